@@ -1,0 +1,73 @@
+//! Cameras as capture tools write them.
+
+use glam::{DMat3, DVec2, DVec3};
+use serde::{Deserialize, Serialize};
+
+/// Pinhole camera with radial and tangential distortion (the OPENCV model).
+///
+/// Pixel (i, j) covers [i, i+1] × [j, j+1], y down; `cx`, `cy` are measured from the top-left corner.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Intrinsics {
+    /// Image width in pixels.
+    pub width: u32,
+    /// Image height in pixels.
+    pub height: u32,
+    /// Focal length in pixels, horizontally.
+    pub fx: f64,
+    /// Focal length in pixels, vertically.
+    pub fy: f64,
+    /// Principal point in pixels from the left edge.
+    pub cx: f64,
+    /// Principal point in pixels from the top edge.
+    pub cy: f64,
+    /// Radial k1, k2, tangential p1, p2, as in OpenCV.
+    pub distortion: [f64; 4],
+}
+
+/// Rigid camera-to-world transform with OpenGL axes: x right, y up, looking down −z.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// Columns are the camera's x, y and z axes in world coordinates (orthonormal).
+    pub rotation: DMat3,
+    /// The camera's centre in world coordinates.
+    pub center: DVec3,
+}
+
+impl Intrinsics {
+    /// Distorted normalised image coordinates of undistorted ones (x right, y down, at unit depth).
+    ///
+    /// `None` beyond the radius where the radial polynomial turns back and the lens model says nothing.
+    pub fn distort(&self, p: DVec2) -> Option<DVec2> {
+        let [k1, k2, p1, p2] = self.distortion;
+        if self.distortion == [0.0; 4] {
+            return Some(p);
+        }
+        let r2 = p.length_squared();
+        let slope = 1.0 + 3.0 * k1 * r2 + 5.0 * k2 * r2 * r2;
+        if slope <= 0.0 {
+            return None;
+        }
+        let radial = 1.0 + k1 * r2 + k2 * r2 * r2;
+        Some(DVec2::new(
+            p.x * radial + 2.0 * p1 * p.x * p.y + p2 * (r2 + 2.0 * p.x * p.x),
+            p.y * radial + p1 * (r2 + 2.0 * p.y * p.y) + 2.0 * p2 * p.x * p.y,
+        ))
+    }
+
+    /// Undistorted normalised image coordinates of distorted ones, by fixed-point iteration.
+    pub fn undistort(&self, distorted: DVec2) -> DVec2 {
+        if self.distortion == [0.0; 4] {
+            return distorted;
+        }
+        let mut p = distorted;
+        for _ in 0..20 {
+            let Some(image) = self.distort(p) else { break };
+            let error = distorted - image;
+            p += error;
+            if error.length_squared() < 1e-24 {
+                break;
+            }
+        }
+        p
+    }
+}

@@ -1,0 +1,57 @@
+//! What comes in: a mesh cut into objects, and posed photographs (a folder; the format is in [`read`]).
+//!
+//! Everything here is f64 and in the capture's own coordinates; [`crate::scene::Scene`] recentres and rounds.
+
+pub mod camera;
+pub mod mesh;
+pub mod photograph;
+
+use crate::error::Result;
+use camera::{Intrinsics, Pose};
+use glam::DVec3;
+use mesh::Mesh;
+use photograph::{Photograph, PhotographSource};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// A scan: geometry and photographs, before anything is estimated.
+#[derive(Debug, Clone)]
+pub struct Capture {
+    /// The name shown to people: the folder's name, or "built-in room".
+    pub name: String,
+    /// The folder, if the capture came from one.
+    pub folder: Option<PathBuf>,
+    /// Triangles grouped in objects.
+    pub mesh: Mesh,
+    /// Posed photographs, in the order of transforms.json.
+    pub frames: Vec<Frame>,
+    /// Unit up vector: the cameras' mean up unless overruled.
+    pub up: DVec3,
+    /// What was odd but could be worked around, each a full sentence naming file and field.
+    pub warnings: Vec<String>,
+}
+
+/// One posed photograph.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    /// Lens and sensor.
+    pub intrinsics: Intrinsics,
+    /// Camera to world.
+    pub pose: Pose,
+    /// Linear multiplier: radiance = value / exposure. `None` where neither the file nor its EXIF says.
+    pub exposure: Option<f64>,
+    /// Where the pixels are.
+    pub photograph: PhotographSource,
+    /// 16-bit depth image and metres per unit, where the capture has one.
+    pub depth: Option<(PathBuf, f64)>,
+}
+
+impl Frame {
+    /// Reads the photograph (values divided by the exposure, if one is given).
+    ///
+    /// # Errors
+    /// The file cannot be read, is no image, or has another size than the camera.
+    pub fn load(&self) -> Result<Arc<Photograph>> {
+        self.photograph.load(&self.intrinsics, self.exposure)
+    }
+}

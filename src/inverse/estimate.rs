@@ -1,0 +1,116 @@
+//! What comes out: emission, materials, outside light, exposures, each with a confidence.
+
+use crate::transport::material::{Albedo, Lobe, Material, TexelColors};
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Everything that a solver has found out about a scene.
+#[derive(Debug, Clone, Default)]
+pub struct Estimate {
+    /// One entry an object, in the scene's order.
+    pub objects: Vec<ObjectEstimate>,
+    /// Spatial detail, where a stage added it.
+    pub texels: Option<Arc<TexelEstimate>>,
+    /// Light from outside the mesh, where a stage added it.
+    pub outside: Option<Outside>,
+    /// Each frame's linear exposure and white balance relative to the median frame, where they were estimated.
+    pub exposures: Option<Vec<Vec3>>,
+}
+
+/// What is known of one object.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ObjectEstimate {
+    /// Diffuse reflectance, linear RGB in [0, 1].
+    pub albedo: Vec3,
+    /// Standard error of `albedo`.
+    pub albedo_stderr: Vec3,
+    /// Emitted radiance, W·sr⁻¹·m⁻².
+    pub emission: Vec3,
+    /// Standard error of `emission`.
+    pub emission_stderr: Vec3,
+    /// GGX roughness α, where a lobe was kept.
+    pub roughness: Option<f32>,
+    /// Specular reflectance at normal incidence, where a lobe was kept.
+    pub specular: Option<f32>,
+    /// Pixels of all photographs whose centre sees the object.
+    pub seen_pixels: u64,
+    /// Whether the photographs determine albedo and emission.
+    pub identifiable: bool,
+    /// Whether the photographs determine the albedo.
+    pub albedo_identifiable: bool,
+    /// Why not, in a sentence; empty where all is determined.
+    pub note: String,
+}
+
+impl Default for ObjectEstimate {
+    fn default() -> Self {
+        Self {
+            albedo: Vec3::ZERO,
+            albedo_stderr: Vec3::ZERO,
+            emission: Vec3::ZERO,
+            emission_stderr: Vec3::ZERO,
+            roughness: None,
+            specular: None,
+            seen_pixels: 0,
+            identifiable: true,
+            albedo_identifiable: true,
+            note: String::new(),
+        }
+    }
+}
+
+/// Albedo texels with their confidence.
+#[derive(Debug, Clone)]
+pub struct TexelEstimate {
+    /// Albedo a texel; used for the objects in `textured`.
+    pub colors: Arc<TexelColors>,
+    /// Standard error of each texel's albedo.
+    pub stderr: Vec<Vec3>,
+    /// Pixels that saw each texel; zero where the value is the neighbours'.
+    pub seen: Vec<u32>,
+    /// For each object, whether its albedo is read from the texels.
+    pub textured: Vec<bool>,
+}
+
+/// Light arriving from outside the mesh.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Outside {
+    /// Equirectangular map of incoming radiance by direction of travel reversed; row 0 is straight up (world +y
+    /// before `up` is applied), columns run around.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Radiance, row by row.
+    pub pixels: Vec<Vec3>,
+}
+
+impl Estimate {
+    /// One material an object, for rendering.
+    pub fn materials(&self) -> Vec<Material> {
+        self.objects
+            .iter()
+            .enumerate()
+            .map(|(index, object)| {
+                let albedo = match &self.texels {
+                    Some(texels) if texels.textured.get(index) == Some(&true) => {
+                        Albedo::Texels(texels.colors.clone())
+                    }
+                    _ => Albedo::Constant(object.albedo),
+                };
+                let lobe = object
+                    .roughness
+                    .zip(object.specular)
+                    .map(|(roughness, specular)| Lobe {
+                        roughness,
+                        specular: Vec3::splat(specular),
+                    });
+                Material {
+                    albedo,
+                    emission: object.emission,
+                    lobe,
+                }
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,177 @@
+//! What a solver is given, what it reports while it runs, and how it ends.
+
+use crate::capture::photograph::Photograph;
+use crate::inverse::estimate::Estimate;
+use crate::inverse::settings::Settings;
+use crate::scene::Scene;
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A scene and what its photographs measured.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    /// Geometry and cameras. Camera sizes equal those of `photographs`.
+    pub scene: Arc<Scene>,
+    /// One photograph a camera, at the working resolution.
+    pub photographs: Vec<Arc<Photograph>>,
+}
+
+/// How far a solve has come. Handed out between iterations.
+#[derive(Debug, Clone, Default)]
+pub struct Progress {
+    /// What is being done now, e.g. "tracing paths".
+    pub phase: String,
+    /// Work done in the current phase, 0 to 1, where that is known.
+    pub fraction: Option<f32>,
+    /// Iterations (optimiser steps) so far.
+    pub iterations: u64,
+    /// Rays traced so far, shadow rays included.
+    pub rays: u64,
+    /// Seconds of solving so far, pauses excluded.
+    pub seconds: f64,
+    /// Seconds until the first estimate that can be shown.
+    pub seconds_to_first_estimate: Option<f64>,
+    /// Loss curve, in time order.
+    pub losses: Vec<LossPoint>,
+    /// Finished stages of the ladder.
+    pub stages: Vec<Stage>,
+    /// Samples dropped, by cause.
+    pub rejected: BTreeMap<String, u64>,
+    /// What a person should know.
+    pub warnings: Vec<String>,
+}
+
+/// One point of the loss curve: mean absolute difference over pixels and channels, in linear radiance.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LossPoint {
+    /// Seconds of solving.
+    pub seconds: f64,
+    /// Iterations.
+    pub iteration: u64,
+    /// Over pixels in the fit; `None` where it was not measured.
+    pub train: Option<f64>,
+    /// Over held-out pixels; `None` where it was not measured.
+    pub held_out: Option<f64>,
+}
+
+/// One rung of the model ladder, tried and kept or not.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Stage {
+    /// What was added, e.g. "objects".
+    pub name: String,
+    /// What it cost.
+    pub seconds: f64,
+    /// Iterations spent.
+    pub iterations: u64,
+    /// Loss in the fit at its end.
+    pub train_loss: Option<f64>,
+    /// Loss on held-out pixels at its end.
+    pub held_out_loss: Option<f64>,
+    /// Whether it stayed in the model.
+    pub kept: bool,
+    /// Why, in a sentence.
+    pub why: String,
+}
+
+/// What the observer wants next.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Control {
+    /// Go on.
+    Continue,
+    /// Go on with other values of the live parameters.
+    Change(Box<Settings>),
+    /// End now with what there is.
+    Stop,
+}
+
+/// Listens to a running solver: at least every 50 ms, between iterations, on the solver's thread.
+///
+/// The observer may take its time (a pause is an observer that does not return); the solver's clock excludes it.
+pub trait Observer {
+    /// Hears how far the solve has come and may steer it.
+    fn observe(&mut self, progress: &Progress, estimate: &Estimate) -> Control;
+}
+
+/// Why a solve ended; the word in `report.json`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Termination {
+    /// The estimate stands still within its reported error.
+    Converged,
+    /// The time is up.
+    Time,
+    /// The step limit is reached.
+    Steps,
+    /// The observer stopped it.
+    Cancelled,
+    /// The iteration left the finite numbers; the last finite estimate is returned.
+    Diverged,
+}
+
+impl Termination {
+    /// The word in `report.json`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Converged => "converged",
+            Self::Time => "time",
+            Self::Steps => "steps",
+            Self::Cancelled => "cancelled",
+            Self::Diverged => "diverged",
+        }
+    }
+}
+
+/// Where a solve can be taken up again. Opaque to everyone but the solver that wrote it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Checkpoint {
+    /// The solver's own state, as JSON.
+    pub state: serde_json::Value,
+}
+
+/// How a solve ended.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// What was found.
+    pub estimate: Estimate,
+    /// The last progress.
+    pub progress: Progress,
+    /// Why it ended.
+    pub termination: Termination,
+    /// Where to go on from, unless it converged for good.
+    pub checkpoint: Option<Checkpoint>,
+}
+
+/// Runs the solver that the settings' preset names.
+///
+/// # Errors
+/// No photograph sees the mesh, or the checkpoint belongs to another capture or preset.
+pub fn solve(
+    problem: &Problem,
+    _settings: &Settings,
+    _resume: Option<&Checkpoint>,
+    observer: &mut dyn Observer,
+) -> crate::error::Result<Solution> {
+    // Placeholder until the solvers land: one grey estimate.
+    let mut estimate = Estimate::default();
+    for _ in &problem.scene.objects {
+        estimate
+            .objects
+            .push(crate::inverse::estimate::ObjectEstimate {
+                albedo: Vec3::splat(0.5),
+                ..Default::default()
+            });
+    }
+    let progress = Progress {
+        phase: "placeholder".into(),
+        ..Default::default()
+    };
+    observer.observe(&progress, &estimate);
+    Ok(Solution {
+        estimate,
+        progress,
+        termination: Termination::Converged,
+        checkpoint: None,
+    })
+}

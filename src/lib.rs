@@ -1,0 +1,28 @@
+//! relit: lights and materials of a scanned room from its photographs, by inverse path tracing.
+//!
+//! Layers, each importing only from those below it (checked by `tests/layers.rs`):
+//!
+//! ```text
+//! app   (egui window)          cli   (commands, progress bars)
+//!   └──────────┬─────────────────┘
+//!          session    worker thread, commands in, snapshots out, save and resume
+//! study      │
+//!   └────┬───┴──────────┬─────────────┬────────┐
+//!     inverse        compose        export    room
+//!   estimate,       insertion,     glb, obj, built-in
+//!   solvers         naive SH       exr, plots  capture
+//!        └─────┬────────┘
+//!          transport    paths: sampling, bsdf, emitters, NEE + MIS
+//!            │
+//!          scene        mesh, objects, hierarchy, cameras
+//!            ├── capture   readers: obj, ply, glb, transforms.json, images
+//!          math         colour, frames, statistics
+//! ```
+
+pub mod capture;
+pub mod error;
+pub mod inverse;
+pub mod math;
+pub mod scene;
+pub mod session;
+pub mod transport;

@@ -1,0 +1,8 @@
+//! Colour, frames, sampling, statistics: what light transport is written in. Knows nothing of scenes.
+
+pub mod color;
+pub mod frame;
+pub mod rng;
+pub mod sh;
+pub mod stats;
+pub mod warp;

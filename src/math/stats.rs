@@ -1,0 +1,96 @@
+//! Running means and variances, quantiles: sums of many terms are held in f64.
+
+use serde::{Deserialize, Serialize};
+
+/// Running mean and variance (Welford 1962), mergeable (Chan et al. 1979).
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Moments {
+    /// Number of samples.
+    pub count: u64,
+    /// Mean of the samples.
+    pub mean: f64,
+    /// Sum of squared deviations from the mean.
+    pub sum_squares: f64,
+}
+
+impl Moments {
+    /// Adds one sample.
+    pub fn push(&mut self, x: f64) {
+        self.count += 1;
+        let delta = x - self.mean;
+        self.mean += delta / self.count as f64;
+        self.sum_squares += delta * (x - self.mean);
+    }
+
+    /// Adds all samples of another set.
+    pub fn merge(&mut self, other: &Self) {
+        if other.count == 0 {
+            return;
+        }
+        let total = self.count + other.count;
+        let delta = other.mean - self.mean;
+        let share = other.count as f64 / total as f64;
+        self.mean += delta * share;
+        self.sum_squares += other.sum_squares + delta * delta * self.count as f64 * share;
+        self.count = total;
+    }
+
+    /// Unbiased variance of one sample; zero for fewer than two.
+    pub fn variance(&self) -> f64 {
+        if self.count < 2 {
+            0.0
+        } else {
+            self.sum_squares / (self.count - 1) as f64
+        }
+    }
+
+    /// Standard error of the mean; infinite for fewer than two samples.
+    pub fn standard_error(&self) -> f64 {
+        if self.count < 2 {
+            f64::INFINITY
+        } else {
+            (self.variance() / self.count as f64).sqrt()
+        }
+    }
+}
+
+/// The `q` quantile (0 … 1) of finite values, linear between ranks; `None` if there are none. Sorts in place.
+pub fn quantile(values: &mut [f64], q: f64) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    values.sort_by(f64::total_cmp);
+    let rank = q.clamp(0.0, 1.0) * (values.len() - 1) as f64;
+    let low = rank.floor() as usize;
+    let high = rank.ceil() as usize;
+    Some(values[low] + (values[high] - values[low]) * (rank - low as f64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn merged_moments_equal_those_of_all_samples() {
+        let xs: Vec<f64> = (0..100).map(|i| ((i * 37) % 101) as f64 + 1e6).collect();
+        let mut all = Moments::default();
+        xs.iter().for_each(|&x| all.push(x));
+        let (mut a, mut b) = (Moments::default(), Moments::default());
+        xs[..33].iter().for_each(|&x| a.push(x));
+        xs[33..].iter().for_each(|&x| b.push(x));
+        a.merge(&b);
+        assert_eq!(a.count, all.count);
+        assert!((a.mean - all.mean).abs() < 1e-9);
+        assert!((a.variance() - all.variance()).abs() < 1e-6);
+        let mean = xs.iter().sum::<f64>() / 100.0;
+        let variance = xs.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 99.0;
+        assert!((all.variance() - variance).abs() < 1e-6);
+    }
+
+    #[test]
+    fn quantiles_interpolate_between_ranks() {
+        assert_eq!(quantile(&mut [3.0, 1.0, 2.0], 0.5), Some(2.0));
+        assert_eq!(quantile(&mut [0.0, 10.0], 0.95), Some(9.5));
+        assert_eq!(quantile(&mut [], 0.5), None);
+    }
+}

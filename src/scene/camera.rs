@@ -1,0 +1,66 @@
+//! Cameras in scene coordinates: pixel to ray, point to pixel.
+
+use crate::capture::camera::{Intrinsics, Pose};
+use crate::scene::geometry::Ray;
+use glam::{DVec2, DVec3, Mat3, Vec2, Vec3};
+
+/// A posed camera relative to the scene's origin.
+#[derive(Debug, Clone)]
+pub struct Camera {
+    /// Lens and sensor.
+    pub intrinsics: Intrinsics,
+    /// Columns are the camera's x (right), y (up) and z (backwards) axes.
+    pub rotation: Mat3,
+    /// Centre of projection.
+    pub center: Vec3,
+}
+
+impl Camera {
+    /// A capture's camera, recentred.
+    pub fn new(intrinsics: &Intrinsics, pose: &Pose, origin: DVec3) -> Self {
+        Self {
+            intrinsics: *intrinsics,
+            rotation: pose.rotation.as_mat3(),
+            center: (pose.center - origin).as_vec3(),
+        }
+    }
+
+    /// The ray through a point of the image plane, in pixels from the top-left corner. Its direction is of unit length.
+    #[inline]
+    pub fn ray(&self, pixel: Vec2) -> Ray {
+        let k = &self.intrinsics;
+        let distorted = DVec2::new(
+            (f64::from(pixel.x) - k.cx) / k.fx,
+            (f64::from(pixel.y) - k.cy) / k.fy,
+        );
+        let p = k.undistort(distorted);
+        let local = Vec3::new(p.x as f32, -p.y as f32, -1.0);
+        Ray::new(self.center, (self.rotation * local).normalize_or_zero())
+    }
+
+    /// Where a point appears, in pixels from the top-left corner; `None` behind the camera or outside the image.
+    #[inline]
+    pub fn project(&self, point: Vec3) -> Option<Vec2> {
+        let local = self.rotation.transpose() * (point - self.center);
+        let depth = -local.z;
+        if depth <= 0.0 {
+            return None;
+        }
+        let k = &self.intrinsics;
+        let p = k.distort(DVec2::new(
+            f64::from(local.x / depth),
+            f64::from(-local.y / depth),
+        ))?;
+        let pixel = Vec2::new((p.x * k.fx + k.cx) as f32, (p.y * k.fy + k.cy) as f32);
+        let inside = pixel.x >= 0.0
+            && pixel.y >= 0.0
+            && pixel.x < k.width as f32
+            && pixel.y < k.height as f32;
+        inside.then_some(pixel)
+    }
+
+    /// Unit viewing direction.
+    pub fn forward(&self) -> Vec3 {
+        -self.rotation.z_axis
+    }
+}

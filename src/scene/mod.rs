@@ -1,0 +1,154 @@
+//! The immutable scene that light moves in: recentred f32 geometry, objects, hierarchy and cameras.
+
+pub mod bvh;
+pub mod camera;
+pub mod geometry;
+pub mod texels;
+
+use crate::capture::Capture;
+use crate::error::{Error, Result};
+use bvh::Bvh;
+use camera::Camera;
+use geometry::{Hit, Ray};
+use glam::{DVec3, Vec3};
+
+/// Geometry and cameras of a capture, in metres relative to [`Scene::origin`].
+#[derive(Debug)]
+pub struct Scene {
+    /// What was subtracted from the capture's coordinates before rounding to f32.
+    pub origin: DVec3,
+    /// Vertex positions relative to `origin`.
+    pub positions: Vec<Vec3>,
+    /// Vertex indices, counter-clockwise seen from the emitting side.
+    pub triangles: Vec<[u32; 3]>,
+    /// For each triangle, an index into `objects`.
+    pub object_of: Vec<u32>,
+    /// Unit geometric normal of each triangle's front; zero for zero-area triangles.
+    pub normals: Vec<Vec3>,
+    /// Area of each triangle in square metres.
+    pub areas: Vec<f32>,
+    /// The named groups of triangles.
+    pub objects: Vec<Object>,
+    /// One camera a frame, in frame order.
+    pub cameras: Vec<Camera>,
+    /// Unit up vector.
+    pub up: Vec3,
+    /// Diagonal of the bounding box in metres.
+    pub diameter: f32,
+    /// Closest-hit and any-hit queries.
+    pub bvh: Bvh,
+}
+
+/// A named group of triangles sharing parameters in the coarse stage.
+#[derive(Debug, Clone)]
+pub struct Object {
+    /// The capture's name for it.
+    pub name: String,
+    /// Its triangles, ascending.
+    pub triangles: Vec<u32>,
+    /// Its area in square metres.
+    pub area: f64,
+}
+
+impl Scene {
+    /// Recentres a capture, rounds it to f32 and builds the hierarchy.
+    ///
+    /// # Errors
+    /// The mesh has no triangle with an area, or no frames.
+    pub fn new(capture: &Capture) -> Result<Self> {
+        let mesh = &capture.mesh;
+        let (low, high) = mesh
+            .positions
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &p| {
+                (low.min(p), high.max(p))
+            });
+        if mesh.triangles.is_empty() || !(high - low).is_finite() {
+            return Err(Error::new(
+                &capture.name,
+                "the mesh has no triangles",
+                "check the mesh file",
+            ));
+        }
+        let origin = (low + high) * 0.5;
+        let positions: Vec<Vec3> = mesh
+            .positions
+            .iter()
+            .map(|&p| (p - origin).as_vec3())
+            .collect();
+
+        // Normals and areas in f64, so that slivers keep theirs.
+        let mut normals = Vec::with_capacity(mesh.triangles.len());
+        let mut areas = Vec::with_capacity(mesh.triangles.len());
+        let mut objects: Vec<Object> = mesh
+            .objects
+            .iter()
+            .map(|name| Object {
+                name: name.clone(),
+                triangles: Vec::new(),
+                area: 0.0,
+            })
+            .collect();
+        for (index, (&[a, b, c], &object)) in mesh.triangles.iter().zip(&mesh.object_of).enumerate()
+        {
+            let corner = |i: u32| positions[i as usize].as_dvec3();
+            let cross = (corner(b) - corner(a)).cross(corner(c) - corner(a));
+            normals.push(cross.normalize_or_zero().as_vec3());
+            areas.push((cross.length() * 0.5) as f32);
+            objects[object as usize].triangles.push(index as u32);
+            objects[object as usize].area += cross.length() * 0.5;
+        }
+        if objects.iter().all(|o| o.area == 0.0) {
+            return Err(Error::new(
+                &capture.name,
+                "every triangle of the mesh has zero area",
+                "check the mesh file",
+            ));
+        }
+
+        let cameras = capture
+            .frames
+            .iter()
+            .map(|frame| Camera::new(&frame.intrinsics, &frame.pose, origin))
+            .collect();
+        let bvh = Bvh::new(&positions, &mesh.triangles);
+        Ok(Self {
+            origin,
+            positions,
+            triangles: mesh.triangles.clone(),
+            object_of: mesh.object_of.clone(),
+            normals,
+            areas,
+            objects,
+            cameras,
+            up: capture.up.as_vec3(),
+            diameter: (high - low).length() as f32,
+            bvh,
+        })
+    }
+
+    /// The nearest hit along a ray.
+    #[inline]
+    pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        self.bvh.intersect(ray)
+    }
+
+    /// Whether anything lies between the ray's `t_min` and `t_max`.
+    #[inline]
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        self.bvh.occluded(ray)
+    }
+
+    /// The corners of a triangle.
+    #[inline]
+    pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
+        self.triangles[triangle as usize].map(|i| self.positions[i as usize])
+    }
+
+    /// The point of a hit, recomputed from its barycentrics (more exact than origin + t · direction).
+    #[inline]
+    pub fn point(&self, hit: &Hit) -> Vec3 {
+        let [a, b, c] = self.corners(hit.triangle);
+        a * (1.0 - hit.b1 - hit.b2) + b * hit.b1 + c * hit.b2
+    }
+}

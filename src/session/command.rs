@@ -1,0 +1,107 @@
+//! What the window or the command line asks of the worker.
+
+use crate::inverse::settings::Settings;
+use crate::scene::camera::Camera;
+use glam::DVec3;
+use std::path::PathBuf;
+
+/// Where a capture comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Source {
+    /// The room built into the program.
+    BuiltInRoom,
+    /// A capture's folder.
+    Folder(PathBuf),
+}
+
+/// A request to the worker, taken between iterations.
+#[derive(Debug, Clone)]
+pub enum Command {
+    /// Loads a capture and starts solving it.
+    Open(Source),
+    /// Starts or goes on.
+    Run,
+    /// Stops between two iterations and keeps everything.
+    Pause,
+    /// One iteration, then pause.
+    Step,
+    /// Forgets the estimate and starts over.
+    Reset,
+    /// Ends the solve, keeping the estimate.
+    Finish,
+    /// Replaces the parameters; those that are not live take effect at the next reset.
+    Set(Box<Settings>),
+    /// Which view to keep rendering; replaces the view asked for before.
+    View(ViewRequest),
+    /// The inserted objects, all of them; replaces those before. Empty takes them away.
+    Insert(Vec<Placement>),
+    /// Writes what `relit solve` writes, into a folder, from the worker's own estimate.
+    Save(PathBuf),
+    /// Writes one file for another program.
+    Export(ExportRequest),
+    /// Takes up the estimate of a folder that `Save` or `relit solve` wrote.
+    Resume(PathBuf),
+    /// Ends the worker.
+    Quit,
+}
+
+/// What to look at.
+#[derive(Debug, Clone)]
+pub struct ViewRequest {
+    /// From where.
+    pub camera: ViewCamera,
+    /// Long side of the picture in pixels, at most the photograph's.
+    pub long_side: u32,
+}
+
+/// A camera to render from.
+#[derive(Debug, Clone)]
+pub enum ViewCamera {
+    /// A photograph's own.
+    Frame(usize),
+    /// Any other, in scene coordinates.
+    Free(Box<Camera>),
+}
+
+/// An object inserted into the scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Placement {
+    /// OBJ or GLB file.
+    pub file: PathBuf,
+    /// Where the middle of the object's base stands, in the capture's coordinates; `None` takes the file's own
+    /// coordinates for the capture's.
+    pub at: Option<DVec3>,
+    /// Factor on the file's size.
+    pub scale: f64,
+    /// Degrees about the up axis, counter-clockwise from above.
+    pub rotate: f64,
+}
+
+/// A file to write for another program.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExportRequest {
+    /// What to write.
+    pub format: ExportFormat,
+    /// Where.
+    pub path: PathBuf,
+}
+
+/// Formats that other programs read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ExportFormat {
+    /// Scene with base colours and emissive strength.
+    Glb,
+    /// Scene as OBJ and MTL.
+    Obj,
+    /// Scene as PLY with vertex colours.
+    Ply,
+    /// Scene as a Mitsuba 3 XML file.
+    Mitsuba,
+    /// Table of objects.
+    Csv,
+    /// The light at a point as a panorama.
+    Probe {
+        /// The point, in the capture's coordinates.
+        at: DVec3,
+    },
+}

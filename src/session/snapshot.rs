@@ -1,0 +1,146 @@
+//! What the worker shows: immutable, shared, latest wins.
+
+use crate::capture::photograph::Photograph;
+use crate::inverse::estimate::Estimate;
+use crate::inverse::settings::Settings;
+use crate::inverse::solver::{Progress, Termination};
+use crate::scene::Scene;
+use glam::Vec3;
+use std::sync::Arc;
+
+/// The state of a session at one moment.
+#[derive(Debug, Clone, Default)]
+pub struct Snapshot {
+    /// Grows with every snapshot.
+    pub sequence: u64,
+    /// What the worker is doing.
+    pub phase: Phase,
+    /// What is open.
+    pub capture: Option<Arc<OpenCapture>>,
+    /// The parameters in force.
+    pub settings: Settings,
+    /// How far the solve has come.
+    pub progress: Arc<Progress>,
+    /// Iterations a second over the last second or so.
+    pub iterations_per_second: f64,
+    /// Rays a second over the last second or so.
+    pub rays_per_second: f64,
+    /// Seconds until the end, where that can be said.
+    pub seconds_left: Option<f64>,
+    /// The estimate so far.
+    pub estimate: Arc<Estimate>,
+    /// Pictures of the requested view.
+    pub view: Option<Arc<View>>,
+    /// Inserted objects and their composites for the requested frame.
+    pub insertion: Option<Arc<Insertion>>,
+    /// Events since the session began, oldest first.
+    pub events: Arc<Vec<Event>>,
+}
+
+/// What the worker is doing.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum Phase {
+    /// Nothing is open.
+    #[default]
+    Idle,
+    /// Reading a capture.
+    Loading,
+    /// Solving.
+    Solving,
+    /// Held between two iterations.
+    Paused,
+    /// At the end.
+    Finished(Termination),
+    /// The worker met an error it could not go on from; the message is in `events`.
+    Failed,
+}
+
+/// What is open, unchanging while it is.
+#[derive(Debug)]
+pub struct OpenCapture {
+    /// Name shown to people.
+    pub name: String,
+    /// Geometry and cameras.
+    pub scene: Arc<Scene>,
+    /// Photographs at the working resolution, one a camera.
+    pub photographs: Vec<Arc<Photograph>>,
+    /// The checked summary, one fact a line.
+    pub summary: Vec<String>,
+    /// What is odd about it.
+    pub warnings: Vec<String>,
+}
+
+/// Linear colours, row by row from the top left.
+#[derive(Debug, Clone)]
+pub struct Picture {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Linear values; what they mean is said where the picture is kept.
+    pub pixels: Vec<Vec3>,
+}
+
+/// Pictures of one view.
+#[derive(Debug, Clone)]
+pub struct View {
+    /// Grows with every change, so that uploads can be skipped.
+    pub sequence: u64,
+    /// The frame, if the view is a photograph's.
+    pub frame: Option<usize>,
+    /// The photograph, radiance.
+    pub photograph: Option<Arc<Picture>>,
+    /// The re-render from the estimate, radiance.
+    pub render: Option<Arc<Picture>>,
+    /// Samples a pixel in `render`.
+    pub samples: u32,
+    /// Estimated diffuse reflectance.
+    pub albedo: Option<Arc<Picture>>,
+    /// Estimated emission, radiance.
+    pub emission: Option<Arc<Picture>>,
+    /// Render − photograph, signed radiance.
+    pub error: Option<Arc<Picture>>,
+    /// Standard error of the albedo.
+    pub stderr: Option<Arc<Picture>>,
+    /// Object index of each pixel; `u32::MAX` where the ray leaves the mesh.
+    pub objects: Option<Arc<Vec<u32>>>,
+}
+
+/// Composites of the inserted objects into the requested frame.
+#[derive(Debug, Clone)]
+pub struct Insertion {
+    /// Grows with every change.
+    pub sequence: u64,
+    /// The frame.
+    pub frame: usize,
+    /// The photograph with the objects, lit and shadowed by the estimate.
+    pub composite: Arc<Picture>,
+    /// Pasted, lit by harmonics of the photographs alone.
+    pub naive: Arc<Picture>,
+    /// Pasted, lit by harmonics of the estimate.
+    pub naive_estimate: Arc<Picture>,
+    /// Samples a pixel in `composite`.
+    pub samples: u32,
+    /// Seconds from the request to this picture.
+    pub seconds: f64,
+}
+
+/// Something that happened.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Event {
+    /// How bad.
+    pub level: Level,
+    /// What happened, in one line.
+    pub message: String,
+}
+
+/// How much an event matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Level {
+    /// Worth knowing.
+    Info,
+    /// Worked around.
+    Warning,
+    /// Failed.
+    Error,
+}
