@@ -1,0 +1,504 @@
+//! Scattering at a surface point: a diffuse base, and over it a rough specular lobe where there is one.
+//!
+//! Directions are unit vectors pointing away from the surface, in the local frame whose z axis is the normal on the
+//! side of `wo`. The lobe is GGX (Walter et al. 2007) with height-correlated Smith masking (Heitz 2014) and Schlick's
+//! Fresnel term; its arithmetic is f64, since a narrow lobe seen at a grazing angle spans more than f32 resolves.
+
+use crate::math::warp;
+use crate::transport::material::Lobe;
+use glam::{DVec3, Vec3};
+use std::f64::consts::{FRAC_1_PI, PI};
+
+/// Roughness below this is taken as this: a mirror is a very narrow lobe.
+pub const MIN_ROUGHNESS: f32 = 1e-4;
+
+/// The material of one surface point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bsdf {
+    /// Diffuse reflectance, in [0, 1] per channel.
+    pub albedo: Vec3,
+    /// Rough specular lobe, where there is one.
+    pub lobe: Option<Lobe>,
+}
+
+/// A sampled direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BsdfSample {
+    /// Unit direction, above the horizon.
+    pub wi: Vec3,
+    /// f(wo, wi) cosθi / pdf.
+    pub weight: Vec3,
+    /// Density of `wi` per solid angle, positive.
+    pub pdf: f32,
+}
+
+/// Derivatives of [`Bsdf::eval`], channel by channel (no channel depends on another's parameters).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BsdfDerivative {
+    /// With respect to the albedo of the channel.
+    pub albedo: Vec3,
+    /// With respect to the GGX roughness α.
+    pub roughness: Vec3,
+    /// With respect to the specular reflectance at normal incidence of the channel.
+    pub specular: Vec3,
+}
+
+impl Bsdf {
+    /// f(wo, wi) cosθi; zero where either direction is at or below the horizon.
+    #[inline]
+    pub fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+        if wo.z <= 0.0 || wi.z <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let Some(lobe) = self.lobe else {
+            return self.albedo * warp::cosine_hemisphere_pdf(wi.z);
+        };
+        let specular = lobe.specular.as_dvec3();
+        let base = self.albedo.as_dvec3() * (DVec3::ONE - specular) * coupling(wo, wi);
+        let microfacet = Microfacet::new(alpha(&lobe), wo, wi);
+        (base + microfacet.fresnel(specular) * microfacet.eval()).as_vec3()
+    }
+
+    /// Density per solid angle with which [`Bsdf::sample`] draws `wi`; zero at or below the horizon.
+    #[inline]
+    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        if wo.z <= 0.0 || wi.z <= 0.0 {
+            return 0.0;
+        }
+        let base = warp::cosine_hemisphere_pdf(wi.z);
+        let Some(lobe) = self.lobe else { return base };
+        let p = lobe_probability(&lobe, wo);
+        let microfacet = Microfacet::new(alpha(&lobe), wo, wi);
+        (p * microfacet.pdf() + (1.0 - p) * f64::from(base)) as f32
+    }
+
+    /// Draws a direction: `choice` decides between lobe and base, `u` the direction.
+    ///
+    /// `None` where `wo` is at or below the horizon, or where the lobe reflects below it: the sample carries nothing.
+    #[inline]
+    pub fn sample(&self, wo: Vec3, choice: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        if wo.z <= 0.0 {
+            return None;
+        }
+        let wi = match &self.lobe {
+            Some(lobe) if f64::from(choice) < lobe_probability(lobe, wo) => {
+                reflect_on_visible_normal(alpha(lobe), wo, u)
+            }
+            _ => warp::cosine_hemisphere(u),
+        };
+        let pdf = self.pdf(wo, wi);
+        if !(pdf > 0.0 && pdf.is_finite()) {
+            return None;
+        }
+        let weight = match self.lobe {
+            Some(_) => self.eval(wo, wi) / pdf,
+            None => self.albedo,
+        };
+        Some(BsdfSample { wi, weight, pdf })
+    }
+
+    /// Derivatives of [`Bsdf::eval`] with respect to the parameters, directions held.
+    ///
+    /// Without a lobe those of roughness and specular reflectance are zero: adding a lobe is another model.
+    pub fn derivative(&self, wo: Vec3, wi: Vec3) -> BsdfDerivative {
+        let mut derivative = BsdfDerivative {
+            albedo: Vec3::ZERO,
+            roughness: Vec3::ZERO,
+            specular: Vec3::ZERO,
+        };
+        if wo.z <= 0.0 || wi.z <= 0.0 {
+            return derivative;
+        }
+        let Some(lobe) = self.lobe else {
+            derivative.albedo = Vec3::splat(warp::cosine_hemisphere_pdf(wi.z));
+            return derivative;
+        };
+        let specular = lobe.specular.as_dvec3();
+        let base = coupling(wo, wi);
+        let microfacet = Microfacet::new(alpha(&lobe), wo, wi);
+        let value = microfacet.eval();
+        derivative.albedo = ((DVec3::ONE - specular) * base).as_vec3();
+        derivative.roughness =
+            (microfacet.fresnel(specular) * value * microfacet.log_derivative()).as_vec3();
+        derivative.specular = (DVec3::splat(value * (1.0 - microfacet.schlick))
+            - self.albedo.as_dvec3() * base)
+            .as_vec3();
+        derivative
+    }
+}
+
+/// Slope of [`reflected`]; 1 would be Schlick's curve itself.
+const COUPLING_SLOPE: f64 = 0.85;
+
+/// Upper bound, over all roughnesses, of the share of light that a lobe with no reflectance at normal incidence
+/// reflects: Schlick's (1 − cosθ)⁵, flattened because rough lobes reflect more than that near the normal.
+#[inline]
+fn reflected(cos_theta: f64) -> f64 {
+    (1.0 - COUPLING_SLOPE * cos_theta).powi(5)
+}
+
+/// The base's f cosθi for unit albedo, before the factor (1 − specular reflectance at normal incidence).
+///
+/// As Ashikhmin and Shirley 2000: what the lobe may reflect at either end is taken from the base, symmetrically, and
+/// the rest is normalised, so that the base returns albedo × (1 − specular) × (1 − reflected(θo)) in all.
+#[inline]
+fn coupling(wo: Vec3, wi: Vec3) -> f64 {
+    const A: f64 = COUPLING_SLOPE;
+    let rest = 1.0 - A;
+    // Cosine-weighted mean of `reflected` over the hemisphere.
+    let mean = (1.0 - rest.powi(6) * (1.0 + 6.0 * A)) / (21.0 * A * A);
+    let (cos_o, cos_i) = (f64::from(wo.z), f64::from(wi.z));
+    FRAC_1_PI * cos_i * (1.0 - reflected(cos_o)) * (1.0 - reflected(cos_i)) / (1.0 - mean)
+}
+
+/// Probability of drawing from the lobe: at least the share of light that it reflects.
+#[inline]
+fn lobe_probability(lobe: &Lobe, wo: Vec3) -> f64 {
+    let specular = f64::from(lobe.specular.element_sum() / 3.0);
+    specular + (1.0 - specular) * reflected(f64::from(wo.z))
+}
+
+#[inline]
+fn alpha(lobe: &Lobe) -> f64 {
+    f64::from(lobe.roughness.clamp(MIN_ROUGHNESS, 1.0))
+}
+
+/// The GGX lobe between two directions above the horizon.
+struct Microfacet {
+    alpha: f64,
+    cos_o: f64,
+    cos_i: f64,
+    /// Squared sines of the two directions.
+    sin2_o: f64,
+    sin2_i: f64,
+    /// Squared sine of the half vector.
+    sin2_h: f64,
+    /// Distribution's denominator: sin²θh / α² + cos²θh.
+    q: f64,
+    /// Schlick's (1 − wo · h)⁵.
+    schlick: f64,
+}
+
+impl Microfacet {
+    fn new(alpha: f64, wo: Vec3, wi: Vec3) -> Self {
+        let (wo, wi) = (wo.as_dvec3(), wi.as_dvec3());
+        let h = (wo + wi).normalize_or_zero();
+        let sin2_h = h.x * h.x + h.y * h.y;
+        Self {
+            alpha,
+            cos_o: wo.z,
+            cos_i: wi.z,
+            sin2_o: wo.x * wo.x + wo.y * wo.y,
+            sin2_i: wi.x * wi.x + wi.y * wi.y,
+            sin2_h,
+            q: sin2_h / (alpha * alpha) + h.z * h.z,
+            // The mean of both ends, so that rounding does not break reciprocity.
+            schlick: (1.0 - 0.5 * h.dot(wo + wi)).clamp(0.0, 1.0).powi(5),
+        }
+    }
+
+    /// Density of normals at the half vector.
+    #[inline]
+    fn distribution(&self) -> f64 {
+        1.0 / (PI * self.alpha * self.alpha * self.q * self.q)
+    }
+
+    /// Smith's √(cos² + α² sin²) = cosθ (1 + 2Λ).
+    #[inline]
+    fn smith(&self, cos: f64, sin2: f64) -> f64 {
+        (cos * cos + self.alpha * self.alpha * sin2).sqrt()
+    }
+
+    #[inline]
+    fn fresnel(&self, specular: DVec3) -> DVec3 {
+        specular + (DVec3::ONE - specular) * self.schlick
+    }
+
+    /// D G₂ cosθi / (4 cosθo cosθi), the lobe's f cosθi without the Fresnel term.
+    #[inline]
+    fn eval(&self) -> f64 {
+        let masking = self.cos_i * self.smith(self.cos_o, self.sin2_o)
+            + self.cos_o * self.smith(self.cos_i, self.sin2_i);
+        0.5 * self.distribution() * self.cos_i / masking
+    }
+
+    /// D G₁ / (4 cosθo): the density of reflection on a visible normal.
+    #[inline]
+    fn pdf(&self) -> f64 {
+        0.5 * self.distribution() / (self.cos_o + self.smith(self.cos_o, self.sin2_o))
+    }
+
+    /// ∂ ln eval / ∂α.
+    fn log_derivative(&self) -> f64 {
+        let a = self.alpha;
+        let (smith_o, smith_i) = (
+            self.smith(self.cos_o, self.sin2_o),
+            self.smith(self.cos_i, self.sin2_i),
+        );
+        let masking = self.cos_i * smith_o + self.cos_o * smith_i;
+        let slope = a * (self.cos_i * self.sin2_o / smith_o + self.cos_o * self.sin2_i / smith_i);
+        4.0 * self.sin2_h / (a * a * a * self.q) - 2.0 / a - slope / masking
+    }
+}
+
+/// `wo` reflected on a normal drawn from those that it sees (Heitz 2018, in the form of Dupuy and Benyoub 2023,
+/// "Sampling Visible GGX Normals with Spherical Caps"). May point below the horizon.
+fn reflect_on_visible_normal(alpha: f64, wo: Vec3, u: [f32; 2]) -> Vec3 {
+    let wo = wo.as_dvec3();
+    // Stretch to the configuration of a hemisphere.
+    let stretched = DVec3::new(alpha * wo.x, alpha * wo.y, wo.z).normalize_or_zero();
+    // Uniform on the cap of directions that the hemisphere reflects `stretched` to.
+    let phi = 2.0 * PI * f64::from(u[0]);
+    let z = (1.0 - f64::from(u[1])) * (1.0 + stretched.z) - stretched.z;
+    let sin = (1.0 - z * z).max(0.0).sqrt();
+    let half = DVec3::new(sin * phi.cos(), sin * phi.sin(), z) + stretched;
+    // Back to the ellipsoid.
+    let h = DVec3::new(alpha * half.x, alpha * half.y, half.z).normalize_or_zero();
+    (h * (2.0 * h.dot(wo)) - wo).normalize_or_zero().as_vec3()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::rng::Stream;
+    use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+    fn direction(cos_theta: f32, phi: f32) -> Vec3 {
+        let sin = (1.0 - cos_theta * cos_theta).max(0.0).sqrt();
+        Vec3::new(sin * phi.cos(), sin * phi.sin(), cos_theta)
+    }
+
+    fn glossy(albedo: f32, roughness: f32, specular: f32) -> Bsdf {
+        Bsdf {
+            albedo: Vec3::splat(albedo),
+            lobe: Some(Lobe {
+                roughness,
+                specular: Vec3::splat(specular),
+            }),
+        }
+    }
+
+    /// Pearson's test of `sample` against `pdf` over 10 × 20 cells of equal solid angle, one for lost samples.
+    fn p_value(bsdf: &Bsdf, wo: Vec3, seed: u64) -> f64 {
+        const ROWS: usize = 10;
+        const COLUMNS: usize = 20;
+        const FINE: usize = 48;
+        let n = 100_000u32;
+        let mut observed = vec![0f64; ROWS * COLUMNS + 1];
+        for sample in 0..n {
+            let mut stream = Stream::new(seed, 0, 0, u64::from(sample));
+            let drawn = bsdf.sample(wo, stream.uniform(), stream.uniform2());
+            let cell = drawn.map_or(ROWS * COLUMNS, |s| {
+                let row = ((s.wi.z * ROWS as f32) as usize).min(ROWS - 1);
+                let turn = (s.wi.y.atan2(s.wi.x) / (2.0 * std::f32::consts::PI)).rem_euclid(1.0);
+                row * COLUMNS + ((turn * COLUMNS as f32) as usize).min(COLUMNS - 1)
+            });
+            observed[cell] += 1.0;
+        }
+        let mut expected = vec![0f64; ROWS * COLUMNS + 1];
+        let area = 2.0 * PI / (ROWS * COLUMNS * FINE * FINE) as f64;
+        for i in 0..ROWS * FINE {
+            for j in 0..COLUMNS * FINE {
+                let z = (i as f32 + 0.5) / (ROWS * FINE) as f32;
+                let turn = (j as f32 + 0.5) / (COLUMNS * FINE) as f32;
+                let wi = direction(z, turn * 2.0 * std::f32::consts::PI);
+                expected[i / FINE * COLUMNS + j / FINE] +=
+                    f64::from(bsdf.pdf(wo, wi)) * area * f64::from(n);
+            }
+        }
+        let integral = expected.iter().sum::<f64>() / f64::from(n);
+        assert!(
+            integral < 1.0 + 2e-3,
+            "the density integrates to {integral}"
+        );
+        expected[ROWS * COLUMNS] = f64::from(n) * (1.0 - integral).max(0.0);
+        // Cells that expect fewer than five samples are pooled.
+        let (mut chi2, mut cells, mut rare) = (0.0, 0, (0.0, 0.0));
+        for (o, e) in observed.iter().zip(&expected) {
+            if *e < 5.0 {
+                rare = (rare.0 + o, rare.1 + e);
+            } else {
+                chi2 += (o - e).powi(2) / e;
+                cells += 1;
+            }
+        }
+        if rare.1 > 5.0 {
+            chi2 += (rare.0 - rare.1).powi(2) / rare.1;
+            cells += 1;
+        } else {
+            assert!(rare.0 < 25.0, "{} samples where none are expected", rare.0);
+        }
+        ChiSquared::new(f64::from(cells - 1)).map_or(0.0, |d| 1.0 - d.cdf(chi2))
+    }
+
+    /// 15 tests at significance 1e-4 each; a narrow lobe at the horizon is too thin for the cells' midpoint rule.
+    #[test]
+    fn samples_follow_the_density() {
+        let mut seed = 0;
+        for cos_theta in [1.0, 0.7, 0.2, 1e-3] {
+            let wo = direction(cos_theta, 0.4);
+            for bsdf in [
+                Bsdf {
+                    albedo: Vec3::ONE,
+                    lobe: None,
+                },
+                glossy(0.5, 0.1, 0.3),
+                glossy(0.5, 0.4, 0.9),
+                glossy(0.5, 1.0, 0.6),
+            ] {
+                seed += 1;
+                if cos_theta < 0.01 && bsdf.lobe.is_some_and(|lobe| lobe.roughness < 0.2) {
+                    continue;
+                }
+                let p = p_value(&bsdf, wo, seed);
+                assert!(p > 1e-4, "p = {p} at cos {cos_theta} for {bsdf:?}");
+            }
+        }
+    }
+
+    /// Share of light reflected from `wo`, by a midpoint rule over the unit square of each technique.
+    fn directional_albedo(bsdf: &Bsdf, wo: Vec3) -> f64 {
+        let n = 192;
+        let p = bsdf.lobe.map_or(0.0, |lobe| lobe_probability(&lobe, wo));
+        let mut sum = 0.0;
+        for i in 0..n * n {
+            let u = [
+                ((i / n) as f32 + 0.5) / n as f32,
+                ((i % n) as f32 + 0.5) / n as f32,
+            ];
+            for (choice, share) in [(0.0, p), (1.0 - f32::EPSILON, 1.0 - p)] {
+                if let Some(sample) = bsdf.sample(wo, choice, u).filter(|_| share > 1e-6) {
+                    sum += share * f64::from(sample.weight.x);
+                }
+            }
+        }
+        sum / f64::from(n * n)
+    }
+
+    #[test]
+    fn no_energy_is_made_and_the_base_returns_its_closed_form() {
+        for roughness in [0.05, 0.2, 0.4, 1.0] {
+            for specular in [0.0, 0.3, 1.0] {
+                for cos_theta in [0.01, 0.4, 0.7, 0.9, 1.0] {
+                    let wo = direction(cos_theta, 1.0);
+                    let white = directional_albedo(&glossy(1.0, roughness, specular), wo);
+                    let black = directional_albedo(&glossy(0.0, roughness, specular), wo);
+                    let what = format!("at α {roughness}, F0 {specular}, cos {cos_theta}");
+                    assert!(white < 1.001, "{white} {what}");
+                    let base =
+                        (1.0 - f64::from(specular)) * (1.0 - reflected(f64::from(cos_theta)));
+                    assert!(
+                        (white - black - base).abs() < 1e-3,
+                        "{white} {black} {base} {what}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn scattering_is_reciprocal_and_weights_are_values_over_densities() {
+        let mut stream = Stream::new(5, 0, 0, 0);
+        for _ in 0..20_000 {
+            let bsdf = glossy(stream.uniform(), stream.uniform(), stream.uniform());
+            let wo = warp::cosine_hemisphere(stream.uniform2());
+            let wi = warp::cosine_hemisphere(stream.uniform2());
+            // f(wo, wi) cosθi · cosθo is symmetric.
+            let forward = f64::from(bsdf.eval(wo, wi).x) * f64::from(wo.z);
+            let backward = f64::from(bsdf.eval(wi, wo).x) * f64::from(wi.z);
+            assert!(
+                (forward - backward).abs() <= 1e-6 * forward.max(backward),
+                "{bsdf:?}"
+            );
+            if let Some(s) = bsdf.sample(wo, stream.uniform(), stream.uniform2()) {
+                let value = bsdf.eval(wo, s.wi);
+                assert_eq!(s.pdf, bsdf.pdf(wo, s.wi));
+                assert!((s.weight * s.pdf - value).abs().x <= 1e-5 * value.x);
+            }
+        }
+    }
+
+    #[test]
+    fn grazing_and_narrow_lobes_stay_finite() {
+        let mut stream = Stream::new(6, 0, 0, 0);
+        for roughness in [0.0, 1e-4, 1e-3, 0.03, 1.0] {
+            for specular in [0.0, 0.04, 1.0] {
+                let bsdf = glossy(0.8, roughness, specular);
+                for cos_theta in [1e-7, 1e-5, 1e-3, 0.5, 1.0] {
+                    let wo = direction(cos_theta, stream.uniform() * 6.0);
+                    for _ in 0..500 {
+                        let drawn = bsdf.sample(wo, stream.uniform(), stream.uniform2());
+                        let Some(s) = drawn else { continue };
+                        let d = bsdf.derivative(wo, s.wi);
+                        assert!(s.wi.z > 0.0 && (s.wi.length() - 1.0).abs() < 1e-5);
+                        assert!(s.weight.is_finite() && s.weight.min_element() >= 0.0);
+                        assert!(s.weight.max_element() < 3.0, "{s:?} from {wo} on {bsdf:?}");
+                        assert!(d.roughness.is_finite() && d.specular.is_finite());
+                    }
+                    assert_eq!(bsdf.eval(wo, -wo), Vec3::ZERO);
+                    assert_eq!(bsdf.pdf(wo, -wo), 0.0);
+                    assert!(bsdf.sample(-wo, 0.5, [0.5; 2]).is_none());
+                }
+            }
+        }
+    }
+
+    /// Central differences of an f64 evaluation, so that only the step's own error is left.
+    #[test]
+    fn derivatives_agree_with_finite_differences() {
+        let value = |albedo: f64, alpha: f64, specular: f64, wo: Vec3, wi: Vec3| {
+            let microfacet = Microfacet::new(alpha, wo, wi);
+            albedo * (1.0 - specular) * coupling(wo, wi)
+                + microfacet.fresnel(DVec3::splat(specular)).x * microfacet.eval()
+        };
+        let mut stream = Stream::new(7, 0, 0, 0);
+        for _ in 0..5_000 {
+            let roughness = 0.05 + 0.95 * stream.uniform();
+            let bsdf = glossy(stream.uniform(), roughness, stream.uniform());
+            let wo = warp::cosine_hemisphere(stream.uniform2());
+            let Some(s) = bsdf.sample(wo, stream.uniform(), stream.uniform2()) else {
+                continue;
+            };
+            let wi = s.wi;
+            let d = bsdf.derivative(wo, wi);
+            let (a, r) = (f64::from(bsdf.albedo.x), f64::from(roughness));
+            let Some(f) = bsdf.lobe.map(|lobe| f64::from(lobe.specular.x)) else {
+                continue;
+            };
+            let scale = value(a, r, f, wo, wi);
+            assert!((scale - f64::from(bsdf.eval(wo, wi).x)).abs() <= 1e-6 * scale);
+            let h = 1e-5 * r;
+            for (name, got, want) in [
+                (
+                    "albedo",
+                    d.albedo.x,
+                    (value(a + h, r, f, wo, wi) - value(a - h, r, f, wo, wi)) / (2.0 * h),
+                ),
+                (
+                    "roughness",
+                    d.roughness.x,
+                    (value(a, r + h, f, wo, wi) - value(a, r - h, f, wo, wi)) / (2.0 * h),
+                ),
+                (
+                    "specular",
+                    d.specular.x,
+                    (value(a, r, f + h, wo, wi) - value(a, r, f - h, wo, wi)) / (2.0 * h),
+                ),
+            ] {
+                let error = (f64::from(got) - want).abs();
+                assert!(
+                    error <= 1e-6 * (want.abs() + scale / r) + 1e-9,
+                    "{name}: {got} against {want} for {bsdf:?}"
+                );
+            }
+        }
+        // Without a lobe only the albedo moves anything.
+        let diffuse = Bsdf {
+            albedo: Vec3::splat(0.5),
+            lobe: None,
+        };
+        let d = diffuse.derivative(Vec3::Z, direction(0.5, 0.0));
+        assert_eq!(d.albedo, diffuse.eval(Vec3::Z, direction(0.5, 0.0)) * 2.0);
+        assert_eq!((d.roughness, d.specular), (Vec3::ZERO, Vec3::ZERO));
+    }
+}
