@@ -21,6 +21,7 @@
 
 pub mod capture;
 pub mod error;
+pub mod export;
 pub mod inverse;
 pub mod math;
 pub mod scene;

@@ -2,6 +2,7 @@
 
 pub mod color;
 pub mod frame;
+pub mod picture;
 pub mod rng;
 pub mod sh;
 pub mod stats;

@@ -5,8 +5,9 @@ use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Progress, Termination};
 use crate::scene::Scene;
-use glam::Vec3;
 use std::sync::Arc;
+
+pub use crate::math::picture::Picture;
 
 /// The state of a session at one moment.
 #[derive(Debug, Clone, Default)]
@@ -68,17 +69,6 @@ pub struct OpenCapture {
     pub summary: Vec<String>,
     /// What is odd about it.
     pub warnings: Vec<String>,
-}
-
-/// Linear colours, row by row from the top left.
-#[derive(Debug, Clone)]
-pub struct Picture {
-    /// Width in pixels.
-    pub width: u32,
-    /// Height in pixels.
-    pub height: u32,
-    /// Linear values; what they mean is said where the picture is kept.
-    pub pixels: Vec<Vec3>,
 }
 
 /// Pictures of one view.

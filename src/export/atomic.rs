@@ -1,0 +1,110 @@
+//! Files that appear whole or not at all.
+
+use crate::error::{Error, Result};
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+/// Why a writer gave up: an input/output error, or anything with a message.
+pub type WriteError = Box<dyn std::error::Error + Send + Sync>;
+
+/// Writes a file through `write`, so that `path` holds either the complete new content or what it held before.
+///
+/// The bytes go to a temporary file in the same folder, are flushed to the disk, and the file is renamed. Missing
+/// folders are made. The file gets the permissions of any newly created file.
+///
+/// # Errors
+/// The folder or file cannot be written, the disk is full, or `write` fails; nothing is left behind.
+pub fn write_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> std::result::Result<(), WriteError>,
+) -> Result<()> {
+    let io = |error: std::io::Error| Error::io(path, &error);
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, &error))?;
+
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".relit-").suffix(".partial");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let temporary = builder.tempfile_in(folder).map_err(io)?;
+
+    let mut writer = BufWriter::new(temporary.as_file().try_clone().map_err(io)?);
+    write(&mut writer).map_err(|error| match error.downcast::<std::io::Error>() {
+        Ok(error) => Error::io(path, &error),
+        Err(error) => Error::file(path, error, "nothing was written there"),
+    })?;
+    writer.flush().map_err(io)?;
+    temporary.as_file().sync_all().map_err(io)?;
+    temporary.persist(path).map_err(|error| io(error.error))?;
+    Ok(())
+}
+
+/// Writes bytes as a whole file or not at all; see [`write_atomically`].
+///
+/// # Errors
+/// The folder or file cannot be written.
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_atomically(path, |writer| Ok(writer.write_all(bytes)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = std::fs::read_dir(folder).expect("folder exists");
+        let name = |entry: std::io::Result<std::fs::DirEntry>| {
+            entry
+                .expect("entry")
+                .file_name()
+                .to_string_lossy()
+                .into_owned()
+        };
+        entries.map(name).collect()
+    }
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("new/a.txt");
+        write_bytes(&path, b"old").expect("first write");
+        let error = write_atomically(&path, |writer| {
+            writer.write_all(b"half of the new")?;
+            Err("the numbers ran out".into())
+        })
+        .expect_err("the writer failed");
+        assert_eq!(error.problem, "the numbers ran out");
+        assert_eq!(std::fs::read(&path).expect("still there"), b"old");
+        assert_eq!(names(&folder.path().join("new")), ["a.txt"]);
+    }
+
+    #[test]
+    fn a_folder_in_the_way_is_an_error_naming_the_path() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let error = write_bytes(folder.path(), b"x").expect_err("a folder is there");
+        assert!(error.place.contains(&folder.path().display().to_string()));
+        let file = folder.path().join("file");
+        write_bytes(&file, b"x").expect("a file");
+        assert!(write_bytes(&file.join("below"), b"x").is_err());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn others_may_read_what_was_written_as_the_umask_says() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let ours = folder.path().join("ours");
+        let plain = folder.path().join("plain");
+        write_bytes(&ours, b"x").expect("ours");
+        std::fs::write(&plain, b"x").expect("plain");
+        let mode = |path: &Path| std::fs::metadata(path).expect("file").permissions().mode();
+        assert_eq!(mode(&ours), mode(&plain));
+    }
+}

@@ -1,0 +1,96 @@
+//! An 8-bit picture to draw text and pictures on, with the program's own font.
+
+use plotters::prelude::{BitMapBackend, DrawingBackend, FontStyle, IntoFont, RGBColor};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::{IntoTextStyle, register_font};
+use std::sync::Once;
+
+/// Name under which plots find the built-in font.
+pub const FONT: &str = "sans-serif";
+
+/// Makes the built-in font known to plotters, so that no system font is needed.
+pub fn register_fonts() {
+    static REGISTERED: Once = Once::new();
+    REGISTERED.call_once(|| {
+        for style in [FontStyle::Normal, FontStyle::Bold] {
+            // The bytes are a font compiled into the program; should they not parse, plots are drawn without text.
+            let _ = register_font(FONT, style, epaint_default_fonts::UBUNTU_LIGHT);
+        }
+    });
+}
+
+/// 8-bit sRGB pixels that can be drawn on.
+#[derive(Debug, Clone)]
+pub struct Canvas {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Three bytes a pixel, row by row from the top left.
+    pub bytes: Vec<u8>,
+}
+
+impl Canvas {
+    /// A canvas of one colour.
+    pub fn new(width: u32, height: u32, color: [u8; 3]) -> Self {
+        Self {
+            width,
+            height,
+            bytes: color.repeat(width as usize * height as usize),
+        }
+    }
+
+    /// Copies sRGB bytes of a `width` × `height` picture so that its top left corner lies at (x, y); what falls
+    /// outside is left out.
+    pub fn paste(&mut self, bytes: &[u8], width: u32, x: u32, y: u32) {
+        if width == 0 || x >= self.width {
+            return;
+        }
+        let visible = width.min(self.width - x) as usize * 3;
+        let rows = bytes.chunks_exact(width as usize * 3);
+        let start = (y as usize * self.width as usize + x as usize) * 3;
+        for (row, line) in rows.zip(0..self.height.saturating_sub(y) as usize) {
+            let at = start + line * self.width as usize * 3;
+            self.bytes[at..at + visible].copy_from_slice(&row[..visible]);
+        }
+    }
+
+    /// Fills a rectangle.
+    pub fn fill(&mut self, x: u32, y: u32, width: u32, height: u32, color: [u8; 3]) {
+        let bytes = color.repeat(width as usize * height as usize);
+        self.paste(&bytes, width, x, y);
+    }
+
+    /// Draws one line of text centred at (x, y).
+    pub fn text(&mut self, text: &str, x: u32, y: u32, size: u32, color: [u8; 3]) {
+        register_fonts();
+        let [r, g, b] = color;
+        let dimensions = (self.width, self.height);
+        let mut backend = BitMapBackend::with_buffer(&mut self.bytes, dimensions);
+        let style = (FONT, size)
+            .into_font()
+            .color(&RGBColor(r, g, b))
+            .pos(Pos::new(HPos::Center, VPos::Center))
+            .into_text_style(&dimensions);
+        // Text that cannot be drawn leaves the picture readable, so a failure is not one of the whole file.
+        let _ = backend.draw_text(text, &style, (x as i32, y as i32));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_leaves_marks_and_pictures_are_clipped() {
+        let mut canvas = Canvas::new(60, 20, [0; 3]);
+        canvas.text("Ag 1", 30, 10, 14, [255; 3]);
+        let lit = canvas.bytes.iter().filter(|&&b| b > 128).count();
+        assert!(lit > 30, "{lit}");
+        canvas.paste(&[7; 4 * 4 * 3], 4, 58, 18);
+        assert_eq!(canvas.bytes[canvas.bytes.len() - 6..], [7; 6]);
+        canvas.paste(&[9; 3], 1, 60, 0);
+        canvas.paste(&[9; 3], 1, 0, 20);
+        assert!(!canvas.bytes.contains(&9));
+    }
+}

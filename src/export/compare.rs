@@ -1,0 +1,83 @@
+//! Pictures side by side, each with a caption.
+
+use crate::error::{Error, Result};
+use crate::export::canvas::Canvas;
+use crate::export::picture::{to_srgb_bytes, write_png_bytes};
+use crate::math::picture::Picture;
+use std::path::Path;
+
+/// Height of the caption above each picture, in pixels.
+const CAPTION: u32 = 26;
+/// White between pictures, in pixels.
+const GAP: u32 = 6;
+
+/// Writes pictures in a row, top-aligned, each below its caption, all at one exposure.
+///
+/// # Errors
+/// The file cannot be written, or there is no picture.
+pub fn write_row(path: &Path, pictures: &[(&str, &Picture)], exposure: f32) -> Result<()> {
+    write_grid(path, pictures, pictures.len().max(1), exposure)
+}
+
+/// Writes pictures row by row in `columns` columns, each below its caption, all at one exposure.
+///
+/// # Errors
+/// The file cannot be written, there is no picture, or one has not one colour a pixel.
+pub fn write_grid(
+    path: &Path,
+    pictures: &[(&str, &Picture)],
+    columns: usize,
+    exposure: f32,
+) -> Result<()> {
+    if let Some((caption, _)) = pictures.iter().find(|(_, picture)| !picture.is_whole()) {
+        return Err(Error::file(
+            path,
+            format!("\"{caption}\" has no pixels"),
+            "",
+        ));
+    }
+    let cell_width = pictures.iter().map(|(_, p)| p.width).max().unwrap_or(0);
+    let cell_height = pictures.iter().map(|(_, p)| p.height).max().unwrap_or(0) + CAPTION;
+    let columns = columns.clamp(1, pictures.len().max(1));
+    let rows = pictures.len().div_ceil(columns);
+    let mut canvas = Canvas::new(
+        columns as u32 * (cell_width + GAP) - GAP.min(columns as u32 * (cell_width + GAP)),
+        rows as u32 * cell_height,
+        [255; 3],
+    );
+    for (index, (caption, picture)) in pictures.iter().enumerate() {
+        let x = (index % columns) as u32 * (cell_width + GAP);
+        let y = (index / columns) as u32 * cell_height;
+        canvas.text(caption, x + picture.width / 2, y + CAPTION / 2, 15, [30; 3]);
+        canvas.paste(
+            &to_srgb_bytes(picture, exposure),
+            picture.width,
+            x,
+            y + CAPTION,
+        );
+    }
+    write_png_bytes(path, canvas.width, canvas.height, &canvas.bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    #[test]
+    fn each_picture_lies_below_its_caption() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("compare.png");
+        let red = Picture::from_fn(80, 40, |_, _| Vec3::X);
+        let blue = Picture::from_fn(60, 30, |_, _| Vec3::Z);
+        write_row(&path, &[("ours", &red), ("naive", &blue)], 1.0).expect("written");
+        let image = image::open(&path).expect("a PNG").to_rgb8();
+        assert_eq!(image.dimensions(), (2 * 80 + GAP, 40 + CAPTION));
+        assert_eq!(image.get_pixel(40, CAPTION + 20).0, [255, 0, 0]);
+        assert_eq!(image.get_pixel(80 + GAP + 30, CAPTION + 20).0, [0, 0, 255]);
+        assert_eq!(image.get_pixel(80 + GAP + 70, CAPTION + 20).0, [255; 3]);
+        let dark = (0..80).any(|x| image.get_pixel(x, CAPTION / 2).0[0] < 128);
+        assert!(dark, "the caption is drawn");
+        assert!(write_row(&path, &[], 1.0).is_err());
+    }
+}

@@ -1,0 +1,259 @@
+//! OpenEXR files: linear pictures, single channels, and named layers, all compressed without loss.
+
+use crate::error::{Error, Result};
+use crate::export::atomic::write_atomically;
+use crate::math::picture::Picture;
+use exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds,
+    LayerAttributes, SmallVec, Text, Vec2, WritableImage, f16,
+};
+use std::path::Path;
+
+/// How exactly numbers are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Precision {
+    /// 16-bit floats: 11 significant bits, largest value 65504.
+    Half,
+    /// 32-bit floats.
+    Float,
+}
+
+/// A named group of channels of one size.
+#[derive(Debug, Clone)]
+pub struct Layer {
+    /// Name of the layer; channels are shown as `name.channel`.
+    pub name: String,
+    /// Its channels, in any order.
+    pub channels: Vec<Channel>,
+}
+
+/// One number a pixel.
+#[derive(Debug, Clone)]
+pub struct Channel {
+    /// Name, such as "R" or "Z".
+    pub name: String,
+    /// Values, row by row from the top left.
+    pub samples: Samples,
+}
+
+/// The values of a channel.
+#[derive(Debug, Clone)]
+pub enum Samples {
+    /// 16-bit floats.
+    Half(Vec<f16>),
+    /// 32-bit floats.
+    Float(Vec<f32>),
+    /// Whole numbers, such as object indices.
+    Index(Vec<u32>),
+}
+
+impl Layer {
+    /// The channels R, G and B of a picture.
+    pub fn rgb(name: &str, picture: &Picture, precision: Precision) -> Self {
+        let channel = |index: usize, letter: &str| Channel {
+            name: letter.to_owned(),
+            samples: match precision {
+                Precision::Float => {
+                    Samples::Float(picture.pixels.iter().map(|c| c[index]).collect())
+                }
+                Precision::Half => Samples::Half(
+                    picture
+                        .pixels
+                        .iter()
+                        .map(|c| f16::from_f32(c[index]))
+                        .collect(),
+                ),
+            },
+        };
+        Self {
+            name: name.to_owned(),
+            channels: vec![channel(0, "R"), channel(1, "G"), channel(2, "B")],
+        }
+    }
+
+    /// A single channel.
+    pub fn single(name: &str, channel: &str, samples: Samples) -> Self {
+        Self {
+            name: name.to_owned(),
+            channels: vec![Channel {
+                name: channel.to_owned(),
+                samples,
+            }],
+        }
+    }
+}
+
+impl Samples {
+    fn len(&self) -> usize {
+        match self {
+            Self::Half(values) => values.len(),
+            Self::Float(values) => values.len(),
+            Self::Index(values) => values.len(),
+        }
+    }
+
+    fn flat(&self) -> FlatSamples {
+        match self {
+            Self::Half(values) => FlatSamples::F16(values.clone()),
+            Self::Float(values) => FlatSamples::F32(values.clone()),
+            Self::Index(values) => FlatSamples::U32(values.clone()),
+        }
+    }
+}
+
+/// Writes a linear picture as channels R, G and B.
+///
+/// # Errors
+/// The file cannot be written, or the picture has no pixels.
+pub fn write_rgb(path: &Path, picture: &Picture, precision: Precision) -> Result<()> {
+    let layer = Layer::rgb("", picture, precision);
+    write_layers(path, picture.width, picture.height, &[layer])
+}
+
+/// Writes one number a pixel as the channel Y, which viewers show as grey.
+///
+/// # Errors
+/// The file cannot be written, or there is not one value a pixel.
+pub fn write_scalar(path: &Path, width: u32, height: u32, values: &[f32]) -> Result<()> {
+    let layer = Layer::single("", "Y", Samples::Float(values.to_vec()));
+    write_layers(path, width, height, &[layer])
+}
+
+/// Writes named layers of one size. A single layer may have an empty name; its channels are then plain R, G, B, ….
+///
+/// # Errors
+/// The file cannot be written, there is nothing to write, or a channel has not one value a pixel.
+pub fn write_layers(path: &Path, width: u32, height: u32, layers: &[Layer]) -> Result<()> {
+    let count = width as usize * height as usize;
+    let wrong = layers
+        .iter()
+        .flat_map(|layer| &layer.channels)
+        .find(|channel| channel.samples.len() != count);
+    if let Some(channel) = wrong {
+        let problem = format!(
+            "channel {} has {} values for {width} × {height} pixels",
+            channel.name,
+            channel.samples.len()
+        );
+        return Err(Error::file(path, problem, ""));
+    }
+    if count == 0 || layers.is_empty() {
+        return Err(Error::file(path, "the picture has no pixels", ""));
+    }
+
+    let size = Vec2(width as usize, height as usize);
+    let exr_layers: Vec<_> = layers
+        .iter()
+        .map(|layer| {
+            let channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = layer
+                .channels
+                .iter()
+                .map(|c| AnyChannel::new(c.name.as_str(), c.samples.flat()))
+                .collect();
+            let attributes = if layer.name.is_empty() {
+                LayerAttributes::default()
+            } else {
+                LayerAttributes::named(Text::from(layer.name.as_str()))
+            };
+            exr::prelude::Layer::new(
+                size,
+                attributes,
+                Encoding::SMALL_LOSSLESS,
+                AnyChannels::sort(channels),
+            )
+        })
+        .collect();
+    let attributes = ImageAttributes::new(IntegerBounds::from_dimensions(size));
+    let image = Image::from_layers(attributes, exr_layers);
+    write_atomically(path, |writer| Ok(image.write().to_buffered(writer)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use exr::prelude::{ReadChannels, ReadLayers};
+    use glam::Vec3;
+
+    fn read_back(path: &Path) -> Image<exr::prelude::Layers<AnyChannels<FlatSamples>>> {
+        exr::prelude::read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels()
+            .all_layers()
+            .all_attributes()
+            .from_file(path)
+            .expect("an EXR file")
+    }
+
+    fn gradient() -> Picture {
+        Picture::from_fn(37, 21, |x, y| {
+            Vec3::new(x as f32 * 0.1, 1e3 * y as f32, -3.7e-5 * (x * y) as f32)
+        })
+    }
+
+    #[test]
+    fn floats_come_back_bit_for_bit_and_halves_within_their_precision() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let picture = gradient();
+        for (precision, tolerance) in [(Precision::Float, 0.0), (Precision::Half, 1.0 / 2048.0)] {
+            let path = folder.path().join("a.exr");
+            write_rgb(&path, &picture, precision).expect("written");
+            let image = image::open(&path).expect("readable by others").to_rgb32f();
+            assert_eq!(image.dimensions(), (37, 21));
+            for (pixel, expected) in image.pixels().zip(&picture.pixels) {
+                let difference = (Vec3::from(pixel.0) - *expected).abs();
+                let allowed = expected.abs() * tolerance + tolerance * 1e-6;
+                assert!(
+                    (difference - allowed).max_element() <= 0.0,
+                    "{expected} {difference}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn layers_keep_their_names_channels_and_values() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("layers.exr");
+        let picture = gradient();
+        let ids: Vec<u32> = (0..37 * 21).map(|i| u32::MAX - i).collect();
+        let layers = [
+            Layer::rgb("with", &picture, Precision::Float),
+            Layer::single("object id", "id", Samples::Index(ids.clone())),
+        ];
+        write_layers(&path, 37, 21, &layers).expect("written");
+        let image = read_back(&path);
+        let find = |name: &str| {
+            image
+                .layer_data
+                .iter()
+                .find(|l| l.attributes.layer_name.as_ref() == Some(&Text::from(name)))
+                .expect("the layer is there")
+        };
+        let green = &find("with").channel_data.list[1];
+        assert_eq!(green.name, Text::from("G"));
+        assert_eq!(
+            green.sample_data,
+            FlatSamples::F32(picture.pixels.iter().map(|c| c.y).collect())
+        );
+        assert_eq!(
+            find("object id").channel_data.list[0].sample_data,
+            FlatSamples::U32(ids)
+        );
+    }
+
+    #[test]
+    fn a_picture_of_the_wrong_size_is_refused_and_no_file_appears() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("a.exr");
+        assert!(write_scalar(&path, 3, 3, &[0.0; 8]).is_err());
+        assert!(write_scalar(&path, 0, 3, &[]).is_err());
+        assert!(!path.exists());
+        write_scalar(&path, 3, 3, &[2.5; 9]).expect("written");
+        let image = read_back(&path);
+        assert_eq!(
+            image.layer_data[0].channel_data.list[0].sample_data,
+            FlatSamples::F32(vec![2.5; 9])
+        );
+    }
+}

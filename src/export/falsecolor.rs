@@ -1,0 +1,157 @@
+//! Numbers as colours, with a legend that says which colour is which number.
+
+use crate::error::Result;
+use crate::export::canvas::Canvas;
+use crate::export::picture::write_png_bytes;
+use crate::export::scale::Scale;
+use crate::math::color::luminance;
+use crate::math::picture::Picture;
+use plotters::coord::ranged1d::ValueFormatter;
+use std::path::Path;
+
+/// Height of the legend below the picture, in pixels.
+const LEGEND: u32 = 34;
+
+/// Blue for negative, white for zero, red for positive values (in [−1, 1]); magenta for what is not a number.
+pub fn diverging(value: f32) -> [u8; 3] {
+    const STOPS: [[f32; 3]; 5] = [
+        [5.0, 48.0, 97.0],
+        [103.0, 169.0, 207.0],
+        [247.0, 247.0, 247.0],
+        [239.0, 138.0, 98.0],
+        [103.0, 0.0, 31.0],
+    ];
+    ramp(&STOPS, (value + 1.0) * 0.5)
+}
+
+/// Dark violet through green to yellow for values in [0, 1], rising evenly in lightness.
+pub fn sequential(value: f32) -> [u8; 3] {
+    const STOPS: [[f32; 3]; 5] = [
+        [68.0, 1.0, 84.0],
+        [59.0, 82.0, 139.0],
+        [33.0, 145.0, 140.0],
+        [94.0, 201.0, 98.0],
+        [253.0, 231.0, 37.0],
+    ];
+    ramp(&STOPS, value)
+}
+
+/// Linear interpolation between evenly spaced stops.
+fn ramp(stops: &[[f32; 3]; 5], position: f32) -> [u8; 3] {
+    if position.is_nan() {
+        return [255, 0, 255];
+    }
+    let scaled = position.clamp(0.0, 1.0) * 4.0;
+    let low = (scaled as usize).min(3);
+    let share = scaled - low as f32;
+    std::array::from_fn(|i| {
+        (stops[low][i] + (stops[low + 1][i] - stops[low][i]) * share + 0.5) as u8
+    })
+}
+
+/// Writes the signed luminance of a picture (render − photograph) in diverging colours with a legend.
+///
+/// The ends of the scale are ± the 99th percentile of the magnitudes.
+///
+/// # Errors
+/// The file cannot be written, or the picture has no pixels.
+pub fn write_signed(path: &Path, picture: &Picture, unit: &str) -> Result<()> {
+    let values: Vec<f32> = picture.pixels.iter().map(|&c| luminance(c)).collect();
+    let end = scale_end(&values);
+    write(path, picture, &values, |v| diverging(v / end), -end, unit)
+}
+
+/// Writes the luminance of a picture of magnitudes (a standard error) in sequential colours with a legend.
+///
+/// The scale runs from 0 to the 99th percentile.
+///
+/// # Errors
+/// The file cannot be written, or the picture has no pixels.
+pub fn write_magnitude(path: &Path, picture: &Picture, unit: &str) -> Result<()> {
+    let values: Vec<f32> = picture.pixels.iter().map(|&c| luminance(c)).collect();
+    let end = scale_end(&values);
+    write(path, picture, &values, |v| sequential(v / end), 0.0, unit)
+}
+
+/// The 99th percentile of the finite magnitudes; their maximum where that is zero, and 1 where all are zero.
+fn scale_end(values: &[f32]) -> f32 {
+    let magnitudes: Vec<glam::Vec3> = values.iter().map(|v| glam::Vec3::splat(v.abs())).collect();
+    crate::export::picture::percentile_exposure(&magnitudes).recip()
+}
+
+/// A value in three significant digits.
+fn three_digits(value: f32) -> String {
+    format!("{value:.2e}")
+        .parse()
+        .map_or_else(|_| value.to_string(), |v: f64| Scale::format(&v))
+}
+
+/// Lays out colours and legend. `low` is the value at the left end; the right end is where `color_of` saturates.
+fn write(
+    path: &Path,
+    picture: &Picture,
+    values: &[f32],
+    color_of: impl Fn(f32) -> [u8; 3],
+    low: f32,
+    unit: &str,
+) -> Result<()> {
+    let high = scale_end(values);
+    let (width, height) = (picture.width, picture.height);
+    let mut canvas = Canvas::new(width, height + LEGEND, [255; 3]);
+    let bytes: Vec<u8> = values.iter().flat_map(|&v| color_of(v)).collect();
+    canvas.paste(&bytes, width, 0, 0);
+
+    // A bar over the middle of the picture, and the values of its ends and middle below.
+    let margin = width / 8;
+    let bar = (width - 2 * margin).max(1);
+    for x in 0..bar {
+        let share = x as f32 / bar as f32;
+        canvas.fill(
+            margin + x,
+            height + 5,
+            1,
+            10,
+            color_of(low + (high - low) * share),
+        );
+    }
+    let middle = (low + high) * 0.5;
+    let labels = [
+        (margin, three_digits(low)),
+        (width / 2, format!("{} {unit}", three_digits(middle))),
+        (width - margin, three_digits(high)),
+    ];
+    for (x, label) in labels {
+        canvas.text(&label, x, height + 24, 12, [40; 3]);
+    }
+    write_png_bytes(path, canvas.width, canvas.height, &canvas.bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    #[test]
+    fn colours_tell_signs_apart_and_saturate() {
+        let [r, _, b] = diverging(0.7);
+        assert!(r > b);
+        let [r, _, b] = diverging(-0.7);
+        assert!(b > r);
+        assert_eq!(diverging(9.0), diverging(1.0));
+        assert_eq!(diverging(f32::NAN), [255, 0, 255]);
+        let lightness = |v: f32| sequential(v).map(u32::from).iter().sum::<u32>();
+        assert!((0..10).all(|i| lightness(i as f32 / 10.0) < lightness((i + 1) as f32 / 10.0)));
+    }
+
+    #[test]
+    fn a_signed_picture_is_written_with_its_legend_below() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("error.png");
+        let picture = Picture::from_fn(160, 100, |x, _| Vec3::splat((x as f32 - 80.0) * 1e-5));
+        write_signed(&path, &picture, "radiance").expect("written");
+        let image = image::open(&path).expect("a PNG").to_rgb8();
+        assert_eq!(image.dimensions(), (160, 100 + LEGEND));
+        assert_eq!(image.get_pixel(80, 50).0, diverging(0.0));
+        assert_eq!(image.get_pixel(0, 50).0, diverging(-1.0));
+    }
+}

@@ -1,0 +1,11 @@
+//! What goes out: pictures, plots, tables, and scenes for other programs. Every file appears whole or not at all.
+
+pub mod atomic;
+pub mod canvas;
+pub mod compare;
+pub mod exr;
+pub mod falsecolor;
+pub mod picture;
+pub mod plot;
+pub mod scale;
+pub mod table;

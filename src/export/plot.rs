@@ -1,0 +1,302 @@
+//! Curves over time or cost, as PNG, with linear or logarithmic axes and without any system font.
+
+use crate::error::{Error, Result};
+use crate::export::canvas::{Canvas, FONT, register_fonts};
+use crate::export::picture::write_png_bytes;
+use crate::export::scale::Scale;
+use crate::inverse::solver::{LossPoint, Stage};
+use plotters::prelude::{
+    BLACK, BitMapBackend, ChartBuilder, Circle, Color, IntoDrawingArea, IntoFont, LineSeries,
+    PathElement, Polygon, RGBColor, Rectangle, SeriesLabelPosition, Text, WHITE,
+};
+use std::path::Path;
+
+/// Colours that stay apart for most eyes (Okabe and Ito 2008).
+const COLORS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(80, 80, 80),
+];
+
+/// Width and height of a plot in pixels.
+const SIZE: (u32, u32) = (960, 600);
+
+/// What an axis shows and how.
+#[derive(Debug, Clone, Default)]
+pub struct Axis {
+    /// Name and unit.
+    pub label: String,
+    /// Whether equal factors, rather than equal differences, take equal room. Values ≤ 0 are then left out.
+    pub logarithmic: bool,
+}
+
+/// One named curve.
+#[derive(Debug, Clone, Default)]
+pub struct Series {
+    /// Name in the legend.
+    pub name: String,
+    /// Points in drawing order.
+    pub points: Vec<[f64; 2]>,
+    /// Lower and upper end of each point's error, or empty.
+    pub band: Vec<[f64; 2]>,
+}
+
+/// A plot of several curves.
+#[derive(Debug, Clone, Default)]
+pub struct Plot {
+    /// Title above.
+    pub title: String,
+    /// Horizontal axis.
+    pub x: Axis,
+    /// Vertical axis.
+    pub y: Axis,
+    /// Curves, each in its own colour.
+    pub series: Vec<Series>,
+    /// Named vertical lines.
+    pub marks: Vec<(f64, String)>,
+}
+
+impl Plot {
+    /// Draws the plot and writes it as a PNG. Points that are not finite are left out.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        register_fonts();
+        let mut canvas = Canvas::new(SIZE.0, SIZE.1, [255; 3]);
+        self.draw(&mut canvas.bytes)
+            .map_err(|error| Error::file(path, error, "nothing was written there"))?;
+        write_png_bytes(path, canvas.width, canvas.height, &canvas.bytes)
+    }
+
+    /// Draws into an sRGB buffer of [`SIZE`].
+    fn draw(&self, bytes: &mut [u8]) -> std::result::Result<(), Box<dyn std::error::Error + '_>> {
+        let shown = |p: &[f64; 2]| self.x.shows(p[0]) && self.y.shows(p[1]);
+        let all = || self.series.iter().flat_map(|s| &s.points);
+        let ends = self.series.iter().flat_map(|s| s.band.iter().flatten());
+        let xs = all().map(|p| p[0]).filter(|&v| self.x.shows(v));
+        let ys = all().map(|p| p[1]).chain(ends.copied());
+        let x_scale = Scale::around(xs, self.x.logarithmic);
+        let y_scale = Scale::around(ys.filter(|&v| self.y.shows(v)), self.y.logarithmic);
+        let (bottom, top) = (y_scale.low(), y_scale.high());
+
+        // Axes.
+        let area = BitMapBackend::with_buffer(bytes, SIZE).into_drawing_area();
+        area.fill(&WHITE)?;
+        let mut chart = ChartBuilder::on(&area)
+            .caption(&self.title, (FONT, 24))
+            .margin(14)
+            .x_label_area_size(48)
+            .y_label_area_size(80)
+            .build_cartesian_2d(x_scale, y_scale)?;
+        chart
+            .configure_mesh()
+            .x_desc(&self.x.label)
+            .y_desc(&self.y.label)
+            .label_style((FONT, 16))
+            .axis_desc_style((FONT, 18))
+            .light_line_style(WHITE)
+            .bold_line_style(RGBColor(225, 225, 225))
+            .draw()?;
+
+        // Marks lie below the curves.
+        for (x, name) in self.marks.iter().filter(|(x, _)| self.x.shows(*x)) {
+            let line = vec![(*x, bottom), (*x, top)];
+            chart.draw_series([PathElement::new(line, RGBColor(150, 150, 150))])?;
+            let style = (FONT, 14).into_font().color(&RGBColor(110, 110, 110));
+            chart.draw_series([Text::new(format!(" {name}"), (*x, top), style)])?;
+        }
+
+        // Bands, curves, and points where there are few.
+        for (series, color) in self.series.iter().zip(COLORS.iter().cycle()) {
+            let banded = series.points.iter().zip(&series.band);
+            let (lower, upper): (Vec<_>, Vec<_>) = banded
+                .filter(|(p, band)| shown(p) && band.iter().all(|&v| self.y.shows(v)))
+                .map(|(p, band)| ((p[0], band[0]), (p[0], band[1])))
+                .unzip();
+            if lower.len() > 1 {
+                let outline: Vec<_> = lower.into_iter().chain(upper.into_iter().rev()).collect();
+                chart.draw_series([Polygon::new(outline, color.mix(0.18).filled())])?;
+            }
+            let points: Vec<(f64, f64)> = series
+                .points
+                .iter()
+                .filter(|p| shown(p))
+                .map(|p| (p[0], p[1]))
+                .collect();
+            if points.len() <= 40 {
+                let dots = points.iter().map(|&p| Circle::new(p, 4, color.filled()));
+                chart.draw_series(dots)?;
+            }
+            let color = *color;
+            chart
+                .draw_series(LineSeries::new(points, color.stroke_width(2)))?
+                .label(&series.name)
+                .legend(move |(x, y)| {
+                    Rectangle::new([(x, y - 2), (x + 18, y + 2)], color.filled())
+                });
+        }
+        if !self.series.is_empty() {
+            chart
+                .configure_series_labels()
+                .position(SeriesLabelPosition::UpperRight)
+                .background_style(WHITE.mix(0.85))
+                .border_style(BLACK.mix(0.2))
+                .label_font((FONT, 16))
+                .margin(8)
+                .draw()?;
+        }
+        area.present()?;
+        Ok(())
+    }
+}
+
+impl Axis {
+    /// An axis with equal room for equal differences.
+    pub fn linear(label: &str) -> Self {
+        Self {
+            label: label.to_owned(),
+            logarithmic: false,
+        }
+    }
+
+    /// An axis with equal room for equal factors.
+    pub fn logarithmic(label: &str) -> Self {
+        Self {
+            label: label.to_owned(),
+            logarithmic: true,
+        }
+    }
+
+    /// Whether a value has a place on the axis.
+    fn shows(&self, value: f64) -> bool {
+        value.is_finite() && (value > 0.0 || !self.logarithmic)
+    }
+}
+
+/// The loss curve of a solve: loss in the fit and on held-out pixels over seconds, with its stages marked.
+pub fn loss_plot(losses: &[LossPoint], stages: &[Stage]) -> Plot {
+    let curve = |name: &str, value: fn(&LossPoint) -> Option<f64>| Series {
+        name: name.to_owned(),
+        points: losses
+            .iter()
+            .filter_map(|p| Some([p.seconds, value(p)?]))
+            .collect(),
+        band: Vec::new(),
+    };
+    let mut start = 0.0;
+    let marks = stages
+        .iter()
+        .map(|stage| {
+            start += stage.seconds;
+            (start - stage.seconds, stage.name.clone())
+        })
+        .collect();
+    let series = [
+        curve("in the fit", |p| p.train),
+        curve("held out", |p| p.held_out),
+    ];
+    Plot {
+        title: "Loss".to_owned(),
+        x: Axis::linear("seconds"),
+        y: Axis::logarithmic("mean absolute difference, radiance"),
+        series: series
+            .into_iter()
+            .filter(|s| !s.points.is_empty())
+            .collect(),
+        marks,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn draw(plot: &Plot) -> image::RgbImage {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("plot.png");
+        plot.write(&path).expect("written");
+        image::open(&path).expect("a PNG").to_rgb8()
+    }
+
+    /// The mean row of the pixels near a colour, over some columns.
+    fn height_of(image: &image::RgbImage, color: RGBColor, columns: std::ops::Range<u32>) -> f64 {
+        let rows: Vec<f64> = image
+            .enumerate_pixels()
+            .filter(|(x, _, p)| columns.contains(x) && p.0 == [color.0, color.1, color.2])
+            .map(|(_, y, _)| f64::from(y))
+            .collect();
+        assert!(!rows.is_empty(), "the curve is drawn there");
+        rows.iter().sum::<f64>() / rows.len() as f64
+    }
+
+    #[test]
+    fn a_power_law_is_a_straight_line_on_logarithmic_axes() {
+        let points: Vec<[f64; 2]> = (0..=60)
+            .map(|i| 10f64.powf(f64::from(i) * 0.05))
+            .map(|x| [x, 3e-7 * x.powf(-0.5)])
+            .collect();
+        let image = draw(&Plot {
+            x: Axis::logarithmic("samples"),
+            y: Axis::logarithmic("error"),
+            series: vec![Series {
+                points,
+                ..Default::default()
+            }],
+            ..Default::default()
+        });
+        let [a, b, c] = [200, 400, 600].map(|x| height_of(&image, COLORS[0], x..x + 20));
+        assert!(a < b && b < c, "it falls");
+        assert!(((b - a) - (c - b)).abs() < 3.0, "{a} {b} {c}");
+    }
+
+    #[test]
+    fn hostile_values_are_left_out_and_an_empty_plot_is_still_a_picture() {
+        draw(&Plot::default());
+        let odd = [
+            [0.0, -1.0],
+            [1.0, f64::NAN],
+            [2.0, f64::INFINITY],
+            [3.0, 0.0],
+            [f64::NAN, 1.0],
+        ];
+        for logarithmic in [false, true] {
+            let y = Axis {
+                label: String::new(),
+                logarithmic,
+            };
+            let series = Series {
+                name: "odd".into(),
+                points: odd.to_vec(),
+                band: vec![[f64::NAN, 1.0]; 5],
+            };
+            let plot = Plot {
+                y,
+                series: vec![series],
+                marks: vec![(f64::NAN, "never".into()), (1e300, "far".into())],
+                ..Default::default()
+            };
+            draw(&plot);
+        }
+    }
+
+    #[test]
+    fn the_loss_plot_shows_both_curves_and_leaves_out_what_was_not_measured() {
+        let point = |i: u32, held_out| LossPoint {
+            seconds: f64::from(i),
+            iteration: u64::from(i),
+            train: Some(0.5f64.powi(i as i32)),
+            held_out,
+        };
+        let losses = [point(0, Some(1.0)), point(1, None), point(2, Some(0.5))];
+        let plot = loss_plot(&losses, &[]);
+        assert_eq!(plot.series[0].points.len(), 3);
+        assert_eq!(plot.series[1].points, [[0.0, 1.0], [2.0, 0.5]]);
+        let image = draw(&plot);
+        assert!(height_of(&image, COLORS[1], 400..900) < height_of(&image, COLORS[0], 400..900));
+    }
+}

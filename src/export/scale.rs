@@ -1,0 +1,175 @@
+//! A plot axis' range, with round ticks, linear or logarithmic.
+
+use plotters::coord::ranged1d::{
+    KeyPointHint, NoDefaultFormatting, Ranged, ReversibleRanged, ValueFormatter,
+};
+use std::ops::Range;
+
+/// Maps values to pixels along one axis.
+#[derive(Debug, Clone)]
+pub struct Scale {
+    low: f64,
+    high: f64,
+    logarithmic: bool,
+}
+
+impl Scale {
+    /// A scale that holds all values with a little room, and is never empty. A logarithmic scale needs values > 0.
+    pub fn around(values: impl Iterator<Item = f64>, logarithmic: bool) -> Self {
+        let (mut low, mut high) = values
+            .map(|v| if logarithmic { v.log10() } else { v })
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+                (low.min(v), high.max(v))
+            });
+        if low > high {
+            (low, high) = (0.0, 1.0);
+        }
+        let room = match (high - low) * 0.04 {
+            room if room > 0.0 => room,
+            _ if logarithmic => 0.5,
+            _ => (low.abs() * 0.5).max(f64::MIN_POSITIVE),
+        };
+        Self {
+            low: low - room,
+            high: high + room,
+            logarithmic,
+        }
+    }
+
+    /// Smallest value shown.
+    pub fn low(&self) -> f64 {
+        self.value(self.low)
+    }
+
+    /// Largest value shown.
+    pub fn high(&self) -> f64 {
+        self.value(self.high)
+    }
+
+    fn value(&self, position: f64) -> f64 {
+        if self.logarithmic {
+            10f64.powf(position)
+        } else {
+            position
+        }
+    }
+}
+
+impl Ranged for Scale {
+    type FormatOption = NoDefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
+        let position = if self.logarithmic {
+            value.log10()
+        } else {
+            *value
+        };
+        let share = ((position - self.low) / (self.high - self.low)).clamp(-1.0, 2.0);
+        limit.0 + (share * f64::from(limit.1 - limit.0)).round() as i32
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        let wanted = hint.max_num_points().clamp(2, 10) as f64;
+        let span = self.high - self.low;
+        let decades = if self.logarithmic { span.ceil() } else { 0.0 };
+
+        // Logarithmic: 1, 2 and 5 in each decade, or decades alone where there are many.
+        if self.logarithmic && decades > 1.0 {
+            let step = (span / wanted).ceil().max(1.0);
+            let digits: &[f64] = if span < 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+            let first = (self.low / step).floor() as i32;
+            let last = (self.high / step).ceil() as i32;
+            return (first..=last)
+                .flat_map(|i| {
+                    digits
+                        .iter()
+                        .map(move |d| d * 10f64.powf(f64::from(i) * step))
+                })
+                .filter(|v| (self.low..=self.high).contains(&v.log10()))
+                .collect();
+        }
+
+        // Linear: the smallest of 1, 2, 5 × 10ⁿ that gives no more ticks than wanted.
+        let (low, high) = (self.low(), self.high());
+        let raw = (high - low) / wanted;
+        let power = 10f64.powf(raw.log10().floor());
+        let step = [1.0, 2.0, 5.0, 10.0]
+            .into_iter()
+            .map(|m| m * power)
+            .find(|&step| step >= raw)
+            .unwrap_or(raw);
+        let first = (low / step).ceil();
+        (0..=wanted as usize)
+            .map(|i| (first + i as f64) * step)
+            .filter(|v| (low..=high).contains(v))
+            .collect()
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.low()..self.high()
+    }
+}
+
+impl ReversibleRanged for Scale {
+    fn unmap(&self, pixel: i32, (min, max): (i32, i32)) -> Option<f64> {
+        let share = f64::from(pixel - min) / f64::from(max - min);
+        (0.0..=1.0)
+            .contains(&share)
+            .then(|| self.value(self.low + share * (self.high - self.low)))
+    }
+}
+
+impl ValueFormatter<f64> for Scale {
+    fn format(value: &f64) -> String {
+        let magnitude = value.abs();
+        // Twelve digits hide the rounding of i · step.
+        let rounded: f64 = format!("{value:.12e}").parse().unwrap_or(*value);
+        if magnitude != 0.0 && !(1e-3..1e5).contains(&magnitude) {
+            format!("{rounded:e}")
+        } else {
+            rounded.to_string()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plotters::coord::ranged1d::BoldPoints;
+
+    #[test]
+    fn ticks_are_round_and_inside() {
+        let linear = Scale::around([0.0, 0.93].into_iter(), false);
+        let labels: Vec<String> = linear
+            .key_points(BoldPoints(6))
+            .iter()
+            .map(Scale::format)
+            .collect();
+        assert_eq!(labels, ["0", "0.2", "0.4", "0.6", "0.8"]);
+        let decades = Scale::around([1e-7, 1e2].into_iter(), true);
+        let labels: Vec<String> = decades
+            .key_points(BoldPoints(10))
+            .iter()
+            .map(Scale::format)
+            .collect();
+        assert!(labels.contains(&"1e-7".to_owned()) && labels.contains(&"100".to_owned()));
+    }
+
+    #[test]
+    fn logarithmic_scales_give_equal_room_to_equal_factors() {
+        let scale = Scale::around([1.0, 100.0].into_iter(), true);
+        let [a, b, c] = [1.0, 10.0, 100.0].map(|v| scale.map(&v, (0, 1000)));
+        assert!((2 * b - a - c).abs() <= 1 && a < b);
+        assert!((scale.unmap(b, (0, 1000)).expect("inside") - 10.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn a_single_value_or_none_still_makes_a_scale() {
+        for values in [vec![], vec![0.0], vec![5.0], vec![-1e-30]] {
+            let scale = Scale::around(values.into_iter(), false);
+            assert!(scale.low() < scale.high());
+            assert!(scale.key_points(BoldPoints(5)).len() < 20);
+        }
+    }
+}

@@ -1,0 +1,35 @@
+//! A rectangle of linear colours.
+
+use glam::Vec3;
+
+/// Linear colours, row by row from the top left.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Linear values; what they mean is said where the picture is kept.
+    pub pixels: Vec<Vec3>,
+}
+
+impl Picture {
+    /// A picture whose pixel (x, y) is `color(x, y)`.
+    pub fn from_fn(width: u32, height: u32, mut color: impl FnMut(u32, u32) -> Vec3) -> Self {
+        let mut pixels = Vec::with_capacity(width as usize * height as usize);
+        for y in 0..height {
+            pixels.extend((0..width).map(|x| color(x, y)));
+        }
+        Self {
+            width,
+            height,
+            pixels,
+        }
+    }
+
+    /// Whether there is one colour for each pixel, and at least one pixel.
+    pub fn is_whole(&self) -> bool {
+        let expected = u64::from(self.width) * u64::from(self.height);
+        expected > 0 && self.pixels.len() as u64 == expected
+    }
+}
