@@ -1,5 +1,10 @@
 //! How light moves: paths, scattering, emitters, next-event estimation, multiple importance sampling.
 
 pub mod bsdf;
+pub mod emitters;
+pub mod environment;
+pub mod film;
+pub mod lit;
 pub mod material;
+pub mod path;
 pub mod world;

@@ -1,6 +1,7 @@
 //! What the path tracer asks of the world around it.
 
 use crate::scene::geometry::Ray;
+use crate::transport::environment::Environment;
 use crate::transport::material::Lobe;
 use glam::Vec3;
 
@@ -61,6 +62,9 @@ pub trait World: Sync {
     /// Density per square metre with which [`World::sample_emitter`] draws a point of this surface.
     fn emitter_pdf(&self, surface: &SurfacePoint) -> f32;
 
-    /// Radiance that arrives along an escaping ray's direction from outside the mesh.
-    fn outside(&self, direction: Vec3) -> Vec3;
+    /// Whether [`World::sample_emitter`] can draw anything.
+    fn has_emitters(&self) -> bool;
+
+    /// Light from outside the mesh, met by rays that escape.
+    fn environment(&self) -> Option<&Environment>;
 }

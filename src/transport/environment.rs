@@ -1,0 +1,128 @@
+//! Light that arrives from outside the mesh, as a map of directions.
+
+use crate::math::color::luminance;
+use glam::Vec3;
+use std::f32::consts::PI;
+
+/// An equirectangular map of incoming radiance, drawn in proportion to luminance × solid angle.
+///
+/// Directions are the scene's (towards the light); the map's pole is the scene's y axis, whatever `up` is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Environment {
+    width: usize,
+    height: usize,
+    pixels: Vec<Vec3>,
+    /// Cumulative luminance × solid angle over pixels, row by row.
+    cumulative: Vec<f64>,
+}
+
+impl Environment {
+    /// A map of `width` × `height` radiances; row 0 is around +y. `None` if the sizes do not fit.
+    pub fn new(width: usize, height: usize, pixels: Vec<Vec3>) -> Option<Self> {
+        if width == 0 || height == 0 || pixels.len() != width * height {
+            return None;
+        }
+        let mut sum = 0.0;
+        let cumulative = pixels
+            .iter()
+            .enumerate()
+            .map(|(i, &radiance)| {
+                let weight = f64::from(luminance(radiance)) * row_solid_angle(i / width, width, height);
+                sum += if weight.is_finite() { weight.max(0.0) } else { 0.0 };
+                sum
+            })
+            .collect();
+        Some(Self { width, height, pixels, cumulative })
+    }
+
+    /// Radiance from a unit direction.
+    pub fn radiance(&self, direction: Vec3) -> Vec3 {
+        self.pixels[self.pixel(direction)]
+    }
+
+    /// Draws a direction; returns it with its density per solid angle. `None` where the map is black.
+    pub fn sample(&self, choice: f64, u: [f32; 2]) -> Option<(Vec3, f32)> {
+        let total = *self.cumulative.last()?;
+        if total <= 0.0 {
+            return None;
+        }
+        let target = choice * total;
+        let index = self.cumulative.partition_point(|&c| c <= target).min(self.pixels.len() - 1);
+        let (row, column) = (index / self.width, index % self.width);
+        // Uniform in solid angle within the pixel: uniform in cosθ and φ.
+        let (top, bottom) = row_cosines(row, self.height);
+        let y = (top + (bottom - top) * f64::from(u[0])) as f32;
+        let phi = 2.0 * PI * (column as f32 + u[1]) / self.width as f32;
+        let r = (1.0 - y * y).max(0.0).sqrt();
+        let direction = Vec3::new(r * phi.cos(), y, r * phi.sin());
+        Some((direction, self.pixel_pdf(index)))
+    }
+
+    /// Density per solid angle with which [`Environment::sample`] draws a direction.
+    pub fn pdf(&self, direction: Vec3) -> f32 {
+        self.pixel_pdf(self.pixel(direction))
+    }
+
+    /// Total luminance × solid angle.
+    pub fn power(&self) -> f64 {
+        self.cumulative.last().copied().unwrap_or(0.0)
+    }
+
+    fn pixel(&self, direction: Vec3) -> usize {
+        let theta = direction.y.clamp(-1.0, 1.0).acos();
+        let row = ((theta / PI * self.height as f32) as usize).min(self.height - 1);
+        let phi = direction.z.atan2(direction.x).rem_euclid(2.0 * PI);
+        let column = ((phi / (2.0 * PI) * self.width as f32) as usize).min(self.width - 1);
+        row * self.width + column
+    }
+
+    fn pixel_pdf(&self, index: usize) -> f32 {
+        let total = self.power();
+        if total <= 0.0 {
+            return 0.0;
+        }
+        let low = if index == 0 { 0.0 } else { self.cumulative[index - 1] };
+        let solid_angle = row_solid_angle(index / self.width, self.width, self.height);
+        ((self.cumulative[index] - low) / total / solid_angle) as f32
+    }
+}
+
+/// Cosines of the upper and lower edge of a row.
+fn row_cosines(row: usize, height: usize) -> (f64, f64) {
+    let angle = |r: usize| (std::f64::consts::PI * r as f64 / height as f64).cos();
+    (angle(row), angle(row + 1))
+}
+
+/// Solid angle of one pixel of a row.
+fn row_solid_angle(row: usize, width: usize, height: usize) -> f64 {
+    let (top, bottom) = row_cosines(row, height);
+    2.0 * std::f64::consts::PI * (top - bottom) / width as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::rng::Stream;
+
+    #[test]
+    fn sampling_matches_its_density_and_a_constant_map_integrates_to_four_pi() {
+        let mut stream = Stream::new(2, 0, 0, 0);
+        let pixels: Vec<Vec3> = (0..32).map(|i| Vec3::splat((i % 5) as f32)).collect();
+        let map = Environment::new(8, 4, pixels).expect("sizes fit");
+        let n = 20_000;
+        let (mut sum, mut missing) = (0.0f64, 0);
+        for _ in 0..n {
+            let (direction, pdf) = map.sample(stream.uniform_f64(), stream.uniform2()).expect("not black");
+            assert!((direction.length() - 1.0).abs() < 1e-5);
+            missing += u32::from((map.pdf(direction) - pdf).abs() > 1e-4 * pdf);
+            sum += f64::from(luminance(map.radiance(direction)) / pdf);
+        }
+        // Directions on a pixel's edge may round into its neighbour.
+        assert!(missing < 5, "{missing}");
+        assert!((sum / f64::from(n) / map.power() - 1.0).abs() < 1e-3);
+        let white = Environment::new(6, 3, vec![Vec3::ONE; 18]).expect("sizes fit");
+        assert!((white.power() - 4.0 * std::f64::consts::PI).abs() < 1e-6);
+        assert!(Environment::new(2, 2, vec![Vec3::ONE; 3]).is_none());
+        assert!(Environment::new(1, 1, vec![Vec3::ZERO]).expect("sizes fit").sample(0.5, [0.5; 2]).is_none());
+    }
+}

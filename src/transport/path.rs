@@ -1,0 +1,221 @@
+//! The unidirectional path tracer with next-event estimation and multiple importance sampling.
+
+use crate::math::frame::Frame;
+use crate::math::rng::Stream;
+use crate::scene::geometry::{Ray, offset_origin};
+use crate::transport::bsdf::Bsdf;
+use crate::transport::world::{SurfacePoint, World};
+use glam::Vec3;
+
+/// How paths are traced.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PathOptions {
+    /// Longest path in bounces (one bounce is direct light); 0 is emission alone.
+    pub max_bounces: u32,
+    /// Bounces before Russian roulette may end a path.
+    pub roulette_after: u32,
+    /// Whether emitters are sampled (next-event estimation).
+    pub sample_emitters: bool,
+    /// Whether emission met by BSDF sampling counts.
+    pub sample_bsdf: bool,
+}
+
+impl Default for PathOptions {
+    fn default() -> Self {
+        Self { max_bounces: u32::MAX, roulette_after: 4, sample_emitters: true, sample_bsdf: true }
+    }
+}
+
+/// What one path found.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct PathSample {
+    /// Radiance estimate.
+    pub radiance: Vec3,
+    /// Rays cast, shadow rays included.
+    pub rays: u32,
+    /// Whether the sample was dropped because it came out non-finite; its radiance is then zero.
+    pub rejected: bool,
+}
+
+/// Weight of a sample drawn with density `a` where `b` could have drawn it too: power heuristic, β = 2 (Veach 1997).
+#[inline]
+pub fn power_heuristic(a: f32, b: f32) -> f32 {
+    if a <= 0.0 {
+        return 0.0;
+    }
+    let ratio = b / a;
+    1.0 / (1.0 + ratio * ratio)
+}
+
+/// Radiance that arrives against a ray, estimated by one path.
+pub fn radiance(world: &impl World, camera_ray: &Ray, stream: &mut Stream, options: &PathOptions) -> PathSample {
+    let mut sample = PathSample::default();
+    let mut ray = *camera_ray;
+    let mut throughput = Vec3::ONE;
+    // Density of the last BSDF sample per solid angle; `None` on the camera ray, which no light sample competes with.
+    let mut bsdf_pdf: Option<f32> = None;
+    let mut bounce = 0;
+    let mut total = Vec3::ZERO;
+
+    loop {
+        // Find the next vertex.
+        sample.rays += 1;
+        let Some(surface) = world.intersect(&ray) else {
+            if let Some(environment) = world.environment() {
+                let direction = ray.direction.normalize_or_zero();
+                let weight = match bsdf_pdf {
+                    Some(pdf) => emission_weight(pdf, environment_pdf(world, direction), options),
+                    None => 1.0,
+                };
+                total += throughput * environment.radiance(direction) * weight;
+            }
+            break;
+        };
+
+        // Add what it emits towards us.
+        let wo = -ray.direction.normalize_or_zero();
+        let cos_emitter = surface.normal.dot(wo);
+        if cos_emitter > 0.0 && surface.emission != Vec3::ZERO {
+            let weight = match bsdf_pdf {
+                Some(pdf) => {
+                    let distance2 = (ray.direction * surface.t).length_squared();
+                    let solid_angle_pdf =
+                        emitter_share(world) * world.emitter_pdf(&surface) * distance2 / cos_emitter;
+                    emission_weight(pdf, solid_angle_pdf, options)
+                }
+                None => 1.0,
+            };
+            total += throughput * surface.emission * weight;
+        }
+        if bounce >= options.max_bounces {
+            break;
+        }
+
+        // Sample light from emitters directly.
+        let side = if cos_emitter < 0.0 { -1.0 } else { 1.0 };
+        let frame = Frame::around(surface.shading_normal * side);
+        let local_wo = frame.to_local(wo);
+        let bsdf = Bsdf { albedo: surface.albedo, lobe: surface.lobe };
+        if options.sample_emitters {
+            total += throughput * direct_light(world, &surface, &frame, local_wo, &bsdf, stream, options, &mut sample.rays);
+        }
+
+        // Continue the path by sampling the BSDF.
+        let Some(next) = bsdf.sample(local_wo, stream.uniform(), stream.uniform2()) else {
+            break;
+        };
+        throughput *= next.weight;
+        let wi = frame.to_world(next.wi);
+        let origin = offset_origin(surface.point, surface.normal, &surface.corners, wi);
+        ray = Ray::new(origin, wi);
+        bsdf_pdf = Some(next.pdf);
+        bounce += 1;
+
+        // End paths that carry little, without bias.
+        if bounce > options.roulette_after {
+            let survival = throughput.max_element().min(0.95);
+            if survival <= 0.0 || stream.uniform() >= survival {
+                break;
+            }
+            throughput /= survival;
+        } else if throughput.max_element() <= 0.0 {
+            break;
+        }
+    }
+
+    if total.is_finite() {
+        sample.radiance = total;
+    } else {
+        sample.rejected = true;
+    }
+    sample
+}
+
+/// Light that reaches a surface straight from an emitter and is scattered towards `local_wo`: one light sample.
+#[expect(clippy::too_many_arguments, reason = "the state of one path vertex")]
+fn direct_light(
+    world: &impl World,
+    surface: &SurfacePoint,
+    frame: &Frame,
+    local_wo: Vec3,
+    bsdf: &Bsdf,
+    stream: &mut Stream,
+    options: &PathOptions,
+    rays: &mut u32,
+) -> Vec3 {
+    let (pick, choice, u) = (stream.uniform(), stream.uniform_f64(), stream.uniform2());
+    let share = emitter_share(world);
+    if pick >= share {
+        // A direction towards the light from outside.
+        let Some((wi, pdf)) = world.environment().and_then(|e| e.sample(choice, u)) else {
+            return Vec3::ZERO;
+        };
+        let local_wi = frame.to_local(wi);
+        let scattered = bsdf.eval(local_wo, local_wi);
+        if scattered == Vec3::ZERO {
+            return Vec3::ZERO;
+        }
+        *rays += 1;
+        let ray = Ray::new(offset_origin(surface.point, surface.normal, &surface.corners, wi), wi);
+        if world.occluded(&ray) {
+            return Vec3::ZERO;
+        }
+        let pdf = pdf * (1.0 - share);
+        let radiance = world.environment().map_or(Vec3::ZERO, |e| e.radiance(wi));
+        return scattered * radiance / pdf * light_weight(pdf, bsdf.pdf(local_wo, local_wi), options);
+    }
+
+    // A point on an emitter's front side.
+    let Some(light) = world.sample_emitter(choice, u) else {
+        return Vec3::ZERO;
+    };
+    let to_light = light.point - surface.point;
+    let distance2 = to_light.length_squared();
+    let wi = to_light.normalize_or_zero();
+    let cos_emitter = -light.normal.dot(wi);
+    if cos_emitter <= 0.0 || distance2 <= 0.0 {
+        return Vec3::ZERO;
+    }
+    let local_wi = frame.to_local(wi);
+    let scattered = bsdf.eval(local_wo, local_wi);
+    if scattered == Vec3::ZERO {
+        return Vec3::ZERO;
+    }
+    *rays += 1;
+    let from = offset_origin(surface.point, surface.normal, &surface.corners, wi);
+    let to = offset_origin(light.point, light.normal, &light.corners, -wi);
+    if world.occluded(&Ray::between(from, to)) {
+        return Vec3::ZERO;
+    }
+    let pdf = share * light.pdf * distance2 / cos_emitter;
+    scattered * light.radiance / pdf * light_weight(pdf, bsdf.pdf(local_wo, local_wi), options)
+}
+
+/// Probability of sampling an emitter of the mesh rather than the light from outside.
+fn emitter_share(world: &impl World) -> f32 {
+    match (world.environment(), world.has_emitters()) {
+        (None, _) => 1.0,
+        (Some(_), false) => 0.0,
+        (Some(_), true) => 0.5,
+    }
+}
+
+/// Density per solid angle with which a direction towards outside is drawn by light sampling.
+fn environment_pdf(world: &impl World, direction: Vec3) -> f32 {
+    world.environment().map_or(0.0, |e| e.pdf(direction) * (1.0 - emitter_share(world)))
+}
+
+/// MIS weight of emission met by BSDF sampling.
+fn emission_weight(bsdf_pdf: f32, light_pdf: f32, options: &PathOptions) -> f32 {
+    match (options.sample_bsdf, options.sample_emitters) {
+        (true, true) => power_heuristic(bsdf_pdf, light_pdf),
+        // Emission that light sampling never draws is left to BSDF sampling.
+        (false, true) => f32::from(light_pdf <= 0.0),
+        _ => 1.0,
+    }
+}
+
+/// MIS weight of a light sample.
+fn light_weight(light_pdf: f32, bsdf_pdf: f32, options: &PathOptions) -> f32 {
+    if options.sample_bsdf { power_heuristic(light_pdf, bsdf_pdf) } else { 1.0 }
+}
