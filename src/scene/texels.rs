@@ -62,7 +62,7 @@ impl TexelLayout {
             row += 1;
         }
         let within = texel - row * (2 * n - row);
-        let third = if within % 2 == 0 {
+        let third = if within.is_multiple_of(2) {
             1.0 / 3.0
         } else {
             2.0 / 3.0

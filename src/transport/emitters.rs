@@ -19,7 +19,10 @@ impl FenwickTree {
     /// The tree of the given weights; what is negative or not finite counts as zero.
     pub fn new(weights: &[f64]) -> Self {
         let weights: Vec<f64> = weights.iter().map(|&w| usable(w)).collect();
-        let mut tree = Self { nodes: vec![0.0; weights.len() + 1], weights };
+        let mut tree = Self {
+            nodes: vec![0.0; weights.len() + 1],
+            weights,
+        };
         for i in 1..tree.nodes.len() {
             tree.recompute(i);
         }
@@ -59,7 +62,11 @@ impl FenwickTree {
     /// Probability of drawing an index; zero where all weights are zero.
     pub fn probability(&self, index: usize) -> f64 {
         let total = self.total();
-        if total > 0.0 { self.weights[index] / total } else { 0.0 }
+        if total > 0.0 {
+            self.weights[index] / total
+        } else {
+            0.0
+        }
     }
 
     /// Draws an index in proportion to its weight from `u` in [0, 1); `None` where all weights are zero.
@@ -78,7 +85,10 @@ impl FenwickTree {
         // Rounding of the prefix sums may end beside the weight that was meant.
         let start = position.min(n.checked_sub(1)?);
         let drawable = |&i: &usize| self.weights[i] > 0.0;
-        (0..=start).rev().find(drawable).or_else(|| (start..n).find(drawable))
+        (0..=start)
+            .rev()
+            .find(drawable)
+            .or_else(|| (start..n).find(drawable))
     }
 
     fn recompute(&mut self, i: usize) {
@@ -97,7 +107,11 @@ fn lowbit(i: usize) -> usize {
 }
 
 fn usable(weight: f64) -> f64 {
-    if weight.is_finite() && weight > 0.0 { weight } else { 0.0 }
+    if weight.is_finite() && weight > 0.0 {
+        weight
+    } else {
+        0.0
+    }
 }
 
 /// Points of one object, uniform in area.
@@ -140,10 +154,16 @@ impl Emitters {
                         sum
                     })
                     .collect();
-                AreaDistribution { triangles: object.triangles.clone(), cumulative }
+                AreaDistribution {
+                    triangles: object.triangles.clone(),
+                    cumulative,
+                }
             })
             .collect();
-        Self { tree: FenwickTree::new(weights), objects }
+        Self {
+            tree: FenwickTree::new(weights),
+            objects,
+        }
     }
 
     /// Replaces the weight of one object.
@@ -160,8 +180,16 @@ impl Emitters {
     #[inline]
     pub fn pdf(&self, object: u32) -> f32 {
         let index = object as usize;
-        let area = self.objects[index].cumulative.last().copied().unwrap_or(0.0);
-        if area > 0.0 { (self.tree.probability(index) / area) as f32 } else { 0.0 }
+        let area = self.objects[index]
+            .cumulative
+            .last()
+            .copied()
+            .unwrap_or(0.0);
+        if area > 0.0 {
+            (self.tree.probability(index) / area) as f32
+        } else {
+            0.0
+        }
     }
 
     /// Draws an object and a point on it; `None` where all weights are zero.
@@ -175,9 +203,17 @@ impl Emitters {
             .cumulative
             .partition_point(|&c| c <= target)
             .min(distribution.triangles.len() - 1);
-        let low = if index == 0 { 0.0 } else { distribution.cumulative[index - 1] };
+        let low = if index == 0 {
+            0.0
+        } else {
+            distribution.cumulative[index - 1]
+        };
         let share = distribution.cumulative[index] - low;
-        let within = if share > 0.0 { ((target - low) / share) as f32 } else { 0.0 };
+        let within = if share > 0.0 {
+            ((target - low) / share) as f32
+        } else {
+            0.0
+        };
         let triangle = distribution.triangles[index];
         let [b1, b2] = warp::uniform_triangle([within.clamp(0.0, 1.0), u[1]]);
         let [a, b, c] = scene.corners(triangle);
@@ -199,7 +235,11 @@ mod tests {
         let mut stream = Stream::new(5, 0, 0, 0);
         for _ in 0..1_000_000 {
             let i = stream.below(n);
-            let w = if stream.uniform() < 0.2 { 0.0 } else { 10f64.powf(16.0 * stream.uniform_f64() - 8.0) };
+            let w = if stream.uniform() < 0.2 {
+                0.0
+            } else {
+                10f64.powf(16.0 * stream.uniform_f64() - 8.0)
+            };
             weights[i] = w;
             tree.set(i, w);
         }
@@ -213,7 +253,9 @@ mod tests {
     #[test]
     fn zero_weights_are_never_drawn_and_others_by_their_share() {
         for n in [1usize, 2, 3, 7, 8, 9, 100] {
-            let weights: Vec<f64> = (0..n).map(|i| if i % 3 == 1 { 0.0 } else { (i + 1) as f64 }).collect();
+            let weights: Vec<f64> = (0..n)
+                .map(|i| if i % 3 == 1 { 0.0 } else { (i + 1) as f64 })
+                .collect();
             let tree = FenwickTree::new(&weights);
             let mut counts = vec![0u32; n];
             let draws = 60_000;
@@ -224,7 +266,11 @@ mod tests {
             }
             for i in 0..n {
                 let expected = tree.probability(i) * f64::from(draws);
-                assert!((f64::from(counts[i]) - expected).abs() <= 2.0, "{n} {i}: {} {expected}", counts[i]);
+                assert!(
+                    (f64::from(counts[i]) - expected).abs() <= 2.0,
+                    "{n} {i}: {} {expected}",
+                    counts[i]
+                );
                 assert!(weights[i] > 0.0 || counts[i] == 0);
             }
         }

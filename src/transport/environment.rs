@@ -27,12 +27,22 @@ impl Environment {
             .iter()
             .enumerate()
             .map(|(i, &radiance)| {
-                let weight = f64::from(luminance(radiance)) * row_solid_angle(i / width, width, height);
-                sum += if weight.is_finite() { weight.max(0.0) } else { 0.0 };
+                let weight =
+                    f64::from(luminance(radiance)) * row_solid_angle(i / width, width, height);
+                sum += if weight.is_finite() {
+                    weight.max(0.0)
+                } else {
+                    0.0
+                };
                 sum
             })
             .collect();
-        Some(Self { width, height, pixels, cumulative })
+        Some(Self {
+            width,
+            height,
+            pixels,
+            cumulative,
+        })
     }
 
     /// Radiance from a unit direction.
@@ -47,7 +57,10 @@ impl Environment {
             return None;
         }
         let target = choice * total;
-        let index = self.cumulative.partition_point(|&c| c <= target).min(self.pixels.len() - 1);
+        let index = self
+            .cumulative
+            .partition_point(|&c| c <= target)
+            .min(self.pixels.len() - 1);
         let (row, column) = (index / self.width, index % self.width);
         // Uniform in solid angle within the pixel: uniform in cosθ and φ.
         let (top, bottom) = row_cosines(row, self.height);
@@ -81,7 +94,11 @@ impl Environment {
         if total <= 0.0 {
             return 0.0;
         }
-        let low = if index == 0 { 0.0 } else { self.cumulative[index - 1] };
+        let low = if index == 0 {
+            0.0
+        } else {
+            self.cumulative[index - 1]
+        };
         let solid_angle = row_solid_angle(index / self.width, self.width, self.height);
         ((self.cumulative[index] - low) / total / solid_angle) as f32
     }
@@ -112,7 +129,9 @@ mod tests {
         let n = 20_000;
         let (mut sum, mut missing) = (0.0f64, 0);
         for _ in 0..n {
-            let (direction, pdf) = map.sample(stream.uniform_f64(), stream.uniform2()).expect("not black");
+            let (direction, pdf) = map
+                .sample(stream.uniform_f64(), stream.uniform2())
+                .expect("not black");
             assert!((direction.length() - 1.0).abs() < 1e-5);
             missing += u32::from((map.pdf(direction) - pdf).abs() > 1e-4 * pdf);
             sum += f64::from(luminance(map.radiance(direction)) / pdf);
@@ -123,6 +142,11 @@ mod tests {
         let white = Environment::new(6, 3, vec![Vec3::ONE; 18]).expect("sizes fit");
         assert!((white.power() - 4.0 * std::f64::consts::PI).abs() < 1e-6);
         assert!(Environment::new(2, 2, vec![Vec3::ONE; 3]).is_none());
-        assert!(Environment::new(1, 1, vec![Vec3::ZERO]).expect("sizes fit").sample(0.5, [0.5; 2]).is_none());
+        assert!(
+            Environment::new(1, 1, vec![Vec3::ZERO])
+                .expect("sizes fit")
+                .sample(0.5, [0.5; 2])
+                .is_none()
+        );
     }
 }

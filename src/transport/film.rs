@@ -40,7 +40,15 @@ impl Film {
 
     /// Adds `samples` paths to every pixel. Streams are keyed by (seed, frame, pixel, sample), so that the
     /// picture does not depend on threads or on how the samples are split over calls.
-    pub fn add(&mut self, world: &impl World, camera: &Camera, options: &PathOptions, seed: u64, frame: u64, samples: u32) {
+    pub fn add(
+        &mut self,
+        world: &impl World,
+        camera: &Camera,
+        options: &PathOptions,
+        seed: u64,
+        frame: u64,
+        samples: u32,
+    ) {
         let first = self.samples;
         let width = self.width as usize;
         let counts: Vec<(u64, u64)> = self
@@ -71,7 +79,11 @@ impl Film {
 
     /// Mean radiance of each pixel; zero before the first sample.
     pub fn mean(&self) -> Vec<Vec3> {
-        let scale = if self.samples == 0 { 0.0 } else { 1.0 / f64::from(self.samples) };
+        let scale = if self.samples == 0 {
+            0.0
+        } else {
+            1.0 / f64::from(self.samples)
+        };
         self.sums.iter().map(|s| (*s * scale).as_vec3()).collect()
     }
 }

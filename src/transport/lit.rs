@@ -24,7 +24,11 @@ pub struct Lit {
 
 impl Lit {
     /// A lit scene; `materials` holds one entry an object.
-    pub fn new(scene: Arc<Scene>, materials: Vec<Material>, outside: Option<Arc<Environment>>) -> Self {
+    pub fn new(
+        scene: Arc<Scene>,
+        materials: Vec<Material>,
+        outside: Option<Arc<Environment>>,
+    ) -> Self {
         let weights: Vec<f64> = scene
             .objects
             .iter()
@@ -32,7 +36,12 @@ impl Lit {
             .map(|(object, material)| object.area * f64::from(luminance(material.emission)))
             .collect();
         let emitters = Emitters::new(&scene, &weights);
-        Self { scene, materials, emitters, outside }
+        Self {
+            scene,
+            materials,
+            emitters,
+            outside,
+        }
     }
 
     /// Everything that scattering needs at a hit.

@@ -22,7 +22,12 @@ pub struct PathOptions {
 
 impl Default for PathOptions {
     fn default() -> Self {
-        Self { max_bounces: u32::MAX, roulette_after: 4, sample_emitters: true, sample_bsdf: true }
+        Self {
+            max_bounces: u32::MAX,
+            roulette_after: 4,
+            sample_emitters: true,
+            sample_bsdf: true,
+        }
     }
 }
 
@@ -48,7 +53,12 @@ pub fn power_heuristic(a: f32, b: f32) -> f32 {
 }
 
 /// Radiance that arrives against a ray, estimated by one path.
-pub fn radiance(world: &impl World, camera_ray: &Ray, stream: &mut Stream, options: &PathOptions) -> PathSample {
+pub fn radiance(
+    world: &impl World,
+    camera_ray: &Ray,
+    stream: &mut Stream,
+    options: &PathOptions,
+) -> PathSample {
     let mut sample = PathSample::default();
     let mut ray = *camera_ray;
     let mut throughput = Vec3::ONE;
@@ -80,7 +90,8 @@ pub fn radiance(world: &impl World, camera_ray: &Ray, stream: &mut Stream, optio
                 Some(pdf) => {
                     let distance2 = (ray.direction * surface.t).length_squared();
                     let solid_angle_pdf =
-                        emitter_share(world) * world.emitter_pdf(&surface) * distance2 / cos_emitter;
+                        emitter_share(world) * world.emitter_pdf(&surface) * distance2
+                            / cos_emitter;
                     emission_weight(pdf, solid_angle_pdf, options)
                 }
                 None => 1.0,
@@ -95,9 +106,22 @@ pub fn radiance(world: &impl World, camera_ray: &Ray, stream: &mut Stream, optio
         let side = if cos_emitter < 0.0 { -1.0 } else { 1.0 };
         let frame = Frame::around(surface.shading_normal * side);
         let local_wo = frame.to_local(wo);
-        let bsdf = Bsdf { albedo: surface.albedo, lobe: surface.lobe };
+        let bsdf = Bsdf {
+            albedo: surface.albedo,
+            lobe: surface.lobe,
+        };
         if options.sample_emitters {
-            total += throughput * direct_light(world, &surface, &frame, local_wo, &bsdf, stream, options, &mut sample.rays);
+            total += throughput
+                * direct_light(
+                    world,
+                    &surface,
+                    &frame,
+                    local_wo,
+                    &bsdf,
+                    stream,
+                    options,
+                    &mut sample.rays,
+                );
         }
 
         // Continue the path by sampling the BSDF.
@@ -156,13 +180,17 @@ fn direct_light(
             return Vec3::ZERO;
         }
         *rays += 1;
-        let ray = Ray::new(offset_origin(surface.point, surface.normal, &surface.corners, wi), wi);
+        let ray = Ray::new(
+            offset_origin(surface.point, surface.normal, &surface.corners, wi),
+            wi,
+        );
         if world.occluded(&ray) {
             return Vec3::ZERO;
         }
         let pdf = pdf * (1.0 - share);
         let radiance = world.environment().map_or(Vec3::ZERO, |e| e.radiance(wi));
-        return scattered * radiance / pdf * light_weight(pdf, bsdf.pdf(local_wo, local_wi), options);
+        return scattered * radiance / pdf
+            * light_weight(pdf, bsdf.pdf(local_wo, local_wi), options);
     }
 
     // A point on an emitter's front side.
@@ -202,7 +230,9 @@ fn emitter_share(world: &impl World) -> f32 {
 
 /// Density per solid angle with which a direction towards outside is drawn by light sampling.
 fn environment_pdf(world: &impl World, direction: Vec3) -> f32 {
-    world.environment().map_or(0.0, |e| e.pdf(direction) * (1.0 - emitter_share(world)))
+    world
+        .environment()
+        .map_or(0.0, |e| e.pdf(direction) * (1.0 - emitter_share(world)))
 }
 
 /// MIS weight of emission met by BSDF sampling.
@@ -217,5 +247,9 @@ fn emission_weight(bsdf_pdf: f32, light_pdf: f32, options: &PathOptions) -> f32 
 
 /// MIS weight of a light sample.
 fn light_weight(light_pdf: f32, bsdf_pdf: f32, options: &PathOptions) -> f32 {
-    if options.sample_bsdf { power_heuristic(light_pdf, bsdf_pdf) } else { 1.0 }
+    if options.sample_bsdf {
+        power_heuristic(light_pdf, bsdf_pdf)
+    } else {
+        1.0
+    }
 }

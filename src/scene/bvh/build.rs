@@ -13,7 +13,10 @@ const LARGE: usize = 2_000_000;
 
 pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Bvh {
     // Leave out what can never be hit and would spoil the boxes.
-    let corners: Vec<[Vec3; 3]> = triangles.iter().map(|t| t.map(|i| positions[i as usize])).collect();
+    let corners: Vec<[Vec3; 3]> = triangles
+        .iter()
+        .map(|t| t.map(|i| positions[i as usize]))
+        .collect();
     let (indices, primitives): (Vec<u32>, Vec<Triangle>) = corners
         .iter()
         .enumerate()
@@ -45,7 +48,13 @@ pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Bvh {
         .map(|t| t.v0.abs().max(t.v1.abs()).max(t.v2.abs()).max_element())
         .fold(0.0, f32::max);
     let margin = largest * 2.0 * f32::EPSILON;
-    let mut layout = Layout { binary: &binary, indices: &indices, corners: &corners, margin, bvh: &mut bvh };
+    let mut layout = Layout {
+        binary: &binary,
+        indices: &indices,
+        corners: &corners,
+        margin,
+        bvh: &mut bvh,
+    };
     layout.run();
     bvh
 }
@@ -120,7 +129,10 @@ impl Layout<'_> {
         let primitives = &self.binary.primitive_indices[first..first + leaf.prim_count as usize];
         let start = self.bvh.groups.len();
         for chunk in primitives.chunks(WIDTH).take(Child::MAX_GROUPS) {
-            let mut group = Group { corners: [[[0.0; WIDTH]; 3]; 3], triangles: [0; WIDTH] };
+            let mut group = Group {
+                corners: [[[0.0; WIDTH]; 3]; 3],
+                triangles: [0; WIDTH],
+            };
             for lane in 0..WIDTH {
                 let primitive = chunk[lane.min(chunk.len() - 1)];
                 let triangle = self.indices[primitive as usize];
@@ -141,6 +153,9 @@ impl Node {
     /// A node whose boxes no ray meets.
     fn empty() -> Self {
         let (low, high) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
-        Self { planes: [low, high, low, high, low, high], children: [Child::EMPTY; WIDTH] }
+        Self {
+            planes: [low, high, low, high, low, high],
+            children: [Child::EMPTY; WIDTH],
+        }
     }
 }

@@ -90,7 +90,12 @@ pub struct Bvh {
 
 impl std::fmt::Debug for Bvh {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Bvh({} triangles, {} nodes)", self.triangles, self.nodes.len())
+        write!(
+            f,
+            "Bvh({} triangles, {} nodes)",
+            self.triangles,
+            self.nodes.len()
+        )
     }
 }
 
@@ -104,7 +109,11 @@ impl Bvh {
     #[must_use]
     pub fn with_instructions(mut self, instructions: InstructionSet) -> Self {
         let available = instructions == InstructionSet::widest();
-        self.instructions = if available { instructions } else { InstructionSet::Portable };
+        self.instructions = if available {
+            instructions
+        } else {
+            InstructionSet::Portable
+        };
         self
     }
 

@@ -16,18 +16,31 @@ struct Entry {
     t: f32,
 }
 
-const NOWHERE: Entry = Entry { child: Child::EMPTY, t: f32::INFINITY };
+const NOWHERE: Entry = Entry {
+    child: Child::EMPTY,
+    t: f32::INFINITY,
+};
 
 #[inline]
 pub(super) fn intersect(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
-    let mut nearest = Hit { t: ray.t_max, triangle: u32::MAX, b1: 0.0, b2: 0.0 };
+    let mut nearest = Hit {
+        t: ray.t_max,
+        triangle: u32::MAX,
+        b1: 0.0,
+        b2: 0.0,
+    };
     dispatch(bvh, ray, &mut nearest, false);
     (nearest.triangle != u32::MAX).then_some(nearest)
 }
 
 #[inline]
 pub(super) fn occluded(bvh: &Bvh, ray: &Ray) -> bool {
-    let mut nearest = Hit { t: ray.t_max, triangle: u32::MAX, b1: 0.0, b2: 0.0 };
+    let mut nearest = Hit {
+        t: ray.t_max,
+        triangle: u32::MAX,
+        b1: 0.0,
+        b2: 0.0,
+    };
     dispatch(bvh, ray, &mut nearest, true);
     nearest.triangle != u32::MAX
 }
@@ -88,7 +101,11 @@ impl<L: Lanes> RayLanes<L> {
             usize::from(size.y > size.x)
         };
         let axes = [(z + 1) % 3, (z + 2) % 3, z];
-        let shear = [direction[axes[0]] / direction[z], direction[axes[1]] / direction[z], 1.0 / direction[z]];
+        let shear = [
+            direction[axes[0]] / direction[z],
+            direction[axes[1]] / direction[z],
+            1.0 / direction[z],
+        ];
         Self {
             origin: ray.origin.to_array().map(L::splat),
             inverse: inverse.map(L::splat),
@@ -105,7 +122,9 @@ impl<L: Lanes> RayLanes<L> {
         // Slab distances are off by at most three roundings (pbrt 4ed, 6.1.2): widen the far side by more.
         const WIDEN: f32 = 1.0 + 8.0 * f32::EPSILON;
         let plane = |axis: usize, row: usize| {
-            L::load(&node.planes[row]).sub(self.origin[axis]).mul(self.inverse[axis])
+            L::load(&node.planes[row])
+                .sub(self.origin[axis])
+                .mul(self.inverse[axis])
         };
         let near = plane(0, self.near[0])
             .max(plane(1, self.near[1]))
@@ -158,9 +177,15 @@ impl<L: Lanes> RayLanes<L> {
             let lane = candidates.trailing_zeros() as usize & (WIDTH - 1);
             candidates &= candidates - 1;
             let triangle = group.triangles[lane];
-            let tied = t[lane] == nearest.t && triangle < nearest.triangle && nearest.triangle != u32::MAX;
+            let tied =
+                t[lane] == nearest.t && triangle < nearest.triangle && nearest.triangle != u32::MAX;
             if t[lane] < nearest.t || tied {
-                *nearest = Hit { t: t[lane], triangle, b1: v[lane] / total[lane], b2: w[lane] / total[lane] };
+                *nearest = Hit {
+                    t: t[lane],
+                    triangle,
+                    b1: v[lane] / total[lane],
+                    b2: w[lane] / total[lane],
+                };
                 met = true;
             }
         }
@@ -169,7 +194,12 @@ impl<L: Lanes> RayLanes<L> {
 }
 
 #[inline(always)]
-fn traverse<L: Lanes, const ANY: bool>(bvh: &Bvh, ray: &Ray, nearest: &mut Hit, stack: &mut [Entry]) {
+fn traverse<L: Lanes, const ANY: bool>(
+    bvh: &Bvh,
+    ray: &Ray,
+    nearest: &mut Hit,
+    stack: &mut [Entry],
+) {
     if bvh.nodes.is_empty() {
         return;
     }
@@ -193,11 +223,17 @@ fn traverse<L: Lanes, const ANY: bool>(bvh: &Bvh, ray: &Ray, nearest: &mut Hit, 
             }
             let t = near.store();
             let base = depth;
-            let mut best = Entry { child: node.children[first & (WIDTH - 1)], t: t[first & (WIDTH - 1)] };
+            let mut best = Entry {
+                child: node.children[first & (WIDTH - 1)],
+                t: t[first & (WIDTH - 1)],
+            };
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize & (WIDTH - 1);
                 mask &= mask - 1;
-                let mut entry = Entry { child: node.children[lane], t: t[lane] };
+                let mut entry = Entry {
+                    child: node.children[lane],
+                    t: t[lane],
+                };
                 if entry.t < best.t {
                     std::mem::swap(&mut entry, &mut best);
                 }
