@@ -1,6 +1,7 @@
 //! Triangles grouped in objects.
 
 use glam::{DVec3, Vec2, Vec3};
+use rayon::prelude::*;
 
 /// An indexed triangle mesh whose triangles each belong to one named object.
 #[derive(Debug, Clone, Default)]
@@ -17,4 +18,36 @@ pub struct Mesh {
     pub vertex_colors: Vec<Vec3>,
     /// Texture coordinates of each triangle's corners, where the file has them; otherwise empty.
     pub corner_uvs: Vec<[Vec2; 3]>,
+}
+
+impl Mesh {
+    /// Lowest and highest corner of the bounding box; infinite and reversed for a mesh without vertices.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        self.positions
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &p| {
+                (low.min(p), high.max(p))
+            })
+    }
+
+    /// For each vertex the lowest index of a vertex at exactly its position.
+    pub fn weld(&self) -> Vec<u32> {
+        // Adding zero turns −0 into 0, so that equal positions have equal bits.
+        let key = |i: u32| {
+            (self.positions[i as usize] + DVec3::ZERO)
+                .to_array()
+                .map(f64::to_bits)
+        };
+        let mut order: Vec<u32> = (0..self.positions.len() as u32).collect();
+        order.par_sort_unstable_by_key(|&i| (key(i), i));
+        let mut welded = vec![0; order.len()];
+        let mut first = 0;
+        for (rank, &i) in order.iter().enumerate() {
+            if rank == 0 || key(order[rank - 1]) != key(i) {
+                first = i;
+            }
+            welded[i as usize] = first;
+        }
+        welded
+    }
 }

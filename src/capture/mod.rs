@@ -5,6 +5,7 @@
 pub mod camera;
 pub mod mesh;
 pub mod photograph;
+pub mod read;
 
 use crate::error::Result;
 use camera::{Intrinsics, Pose};

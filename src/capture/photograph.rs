@@ -1,6 +1,7 @@
 //! Photographs in linear light.
 
 use crate::capture::camera::Intrinsics;
+use crate::capture::read;
 use crate::error::Result;
 use glam::Vec3;
 use std::path::PathBuf;
@@ -48,18 +49,10 @@ impl PhotographSource {
     ///
     /// # Errors
     /// The file cannot be read, is no image, or has another size than the camera.
-    pub fn load(
-        &self,
-        _intrinsics: &Intrinsics,
-        _exposure: Option<f64>,
-    ) -> Result<Arc<Photograph>> {
+    pub fn load(&self, intrinsics: &Intrinsics, exposure: Option<f64>) -> Result<Arc<Photograph>> {
         match self {
             Self::Memory(photograph) => Ok(photograph.clone()),
-            Self::File(path) => Err(crate::error::Error::file(
-                path,
-                "no reader for this image yet",
-                "",
-            )),
+            Self::File(path) => read::image::read(path, intrinsics, exposure).map(Arc::new),
         }
     }
 }

@@ -1,0 +1,168 @@
+//! Keeps the paths written in a capture inside its folder.
+
+use crate::error::{Error, Result};
+use std::path::{Component, Path, PathBuf};
+
+/// Files of other formats are refused beyond this many bytes before they are read.
+const MAX_FILE_BYTES: u64 = 1 << 36;
+
+/// A folder that file paths may not leave.
+#[derive(Debug, Clone)]
+pub struct Confine {
+    folder: PathBuf,
+    canonical: PathBuf,
+    allow_outside: bool,
+}
+
+impl Confine {
+    /// Confines to `folder`, or to nothing if `allow_outside`.
+    ///
+    /// # Errors
+    /// The folder cannot be resolved.
+    pub fn new(folder: &Path, allow_outside: bool) -> Result<Self> {
+        let canonical = folder.canonicalize().map_err(|e| Error::io(folder, &e))?;
+        Ok(Self {
+            folder: folder.to_path_buf(),
+            canonical,
+            allow_outside,
+        })
+    }
+
+    /// The folder as the person named it.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The existing regular file that `path`, relative to `base` (a folder inside), leads to. `place` names the field for messages.
+    ///
+    /// # Errors
+    /// The path is empty, leaves the folder (also by a symbolic link), or leads to no regular file.
+    pub fn file_from(&self, base: &Path, place: &str, path: &str) -> Result<PathBuf> {
+        if path.is_empty() {
+            return Err(Error::new(place, "the path is empty", "name a file"));
+        }
+        let relative = Path::new(path);
+        let full = base.join(relative);
+        if !self.allow_outside && !stays_inside(&self.folder, base, relative) {
+            return Err(outside(place, path));
+        }
+        let resolved = full.canonicalize().map_err(|e| {
+            Error::new(
+                place,
+                format!("{}: {e}", full.display()),
+                "check the path and that the file is there",
+            )
+        })?;
+        if !self.allow_outside && !resolved.starts_with(&self.canonical) {
+            return Err(outside(place, path));
+        }
+        let metadata = resolved.metadata().map_err(|e| Error::io(&full, &e))?;
+        if !metadata.is_file() {
+            return Err(Error::new(
+                place,
+                format!("{} is not a regular file", full.display()),
+                "name a file",
+            ));
+        }
+        if metadata.len() > MAX_FILE_BYTES {
+            return Err(Error::file(
+                &full,
+                format!("the file is larger than {MAX_FILE_BYTES} bytes"),
+                "make it smaller",
+            ));
+        }
+        Ok(full)
+    }
+
+    /// [`Confine::file_from`] the folder itself.
+    ///
+    /// # Errors
+    /// As [`Confine::file_from`].
+    pub fn file(&self, place: &str, path: &str) -> Result<PathBuf> {
+        self.file_from(&self.folder, place, path)
+    }
+
+    /// Whether a path is one that [`Confine::file`] refuses as leaving the folder, by its letters alone.
+    pub fn leads_out(&self, path: &str) -> bool {
+        !self.allow_outside && !stays_inside(&self.folder, &self.folder, Path::new(path))
+    }
+
+    /// Whether something of this name lies in the folder.
+    pub fn holds(&self, name: &str) -> bool {
+        self.folder.join(name).symlink_metadata().is_ok()
+    }
+}
+
+fn outside(place: &str, path: &str) -> Error {
+    Error::new(
+        place,
+        format!("the path {path:?} leaves the capture's folder"),
+        "copy the file into the folder, or pass --allow-outside if you trust the capture",
+    )
+}
+
+/// Whether a relative path never climbs above the folder on its way.
+fn stays_inside(folder: &Path, base: &Path, relative: &Path) -> bool {
+    let mut depth = base
+        .strip_prefix(folder)
+        .map_or(0, |inner| inner.components().count() as i64);
+    relative.components().all(|component| {
+        match component {
+            Component::Normal(_) => depth += 1,
+            Component::CurDir => {}
+            Component::ParentDir => depth -= 1,
+            Component::RootDir | Component::Prefix(_) => return false,
+        }
+        depth >= 0
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_cannot_leave_the_folder_unless_allowed() {
+        let outer = tempfile::tempdir().unwrap();
+        let folder = outer.path().join("capture");
+        std::fs::create_dir_all(folder.join("images")).unwrap();
+        std::fs::write(outer.path().join("secret"), "x").unwrap();
+        std::fs::write(folder.join("images/a.png"), "x").unwrap();
+        let confined = Confine::new(&folder, false).unwrap();
+        assert!(confined.file("field", "images/../images/a.png").is_ok());
+        let absolute = outer.path().join("secret");
+        for path in [
+            "../secret",
+            "images/../../secret",
+            "../capture/images/a.png",
+            absolute.to_str().unwrap(),
+            "",
+        ] {
+            let error = confined.file("field", path).unwrap_err();
+            assert_eq!(error.place, "field", "{path}");
+        }
+        assert!(confined.file("field", "images").is_err());
+        assert!(confined.file("field", "images/none.png").is_err());
+        assert!(
+            Confine::new(&folder, true)
+                .unwrap()
+                .file("field", "../secret")
+                .is_ok()
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn symbolic_links_out_of_the_folder_are_refused() {
+        let outer = tempfile::tempdir().unwrap();
+        let folder = outer.path().join("capture");
+        std::fs::create_dir(&folder).unwrap();
+        std::fs::write(outer.path().join("secret"), "x").unwrap();
+        std::os::unix::fs::symlink(outer.path().join("secret"), folder.join("link")).unwrap();
+        let error = Confine::new(&folder, false)
+            .unwrap()
+            .file("field", "link")
+            .unwrap_err();
+        assert!(error.problem.contains("leaves"), "{error}");
+    }
+}

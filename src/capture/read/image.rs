@@ -1,0 +1,206 @@
+//! Photographs from EXR, Radiance HDR, PNG (8 and 16 bit) and JPEG, in linear light.
+
+use crate::capture::camera::Intrinsics;
+use crate::capture::photograph::{Encoding, Photograph};
+use crate::capture::read::exposure;
+use crate::error::{Error, Result};
+use crate::math::color::srgb_to_linear;
+use glam::Vec3;
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+/// Photographs of more pixels are refused before anything is allocated (RGB in f32: 3 GiB).
+pub const MAX_PIXELS: u64 = 1 << 28;
+
+/// What a photograph's header says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Header {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// How the values are stored.
+    pub encoding: Encoding,
+    /// Time × ISO / F² where EXIF has it.
+    pub exif_exposure: Option<f64>,
+}
+
+/// Reads a photograph's header.
+///
+/// # Errors
+/// The file cannot be read, is no image of a known format, is empty or has more than [`MAX_PIXELS`] pixels.
+pub fn header(path: &Path) -> Result<Header> {
+    let mut decoder = decoder(path)?;
+    let (width, height) = decoder.dimensions();
+    let encoding = encoding(path, decoder.color_type())?;
+    let block = decoder.exif_metadata().ok().flatten();
+    Ok(Header {
+        width,
+        height,
+        encoding,
+        exif_exposure: block.and_then(exposure::of_exif),
+    })
+}
+
+/// Reads a photograph: linear values divided by the exposure; alpha below one half, values that are no number,
+/// infinite or negative make a pixel unusable (its colour is then zero).
+///
+/// # Errors
+/// The file cannot be read, is no image, or has another size than the camera.
+pub fn read(path: &Path, intrinsics: &Intrinsics, exposure: Option<f64>) -> Result<Photograph> {
+    let decoder = decoder(path)?;
+    let (width, height) = decoder.dimensions();
+    if (width, height) != (intrinsics.width, intrinsics.height) {
+        return Err(Error::file(
+            path,
+            format!(
+                "is {width}×{height} pixels, but its camera {}×{}",
+                intrinsics.width, intrinsics.height
+            ),
+            "correct the intrinsics or use photographs of the camera's size",
+        ));
+    }
+    let encoding = encoding(path, decoder.color_type())?;
+    let decoded = DynamicImage::from_decoder(decoder).map_err(|e| broken(path, &e))?;
+    let scale = (1.0 / exposure.unwrap_or(1.0)) as f32;
+    let values = linear_values(decoded, encoding);
+
+    let mut usable = Vec::with_capacity(values.len());
+    let pixels: Vec<Vec3> = values
+        .iter()
+        .map(|&[r, g, b, alpha]| {
+            let rgb = Vec3::new(r, g, b) * scale;
+            let good = rgb.is_finite() && rgb.min_element() >= 0.0 && alpha >= 0.5;
+            usable.push(good);
+            if good { rgb } else { Vec3::ZERO }
+        })
+        .collect();
+    if usable.iter().all(|&good| good) {
+        usable.clear();
+    }
+    Ok(Photograph {
+        width,
+        height,
+        pixels,
+        usable,
+        encoding,
+        saturation: match encoding {
+            Encoding::Linear => f32::INFINITY,
+            Encoding::Srgb8 | Encoding::Srgb16 => scale,
+        },
+    })
+}
+
+/// Opens the decoder that the file's first bytes ask for, with its size checked and its memory limited.
+fn decoder(path: &Path) -> Result<impl ImageDecoder> {
+    let file = File::open(path).map_err(|e| Error::io(path, &e))?;
+    let mut reader = ImageReader::new(BufReader::new(file))
+        .with_guessed_format()
+        .map_err(|e| Error::io(path, &e))?;
+    match reader.format() {
+        Some(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Hdr | ImageFormat::OpenExr) => {}
+        _ => {
+            return Err(Error::file(
+                path,
+                "is no EXR, HDR, PNG or JPEG image",
+                "convert it to one of these",
+            ));
+        }
+    }
+    if reader.format() == Some(ImageFormat::OpenExr) {
+        check_exr_windows(path)?;
+    }
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(MAX_PIXELS * 16 * 2);
+    reader.limits(limits);
+    let decoder = reader.into_decoder().map_err(|e| broken(path, &e))?;
+    let (width, height) = decoder.dimensions();
+    check_size(path, u64::from(width), u64::from(height))?;
+    Ok(decoder)
+}
+
+/// An EXR may store another rectangle than it shows; both must be of a size that can be held.
+fn check_exr_windows(path: &Path) -> Result<()> {
+    let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|e| {
+        Error::file(
+            path,
+            format!("is a broken EXR file: {e}"),
+            "export it again",
+        )
+    })?;
+    for header in &meta.headers {
+        let stored = header.layer_size;
+        let shown = header.shared_attributes.display_window.size;
+        for size in [stored, shown] {
+            check_size(path, size.x() as u64, size.y() as u64)?;
+        }
+    }
+    Ok(())
+}
+
+fn check_size(path: &Path, width: u64, height: u64) -> Result<()> {
+    if width.saturating_mul(height) == 0 {
+        return Err(Error::file(path, "has no pixels", "export it again"));
+    }
+    if width.saturating_mul(height) > MAX_PIXELS {
+        return Err(Error::file(
+            path,
+            format!("claims {width}×{height} pixels, more than the {MAX_PIXELS} that are read"),
+            "make it smaller",
+        ));
+    }
+    Ok(())
+}
+
+fn encoding(path: &Path, color: ColorType) -> Result<Encoding> {
+    match color {
+        ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => Ok(Encoding::Srgb8),
+        ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => {
+            Ok(Encoding::Srgb16)
+        }
+        ColorType::Rgb32F | ColorType::Rgba32F => Ok(Encoding::Linear),
+        _ => Err(Error::file(
+            path,
+            format!("the pixel format {color:?} is not supported"),
+            "convert it to RGB",
+        )),
+    }
+}
+
+/// Linear red, green, blue and alpha of every pixel.
+fn linear_values(image: DynamicImage, encoding: Encoding) -> Vec<[f32; 4]> {
+    match encoding {
+        Encoding::Linear => image.into_rgba32f().pixels().map(|p| p.0).collect(),
+        Encoding::Srgb8 => {
+            let table: [f32; 256] = std::array::from_fn(|i| srgb_to_linear(i as f32 / 255.0));
+            let decode = |v: u8| table[usize::from(v)];
+            let rgba = image.into_rgba8();
+            rgba.pixels()
+                .map(|p| {
+                    let [r, g, b, a] = p.0;
+                    [decode(r), decode(g), decode(b), f32::from(a) / 255.0]
+                })
+                .collect()
+        }
+        Encoding::Srgb16 => {
+            let decode = |v: u16| srgb_to_linear(f32::from(v) / 65535.0);
+            let rgba = image.into_rgba16();
+            rgba.pixels()
+                .map(|p| {
+                    let [r, g, b, a] = p.0;
+                    [decode(r), decode(g), decode(b), f32::from(a) / 65535.0]
+                })
+                .collect()
+        }
+    }
+}
+
+fn broken(path: &Path, error: &image::ImageError) -> Error {
+    Error::file(
+        path,
+        format!("cannot be decoded: {error}"),
+        "export it again",
+    )
+}

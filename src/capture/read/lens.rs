@@ -1,0 +1,140 @@
+//! Intrinsics as transforms.json writes them: shared fields, overruled frame by frame.
+
+use crate::capture::camera::Intrinsics;
+use crate::capture::read::fields::Fields;
+use crate::error::{Error, Result};
+use glam::DVec2;
+
+/// Coefficients of lens models that relit does not have; they may be present but must be zero.
+const HIGHER_COEFFICIENTS: [&str; 8] = ["k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"];
+
+/// Reads the lens of one frame for an image of `size` (width, height) pixels.
+///
+/// Returns remarks about what had to be guessed.
+///
+/// # Errors
+/// A lens model other than pinhole with k1 k2 p1 p2, no focal length, a size other than the image's, numbers out of range.
+pub fn read(
+    shared: &Fields,
+    frame: &Fields,
+    size: [u32; 2],
+) -> Result<(Intrinsics, Vec<&'static str>)> {
+    let mut remarks = Vec::new();
+    let of = |name: &str| -> &Fields {
+        if frame.get(name).is_some() {
+            frame
+        } else {
+            shared
+        }
+    };
+    let number = |name: &str| of(name).number(name);
+
+    // The lens model.
+    let fields = of("camera_model");
+    match fields.text("camera_model")?.map(str::to_ascii_uppercase) {
+        None => {}
+        Some(model) => match model.as_str() {
+            "PINHOLE" | "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" | "OPENCV" => {}
+            _ => {
+                return Err(Error::new(
+                    fields.place("camera_model"),
+                    format!("the lens model {model:?} is not supported"),
+                    "undistort the photographs to PINHOLE or OPENCV first",
+                ));
+            }
+        },
+    }
+    for name in HIGHER_COEFFICIENTS {
+        if number(name)?.is_some_and(|k| k != 0.0) {
+            return Err(Error::new(
+                of(name).place(name),
+                "this lens coefficient is not supported",
+                "undistort the photographs first, or refit the lens with k1 k2 p1 p2",
+            ));
+        }
+    }
+
+    // The size must be the image's own.
+    let [width, height] = size;
+    for (name, actual) in [("w", width), ("h", height)] {
+        if let Some(stated) = of(name).count(name)?
+            && stated != actual
+        {
+            return Err(Error::new(
+                of(name).place(name),
+                format!("is {stated}, but the photograph is {width}×{height} pixels"),
+                "correct the intrinsics or use photographs of the camera's size",
+            ));
+        }
+    }
+
+    // Focal length in pixels, or from the field of view.
+    let half = |extent: u32, angle: f64| f64::from(extent) * 0.5 / (angle * 0.5).tan();
+    let fx = match (number("fl_x")?, number("camera_angle_x")?) {
+        (Some(f), _) => f,
+        (None, Some(angle)) => half(width, angle),
+        (None, None) => {
+            return Err(Error::new(
+                frame.place("fl_x"),
+                "there is neither fl_x nor camera_angle_x",
+                "give the focal length in pixels",
+            ));
+        }
+    };
+    let fy = match (number("fl_y")?, number("camera_angle_y")?) {
+        (Some(f), _) => f,
+        (None, Some(angle)) => half(height, angle),
+        (None, None) => {
+            remarks.push("fl_y is absent and taken equal to fl_x");
+            fx
+        }
+    };
+    let mut center = |name: &str, extent: u32| -> Result<f64> {
+        Ok(match number(name)? {
+            Some(c) => c,
+            None => {
+                remarks.push("cx or cy is absent and taken as the middle of the photograph");
+                f64::from(extent) * 0.5
+            }
+        })
+    };
+    let (cx, cy) = (center("cx", width)?, center("cy", height)?);
+    let mut distortion = [0.0; 4];
+    for (value, name) in distortion.iter_mut().zip(["k1", "k2", "p1", "p2"]) {
+        *value = number(name)?.unwrap_or(0.0);
+    }
+    for (name, f) in [("fl_x", fx), ("fl_y", fy)] {
+        if !(f.is_finite() && f > 0.0) {
+            return Err(Error::new(
+                of(name).place(name),
+                format!("a focal length of {f} pixels is impossible"),
+                "give a positive focal length in pixels",
+            ));
+        }
+    }
+    let intrinsics = Intrinsics {
+        width,
+        height,
+        fx,
+        fy,
+        cx,
+        cy,
+        distortion,
+    };
+    if !invertible(&intrinsics) {
+        remarks
+            .push("the lens distortion turns back inside the photograph; its corners may be wrong");
+    }
+    Ok((intrinsics, remarks))
+}
+
+/// Whether the distortion can be undone at the photograph's corners and edges, to a tenth of a pixel.
+fn invertible(k: &Intrinsics) -> bool {
+    let (w, h) = (f64::from(k.width), f64::from(k.height));
+    (0..9).all(|i| {
+        let pixel = DVec2::new(w * f64::from(i % 3) * 0.5, h * f64::from(i / 3) * 0.5);
+        let distorted = DVec2::new((pixel.x - k.cx) / k.fx, (pixel.y - k.cy) / k.fy);
+        k.distort(k.undistort(distorted))
+            .is_some_and(|d| ((d - distorted) * DVec2::new(k.fx, k.fy)).length() < 0.1)
+    })
+}

@@ -1,0 +1,170 @@
+//! What every mesh reader hands over, and the checks that all of them share.
+
+use crate::capture::mesh::Mesh;
+use crate::capture::read::confine::Confine;
+use crate::capture::read::obj;
+use crate::error::{Error, Result};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::collections::HashSet;
+use std::path::Path;
+
+/// A mesh as a file holds it, before it is checked.
+#[derive(Debug, Default)]
+pub struct RawMesh {
+    /// Geometry and objects; `objects` may hold equal or empty names.
+    pub mesh: Mesh,
+    /// Whether the file says which triangle belongs to which object.
+    pub has_objects: bool,
+    /// Largest rounding of a position that the file's own number format causes, in the capture's units.
+    pub rounding: f64,
+    /// What was odd.
+    pub warnings: Vec<String>,
+}
+
+/// Reads and checks a mesh.
+///
+/// # Errors
+/// The format is unknown, the file is broken, a vertex is not finite, an index is out of range, or there is no triangle.
+pub fn read(path: &Path, confine: &Confine, warnings: &mut Vec<String>) -> Result<RawMesh> {
+    let extension = path
+        .extension()
+        .map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let mut raw = match extension.as_deref() {
+        Some("obj") => obj::read(path)?,
+        _ => {
+            return Err(Error::file(
+                path,
+                "is no OBJ, PLY, GLB or glTF mesh",
+                "convert it to one of these",
+            ));
+        }
+    };
+    let _ = confine;
+    check(path, &raw.mesh)?;
+    for warning in raw.warnings.drain(..) {
+        warnings.push(format!("{}: {warning}", path.display()));
+    }
+    make_names_unique(path, &mut raw.mesh.objects, warnings);
+    remark_on_triangles(path, &raw, warnings);
+    Ok(raw)
+}
+
+/// Refuses what no scene can be built from.
+fn check(path: &Path, mesh: &Mesh) -> Result<()> {
+    if mesh.triangles.is_empty() {
+        return Err(Error::file(
+            path,
+            "the mesh has no triangles",
+            "export it with faces",
+        ));
+    }
+    if let Some(index) = mesh.positions.iter().position(|p| !p.is_finite()) {
+        return Err(Error::file(
+            path,
+            format!(
+                "vertex {index} (counted from 0) is not finite: {}",
+                mesh.positions[index]
+            ),
+            "repair the mesh",
+        ));
+    }
+    let count = mesh.positions.len();
+    let bad = mesh
+        .triangles
+        .iter()
+        .position(|t| t.iter().any(|&i| i as usize >= count));
+    if let Some(index) = bad {
+        return Err(Error::file(
+            path,
+            format!(
+                "triangle {index} (counted from 0) refers to a vertex beyond the {count} there are"
+            ),
+            "repair the mesh",
+        ));
+    }
+    Ok(())
+}
+
+/// Gives repeated names a number and empty ones a name.
+fn make_names_unique(path: &Path, names: &mut [String], warnings: &mut Vec<String>) {
+    let mut taken: HashSet<String> = names.iter().cloned().collect();
+    let mut seen = HashSet::new();
+    let mut next = std::collections::HashMap::<String, usize>::new();
+    let mut renamed = 0;
+    for name in names.iter_mut() {
+        if name.is_empty() {
+            *name = "unnamed".into();
+            taken.insert(name.clone());
+        }
+        if seen.insert(name.clone()) {
+            continue;
+        }
+        let number = next.entry(name.clone()).or_insert(1);
+        let unique = loop {
+            let candidate = format!("{name}.{number:03}");
+            *number += 1;
+            if taken.insert(candidate.clone()) {
+                break candidate;
+            }
+        };
+        seen.insert(unique.clone());
+        *name = unique;
+        renamed += 1;
+    }
+    if renamed > 0 {
+        warnings.push(format!(
+            "{}: {renamed} objects had the name of another one and got a number",
+            path.display()
+        ));
+    }
+}
+
+/// Counts triangles that are there twice or have no area, and says where the file's numbers are too coarse.
+fn remark_on_triangles(path: &Path, raw: &RawMesh, warnings: &mut Vec<String>) {
+    let mesh = &raw.mesh;
+    let place = path.display();
+    let flat = mesh
+        .triangles
+        .par_iter()
+        .filter(|t| {
+            let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+            (b - a).cross(c - a) == DVec3::ZERO
+        })
+        .count();
+    if flat > 0 {
+        warnings.push(format!("{place}: {flat} triangles have no area"));
+    }
+    let twice = duplicates(mesh);
+    if twice > 0 {
+        warnings.push(format!(
+            "{place}: {twice} triangles lie exactly upon another one"
+        ));
+    }
+    let (low, high) = mesh.bounds();
+    // Half a unit in the last place of f32 is 2⁻²⁵ of a number; a mesh about the origin has 2⁻²⁵ of its own size.
+    if raw.rounding > 16.0 * (high - low).length() * f64::from(f32::EPSILON) {
+        warnings.push(format!(
+            "{place}: the mesh lies far from the origin in single precision; positions are rounded by up to {:.1e}, {:.1e} of its size",
+            raw.rounding,
+            raw.rounding / (high - low).length()
+        ));
+    }
+}
+
+/// Number of triangles whose corners coincide with those of an earlier one, in any order.
+fn duplicates(mesh: &Mesh) -> usize {
+    let welded = mesh.weld();
+    let mut keys: Vec<[u32; 3]> = mesh
+        .triangles
+        .par_iter()
+        .map(|t| {
+            let mut key = t.map(|i| welded[i as usize]);
+            key.sort_unstable();
+            key
+        })
+        .filter(|[a, b, c]| a != b && b != c)
+        .collect();
+    keys.par_sort_unstable();
+    keys.windows(2).filter(|pair| pair[0] == pair[1]).count()
+}

@@ -1,0 +1,76 @@
+//! Reads a capture from a folder: transforms.json, a mesh, and photographs (which are read when needed).
+//!
+//! ```text
+//! transforms.json     camera_model, w, h, fl_x, fl_y, cx, cy, [k1 k2 p1 p2], frames[{file_path,
+//!                     transform_matrix (camera-to-world, x right, y up, looking down -z),
+//!                     optional per-frame intrinsics, optional exposure}], optional mesh_path, up
+//! mesh.obj|ply|glb    objects = OBJ `o`/`g`, glTF nodes, or a per-face `object_id` in PLY
+//! images/*            .exr, .hdr (linear), .png, .jpg (sRGB)
+//! ```
+//!
+//! A capture from someone else is data: nothing outside its folder is opened unless the person allows it, and no
+//! header is believed before it was compared with the file's length or the camera's size.
+
+pub mod confine;
+mod exposure;
+mod fields;
+pub mod image;
+mod lens;
+mod mesh;
+mod obj;
+mod pose;
+mod transforms;
+
+use crate::capture::Capture;
+use crate::error::{Error, Result};
+use confine::Confine;
+use glam::DVec3;
+use std::path::Path;
+
+/// What a person may choose about reading.
+#[derive(Debug, Clone, Default)]
+pub struct ReadOptions {
+    /// Overrules the cameras' mean up; need not be of unit length.
+    pub up: Option<DVec3>,
+    /// About how many segments a mesh without objects is cut into; 1 leaves it whole.
+    pub segments: Option<usize>,
+    /// Lets file paths inside the capture lead out of its folder.
+    pub allow_outside: bool,
+}
+
+/// Reads the capture in `folder`. Photographs are checked (they exist and have their camera's size) but not decoded.
+///
+/// # Errors
+/// Anything that leaves no capture to work on: a missing or broken transforms.json, a pose that is no rigid motion, a
+/// photograph of another size than its camera, no mesh, a broken mesh, a path that leaves the folder.
+pub fn read(folder: &Path, options: &ReadOptions) -> Result<Capture> {
+    if !folder.is_dir() {
+        return Err(Error::file(
+            folder,
+            "is not a folder",
+            "name the folder that holds transforms.json",
+        ));
+    }
+    let confine = Confine::new(folder, options.allow_outside)?;
+    let mut warnings = Vec::new();
+    let transforms = transforms::read(&confine, options.up, &mut warnings)?;
+    let mesh = mesh::read(&transforms.mesh, &confine, &mut warnings)?.mesh;
+    Ok(Capture {
+        name: name_of(folder),
+        folder: Some(folder.to_path_buf()),
+        mesh,
+        frames: transforms.frames,
+        up: transforms.up,
+        warnings,
+    })
+}
+
+/// The folder's own name, also of `.` and `..`.
+fn name_of(folder: &Path) -> String {
+    let absolute = folder.canonicalize();
+    let path = absolute.as_deref().unwrap_or(folder);
+    path.file_name().map_or_else(
+        || path.display().to_string(),
+        |name| name.to_string_lossy().into_owned(),
+    )
+}

@@ -1,0 +1,123 @@
+//! Wavefront OBJ: every `o` or `g` is an object. Parsed by tobj; materials are not needed here and not opened.
+
+use crate::capture::read::mesh::RawMesh;
+use crate::error::{Error, Result};
+use glam::{DVec3, Vec2, Vec3};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+/// The name tobj gives to faces before the first `o` or `g`.
+const UNNAMED: &str = "unnamed_object";
+
+/// Reads an OBJ file; polygons become fans of triangles.
+///
+/// # Errors
+/// The file cannot be read or breaks the format, with the number of the line where that showed.
+pub fn read(path: &Path) -> Result<RawMesh> {
+    let file = File::open(path).map_err(|e| Error::io(path, &e))?;
+    parse(path, BufReader::new(file))
+}
+
+fn parse(path: &Path, reader: impl BufRead) -> Result<RawMesh> {
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+        ..tobj::LoadOptions::default()
+    };
+    let mut lines = CountLines::new(reader);
+    let no_materials = |_: &Path| Ok((Vec::new(), Default::default()));
+    let (models, _) = tobj::load_obj_buf(&mut lines, &options, no_materials).map_err(|e| {
+        let problem = match e {
+            tobj::LoadError::FaceVertexOutOfBounds
+            | tobj::LoadError::FaceTexCoordOutOfBounds
+            | tobj::LoadError::FaceNormalOutOfBounds
+            | tobj::LoadError::FaceColorOutOfBounds => {
+                format!("{e}, in the object that ends before line {}", lines.line)
+            }
+            _ => format!("line {}: {e}", lines.line),
+        };
+        Error::file(path, problem, "repair the mesh")
+    })?;
+
+    let mut raw = RawMesh::default();
+    let mesh = &mut raw.mesh;
+    let colored = models.iter().any(|m| !m.mesh.vertex_color.is_empty());
+    let textured = models.iter().any(|m| !m.mesh.texcoords.is_empty());
+    for model in models {
+        let part = model.mesh;
+        if part.indices.is_empty() {
+            continue;
+        }
+        let first = u32::try_from(mesh.positions.len()).map_err(|_| too_large(path))?;
+        let object = mesh.objects.len() as u32;
+        mesh.positions
+            .extend(part.positions.chunks_exact(3).map(DVec3::from_slice));
+        if u32::try_from(mesh.positions.len()).is_err() {
+            return Err(too_large(path));
+        }
+        let corners = |indices: &[u32]| [indices[0], indices[1], indices[2]];
+        let triangles = part.indices.chunks_exact(3).map(corners);
+        mesh.triangles
+            .extend(triangles.map(|t| t.map(|i| first + i)));
+        mesh.object_of.resize(mesh.triangles.len(), object);
+        if colored {
+            let color = |c: &[f64]| DVec3::from_slice(c).as_vec3();
+            mesh.vertex_colors
+                .extend(part.vertex_color.chunks_exact(3).map(color));
+            mesh.vertex_colors.resize(mesh.positions.len(), Vec3::ONE);
+        }
+        if textured {
+            let uvs: Vec<Vec2> = part
+                .texcoords
+                .chunks_exact(2)
+                .map(|uv| Vec2::new(uv[0] as f32, uv[1] as f32))
+                .collect();
+            let uv = |i: u32| uvs.get(i as usize).copied().unwrap_or_default();
+            let corners = part.texcoord_indices.chunks_exact(3).map(corners);
+            mesh.corner_uvs.extend(corners.map(|t| t.map(uv)));
+            mesh.corner_uvs
+                .resize(mesh.triangles.len(), [Vec2::ZERO; 3]);
+        }
+        mesh.objects.push(model.name);
+    }
+    raw.has_objects = mesh.objects.iter().any(|name| name != UNNAMED);
+    Ok(raw)
+}
+
+fn too_large(path: &Path) -> Error {
+    Error::file(path, "has more than 2³² vertices", "make the mesh smaller")
+}
+
+/// Counts the lines that pass, so that an error can name one.
+struct CountLines<R> {
+    inner: R,
+    line: usize,
+}
+
+impl<R> CountLines<R> {
+    fn new(inner: R) -> Self {
+        Self { inner, line: 0 }
+    }
+}
+
+impl<R: BufRead> Read for CountLines<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        self.inner.read(buffer)
+    }
+}
+
+impl<R: BufRead> BufRead for CountLines<R> {
+    fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
+        self.inner.fill_buf()
+    }
+
+    fn consume(&mut self, amount: usize) {
+        if let Ok(buffer) = self.inner.fill_buf() {
+            let passed = &buffer[..amount.min(buffer.len())];
+            self.line += passed.iter().filter(|&&byte| byte == b'\n').count();
+        }
+        self.inner.consume(amount);
+    }
+}

@@ -1,0 +1,246 @@
+//! transforms.json: cameras, photographs, exposures, the way to the mesh, and which way is up.
+
+use crate::capture::Frame;
+use crate::capture::photograph::PhotographSource;
+use crate::capture::read::confine::Confine;
+use crate::capture::read::fields::Fields;
+use crate::capture::read::{exposure, image, lens, pose};
+use crate::error::{Error, Result};
+use glam::DVec3;
+use rayon::prelude::*;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Longest transforms.json that is read.
+const MAX_BYTES: u64 = 1 << 28;
+/// The mesh, where `mesh_path` does not name one, in this order.
+const MESH_NAMES: [&str; 3] = ["mesh.glb", "mesh.ply", "mesh.obj"];
+/// Metres per unit of a depth image where the file does not say (16-bit millimetres).
+const DEPTH_UNIT: f64 = 0.001;
+
+/// What transforms.json says.
+#[derive(Debug)]
+pub struct Transforms {
+    /// Posed photographs in file order.
+    pub frames: Vec<Frame>,
+    /// Where the mesh is.
+    pub mesh: PathBuf,
+    /// Unit up vector.
+    pub up: DVec3,
+}
+
+/// Reads transforms.json and the headers of the photographs it names.
+///
+/// # Errors
+/// See [`crate::capture::read::read`].
+pub fn read(
+    confine: &Confine,
+    up: Option<DVec3>,
+    warnings: &mut Vec<String>,
+) -> Result<Transforms> {
+    let path = confine.folder().join("transforms.json");
+    let place = path.display().to_string();
+    let file = confine.file(&place, "transforms.json")?;
+    let length = file.metadata().map_err(|e| Error::io(&file, &e))?.len();
+    if length > MAX_BYTES {
+        return Err(Error::file(
+            &file,
+            format!("{length} bytes are more than the {MAX_BYTES} that are read"),
+            "split the capture",
+        ));
+    }
+    let text = std::fs::read(&file).map_err(|e| Error::io(&file, &e))?;
+    let value: Value = serde_json::from_slice(&text)
+        .map_err(|e| Error::file(&file, format!("is not valid JSON: {e}"), "correct the file"))?;
+    let shared = Fields::new(format!("{place}: "), &value)?;
+
+    let frames = read_frames(confine, &shared, warnings)?;
+    let mesh = find_mesh(confine, &shared)?;
+    if shared.get("applied_transform").is_some() {
+        warnings.push(format!(
+            "{place}: applied_transform is not applied; mesh and poses are taken to share one coordinate system"
+        ));
+    }
+    let up = match up {
+        Some(up) => unit(up, "--up")?,
+        None => match shared.vector("up")? {
+            Some(up) => unit(up, &shared.place("up"))?,
+            None => mean_up(&frames, &place, warnings),
+        },
+    };
+    Ok(Transforms { frames, mesh, up })
+}
+
+/// Reads all frames in parallel and gathers their remarks, each once with the number of frames concerned.
+fn read_frames(
+    confine: &Confine,
+    shared: &Fields,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Frame>> {
+    let place = shared.place("frames");
+    let entries = shared
+        .get("frames")
+        .and_then(Value::as_array)
+        .ok_or_else(|| Error::new(&place, "is no list of frames", "add the photographs"))?;
+    if entries.is_empty() {
+        return Err(Error::new(&place, "is empty", "add the photographs"));
+    }
+    let results: Vec<Result<(Frame, image::Header, Vec<String>)>> = entries
+        .par_iter()
+        .enumerate()
+        .map(|(index, entry)| {
+            let fields = Fields::new(format!("{place}[{index}]."), entry)?;
+            read_frame(confine, shared, &fields)
+        })
+        .collect();
+
+    let mut frames = Vec::with_capacity(results.len());
+    let mut headers = Vec::with_capacity(results.len());
+    let mut remarks: BTreeMap<String, (usize, usize)> = BTreeMap::new();
+    for (index, result) in results.into_iter().enumerate() {
+        let (frame, header, said) = result?;
+        for remark in said {
+            remarks.entry(remark).or_insert((index, 0)).1 += 1;
+        }
+        frames.push(frame);
+        headers.push(header);
+    }
+    for (remark, (first, count)) in remarks {
+        warnings.push(match count {
+            1 => format!("{place}[{first}]: {remark}"),
+            _ => format!("{place}[{first}] and {} more: {remark}", count - 1),
+        });
+    }
+    exposure::from_exif(&mut frames, &headers, &place, warnings);
+    Ok(frames)
+}
+
+/// Reads one entry of `frames`.
+fn read_frame(
+    confine: &Confine,
+    shared: &Fields,
+    fields: &Fields,
+) -> Result<(Frame, image::Header, Vec<String>)> {
+    let place = fields.place("file_path");
+    let name = fields
+        .text("file_path")?
+        .ok_or_else(|| Error::new(&place, "is absent", "name the photograph"))?;
+    let photograph = confine.file(&place, name)?;
+    let header = image::header(&photograph)?;
+    let (intrinsics, said) = lens::read(shared, fields, [header.width, header.height])?;
+    let mut remarks: Vec<String> = said.into_iter().map(str::to_owned).collect();
+
+    let place = fields.place("transform_matrix");
+    let rows = fields
+        .matrix("transform_matrix")?
+        .ok_or_else(|| Error::new(&place, "is absent", "add the camera-to-world matrix"))?;
+    let (pose, remark) = pose::from_rows(&rows).map_err(|problem| {
+        Error::new(
+            &place,
+            format!("the matrix {problem}"),
+            "give the camera-to-world rotation and position",
+        )
+    })?;
+    remarks.extend(remark.map(|r| format!("transform_matrix {r}")));
+
+    let source = if fields.get("exposure").is_some() {
+        fields
+    } else {
+        shared
+    };
+    let exposure = source.number("exposure")?;
+    if let Some(value) = exposure
+        && value <= 0.0
+    {
+        return Err(Error::new(
+            source.place("exposure"),
+            format!("an exposure of {value} is impossible"),
+            "give a positive multiplier",
+        ));
+    }
+    if fields.get("mask_path").is_some() {
+        remarks.push("mask_path is not read; put the mask into the photograph's alpha".into());
+    }
+    let depth = read_depth(confine, shared, fields, &mut remarks)?;
+    let frame = Frame {
+        intrinsics,
+        pose,
+        exposure,
+        photograph: PhotographSource::File(photograph),
+        depth,
+    };
+    Ok((frame, header, remarks))
+}
+
+/// The frame's depth image, if it is there.
+fn read_depth(
+    confine: &Confine,
+    shared: &Fields,
+    fields: &Fields,
+    remarks: &mut Vec<String>,
+) -> Result<Option<(PathBuf, f64)>> {
+    let Some(name) = fields.text("depth_file_path")? else {
+        return Ok(None);
+    };
+    let scale = match fields.number("depth_unit_scale_factor")? {
+        Some(scale) => Some(scale),
+        None => shared.number("depth_unit_scale_factor")?,
+    };
+    let scale = scale.unwrap_or_else(|| {
+        remarks.push("depth_unit_scale_factor is absent and taken as 0.001 (millimetres)".into());
+        DEPTH_UNIT
+    });
+    let place = fields.place("depth_file_path");
+    if scale <= 0.0 {
+        return Err(Error::new(
+            shared.place("depth_unit_scale_factor"),
+            format!("a depth unit of {scale} is impossible"),
+            "give the metres per unit",
+        ));
+    }
+    if !confine.holds(name) && !confine.leads_out(name) {
+        remarks.push("the depth image is missing".into());
+        return Ok(None);
+    }
+    Ok(Some((confine.file(&place, name)?, scale)))
+}
+
+/// The mesh named by `mesh_path`, or the first of the usual names.
+fn find_mesh(confine: &Confine, shared: &Fields) -> Result<PathBuf> {
+    let place = shared.place("mesh_path");
+    if let Some(name) = shared.text("mesh_path")? {
+        return confine.file(&place, name);
+    }
+    match MESH_NAMES.iter().find(|name| confine.holds(name)) {
+        Some(name) => confine.file(&place, name),
+        None => Err(Error::new(
+            place,
+            "is absent, and there is no mesh.glb, mesh.ply or mesh.obj",
+            "put the mesh beside transforms.json or name it in mesh_path",
+        )),
+    }
+}
+
+fn unit(up: DVec3, place: &str) -> Result<DVec3> {
+    up.try_normalize()
+        .ok_or_else(|| Error::new(place, "the up vector has no length", "give a direction"))
+}
+
+/// The cameras' mean up. Where it vanishes, +y is taken and said.
+fn mean_up(frames: &[Frame], place: &str, warnings: &mut Vec<String>) -> DVec3 {
+    let sum: DVec3 = frames.iter().map(|frame| frame.pose.rotation.y_axis).sum();
+    // Cameras in all attitudes leave a mean of the order of its own noise, which says nothing.
+    let noise = (frames.len() as f64).sqrt();
+    if frames.len() > 2 && sum.length() < noise {
+        warnings.push(format!(
+            "{place}: the cameras point every way, so their mean up is a guess; pass --up"
+        ));
+    }
+    sum.try_normalize().unwrap_or_else(|| {
+        warnings.push(format!(
+            "{place}: the cameras' up vectors cancel; +y is taken as up; pass --up"
+        ));
+        DVec3::Y
+    })
+}

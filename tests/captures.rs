@@ -1,0 +1,44 @@
+//! Reads the captures beside the repository, where they are present.
+
+use relit::capture::photograph::Encoding;
+use relit::capture::read::{ReadOptions, read};
+use relit::scene::Scene;
+use std::path::PathBuf;
+
+/// The folder of a capture, or a line saying that it is absent.
+fn capture(name: &str) -> Option<PathBuf> {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("../shared/captures")
+        .join(name);
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    println!("skipped: ../shared/captures/{name} is absent");
+    None
+}
+
+#[test]
+fn rendered_rooms_load_with_objects_and_linear_photographs() {
+    for (name, objects, triangles, frames, pixels) in [
+        ("cornell", 8, 36, 5, 128 * 128),
+        ("staircase", 31, 31_131, 16, 256 * 192),
+    ] {
+        let Some(folder) = capture(name) else {
+            continue;
+        };
+        let capture = read(&folder, &ReadOptions::default()).unwrap();
+        assert_eq!(capture.name, name);
+        assert_eq!(capture.mesh.objects.len(), objects);
+        assert_eq!(capture.mesh.triangles.len(), triangles);
+        assert_eq!(capture.frames.len(), frames);
+        assert!(capture.up.y > 0.9, "{}", capture.up);
+        let photograph = capture.frames[0].load().unwrap();
+        assert_eq!(photograph.encoding, Encoding::Linear);
+        assert_eq!(photograph.pixels.len(), pixels);
+        let sum: f32 = photograph.pixels.iter().map(|p| p.x + p.y + p.z).sum();
+        assert!(sum.is_finite() && sum > 0.0);
+        let scene = Scene::new(&capture).unwrap();
+        assert_eq!(scene.cameras.len(), frames);
+        println!("{name}: {:?}", capture.warnings);
+    }
+}
