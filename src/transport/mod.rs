@@ -6,5 +6,6 @@ pub mod environment;
 pub mod film;
 pub mod lit;
 pub mod material;
+pub mod microfacet;
 pub mod path;
 pub mod world;
