@@ -20,6 +20,7 @@
 //! ```
 
 pub mod capture;
+pub mod compose;
 pub mod error;
 pub mod export;
 pub mod inverse;

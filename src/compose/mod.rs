@@ -1,0 +1,3 @@
+//! Virtual objects in photographs: reading them, placing them, lighting them, and compositing.
+
+pub mod object;

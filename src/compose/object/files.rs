@@ -1,0 +1,119 @@
+//! Files that an object file refers to: only from its own folder, and of bounded size.
+
+use crate::error::{Error, Result};
+use crate::math::color::srgb_to_linear;
+use crate::math::picture::Picture;
+use glam::Vec3;
+use image::{DynamicImage, ImageReader, Limits};
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+/// Largest file that is read into memory.
+const MAX_BYTES: u64 = 1 << 30;
+/// Longest side that a texture may have in its file.
+const MAX_SIDE: u32 = 16_384;
+/// Longest side that a texture is kept at; larger ones are halved until they fit.
+const KEPT_SIDE: u32 = 4096;
+
+/// Reads a whole file of bounded size.
+pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
+    let length = std::fs::metadata(path).map_err(|e| Error::io(path, &e))?;
+    if length.len() > MAX_BYTES {
+        return Err(Error::file(
+            path,
+            "is larger than 1 GiB",
+            "reduce the object",
+        ));
+    }
+    std::fs::read(path).map_err(|e| Error::io(path, &e))
+}
+
+/// The path of a file that `referrer` names, refused where it leaves the referrer's folder.
+pub fn beside(referrer: &Path, name: &str) -> Result<PathBuf> {
+    let folder = match referrer.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let folder = folder.canonicalize().map_err(|e| Error::io(folder, &e))?;
+    let missing = |_| {
+        Error::file(
+            referrer,
+            format!("refers to `{name}`, which cannot be opened"),
+            "put that file beside it",
+        )
+    };
+    // Backslashes are how some exporters on Windows write folders.
+    let wanted = folder.join(name.replace('\\', "/"));
+    let found = wanted.canonicalize().map_err(missing)?;
+    if !found.starts_with(&folder) {
+        return Err(Error::file(
+            referrer,
+            format!("refers to `{name}`, outside its own folder"),
+            "put that file beside it and name it without a folder",
+        ));
+    }
+    Ok(found)
+}
+
+/// What the numbers of a texture mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Meaning {
+    /// Colours: 8- and 16-bit files hold the sRGB curve, floating-point ones linear values.
+    Color,
+    /// Parameters, linear in every file.
+    Data,
+}
+
+/// Decodes an image to linear values. `place` names it in errors.
+pub fn decode(bytes: &[u8], meaning: Meaning, place: &str) -> Result<Picture> {
+    let broken = |e: &dyn std::fmt::Display| {
+        Error::new(
+            place,
+            format!("the texture cannot be read: {e}"),
+            "save it as PNG or JPEG of at most 16384 pixels a side",
+        )
+    };
+    let mut reader = ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|e| broken(&e))?;
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(MAX_SIDE);
+    limits.max_image_height = Some(MAX_SIDE);
+    reader.limits(limits);
+    let image = reader.decode().map_err(|e| broken(&e))?;
+    let linear = meaning == Meaning::Data
+        || matches!(
+            image,
+            DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)
+        );
+    let colors = image.to_rgb32f();
+    let mut picture = Picture {
+        width: colors.width(),
+        height: colors.height(),
+        pixels: colors
+            .pixels()
+            .map(|p| Vec3::from(if linear { p.0 } else { p.0.map(srgb_to_linear) }))
+            .collect(),
+    };
+    if !picture.pixels.iter().all(|c| c.is_finite()) {
+        return Err(broken(&"it holds values that are not finite"));
+    }
+    while picture.width.max(picture.height) > KEPT_SIDE {
+        picture = halved(&picture);
+    }
+    Ok(picture)
+}
+
+/// The picture at half its size, rounded up, each pixel the mean of up to four.
+fn halved(picture: &Picture) -> Picture {
+    let (width, height) = (picture.width.div_ceil(2), picture.height.div_ceil(2));
+    Picture::from_fn(width, height, |x, y| {
+        let mut sum = Vec3::ZERO;
+        for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+            let i = (2 * x + dx).min(picture.width - 1);
+            let j = (2 * y + dy).min(picture.height - 1);
+            sum += picture.pixels[j as usize * picture.width as usize + i as usize];
+        }
+        sum * 0.25
+    })
+}

@@ -1,0 +1,226 @@
+//! Objects to insert: triangles with their own known materials, read from OBJ or glTF.
+
+mod files;
+mod gltf;
+mod obj;
+pub mod surface;
+
+use crate::error::{Error, Result};
+use crate::transport::material::Material;
+use glam::{DVec3, Vec2, Vec3};
+use std::path::Path;
+use std::sync::Arc;
+use surface::Surface;
+
+/// Most triangles that an object may have.
+const MAX_TRIANGLES: usize = 20_000_000;
+
+/// An object in its file's coordinates.
+///
+/// The file's up axis is +y, as glTF demands and OBJ writers agree on.
+#[derive(Debug, Clone)]
+pub struct ObjectModel {
+    /// The file's name without its folder and ending.
+    pub name: String,
+    /// Corners of each triangle in the file's coordinates and units, counter-clockwise seen from the front.
+    pub corners: Vec<[DVec3; 3]>,
+    /// Unit normals at each triangle's corners, on its front side; empty where the file has none.
+    pub corner_normals: Vec<[Vec3; 3]>,
+    /// Linear colours at each triangle's corners, factors on the albedo; empty where the file has none.
+    pub corner_colors: Vec<[Vec3; 3]>,
+    /// For each triangle, an index into `materials`.
+    pub material_of: Vec<u32>,
+    /// What it is made of.
+    pub materials: Vec<Material>,
+    /// What was replaced or left out, each a full sentence naming the file.
+    pub warnings: Vec<String>,
+}
+
+impl ObjectModel {
+    /// Reads an OBJ, GLB or glTF file, told apart by the name's ending.
+    ///
+    /// # Errors
+    /// The file cannot be read, is of another kind, is broken, holds no triangle with an area, or names a texture
+    /// outside its own folder.
+    pub fn read(path: &Path) -> Result<Self> {
+        let ending = path
+            .extension()
+            .map(|e| e.to_string_lossy().to_ascii_lowercase());
+        let parts = match ending.as_deref() {
+            Some("obj") => obj::read(path)?,
+            Some("glb" | "gltf") => gltf::read(path)?,
+            _ => {
+                return Err(Error::file(
+                    path,
+                    "not a file that objects are read from",
+                    "give an .obj, .glb or .gltf file",
+                ));
+            }
+        };
+        let name = path
+            .file_stem()
+            .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        parts.finish(name, path)
+    }
+
+    /// An object from parts in memory, of one material.
+    ///
+    /// # Errors
+    /// No triangle has an area, or a coordinate is not finite.
+    pub fn from_corners(name: &str, corners: Vec<[DVec3; 3]>, material: Material) -> Result<Self> {
+        let mut parts = Parts::default();
+        for triangle in corners {
+            parts.push(Corners::flat(triangle), 0);
+        }
+        let mut model = parts.finish(name.to_owned(), Path::new(name))?;
+        model.materials = vec![material];
+        Ok(model)
+    }
+
+    /// Replaces every material by one.
+    ///
+    /// Textures and vertex colours go with the materials that they belonged to.
+    pub fn with_material(mut self, surface: &Surface) -> Self {
+        self.materials = vec![surface.material(None)];
+        self.material_of.fill(0);
+        self.corner_colors.clear();
+        self
+    }
+
+    /// Lowest and highest coordinates.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        self.corners
+            .iter()
+            .flatten()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &p| {
+                (low.min(p), high.max(p))
+            })
+    }
+
+    /// The middle of the base: the lowest height, in the middle of the bounding box.
+    pub fn base(&self) -> DVec3 {
+        let (low, high) = self.bounds();
+        DVec3::new((low.x + high.x) * 0.5, low.y, (low.z + high.z) * 0.5)
+    }
+}
+
+/// One triangle as the readers meet it.
+struct Corners {
+    positions: [DVec3; 3],
+    normals: Option<[Vec3; 3]>,
+    uvs: Option<[Vec2; 3]>,
+    colors: Option<[Vec3; 3]>,
+}
+
+impl Corners {
+    fn flat(positions: [DVec3; 3]) -> Self {
+        Self {
+            positions,
+            normals: None,
+            uvs: None,
+            colors: None,
+        }
+    }
+}
+
+/// What the readers gather, before gaps are filled.
+#[derive(Default)]
+struct Parts {
+    triangles: Vec<(Corners, u32)>,
+    surfaces: Vec<Surface>,
+    warnings: Vec<String>,
+    skipped: usize,
+    not_finite: usize,
+}
+
+impl Parts {
+    /// Adds a triangle; those without an area or with a coordinate that is not finite are counted and left out.
+    fn push(&mut self, corners: Corners, material: u32) {
+        let [a, b, c] = corners.positions;
+        let finite = a.is_finite() && b.is_finite() && c.is_finite();
+        let area = (b - a).cross(c - a).length_squared();
+        match (finite, area > 0.0 && area.is_finite()) {
+            (false, _) => self.not_finite += 1,
+            (true, false) => self.skipped += 1,
+            (true, true) => self.triangles.push((corners, material)),
+        }
+    }
+
+    fn finish(mut self, name: String, path: &Path) -> Result<ObjectModel> {
+        if self.triangles.is_empty() {
+            return Err(Error::file(
+                path,
+                "holds no triangle with an area",
+                "export the object as a triangle mesh",
+            ));
+        }
+        if self.triangles.len() > MAX_TRIANGLES {
+            return Err(Error::file(
+                path,
+                format!("has {} triangles", self.triangles.len()),
+                format!("reduce the object to {MAX_TRIANGLES} triangles or fewer"),
+            ));
+        }
+        for (count, what) in [
+            (self.skipped, "have no area"),
+            (self.not_finite, "have coordinates that are not finite"),
+        ] {
+            if count > 0 {
+                self.warnings.push(format!(
+                    "{}: {count} triangles {what} and are left out.",
+                    path.display()
+                ));
+            }
+        }
+
+        // Attributes that only some triangles have are completed for all.
+        let has_normals = self.triangles.iter().any(|(c, _)| c.normals.is_some());
+        let has_colors = self.triangles.iter().any(|(c, _)| c.colors.is_some());
+        let corner_uvs: Arc<Vec<[Vec2; 3]>> = Arc::new(
+            self.triangles
+                .iter()
+                .map(|(c, _)| c.uvs.unwrap_or_default())
+                .collect(),
+        );
+        let mut model = ObjectModel {
+            name,
+            corners: Vec::with_capacity(self.triangles.len()),
+            corner_normals: Vec::new(),
+            corner_colors: Vec::new(),
+            material_of: Vec::with_capacity(self.triangles.len()),
+            materials: self
+                .surfaces
+                .iter()
+                .map(|surface| surface.material(Some(&corner_uvs)))
+                .collect(),
+            warnings: self.warnings,
+        };
+        for (corners, material) in self.triangles {
+            if has_normals {
+                model.corner_normals.push(front_normals(&corners));
+            }
+            if has_colors {
+                model
+                    .corner_colors
+                    .push(corners.colors.unwrap_or([Vec3::ONE; 3]));
+            }
+            model.corners.push(corners.positions);
+            model.material_of.push(material);
+        }
+        Ok(model)
+    }
+}
+
+/// The file's normals, turned to the front where they look back, or the geometric one where they are missing.
+fn front_normals(corners: &Corners) -> [Vec3; 3] {
+    let [a, b, c] = corners.positions;
+    let geometric = (b - a).cross(c - a).normalize_or_zero().as_vec3();
+    let mut normals = corners
+        .normals
+        .unwrap_or([geometric; 3])
+        .map(|n| n.normalize_or(geometric));
+    if normals.iter().map(|n| n.dot(geometric)).sum::<f32>() < 0.0 {
+        normals = normals.map(|n| -n);
+    }
+    normals
+}

@@ -1,0 +1,218 @@
+//! Wavefront OBJ with MTL.
+//!
+//! Base colour is Kd × map_Kd (and × vertex colours). Ns and Ks become a rough lobe where `illum` asks for highlights:
+//! α = √(2 / (Ns + 2)), Blinn–Phong's exponent at GGX's curvature (Walter et al. 2007), and specular reflectance
+//! 0.08 × Ks, the convention of the exporters that write Ks as a strength rather than a colour. `Pr` and `Pm`, where
+//! a file has them, are roughness (α = Pr²) and metalness.
+
+use super::files::{self, Meaning};
+use super::surface::{DIELECTRIC, Surface};
+use super::{Corners, Parts};
+use crate::error::{Error, Result};
+use crate::math::picture::Picture;
+use glam::{DVec3, Vec2, Vec3};
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::{BufReader, Cursor};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Specular reflectance at normal incidence for Ks = 1.
+const SPECULAR_OF_KS: f32 = 0.08;
+
+/// Reads an OBJ file and the MTL files and textures that it names.
+pub(super) fn read(path: &Path) -> Result<Parts> {
+    let file = File::open(path).map_err(|e| Error::io(path, &e))?;
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+        ..Default::default()
+    };
+    // Libraries are found by a callback that cannot carry an error of ours, so the first one is kept aside.
+    let library_error = RefCell::new(None);
+    let library_path = RefCell::new(path.to_path_buf());
+    let loaded = tobj::load_obj_buf(&mut BufReader::new(file), &options, |name| {
+        open_library(path, name).map_or_else(
+            |error| {
+                library_error.borrow_mut().get_or_insert(error);
+                Err(tobj::LoadError::OpenFileFailed)
+            },
+            |(found, bytes)| {
+                *library_path.borrow_mut() = found;
+                tobj::load_mtl_buf(&mut Cursor::new(bytes))
+            },
+        )
+    });
+    let (models, materials) = loaded.map_err(|e| {
+        Error::file(
+            path,
+            format!("is no readable OBJ file: {e}"),
+            "export it again as a triangle mesh",
+        )
+    })?;
+
+    let mut parts = Parts::default();
+    if let Some(error) = library_error.into_inner() {
+        return Err(error);
+    }
+    let library = library_path.into_inner();
+    let materials = materials.map_err(|e| {
+        Error::file(
+            &library,
+            format!("is no readable MTL file: {e}"),
+            "export the object again",
+        )
+    })?;
+    let mut textures = HashMap::new();
+    for material in &materials {
+        let surface = surface(material, &library, &mut textures, &mut parts.warnings)?;
+        parts.surfaces.push(surface);
+    }
+    // Triangles without a material are grey.
+    let plain = parts.surfaces.len() as u32;
+    parts.surfaces.push(Surface::diffuse(Vec3::splat(0.5)));
+
+    for model in &models {
+        let material = model
+            .mesh
+            .material_id
+            .map_or(plain, |id| (id as u32).min(plain));
+        push_mesh(&mut parts, &model.mesh, material).ok_or_else(|| {
+            Error::file(
+                path,
+                format!("object `{}` refers to a vertex that it lacks", model.name),
+                "export it again as a triangle mesh",
+            )
+        })?;
+    }
+    Ok(parts)
+}
+
+fn open_library(referrer: &Path, name: &Path) -> Result<(PathBuf, Vec<u8>)> {
+    let found = files::beside(referrer, &name.to_string_lossy())?;
+    let bytes = files::read_bytes(&found)?;
+    Ok((found, bytes))
+}
+
+/// Adds a mesh's triangles; `None` where an index is out of range.
+fn push_mesh(parts: &mut Parts, mesh: &tobj::Mesh, material: u32) -> Option<()> {
+    let vector = |values: &[f64], index: u32| {
+        let start = index as usize * 3;
+        let v = values.get(start..start + 3)?;
+        Some(DVec3::new(v[0], v[1], v[2]))
+    };
+    for (number, triangle) in mesh.indices.chunks_exact(3).enumerate() {
+        // Normals and texture coordinates are indexed apart from positions.
+        let corner_indices = |indices: &[u32]| -> Option<[u32; 3]> {
+            indices.get(number * 3..number * 3 + 3)?.try_into().ok()
+        };
+        let mut positions = [DVec3::ZERO; 3];
+        for (corner, &index) in positions.iter_mut().zip(triangle) {
+            *corner = vector(&mesh.positions, index)?;
+        }
+        let normals = corner_indices(&mesh.normal_indices).and_then(|indices| {
+            let [a, b, c] = indices.map(|i| vector(&mesh.normals, i));
+            Some([a?.as_vec3(), b?.as_vec3(), c?.as_vec3()])
+        });
+        let uvs = corner_indices(&mesh.texcoord_indices).and_then(|indices| {
+            let [a, b, c] = indices.map(|i| {
+                let uv = mesh.texcoords.get(i as usize * 2..i as usize * 2 + 2)?;
+                Some(Vec2::new(uv[0] as f32, uv[1] as f32))
+            });
+            Some([a?, b?, c?])
+        });
+        let [a, b, c] = [triangle[0], triangle[1], triangle[2]]
+            .map(|index| vector(&mesh.vertex_color, index).map(DVec3::as_vec3));
+        parts.push(
+            Corners {
+                positions,
+                normals,
+                uvs,
+                colors: a.zip(b).zip(c).map(|((a, b), c)| [a, b, c]),
+            },
+            material,
+        );
+    }
+    Some(())
+}
+
+/// What an MTL entry describes; each texture is read once.
+fn surface(
+    material: &tobj::Material,
+    library: &Path,
+    textures: &mut HashMap<String, Arc<Picture>>,
+    warnings: &mut Vec<String>,
+) -> Result<Surface> {
+    let place = || format!("{}: material `{}`", library.display(), material.name);
+    let number =
+        |key: &str| -> Option<f32> { material.unknown_param.get(key)?.trim().parse().ok() };
+    let kd = material
+        .diffuse
+        .map_or(Vec3::splat(0.8), |c| Vec3::from(c.map(|v| v as f32)));
+    let ks = material
+        .specular
+        .map_or(0.0, |c| (c.iter().sum::<f64>() / 3.0) as f32);
+    let highlights = material.illumination_model.unwrap_or(2) >= 2 && ks > 0.0;
+    let phong = material.shininess.filter(|_| highlights);
+    let mut surface = Surface {
+        texture: None,
+        base_color: kd,
+        metallic: number("Pm").unwrap_or(0.0),
+        alpha: number("Pr")
+            .map(|roughness| roughness * roughness)
+            .or_else(|| phong.map(|ns| (2.0 / (ns.max(0.0) + 2.0)).sqrt() as f32)),
+        dielectric: if number("Pr").is_some() {
+            DIELECTRIC
+        } else {
+            SPECULAR_OF_KS * ks
+        },
+    };
+
+    if let Some(options) = &material.diffuse_texture {
+        // Options such as `-s 1 1 1` precede the file's name.
+        let name = options.split_whitespace().last().unwrap_or_default();
+        let name = if options.starts_with('-') {
+            name
+        } else {
+            options
+        };
+        if options.starts_with('-') {
+            warnings.push(format!("{}: options of map_Kd are ignored.", place()));
+        }
+        let texture = match textures.get(name) {
+            Some(texture) => texture.clone(),
+            None => {
+                let found = files::beside(library, name)?;
+                let bytes = files::read_bytes(&found)?;
+                Arc::new(files::decode(
+                    &bytes,
+                    Meaning::Color,
+                    &found.display().to_string(),
+                )?)
+            }
+        };
+        textures.insert(name.to_owned(), texture.clone());
+        surface.texture = Some(texture);
+    }
+
+    let transparent = material.dissolve.is_some_and(|d| d < 1.0)
+        || number("Tr").is_some_and(|t| t > 0.0)
+        || material.dissolve_texture.is_some();
+    if transparent {
+        warnings.push(format!(
+            "{}: see-through (d, Tr) is not supported and is taken as opaque.",
+            place()
+        ));
+    }
+    if material
+        .emissive
+        .is_some_and(|e| e.iter().any(|&v| v > 0.0))
+    {
+        warnings.push(format!("{}: emission (Ke) is ignored.", place()));
+    }
+    surface
+        .checked()
+        .ok_or_else(|| Error::new(place(), "a value is not finite", "correct the MTL file"))
+}

@@ -1,0 +1,95 @@
+//! A material as files describe it, made into what light transport knows.
+
+use crate::math::picture::Picture;
+use crate::transport::material::{Albedo, Lobe, Material, Texture};
+use glam::{Vec2, Vec3};
+use std::sync::Arc;
+
+/// Specular reflectance of a dielectric at normal incidence (index of refraction 1.5), as glTF fixes it.
+pub const DIELECTRIC: f32 = 0.04;
+
+/// Base colour, metalness and roughness.
+#[derive(Debug, Clone)]
+pub struct Surface {
+    /// Linear base colour, a factor on the texture where there is one.
+    pub base_color: Vec3,
+    /// Linear image of the base colour.
+    pub texture: Option<Arc<Picture>>,
+    /// 0 a dielectric, 1 a metal; between them a mixture.
+    pub metallic: f32,
+    /// GGX roughness α; `None` is diffuse alone.
+    pub alpha: Option<f32>,
+    /// Specular reflectance of the dielectric part at normal incidence.
+    pub dielectric: f32,
+}
+
+/// Mean colour of a picture.
+pub fn mean(image: &Picture) -> Vec3 {
+    let sum = image
+        .pixels
+        .iter()
+        .fold(glam::DVec3::ZERO, |sum, c| sum + c.as_dvec3());
+    (sum / image.pixels.len().max(1) as f64).as_vec3()
+}
+
+impl Surface {
+    /// A diffuse surface.
+    pub fn diffuse(base_color: Vec3) -> Self {
+        Self {
+            base_color,
+            texture: None,
+            metallic: 0.0,
+            alpha: None,
+            dielectric: 0.0,
+        }
+    }
+
+    /// The surface with every value inside its physical range; `None` where one is not a number.
+    pub fn checked(self) -> Option<Self> {
+        let finite = self.base_color.is_finite()
+            && self.metallic.is_finite()
+            && self.dielectric.is_finite()
+            && self.alpha.is_none_or(f32::is_finite);
+        finite.then(|| Self {
+            base_color: self.base_color.clamp(Vec3::ZERO, Vec3::ONE),
+            metallic: self.metallic.clamp(0.0, 1.0),
+            dielectric: self.dielectric.clamp(0.0, 1.0),
+            alpha: self.alpha.map(|alpha| alpha.clamp(0.0, 1.0)),
+            ..self
+        })
+    }
+
+    /// The material; `corner_uvs` are the texture coordinates that a texture is looked up with.
+    ///
+    /// A metal's specular reflectance is its base colour (the mean of its texture: the lobe is one an object), and its
+    /// diffuse reflectance is zero.
+    pub fn material(&self, corner_uvs: Option<&Arc<Vec<[Vec2; 3]>>>) -> Material {
+        let diffuse = self.base_color * (1.0 - self.metallic);
+        let (albedo, mean) = match (&self.texture, corner_uvs) {
+            (Some(image), Some(corner_uvs)) => {
+                let texture = Texture {
+                    width: image.width,
+                    height: image.height,
+                    pixels: image.pixels.clone(),
+                    corner_uvs: corner_uvs.clone(),
+                };
+                let mean = mean(image) * self.base_color;
+                (Albedo::Image(Arc::new(texture), diffuse), mean)
+            }
+            _ => (Albedo::Constant(diffuse), self.base_color),
+        };
+        let specular = Vec3::splat(self.dielectric).lerp(mean, self.metallic);
+        let lobe = self
+            .alpha
+            .filter(|_| specular.max_element() > 0.0)
+            .map(|roughness| Lobe {
+                roughness,
+                specular,
+            });
+        Material {
+            albedo,
+            emission: Vec3::ZERO,
+            lobe,
+        }
+    }
+}
