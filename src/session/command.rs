@@ -1,5 +1,6 @@
 //! What the window or the command line asks of the worker.
 
+pub use crate::compose::placement::Placement;
 use crate::inverse::settings::Settings;
 use crate::scene::camera::Camera;
 use glam::DVec3;
@@ -61,20 +62,6 @@ pub enum ViewCamera {
     Frame(usize),
     /// Any other, in scene coordinates.
     Free(Box<Camera>),
-}
-
-/// An object inserted into the scene.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Placement {
-    /// OBJ or GLB file.
-    pub file: PathBuf,
-    /// Where the middle of the object's base stands, in the capture's coordinates; `None` takes the file's own
-    /// coordinates for the capture's.
-    pub at: Option<DVec3>,
-    /// Factor on the file's size.
-    pub scale: f64,
-    /// Degrees about the up axis, counter-clockwise from above.
-    pub rotate: f64,
 }
 
 /// A file to write for another program.

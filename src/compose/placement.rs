@@ -1,0 +1,155 @@
+//! Where an inserted object stands, and its triangles there.
+
+use crate::compose::object::ObjectModel;
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use crate::scene::bvh::Bvh;
+use crate::scene::geometry::Hit;
+use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// An object inserted into the scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Placement {
+    /// OBJ or GLB file.
+    pub file: PathBuf,
+    /// Where the middle of the object's base stands, in the capture's coordinates; `None` takes the file's own
+    /// coordinates for the capture's.
+    pub at: Option<DVec3>,
+    /// Factor on the file's size.
+    pub scale: f64,
+    /// Degrees about the up axis, counter-clockwise from above.
+    pub rotate: f64,
+}
+
+impl Placement {
+    /// The map from the file's coordinates to the capture's, whose unit up vector is `up`.
+    ///
+    /// With `at` the file's +y is first turned to `up` by the shortest way. As modelled, nothing is but what `scale`
+    /// and `rotate` ask for, about the file's origin.
+    ///
+    /// # Errors
+    /// The scale is not positive, or a number is not finite.
+    pub fn transform(&self, model: &ObjectModel, up: DVec3) -> Result<DAffine3> {
+        if !(self.scale.is_finite() && self.scale > 0.0) {
+            return Err(Error::usage(
+                "--scale",
+                format!("{} is no size", self.scale),
+                "give a number above 0",
+            ));
+        }
+        if !self.rotate.is_finite() || !self.at.is_none_or(DVec3::is_finite) {
+            return Err(Error::usage(
+                "--at, --rotate",
+                "a number is not finite",
+                "give finite numbers",
+            ));
+        }
+        let turn = DQuat::from_axis_angle(up, self.rotate.to_radians());
+        let linear = |rotation: DQuat| DMat3::from_quat(rotation) * self.scale;
+        Ok(match self.at {
+            None => DAffine3::from_mat3(linear(turn)),
+            Some(at) => {
+                let upright = DQuat::from_rotation_arc(DVec3::Y, up);
+                let linear = linear(turn * upright);
+                DAffine3::from_mat3_translation(linear, at - linear * model.base())
+            }
+        })
+    }
+}
+
+/// An object's triangles in scene coordinates, ready for rays.
+#[derive(Debug)]
+pub struct PlacedObject {
+    /// The object.
+    pub model: Arc<ObjectModel>,
+    /// Corners of each triangle.
+    pub corners: Vec<[Vec3; 3]>,
+    /// Unit geometric normal of each triangle's front.
+    pub normals: Vec<Vec3>,
+    /// Unit shading normals at the corners; empty where the object has none.
+    pub corner_normals: Vec<[Vec3; 3]>,
+    /// Middle of the bounding box.
+    pub center: Vec3,
+    /// Closest-hit and any-hit queries.
+    pub bvh: Bvh,
+}
+
+impl PlacedObject {
+    /// Places an object in a scene.
+    ///
+    /// # Errors
+    /// The scale is not positive, a number is not finite, or the object comes to lie too far away for f32.
+    pub fn new(model: Arc<ObjectModel>, placement: &Placement, scene: &Scene) -> Result<Self> {
+        let transform = placement.transform(&model, scene.up.as_dvec3().normalize_or(DVec3::Y))?;
+        let rotation = transform.matrix3 * placement.scale.recip();
+        let corners: Vec<[Vec3; 3]> = model
+            .corners
+            .iter()
+            .map(|c| c.map(|p| (transform.transform_point3(p) - scene.origin).as_vec3()))
+            .collect();
+        if !corners.iter().flatten().all(|p| p.is_finite()) {
+            return Err(Error::file(
+                &placement.file,
+                "comes to lie outside the range of coordinates",
+                "check --at and --scale",
+            ));
+        }
+        let turned = |n: DVec3| (rotation * n).normalize_or_zero().as_vec3();
+        let normals = model
+            .corners
+            .iter()
+            .map(|[a, b, c]| turned((*b - *a).cross(*c - *a).normalize_or_zero()))
+            .collect();
+        let corner_normals = model
+            .corner_normals
+            .iter()
+            .map(|corner| corner.map(|n| turned(n.as_dvec3())))
+            .collect();
+        let (low, high) = corners
+            .iter()
+            .flatten()
+            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &p| {
+                (low.min(p), high.max(p))
+            });
+        let positions: Vec<Vec3> = corners.iter().flatten().copied().collect();
+        let indices: Vec<[u32; 3]> = (0..corners.len() as u32)
+            .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
+            .collect();
+        Ok(Self {
+            bvh: Bvh::new(&positions, &indices),
+            model,
+            corners,
+            normals,
+            corner_normals,
+            center: (low + high) * 0.5,
+        })
+    }
+
+    /// The unit shading normal at a hit, on the front side.
+    pub fn shading_normal(&self, hit: &Hit) -> Vec3 {
+        let geometric = self.normals[hit.triangle as usize];
+        self.corner_normals
+            .get(hit.triangle as usize)
+            .map_or(geometric, |n| interpolate(n, hit).normalize_or(geometric))
+    }
+
+    /// Diffuse reflectance at a hit, vertex colours included.
+    pub fn albedo(&self, hit: &Hit) -> Vec3 {
+        let triangle = hit.triangle as usize;
+        let material = &self.model.materials[self.model.material_of[triangle] as usize];
+        let tint = self
+            .model
+            .corner_colors
+            .get(triangle)
+            .map_or(Vec3::ONE, |colors| interpolate(colors, hit));
+        (material.albedo_at(hit) * tint).clamp(Vec3::ZERO, Vec3::ONE)
+    }
+}
+
+/// A value at a hit from those at the triangle's corners.
+#[inline]
+pub fn interpolate(corners: &[Vec3; 3], hit: &Hit) -> Vec3 {
+    corners[0] * (1.0 - hit.b1 - hit.b2) + corners[1] * hit.b1 + corners[2] * hit.b2
+}

@@ -1,0 +1,127 @@
+//! The scene with inserted objects: what the path tracer meets when something new stands in the room.
+
+use crate::compose::placement::{PlacedObject, interpolate};
+use crate::scene::geometry::{Hit, Ray};
+use crate::transport::environment::Environment;
+use crate::transport::lit::Lit;
+use crate::transport::world::{EmitterSample, SurfacePoint, World};
+use glam::Vec3;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A lit scene and the objects in it. Lights are the scene's alone.
+#[derive(Debug)]
+pub struct FurnishedScene<'a> {
+    lit: &'a Lit,
+    objects: &'a [Arc<PlacedObject>],
+    touched: AtomicBool,
+}
+
+impl<'a> FurnishedScene<'a> {
+    /// A scene with objects; their object indices follow the scene's.
+    pub fn new(lit: &'a Lit, objects: &'a [Arc<PlacedObject>]) -> Self {
+        Self {
+            lit,
+            objects,
+            touched: AtomicBool::new(false),
+        }
+    }
+
+    /// Whether an object has changed the answer to any query since the last call.
+    ///
+    /// Where it has not, the same path in the scene alone would have been the same to the bit.
+    pub fn take_touched(&self) -> bool {
+        self.touched.swap(false, Ordering::Relaxed)
+    }
+
+    /// The nearest object in front of `t_max`.
+    fn nearest_object(&self, ray: &Ray, t_max: f32) -> Option<(usize, Hit)> {
+        let mut nearest = None;
+        let mut ray = Ray { t_max, ..*ray };
+        for (index, object) in self.objects.iter().enumerate() {
+            if let Some(hit) = object.bvh.intersect(&ray) {
+                ray.t_max = hit.t;
+                nearest = Some((index, hit));
+            }
+        }
+        nearest
+    }
+
+    fn surface(&self, index: usize, hit: &Hit, ray: &Ray) -> SurfacePoint {
+        let object = &self.objects[index];
+        let triangle = hit.triangle as usize;
+        let corners = object.corners[triangle];
+        let normal = object.normals[triangle];
+        let material = &object.model.materials[object.model.material_of[triangle] as usize];
+        SurfacePoint {
+            point: interpolate(&corners, hit),
+            corners,
+            normal,
+            shading_normal: towards_viewer(
+                object.shading_normal(hit),
+                normal,
+                -ray.direction.normalize_or_zero(),
+            ),
+            albedo: object.albedo(hit),
+            emission: Vec3::ZERO,
+            lobe: material.lobe,
+            object: (self.lit.scene.objects.len() + index) as u32,
+            triangle: hit.triangle,
+            t: hit.t,
+        }
+    }
+}
+
+/// The shading normal, bent just far enough that `wo` sees its front where it sees the geometric normal's.
+fn towards_viewer(shading: Vec3, geometric: Vec3, wo: Vec3) -> Vec3 {
+    /// Sine of the angle that the bent normal keeps above the view's horizon.
+    const MARGIN: f32 = 0.01;
+    let side = if geometric.dot(wo) < 0.0 { -wo } else { wo };
+    let cos = shading.dot(side);
+    if cos >= MARGIN {
+        return shading;
+    }
+    (shading + side * (MARGIN - cos)).normalize_or(geometric)
+}
+
+impl World for FurnishedScene<'_> {
+    fn intersect(&self, ray: &Ray) -> Option<SurfacePoint> {
+        let scene_hit = self.lit.scene.intersect(ray);
+        let t_max = scene_hit.map_or(ray.t_max, |hit| hit.t);
+        if let Some((index, hit)) = self.nearest_object(ray, t_max) {
+            self.touched.store(true, Ordering::Relaxed);
+            return Some(self.surface(index, &hit, ray));
+        }
+        scene_hit.map(|hit| self.lit.surface(&hit))
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        if self.lit.scene.occluded(ray) {
+            return true;
+        }
+        let occluded = self.objects.iter().any(|object| object.bvh.occluded(ray));
+        if occluded {
+            self.touched.store(true, Ordering::Relaxed);
+        }
+        occluded
+    }
+
+    fn sample_emitter(&self, choice: f64, u: [f32; 2]) -> Option<EmitterSample> {
+        self.lit.sample_emitter(choice, u)
+    }
+
+    fn emitter_pdf(&self, surface: &SurfacePoint) -> f32 {
+        if surface.object as usize >= self.lit.scene.objects.len() {
+            return 0.0;
+        }
+        self.lit.emitter_pdf(surface)
+    }
+
+    fn has_emitters(&self) -> bool {
+        self.lit.has_emitters()
+    }
+
+    fn environment(&self) -> Option<&Environment> {
+        self.lit.environment()
+    }
+}
