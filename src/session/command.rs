@@ -4,6 +4,7 @@ pub use crate::compose::placement::Placement;
 use crate::inverse::settings::Settings;
 use crate::scene::camera::Camera;
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// Where a capture comes from.
@@ -91,4 +92,14 @@ pub enum ExportFormat {
         /// The point, in the capture's coordinates.
         at: DVec3,
     },
+}
+
+/// How a capture is read.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct OpenOptions {
+    /// Up axis in the capture's coordinates; `None` takes the cameras' mean up.
+    pub up: Option<DVec3>,
+    /// Number of segments that a mesh without objects is cut into; `None` chooses.
+    pub segments: Option<u64>,
 }

@@ -1,4 +1,13 @@
 //! The worker thread: commands in, snapshots out, save and resume. Knows no window; wakes it by a callback.
 
 pub mod command;
+pub mod inbox;
+pub mod open;
+pub mod rates;
+pub mod save;
+pub mod slot;
 pub mod snapshot;
+pub mod view;
+pub mod worker;
+
+pub use worker::Session;

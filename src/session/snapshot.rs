@@ -1,10 +1,12 @@
 //! What the worker shows: immutable, shared, latest wins.
 
+use crate::capture::Capture;
 use crate::capture::photograph::Photograph;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Progress, Termination};
 use crate::scene::Scene;
+use crate::session::command::{OpenOptions, Source};
 use std::sync::Arc;
 
 pub use crate::math::picture::Picture;
@@ -59,6 +61,14 @@ pub enum Phase {
 /// What is open, unchanging while it is.
 #[derive(Debug)]
 pub struct OpenCapture {
+    /// Where it came from.
+    pub source: Source,
+    /// How it was read.
+    pub options: OpenOptions,
+    /// Hash of the mesh, the cameras and the photographs.
+    pub hash: String,
+    /// The capture itself, with cameras at the photographs' full size.
+    pub capture: Arc<Capture>,
     /// Name shown to people.
     pub name: String,
     /// Geometry and cameras.

@@ -1,0 +1,176 @@
+//! The way in: a bounded queue of commands that the sender never waits for.
+
+use crate::session::command::{Command, Placement, ViewRequest};
+use crossbeam_channel::{Receiver, Sender, TryRecvError, TrySendError, bounded};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Commands that may wait at a time. Views and insertions do not count: of each only the newest waits.
+pub const CAPACITY: usize = 256;
+
+/// What travels through the queue.
+enum Message {
+    Command(Command),
+    /// A view or an insertion lies in [`Latest`].
+    Look,
+}
+
+/// Requests of which only the newest counts.
+#[derive(Default)]
+struct Latest {
+    view: Option<ViewRequest>,
+    insert: Option<Vec<Placement>>,
+}
+
+/// The sending end.
+pub struct Outbox {
+    queue: Sender<Message>,
+    latest: Arc<Mutex<Latest>>,
+}
+
+/// The worker's end.
+pub struct Inbox {
+    queue: Receiver<Message>,
+    latest: Arc<Mutex<Latest>>,
+}
+
+/// What waits in the inbox.
+pub enum Mail {
+    /// A command.
+    Command(Command),
+    /// Nothing now.
+    Nothing,
+    /// Nothing ever again: the sender is gone.
+    Closed,
+}
+
+/// Both ends of a new queue.
+pub fn queue() -> (Outbox, Inbox) {
+    let (sender, receiver) = bounded(CAPACITY);
+    let latest = Arc::new(Mutex::new(Latest::default()));
+    (
+        Outbox {
+            queue: sender,
+            latest: latest.clone(),
+        },
+        Inbox {
+            queue: receiver,
+            latest,
+        },
+    )
+}
+
+impl Outbox {
+    /// Puts a command into the queue without ever waiting; false if the queue is full or the worker has ended.
+    pub fn send(&self, command: Command) -> bool {
+        let message = {
+            let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+            match command {
+                Command::View(request) => {
+                    latest.view = Some(request);
+                    Message::Look
+                }
+                Command::Insert(placements) => {
+                    latest.insert = Some(placements);
+                    Message::Look
+                }
+                other => Message::Command(other),
+            }
+        };
+        match self.queue.try_send(message) {
+            Ok(()) => true,
+            // A full queue is emptied soon, and what lies in `latest` is found then.
+            Err(TrySendError::Full(Message::Look)) => true,
+            Err(_) => false,
+        }
+    }
+}
+
+impl Inbox {
+    /// The next command, if one waits.
+    pub fn poll(&self) -> Mail {
+        loop {
+            match self.queue.try_recv() {
+                Ok(Message::Command(command)) => return Mail::Command(command),
+                Ok(Message::Look) => {
+                    if let Some(command) = self.newest() {
+                        return Mail::Command(command);
+                    }
+                }
+                Err(TryRecvError::Empty) => {
+                    return self.newest().map_or(Mail::Nothing, Mail::Command);
+                }
+                Err(TryRecvError::Disconnected) => return Mail::Closed,
+            }
+        }
+    }
+
+    /// The next command; sleeps until there is one.
+    pub fn wait(&self) -> Mail {
+        loop {
+            match self.poll() {
+                Mail::Nothing => {}
+                mail => return mail,
+            }
+            match self.queue.recv() {
+                Ok(Message::Command(command)) => return Mail::Command(command),
+                Ok(Message::Look) => {}
+                Err(_) => return Mail::Closed,
+            }
+        }
+    }
+
+    /// Whether nothing waits.
+    pub fn is_empty(&self) -> bool {
+        self.queue.is_empty()
+    }
+
+    fn newest(&self) -> Option<Command> {
+        let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+        match latest.view.take() {
+            Some(view) => Some(Command::View(view)),
+            None => latest.insert.take().map(Command::Insert),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::session::command::ViewCamera;
+
+    fn view(frame: usize) -> Command {
+        Command::View(ViewRequest {
+            camera: ViewCamera::Frame(frame),
+            long_side: 64,
+        })
+    }
+
+    #[test]
+    fn a_flood_of_views_leaves_room_for_commands_and_only_the_newest_arrives() {
+        let (outbox, inbox) = queue();
+        for frame in 0..10 * CAPACITY {
+            assert!(outbox.send(view(frame)));
+        }
+        let mut seen = Vec::new();
+        while let Mail::Command(Command::View(request)) = inbox.poll() {
+            seen.push(request.camera);
+        }
+        let last = 10 * CAPACITY - 1;
+        assert!(matches!(seen[..], [ViewCamera::Frame(frame)] if frame == last));
+    }
+
+    #[test]
+    fn a_full_queue_refuses_commands_without_waiting_and_a_closed_one_says_so() {
+        let (outbox, inbox) = queue();
+        for _ in 0..CAPACITY {
+            assert!(outbox.send(Command::Step));
+        }
+        assert!(!outbox.send(Command::Pause));
+        for _ in 0..CAPACITY {
+            assert!(matches!(inbox.poll(), Mail::Command(Command::Step)));
+        }
+        assert!(matches!(inbox.poll(), Mail::Nothing));
+        drop(outbox);
+        assert!(matches!(inbox.wait(), Mail::Closed));
+    }
+}

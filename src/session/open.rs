@@ -1,0 +1,102 @@
+//! From a source to a capture that can be solved and shown.
+
+use crate::capture::Capture;
+use crate::capture::photograph::PhotographSource;
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use crate::session::command::{OpenOptions, Source};
+use crate::session::snapshot::OpenCapture;
+use rayon::prelude::*;
+use std::fs;
+use std::sync::Arc;
+
+/// Reads a capture and its photographs.
+///
+/// # Errors
+/// Something in it is missing or broken.
+pub fn open(source: &Source, options: &OpenOptions) -> Result<OpenCapture> {
+    let capture = match source {
+        Source::BuiltInRoom => {
+            return Err(Error::new(
+                "built-in room",
+                "not there yet",
+                "name a capture",
+            ));
+        }
+        Source::Folder(folder) => {
+            return Err(Error::file(folder, "no reader yet", ""));
+        }
+    };
+    #[expect(unreachable_code)]
+    OpenCapture::new(source.clone(), options.clone(), capture)
+}
+
+impl OpenCapture {
+    /// Prepares a capture for solving: scene, photographs, summary, hash.
+    ///
+    /// # Errors
+    /// The mesh holds nothing to solve, or a photograph cannot be read.
+    pub fn new(source: Source, options: OpenOptions, capture: Capture) -> Result<Self> {
+        let photographs = capture
+            .frames
+            .par_iter()
+            .map(|frame| frame.load())
+            .collect::<Result<Vec<_>>>()?;
+        let scene = Scene::new(&capture)?;
+        let count = |n: usize, one: &str| match n {
+            1 => format!("1 {one}"),
+            _ => format!("{n} {one}s"),
+        };
+        let summary = vec![
+            count(scene.triangles.len(), "triangle"),
+            count(scene.objects.len(), "object"),
+            count(photographs.len(), "photograph"),
+        ];
+        Ok(Self {
+            name: capture.name.clone(),
+            hash: hash(&capture)?,
+            source,
+            options,
+            summary,
+            warnings: capture.warnings.clone(),
+            scene: Arc::new(scene),
+            photographs,
+            capture: Arc::new(capture),
+        })
+    }
+}
+
+/// Hash of what an estimate depends on: mesh, cameras, exposures and the bytes of the photographs.
+fn hash(capture: &Capture) -> Result<String> {
+    let mut hasher = blake3::Hasher::new();
+    let mesh = &capture.mesh;
+    hasher.update(&(mesh.positions.len() as u64).to_le_bytes());
+    for position in &mesh.positions {
+        for v in position.to_array() {
+            hasher.update(&v.to_le_bytes());
+        }
+    }
+    for triangle in &mesh.triangles {
+        for i in triangle {
+            hasher.update(&i.to_le_bytes());
+        }
+    }
+    for frame in &capture.frames {
+        let k = &frame.intrinsics;
+        hasher.update(format!("{k:?} {:?} {:?}", frame.pose, frame.exposure).as_bytes());
+        match &frame.photograph {
+            PhotographSource::File(path) => {
+                let bytes = fs::read(path).map_err(|error| Error::io(path, &error))?;
+                hasher.update(blake3::hash(&bytes).as_bytes());
+            }
+            PhotographSource::Memory(photograph) => {
+                for pixel in &photograph.pixels {
+                    for v in pixel.to_array() {
+                        hasher.update(&v.to_le_bytes());
+                    }
+                }
+            }
+        }
+    }
+    Ok(hasher.finalize().to_hex().to_string())
+}

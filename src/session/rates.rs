@@ -1,0 +1,116 @@
+//! Iterations and rays a second, and the time left.
+
+use crate::inverse::settings::Settings;
+use crate::inverse::solver::Progress;
+use std::collections::VecDeque;
+
+/// Seconds of solving over which rates are taken.
+const WINDOW: f64 = 1.0;
+
+/// Counters of the last second or so of solving time.
+#[derive(Debug, Default)]
+pub struct Rates {
+    marks: VecDeque<Mark>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Mark {
+    seconds: f64,
+    iterations: u64,
+    rays: u64,
+}
+
+impl Rates {
+    /// Takes note of how far the solve is. Time that stands still (a pause) or runs backwards (a new solve) is
+    /// no progress.
+    pub fn note(&mut self, progress: &Progress) {
+        let mark = Mark {
+            seconds: progress.seconds,
+            iterations: progress.iterations,
+            rays: progress.rays,
+        };
+        if let Some(last) = self.marks.back() {
+            if mark.seconds < last.seconds || mark.iterations < last.iterations {
+                self.marks.clear();
+            } else if mark.seconds == last.seconds {
+                return;
+            }
+        }
+        self.marks.push_back(mark);
+        while self
+            .marks
+            .get(1)
+            .is_some_and(|second| mark.seconds - second.seconds >= WINDOW)
+        {
+            self.marks.pop_front();
+        }
+    }
+
+    /// Iterations a second.
+    pub fn iterations(&self) -> f64 {
+        self.rate(|mark| mark.iterations)
+    }
+
+    /// Rays a second.
+    pub fn rays(&self) -> f64 {
+        self.rate(|mark| mark.rays)
+    }
+
+    fn rate(&self, count: impl Fn(&Mark) -> u64) -> f64 {
+        match (self.marks.front(), self.marks.back()) {
+            (Some(first), Some(last)) if last.seconds > first.seconds => {
+                count(last).saturating_sub(count(first)) as f64 / (last.seconds - first.seconds)
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Seconds until a limit of the settings ends the solve; `None` where no limit is set. It may converge earlier.
+    pub fn seconds_left(&self, progress: &Progress, settings: &Settings) -> Option<f64> {
+        let by_time = (settings.time > 0.0).then(|| (settings.time - progress.seconds).max(0.0));
+        let rate = self.iterations();
+        let by_steps = (settings.steps > 0 && rate > 0.0)
+            .then(|| settings.steps.saturating_sub(progress.iterations) as f64 / rate);
+        match (by_time, by_steps) {
+            (Some(time), Some(steps)) => Some(time.min(steps)),
+            (time, steps) => time.or(steps),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(seconds: f64, iterations: u64) -> Progress {
+        Progress {
+            seconds,
+            iterations,
+            rays: 1000 * iterations,
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn rates_cover_the_last_second_and_forget_an_earlier_solve() {
+        let mut rates = Rates::default();
+        for i in 0..=40u32 {
+            // 10 iterations a second for two seconds, then 100.
+            let seconds = f64::from(i) * 0.1;
+            let iterations = if i <= 20 { i } else { 20 + (i - 20) * 10 };
+            rates.note(&at(seconds, u64::from(iterations)));
+        }
+        assert!((rates.iterations() - 100.0).abs() < 1.0, "{rates:?}");
+        assert!((rates.rays() - 100_000.0).abs() < 1000.0);
+        let settings = Settings {
+            time: 10.0,
+            steps: 320,
+            ..Default::default()
+        };
+        let left = rates.seconds_left(&at(4.0, 220), &settings);
+        assert!(left.is_some_and(|s| (s - 1.0).abs() < 0.05), "{left:?}");
+        rates.note(&at(0.0, 0));
+        assert_eq!(rates.iterations(), 0.0);
+        assert_eq!(rates.seconds_left(&at(0.0, 0), &Settings::default()), None);
+    }
+}

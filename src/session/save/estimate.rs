@@ -1,0 +1,239 @@
+//! `estimate.json`: everything that later commands need, with the maps beside it.
+
+use crate::error::{Error, Result};
+use crate::inverse::estimate::Estimate;
+use crate::inverse::settings::Settings;
+use crate::inverse::solver::Termination;
+use crate::session::command::{OpenOptions, Source};
+use crate::session::save::maps::{self, Maps};
+use crate::session::save::named::Named;
+use crate::session::save::objects::{ObjectRecord, Rgb, records, rgb};
+use crate::session::snapshot::OpenCapture;
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Version of the format; a reader refuses newer ones.
+pub const VERSION: u32 = 1;
+
+/// The contents of `estimate.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EstimateFile {
+    /// [`VERSION`] when it was written.
+    pub version: u32,
+    /// The program's version.
+    pub relit: String,
+    /// Which capture it belongs to.
+    pub capture: CaptureReference,
+    /// The parameters it was found with.
+    pub settings: Settings,
+    /// Why the solve ended; `null` while it runs.
+    pub stopped_because: Option<Termination>,
+    /// One entry an object, in the scene's order.
+    pub objects: Named<ObjectRecord>,
+    /// The file with the maps (see [`maps::encode`]), beside this one.
+    pub maps: Option<String>,
+    /// Each frame's linear exposure and white balance relative to the median frame.
+    pub exposures: Option<Vec<Rgb>>,
+}
+
+/// Where a capture is, and how to know that it is the same.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CaptureReference {
+    /// Name shown to people.
+    pub name: String,
+    /// Whether it is the room built into the program; it then has no path.
+    pub built_in: bool,
+    /// Path from the folder of `estimate.json`, with forward slashes.
+    pub relative: Option<String>,
+    /// Absolute path.
+    pub absolute: Option<PathBuf>,
+    /// Hash of its contents.
+    pub hash: String,
+    /// How it was read.
+    pub options: OpenOptions,
+}
+
+impl EstimateFile {
+    /// What to write into `folder`, and the bytes of the maps.
+    ///
+    /// # Errors
+    /// The maps do not fit their layout.
+    pub fn new(
+        folder: &Path,
+        capture: &OpenCapture,
+        settings: &Settings,
+        estimate: &Estimate,
+        stopped_because: Option<Termination>,
+    ) -> Result<(Self, Option<Vec<u8>>)> {
+        let bytes = maps::encode(estimate)?;
+        // Named by its contents, so that estimate.json never meets the maps of another run.
+        let maps = bytes.as_ref().map(|bytes| {
+            let hash = blake3::hash(bytes).to_hex();
+            format!("maps-{}.safetensors", &hash.as_str()[..12])
+        });
+        let file = Self {
+            version: VERSION,
+            relit: env!("CARGO_PKG_VERSION").to_owned(),
+            capture: CaptureReference::new(folder, capture),
+            settings: settings.clone(),
+            stopped_because,
+            objects: records(&capture.scene, estimate),
+            maps,
+            exposures: estimate
+                .exposures
+                .as_ref()
+                .map(|exposures| exposures.iter().map(|&e| rgb(e)).collect()),
+        };
+        Ok((file, bytes))
+    }
+
+    /// Refuses files of a later version.
+    ///
+    /// # Errors
+    /// The version is not known.
+    pub fn check(&self, path: &Path) -> Result<()> {
+        if self.version <= VERSION {
+            return Ok(());
+        }
+        Err(Error::new(
+            format!("{}: version", path.display()),
+            format!("{} is newer than {VERSION}, the newest known", self.version),
+            "use a newer relit",
+        ))
+    }
+
+    /// Reads the maps that this file names; `folder` is where it lies.
+    ///
+    /// # Errors
+    /// They are missing or broken.
+    pub fn read_maps(&self, folder: &Path) -> Result<Maps> {
+        let Some(name) = &self.maps else {
+            return Ok(Maps::default());
+        };
+        let path = folder.join(name);
+        let bytes = fs::read(&path).map_err(|error| Error::io(&path, &error))?;
+        maps::decode(&path, &bytes)
+    }
+
+    /// The estimate of a capture's objects.
+    ///
+    /// # Errors
+    /// The capture has an object that the file does not know, or maps of another mesh.
+    pub fn estimate(&self, path: &Path, maps: &Maps, capture: &OpenCapture) -> Result<Estimate> {
+        let scene = &capture.scene;
+        let place = |field: &str| format!("{}: {field}", path.display());
+        let objects = scene
+            .objects
+            .iter()
+            .map(|object| {
+                self.objects
+                    .get(&object.name)
+                    .map(Into::into)
+                    .ok_or_else(|| {
+                        Error::new(
+                            place("objects"),
+                            format!("no entry for object \"{}\" of the capture", object.name),
+                            "name the capture it was made from with --capture, or solve again",
+                        )
+                    })
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let misfit = |field: &str| {
+            Error::new(
+                place(field),
+                "does not fit the capture's mesh",
+                "name the capture it was made from with --capture, or solve again",
+            )
+        };
+        if let Some(texels) = &maps.texels
+            && (texels.colors.layout.levels.len() != scene.triangles.len()
+                || texels.textured.len() != objects.len())
+        {
+            return Err(misfit("maps"));
+        }
+        if let Some(exposures) = &self.exposures
+            && exposures.len() != scene.cameras.len()
+        {
+            return Err(misfit("exposures"));
+        }
+        Ok(Estimate {
+            objects,
+            texels: maps.texels.clone(),
+            outside: maps.outside.clone(),
+            exposures: self.exposures.as_ref().map(|exposures| {
+                exposures
+                    .iter()
+                    .map(|e| Vec3::from_array(e.map(|v| v.unwrap_or(1.0))))
+                    .collect()
+            }),
+        })
+    }
+}
+
+impl CaptureReference {
+    fn new(folder: &Path, capture: &OpenCapture) -> Self {
+        let absolute = match &capture.source {
+            Source::BuiltInRoom => None,
+            Source::Folder(path) => std::path::absolute(path).ok(),
+        };
+        let relative = absolute
+            .as_ref()
+            .zip(std::path::absolute(folder).ok())
+            .and_then(|(capture, folder)| relative(&folder, capture));
+        Self {
+            name: capture.name.clone(),
+            built_in: capture.source == Source::BuiltInRoom,
+            relative,
+            absolute,
+            hash: capture.hash.clone(),
+            options: capture.options.clone(),
+        }
+    }
+
+    /// Where the capture is now: where it lies from `folder`, else where it was.
+    pub fn source(&self, folder: &Path) -> Source {
+        if self.built_in {
+            return Source::BuiltInRoom;
+        }
+        let beside = self.relative.as_ref().map(|path| folder.join(path));
+        match (beside, &self.absolute) {
+            (Some(beside), _) if beside.is_dir() => Source::Folder(beside),
+            (_, Some(absolute)) => Source::Folder(absolute.clone()),
+            (Some(beside), None) => Source::Folder(beside),
+            (None, None) => Source::Folder(folder.to_owned()),
+        }
+    }
+}
+
+/// The path from one absolute folder to another, with forward slashes; `None` where they share no root.
+fn relative(from: &Path, to: &Path) -> Option<String> {
+    let (from, to): (Vec<_>, Vec<_>) = (from.components().collect(), to.components().collect());
+    let shared = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
+    if shared == 0 {
+        return None;
+    }
+    let up = from[shared..].iter().map(|_| Some(".."));
+    let down = to[shared..].iter().map(|part| part.as_os_str().to_str());
+    let parts: Vec<&str> = up.chain(down).collect::<Option<_>>()?;
+    Some(if parts.is_empty() {
+        ".".to_owned()
+    } else {
+        parts.join("/")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn relative_paths_lead_back() {
+        let path = |from: &str, to: &str| relative(Path::new(from), Path::new(to));
+        assert_eq!(path("/a/b/out", "/a/room").as_deref(), Some("../../room"));
+        assert_eq!(path("/a", "/a/b/c").as_deref(), Some("b/c"));
+        assert_eq!(path("/a", "/a").as_deref(), Some("."));
+    }
+}

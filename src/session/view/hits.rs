@@ -1,0 +1,99 @@
+//! What each pixel's centre sees, and what the estimate says about it.
+
+use crate::inverse::estimate::Estimate;
+use crate::scene::Scene;
+use crate::scene::camera::Camera;
+use crate::scene::geometry::Hit;
+use crate::session::snapshot::Picture;
+use crate::transport::material::Material;
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+/// The nearest surface behind each pixel's centre, row by row.
+#[derive(Debug)]
+pub struct Hits {
+    width: u32,
+    height: u32,
+    hits: Vec<Option<Hit>>,
+}
+
+impl Hits {
+    /// Casts one ray a pixel.
+    pub fn new(scene: &Scene, camera: &Camera) -> Self {
+        let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
+        let hits = (0..width as usize * height as usize)
+            .into_par_iter()
+            .map(|pixel| {
+                let (x, y) = (pixel % width as usize, pixel / width as usize);
+                scene.intersect(&camera.ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5)))
+            })
+            .collect();
+        Self {
+            width,
+            height,
+            hits,
+        }
+    }
+
+    /// Object index of each pixel; `u32::MAX` where the ray leaves the mesh.
+    pub fn objects(&self, scene: &Scene) -> Vec<u32> {
+        self.hits
+            .iter()
+            .map(|hit| hit.map_or(u32::MAX, |h| scene.object_of[h.triangle as usize]))
+            .collect()
+    }
+
+    /// Diffuse reflectance; black where the ray leaves the mesh.
+    pub fn albedo(&self, scene: &Scene, materials: &[Material]) -> Picture {
+        self.paint(scene, |object, hit| {
+            materials
+                .get(object)
+                .map_or(Vec3::ZERO, |m| m.albedo_at(hit))
+        })
+    }
+
+    /// Emitted radiance towards the camera: that of front sides.
+    pub fn emission(&self, scene: &Scene, camera: &Camera, estimate: &Estimate) -> Picture {
+        self.paint(scene, |object, hit| {
+            let to_camera = camera.center - scene.point(hit);
+            let front = scene.normals[hit.triangle as usize].dot(to_camera) > 0.0;
+            match estimate.objects.get(object) {
+                Some(object) if front => object.emission,
+                _ => Vec3::ZERO,
+            }
+        })
+    }
+
+    /// Standard error of the albedo.
+    pub fn stderr(&self, scene: &Scene, estimate: &Estimate) -> Picture {
+        self.paint(scene, |object, hit| {
+            let texel = estimate
+                .texels
+                .as_ref()
+                .filter(|texels| texels.textured.get(object) == Some(&true))
+                .and_then(|texels| {
+                    let texel = texels.colors.layout.texel(hit);
+                    texels.stderr.get(texel as usize).copied()
+                });
+            let whole = estimate.objects.get(object).map(|o| o.albedo_stderr);
+            texel.or(whole).unwrap_or(Vec3::ZERO)
+        })
+    }
+
+    fn paint(&self, scene: &Scene, color: impl Fn(usize, &Hit) -> Vec3 + Sync) -> Picture {
+        let pixels = self
+            .hits
+            .par_iter()
+            .map(|hit| {
+                hit.as_ref().map_or(Vec3::ZERO, |hit| {
+                    color(scene.object_of[hit.triangle as usize] as usize, hit)
+                })
+            })
+            .collect();
+        Picture {
+            width: self.width,
+            height: self.height,
+            pixels,
+        }
+    }
+}

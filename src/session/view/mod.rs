@@ -1,0 +1,136 @@
+//! Pictures of the requested view, drawn a slice at a time between other work.
+
+mod hits;
+pub mod sized;
+mod target;
+
+use crate::inverse::estimate::Estimate;
+use crate::session::command::{Placement, ViewCamera, ViewRequest};
+use crate::session::snapshot::{OpenCapture, View};
+use std::sync::Arc;
+use std::time::Instant;
+use target::Target;
+
+/// Long side in pixels of the first picture after a camera move.
+const FIRST_LONG_SIDE: u32 = 96;
+/// Drawing time, in seconds, that may be saved up while the solver is busy.
+const MOST_CREDIT: f32 = 0.05;
+/// Shortest time between two looks at a changing estimate, in seconds.
+const LOOK_AGAIN: f32 = 0.4;
+
+/// Draws the requested view progressively: at once coarse, then sharper.
+#[derive(Debug, Default)]
+pub struct Views {
+    request: Option<ViewRequest>,
+    changed: bool,
+    target: Option<Target>,
+    shown: Option<Arc<View>>,
+    sequence: u64,
+    credit: f32,
+    last: Option<Instant>,
+    looked: Option<Instant>,
+    placements: Vec<Placement>,
+}
+
+impl Views {
+    /// Asks for a view; it replaces the one before.
+    pub fn look(&mut self, request: ViewRequest) {
+        self.request = Some(request);
+        self.changed = true;
+    }
+
+    /// Replaces the inserted objects.
+    pub fn insert(&mut self, placements: Vec<Placement>) {
+        self.placements = placements;
+    }
+
+    /// The newest pictures.
+    pub fn shown(&self) -> Option<Arc<View>> {
+        self.shown.clone()
+    }
+
+    /// Forgets all pictures, as when another capture is opened; a frame that was asked for is drawn anew.
+    pub fn reset(&mut self) {
+        let request = self
+            .request
+            .take()
+            .filter(|r| matches!(r.camera, ViewCamera::Frame(_)));
+        *self = Self {
+            changed: request.is_some(),
+            request,
+            sequence: self.sequence,
+            ..Self::default()
+        };
+    }
+
+    /// Stops drawing; what was asked for is forgotten.
+    pub fn stop(&mut self) {
+        *self = Self {
+            sequence: self.sequence,
+            ..Self::default()
+        };
+    }
+
+    /// Starts the render over, since the estimate is final now.
+    pub fn refresh(&mut self) {
+        self.looked = None;
+        if let Some(target) = &mut self.target {
+            target.start_over();
+        }
+    }
+
+    /// Draws for a moment, taking at most about `share` of the time since the last call, but a new request at once.
+    /// Returns whether the pictures changed, and whether there is more to draw.
+    pub fn draw(
+        &mut self,
+        capture: &OpenCapture,
+        estimate: &Arc<Estimate>,
+        share: f32,
+    ) -> (bool, bool) {
+        let now = Instant::now();
+        let elapsed = self
+            .last
+            .replace(now)
+            .map_or(0.0, |last| (now - last).as_secs_f32());
+        self.credit = (self.credit + share * elapsed).min(MOST_CREDIT);
+        if self.changed {
+            self.changed = false;
+            let request = self.request.as_ref();
+            self.target = request.and_then(|r| Target::new(capture, estimate, r, FIRST_LONG_SIDE));
+            self.looked = Some(now);
+            let drawn = self.sharpen();
+            return (drawn, self.target.is_some());
+        }
+        if share < 1.0 && self.credit <= 0.0 {
+            return (false, self.target.is_some());
+        }
+        self.follow(estimate, now);
+        let drawn = self.sharpen();
+        self.credit -= now.elapsed().as_secs_f32();
+        let more = self.target.as_ref().is_some_and(|t| !t.is_done());
+        (drawn, more)
+    }
+
+    /// Takes up a newer estimate, where it differs to the eye and the last one had its time.
+    fn follow(&mut self, estimate: &Arc<Estimate>, now: Instant) {
+        let rested = self
+            .looked
+            .is_none_or(|at| (now - at).as_secs_f32() >= LOOK_AGAIN);
+        if let Some(target) = self.target.as_mut().filter(|_| rested) {
+            self.looked = Some(now);
+            target.follow(estimate);
+        }
+    }
+
+    fn sharpen(&mut self) -> bool {
+        let Some(target) = &mut self.target else {
+            return false;
+        };
+        let Some(view) = target.sharpen(self.sequence + 1) else {
+            return false;
+        };
+        self.sequence += 1;
+        self.shown = Some(Arc::new(view));
+        true
+    }
+}
