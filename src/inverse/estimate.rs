@@ -1,5 +1,8 @@
 //! What comes out: emission, materials, outside light, exposures, each with a confidence.
 
+use crate::scene::Scene;
+use crate::transport::environment::Environment;
+use crate::transport::lit::Lit;
 use crate::transport::material::{Albedo, Lobe, Material, TexelColors};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -86,6 +89,20 @@ pub struct Outside {
 }
 
 impl Estimate {
+    /// The scene in the light and the materials of this estimate.
+    pub fn lit(&self, scene: &Arc<Scene>) -> Lit {
+        let mut materials = self.materials();
+        materials.resize(
+            scene.objects.len(),
+            Material::diffuse(Vec3::ZERO, Vec3::ZERO),
+        );
+        let outside = self.outside.as_ref().and_then(|outside| {
+            let (width, height) = (outside.width as usize, outside.height as usize);
+            Environment::new(width, height, outside.pixels.clone())
+        });
+        Lit::new(scene.clone(), materials, outside.map(Arc::new))
+    }
+
     /// One material an object, for rendering.
     pub fn materials(&self) -> Vec<Material> {
         self.objects

@@ -1,6 +1,7 @@
 //! Pictures of the requested view, drawn a slice at a time between other work.
 
 mod hits;
+pub mod progressive;
 pub mod sized;
 mod target;
 
@@ -71,11 +72,10 @@ impl Views {
         };
     }
 
-    /// Starts the render over, since the estimate is final now.
-    pub fn refresh(&mut self) {
-        self.looked = None;
+    /// Starts the render over with an estimate that is final.
+    pub fn refresh(&mut self, estimate: &Arc<Estimate>) {
         if let Some(target) = &mut self.target {
-            target.start_over();
+            target.start_over(estimate);
         }
     }
 

@@ -6,7 +6,10 @@ use crate::scene::camera::Camera;
 use crate::session::command::{ViewCamera, ViewRequest};
 use crate::session::snapshot::{OpenCapture, Picture, View};
 use crate::session::view::hits::Hits;
+use crate::session::view::progressive::{ENOUGH, Progressive};
 use crate::session::view::sized::{box_filter, repeat, shrink};
+use crate::transport::lit::Lit;
+use crate::transport::path::PathOptions;
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -24,6 +27,13 @@ pub struct Target {
     /// The camera of the coarse first picture, until that is drawn.
     coarse: Option<Camera>,
     hits: Option<Hits>,
+    world: Lit,
+    render: Progressive,
+    /// The newest complete render, and its samples a pixel.
+    rendered: Option<(Arc<Picture>, u32)>,
+    /// Pictures of albedo, emission and standard error, in this order.
+    maps: [Option<Arc<Picture>>; 3],
+    objects: Option<Arc<Vec<u32>>>,
     /// Whether the pictures of albedo, emission and error are behind the estimate.
     stale: bool,
 }
@@ -54,6 +64,11 @@ impl Target {
         });
         let coarse = shrink(&camera, first_long_side);
         Some(Self {
+            world: estimate.lit(&scene),
+            render: Progressive::new(&camera),
+            rendered: None,
+            maps: [const { None }; 3],
+            objects: None,
             scene,
             frame,
             camera,
@@ -68,64 +83,111 @@ impl Target {
     /// Takes up another estimate if it differs to the eye.
     pub fn follow(&mut self, estimate: &Arc<Estimate>) {
         if !Arc::ptr_eq(&self.estimate, estimate) && differs(&self.estimate, estimate) {
-            self.estimate = estimate.clone();
-            self.stale = true;
+            self.adopt(estimate);
+            self.render.fade();
         }
     }
 
-    /// Forgets the samples taken with earlier estimates.
-    pub fn start_over(&mut self) {
+    /// Takes up another estimate and forgets the samples of the last; its render is shown until a new one is there.
+    pub fn start_over(&mut self, estimate: &Arc<Estimate>) {
+        self.adopt(estimate);
+        self.render.clear();
+    }
+
+    fn adopt(&mut self, estimate: &Arc<Estimate>) {
+        self.estimate = estimate.clone();
+        self.world = estimate.lit(&self.scene);
         self.stale = true;
     }
 
     /// Whether there is nothing left to draw.
     pub fn is_done(&self) -> bool {
-        self.coarse.is_none() && !self.stale
+        self.coarse.is_none() && !self.stale && self.render.samples() >= ENOUGH
     }
 
-    /// Draws the next slice; the pictures, if a new set is ready.
+    /// Draws the next slice; the pictures, if one of them is new.
     pub fn sharpen(&mut self, sequence: u64) -> Option<View> {
         if let Some(coarse) = self.coarse.take() {
-            let hits = Hits::new(&self.scene, &coarse);
-            return Some(self.view(sequence, &coarse, &hits));
-        }
-        if !self.stale {
+            self.sketch(&coarse);
+        } else if self.stale {
+            self.stale = false;
+            let hits = self
+                .hits
+                .take()
+                .unwrap_or_else(|| Hits::new(&self.scene, &self.camera));
+            self.map(&hits, &self.camera.clone());
+            self.objects = Some(Arc::new(hits.objects(&self.scene)));
+            self.hits = Some(hits);
+        } else if self.render.samples() >= ENOUGH
+            || !self
+                .render
+                .add(&self.world, &self.camera, &PathOptions::default())
+        {
             return None;
+        } else {
+            let picture = self.render.picture(&self.camera);
+            self.rendered = Some((Arc::new(picture), self.render.samples()));
         }
-        self.stale = false;
-        let hits = self
-            .hits
-            .take()
-            .unwrap_or_else(|| Hits::new(&self.scene, &self.camera));
-        let view = self.view(sequence, &self.camera, &hits);
-        self.hits = Some(hits);
-        Some(view)
+        Some(self.view(sequence))
     }
 
-    fn view(&self, sequence: u64, camera: &Camera, hits: &Hits) -> View {
-        let materials = self.estimate.materials();
+    /// All pictures at once, coarsely.
+    fn sketch(&mut self, coarse: &Camera) {
+        let hits = Hits::new(&self.scene, coarse);
+        self.map(&hits, coarse);
+        let mut render = Progressive::new(coarse);
+        while !render.add(&self.world, coarse, &PathOptions::default()) {}
+        let picture = self.enlarged(render.picture(coarse));
+        self.rendered = Some((picture, 1));
+    }
+
+    fn map(&mut self, hits: &Hits, camera: &Camera) {
+        let maps = [
+            hits.albedo(&self.scene, &self.world.materials),
+            hits.emission(&self.scene, camera, &self.estimate),
+            hits.stderr(&self.scene, &self.estimate),
+        ];
+        self.maps = maps.map(|picture| Some(self.enlarged(picture)));
+    }
+
+    fn enlarged(&self, picture: Picture) -> Arc<Picture> {
         let k = &self.camera.intrinsics;
-        let full = |picture: Picture| {
-            let same = (picture.width, picture.height) == (k.width, k.height);
-            Arc::new(if same {
-                picture
-            } else {
-                repeat(&picture, k.width, k.height)
-            })
-        };
-        let sharp = (camera.intrinsics.width, camera.intrinsics.height) == (k.width, k.height);
+        if (picture.width, picture.height) == (k.width, k.height) {
+            return Arc::new(picture);
+        }
+        Arc::new(repeat(&picture, k.width, k.height))
+    }
+
+    fn view(&self, sequence: u64) -> View {
+        let [albedo, emission, stderr] = self.maps.clone();
+        let (render, samples) = self.rendered.clone().unzip();
+        let error = render
+            .as_ref()
+            .zip(self.photograph.as_ref())
+            .map(|(render, photograph)| Arc::new(difference(render, photograph)));
         View {
             sequence,
             frame: self.frame,
             photograph: self.photograph.clone(),
-            render: None,
-            samples: 0,
-            albedo: Some(full(hits.albedo(&self.scene, &materials))),
-            emission: Some(full(hits.emission(&self.scene, camera, &self.estimate))),
-            error: None,
-            stderr: Some(full(hits.stderr(&self.scene, &self.estimate))),
-            objects: sharp.then(|| Arc::new(hits.objects(&self.scene))),
+            render,
+            samples: samples.unwrap_or(0),
+            albedo,
+            emission,
+            error,
+            stderr,
+            objects: self.objects.clone(),
         }
+    }
+}
+
+/// Render − photograph, signed.
+fn difference(render: &Picture, photograph: &Picture) -> Picture {
+    let pixels = (render.pixels.iter().zip(&photograph.pixels))
+        .map(|(r, p)| *r - *p)
+        .collect();
+    Picture {
+        pixels,
+        ..*photograph
     }
 }
 

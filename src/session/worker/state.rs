@@ -270,7 +270,7 @@ impl Worker {
                 self.progress = Arc::new(solution.progress);
                 self.checkpoint = solution.checkpoint;
                 self.phase = Phase::Finished(solution.termination);
-                self.views.refresh();
+                self.views.refresh(&self.estimate);
             }
             Ok(Err(error)) => {
                 self.phase = Phase::Failed;

@@ -1,0 +1,225 @@
+//! The session's protocol: what a window may rely on, whatever the solver does.
+
+mod common;
+
+use relit::inverse::estimate::Estimate;
+use relit::inverse::settings::Settings;
+use relit::inverse::solver::{
+    Control, LossPoint, Observer, Problem, Progress, Solution, Termination,
+};
+use relit::session::Session;
+use relit::session::command::{Command, Source, ViewCamera, ViewRequest};
+use relit::session::snapshot::{Level, OpenCapture, Phase, Snapshot};
+use relit::session::worker::Backend;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, LazyLock};
+use std::time::{Duration, Instant};
+
+static ROOM: LazyLock<relit::capture::Capture> = LazyLock::new(common::room);
+
+/// Iterates until told to stop, counting its steps; the estimate says how many.
+fn count_up(observer: &mut dyn Observer, steps: &AtomicU64, panic_at: Option<u64>) -> Solution {
+    let mut progress = Progress::default();
+    let mut estimate = common::truth();
+    loop {
+        progress.iterations += 1;
+        progress.rays += 1000;
+        progress.seconds = progress.iterations as f64 * 1e-3;
+        progress.losses = vec![LossPoint {
+            seconds: progress.seconds,
+            iteration: progress.iterations,
+            train: Some(1.0),
+            held_out: None,
+        }];
+        estimate.objects[1].seen_pixels = progress.iterations;
+        steps.store(progress.iterations, Ordering::SeqCst);
+        assert!(panic_at != Some(progress.iterations), "injected fault");
+        std::thread::sleep(Duration::from_millis(1));
+        if observer.observe(&progress, &estimate) == Control::Stop {
+            return Solution {
+                estimate,
+                progress,
+                termination: Termination::Cancelled,
+                checkpoint: None,
+            };
+        }
+    }
+}
+
+struct Rig {
+    session: Session,
+    steps: Arc<AtomicU64>,
+}
+
+impl Rig {
+    /// A session on the tiny room whose first solve panics at a step, if one is given.
+    fn new(panic_at: Option<u64>) -> Self {
+        let steps = Arc::new(AtomicU64::new(0));
+        let shared = steps.clone();
+        let mut fault = panic_at;
+        let backend = Backend {
+            open: Box::new(|source, options| {
+                OpenCapture::new(source.clone(), options.clone(), ROOM.clone())
+            }),
+            solve: Box::new(move |_: &Problem, _: &Settings, _, observer| {
+                Ok(count_up(observer, &shared, fault.take()))
+            }),
+        };
+        let session = Session::spawn_with(
+            Some(Source::BuiltInRoom),
+            Settings::default(),
+            Arc::new(|| {}),
+            backend,
+        )
+        .expect("a thread");
+        Self { session, steps }
+    }
+
+    /// Waits for a snapshot that satisfies a condition.
+    fn until(&self, what: &str, mut holds: impl FnMut(&Snapshot) -> bool) -> Arc<Snapshot> {
+        let started = Instant::now();
+        loop {
+            let snapshot = self.session.latest();
+            if holds(&snapshot) {
+                return snapshot;
+            }
+            assert!(
+                started.elapsed() < Duration::from_secs(60),
+                "no snapshot with {what}: {:?} {:?}",
+                snapshot.phase,
+                snapshot.events
+            );
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    fn look(&self, long_side: u32) {
+        let camera = ViewCamera::Frame(0);
+        assert!(
+            self.session
+                .send(Command::View(ViewRequest { camera, long_side }))
+        );
+    }
+}
+
+fn iterations(snapshot: &Snapshot) -> u64 {
+    snapshot.progress.iterations
+}
+
+#[test]
+fn a_pause_holds_the_solver_a_step_moves_it_by_one_and_run_lets_it_go() {
+    let rig = Rig::new(None);
+    rig.until("some steps", |s| iterations(s) > 3);
+    assert!(rig.session.send(Command::Pause));
+    let paused = rig.until("the pause", |s| s.phase == Phase::Paused);
+    // From the moment the pause shows, the solver stands where the snapshot says.
+    let at = rig.until("the last step", |s| {
+        s.phase == Phase::Paused && iterations(s) == rig.steps.load(Ordering::SeqCst)
+    });
+    assert!(iterations(&at) >= iterations(&paused));
+    for step in 1..=3 {
+        assert!(rig.session.send(Command::Step));
+        rig.until("one more step", |s| iterations(s) == iterations(&at) + step);
+    }
+    assert_eq!(rig.steps.load(Ordering::SeqCst), iterations(&at) + 3);
+    assert!(rig.session.send(Command::Run));
+    let running = rig.until("running on", |s| iterations(s) > iterations(&at) + 10);
+    assert_eq!(running.phase, Phase::Solving);
+}
+
+#[test]
+fn views_sharpen_while_solving_while_paused_and_after_the_end() {
+    let rig = Rig::new(None);
+    rig.look(16);
+    rig.until("a first view", |s| {
+        s.view.as_ref().is_some_and(|v| {
+            v.photograph.is_some() && v.render.is_some() && v.error.is_some() && v.samples >= 1
+        })
+    });
+    for (command, phase) in [
+        (Command::Pause, Phase::Paused),
+        (Command::Finish, Phase::Finished(Termination::Cancelled)),
+    ] {
+        assert!(rig.session.send(command));
+        rig.until("the phase", |s| s.phase == phase);
+        rig.look(12);
+        let sharp = rig.until("a sharp view", |s| {
+            s.view
+                .as_ref()
+                .is_some_and(|v| v.samples > 200 && v.objects.is_some())
+        });
+        assert_eq!(sharp.phase, phase);
+    }
+    let snapshot = rig.session.latest();
+    let view = snapshot.view.as_ref().expect("a view");
+    let (render, photograph) = (
+        view.render.as_ref().expect("a render"),
+        view.photograph.as_ref().expect("a photograph"),
+    );
+    assert_eq!((render.width, render.height), (12, 12));
+    // The estimate is the truth, so that render and photograph agree in the mean.
+    let mean = |p: &relit::math::picture::Picture| {
+        p.pixels.iter().map(|c| f64::from(c.x)).sum::<f64>() / p.pixels.len() as f64
+    };
+    let (a, b) = (mean(render), mean(photograph));
+    assert!((a / b - 1.0).abs() < 0.1, "{a} {b}");
+}
+
+#[test]
+fn a_panic_becomes_an_event_the_estimate_stays_and_the_session_goes_on() {
+    let rig = Rig::new(Some(200));
+    let failed = rig.until("the failure", |s| s.phase == Phase::Failed);
+    let message = &failed.events.last().expect("an event").message;
+    assert!(message.contains("injected fault"), "{message}");
+    assert_eq!(failed.events.last().map(|e| e.level), Some(Level::Error));
+    assert!(!failed.estimate.objects.is_empty());
+
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    assert!(rig.session.send(Command::Save(folder.path().join("saved"))));
+    rig.until("the save", |s| {
+        s.events.iter().any(|e| e.message.starts_with("saved to"))
+    });
+    assert!(folder.path().join("saved/estimate.json").is_file());
+    assert!(rig.session.send(Command::Reset));
+    rig.until("solving again", |s| {
+        s.phase == Phase::Solving && iterations(s) > 3
+    });
+}
+
+#[test]
+fn save_writes_the_workers_own_estimate_and_resume_brings_it_back() {
+    let rig = Rig::new(None);
+    rig.until("some steps", |s| iterations(s) > 20);
+    assert!(rig.session.send(Command::Finish));
+    let done = rig.until("the end", |s| matches!(s.phase, Phase::Finished(_)));
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    assert!(rig.session.send(Command::Save(folder.path().to_owned())));
+    rig.until("the save", |s| {
+        s.events.iter().any(|e| e.message.starts_with("saved to"))
+    });
+    let other = Rig::new(None);
+    other.until("some steps", |s| iterations(s) > 3);
+    assert!(
+        other
+            .session
+            .send(Command::Resume(folder.path().to_owned()))
+    );
+    let resumed = other.until("the saved estimate", |s| {
+        matches!(s.phase, Phase::Finished(_)) && iterations(s) == 0
+    });
+    assert_eq!(resumed.estimate.objects, done.estimate.objects);
+    let same = |a: &Estimate, b: &Estimate| a.objects[1].seen_pixels == b.objects[1].seen_pixels;
+    assert!(same(&resumed.estimate, &done.estimate));
+}
+
+#[test]
+fn what_cannot_be_opened_is_an_event_and_what_was_open_stays() {
+    let rig = Rig::new(None);
+    rig.until("some steps", |s| iterations(s) > 3);
+    assert!(rig.session.send(Command::Resume("no/such/folder".into())));
+    let snapshot = rig.until("the error", |s| {
+        s.events.iter().any(|e| e.level == Level::Error)
+    });
+    assert!(snapshot.capture.is_some());
+    rig.session.join();
+}
