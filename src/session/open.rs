@@ -2,6 +2,7 @@
 
 use crate::capture::Capture;
 use crate::capture::photograph::PhotographSource;
+use crate::capture::read::{ReadOptions, read};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::session::command::{OpenOptions, Source};
@@ -16,18 +17,20 @@ use std::sync::Arc;
 /// Something in it is missing or broken.
 pub fn open(source: &Source, options: &OpenOptions) -> Result<OpenCapture> {
     let capture = match source {
-        Source::BuiltInRoom => {
-            return Err(Error::new(
-                "built-in room",
-                "not there yet",
-                "name a capture",
-            ));
-        }
-        Source::Folder(folder) => {
-            return Err(Error::file(folder, "no reader yet", ""));
-        }
-    };
-    #[expect(unreachable_code)]
+        Source::BuiltInRoom => Err(Error::new(
+            "built-in room",
+            "not there yet",
+            "name a capture",
+        )),
+        Source::Folder(folder) => read(
+            folder,
+            &ReadOptions {
+                up: options.up,
+                segments: options.segments.map(|n| n as usize),
+                ..ReadOptions::default()
+            },
+        ),
+    }?;
     OpenCapture::new(source.clone(), options.clone(), capture)
 }
 

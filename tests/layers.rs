@@ -1,0 +1,138 @@
+//! Imports point downwards only: every `crate::…` path in the sources, against the layers of `src/lib.rs`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Layers from the bottom; those of one row may not import each other unless listed in [`BESIDE`].
+const LAYERS: &[&[&str]] = &[
+    &["error"],
+    &["math"],
+    &["capture"],
+    &["scene"],
+    &["transport"],
+    &["inverse"],
+    &["compose", "export", "room"],
+    &["study"],
+    &["session"],
+    &["cli", "app"],
+];
+
+/// Imports within a row: (from, to).
+const BESIDE: &[(&str, &str)] = &[("compose", "export"), ("room", "export")];
+
+fn level(module: &str) -> Option<usize> {
+    LAYERS.iter().position(|row| row.contains(&module))
+}
+
+fn sources(folder: &Path, files: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).expect("src is readable") {
+        let path = entry.expect("src is readable").path();
+        if path.is_dir() {
+            sources(&path, files);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            files.push(path);
+        }
+    }
+}
+
+/// The top modules that a source names, by `crate::module` or in a braced `use crate::{…}`.
+fn imports(source: &str) -> Vec<String> {
+    let word = |text: &str| -> String {
+        text.chars()
+            .take_while(|c| c.is_alphanumeric() || *c == '_')
+            .collect()
+    };
+    let code: String = source
+        .lines()
+        .map(|line| line.split("//").next().unwrap_or(""))
+        .collect::<Vec<_>>()
+        .join("\n");
+    code.split("crate::")
+        .skip(1)
+        .flat_map(|rest| match rest.strip_prefix('{') {
+            Some(list) => {
+                let end = list.find(';').unwrap_or(list.len());
+                let mut depth = 0;
+                let mut names = vec![String::new()];
+                for c in list[..end].chars() {
+                    match c {
+                        '{' => depth += 1,
+                        '}' => depth -= 1,
+                        ',' if depth == 0 => names.push(String::new()),
+                        _ => {}
+                    }
+                    if depth == 0 && c != ',' {
+                        names.last_mut().expect("never empty").push(c);
+                    }
+                }
+                names.iter().map(|n| word(n.trim())).collect()
+            }
+            None => vec![word(rest)],
+        })
+        .filter(|name| !name.is_empty())
+        .collect()
+}
+
+/// Imports that point upwards or sideways in one file of a module.
+fn violations(module: &str, source: &str) -> Vec<String> {
+    let Some(own) = level(module) else {
+        return vec![format!("{module} is in no layer")];
+    };
+    imports(source)
+        .into_iter()
+        .filter(|to| to != module && !BESIDE.contains(&(module, to)))
+        .filter(|to| level(to).is_none_or(|level| level >= own))
+        .map(|to| format!("{module} imports {to}"))
+        .collect()
+}
+
+#[test]
+fn imports_point_downwards() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    sources(&root, &mut files);
+    assert!(files.len() > 20, "only {} sources found", files.len());
+    let mut wrong = Vec::new();
+    for file in files {
+        let inside = file.strip_prefix(&root).expect("within src");
+        let first = inside.components().next().expect("a file");
+        let module = Path::new(first.as_os_str()).with_extension("");
+        let module = module.to_str().expect("a plain name");
+        if ["lib", "main"].contains(&module) {
+            continue;
+        }
+        let source = fs::read_to_string(&file).expect("readable");
+        for violation in violations(module, &source) {
+            wrong.push(format!("{}: {violation}", inside.display()));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_window_library_stays_in_the_window() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    sources(&root, &mut files);
+    for file in files {
+        let inside = file.strip_prefix(&root).expect("within src");
+        if inside.starts_with("app") {
+            continue;
+        }
+        let source = fs::read_to_string(&file).expect("readable");
+        for name in ["egui::", "eframe::", "wgpu::"] {
+            assert!(!source.contains(name), "{} uses {name}", inside.display());
+        }
+    }
+}
+
+#[test]
+fn upward_and_sideways_imports_would_be_found() {
+    assert!(violations("math", "use crate::scene::Scene;").len() == 1);
+    assert!(violations("session", "fn f() { crate::cli::run() }").len() == 1);
+    assert!(violations("cli", "use crate::{app::run, error::{Error, Result}};").len() == 1);
+    assert!(violations("export", "use crate::room::write;").len() == 1);
+    assert!(violations("scene", "use crate::nowhere::X;").len() == 1);
+    assert!(violations("session", "use crate::session::slot::Slot; // crate::cli").is_empty());
+    assert!(violations("cli", "use crate::{error::{Error, Result}, math};").is_empty());
+}
