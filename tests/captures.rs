@@ -2,6 +2,7 @@
 
 use relit::capture::photograph::Encoding;
 use relit::capture::read::{ReadOptions, read};
+use relit::capture::working::load_working;
 use relit::scene::Scene;
 use std::path::PathBuf;
 
@@ -41,4 +42,28 @@ fn rendered_rooms_load_with_objects_and_linear_photographs() {
         assert_eq!(scene.cameras.len(), frames);
         println!("{name}: {:?}", capture.warnings);
     }
+}
+
+#[test]
+fn a_scan_without_objects_is_cut_into_segments_and_reduced_to_a_budget() {
+    let Some(folder) = capture("office") else {
+        return;
+    };
+    let capture = read(&folder, &ReadOptions::default()).unwrap();
+    assert_eq!(capture.mesh.triangles.len(), 309_026);
+    assert!((50..=400).contains(&capture.mesh.objects.len()));
+    assert_eq!(capture.frames.len(), 75);
+    assert!(capture.frames.iter().all(|frame| frame.depth.is_some()));
+    println!(
+        "{} objects; {:?}",
+        capture.mesh.objects.len(),
+        capture.warnings
+    );
+
+    let working = load_working(&capture, 1 << 20).unwrap();
+    let pixels: usize = working.photographs.iter().map(|p| p.pixels.len()).sum();
+    assert!(pixels <= 1 << 20 && working.factor == 4, "{pixels}");
+    assert_eq!(working.photographs[0].encoding, Encoding::Srgb8);
+    let scene = Scene::new(&capture.at(&working)).unwrap();
+    assert_eq!(scene.cameras[0].intrinsics, working.intrinsics[0]);
 }

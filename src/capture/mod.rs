@@ -6,6 +6,8 @@ pub mod camera;
 pub mod mesh;
 pub mod photograph;
 pub mod read;
+pub mod segment;
+pub mod working;
 
 use crate::error::Result;
 use camera::{Intrinsics, Pose};

@@ -50,9 +50,24 @@ impl PhotographSource {
     /// # Errors
     /// The file cannot be read, is no image, or has another size than the camera.
     pub fn load(&self, intrinsics: &Intrinsics, exposure: Option<f64>) -> Result<Arc<Photograph>> {
+        Ok(self.load_counted(intrinsics, exposure)?.0)
+    }
+
+    /// [`PhotographSource::load`], and the number of pixels whose values are impossible: not finite or negative.
+    ///
+    /// # Errors
+    /// As [`PhotographSource::load`].
+    pub fn load_counted(
+        &self,
+        intrinsics: &Intrinsics,
+        exposure: Option<f64>,
+    ) -> Result<(Arc<Photograph>, usize)> {
         match self {
-            Self::Memory(photograph) => Ok(photograph.clone()),
-            Self::File(path) => read::image::read(path, intrinsics, exposure).map(Arc::new),
+            Self::Memory(photograph) => Ok((photograph.clone(), 0)),
+            Self::File(path) => {
+                let (photograph, invalid) = read::image::read(path, intrinsics, exposure)?;
+                Ok((Arc::new(photograph), invalid))
+            }
         }
     }
 }

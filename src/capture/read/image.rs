@@ -44,12 +44,16 @@ pub fn header(path: &Path) -> Result<Header> {
     })
 }
 
-/// Reads a photograph: linear values divided by the exposure; alpha below one half, values that are no number,
-/// infinite or negative make a pixel unusable (its colour is then zero).
+/// Reads a photograph: linear values divided by the exposure. Alpha below one half, values that are no number,
+/// infinite or negative make a pixel unusable (its colour is then zero); such values, alpha apart, are counted.
 ///
 /// # Errors
 /// The file cannot be read, is no image, or has another size than the camera.
-pub fn read(path: &Path, intrinsics: &Intrinsics, exposure: Option<f64>) -> Result<Photograph> {
+pub fn read(
+    path: &Path,
+    intrinsics: &Intrinsics,
+    exposure: Option<f64>,
+) -> Result<(Photograph, usize)> {
     let decoder = decoder(path)?;
     let (width, height) = decoder.dimensions();
     if (width, height) != (intrinsics.width, intrinsics.height) {
@@ -68,11 +72,14 @@ pub fn read(path: &Path, intrinsics: &Intrinsics, exposure: Option<f64>) -> Resu
     let values = linear_values(decoded, encoding);
 
     let mut usable = Vec::with_capacity(values.len());
+    let mut invalid = 0;
     let pixels: Vec<Vec3> = values
         .iter()
         .map(|&[r, g, b, alpha]| {
             let rgb = Vec3::new(r, g, b) * scale;
-            let good = rgb.is_finite() && rgb.min_element() >= 0.0 && alpha >= 0.5;
+            let valid = rgb.is_finite() && rgb.min_element() >= 0.0;
+            invalid += usize::from(!valid);
+            let good = valid && alpha >= 0.5;
             usable.push(good);
             if good { rgb } else { Vec3::ZERO }
         })
@@ -80,7 +87,7 @@ pub fn read(path: &Path, intrinsics: &Intrinsics, exposure: Option<f64>) -> Resu
     if usable.iter().all(|&good| good) {
         usable.clear();
     }
-    Ok(Photograph {
+    let photograph = Photograph {
         width,
         height,
         pixels,
@@ -90,7 +97,8 @@ pub fn read(path: &Path, intrinsics: &Intrinsics, exposure: Option<f64>) -> Resu
             Encoding::Linear => f32::INFINITY,
             Encoding::Srgb8 | Encoding::Srgb16 => scale,
         },
-    })
+    };
+    Ok((photograph, invalid))
 }
 
 /// Opens the decoder that the file's first bytes ask for, with its size checked and its memory limited.

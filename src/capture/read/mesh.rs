@@ -2,7 +2,7 @@
 
 use crate::capture::mesh::Mesh;
 use crate::capture::read::confine::Confine;
-use crate::capture::read::obj;
+use crate::capture::read::{obj, ply};
 use crate::error::{Error, Result};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -32,6 +32,7 @@ pub fn read(path: &Path, confine: &Confine, warnings: &mut Vec<String>) -> Resul
         .map(|e| e.to_string_lossy().to_ascii_lowercase());
     let mut raw = match extension.as_deref() {
         Some("obj") => obj::read(path)?,
+        Some("ply") => ply::read(path)?,
         _ => {
             return Err(Error::file(
                 path,

@@ -18,14 +18,22 @@ pub mod image;
 mod lens;
 mod mesh;
 mod obj;
+mod ply;
+mod ply_elements;
 mod pose;
 mod transforms;
 
 use crate::capture::Capture;
+use crate::capture::mesh::Mesh;
+use crate::capture::read::mesh::RawMesh;
+use crate::capture::segment::segment;
 use crate::error::{Error, Result};
 use confine::Confine;
 use glam::DVec3;
 use std::path::Path;
+
+/// A mesh whose only object has more triangles than this is taken for a scan without objects.
+const MAX_TRIANGLES_OF_ONE_OBJECT: usize = 5000;
 
 /// What a person may choose about reading.
 #[derive(Debug, Clone, Default)]
@@ -54,7 +62,8 @@ pub fn read(folder: &Path, options: &ReadOptions) -> Result<Capture> {
     let confine = Confine::new(folder, options.allow_outside)?;
     let mut warnings = Vec::new();
     let transforms = transforms::read(&confine, options.up, &mut warnings)?;
-    let mesh = mesh::read(&transforms.mesh, &confine, &mut warnings)?.mesh;
+    let raw = mesh::read(&transforms.mesh, &confine, &mut warnings)?;
+    let mesh = with_objects(raw, &transforms.mesh, options.segments, &mut warnings);
     Ok(Capture {
         name: name_of(folder),
         folder: Some(folder.to_path_buf()),
@@ -63,6 +72,35 @@ pub fn read(folder: &Path, options: &ReadOptions) -> Result<Capture> {
         up: transforms.up,
         warnings,
     })
+}
+
+/// Cuts a mesh without objects into segments, if that is wanted; a single object of a scan's complexity counts as none.
+fn with_objects(
+    raw: RawMesh,
+    path: &Path,
+    segments: Option<usize>,
+    warnings: &mut Vec<String>,
+) -> Mesh {
+    let mut mesh = raw.mesh;
+    let whole = !raw.has_objects
+        || (mesh.objects.len() == 1 && mesh.triangles.len() > MAX_TRIANGLES_OF_ONE_OBJECT);
+    let place = path.display();
+    match segments {
+        Some(1) if mesh.objects.len() == 1 => {}
+        Some(_) if !whole && mesh.objects.len() > 1 => warnings.push(format!(
+            "{place}: the mesh has {} objects of its own; it is not cut into segments",
+            mesh.objects.len()
+        )),
+        None if !whole => {}
+        _ => {
+            segment(&mut mesh, segments);
+            warnings.push(format!(
+                "{place}: the mesh has no objects; it was cut into {} segments by normal and colour (--segments changes the number)",
+                mesh.objects.len()
+            ));
+        }
+    }
+    mesh
 }
 
 /// The folder's own name, also of `.` and `..`.

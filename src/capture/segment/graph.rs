@@ -1,0 +1,127 @@
+//! Faces and which of them share an edge.
+
+use crate::capture::mesh::Mesh;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// How much a full change of normal counts against a full change of colour.
+const NORMAL_WEIGHT: f64 = 1.0;
+/// See [`NORMAL_WEIGHT`].
+const COLOR_WEIGHT: f64 = 0.5;
+
+/// The dual graph of a mesh with what segmentation looks at.
+#[derive(Debug)]
+pub struct FaceGraph {
+    /// Areas.
+    pub area: Vec<f64>,
+    /// Unit normals, smoothed over the corners; zero for faces without area.
+    pub normal: Vec<DVec3>,
+    /// Colours relative to the mesh's mean, compressed by the square root, as perception does; zero without vertex colours.
+    pub color: Vec<DVec3>,
+    /// Middles.
+    pub centroid: Vec<DVec3>,
+    /// Pairs of faces that share an edge.
+    pub edges: Vec<[u32; 2]>,
+}
+
+impl FaceGraph {
+    /// The graph of a mesh; vertices at equal positions count as one.
+    pub fn new(mesh: &Mesh) -> Self {
+        let welded = mesh.weld();
+        let corners: Vec<[u32; 3]> = mesh
+            .triangles
+            .iter()
+            .map(|t| t.map(|i| welded[i as usize]))
+            .collect();
+        let position = |i: u32| mesh.positions[i as usize];
+        let crosses: Vec<DVec3> = corners
+            .par_iter()
+            .map(|t| {
+                let [a, b, c] = t.map(position);
+                (b - a).cross(c - a)
+            })
+            .collect();
+
+        // Normals averaged over each vertex, then over each face: fused depth is noisy at the scale of a face.
+        let mut at_vertex = vec![DVec3::ZERO; mesh.positions.len()];
+        for (t, &cross) in corners.iter().zip(&crosses) {
+            t.iter().for_each(|&i| at_vertex[i as usize] += cross);
+        }
+        let normal = corners
+            .iter()
+            .zip(&crosses)
+            .map(|(t, cross)| {
+                let sum: DVec3 = t
+                    .iter()
+                    .map(|&i| at_vertex[i as usize].normalize_or_zero())
+                    .sum();
+                (sum + cross.normalize_or_zero()).normalize_or_zero()
+            })
+            .collect();
+        Self {
+            area: crosses.iter().map(|cross| cross.length() * 0.5).collect(),
+            normal,
+            color: colors(mesh),
+            centroid: corners
+                .iter()
+                .map(|t| t.map(position).iter().sum::<DVec3>() / 3.0)
+                .collect(),
+            edges: shared_edges(&corners),
+        }
+    }
+
+    /// The contrast of every edge: change of colour, and of normal, squared where the edge is convex.
+    pub fn contrasts(&self) -> Vec<f64> {
+        self.edges
+            .par_iter()
+            .map(|&[a, b]| {
+                let (a, b) = (a as usize, b as usize);
+                let bend = (1.0 - self.normal[a].dot(self.normal[b])).max(0.0);
+                let ahead = self.centroid[b] - self.centroid[a];
+                let convex = ahead.dot(self.normal[b] - self.normal[a]) > 0.0;
+                let bend = if convex { bend * bend } else { bend };
+                NORMAL_WEIGHT * bend + COLOR_WEIGHT * self.color[a].distance(self.color[b])
+            })
+            .collect()
+    }
+}
+
+/// Colour of each face: the mean of its corners.
+fn colors(mesh: &Mesh) -> Vec<DVec3> {
+    if mesh.vertex_colors.is_empty() {
+        return vec![DVec3::ZERO; mesh.triangles.len()];
+    }
+    let compressed: Vec<DVec3> = mesh
+        .vertex_colors
+        .iter()
+        .map(|c| {
+            let c = c.as_dvec3().max(DVec3::ZERO);
+            DVec3::new(c.x.sqrt(), c.y.sqrt(), c.z.sqrt())
+        })
+        .collect();
+    let sum: DVec3 = compressed.iter().sum();
+    let mean = sum.element_sum() / (3.0 * compressed.len() as f64);
+    let scale = if mean > 0.0 { mean.recip() } else { 0.0 };
+    mesh.triangles
+        .iter()
+        .map(|t| t.iter().map(|&i| compressed[i as usize]).sum::<DVec3>() * (scale / 3.0))
+        .collect()
+}
+
+/// Pairs of faces that share two corners; at an edge of more than two faces each is paired with the next.
+fn shared_edges(corners: &[[u32; 3]]) -> Vec<[u32; 2]> {
+    let mut sides: Vec<(u32, u32, u32)> = corners
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(|(face, &[a, b, c])| {
+            [(a, b), (b, c), (c, a)].map(|(i, j)| (i.min(j), i.max(j), face as u32))
+        })
+        .filter(|(i, j, _)| i != j)
+        .collect();
+    sides.par_sort_unstable();
+    sides
+        .windows(2)
+        .filter(|pair| (pair[0].0, pair[0].1) == (pair[1].0, pair[1].1) && pair[0].2 != pair[1].2)
+        .map(|pair| [pair[0].2, pair[1].2])
+        .collect()
+}

@@ -1,0 +1,152 @@
+//! Cuts a mesh without objects into segments by normal and colour.
+//!
+//! Fine segments first, by the graph-based segmentation of Felzenszwalb and Huttenlocher (2004) over the edges between
+//! faces, where concave edges count more than convex ones (Karpathy et al. 2013); then neighbours are merged in
+//! Ward's order (1963: the least increase of the area-weighted variance of normal and colour) to the number wanted.
+//! Every quantity is relative to the mesh's own area and colours: size, tessellation and exposure do not matter.
+
+mod graph;
+mod sets;
+mod ward;
+
+use crate::capture::mesh::Mesh;
+use graph::FaceGraph;
+use sets::Sets;
+
+/// Felzenszwalb and Huttenlocher's k: the contrast that a segment of one mean face tolerates.
+const FINE_CONTRAST: f64 = 0.2;
+
+/// Replaces the mesh's objects by segments, named "segment 000", "segment 001", … by descending area.
+///
+/// `wanted` is the number of segments; `None` lets the mesh's complexity decide. The result depends on nothing else.
+pub fn segment(mesh: &mut Mesh, wanted: Option<usize>) {
+    let graph = FaceGraph::new(mesh);
+    let fine = fine_segments(&graph);
+    let (segment_of, count) = ward::merge(&graph, &fine, wanted);
+    mesh.object_of = segment_of;
+    mesh.objects = (0..count).map(|i| format!("segment {i:03}")).collect();
+}
+
+/// Felzenszwalb–Huttenlocher: for each face, a face that stands for its segment.
+fn fine_segments(graph: &FaceGraph) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..graph.edges.len() as u32).collect();
+    let contrasts: Vec<f64> = graph.contrasts();
+    order.sort_unstable_by(|&a, &b| {
+        let contrast = |edge: u32| contrasts[edge as usize];
+        contrast(a).total_cmp(&contrast(b)).then(a.cmp(&b))
+    });
+
+    // Join two segments where the edge between them is no stronger than what each tolerates inside.
+    let count = graph.area.len();
+    let mean_area = graph.area.iter().sum::<f64>() / count as f64;
+    let mut sets = Sets::new(count);
+    let mut size: Vec<f64> = graph.area.iter().map(|a| a / mean_area).collect();
+    let mut tolerance: Vec<f64> = size.iter().map(|s| FINE_CONTRAST / s).collect();
+    for edge in order {
+        let contrast = contrasts[edge as usize];
+        let [a, b] = graph.edges[edge as usize].map(|face| sets.find(face));
+        if a == b || contrast > tolerance[a as usize].min(tolerance[b as usize]) {
+            continue;
+        }
+        let total = size[a as usize] + size[b as usize];
+        let root = sets.join(a, b) as usize;
+        size[root] = total;
+        tolerance[root] = contrast + FINE_CONTRAST / total;
+    }
+    (0..count as u32).map(|face| sets.find(face)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DVec3, Vec3};
+
+    /// Floor (half of it red), back wall and a floating square, each a grid of `n` × `n` quads with a little noise.
+    fn room(n: usize, scale: f64, exposure: f32) -> Mesh {
+        let mut mesh = Mesh::default();
+        let mut square = |origin: DVec3, u: DVec3, v: DVec3, color: &dyn Fn(f64) -> Vec3| {
+            let first = mesh.positions.len() as u32;
+            let side = n as u32 + 1;
+            for j in 0..side {
+                for i in 0..side {
+                    let (s, t) = (f64::from(i) / n as f64, f64::from(j) / n as f64);
+                    let inside = i > 0 && j > 0 && i + 1 < side && j + 1 < side;
+                    let noise = if inside {
+                        ((i * 7 + j * 13) % 5) as f64 * 0.002
+                    } else {
+                        0.0
+                    };
+                    let normal = u.cross(v).normalize();
+                    mesh.positions
+                        .push((origin + u * s + v * t + normal * noise) * scale);
+                    mesh.vertex_colors.push(color(s) * exposure);
+                }
+            }
+            for j in 0..n as u32 {
+                for i in 0..n as u32 {
+                    let a = first + j * side + i;
+                    mesh.triangles.push([a, a + 1, a + side + 1]);
+                    mesh.triangles.push([a, a + side + 1, a + side]);
+                }
+            }
+        };
+        let gray = |_: f64| Vec3::splat(0.5);
+        let half_red = |s: f64| {
+            if s < 0.5 {
+                Vec3::new(0.6, 0.1, 0.1)
+            } else {
+                Vec3::splat(0.5)
+            }
+        };
+        square(DVec3::ZERO, DVec3::X * 4.0, DVec3::Y * 4.0, &half_red);
+        square(DVec3::Y * 4.0, DVec3::X * 4.0, DVec3::Z * 3.0, &gray);
+        square(DVec3::new(1.0, 1.0, 2.5), DVec3::X, DVec3::Y, &gray);
+        mesh.object_of = vec![0; mesh.triangles.len()];
+        mesh.objects = vec!["mesh".into()];
+        mesh
+    }
+
+    #[test]
+    fn surfaces_and_colours_come_apart_at_any_size_and_exposure() {
+        for (scale, exposure) in [(1.0, 1.0), (1e-3, 1e4), (1e5, 1e-5)] {
+            let mut mesh = room(20, scale, exposure);
+            segment(&mut mesh, Some(4));
+            assert_eq!(mesh.objects.len(), 4);
+            let squares: Vec<&[u32]> = mesh.object_of.chunks(800).collect();
+            for whole in &squares[1..] {
+                assert!(whole.iter().all(|s| s == &whole[0]), "{scale}");
+            }
+            let mut seen = [squares[0][0], squares[0][39], squares[1][0], squares[2][0]];
+            seen.sort_unstable();
+            assert_eq!(seen, [0, 1, 2, 3]);
+        }
+    }
+
+    #[test]
+    fn the_number_wanted_is_met_and_areas_descend() {
+        for wanted in [1, 2, 3, 4, 10, 100] {
+            let mut mesh = room(20, 1.0, 1.0);
+            segment(&mut mesh, Some(wanted));
+            assert!(mesh.objects.len() <= wanted && mesh.objects.len() >= wanted.min(4));
+            let graph = FaceGraph::new(&mesh);
+            let mut areas = vec![0.0; mesh.objects.len()];
+            for (&object, area) in mesh.object_of.iter().zip(&graph.area) {
+                areas[object as usize] += area;
+            }
+            assert!(areas.is_sorted_by(|a, b| a >= b), "{areas:?}");
+        }
+    }
+
+    #[test]
+    fn degenerate_meshes_are_segmented_without_panic() {
+        let mut flat = Mesh {
+            positions: vec![DVec3::ZERO; 3],
+            triangles: vec![[0, 1, 2], [0, 0, 0]],
+            object_of: vec![0; 2],
+            objects: vec!["mesh".into()],
+            ..Mesh::default()
+        };
+        segment(&mut flat, None);
+        assert!(flat.objects.len() == 1 && flat.object_of == [0, 0]);
+    }
+}

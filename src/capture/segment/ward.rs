@@ -1,0 +1,193 @@
+//! Merges neighbouring segments in Ward's order.
+
+use crate::capture::segment::graph::FaceGraph;
+use crate::capture::segment::sets::Sets;
+use glam::DVec3;
+use std::cmp::Reverse;
+use std::collections::{BTreeSet, BinaryHeap};
+
+/// Without a number wanted, merging ends where the next merge would add this share of the mesh's area times the
+/// square of a full change of normal or colour.
+const MERGE_LIMIT: f64 = 1e-3;
+/// Without a number wanted, at most so many segments, however complex the mesh.
+const MAX_SEGMENTS: usize = 400;
+
+/// Area, and area-weighted sums of normal, colour and position.
+#[derive(Debug, Clone, Copy, Default)]
+struct Region {
+    area: f64,
+    normal: DVec3,
+    color: DVec3,
+    position: DVec3,
+    /// Counts the changes, so that outdated merges are recognised.
+    version: u32,
+}
+
+impl Region {
+    fn centroid(&self) -> DVec3 {
+        self.position / self.area.max(f64::MIN_POSITIVE)
+    }
+
+    /// By how much the area-weighted variance of normal and colour grows if two regions become one.
+    fn cost(&self, other: &Self) -> f64 {
+        if self.area <= 0.0 || other.area <= 0.0 {
+            return 0.0;
+        }
+        let difference = |a: DVec3, b: DVec3| (a / self.area).distance_squared(b / other.area);
+        let change =
+            difference(self.normal, other.normal) + 2.0 * difference(self.color, other.color);
+        change * self.area * other.area / (self.area + other.area)
+    }
+
+    fn absorb(&mut self, other: &Self) {
+        self.area += other.area;
+        self.normal += other.normal;
+        self.color += other.color;
+        self.position += other.position;
+        self.version += 1;
+    }
+}
+
+/// Merges the segments of `fine` (for each face one that stands for its segment) to `wanted` of them.
+///
+/// Returns for each face its segment's number, by descending area, and the number of segments.
+pub fn merge(graph: &FaceGraph, fine: &[u32], wanted: Option<usize>) -> (Vec<u32>, usize) {
+    let (region_of, mut regions) = sum_up(graph, fine);
+    let mut neighbors = vec![BTreeSet::new(); regions.len()];
+    for &[a, b] in &graph.edges {
+        let (a, b) = (region_of[a as usize], region_of[b as usize]);
+        if a != b {
+            neighbors[a as usize].insert(b);
+            neighbors[b as usize].insert(a);
+        }
+    }
+    link_islands(&regions, &mut neighbors);
+
+    // The cheapest merge first; costs are never negative, so their bits order as they do.
+    let mut heap = BinaryHeap::new();
+    let candidate = |regions: &[Region], a: u32, b: u32| {
+        let (ra, rb) = (&regions[a as usize], &regions[b as usize]);
+        Reverse((ra.cost(rb).to_bits(), a, b, ra.version, rb.version))
+    };
+    for (a, around) in (0..).zip(&neighbors) {
+        heap.extend(around.range(a + 1..).map(|&b| candidate(&regions, a, b)));
+    }
+    let total: f64 = regions.iter().map(|region| region.area).sum();
+    let mut sets = Sets::new(regions.len());
+    let mut count = regions.len();
+    while let Some(Reverse((cost, a, b, version_a, version_b))) = heap.pop() {
+        let enough = match wanted {
+            Some(wanted) => count <= wanted.max(1),
+            None => count <= MAX_SEGMENTS && f64::from_bits(cost) > MERGE_LIMIT * total,
+        };
+        if enough {
+            break;
+        }
+        let current = |x: u32, version: u32| regions[x as usize].version == version;
+        if !current(a, version_a) || !current(b, version_b) {
+            continue;
+        }
+        let root = sets.join(a, b);
+        let child = if root == a { b } else { a };
+        let absorbed = regions[child as usize];
+        regions[root as usize].absorb(&absorbed);
+        regions[child as usize].version = u32::MAX;
+        count -= 1;
+        let moved = std::mem::take(&mut neighbors[child as usize]);
+        for other in moved {
+            neighbors[other as usize].remove(&child);
+            if other != root {
+                neighbors[other as usize].insert(root);
+                neighbors[root as usize].insert(other);
+            }
+        }
+        let around = &neighbors[root as usize];
+        heap.extend(around.iter().map(|&b| candidate(&regions, root, b)));
+    }
+    number_by_area(&region_of, &regions, &mut sets)
+}
+
+/// For each face its region's index, and the regions in the order of their first faces.
+fn sum_up(graph: &FaceGraph, fine: &[u32]) -> (Vec<u32>, Vec<Region>) {
+    let mut index = vec![u32::MAX; fine.len()];
+    let mut regions: Vec<Region> = Vec::new();
+    let region_of = fine
+        .iter()
+        .enumerate()
+        .map(|(face, &segment)| {
+            let slot = &mut index[segment as usize];
+            if *slot == u32::MAX {
+                *slot = regions.len() as u32;
+                regions.push(Region::default());
+            }
+            let area = graph.area[face];
+            let region = &mut regions[*slot as usize];
+            region.area += area;
+            region.normal += graph.normal[face] * area;
+            region.color += graph.color[face] * area;
+            region.position += graph.centroid[face] * area;
+            *slot
+        })
+        .collect();
+    (region_of, regions)
+}
+
+/// Makes separate pieces of the mesh neighbours: each piece's largest region of the nearest one in a larger piece.
+fn link_islands(regions: &[Region], neighbors: &mut [BTreeSet<u32>]) {
+    let mut sets = Sets::new(regions.len());
+    for (a, around) in (0..).zip(neighbors.iter()) {
+        for &b in around {
+            let (a, b) = (sets.find(a), sets.find(b));
+            if a != b {
+                sets.join(a, b);
+            }
+        }
+    }
+    // Pieces by descending area, each with its regions; ties by the first region.
+    let mut members: Vec<Vec<u32>> = vec![Vec::new(); regions.len()];
+    for a in 0..regions.len() as u32 {
+        members[sets.find(a) as usize].push(a);
+    }
+    members.retain(|piece| !piece.is_empty());
+    let area = |piece: &[u32]| -> f64 { piece.iter().map(|&a| regions[a as usize].area).sum() };
+    members.sort_by(|a, b| area(b).total_cmp(&area(a)).then(a[0].cmp(&b[0])));
+
+    let mut larger: Vec<u32> = Vec::new();
+    for piece in members {
+        let by_area = |a: &u32, b: &u32| {
+            let area = |x: u32| regions[x as usize].area;
+            area(*a).total_cmp(&area(*b)).then(b.cmp(a))
+        };
+        if let Some(&largest) = piece.iter().max_by(|a, b| by_area(a, b)) {
+            let center = regions[largest as usize].centroid();
+            let distance = |x: u32| regions[x as usize].centroid().distance_squared(center);
+            let nearest = larger
+                .iter()
+                .min_by(|&&a, &&b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
+            if let Some(&nearest) = nearest {
+                neighbors[largest as usize].insert(nearest);
+                neighbors[nearest as usize].insert(largest);
+            }
+        }
+        larger.extend(piece);
+    }
+}
+
+/// Numbers the merged regions by descending area, ties by the first face.
+fn number_by_area(region_of: &[u32], regions: &[Region], sets: &mut Sets) -> (Vec<u32>, usize) {
+    let roots: Vec<u32> = (0..regions.len() as u32).map(|a| sets.find(a)).collect();
+    let mut order = roots.clone();
+    order.sort_unstable();
+    order.dedup();
+    let area = |root: u32| regions[root as usize].area;
+    order.sort_by(|&a, &b| area(b).total_cmp(&area(a)).then(a.cmp(&b)));
+    let mut number = vec![0; regions.len()];
+    for (rank, &root) in (0..).zip(&order) {
+        number[root as usize] = rank;
+    }
+    let segment_of = region_of
+        .iter()
+        .map(|&region| number[roots[region as usize] as usize])
+        .collect();
+    (segment_of, order.len())
+}

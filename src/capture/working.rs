@@ -1,0 +1,233 @@
+//! The working resolution: photographs reduced until they fit a budget of pixels, with cameras reduced exactly.
+
+use crate::capture::camera::Intrinsics;
+use crate::capture::photograph::{Photograph, PhotographSource};
+use crate::capture::{Capture, Frame};
+use crate::error::Result;
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// All photographs of a capture in memory at the working resolution.
+#[derive(Debug, Clone)]
+pub struct Working {
+    /// One a frame, in frame order: linear radiance, each pixel the mean of `factor`² pixels of the file.
+    pub photographs: Vec<Arc<Photograph>>,
+    /// The frames' lenses at this resolution; sizes equal those of `photographs`.
+    pub intrinsics: Vec<Intrinsics>,
+    /// Width and height of the block of pixels that became one.
+    pub factor: u32,
+    /// What was odd, each a full sentence naming the file.
+    pub warnings: Vec<String>,
+}
+
+/// Loads all photographs, reduced by the smallest whole factor with which they have at most `max_pixels` together.
+///
+/// Frames are read in parallel; no more full-size photographs are held at once than there are threads.
+///
+/// # Errors
+/// A photograph cannot be read or has another size than its camera.
+pub fn load_working(capture: &Capture, max_pixels: u64) -> Result<Working> {
+    let factor = reduction(&capture.frames, max_pixels);
+    let loaded: Vec<Result<(Arc<Photograph>, usize)>> = capture
+        .frames
+        .par_iter()
+        .map(|frame| {
+            let (photograph, invalid) = frame
+                .photograph
+                .load_counted(&frame.intrinsics, frame.exposure)?;
+            let reduced = match factor {
+                1 => photograph,
+                _ => Arc::new(reduce(&photograph, factor)),
+            };
+            Ok((reduced, invalid))
+        })
+        .collect();
+
+    let mut photographs = Vec::with_capacity(loaded.len());
+    let mut warnings = Vec::new();
+    for (index, (loaded, frame)) in loaded.into_iter().zip(&capture.frames).enumerate() {
+        let (photograph, invalid) = loaded?;
+        if invalid > 0 {
+            let place = match &frame.photograph {
+                PhotographSource::File(path) => path.display().to_string(),
+                PhotographSource::Memory(_) => format!("frame {index}"),
+            };
+            warnings.push(format!(
+                "{place}: {invalid} pixels are negative or no finite number and are left out"
+            ));
+        }
+        photographs.push(photograph);
+    }
+    Ok(Working {
+        photographs,
+        intrinsics: capture
+            .frames
+            .iter()
+            .map(|frame| frame.intrinsics.reduced(factor))
+            .collect(),
+        factor,
+        warnings,
+    })
+}
+
+impl Capture {
+    /// The same capture seen at the working resolution: cameras and photographs are replaced by those of `working`.
+    pub fn at(&self, working: &Working) -> Self {
+        let mut capture = self.clone();
+        let reduced = working.intrinsics.iter().zip(&working.photographs);
+        for (frame, (&intrinsics, photograph)) in capture.frames.iter_mut().zip(reduced) {
+            frame.intrinsics = intrinsics;
+            frame.photograph = PhotographSource::Memory(photograph.clone());
+        }
+        capture
+    }
+}
+
+impl Intrinsics {
+    /// The lens of a photograph whose pixels are blocks of `factor` × `factor` pixels of this one, counted from the
+    /// top-left corner; a remainder at the right and the bottom is cut off.
+    pub fn reduced(&self, factor: u32) -> Self {
+        let scale = f64::from(factor);
+        Self {
+            width: self.width / factor,
+            height: self.height / factor,
+            fx: self.fx / scale,
+            fy: self.fy / scale,
+            cx: self.cx / scale,
+            cy: self.cy / scale,
+            distortion: self.distortion,
+        }
+    }
+}
+
+/// The smallest factor that meets the budget; no photograph shrinks below one pixel.
+fn reduction(frames: &[Frame], max_pixels: u64) -> u32 {
+    let sizes = || {
+        frames
+            .iter()
+            .map(|f| (f.intrinsics.width, f.intrinsics.height))
+    };
+    let largest = sizes().map(|(w, h)| w.min(h)).min().unwrap_or(1).max(1);
+    let pixels = |factor: u32| -> u64 {
+        sizes()
+            .map(|(w, h)| u64::from(w / factor) * u64::from(h / factor))
+            .sum()
+    };
+    // The number of pixels falls with the factor, so the smallest that fits is found by halving.
+    let (mut low, mut high) = (1, largest);
+    while low < high {
+        let middle = low + (high - low) / 2;
+        if pixels(middle) <= max_pixels {
+            high = middle;
+        } else {
+            low = middle + 1;
+        }
+    }
+    low
+}
+
+/// The mean of every block of pixels. A block with an unusable pixel is unusable, and so is one of which only a part
+/// is saturated: its mean is unknown. Blocks saturated all over stay saturated.
+fn reduce(photograph: &Photograph, factor: u32) -> Photograph {
+    let (width, height) = (photograph.width / factor, photograph.height / factor);
+    let count = f64::from(factor) * f64::from(factor);
+    let blocks: Vec<(glam::Vec3, bool)> = (0..height)
+        .flat_map(|y| (0..width).map(move |x| (x, y)))
+        .map(|(x, y)| {
+            let mut sum = DVec3::ZERO;
+            let mut saturated = glam::UVec3::ZERO;
+            let mut usable = true;
+            for j in y * factor..(y + 1) * factor {
+                for i in x * factor..(x + 1) * factor {
+                    let index = j as usize * photograph.width as usize + i as usize;
+                    let pixel = photograph.pixels[index];
+                    sum += pixel.as_dvec3();
+                    saturated += glam::UVec3::from(
+                        pixel
+                            .to_array()
+                            .map(|v| u32::from(v >= photograph.saturation)),
+                    );
+                    usable &= photograph.usable.get(index).copied().unwrap_or(true);
+                }
+            }
+            let partly = saturated
+                .to_array()
+                .iter()
+                .any(|&n| n > 0 && n < factor * factor);
+            ((sum / count).as_vec3(), usable && !partly)
+        })
+        .collect();
+    let (pixels, mut usable): (Vec<_>, Vec<_>) = blocks.into_iter().unzip();
+    if usable.iter().all(|&good| good) {
+        usable.clear();
+    }
+    Photograph {
+        width,
+        height,
+        pixels,
+        usable,
+        encoding: photograph.encoding,
+        saturation: photograph.saturation,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::capture::photograph::Encoding;
+    use glam::{DVec2, Vec3};
+
+    fn photograph(width: u32, height: u32) -> Photograph {
+        Photograph {
+            width,
+            height,
+            pixels: (0..width * height).map(|i| Vec3::splat(i as f32)).collect(),
+            usable: Vec::new(),
+            encoding: Encoding::Linear,
+            saturation: f32::INFINITY,
+        }
+    }
+
+    #[test]
+    fn blocks_become_their_means_and_the_remainder_is_cut_off() {
+        let reduced = reduce(&photograph(5, 4), 2);
+        assert_eq!((reduced.width, reduced.height), (2, 2));
+        let values: Vec<f32> = reduced.pixels.iter().map(|p| p.x).collect();
+        assert_eq!(values, [3.0, 5.0, 13.0, 15.0]);
+    }
+
+    #[test]
+    fn unusable_and_partly_saturated_blocks_are_unusable() {
+        let mut p = photograph(4, 4);
+        p.usable = vec![true; 16];
+        p.usable[0] = false;
+        p.saturation = 7.0;
+        p.pixels
+            .iter_mut()
+            .for_each(|v| *v = v.min(Vec3::splat(7.0)));
+        let reduced = reduce(&p, 2);
+        assert_eq!(reduced.usable, [false, false, true, true]);
+        assert_eq!(reduced.pixels[3], Vec3::splat(7.0));
+    }
+
+    #[test]
+    fn a_point_lands_on_the_same_spot_of_the_reduced_photograph() {
+        let lens = Intrinsics {
+            width: 641,
+            height: 480,
+            fx: 500.0,
+            fy: 510.0,
+            cx: 321.3,
+            cy: 240.1,
+            distortion: [0.1, -0.02, 1e-3, 2e-3],
+        };
+        let reduced = lens.reduced(4);
+        assert_eq!((reduced.width, reduced.height), (160, 120));
+        let project = |k: &Intrinsics| {
+            let p = k.distort(DVec2::new(0.2, -0.3)).unwrap();
+            DVec2::new(p.x * k.fx + k.cx, p.y * k.fy + k.cy)
+        };
+        assert!((project(&lens) / 4.0 - project(&reduced)).length() < 1e-12);
+    }
+}
