@@ -19,6 +19,8 @@
 //!          math         colour, frames, statistics
 //! ```
 
+#[cfg(feature = "gui")]
+pub mod app;
 pub mod capture;
 pub mod compose;
 pub mod error;

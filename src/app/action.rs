@@ -1,0 +1,197 @@
+//! Everything that can be asked of the window, once: menus, palette, shortcuts and the window of keys read this table.
+
+use egui::{Key, KeyboardShortcut, Modifiers};
+
+/// One row: variant, text, tooltip, menu, shortcut.
+macro_rules! actions {
+    ($($variant:ident, $menu:ident, $text:literal, $help:literal, $shortcut:expr;)*) => {
+        /// An action of the window.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum Action { $(#[doc = $help] $variant,)* }
+
+        impl Action {
+            /// All actions, in the order in which menus show them.
+            pub const ALL: &'static [Action] = &[$(Action::$variant,)*];
+
+            /// Its text in menus and in the palette.
+            pub fn text(self) -> &'static str {
+                match self { $(Self::$variant => $text,)* }
+            }
+
+            /// What it does, in a sentence.
+            pub fn help(self) -> &'static str {
+                match self { $(Self::$variant => $help,)* }
+            }
+
+            /// The menu that it is found in.
+            pub fn menu(self) -> Menu {
+                match self { $(Self::$variant => Menu::$menu,)* }
+            }
+
+            /// Its keys.
+            pub fn shortcut(self) -> Option<KeyboardShortcut> {
+                match self { $(Self::$variant => $shortcut,)* }
+            }
+        }
+    };
+}
+
+/// A menu of the menu bar.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Menu {
+    /// Captures and results.
+    File,
+    /// Undo and inserted objects.
+    Edit,
+    /// The solver.
+    Solve,
+    /// Pictures and the 3D view.
+    View,
+    /// Panes and themes.
+    Window,
+    /// Help.
+    Help,
+}
+
+impl Menu {
+    /// All menus, from the left.
+    pub const ALL: [Menu; 6] = [
+        Self::File,
+        Self::Edit,
+        Self::Solve,
+        Self::View,
+        Self::Window,
+        Self::Help,
+    ];
+
+    /// Its title.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::File => "File",
+            Self::Edit => "Edit",
+            Self::Solve => "Solve",
+            Self::View => "View",
+            Self::Window => "Window",
+            Self::Help => "Help",
+        }
+    }
+}
+
+const fn key(key: Key) -> Option<KeyboardShortcut> {
+    Some(KeyboardShortcut::new(Modifiers::NONE, key))
+}
+
+const fn ctrl(key: Key) -> Option<KeyboardShortcut> {
+    Some(KeyboardShortcut::new(Modifiers::COMMAND, key))
+}
+
+const fn ctrl_shift(key: Key) -> Option<KeyboardShortcut> {
+    let modifiers = Modifiers::COMMAND.plus(Modifiers::SHIFT);
+    Some(KeyboardShortcut::new(modifiers, key))
+}
+
+actions! {
+    OpenFolder, File, "Open capture…", "Chooses a capture's folder with a file dialog", ctrl(Key::O);
+    OpenRoom, File, "Open built-in room", "Opens the room that is built into the program", ctrl_shift(Key::O);
+    StartPage, File, "Start page", "Shows recent captures and the field for a typed path", ctrl(Key::N);
+    Save, File, "Save results…", "Writes estimate, report and pictures into a folder", ctrl(Key::S);
+    Export, File, "Export…", "Writes one file for another program", ctrl(Key::E);
+    Screenshot, File, "Screenshot of the window", "Writes a picture of the whole window into the current folder", key(Key::F12);
+    Quit, File, "Quit", "Closes the window", ctrl(Key::Q);
+
+    Undo, Edit, "Undo", "Takes back the last change to the inserted objects", ctrl(Key::Z);
+    Redo, Edit, "Redo", "Makes the last change that was undone again", ctrl_shift(Key::Z);
+    InsertObject, Edit, "Insert object…", "Shows the panel that puts OBJ and GLB objects into the photographs", ctrl(Key::I);
+    Place, Edit, "Place by click", "The next click in a view puts the chosen object there", key(Key::G);
+    Duplicate, Edit, "Duplicate object", "Copies the chosen inserted object", ctrl(Key::D);
+    Delete, Edit, "Delete object", "Takes the chosen inserted object away", key(Key::Delete);
+    Deselect, Edit, "Deselect", "Selects nothing and ends placing", key(Key::Escape);
+
+    RunPause, Solve, "Run / Pause", "Starts, holds or goes on with the solve", key(Key::Space);
+    Step, Solve, "Step", "One iteration, then pause", key(Key::Period);
+    Finish, Solve, "Finish", "Ends the solve and keeps the estimate", None;
+    Reset, Solve, "Reset", "Forgets the estimate and starts over", ctrl(Key::R);
+
+    PreviousFrame, View, "Previous photograph", "Steps to the photograph before", key(Key::OpenBracket);
+    NextFrame, View, "Next photograph", "Steps to the next photograph", key(Key::CloseBracket);
+    ShowPhotograph, View, "Hold to see the photograph", "While the key is down all pictures show the photograph", key(Key::P);
+    Flip, View, "Flip", "Swaps the two pictures of the comparison", key(Key::X);
+    CompareMode, View, "Wipe / flip / side by side", "Steps through the ways to compare two pictures", key(Key::C);
+    Brighter, View, "Brighter", "Half a stop more exposure", key(Key::Plus);
+    Darker, View, "Darker", "Half a stop less exposure", key(Key::Minus);
+    AutoExposure, View, "Automatic exposure", "Puts the photograph's 99th percentile at 1", key(Key::Num0);
+    ToneCurve, View, "Next tone curve", "Steps through none, Reinhard and filmic", key(Key::T);
+    FitPictures, View, "Fit pictures", "Shows whole pictures", key(Key::Home);
+    FrameSelection, View, "Frame selection", "Turns the 3D view to the selected object, or to the whole scene", key(Key::F);
+    JumpToFrame, View, "View from photograph", "Puts the 3D view's camera where the photograph was taken", key(Key::J);
+    RenderFromHere, View, "Re-render from 3D view", "Re-renders from the 3D view's camera instead of the photograph's", key(Key::R);
+
+    Thumbnails, Window, "Thumbnails", "Shows or hides the strip of photographs", ctrl(Key::T);
+    ResetLayout, Window, "Reset layout", "Puts all panes back where they were at first", None;
+    Theme, Window, "Light / dark theme", "Changes between the light and the dark theme", ctrl(Key::L);
+
+    Palette, Help, "Command palette", "Finds any command by name", ctrl(Key::P);
+    Keys, Help, "Keys and mouse", "Shows what keys and mouse do", key(Key::Questionmark);
+}
+
+impl Action {
+    /// Its keys in words, or an empty text.
+    pub fn keys(self, ctx: &egui::Context) -> String {
+        self.shortcut()
+            .map(|shortcut| ctx.format_shortcut(&shortcut))
+            .unwrap_or_default()
+    }
+}
+
+/// The actions whose keys were pressed this frame, taken out of the input.
+///
+/// Plain keys are left to a focused text field.
+pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
+    let typing = ctx.text_edit_focused();
+    let mut actions = Vec::new();
+    // Longer combinations first, so that Ctrl+Shift+Z is not taken for Ctrl+Z.
+    let mut by_length: Vec<Action> = Action::ALL.to_vec();
+    by_length.sort_by_key(|action| {
+        std::cmp::Reverse(action.shortcut().map_or(0, |s| {
+            u8::from(s.modifiers.command) + u8::from(s.modifiers.shift)
+        }))
+    });
+    for action in by_length {
+        let Some(shortcut) = action.shortcut() else {
+            continue;
+        };
+        // Held rather than pressed; see `App::show_photograph`.
+        if action == Action::ShowPhotograph {
+            continue;
+        }
+        let plain = shortcut.modifiers.is_none();
+        if plain && typing && !matches!(shortcut.logical_key, Key::F12 | Key::Escape) {
+            continue;
+        }
+        if ctx.input_mut(|input| input.consume_shortcut(&shortcut)) {
+            actions.push(action);
+        }
+    }
+    actions
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn no_two_actions_share_text_or_keys() {
+        let mut texts = HashSet::new();
+        let mut keys = HashSet::new();
+        for action in Action::ALL {
+            assert!(texts.insert(action.text()), "{}", action.text());
+            assert!(!action.help().is_empty());
+            if let Some(shortcut) = action.shortcut() {
+                let press = (shortcut.modifiers.command, shortcut.modifiers.shift, shortcut.logical_key);
+                assert!(keys.insert(press), "{} has keys of another action", action.text());
+            }
+        }
+        assert!(Menu::ALL.iter().all(|menu| Action::ALL.iter().any(|a| a.menu() == *menu)));
+    }
+}

@@ -1,0 +1,184 @@
+//! The inserted objects as the window edits them: placed, moved, duplicated, hidden, with undo.
+
+use crate::app::undo::History;
+use crate::session::command::Placement;
+use glam::DVec3;
+use std::path::{Path, PathBuf};
+
+/// An inserted object.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Inserted {
+    /// What the worker is told.
+    pub placement: Placement,
+    /// Whether it is shown.
+    pub visible: bool,
+}
+
+impl Inserted {
+    /// The file's name without its ending.
+    pub fn name(&self) -> String {
+        self.placement
+            .file
+            .file_stem()
+            .map_or_else(|| "object".to_owned(), |stem| stem.to_string_lossy().into_owned())
+    }
+}
+
+/// All inserted objects and how they are being edited.
+#[derive(Debug, Default)]
+pub struct Insertions {
+    /// The objects, in the order in which they were added.
+    pub objects: Vec<Inserted>,
+    /// The one that is edited.
+    pub chosen: Option<usize>,
+    /// Whether the next click in a view places the chosen object.
+    pub placing: bool,
+    /// The path as typed.
+    pub path: String,
+    history: History<Vec<Inserted>>,
+}
+
+/// Endings that can be inserted.
+pub const ENDINGS: [&str; 3] = ["obj", "glb", "gltf"];
+
+/// Whether a file's ending is that of an object.
+pub fn is_object(path: &Path) -> bool {
+    path.extension()
+        .and_then(|ending| ending.to_str())
+        .is_some_and(|ending| ENDINGS.contains(&ending.to_ascii_lowercase().as_str()))
+}
+
+impl Insertions {
+    /// Adds an object at `at`, chooses it, and waits for a click that places it where `at` is unknown.
+    pub fn add(&mut self, file: PathBuf, at: Option<DVec3>) {
+        self.objects.push(Inserted {
+            placement: Placement {
+                file,
+                at,
+                scale: 1.0,
+                rotate: 0.0,
+            },
+            visible: true,
+        });
+        self.chosen = Some(self.objects.len() - 1);
+        self.placing = true;
+    }
+
+    /// The chosen object.
+    pub fn chosen(&mut self) -> Option<&mut Inserted> {
+        self.chosen.and_then(|index| self.objects.get_mut(index))
+    }
+
+    /// Puts the chosen object at a point of the capture; false where none is chosen.
+    pub fn place(&mut self, at: DVec3) -> bool {
+        let Some(object) = self.chosen() else {
+            return false;
+        };
+        object.placement.at = Some(at);
+        true
+    }
+
+    /// Copies the chosen object, a little aside along `aside`.
+    pub fn duplicate(&mut self, aside: DVec3) {
+        let Some(mut copy) = self.chosen().cloned() else {
+            return;
+        };
+        copy.placement.at = copy.placement.at.map(|at| at + aside);
+        self.objects.push(copy);
+        self.chosen = Some(self.objects.len() - 1);
+    }
+
+    /// Takes the chosen object away.
+    pub fn delete(&mut self) {
+        if let Some(index) = self.chosen.filter(|&index| index < self.objects.len()) {
+            self.objects.remove(index);
+            self.chosen = self.objects.len().checked_sub(1).map(|last| index.min(last));
+            self.placing = false;
+        }
+    }
+
+    /// Takes everything away and forgets the history, for a new capture.
+    pub fn clear(&mut self) {
+        let path = std::mem::take(&mut self.path);
+        *self = Self { path, ..Self::default() };
+    }
+
+    /// What the worker is to show.
+    pub fn placements(&self) -> Vec<Placement> {
+        self.objects
+            .iter()
+            .filter(|object| object.visible)
+            .map(|object| object.placement.clone())
+            .collect()
+    }
+
+    /// Records a step; to be called while no button is down.
+    pub fn settle(&mut self) {
+        self.history.settle(&self.objects);
+    }
+
+    /// Whether there is a step to take back.
+    pub fn can_undo(&self) -> bool {
+        self.history.can_undo()
+    }
+
+    /// Whether there is a step to make again.
+    pub fn can_redo(&self) -> bool {
+        self.history.can_redo()
+    }
+
+    /// Takes the last step back.
+    pub fn undo(&mut self) {
+        self.history.undo(&mut self.objects);
+        self.keep_choice();
+    }
+
+    /// Makes the last undone step again.
+    pub fn redo(&mut self) {
+        self.history.redo(&mut self.objects);
+        self.keep_choice();
+    }
+
+    fn keep_choice(&mut self) {
+        self.placing = false;
+        self.chosen = match (self.chosen, self.objects.len()) {
+            (_, 0) => None,
+            (chosen, count) => Some(chosen.unwrap_or(count - 1).min(count - 1)),
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_visible_objects_reach_the_worker_and_undo_brings_them_back() {
+        let mut insertions = Insertions::default();
+        insertions.add("chair.glb".into(), Some(DVec3::ZERO));
+        insertions.settle();
+        insertions.duplicate(DVec3::X);
+        insertions.settle();
+        assert_eq!(insertions.placements().len(), 2);
+        assert_eq!(insertions.placements()[1].at, Some(DVec3::X));
+        insertions.objects[0].visible = false;
+        insertions.settle();
+        assert_eq!(insertions.placements().len(), 1);
+        insertions.delete();
+        insertions.delete();
+        insertions.settle();
+        assert!(insertions.objects.is_empty() && insertions.chosen.is_none());
+        insertions.undo();
+        assert_eq!((insertions.objects.len(), insertions.placements().len()), (2, 1));
+        insertions.undo();
+        assert_eq!(insertions.placements().len(), 2);
+        insertions.redo();
+        assert_eq!(insertions.placements().len(), 1);
+    }
+
+    #[test]
+    fn objects_are_told_by_their_ending() {
+        assert!(is_object(Path::new("a/Chair.OBJ")) && is_object(Path::new("b.glb")));
+        assert!(!is_object(Path::new("capture")) && !is_object(Path::new("a.png")));
+    }
+}

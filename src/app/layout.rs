@@ -1,0 +1,247 @@
+//! The panes and where they are: a tree of tiles that can be moved, closed, brought back and reset.
+
+use crate::app::picture::quantity::Quantity;
+use crate::app::state::App;
+use crate::app::{model, panels, picture, theme};
+use egui_tiles::{Behavior, SimplificationOptions, TileId, Tiles, Tree, UiResponse};
+use serde::{Deserialize, Serialize};
+
+/// What a tile shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Pane {
+    /// One picture of the view.
+    Picture(Quantity),
+    /// Two pictures under a wipe, flipped, or side by side.
+    Compare,
+    /// The mesh in 3D.
+    Model,
+    /// The table of objects.
+    Objects,
+    /// Inserting objects.
+    Insert,
+    /// The solver's parameters.
+    Settings,
+    /// The summary of the capture.
+    Capture,
+    /// The loss curve.
+    Loss,
+    /// The ladder of models.
+    Stages,
+    /// What happened.
+    Log,
+}
+
+impl Pane {
+    /// All panes, in the order in which the menu shows them.
+    pub fn all() -> Vec<Pane> {
+        let pictures = Quantity::ALL.into_iter().map(Pane::Picture);
+        let rest = [
+            Self::Compare,
+            Self::Model,
+            Self::Objects,
+            Self::Insert,
+            Self::Settings,
+            Self::Capture,
+            Self::Loss,
+            Self::Stages,
+            Self::Log,
+        ];
+        pictures.chain(rest).collect()
+    }
+
+    /// Title of the tab.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Picture(quantity) => quantity.name(),
+            Self::Compare => "Compare",
+            Self::Model => "3D view",
+            Self::Objects => "Objects",
+            Self::Insert => "Insert",
+            Self::Settings => "Settings",
+            Self::Capture => "Capture",
+            Self::Loss => "Loss",
+            Self::Stages => "Stages",
+            Self::Log => "Log",
+        }
+    }
+}
+
+/// The layout of the first start; made for 1280 × 800 and up.
+pub fn first_layout() -> Tree<Pane> {
+    let mut tiles = Tiles::default();
+    let mut tabs = |panes: &[Pane]| {
+        let children: Vec<TileId> = panes.iter().map(|&pane| tiles.insert_pane(pane)).collect();
+        tiles.insert_tab_tile(children)
+    };
+    let picture = Pane::Picture;
+    let photograph = tabs(&[picture(Quantity::Photograph), Pane::Compare]);
+    let render = tabs(&[picture(Quantity::Render), picture(Quantity::Composite)]);
+    let model = tabs(&[Pane::Model]);
+    let albedo = tabs(&[picture(Quantity::Albedo), picture(Quantity::Emission)]);
+    let error = tabs(&[picture(Quantity::Error), picture(Quantity::StandardError)]);
+    let side = tabs(&[Pane::Objects, Pane::Insert, Pane::Settings, Pane::Capture]);
+    let course = tabs(&[Pane::Loss, Pane::Stages, Pane::Log]);
+    let upper = tiles.insert_horizontal_tile(vec![photograph, render]);
+    let lower = tiles.insert_horizontal_tile(vec![model, albedo, error]);
+    let views = tiles.insert_vertical_tile(vec![upper, lower]);
+    let right = tiles.insert_vertical_tile(vec![side, course]);
+    let root = tiles.insert_horizontal_tile(vec![views, right]);
+    share(&mut tiles, root, &[(views, 0.69), (right, 0.31)]);
+    share(&mut tiles, views, &[(upper, 0.53), (lower, 0.47)]);
+    share(&mut tiles, right, &[(side, 0.62), (course, 0.38)]);
+    Tree::new(egui::Id::unique("panes"), root, tiles)
+}
+
+fn share(tiles: &mut Tiles<Pane>, parent: TileId, shares: &[(TileId, f32)]) {
+    if let Some(egui_tiles::Tile::Container(egui_tiles::Container::Linear(linear))) =
+        tiles.get_mut(parent)
+    {
+        for &(child, share) in shares {
+            linear.shares.set_share(child, share);
+        }
+    }
+}
+
+/// Brings a pane to the front, opening it beside the last where it was closed.
+pub fn show(tree: &mut Tree<Pane>, pane: Pane) {
+    let found = tree.tiles.find_pane(&pane);
+    let Some(tile) = found else {
+        let tile = tree.tiles.insert_pane(pane);
+        match tree.root {
+            Some(root) => tree.move_tile_to_container(tile, largest_tabs(tree, root), usize::MAX, true),
+            None => tree.root = Some(tile),
+        }
+        tree.make_active(|id, _| id == tile);
+        return;
+    };
+    tree.tiles.set_visible(tile, true);
+    tree.make_active(|id, _| id == tile);
+}
+
+/// Closes a pane if it is open.
+pub fn close(tree: &mut Tree<Pane>, pane: Pane) {
+    if let Some(tile) = tree.tiles.find_pane(&pane) {
+        tree.remove_recursively(tile);
+    }
+}
+
+/// Whether a pane is open, in front or behind another.
+pub fn is_open(tree: &Tree<Pane>, pane: Pane) -> bool {
+    tree.tiles.find_pane(&pane).is_some()
+}
+
+/// The container of tabs that takes most of the window, or the root.
+fn largest_tabs(tree: &Tree<Pane>, root: TileId) -> TileId {
+    tree.tiles
+        .iter()
+        .filter(|(_, tile)| {
+            matches!(tile, egui_tiles::Tile::Container(egui_tiles::Container::Tabs(_)))
+        })
+        .max_by(|(a, _), (b, _)| {
+            let area = |id: TileId| tree.tiles.rect(id).map_or(0.0, |rect| rect.area());
+            area(**a).total_cmp(&area(**b)).then(b.0.cmp(&a.0))
+        })
+        .map_or(root, |(id, _)| *id)
+}
+
+/// Draws panes for the tree.
+pub struct Panes<'a> {
+    /// The state they show.
+    pub app: &'a mut App,
+}
+
+impl Behavior<Pane> for Panes<'_> {
+    fn pane_ui(&mut self, ui: &mut egui::Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
+        ui.painter()
+            .rect_filled(ui.max_rect(), 0.0, theme::tokens(ui).panel);
+        match *pane {
+            Pane::Picture(quantity) => picture::canvas::pane(ui, self.app, quantity),
+            Pane::Compare => picture::compare::pane(ui, self.app),
+            Pane::Model => model::pane::pane(ui, self.app),
+            other => {
+                egui::Frame::NONE.inner_margin(theme::GAP).show(ui, |ui| {
+                    ui.take_available_space();
+                    match other {
+                        Pane::Objects => panels::objects::pane(ui, self.app),
+                        Pane::Insert => panels::insert::pane(ui, self.app),
+                        Pane::Settings => panels::settings::pane(ui, self.app),
+                        Pane::Capture => panels::capture::pane(ui, self.app),
+                        Pane::Loss => panels::loss::pane(ui, self.app),
+                        Pane::Stages => panels::stages::pane(ui, self.app),
+                        _ => panels::log::pane(ui, self.app),
+                    }
+                });
+            }
+        }
+        UiResponse::None
+    }
+
+    fn tab_title_for_pane(&mut self, pane: &Pane) -> egui::WidgetText {
+        pane.title().into()
+    }
+
+    fn is_tab_closable(&self, _tiles: &Tiles<Pane>, _tile: TileId) -> bool {
+        true
+    }
+
+    fn simplification_options(&self) -> SimplificationOptions {
+        SimplificationOptions {
+            all_panes_must_have_tabs: true,
+            ..SimplificationOptions::default()
+        }
+    }
+
+    fn gap_width(&self, _style: &egui::Style) -> f32 {
+        3.0
+    }
+
+    fn min_size(&self) -> f32 {
+        120.0
+    }
+
+    fn tab_bar_color(&self, visuals: &egui::Visuals) -> egui::Color32 {
+        theme::of(visuals).sunken
+    }
+
+    fn tab_text_color(
+        &self,
+        visuals: &egui::Visuals,
+        _tiles: &Tiles<Pane>,
+        _tile: TileId,
+        state: &egui_tiles::TabState,
+    ) -> egui::Color32 {
+        let tokens = theme::of(visuals);
+        if state.active { tokens.strong } else { tokens.weak }
+    }
+
+    fn tab_outline_stroke(
+        &self,
+        _visuals: &egui::Visuals,
+        _tiles: &Tiles<Pane>,
+        _tile: TileId,
+        _state: &egui_tiles::TabState,
+    ) -> egui::Stroke {
+        egui::Stroke::NONE
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pane_can_be_closed_and_brought_back() {
+        let mut tree = first_layout();
+        for pane in Pane::all() {
+            close(&mut tree, pane);
+            assert!(!is_open(&tree, pane), "{pane:?}");
+            show(&mut tree, pane);
+            assert!(is_open(&tree, pane), "{pane:?}");
+        }
+        for pane in Pane::all() {
+            close(&mut tree, pane);
+        }
+        show(&mut tree, Pane::Loss);
+        assert!(is_open(&tree, Pane::Loss));
+    }
+}

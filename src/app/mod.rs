@@ -1,0 +1,19 @@
+//! The window: panes over a session, drawn by egui and wgpu. Talks to the worker through [`connection::Connection`].
+
+pub mod action;
+pub mod connection;
+pub mod insertion;
+pub mod layout;
+pub mod model;
+pub mod panels;
+mod perform;
+pub mod picture;
+pub mod preferences;
+mod run;
+pub mod shell;
+pub mod state;
+pub mod theme;
+pub mod undo;
+pub mod window;
+
+pub use run::run;

@@ -1,0 +1,337 @@
+//! The mesh on the graphics card: drawn with a depth buffer into a texture, and only when something has changed.
+
+use crate::app::model::surface::Surface;
+use crate::app::model::view::Colors;
+use eframe::egui_wgpu::{CallbackResources, CallbackTrait, RenderState, ScreenDescriptor};
+use egui::PaintCallbackInfo;
+use std::sync::Arc;
+use wgpu::util::DeviceExt;
+
+/// The uniform block of `mesh.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct SceneUniform {
+    /// Scene to clip space, by columns.
+    pub clip_from_scene: [[f32; 4]; 4],
+    /// Centre of projection.
+    pub eye: [f32; 3],
+    /// Factor on radiance.
+    pub exposure: f32,
+    /// Colour of the selected object.
+    pub accent: [f32; 4],
+    /// Behind the mesh.
+    pub background: [f32; 4],
+    /// Index of the selected object, or −1.
+    pub selected: f32,
+    /// Whether exposure and tone curve apply.
+    pub radiance: u32,
+    /// Tone curve, as in `picture.wgsl`.
+    pub tone: u32,
+    /// Whether faces seen from behind are left out.
+    pub cull: u32,
+}
+
+/// Draws the 3D view.
+pub struct MeshPaint {
+    /// Faces.
+    pub surface: Arc<Surface>,
+    /// Their colours.
+    pub colors: Colors,
+    /// Camera and shading.
+    pub uniform: SceneUniform,
+    /// Size in pixels.
+    pub size: [u32; 2],
+}
+
+/// Everything on the card.
+struct Meshes {
+    mesh_pipeline: wgpu::RenderPipeline,
+    screen_pipeline: wgpu::RenderPipeline,
+    uniform: wgpu::Buffer,
+    corners: Option<(Arc<Surface>, wgpu::Buffer)>,
+    colors: Option<(Colors, wgpu::BindGroup)>,
+    target: Option<Target>,
+}
+
+/// The picture drawn into, and what it shows.
+struct Target {
+    size: [u32; 2],
+    color: wgpu::TextureView,
+    depth: wgpu::TextureView,
+    bind_group: wgpu::BindGroup,
+    shows: Option<SceneUniform>,
+}
+
+/// Columns of the texture of face colours.
+const COLUMNS: u32 = 2048;
+const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// Prepares drawing meshes.
+pub fn install(render_state: &RenderState) {
+    let device = &render_state.device;
+    let shader = device.create_shader_module(wgpu::include_wgsl!("mesh.wgsl"));
+    let options = wgpu::PipelineCompilationOptions::default;
+    let mesh_pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some("mesh"),
+        layout: None,
+        vertex: wgpu::VertexState {
+            module: &shader,
+            entry_point: Some("vertex"),
+            compilation_options: options(),
+            buffers: &[Some(wgpu::VertexBufferLayout {
+                array_stride: 12,
+                step_mode: wgpu::VertexStepMode::Vertex,
+                attributes: &wgpu::vertex_attr_array![0 => Float32x3],
+            })],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(wgpu::CompareFunction::Greater),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        }),
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: &shader,
+            entry_point: Some("fragment"),
+            compilation_options: options(),
+            targets: &[Some(COLOR.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    });
+    let screen_pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some("3D view"),
+        layout: None,
+        vertex: wgpu::VertexState {
+            module: &shader,
+            entry_point: Some("screen_vertex"),
+            compilation_options: options(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: None,
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: &shader,
+            entry_point: Some("screen_fragment"),
+            compilation_options: options(),
+            targets: &[Some(render_state.target_format.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    });
+    let uniform = device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("3D view"),
+        size: size_of::<SceneUniform>() as u64,
+        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    render_state.renderer.write().callback_resources.insert(Meshes {
+        mesh_pipeline,
+        screen_pipeline,
+        uniform,
+        corners: None,
+        colors: None,
+        target: None,
+    });
+}
+
+impl CallbackTrait for MeshPaint {
+    fn prepare(
+        &self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        _screen: &ScreenDescriptor,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut CallbackResources,
+    ) -> Vec<wgpu::CommandBuffer> {
+        if let Some(meshes) = resources.get_mut::<Meshes>() {
+            meshes.upload(device, queue, self);
+            meshes.draw(device, queue, encoder, self);
+        }
+        Vec::new()
+    }
+
+    fn paint(
+        &self,
+        _info: PaintCallbackInfo,
+        pass: &mut wgpu::RenderPass<'static>,
+        resources: &CallbackResources,
+    ) {
+        let target = resources
+            .get::<Meshes>()
+            .and_then(|meshes| Some((meshes, meshes.target.as_ref()?)));
+        if let Some((meshes, target)) = target {
+            pass.set_pipeline(&meshes.screen_pipeline);
+            pass.set_bind_group(0, &target.bind_group, &[]);
+            pass.draw(0..3, 0..1);
+        }
+    }
+}
+
+impl Meshes {
+    /// Brings faces and colours up to date.
+    fn upload(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, paint: &MeshPaint) {
+        let changed = |target: &mut Option<Target>| {
+            if let Some(target) = target {
+                target.shows = None;
+            }
+        };
+        if !matches!(&self.corners, Some((surface, _)) if Arc::ptr_eq(surface, &paint.surface)) {
+            let points: Vec<[f32; 3]> = paint
+                .surface
+                .corners
+                .iter()
+                .flat_map(|corners| corners.map(|p| p.to_array()))
+                .collect();
+            let buffer = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("faces"),
+                contents: bytemuck::cast_slice(&points),
+                usage: wgpu::BufferUsages::VERTEX,
+            });
+            self.corners = Some((paint.surface.clone(), buffer));
+            changed(&mut self.target);
+        }
+        if !matches!(&self.colors, Some((colors, _)) if Arc::ptr_eq(colors, &paint.colors)) {
+            let group = self.color_group(device, queue, &paint.colors);
+            self.colors = Some((paint.colors.clone(), group));
+            changed(&mut self.target);
+        }
+    }
+
+    fn color_group(
+        &self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        colors: &[[f32; 4]],
+    ) -> wgpu::BindGroup {
+        let rows = (colors.len() as u32).div_ceil(COLUMNS).max(1);
+        let mut texels = colors.to_vec();
+        texels.resize((rows * COLUMNS) as usize, [0.0; 4]);
+        let texture = device.create_texture_with_data(
+            queue,
+            &wgpu::TextureDescriptor {
+                label: Some("face colours"),
+                size: wgpu::Extent3d {
+                    width: COLUMNS,
+                    height: rows,
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::Rgba32Float,
+                usage: wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            },
+            wgpu::util::TextureDataOrder::LayerMajor,
+            bytemuck::cast_slice(&texels),
+        );
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("faces"),
+            layout: &self.mesh_pipeline.get_bind_group_layout(0),
+            entries: &[
+                wgpu::BindGroupEntry {
+                    binding: 0,
+                    resource: self.uniform.as_entire_binding(),
+                },
+                wgpu::BindGroupEntry {
+                    binding: 1,
+                    resource: wgpu::BindingResource::TextureView(&view),
+                },
+            ],
+        })
+    }
+
+    /// Draws the faces, unless the picture already shows them so.
+    fn draw(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        encoder: &mut wgpu::CommandEncoder,
+        paint: &MeshPaint,
+    ) {
+        if !matches!(&self.target, Some(target) if target.size == paint.size) {
+            self.target = Some(self.new_target(device, paint.size));
+        }
+        let (Some(target), Some((surface, corners)), Some((_, colors))) =
+            (&mut self.target, &self.corners, &self.colors)
+        else {
+            return;
+        };
+        if target.shows == Some(paint.uniform) {
+            return;
+        }
+        queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&paint.uniform));
+        let [r, g, b, a] = paint.uniform.background.map(f64::from);
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("3D view"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &target.color,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a }),
+                    store: wgpu::StoreOp::Store,
+                },
+                depth_slice: None,
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &target.depth,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0.0),
+                    store: wgpu::StoreOp::Discard,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        pass.set_pipeline(&self.mesh_pipeline);
+        pass.set_bind_group(0, colors, &[]);
+        pass.set_vertex_buffer(0, corners.slice(..));
+        pass.draw(0..3 * surface.corners.len() as u32, 0..1);
+        target.shows = Some(paint.uniform);
+    }
+
+    fn new_target(&self, device: &wgpu::Device, size: [u32; 2]) -> Target {
+        let view = |format, usage| {
+            device
+                .create_texture(&wgpu::TextureDescriptor {
+                    label: Some("3D view"),
+                    size: wgpu::Extent3d {
+                        width: size[0].max(1),
+                        height: size[1].max(1),
+                        depth_or_array_layers: 1,
+                    },
+                    mip_level_count: 1,
+                    sample_count: 1,
+                    dimension: wgpu::TextureDimension::D2,
+                    format,
+                    usage,
+                    view_formats: &[],
+                })
+                .create_view(&wgpu::TextureViewDescriptor::default())
+        };
+        let attachment = wgpu::TextureUsages::RENDER_ATTACHMENT;
+        let color = view(COLOR, attachment | wgpu::TextureUsages::TEXTURE_BINDING);
+        let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("3D view"),
+            layout: &self.screen_pipeline.get_bind_group_layout(0),
+            entries: &[wgpu::BindGroupEntry {
+                binding: 0,
+                resource: wgpu::BindingResource::TextureView(&color),
+            }],
+        });
+        Target {
+            size,
+            depth: view(DEPTH, attachment),
+            color,
+            bind_group,
+            shows: None,
+        }
+    }
+}

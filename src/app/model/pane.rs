@@ -1,0 +1,192 @@
+//! The pane of the 3D view: tool line, mouse and keys, and drawing.
+
+use crate::app::model::coloring::Coloring;
+use crate::app::model::gpu::{MeshPaint, SceneUniform};
+use crate::app::model::overlay;
+use crate::app::picture::gpu::rgba;
+use crate::app::picture::look::ToneCurve;
+use crate::app::state::{App, Shown};
+use crate::app::theme;
+use crate::scene::Scene;
+use crate::scene::geometry::{Hit, Ray};
+use egui::{ComboBox, Key, PointerButton, Rect, Response, Sense, Ui};
+use glam::{Vec2, Vec3};
+
+/// Draws the pane.
+pub fn pane(ui: &mut Ui, app: &mut App) {
+    egui::Frame::NONE
+        .inner_margin(egui::Margin::symmetric(6, 3))
+        .show(ui, |ui| controls(ui, app));
+    let rect = ui.available_rect_before_wrap();
+    let tokens = theme::tokens(ui);
+    ui.painter().rect_filled(rect, 0.0, tokens.surround);
+    let Some(capture) = app.capture().cloned() else {
+        ui.centered_and_justified(|ui| ui.weak("No capture is open"));
+        return;
+    };
+    let scene = &capture.scene;
+    let pixels = rect.size() * ui.pixels_per_point();
+    app.model.orbit.size = Vec2::new(pixels.x.max(1.0), pixels.y.max(1.0));
+    if app.model.orbit.distance == 0.0 {
+        app.model.orbit.frame(scene, None);
+    }
+
+    let response = ui.allocate_rect(rect, Sense::click_and_drag());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "3D view"));
+    let before = app.model.orbit.clone();
+    steer(ui, app, scene, &response);
+    click(ui, app, scene, &response);
+    if let Shown::Free(_, count) = app.shown
+        && before != app.model.orbit
+    {
+        app.shown = Shown::Free(Box::new(app.model.orbit.camera(scene)), count + 1);
+    }
+
+    let estimate = app.snapshot.estimate.clone();
+    let Some((surface, colors)) = app.model.faces(ui.ctx(), &capture, &estimate) else {
+        ui.put(rect, egui::Label::new("Preparing the mesh…"));
+        return;
+    };
+    let orbit = &app.model.orbit;
+    let uniform = SceneUniform {
+        clip_from_scene: orbit.clip_from_scene(scene).to_cols_array_2d(),
+        eye: orbit.eye().to_array(),
+        exposure: app.look.exposure.exp2(),
+        accent: rgba(tokens.accent),
+        background: rgba(tokens.surround),
+        selected: app.selected.map_or(-1.0, |object| object as f32),
+        radiance: u32::from(app.model.coloring.is_radiance()),
+        tone: match app.look.tone {
+            ToneCurve::None => 0,
+            ToneCurve::Reinhard => 1,
+            ToneCurve::Filmic => 2,
+        },
+        cull: u32::from(app.model.cull),
+    };
+    let paint = MeshPaint {
+        surface,
+        colors,
+        uniform,
+        size: [orbit.size.x.round() as u32, orbit.size.y.round() as u32],
+    };
+    ui.painter()
+        .add(eframe::egui_wgpu::Callback::new_paint_callback(rect, paint));
+    overlay::draw(ui, app, &capture, rect);
+}
+
+fn controls(ui: &mut Ui, app: &mut App) {
+    ui.horizontal(|ui| {
+        let response = ComboBox::from_id_salt("coloured by")
+            .selected_text(app.model.coloring.name())
+            .width(88.0)
+            .show_ui(ui, |ui| {
+                for coloring in Coloring::ALL {
+                    ui.selectable_value(&mut app.model.coloring, coloring, coloring.name());
+                }
+            })
+            .response;
+        response.widget_info(|| {
+            egui::WidgetInfo::labeled(egui::Role::ComboBox, true, "Coloured by")
+        });
+        ui.toggle_value(&mut app.model.cull, "See inside")
+            .on_hover_text("Leaves out faces seen from behind");
+        ui.toggle_value(&mut app.model.cameras, "Cameras")
+            .on_hover_text("Shows where the photographs were taken; click one to look through it");
+    });
+}
+
+/// Where the pointer is in the view, in its pixels.
+fn pixel(ui: &Ui, rect: Rect, pointer: egui::Pos2) -> Vec2 {
+    let offset = (pointer - rect.min) * ui.pixels_per_point();
+    Vec2::new(offset.x, offset.y)
+}
+
+/// The surface under a pixel, leaving out what is not drawn.
+fn under(app: &App, scene: &Scene, pixel: Vec2) -> Option<Hit> {
+    let mut ray = app.model.orbit.camera(scene).ray(pixel);
+    loop {
+        let hit = scene.intersect(&ray)?;
+        let normal = scene.normals.get(hit.triangle as usize)?;
+        if !app.model.cull || normal.dot(ray.direction) < 0.0 {
+            return Some(hit);
+        }
+        ray = Ray {
+            t_min: hit.t * (1.0 + 4.0 * f32::EPSILON),
+            ..ray
+        };
+    }
+}
+
+/// Orbit, pan, zoom and fly.
+fn steer(ui: &Ui, app: &mut App, scene: &Scene, response: &Response) {
+    let per_point = ui.pixels_per_point();
+    let drag = response.drag_delta() * per_point;
+    let drag = Vec2::new(drag.x, drag.y);
+    let shift = ui.input(|input| input.modifiers.shift);
+    if response.dragged_by(PointerButton::Primary) && !shift {
+        app.model.orbit.turn(drag);
+    } else if response.dragged() {
+        app.model.orbit.pan(drag);
+    }
+    let Some(pointer) = response.hover_pos() else {
+        return;
+    };
+    let at = pixel(ui, response.rect, pointer);
+    let (scroll, pinch) = ui.input(|input| (input.smooth_scroll_delta.y, input.zoom_delta()));
+    let factor = (scroll * 0.004).exp() * pinch;
+    if factor != 1.0 {
+        let point = match under(app, scene, at) {
+            Some(hit) => scene.point(&hit),
+            None => {
+                let ray = app.model.orbit.camera(scene).ray(at);
+                ray.origin + ray.direction * app.model.orbit.distance
+            }
+        };
+        app.model.orbit.zoom_to(point, 1.0 / factor, scene);
+    }
+    if ui.ctx().text_edit_focused() || ui.input(|input| input.modifiers.command) {
+        return;
+    }
+    let (steps, dt) = ui.input(|input| {
+        let axis = |plus, minus| {
+            f32::from(u8::from(input.key_down(plus))) - f32::from(u8::from(input.key_down(minus)))
+        };
+        let steps = Vec3::new(
+            axis(Key::D, Key::A),
+            axis(Key::E, Key::Q),
+            axis(Key::W, Key::S),
+        );
+        (steps, input.stable_dt.min(0.1))
+    });
+    if steps != Vec3::ZERO {
+        let speed = scene.diameter * if shift { 0.5 } else { 0.15 };
+        app.model.orbit.fly(steps * speed * dt);
+        ui.ctx().request_repaint();
+    }
+}
+
+/// A click looks through a camera, places the chosen object, or selects; a double click turns about what is there.
+fn click(ui: &Ui, app: &mut App, scene: &Scene, response: &Response) {
+    let Some(pointer) = response.interact_pointer_pos().filter(|_| response.clicked()) else {
+        return;
+    };
+    if !app.insertions.placing
+        && let Some(frame) = overlay::camera_at(app, scene, response.rect, pointer)
+    {
+        app.jump_to_frame(frame);
+        return;
+    }
+    let hit = under(app, scene, pixel(ui, response.rect, pointer));
+    if let Some(hit) = &hit {
+        let point = scene.point(hit);
+        if response.double_clicked() {
+            let orbit = &mut app.model.orbit;
+            orbit.target = orbit.eye() + orbit.forward() * point.distance(orbit.eye());
+        }
+        if app.insertions.placing && app.insertions.place(point.as_dvec3() + scene.origin) {
+            app.insertions.placing = false;
+            return;
+        }
+    }
+    app.select(hit.and_then(|hit| scene.object_of.get(hit.triangle as usize).copied()));
+}

@@ -1,0 +1,196 @@
+//! Putting objects into the photographs: adding, placing, moving, turning, scaling, and the two results.
+
+use crate::app::action::Action;
+use crate::app::layout::Pane;
+use crate::app::picture::compare::Mode;
+use crate::app::picture::quantity::Quantity;
+use crate::app::shell::dialogs::Ask;
+use crate::app::state::App;
+use crate::app::theme;
+use egui::{Checkbox, DragValue, Grid, ScrollArea, TextEdit, Ui};
+use glam::DVec3;
+use std::path::PathBuf;
+
+/// Draws the pane.
+pub fn pane(ui: &mut Ui, app: &mut App) {
+    let Some(capture) = app.capture().cloned() else {
+        ui.weak("No capture is open");
+        return;
+    };
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        add(ui, app);
+        if app.insertions.objects.is_empty() {
+            ui.add_space(theme::GAP);
+            ui.weak("OBJ and GLB files can also be dropped on the window. Then click where the object should stand.");
+            return;
+        }
+        ui.separator();
+        list(ui, app);
+        ui.separator();
+        actions(ui, app);
+        edit(ui, app, f64::from(capture.scene.diameter));
+        ui.separator();
+        results(ui, app);
+    });
+}
+
+fn add(ui: &mut Ui, app: &mut App) {
+    ui.horizontal(|ui| {
+        let label = ui.label("Object file");
+        let width = (ui.available_width() - 112.0).max(60.0);
+        let field = TextEdit::singleline(&mut app.insertions.path)
+            .hint_text("chair.glb")
+            .desired_width(width);
+        let response = ui.add(field).labelled_by(label.id);
+        let entered = response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+        let add = ui
+            .button("Add")
+            .on_hover_text("Adds the object whose path is typed");
+        if (entered || add.clicked()) && !app.insertions.path.trim().is_empty() {
+            let path = PathBuf::from(app.insertions.path.trim());
+            app.insertions.add(path, None);
+        }
+        if ui
+            .button("Browse…")
+            .on_hover_text("Chooses an object with a file dialog")
+            .clicked()
+        {
+            app.ask(Ask::Object, &ui.ctx().clone());
+        }
+    });
+}
+
+/// All inserted objects.
+fn list(ui: &mut Ui, app: &mut App) {
+    for index in 0..app.insertions.objects.len() {
+        ui.horizontal(|ui| {
+            let object = &mut app.insertions.objects[index];
+            let name = object.name();
+            let shown = ui
+                .add(Checkbox::without_text(&mut object.visible))
+                .on_hover_text("Shows or hides the object");
+            shown.widget_info(|| {
+                egui::WidgetInfo::selected(egui::Role::CheckBox, true, object.visible, format!("Show {name} {}", index + 1))
+            });
+            let chosen = app.insertions.chosen == Some(index);
+            let text = format!("{}  {name}", index + 1);
+            if ui.selectable_label(chosen, text).clicked() {
+                app.insertions.chosen = Some(index);
+            }
+            let object = &app.insertions.objects[index];
+            if object.placement.at.is_none() {
+                ui.weak("as modelled");
+            }
+        });
+    }
+}
+
+/// Buttons for the chosen object.
+fn actions(ui: &mut Ui, app: &mut App) {
+    let ctx = ui.ctx().clone();
+    ui.horizontal_wrapped(|ui| {
+        let placing = app.insertions.placing;
+        let text = if placing { "Click in a view…" } else { "Place by click" };
+        let place = ui
+            .selectable_label(placing, text)
+            .on_hover_text(Action::Place.help());
+        if place.clicked() {
+            app.perform(Action::Place, &ctx);
+        }
+        for (action, text) in [
+            (Action::Duplicate, "Duplicate"),
+            (Action::Delete, "Delete"),
+            (Action::Undo, "Undo"),
+            (Action::Redo, "Redo"),
+        ] {
+            let button = ui.add_enabled(app.can(action), egui::Button::new(text));
+            if button.on_hover_text(action.help()).clicked() {
+                app.perform(action, &ctx);
+            }
+        }
+    });
+}
+
+/// Place, turn and size of the chosen object.
+fn edit(ui: &mut Ui, app: &mut App, diameter: f64) {
+    let Some(object) = app.insertions.chosen() else {
+        return;
+    };
+    let placement = &mut object.placement;
+    Grid::new("placement").num_columns(2).show(ui, |ui| {
+        ui.label("Place")
+            .on_hover_text("Where the middle of the object's base stands, in the capture's coordinates");
+        ui.horizontal(|ui| {
+            let mut at = placement.at.unwrap_or(DVec3::ZERO);
+            let mut changed = false;
+            for (axis, value) in ["x", "y", "z"].into_iter().zip(at.as_mut()) {
+                let drag = DragValue::new(value)
+                    .speed(diameter * 1e-3)
+                    .max_decimals(3)
+                    .prefix(format!("{axis} "));
+                let response = ui.add(drag);
+                response.widget_info(|| {
+                    egui::WidgetInfo::labeled(egui::Role::SpinButton, true, format!("Place {axis}"))
+                });
+                changed |= response.changed();
+            }
+            if changed {
+                placement.at = Some(at);
+            }
+        });
+        ui.end_row();
+        for (title, value, range, speed, unit, help) in [
+            (
+                "Turn",
+                &mut placement.rotate,
+                -360.0..=360.0,
+                1.0,
+                "°",
+                "Counter-clockwise from above",
+            ),
+            (
+                "Scale",
+                &mut placement.scale,
+                1e-6..=1e6,
+                0.01,
+                "×",
+                "Factor on the file's size; 0.01 for files in centimetres",
+            ),
+        ] {
+            ui.label(title).on_hover_text(help);
+            let speed = if title == "Scale" { value.abs() * speed } else { speed };
+            let drag = DragValue::new(value)
+                .range(range)
+                .speed(speed)
+                .max_decimals(4)
+                .suffix(format!(" {unit}"));
+            let response = ui.add(drag);
+            response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, title));
+            ui.end_row();
+        }
+    });
+}
+
+/// The ways to look at what came out.
+fn results(ui: &mut Ui, app: &mut App) {
+    ui.horizontal_wrapped(|ui| {
+        for (text, mode, left, right) in [
+            ("Naive | ours", Mode::SideBySide, Quantity::Naive, Quantity::Composite),
+            ("Wipe naive / ours", Mode::Wipe, Quantity::Naive, Quantity::Composite),
+            ("Before / after", Mode::Wipe, Quantity::Photograph, Quantity::Composite),
+        ] {
+            if ui.button(text).clicked() {
+                app.compare.mode = mode;
+                app.compare.left = left;
+                app.compare.right = right;
+                app.bring_forward = Some(Pane::Compare);
+            }
+        }
+    });
+    if let Some(insertion) = &app.snapshot.insertion {
+        ui.weak(format!(
+            "{} samples a pixel, {:.1} s after the last change",
+            insertion.samples, insertion.seconds
+        ));
+    }
+}

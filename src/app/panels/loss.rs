@@ -1,0 +1,102 @@
+//! The loss curve on a logarithmic axis, with the held-out loss and the ends of stages.
+
+use crate::app::picture::inspect::number;
+use crate::app::state::App;
+use crate::app::theme;
+use crate::inverse::solver::LossPoint;
+use egui::Ui;
+use egui_plot::{Corner, HoverPosition, Legend, Line, LineStyle, Plot, PlotPoints, Points, VLine};
+
+/// Points drawn of a curve at most.
+const POINTS: usize = 2000;
+
+/// Draws the pane.
+pub fn pane(ui: &mut Ui, app: &mut App) {
+    let tokens = theme::tokens(ui);
+    let progress = app.snapshot.progress.clone();
+    if progress.losses.is_empty() {
+        ui.weak("No loss has been measured yet");
+        return;
+    }
+    let train = curve(&progress.losses, |point| point.train);
+    let held_out = curve(&progress.losses, |point| point.held_out);
+    let mut marks = Vec::new();
+    let mut end = 0.0;
+    for stage in &progress.stages {
+        end += stage.seconds;
+        marks.push((end, stage.name.clone()));
+    }
+    Plot::new("loss")
+        .legend(Legend::default().position(Corner::RightTop).background_alpha(0.6))
+        .y_axis_formatter(|mark, _| power_of_ten(mark.value))
+        .x_axis_formatter(|mark, _| format!("{} s", mark.value))
+        .label_formatter(|position| match position {
+            HoverPosition::NearDataPoint { plot_name, position, .. } => Some(format!(
+                "{plot_name}\n{:.1} s: {}",
+                position.x,
+                number(10f64.powf(position.y) as f32)
+            )),
+            HoverPosition::Elsewhere { .. } => None,
+        })
+        .y_axis_min_width(36.0)
+        .show(ui, |plot| {
+            for (at, name) in marks {
+                plot.vline(
+                    VLine::new(name, at)
+                        .color(tokens.outline)
+                        .style(LineStyle::dashed_loose()),
+                );
+            }
+            // A single point has no line.
+            for (name, points, color) in [
+                ("Loss", train, tokens.train),
+                ("Held out", held_out, tokens.held_out),
+            ] {
+                if points.len() == 1 {
+                    plot.points(Points::new(name, points).color(color).radius(3.0));
+                } else {
+                    plot.line(Line::new(name, PlotPoints::from(points)).color(color).width(1.8));
+                }
+            }
+        });
+}
+
+/// Seconds and logarithm of the loss, thinned out evenly; what is not positive has no place on the axis.
+fn curve(losses: &[LossPoint], value: impl Fn(&LossPoint) -> Option<f64>) -> Vec<[f64; 2]> {
+    let points: Vec<[f64; 2]> = losses
+        .iter()
+        .filter_map(|point| Some([point.seconds, value(point).filter(|v| *v > 0.0)?.log10()]))
+        .collect();
+    let stride = points.len().div_ceil(POINTS).max(1);
+    let last = points.last().copied();
+    let mut thinned: Vec<[f64; 2]> = points.into_iter().step_by(stride).collect();
+    if let Some(last) = last.filter(|last| thinned.last() != Some(last)) {
+        thinned.push(last);
+    }
+    thinned
+}
+
+fn power_of_ten(exponent: f64) -> String {
+    number(10f64.powf(exponent) as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn curves_are_logarithmic_keep_their_end_and_leave_out_what_was_not_measured() {
+        let losses: Vec<LossPoint> = (0..5001)
+            .map(|i| LossPoint {
+                seconds: f64::from(i),
+                iteration: i as u64,
+                train: Some(0.01),
+                held_out: (i % 2 == 0).then_some(f64::from(i)),
+            })
+            .collect();
+        let train = curve(&losses, |p| p.train);
+        assert!(train.len() <= POINTS + 1 && train.last() == Some(&[5000.0, -2.0]));
+        let held_out = curve(&losses, |p| p.held_out);
+        assert!(held_out.iter().all(|p| p[0] > 0.0 && p[0] % 2.0 == 0.0));
+    }
+}

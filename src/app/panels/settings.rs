@@ -1,0 +1,104 @@
+//! The solver's parameters: widgets made from the one table that declares them.
+
+use crate::app::state::App;
+use crate::app::theme;
+use crate::inverse::settings::{Kind, PARAMETERS, Parameter, Value};
+use crate::session::command::Command;
+use egui::{Checkbox, ComboBox, DragValue, Grid, ScrollArea, Ui};
+
+/// Draws the pane.
+pub fn pane(ui: &mut Ui, app: &mut App) {
+    let mut settings = app.settings.clone();
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        Grid::new("settings").num_columns(3).striped(true).show(ui, |ui| {
+            for parameter in PARAMETERS {
+                let before = parameter.get(&settings);
+                let title = title(parameter);
+                let help = help(parameter);
+                ui.label(&title).on_hover_text(&help);
+                let mut value = before.clone();
+                ui.push_id(parameter.name, |ui| {
+                    widget(ui, parameter, &title, &mut value);
+                });
+                ui.horizontal(|ui| {
+                    if !parameter.unit.is_empty() {
+                        ui.weak(parameter.unit);
+                    }
+                    if parameter.live {
+                        ui.colored_label(theme::tokens(ui).good, "live")
+                            .on_hover_text("Takes effect at once");
+                    }
+                });
+                ui.end_row();
+                if value != before
+                    && let Err(message) = parameter.set(&mut settings, &value)
+                {
+                    app.notices
+                        .say(crate::session::snapshot::Level::Warning, message);
+                }
+            }
+        });
+        ui.add_space(theme::GAP);
+        ui.weak("What is not live takes effect at the next reset.");
+    });
+    if settings != app.settings {
+        app.settings = settings.clone();
+        app.send(Command::Set(Box::new(settings)));
+    }
+}
+
+/// The name in words.
+fn title(parameter: &Parameter) -> String {
+    let words = parameter.name.replace('_', " ");
+    let mut letters = words.chars();
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().collect::<String>() + letters.as_str()
+    })
+}
+
+/// Help, unit and range.
+fn help(parameter: &Parameter) -> String {
+    format!("{}.\nAllowed: {}.", parameter.help, parameter.allowed())
+}
+
+fn widget(ui: &mut Ui, parameter: &Parameter, title: &str, value: &mut Value) {
+    let name = |response: egui::Response, kind| {
+        response.widget_info(|| egui::WidgetInfo::labeled(kind, true, title));
+        response.on_hover_text(help(parameter));
+    };
+    match (parameter.kind, value) {
+        (Kind::Flag, Value::Flag(flag)) => {
+            let response = ui.add(Checkbox::without_text(flag));
+            name(response, egui::Role::CheckBox);
+        }
+        (Kind::Whole { min, max }, Value::Whole(n)) => {
+            let response = ui.add(DragValue::new(n).range(min..=max).speed(0.1));
+            name(response, egui::Role::SpinButton);
+        }
+        (Kind::Real { min, max, logarithmic }, Value::Real(x)) => {
+            let speed = if logarithmic { (x.abs() * 0.01).max(1e-6) } else { (max - min) * 1e-3 };
+            let response = ui.add(
+                DragValue::new(x)
+                    .range(min..=max)
+                    .speed(speed)
+                    .max_decimals(6),
+            );
+            name(response, egui::Role::SpinButton);
+        }
+        (Kind::Choice(words), Value::Choice(word)) => {
+            let response = ComboBox::from_id_salt("choice")
+                .selected_text(word.as_str())
+                .width(96.0)
+                .show_ui(ui, |ui| {
+                    for choice in words {
+                        ui.selectable_value(word, (*choice).to_owned(), *choice);
+                    }
+                })
+                .response;
+            name(response, egui::Role::ComboBox);
+        }
+        (_, value) => {
+            ui.label(format!("{value:?}"));
+        }
+    }
+}

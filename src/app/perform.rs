@@ -1,0 +1,165 @@
+//! What each action does.
+
+use crate::app::action::Action;
+use crate::app::layout::Pane;
+use crate::app::shell::dialogs::Ask;
+use crate::app::shell::files::Sheet;
+use crate::app::shell::palette::Palette;
+use crate::app::state::{App, Shown};
+use crate::session::command::{Command, Source};
+use crate::session::snapshot::{Level, Phase};
+use egui::ViewportCommand;
+
+impl App {
+    /// Does what an action says.
+    pub fn perform(&mut self, action: Action, ctx: &egui::Context) {
+        if !self.can(action) {
+            return;
+        }
+        match action {
+            Action::OpenFolder => self.ask(Ask::Capture, ctx),
+            Action::OpenRoom => self.open(Source::BuiltInRoom),
+            Action::StartPage => self.start_page = !self.start_page,
+            Action::Save => self.sheet = Sheet::save(self.capture_name()),
+            Action::Export => self.sheet = Sheet::export(self.capture_name()),
+            Action::Screenshot => self.screenshot(ctx),
+            Action::Quit => ctx.send_viewport_cmd(ViewportCommand::Close),
+
+            Action::Undo => self.insertions.undo(),
+            Action::Redo => self.insertions.redo(),
+            Action::InsertObject => self.bring_forward = Some(Pane::Insert),
+            Action::Place => self.insertions.placing = !self.insertions.placing,
+            Action::Duplicate => self.duplicate(),
+            Action::Delete => self.insertions.delete(),
+            Action::Deselect => {
+                self.selected = None;
+                self.insertions.placing = false;
+                self.keys = false;
+                self.palette = None;
+                self.sheet = Sheet::default();
+                self.start_page = false;
+            }
+
+            Action::RunPause => self.run_or_pause(),
+            Action::Step => self.send(Command::Step),
+            Action::Finish => self.send(Command::Finish),
+            Action::Reset => self.send(Command::Reset),
+
+            Action::PreviousFrame => self.step_frame(-1),
+            Action::NextFrame => self.step_frame(1),
+            Action::ShowPhotograph => self.look.photograph = true,
+            Action::Flip => self.compare.flip(),
+            Action::CompareMode => {
+                self.compare.next_mode();
+                self.bring_forward = Some(Pane::Compare);
+            }
+            Action::Brighter => self.look.exposure += 0.5,
+            Action::Darker => self.look.exposure -= 0.5,
+            Action::AutoExposure => self.expose_automatically(),
+            Action::ToneCurve => {
+                self.look.tone = self.look.tone.next();
+                self.preferences.tone = self.look.tone;
+            }
+            Action::FitPictures => self.look.fit(),
+            Action::FrameSelection => self.frame_selection(),
+            Action::JumpToFrame => self.jump_to_frame(self.frame),
+            Action::RenderFromHere => self.render_from_here(),
+
+            Action::Thumbnails => self.preferences.thumbnails = !self.preferences.thumbnails,
+            Action::ResetLayout => self.reset_layout = true,
+            Action::Theme => {
+                self.preferences.light = !self.preferences.light;
+                self.apply_theme(ctx);
+            }
+            Action::Palette => self.palette = Some(Palette::default()),
+            Action::Keys => self.keys = !self.keys,
+        }
+    }
+
+    /// Opens a file dialog.
+    pub fn ask(&mut self, ask: Ask, ctx: &egui::Context) {
+        let ctx = ctx.clone();
+        self.dialogs.open(ask, move || ctx.request_repaint());
+    }
+
+    /// Shows the remembered theme.
+    pub fn apply_theme(&self, ctx: &egui::Context) {
+        ctx.set_theme(if self.preferences.light {
+            egui::Theme::Light
+        } else {
+            egui::Theme::Dark
+        });
+    }
+
+    /// Whether the solver runs, and would be paused by "Run / Pause".
+    pub fn is_running(&self) -> bool {
+        matches!(self.snapshot.phase, Phase::Solving | Phase::Loading)
+    }
+
+    fn run_or_pause(&mut self) {
+        let command = if self.is_running() {
+            Command::Pause
+        } else {
+            Command::Run
+        };
+        self.send(command);
+    }
+
+    fn capture_name(&self) -> &str {
+        self.capture().map_or("relit", |capture| capture.name.as_str())
+    }
+
+    fn duplicate(&mut self) {
+        if let Some(capture) = self.capture() {
+            let scene = &capture.scene;
+            let aside = scene.up.any_orthonormal_vector() * scene.diameter * 0.05;
+            self.insertions.duplicate(aside.as_dvec3());
+        }
+    }
+
+    /// Turns the 3D view to a photograph's camera.
+    pub fn jump_to_frame(&mut self, frame: usize) {
+        if let Some(capture) = self.capture().cloned()
+            && let Some(camera) = capture.scene.cameras.get(frame)
+        {
+            self.model.orbit.take_camera(&capture.scene, camera);
+            self.show_frame(frame);
+            self.bring_forward = Some(Pane::Model);
+        }
+    }
+
+    fn frame_selection(&mut self) {
+        if let Some(capture) = self.capture().cloned() {
+            self.model.orbit.frame(&capture.scene, self.selected);
+            self.bring_forward = Some(Pane::Model);
+        }
+    }
+
+    fn render_from_here(&mut self) {
+        let Some(capture) = self.capture().cloned() else {
+            return;
+        };
+        self.shown = match &self.shown {
+            Shown::Free(..) => Shown::Frame,
+            Shown::Frame => Shown::Free(Box::new(self.model.orbit.camera(&capture.scene)), 0),
+        };
+    }
+
+    fn screenshot(&mut self, ctx: &egui::Context) {
+        let path = (1..)
+            .map(|n| std::path::PathBuf::from(format!("relit-{n}.png")))
+            .find(|path| !path.exists())
+            .unwrap_or_default();
+        self.notices.say(Level::Info, format!("screenshot: {}", path.display()));
+        let finished = egui::ScreenshotCallback::new(move |image| {
+            let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| [p.r(), p.g(), p.b()]).collect();
+            let [width, height] = image.size.map(|side| side as u32);
+            if let Some(picture) = image::RgbImage::from_raw(width, height, bytes)
+                && let Err(error) = picture.save(&path)
+            {
+                eprintln!("{}: {error}; choose a folder that can be written", path.display());
+            }
+        });
+        ctx.send_viewport_cmd(ViewportCommand::Screenshot(finished));
+    }
+}

@@ -1,0 +1,284 @@
+//! A pane with one picture: zoom and pan shared by all, clicks that select or place, numbers inside large pixels.
+
+use crate::app::picture::gpu::PicturePaint;
+use crate::app::picture::look::{Cursor, fraction};
+use crate::app::picture::quantity::{Quantity, Shading};
+use crate::app::picture::{inspect, ramp};
+use crate::app::state::{App, Shown};
+use crate::app::{insertion, theme};
+use crate::session::snapshot::{Picture, View};
+use egui::{Align2, Color32, FontId, Pos2, Rect, Sense, Ui, vec2};
+use std::sync::Arc;
+
+/// A picture to draw.
+#[derive(Debug, Clone)]
+pub struct Drawn {
+    /// What it is.
+    pub quantity: Quantity,
+    /// Its numbers.
+    pub picture: Arc<Picture>,
+    /// Object index of each of its pixels, where known.
+    pub objects: Option<Arc<Vec<u32>>>,
+    /// Magnitude at the end of false colours.
+    pub range: f32,
+}
+
+impl App {
+    /// The pictures of the shown view, once the worker has sent them.
+    pub fn view(&self) -> Option<&Arc<View>> {
+        let frame = match self.shown {
+            Shown::Frame => Some(self.frame),
+            Shown::Free(..) => None,
+        };
+        self.snapshot.view.as_ref().filter(|view| view.frame == frame)
+    }
+
+    /// A picture of the shown view.
+    pub fn drawn(&self, quantity: Quantity) -> Option<Drawn> {
+        let view = self.view();
+        let insertion = self
+            .snapshot
+            .insertion
+            .as_ref()
+            .filter(|insertion| matches!(self.shown, Shown::Frame) && insertion.frame == self.frame);
+        let picture = match quantity {
+            Quantity::Photograph => view
+                .and_then(|view| view.photograph.clone())
+                .or_else(|| self.photograph()),
+            Quantity::Render => view.and_then(|view| view.render.clone()),
+            Quantity::Albedo => view.and_then(|view| view.albedo.clone()),
+            Quantity::Emission => view.and_then(|view| view.emission.clone()),
+            Quantity::Error => view.and_then(|view| view.error.clone()),
+            Quantity::StandardError => view.and_then(|view| view.stderr.clone()),
+            Quantity::Naive => insertion.map(|insertion| insertion.naive.clone()),
+            Quantity::NaiveEstimate => insertion.map(|insertion| insertion.naive_estimate.clone()),
+            Quantity::Composite => insertion.map(|insertion| insertion.composite.clone()),
+        }?;
+        let range = match quantity.shading() {
+            Shading::Signed | Shading::Positive => ramp::range(&picture),
+            _ => 1.0,
+        };
+        let objects = view
+            .and_then(|view| view.objects.clone())
+            .filter(|objects| objects.len() == picture.pixels.len());
+        Some(Drawn {
+            quantity,
+            picture,
+            objects,
+            range,
+        })
+    }
+}
+
+/// Draws the pane of one picture.
+pub fn pane(ui: &mut Ui, app: &mut App, quantity: Quantity) {
+    let rect = ui.max_rect();
+    ui.painter()
+        .rect_filled(rect, 0.0, theme::tokens(ui).surround);
+    let shown = if app.look.photograph {
+        Quantity::Photograph
+    } else {
+        quantity
+    };
+    let Some(drawn) = app.drawn(shown) else {
+        missing(ui, app, shown);
+        return;
+    };
+    interact(ui, app, rect, &drawn, &format!("{} picture", quantity.name()));
+    paint(ui, app, rect, &drawn, egui::Id::unique(("picture", quantity)));
+    overlay(ui, app, rect, &drawn);
+}
+
+/// Says why there is no picture.
+pub fn missing(ui: &mut Ui, app: &App, quantity: Quantity) {
+    let text = match quantity {
+        _ if app.capture().is_none() => "No capture is open",
+        Quantity::Photograph => "No photograph was taken from here",
+        Quantity::Error if !matches!(app.shown, Shown::Frame) => "No photograph was taken from here",
+        Quantity::Naive | Quantity::NaiveEstimate | Quantity::Composite => {
+            if app.insertions.objects.is_empty() {
+                "Insert an object to see the composite"
+            } else {
+                "Compositing…"
+            }
+        }
+        _ => "Waiting for the first picture…",
+    };
+    ui.centered_and_justified(|ui| ui.weak(text));
+}
+
+/// Zoom, pan, cursor, selection and placing.
+pub fn interact(ui: &mut Ui, app: &mut App, rect: Rect, drawn: &Drawn, name: &str) {
+    let size = [drawn.picture.width, drawn.picture.height];
+    let response = ui.allocate_rect(rect, Sense::click_and_drag());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, name));
+    let needed = app.look.placement(rect, size).size().max_elem() * ui.pixels_per_point();
+    app.pixels_needed = app.pixels_needed.max(needed);
+
+    if let Some(pointer) = response.hover_pos() {
+        let (scroll, pinch) = ui.input(|input| (input.smooth_scroll_delta.y, input.zoom_delta()));
+        let factor = (scroll * 0.005).exp() * pinch;
+        if factor != 1.0 {
+            app.look.zoom_at(rect, size, pointer, factor);
+        }
+        let at = fraction(app.look.placement(rect, size), pointer);
+        let inside = Rect::from_min_size(Pos2::ZERO, vec2(1.0, 1.0)).contains(at);
+        if inside {
+            app.look.cursor = Some(Cursor {
+                at,
+                over: drawn.quantity,
+            });
+        }
+    }
+    if response.dragged() {
+        app.look.pan(rect, size, response.drag_delta());
+    }
+    if response.double_clicked() {
+        app.look.fit();
+    } else if response.clicked()
+        && let Some(pointer) = response.interact_pointer_pos()
+    {
+        click(app, fraction(app.look.placement(rect, size), pointer));
+    }
+    if app.insertions.placing {
+        response.on_hover_cursor(egui::CursorIcon::Crosshair);
+    }
+}
+
+/// A click at a point of the view: places the chosen object, or selects what is there.
+fn click(app: &mut App, at: Pos2) {
+    let Some((capture, camera)) = app.capture().cloned().zip(app.camera()) else {
+        return;
+    };
+    let size = glam::vec2(camera.intrinsics.width as f32, camera.intrinsics.height as f32);
+    let ray = camera.ray(glam::vec2(at.x, at.y) * size);
+    let Some(hit) = capture.scene.intersect(&ray) else {
+        app.selected = None;
+        return;
+    };
+    if app.insertions.placing {
+        let point = capture.scene.point(&hit).as_dvec3() + capture.scene.origin;
+        if app.insertions.place(point) {
+            app.insertions.placing = false;
+            return;
+        }
+    }
+    app.select(capture.scene.object_of.get(hit.triangle as usize).copied());
+}
+
+impl App {
+    /// Selects an object of the scene and shows it in the table.
+    pub fn select(&mut self, object: Option<u32>) {
+        self.selected = object;
+        self.objects.reveal = object.is_some();
+    }
+}
+
+/// Draws the picture itself.
+pub fn paint(ui: &Ui, app: &App, rect: Rect, drawn: &Drawn, slot: egui::Id) {
+    let tokens = theme::tokens(ui);
+    let paint = PicturePaint {
+        objects: drawn.objects.clone(),
+        shading: drawn.quantity.shading(),
+        range: drawn.range,
+        selected: app.selected,
+        ..PicturePaint::new(slot, drawn.picture.clone(), rect, &app.look, tokens)
+    };
+    ui.painter()
+        .add(eframe::egui_wgpu::Callback::new_paint_callback(rect, paint));
+}
+
+/// What lies over the picture: cursor, legend, numbers, anchors of inserted objects.
+pub fn overlay(ui: &Ui, app: &App, rect: Rect, drawn: &Drawn) {
+    let tokens = theme::tokens(ui);
+    let size = [drawn.picture.width, drawn.picture.height];
+    let placement = app.look.placement(rect, size);
+    let painter = ui.painter().with_clip_rect(rect);
+
+    numbers(&painter, rect, placement, &drawn.picture);
+    anchors(ui, app, rect, placement);
+
+    // The cursor of the pane that the pointer is in, in all the others.
+    if let Some(cursor) = app.look.cursor
+        && cursor.over != drawn.quantity
+    {
+        let at = placement.min + cursor.at.to_vec2() * placement.size();
+        for (color, width) in [(Color32::from_black_alpha(160), 3.0), (tokens.strong, 1.0)] {
+            let stroke = egui::Stroke::new(width, color);
+            for (from, to) in [
+                (vec2(-9.0, 0.0), vec2(-3.0, 0.0)),
+                (vec2(3.0, 0.0), vec2(9.0, 0.0)),
+                (vec2(0.0, -9.0), vec2(0.0, -3.0)),
+                (vec2(0.0, 3.0), vec2(0.0, 9.0)),
+            ] {
+                painter.line_segment([at + from, at + to], stroke);
+            }
+        }
+    }
+    if matches!(drawn.quantity.shading(), Shading::Signed | Shading::Positive) {
+        inspect::legend(ui, rect, drawn);
+    }
+}
+
+/// Writes each pixel's three numbers into it once it is large enough.
+fn numbers(painter: &egui::Painter, rect: Rect, placement: Rect, picture: &Picture) {
+    let side = placement.width() / picture.width.max(1) as f32;
+    if side < 44.0 {
+        return;
+    }
+    let first = ((rect.min - placement.min) / side).floor().max(vec2(0.0, 0.0));
+    let last = ((rect.max - placement.min) / side).ceil();
+    let font = FontId::monospace((side * 0.17).min(13.0));
+    for j in first.y as u32..(last.y.max(0.0) as u32).min(picture.height) {
+        for i in first.x as u32..(last.x.max(0.0) as u32).min(picture.width) {
+            let Some(value) = picture.pixels.get((j * picture.width + i) as usize) else {
+                continue;
+            };
+            let center = placement.min + vec2(i as f32 + 0.5, j as f32 + 0.5) * side;
+            for (k, (v, color)) in value
+                .to_array()
+                .into_iter()
+                .zip([
+                    Color32::from_rgb(255, 120, 110),
+                    Color32::from_rgb(120, 235, 120),
+                    Color32::from_rgb(130, 175, 255),
+                ])
+                .enumerate()
+            {
+                let at = center + vec2(0.0, (k as f32 - 1.0) * font.size * 1.25);
+                let text = inspect::number(v);
+                // A shadow keeps the numbers readable on any picture.
+                painter.text(
+                    at + vec2(1.0, 1.0),
+                    Align2::CENTER_CENTER,
+                    &text,
+                    font.clone(),
+                    Color32::BLACK,
+                );
+                painter.text(at, Align2::CENTER_CENTER, text, font.clone(), color);
+            }
+        }
+    }
+}
+
+/// Marks where inserted objects stand.
+fn anchors(ui: &Ui, app: &App, rect: Rect, placement: Rect) {
+    let Some((capture, camera)) = app.capture().zip(app.camera()) else {
+        return;
+    };
+    let painter = ui.painter().with_clip_rect(rect);
+    let tokens = theme::tokens(ui);
+    let size = vec2(camera.intrinsics.width as f32, camera.intrinsics.height as f32);
+    for (index, object) in app.insertions.objects.iter().enumerate() {
+        let insertion::Inserted { placement: at, visible: true } = object else {
+            continue;
+        };
+        let Some(point) = at.at else { continue };
+        let local = (point - capture.scene.origin).as_vec3();
+        if let Some(pixel) = camera.project(local) {
+            let at = placement.min + vec2(pixel.x, pixel.y) / size * placement.size();
+            let radius = if app.insertions.chosen == Some(index) { 5.0 } else { 3.0 };
+            painter.circle(at, radius, tokens.inserted, (1.0, Color32::BLACK));
+        }
+    }
+}

@@ -1,0 +1,349 @@
+//! Linear pictures on the graphics card: uploads on change, and the paint callback that draws them.
+
+use crate::app::picture::look::{Look, ToneCurve};
+use crate::app::picture::quantity::Shading;
+use crate::app::picture::ramp;
+use crate::app::theme::Tokens;
+use crate::session::snapshot::Picture;
+use eframe::egui_wgpu::{CallbackResources, CallbackTrait, ScreenDescriptor};
+use egui::{Color32, PaintCallbackInfo, Rect};
+use std::collections::HashMap;
+use std::sync::Arc;
+use wgpu::util::DeviceExt;
+
+/// The uniform block of `picture.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct ViewUniform {
+    origin: [f32; 2],
+    step: [f32; 2],
+    corner: [f32; 2],
+    exposure: f32,
+    tone: u32,
+    shading: u32,
+    range: f32,
+    selected: f32,
+    padding: f32,
+    surround: [f32; 4],
+    outline: [f32; 4],
+    ramp: [[f32; 4]; ramp::STOPS],
+}
+
+/// Draws one picture; made anew each pass, so it carries the newest picture and compares when preparing.
+pub struct PicturePaint {
+    /// Which texture to keep it in: one for each pane and side.
+    pub slot: egui::Id,
+    /// The picture.
+    pub picture: Arc<Picture>,
+    /// Object index of each pixel, for outlines.
+    pub objects: Option<Arc<Vec<u32>>>,
+    /// The pane, in points.
+    pub pane: Rect,
+    /// Where the picture lies, in points.
+    pub placement: Rect,
+    /// How numbers become colours.
+    pub shading: Shading,
+    /// Magnitude at the end of false colours.
+    pub range: f32,
+    /// Factor on radiance.
+    pub exposure: f32,
+    /// Tone curve of radiance.
+    pub tone: ToneCurve,
+    /// Object to outline.
+    pub selected: Option<u32>,
+    /// Colours.
+    pub tokens: &'static Tokens,
+}
+
+impl PicturePaint {
+    /// The picture as `look` shows it in `pane`.
+    pub fn new(
+        slot: egui::Id,
+        picture: Arc<Picture>,
+        pane: Rect,
+        look: &Look,
+        tokens: &'static Tokens,
+    ) -> Self {
+        let placement = look.placement(pane, [picture.width, picture.height]);
+        Self {
+            slot,
+            picture,
+            objects: None,
+            pane,
+            placement,
+            shading: Shading::Radiance,
+            range: 1.0,
+            exposure: look.exposure.exp2(),
+            tone: look.tone,
+            selected: None,
+            tokens,
+        }
+    }
+
+    fn uniform(&self, pixels_per_point: f32) -> ViewUniform {
+        let size = egui::vec2(self.picture.width as f32, self.picture.height as f32);
+        let step = size / self.placement.size();
+        let origin = (self.pane.min - self.placement.min) * step;
+        let corner = self.pane.min.to_vec2() * pixels_per_point;
+        ViewUniform {
+            origin: origin.into(),
+            step: (step / pixels_per_point).into(),
+            corner: [corner.x.round(), corner.y.round()],
+            exposure: self.exposure,
+            tone: match self.tone {
+                ToneCurve::None => 0,
+                ToneCurve::Reinhard => 1,
+                ToneCurve::Filmic => 2,
+            },
+            shading: match self.shading {
+                Shading::Radiance => 0,
+                Shading::Reflectance => 1,
+                Shading::Signed => 2,
+                Shading::Positive => 3,
+            },
+            range: self.range,
+            selected: self.selected.map_or(-1.0, |object| object as f32),
+            padding: 0.0,
+            surround: rgba(self.tokens.surround),
+            outline: rgba(self.tokens.accent),
+            ramp: ramp::stops(self.shading).map(|[r, g, b]| [r, g, b, 1.0]),
+        }
+    }
+}
+
+/// A theme colour as it goes to egui's target, which is not sRGB-aware.
+pub fn rgba(color: Color32) -> [f32; 4] {
+    color.to_normalized_gamma_f32()
+}
+
+/// What all pictures share on the card.
+struct Pictures {
+    pipeline: wgpu::RenderPipeline,
+    layout: wgpu::BindGroupLayout,
+    slots: HashMap<egui::Id, Slot>,
+}
+
+/// One picture on the card, and what it was made from.
+struct Slot {
+    picture: Arc<Picture>,
+    objects: Option<Arc<Vec<u32>>>,
+    texture: wgpu::Texture,
+    uniform: wgpu::Buffer,
+    bind_group: wgpu::BindGroup,
+}
+
+/// Prepares drawing pictures into a target of this format.
+pub fn install(render_state: &eframe::egui_wgpu::RenderState) {
+    let device = &render_state.device;
+    let shader = device.create_shader_module(wgpu::include_wgsl!("picture.wgsl"));
+    let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("picture"),
+        entries: &[
+            wgpu::BindGroupLayoutEntry {
+                binding: 0,
+                visibility: wgpu::ShaderStages::FRAGMENT,
+                ty: wgpu::BindingType::Buffer {
+                    ty: wgpu::BufferBindingType::Uniform,
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+                count: None,
+            },
+            wgpu::BindGroupLayoutEntry {
+                binding: 1,
+                visibility: wgpu::ShaderStages::FRAGMENT,
+                ty: wgpu::BindingType::Texture {
+                    sample_type: wgpu::TextureSampleType::Float { filterable: false },
+                    view_dimension: wgpu::TextureViewDimension::D2,
+                    multisampled: false,
+                },
+                count: None,
+            },
+        ],
+    });
+    let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("picture"),
+        bind_group_layouts: &[Some(&layout)],
+        immediate_size: 0,
+    });
+    let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some("picture"),
+        layout: Some(&pipeline_layout),
+        vertex: wgpu::VertexState {
+            module: &shader,
+            entry_point: Some("vertex"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: None,
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: &shader,
+            entry_point: Some("fragment"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            targets: &[Some(render_state.target_format.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    });
+    render_state.renderer.write().callback_resources.insert(Pictures {
+        pipeline,
+        layout,
+        slots: HashMap::new(),
+    });
+}
+
+impl CallbackTrait for PicturePaint {
+    fn prepare(
+        &self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        screen: &ScreenDescriptor,
+        _encoder: &mut wgpu::CommandEncoder,
+        resources: &mut CallbackResources,
+    ) -> Vec<wgpu::CommandBuffer> {
+        let Some(pictures) = resources.get_mut::<Pictures>() else {
+            return Vec::new();
+        };
+        let slot = match pictures.slots.entry(self.slot) {
+            std::collections::hash_map::Entry::Occupied(entry) => {
+                let slot = entry.into_mut();
+                if slot.picture.width != self.picture.width
+                    || slot.picture.height != self.picture.height
+                {
+                    *slot = Slot::new(device, queue, &pictures.layout, self);
+                } else if !slot.shows(self) {
+                    slot.picture = self.picture.clone();
+                    slot.objects = self.objects.clone();
+                    upload(queue, &slot.texture, &self.picture, self.objects.as_deref());
+                }
+                slot
+            }
+            std::collections::hash_map::Entry::Vacant(entry) => {
+                entry.insert(Slot::new(device, queue, &pictures.layout, self))
+            }
+        };
+        let uniform = self.uniform(screen.pixels_per_point);
+        queue.write_buffer(&slot.uniform, 0, bytemuck::bytes_of(&uniform));
+        Vec::new()
+    }
+
+    fn paint(
+        &self,
+        _info: PaintCallbackInfo,
+        pass: &mut wgpu::RenderPass<'static>,
+        resources: &CallbackResources,
+    ) {
+        let Some(pictures) = resources.get::<Pictures>() else {
+            return;
+        };
+        if let Some(slot) = pictures.slots.get(&self.slot) {
+            pass.set_pipeline(&pictures.pipeline);
+            pass.set_bind_group(0, &slot.bind_group, &[]);
+            pass.draw(0..3, 0..1);
+        }
+    }
+}
+
+impl Slot {
+    fn new(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        layout: &wgpu::BindGroupLayout,
+        paint: &PicturePaint,
+    ) -> Self {
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("picture"),
+            size: extent(&paint.picture),
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba32Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        });
+        upload(queue, &texture, &paint.picture, paint.objects.as_deref());
+        let uniform = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("picture view"),
+            contents: bytemuck::bytes_of(&paint.uniform(1.0)),
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        });
+        let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("picture"),
+            layout,
+            entries: &[
+                wgpu::BindGroupEntry {
+                    binding: 0,
+                    resource: uniform.as_entire_binding(),
+                },
+                wgpu::BindGroupEntry {
+                    binding: 1,
+                    resource: wgpu::BindingResource::TextureView(
+                        &texture.create_view(&wgpu::TextureViewDescriptor::default()),
+                    ),
+                },
+            ],
+        });
+        Self {
+            picture: paint.picture.clone(),
+            objects: paint.objects.clone(),
+            texture,
+            uniform,
+            bind_group,
+        }
+    }
+
+    fn shows(&self, paint: &PicturePaint) -> bool {
+        let same_objects = match (&self.objects, &paint.objects) {
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            (None, None) => true,
+            _ => false,
+        };
+        same_objects && Arc::ptr_eq(&self.picture, &paint.picture)
+    }
+}
+
+fn extent(picture: &Picture) -> wgpu::Extent3d {
+    wgpu::Extent3d {
+        width: picture.width.max(1),
+        height: picture.height.max(1),
+        depth_or_array_layers: 1,
+    }
+}
+
+/// Writes a picture, with the object index of each pixel in alpha (−1 where none is known).
+fn upload(
+    queue: &wgpu::Queue,
+    texture: &wgpu::Texture,
+    picture: &Picture,
+    objects: Option<&Vec<u32>>,
+) {
+    let objects = objects.filter(|objects| objects.len() == picture.pixels.len());
+    let texels: Vec<[f32; 4]> = picture
+        .pixels
+        .iter()
+        .enumerate()
+        .map(|(index, p)| {
+            let object = objects.map_or(-1.0, |objects| match objects[index] {
+                u32::MAX => -1.0,
+                object => object as f32,
+            });
+            [p.x, p.y, p.z, object]
+        })
+        .collect();
+    let size = extent(picture);
+    if texels.len() != (size.width * size.height) as usize {
+        return;
+    }
+    queue.write_texture(
+        texture.as_image_copy(),
+        bytemuck::cast_slice(&texels),
+        wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(size.width * 16),
+            rows_per_image: None,
+        },
+        size,
+    );
+}

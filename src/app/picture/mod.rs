@@ -1,0 +1,9 @@
+//! Pictures of a view: which there are, how they are looked at, compared, and drawn.
+
+pub mod canvas;
+pub mod compare;
+pub mod gpu;
+pub mod inspect;
+pub mod look;
+pub mod quantity;
+pub mod ramp;

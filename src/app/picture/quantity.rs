@@ -1,0 +1,102 @@
+//! The pictures that can be looked at, and what their numbers mean.
+
+use serde::{Deserialize, Serialize};
+
+/// One of the pictures of a view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Quantity {
+    /// What the camera saw, radiance.
+    Photograph,
+    /// What the estimate predicts, radiance.
+    Render,
+    /// Diffuse reflectance.
+    Albedo,
+    /// Emitted radiance.
+    Emission,
+    /// Render − photograph, signed radiance.
+    Error,
+    /// Standard error of the albedo.
+    StandardError,
+    /// Objects pasted over the photograph, lit by harmonics of the photographs.
+    Naive,
+    /// Objects pasted over the photograph, lit by harmonics of the estimate.
+    NaiveEstimate,
+    /// Objects composited by differential rendering with the estimate.
+    Composite,
+}
+
+/// How numbers become colours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shading {
+    /// Radiance: exposure, tone curve, sRGB curve.
+    Radiance,
+    /// Reflectance: sRGB curve alone, so that 1 is white.
+    Reflectance,
+    /// False colour of the mean over RGB, zero in the middle.
+    Signed,
+    /// False colour of the mean over RGB, from zero up.
+    Positive,
+}
+
+impl Quantity {
+    /// All, in the order in which menus show them.
+    pub const ALL: [Quantity; 9] = [
+        Self::Photograph,
+        Self::Render,
+        Self::Albedo,
+        Self::Emission,
+        Self::Error,
+        Self::StandardError,
+        Self::Naive,
+        Self::NaiveEstimate,
+        Self::Composite,
+    ];
+
+    /// Name shown to people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Photograph => "Photograph",
+            Self::Render => "Re-render",
+            Self::Albedo => "Albedo",
+            Self::Emission => "Emission",
+            Self::Error => "Error",
+            Self::StandardError => "Standard error",
+            Self::Naive => "Naive composite",
+            Self::NaiveEstimate => "Naive, our light",
+            Self::Composite => "Composite",
+        }
+    }
+
+    /// What is shown, in a sentence.
+    pub fn help(self) -> &'static str {
+        match self {
+            Self::Photograph => "Radiance that the camera measured",
+            Self::Render => "Radiance that the estimate predicts for this view",
+            Self::Albedo => "Estimated diffuse reflectance; 1 is white",
+            Self::Emission => "Estimated emitted radiance",
+            Self::Error => "Re-render minus photograph: blue is too dark, red is too bright",
+            Self::StandardError => "Standard error of the estimated albedo",
+            Self::Naive => "Objects lit by harmonics of the photographs, pasted without shadow",
+            Self::NaiveEstimate => "Objects lit by harmonics of our estimate, pasted without shadow",
+            Self::Composite => "Objects lit and shadowed by the estimate",
+        }
+    }
+
+    /// Unit of its numbers, or empty.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Albedo | Self::StandardError => "",
+            _ => "W/(sr·m²)",
+        }
+    }
+
+    /// How its numbers become colours.
+    pub fn shading(self) -> Shading {
+        match self {
+            Self::Albedo => Shading::Reflectance,
+            Self::Error => Shading::Signed,
+            Self::StandardError => Shading::Positive,
+            _ => Shading::Radiance,
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! False colours: the stops that the shader and the legends share, and the range that a picture needs.
+
+use crate::app::picture::quantity::Shading;
+use crate::session::snapshot::Picture;
+use glam::Vec3;
+
+/// Number of evenly spaced stops of a ramp.
+pub const STOPS: usize = 7;
+
+/// Blue over grey to red, sRGB values: below, at and above zero.
+const SIGNED: [[f32; 3]; STOPS] = [
+    [0.42, 0.78, 1.00],
+    [0.16, 0.47, 0.90],
+    [0.10, 0.20, 0.48],
+    [0.12, 0.12, 0.13],
+    [0.48, 0.13, 0.10],
+    [0.90, 0.32, 0.16],
+    [1.00, 0.74, 0.40],
+];
+
+/// Black over violet and orange to pale yellow, sRGB values, of rising lightness.
+const POSITIVE: [[f32; 3]; STOPS] = [
+    [0.02, 0.02, 0.06],
+    [0.20, 0.06, 0.36],
+    [0.45, 0.11, 0.43],
+    [0.70, 0.19, 0.34],
+    [0.90, 0.38, 0.19],
+    [0.98, 0.66, 0.16],
+    [0.99, 0.96, 0.68],
+];
+
+/// The stops of a shading, from its lowest value to its highest.
+pub fn stops(shading: Shading) -> &'static [[f32; 3]; STOPS] {
+    match shading {
+        Shading::Signed => &SIGNED,
+        _ => &POSITIVE,
+    }
+}
+
+/// The sRGB colour at `t` in [0, 1].
+pub fn color(shading: Shading, t: f32) -> [f32; 3] {
+    let stops = stops(shading);
+    let x = t.clamp(0.0, 1.0) * (STOPS - 1) as f32;
+    let below = (x as usize).min(STOPS - 2);
+    let mix = x - below as f32;
+    std::array::from_fn(|c| stops[below][c] * (1.0 - mix) + stops[below + 1][c] * mix)
+}
+
+/// The magnitude that 98 of 100 pixels stay below, rounded up to 1, 2 or 5 times a power of ten.
+///
+/// Looks at no more than about 4096 pixels. At least the smallest positive step, so that it may be divided by.
+pub fn range(picture: &Picture) -> f32 {
+    let stride = (picture.pixels.len() / 4096).max(1);
+    let mut magnitudes: Vec<f32> = picture
+        .pixels
+        .iter()
+        .step_by(stride)
+        .map(|p| (p.element_sum() / 3.0).abs())
+        .filter(|m| m.is_finite())
+        .collect();
+    round_up(percentile(&mut magnitudes, 0.98))
+}
+
+/// Stops of exposure that put the 99th percentile of a picture's brightest channel at 1.
+pub fn automatic_exposure(pixels: &[Vec3]) -> f32 {
+    let stride = (pixels.len() / 16384).max(1);
+    let mut values: Vec<f32> = pixels
+        .iter()
+        .step_by(stride)
+        .map(|p| p.max_element())
+        .filter(|v| v.is_finite())
+        .collect();
+    let high = percentile(&mut values, 0.99);
+    if high > 0.0 { -high.log2() } else { 0.0 }
+}
+
+fn percentile(values: &mut [f32], share: f32) -> f32 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let index = ((values.len() - 1) as f32 * share) as usize;
+    *values.select_nth_unstable_by(index, f32::total_cmp).1
+}
+
+fn round_up(value: f32) -> f32 {
+    if !(value > 0.0) {
+        return 1e-3;
+    }
+    let power = 10f32.powf(value.log10().floor());
+    [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .map(|step| step * power)
+        .find(|&step| step >= value)
+        .unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_round_and_hold_nearly_all_pixels() {
+        for (value, range) in [(0.013, 0.02), (0.5, 0.5), (7.0, 10.0), (0.0, 1e-3)] {
+            assert!((round_up(value) - range).abs() < 1e-6 * range, "{value}");
+        }
+        let pixels = (0..1000).map(|i| Vec3::splat(i as f32 / 1000.0)).collect();
+        let picture = Picture { width: 1000, height: 1, pixels };
+        assert_eq!(range(&picture), 1.0);
+    }
+
+    #[test]
+    fn automatic_exposure_puts_the_99th_percentile_at_one() {
+        let pixels: Vec<Vec3> = (0..=1000).map(|i| Vec3::new(0.0, i as f32 / 250.0, 0.0)).collect();
+        let exposure = automatic_exposure(&pixels);
+        assert!((exposure.exp2() * 3.96 - 1.0).abs() < 1e-3);
+        assert_eq!(automatic_exposure(&[Vec3::ZERO; 4]), 0.0);
+        assert_eq!(automatic_exposure(&[Vec3::NAN]), 0.0);
+    }
+
+    #[test]
+    fn ramps_meet_their_ends_and_positive_ones_grow_lighter() {
+        assert_eq!(color(Shading::Signed, -1.0), SIGNED[0]);
+        assert_eq!(color(Shading::Positive, 2.0), POSITIVE[STOPS - 1]);
+        let lightness = |t: f32| color(Shading::Positive, t).iter().sum::<f32>();
+        assert!((1..=20).all(|i| lightness(i as f32 / 20.0) > lightness((i - 1) as f32 / 20.0)));
+    }
+}

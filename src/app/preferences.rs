@@ -1,0 +1,104 @@
+//! What the window remembers between runs: theme, recent captures, tone curve and layout, as one JSON file.
+
+use crate::app::layout::Pane;
+use crate::app::picture::look::ToneCurve;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Remembered choices.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Preferences {
+    /// Whether the light theme is used.
+    pub light: bool,
+    /// Tone curve of radiance.
+    pub tone: ToneCurve,
+    /// Whether the strip of photographs is shown.
+    pub thumbnails: bool,
+    /// Captures opened before, the newest first.
+    pub recent: Vec<PathBuf>,
+    /// Where the panes are; `None` is the layout of the first start.
+    pub layout: Option<egui_tiles::Tree<Pane>>,
+}
+
+impl Default for Preferences {
+    fn default() -> Self {
+        Self {
+            light: false,
+            tone: ToneCurve::None,
+            thumbnails: true,
+            recent: Vec::new(),
+            layout: None,
+        }
+    }
+}
+
+/// Captures that are remembered.
+const RECENT: usize = 8;
+
+impl Preferences {
+    /// Reads the file; what is missing or cannot be read keeps its default.
+    pub fn load(path: &Path) -> Self {
+        std::fs::read(path)
+            .ok()
+            .and_then(|bytes| serde_json::from_slice(&bytes).ok())
+            .unwrap_or_default()
+    }
+
+    /// Writes the file through a temporary one beside it, so that a kill leaves the old or the new.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn save(&self, path: &Path) -> std::io::Result<()> {
+        let folder = path.parent().unwrap_or(Path::new("."));
+        std::fs::create_dir_all(folder)?;
+        let file = tempfile::NamedTempFile::new_in(folder)?;
+        serde_json::to_writer_pretty(&file, self)?;
+        file.persist(path)?;
+        Ok(())
+    }
+
+    /// Puts a capture at the head of the recent ones.
+    pub fn opened(&mut self, folder: &Path) {
+        self.recent.retain(|known| known != folder);
+        self.recent.insert(0, folder.to_owned());
+        self.recent.truncate(RECENT);
+    }
+}
+
+/// The file of this user, where the system names a folder for it.
+pub fn path() -> Option<PathBuf> {
+    let named = |variable| std::env::var_os(variable).map(PathBuf::from);
+    let folder = if cfg!(windows) {
+        named("APPDATA")?
+    } else if cfg!(target_os = "macos") {
+        std::env::home_dir()?.join("Library/Application Support")
+    } else {
+        named("XDG_CONFIG_HOME").or_else(|| Some(std::env::home_dir()?.join(".config")))?
+    };
+    Some(folder.join("relit").join("window.json"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_saved_is_read_again_and_rubbish_is_the_default() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("deep/window.json");
+        let mut preferences = Preferences {
+            light: true,
+            layout: Some(crate::app::layout::first_layout()),
+            ..Preferences::default()
+        };
+        for name in ["a", "b", "a"] {
+            preferences.opened(Path::new(name));
+        }
+        assert_eq!(preferences.recent, [PathBuf::from("a"), PathBuf::from("b")]);
+        preferences.save(&path).expect("saved");
+        assert_eq!(Preferences::load(&path), preferences);
+        std::fs::write(&path, "{").expect("written");
+        assert_eq!(Preferences::load(&path), Preferences::default());
+    }
+}

@@ -1,0 +1,102 @@
+//! Opening the window on a session of its own; where none can be opened, an error that says why in one line.
+
+use crate::app::preferences::{self, Preferences};
+use crate::app::state::App;
+use crate::app::window::Window;
+use crate::error::{Error, Result};
+use crate::inverse::settings::Settings;
+use crate::session::Session;
+use crate::session::command::Source;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Least time between passes for what the worker sends: where a graphics card draws, and where the processor has to.
+const REPAINT: [Duration; 2] = [Duration::from_millis(16), Duration::from_millis(250)];
+
+/// Opens the window and returns when it is closed. With no `source` it shows the start page.
+///
+/// # Errors
+/// There is no display, no library for it, or no graphics adapter.
+pub fn run(source: Option<Source>, settings: Settings) -> Result<()> {
+    let options = eframe::NativeOptions {
+        viewport: egui::ViewportBuilder::default()
+            .with_title("relit")
+            .with_app_id("relit")
+            .with_inner_size([1280.0, 800.0])
+            .with_min_inner_size([760.0, 480.0]),
+        renderer: eframe::Renderer::Wgpu,
+        ..Default::default()
+    };
+    let opened = Arc::new(AtomicBool::new(false));
+    let create: eframe::AppCreator<'_> = {
+        let opened = opened.clone();
+        Box::new(move |cc| {
+            let window = window(cc, source, settings)?;
+            opened.store(true, Ordering::Relaxed);
+            Ok(Box::new(window))
+        })
+    };
+
+    // A missing X library makes the window library panic, which is kept quiet until the window is open.
+    let before: Arc<dyn Fn(&std::panic::PanicHookInfo<'_>) + Send + Sync> =
+        Arc::from(std::panic::take_hook());
+    std::panic::set_hook(Box::new({
+        let (opened, before) = (opened.clone(), before.clone());
+        move |info| {
+            if opened.load(Ordering::Relaxed) {
+                before(info);
+            }
+        }
+    }));
+    let ended = catch_unwind(AssertUnwindSafe(|| {
+        eframe::run_native("relit", options, create)
+    }));
+    std::panic::set_hook(Box::new(move |info| before(info)));
+
+    match ended {
+        Ok(Ok(())) => Ok(()),
+        Ok(Err(error)) => Err(no_window(&error.to_string())),
+        Err(panic) if opened.load(Ordering::Relaxed) => resume_unwind(panic),
+        Err(panic) => {
+            let words = panic
+                .downcast_ref::<String>()
+                .map(String::as_str)
+                .or_else(|| panic.downcast_ref::<&str>().copied())
+                .unwrap_or("the window library failed");
+            Err(no_window(words))
+        }
+    }
+}
+
+/// The window on a worker that wakes it.
+fn window(
+    cc: &eframe::CreationContext<'_>,
+    source: Option<Source>,
+    settings: Settings,
+) -> Result<Window> {
+    let software = cc.wgpu_render_state.as_ref().is_none_or(|render_state| {
+        render_state.adapter.get_info().device_type == wgpu::DeviceType::Cpu
+    });
+    let interval = REPAINT[usize::from(software)];
+    let ctx = cc.egui_ctx.clone();
+    let wake = Arc::new(move || ctx.request_repaint_after(interval));
+    let mut preferences_of_user = Preferences::default();
+    let kept = preferences::path();
+    if let Some(path) = &kept {
+        preferences_of_user = Preferences::load(path);
+    }
+    let session = Session::spawn(source.clone(), settings.clone(), wake)?;
+    let mut app = App::new(Box::new(session), preferences_of_user);
+    app.settings = settings;
+    app.opened_with(source);
+    Ok(Window::new(cc, app, kept))
+}
+
+/// The reason in one line.
+fn no_window(reason: &str) -> Error {
+    let line = reason.split_whitespace().collect::<Vec<_>>().join(" ");
+    let remedy = "install what is missing, or use `relit solve`";
+    Error::new("window", line, remedy)
+}

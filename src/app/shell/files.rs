@@ -1,0 +1,206 @@
+//! The sheet for saving results and exporting: a typed path, a dialog where there is one.
+
+use crate::app::shell::dialogs::Ask;
+use crate::app::state::App;
+use crate::session::command::{Command, ExportFormat, ExportRequest};
+use egui::{Id, Modal, TextEdit, Ui};
+use glam::DVec3;
+use std::path::PathBuf;
+
+/// What the sheet is for.
+#[derive(Debug, Clone, Default)]
+pub enum Sheet {
+    /// It is closed.
+    #[default]
+    Closed,
+    /// Saving results into a folder.
+    Save {
+        /// The folder as typed.
+        folder: String,
+    },
+    /// Exporting one file.
+    Export {
+        /// The file as typed.
+        file: String,
+        /// Which of [`FORMATS`].
+        format: usize,
+    },
+}
+
+/// A format that can be exported: its name, what reads it, and the ending of its files.
+struct Format {
+    name: &'static str,
+    help: &'static str,
+    ending: &'static str,
+    format: ExportFormat,
+}
+
+/// All formats, in the order shown. The probe's point is filled in when it is exported.
+const FORMATS: [Format; 6] = [
+    Format {
+        name: "GLB",
+        help: "Base colours and emissive strength, for Blender and engines",
+        ending: "glb",
+        format: ExportFormat::Glb,
+    },
+    Format {
+        name: "OBJ",
+        help: "With an MTL file beside it",
+        ending: "obj",
+        format: ExportFormat::Obj,
+    },
+    Format {
+        name: "PLY",
+        help: "Albedo as vertex colours",
+        ending: "ply",
+        format: ExportFormat::Ply,
+    },
+    Format {
+        name: "Mitsuba 3",
+        help: "A scene file that Mitsuba 3 renders",
+        ending: "xml",
+        format: ExportFormat::Mitsuba,
+    },
+    Format {
+        name: "CSV",
+        help: "The table of objects",
+        ending: "csv",
+        format: ExportFormat::Csv,
+    },
+    Format {
+        name: "Light probe",
+        help: "The light at the inserted object's place, or in the middle of the 3D view, as a panorama",
+        ending: "hdr",
+        format: ExportFormat::Probe { at: DVec3::ZERO },
+    },
+];
+
+impl Sheet {
+    /// The sheet for saving.
+    pub fn save(name: &str) -> Self {
+        Self::Save {
+            folder: format!("relit-out/{}", file_name(name)),
+        }
+    }
+
+    /// The sheet for exporting.
+    pub fn export(name: &str) -> Self {
+        Self::Export {
+            file: format!("{}.{}", file_name(name), FORMATS[0].ending),
+            format: 0,
+        }
+    }
+
+    /// Takes over what a dialog answered.
+    pub fn chosen(&mut self, ask: Ask, path: PathBuf) {
+        let text = path.to_string_lossy().into_owned();
+        match (self, ask) {
+            (Self::Save { folder }, Ask::SaveFolder) => *folder = text,
+            (Self::Export { file, .. }, Ask::ExportFile) => *file = text,
+            _ => {}
+        }
+    }
+}
+
+/// A capture's name without what file systems object to.
+fn file_name(name: &str) -> String {
+    name.chars()
+        .map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '-' })
+        .collect()
+}
+
+/// Draws the sheet while it is open.
+pub fn show(ctx: &egui::Context, app: &mut App) {
+    if matches!(app.sheet, Sheet::Closed) {
+        return;
+    }
+    let modal = Modal::new(Id::unique("sheet")).show(ctx, |ui| {
+        ui.set_width(420.0);
+        let mut sheet = app.sheet.clone();
+        let close = match &mut sheet {
+            Sheet::Closed => true,
+            Sheet::Save { folder } => save(ui, app, folder),
+            Sheet::Export { file, format } => export(ui, app, file, format),
+        };
+        app.sheet = if close { Sheet::Closed } else { sheet };
+    });
+    if modal.should_close() {
+        app.sheet = Sheet::Closed;
+    }
+}
+
+/// Draws the sheet for saving; true when it is to close.
+fn save(ui: &mut Ui, app: &mut App, folder: &mut String) -> bool {
+    ui.heading("Save results");
+    ui.label("Estimate, report, loss, scene and pictures, as `relit solve` writes them.");
+    path_field(ui, app, "Folder", folder, Ask::SaveFolder);
+    let (go, cancel) = buttons(ui, "Save", !folder.trim().is_empty());
+    if go {
+        app.send(Command::Save(PathBuf::from(folder.trim())));
+    }
+    go || cancel
+}
+
+/// Draws the sheet for exporting; true when it is to close.
+fn export(ui: &mut Ui, app: &mut App, file: &mut String, chosen: &mut usize) -> bool {
+    ui.heading("Export");
+    ui.horizontal_wrapped(|ui| {
+        for (index, format) in FORMATS.iter().enumerate() {
+            let response = ui
+                .selectable_label(*chosen == index, format.name)
+                .on_hover_text(format.help);
+            if response.clicked() {
+                *chosen = index;
+                *file = PathBuf::from(&*file)
+                    .with_extension(format.ending)
+                    .to_string_lossy()
+                    .into_owned();
+            }
+        }
+    });
+    let format = &FORMATS[(*chosen).min(FORMATS.len() - 1)];
+    ui.weak(format.help);
+    path_field(ui, app, "File", file, Ask::ExportFile);
+    let (go, cancel) = buttons(ui, "Export", !file.trim().is_empty());
+    if go {
+        let format = match format.format {
+            ExportFormat::Probe { .. } => ExportFormat::Probe { at: probe_point(app) },
+            other => other,
+        };
+        app.send(Command::Export(ExportRequest {
+            format,
+            path: PathBuf::from(file.trim()),
+        }));
+    }
+    go || cancel
+}
+
+/// Where a probe is taken: at the chosen inserted object, or at the 3D view's target.
+fn probe_point(app: &mut App) -> DVec3 {
+    let origin = app.capture().map_or(DVec3::ZERO, |capture| capture.scene.origin);
+    app.insertions
+        .chosen()
+        .and_then(|object| object.placement.at)
+        .unwrap_or(app.model.orbit.target.as_dvec3() + origin)
+}
+
+fn path_field(ui: &mut Ui, app: &mut App, name: &str, path: &mut String, ask: Ask) {
+    ui.horizontal(|ui| {
+        let label = ui.label(name);
+        ui.add(TextEdit::singleline(path).desired_width(270.0))
+            .labelled_by(label.id);
+        if ui.button("Browse…").clicked() {
+            app.ask(ask, &ui.ctx().clone());
+        }
+    });
+}
+
+/// The two buttons at the end: whether each was clicked.
+fn buttons(ui: &mut Ui, go: &str, enabled: bool) -> (bool, bool) {
+    ui.horizontal(|ui| {
+        let cancel = ui.button("Cancel").clicked();
+        let go = ui.add_enabled(enabled, egui::Button::new(go)).clicked();
+        (go, cancel)
+    })
+    .inner
+}

@@ -1,0 +1,85 @@
+//! The start page: the built-in room, a typed path, recent captures, and where to drop a folder.
+
+use crate::app::action::Action;
+use crate::app::state::App;
+use crate::app::theme;
+use crate::session::command::Source;
+use egui::{Align, Button, Frame, Layout, RichText, Stroke, TextEdit, Ui, vec2};
+
+/// Draws the page.
+pub fn page(ui: &mut Ui, app: &mut App) {
+    let tokens = theme::tokens(ui);
+    ui.painter().rect_filled(ui.max_rect(), 0.0, tokens.panel);
+    ui.vertical_centered(|ui| {
+        ui.set_max_width(560.0);
+        ui.add_space((ui.available_height() * 0.12).max(8.0));
+        ui.label(RichText::new("relit").size(34.0).color(tokens.strong));
+        ui.label("Recovers the lights and materials of a scanned room from photographs,\nand puts new objects into them.");
+        ui.add_space(18.0);
+        let room = Button::new(RichText::new("Open the built-in room").size(15.0))
+            .min_size(vec2(260.0, 34.0))
+            .fill(tokens.selection);
+        if ui.add(room).on_hover_text(Action::OpenRoom.help()).clicked() {
+            app.open(Source::BuiltInRoom);
+        }
+        ui.add_space(14.0);
+        typed_path(ui, app);
+        ui.add_space(10.0);
+        drop_area(ui);
+        ui.add_space(10.0);
+        recent(ui, app);
+    });
+}
+
+fn typed_path(ui: &mut Ui, app: &mut App) {
+    ui.allocate_ui_with_layout(vec2(540.0, 24.0), Layout::left_to_right(Align::Center), |ui| {
+        let label = ui.label("Capture folder");
+        let field = TextEdit::singleline(&mut app.path)
+            .hint_text("a folder with transforms.json")
+            .desired_width(300.0);
+        let response = ui.add(field).labelled_by(label.id);
+        let entered = response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+        let open = ui.add_enabled(!app.path.trim().is_empty(), Button::new("Open"));
+        if entered || open.clicked() {
+            app.open_typed();
+        }
+        if ui
+            .button("Browse…")
+            .on_hover_text(Action::OpenFolder.help())
+            .clicked()
+        {
+            app.perform(Action::OpenFolder, &ui.ctx().clone());
+        }
+    });
+}
+
+fn drop_area(ui: &mut Ui) {
+    let tokens = theme::tokens(ui);
+    let hovering = ui.input(|input| !input.raw.hovered_files.is_empty());
+    let color = if hovering { tokens.accent } else { tokens.outline };
+    Frame::NONE
+        .stroke(Stroke::new(1.5, color))
+        .fill(tokens.sunken)
+        .corner_radius(6)
+        .inner_margin(18)
+        .show(ui, |ui| {
+            ui.set_width(504.0);
+            ui.vertical_centered(|ui| ui.weak("Drop a capture's folder here"));
+        });
+}
+
+fn recent(ui: &mut Ui, app: &mut App) {
+    if app.preferences.recent.is_empty() {
+        return;
+    }
+    ui.weak("Recent captures");
+    let mut chosen = None;
+    for folder in &app.preferences.recent {
+        if ui.button(folder.display().to_string()).clicked() {
+            chosen = Some(folder.clone());
+        }
+    }
+    if let Some(folder) = chosen {
+        app.open(Source::Folder(folder));
+    }
+}

@@ -1,0 +1,137 @@
+//! The status bar: what the worker does, how fast, how long still, and with how much memory.
+
+use crate::app::picture::inspect::number;
+use crate::app::state::App;
+use crate::app::theme;
+use crate::session::snapshot::Phase;
+use egui::{ProgressBar, RichText, Ui};
+use std::time::{Duration, Instant};
+use sysinfo::{ProcessRefreshKind, ProcessesToUpdate, System};
+
+/// Memory of this process, looked up now and then.
+pub struct Memory {
+    system: Option<System>,
+    looked_up: Option<Instant>,
+    bytes: u64,
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Self {
+            system: System::new().ok(),
+            looked_up: None,
+            bytes: 0,
+        }
+    }
+}
+
+impl Memory {
+    /// Resident bytes, at most two seconds old.
+    fn bytes(&mut self) -> u64 {
+        let fresh = self
+            .looked_up
+            .is_some_and(|at| at.elapsed() < Duration::from_secs(2));
+        if !fresh
+            && let Some(system) = &mut self.system
+            && let Ok(process) = sysinfo::get_current_pid()
+        {
+            let kind = ProcessRefreshKind::nothing().with_memory();
+            let processes = ProcessesToUpdate::Some(&[process]);
+            system.refresh_processes_specifics(processes, false, kind);
+            self.bytes = system.process(process).map_or(0, |p| p.memory());
+            self.looked_up = Some(Instant::now());
+        }
+        self.bytes
+    }
+}
+
+/// Word of a phase.
+pub fn phase_word(phase: &Phase) -> String {
+    match phase {
+        Phase::Idle => "Idle".to_owned(),
+        Phase::Loading => "Loading".to_owned(),
+        Phase::Solving => "Solving".to_owned(),
+        Phase::Paused => "Paused".to_owned(),
+        Phase::Finished(why) => format!("Finished: {}", why.word()),
+        Phase::Failed => "Failed".to_owned(),
+    }
+}
+
+/// Draws the bar.
+pub fn bar(ui: &mut Ui, app: &mut App) {
+    let tokens = theme::tokens(ui);
+    let bytes = app.memory.bytes();
+    let snapshot = &app.snapshot;
+    let color = match snapshot.phase {
+        Phase::Solving | Phase::Loading => tokens.accent,
+        Phase::Finished(_) => tokens.good,
+        Phase::Failed => tokens.error,
+        Phase::Paused | Phase::Idle => tokens.weak,
+    };
+    ui.horizontal_centered(|ui| {
+        ui.label(RichText::new(phase_word(&snapshot.phase)).color(color).strong());
+        let progress = &snapshot.progress;
+        if app.is_running() {
+            if let Some(fraction) = progress.fraction {
+                ui.add(ProgressBar::new(fraction).desired_width(90.0).desired_height(8.0));
+            }
+            ui.label(&progress.phase);
+        }
+        if let Some(stage) = progress.stages.last() {
+            ui.separator();
+            ui.label(format!("after stage {}: {}", progress.stages.len(), stage.name));
+        }
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            ui.label(format!("{} MB", bytes / 1_000_000)).on_hover_text("Memory in use");
+            ui.separator();
+            if let Some(left) = snapshot.seconds_left {
+                ui.label(format!("{} left", duration(left)));
+                ui.separator();
+            }
+            ui.label(duration(progress.seconds))
+                .on_hover_text("Seconds of solving, pauses excluded");
+            ui.separator();
+            ui.label(format!("{} rays/s", magnitude(snapshot.rays_per_second)));
+            ui.separator();
+            ui.label(format!("{} iterations/s", number(snapshot.iterations_per_second as f32)));
+            ui.separator();
+            ui.label(format!("iteration {}", progress.iterations));
+        });
+    });
+}
+
+/// Seconds as people read them.
+fn duration(seconds: f64) -> String {
+    let whole = seconds.max(0.0);
+    if whole < 60.0 {
+        format!("{whole:.1} s")
+    } else if whole < 3600.0 {
+        format!("{:.0} min {:02.0} s", (whole / 60.0).floor(), (whole % 60.0).floor())
+    } else {
+        format!("{:.0} h {:02.0} min", (whole / 3600.0).floor(), (whole % 3600.0 / 60.0).floor())
+    }
+}
+
+/// A large number with a letter for its power of a thousand.
+fn magnitude(value: f64) -> String {
+    match value {
+        v if v >= 1e9 => format!("{:.1} G", v / 1e9),
+        v if v >= 1e6 => format!("{:.1} M", v / 1e6),
+        v if v >= 1e3 => format!("{:.0} k", v / 1e3),
+        v => format!("{v:.0}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn durations_and_magnitudes_are_short() {
+        assert_eq!(duration(3.25), "3.2 s");
+        assert_eq!(duration(185.0), "3 min 05 s");
+        assert_eq!(duration(7260.0), "2 h 01 min");
+        assert_eq!(magnitude(2_340_000.0), "2.3 M");
+        assert_eq!(magnitude(12.0), "12");
+    }
+}

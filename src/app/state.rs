@@ -1,0 +1,399 @@
+//! The state of the window: the newest snapshot, how it is looked at, and what is asked of the worker.
+
+use crate::app::action::Action;
+use crate::app::connection::Connection;
+use crate::app::insertion::Insertions;
+use crate::app::layout::Pane;
+use crate::app::model::view::ModelView;
+use crate::app::panels::objects::ObjectsTable;
+use crate::app::picture::compare::Compare;
+use crate::app::picture::look::Look;
+use crate::app::picture::ramp;
+use crate::app::preferences::Preferences;
+use crate::app::shell::dialogs::{Ask, Dialogs};
+use crate::app::shell::files::Sheet;
+use crate::app::shell::notices::Notices;
+use crate::app::shell::palette::Palette;
+use crate::app::shell::status::Memory;
+use crate::app::shell::thumbnails::Thumbnails;
+use crate::inverse::settings::Settings;
+use crate::scene::camera::Camera;
+use crate::session::command::{Command, Placement, Source, ViewCamera, ViewRequest};
+use crate::session::snapshot::{Level, OpenCapture, Phase, Picture, Snapshot};
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// What the view shows.
+#[derive(Debug, Clone, Default)]
+pub enum Shown {
+    /// The chosen frame.
+    #[default]
+    Frame,
+    /// The 3D view's camera, and how often it was taken over.
+    Free(Box<Camera>, u64),
+}
+
+/// Everything that the window knows.
+pub struct App {
+    connection: Box<dyn Connection>,
+    /// The newest snapshot.
+    pub snapshot: Arc<Snapshot>,
+    /// The parameters as edited here.
+    pub settings: Settings,
+    /// How pictures are looked at.
+    pub look: Look,
+    /// The two pictures compared.
+    pub compare: Compare,
+    /// The chosen photograph.
+    pub frame: usize,
+    /// Whether pictures are of that photograph or of the 3D view.
+    pub shown: Shown,
+    /// The selected object of the scene.
+    pub selected: Option<u32>,
+    /// The inserted objects.
+    pub insertions: Insertions,
+    /// The 3D view.
+    pub model: ModelView,
+    /// The table of objects.
+    pub objects: ObjectsTable,
+    /// Events.
+    pub notices: Notices,
+    /// File dialogs.
+    pub dialogs: Dialogs,
+    /// Saving and exporting.
+    pub sheet: Sheet,
+    /// The command palette, while it is open.
+    pub palette: Option<Palette>,
+    /// Whether the window of keys is open.
+    pub keys: bool,
+    /// Whether the start page covers the panes.
+    pub start_page: bool,
+    /// The capture's path as typed.
+    pub path: String,
+    /// What is remembered between runs.
+    pub preferences: Preferences,
+    /// A pane to bring to the front in this pass.
+    pub bring_forward: Option<Pane>,
+    /// Whether the layout is to be reset in this pass.
+    pub reset_layout: bool,
+    /// Memory in use.
+    pub memory: Memory,
+    /// The strip of photographs.
+    pub thumbnails: Thumbnails,
+    /// The most pixels a pane showed along a side in this pass.
+    pub pixels_needed: f32,
+    photograph: Option<(usize, Arc<Picture>)>,
+    pending: VecDeque<Command>,
+    opening: Option<Source>,
+    sent_view: Option<(Option<usize>, u64, u32)>,
+    sent_insertions: Vec<Placement>,
+}
+
+impl App {
+    /// A window on a session.
+    pub fn new(connection: Box<dyn Connection>, preferences: Preferences) -> Self {
+        let look = Look {
+            tone: preferences.tone,
+            ..Look::default()
+        };
+        Self {
+            connection,
+            snapshot: Arc::default(),
+            settings: Settings::default(),
+            look,
+            compare: Compare::default(),
+            frame: 0,
+            shown: Shown::Frame,
+            selected: None,
+            insertions: Insertions::default(),
+            model: ModelView::default(),
+            objects: ObjectsTable::default(),
+            notices: Notices::default(),
+            dialogs: Dialogs::default(),
+            sheet: Sheet::default(),
+            palette: None,
+            keys: false,
+            start_page: false,
+            path: String::new(),
+            preferences,
+            bring_forward: None,
+            reset_layout: false,
+            memory: Memory::default(),
+            thumbnails: Thumbnails::default(),
+            photograph: None,
+            pixels_needed: 0.0,
+            pending: VecDeque::new(),
+            opening: None,
+            sent_view: None,
+            sent_insertions: Vec::new(),
+        }
+    }
+
+    /// Asks something of the worker; kept and tried again while its channel is full.
+    pub fn send(&mut self, command: Command) {
+        self.pending.push_back(command);
+        self.flush();
+    }
+
+    /// Opens a capture.
+    pub fn open(&mut self, source: Source) {
+        self.start_page = false;
+        self.opening = Some(source.clone());
+        self.send(Command::Open(source));
+    }
+
+    /// Notes what the session was started with.
+    pub fn opened_with(&mut self, source: Option<Source>) {
+        self.opening = source;
+    }
+
+    /// Opens the folder whose path was typed.
+    pub fn open_typed(&mut self) {
+        let path = self.path.trim();
+        if !path.is_empty() {
+            self.open(Source::Folder(PathBuf::from(path)));
+        }
+    }
+
+    /// What is open.
+    pub fn capture(&self) -> Option<&Arc<OpenCapture>> {
+        self.snapshot.capture.as_ref()
+    }
+
+    /// Whether the start page is shown: nothing is open, or it was asked for.
+    pub fn shows_start_page(&self) -> bool {
+        self.start_page
+            || (self.capture().is_none()
+                && matches!(self.snapshot.phase, Phase::Idle | Phase::Failed)
+                && self.opening.is_none())
+    }
+
+    /// Number of photographs.
+    pub fn frames(&self) -> usize {
+        self.capture().map_or(0, |capture| capture.scene.cameras.len())
+    }
+
+    /// Goes `by` photographs on, around the ends.
+    pub fn step_frame(&mut self, by: isize) {
+        let frames = self.frames() as isize;
+        if frames > 0 {
+            self.show_frame((self.frame as isize + by).rem_euclid(frames) as usize);
+        }
+    }
+
+    /// Shows a photograph and what belongs to it.
+    pub fn show_frame(&mut self, frame: usize) {
+        self.frame = frame;
+        self.shown = Shown::Frame;
+    }
+
+    /// The camera of the shown view.
+    pub fn camera(&self) -> Option<&Camera> {
+        match &self.shown {
+            Shown::Free(camera, _) => Some(camera),
+            Shown::Frame => self.capture()?.scene.cameras.get(self.frame),
+        }
+    }
+
+    /// Takes in what is new and asks for what is missing. Called before every pass, also while the window is hidden.
+    pub fn update(&mut self, ctx: &egui::Context) {
+        let snapshot = self.connection.latest();
+        if snapshot.sequence != self.snapshot.sequence {
+            self.take(snapshot);
+        }
+        while let Some((ask, answer)) = self.dialogs.take() {
+            self.answered(ask, answer);
+        }
+        if !ctx.input(|input| input.pointer.any_down()) {
+            self.insertions.settle();
+        }
+        self.convert_photograph();
+        self.request();
+        self.flush();
+        if !self.pending.is_empty() {
+            ctx.request_repaint_after(std::time::Duration::from_millis(30));
+        }
+    }
+
+    fn take(&mut self, snapshot: Arc<Snapshot>) {
+        let other_capture = match (&self.snapshot.capture, &snapshot.capture) {
+            (Some(old), Some(new)) => !Arc::ptr_eq(old, new),
+            (old, new) => old.is_some() != new.is_some(),
+        };
+        let before = std::mem::replace(&mut self.snapshot, snapshot);
+        let events = self.snapshot.events.clone();
+        self.notices.take(&events);
+        if before.settings != self.snapshot.settings || before.sequence == 0 {
+            self.settings = self.snapshot.settings.clone();
+        }
+        if self.snapshot.phase == Phase::Failed {
+            self.opening = None;
+        }
+        if other_capture {
+            self.capture_changed();
+        }
+    }
+
+    fn capture_changed(&mut self) {
+        self.frame = 0;
+        self.shown = Shown::Frame;
+        self.selected = None;
+        self.sent_view = None;
+        self.photograph = None;
+        self.insertions.clear();
+        self.sent_insertions.clear();
+        self.model = ModelView::default();
+        self.look.fit();
+        if self.capture().is_some() {
+            if let Some(Source::Folder(folder)) = self.opening.take() {
+                self.preferences.opened(&folder);
+            }
+            self.opening = None;
+            self.expose_automatically();
+        }
+    }
+
+    /// Puts the shown photograph's 99th percentile at 1.
+    pub fn expose_automatically(&mut self) {
+        let photograph = self
+            .capture()
+            .and_then(|capture| capture.photographs.get(self.frame));
+        if let Some(photograph) = photograph {
+            let stops = ramp::automatic_exposure(&photograph.pixels);
+            self.look.exposure = (stops * 4.0).round() / 4.0;
+        }
+    }
+
+    /// The chosen photograph, there before the worker has sent anything of its view.
+    pub fn photograph(&self) -> Option<Arc<Picture>> {
+        let (frame, picture) = self.photograph.as_ref()?;
+        (*frame == self.frame && matches!(self.shown, Shown::Frame)).then(|| picture.clone())
+    }
+
+    fn convert_photograph(&mut self) {
+        if matches!(&self.photograph, Some((frame, _)) if *frame == self.frame) {
+            return;
+        }
+        let photograph = self.capture().and_then(|capture| capture.photographs.get(self.frame));
+        self.photograph = photograph.map(|photograph| {
+            let picture = Picture {
+                width: photograph.width,
+                height: photograph.height,
+                pixels: photograph.pixels.clone(),
+            };
+            (self.frame, Arc::new(picture))
+        });
+    }
+
+    /// Asks for the view and the insertion that are shown, where they differ from those asked for.
+    fn request(&mut self) {
+        let Some(camera) = self.camera() else {
+            return;
+        };
+        let long_side = render_size(camera, self.pixels_needed);
+        let (key, view) = match &self.shown {
+            Shown::Frame => (
+                (Some(self.frame), 0, long_side),
+                ViewCamera::Frame(self.frame),
+            ),
+            Shown::Free(camera, count) => {
+                ((None, *count, long_side), ViewCamera::Free(camera.clone()))
+            }
+        };
+        if self.sent_view != Some(key) {
+            let request = ViewRequest {
+                camera: view,
+                long_side,
+            };
+            if self.connection.send(Command::View(request)) {
+                self.sent_view = Some(key);
+            }
+        }
+        let placements = self.insertions.placements();
+        if placements != self.sent_insertions
+            && self.connection.send(Command::Insert(placements.clone()))
+        {
+            self.sent_insertions = placements;
+        }
+    }
+
+    fn flush(&mut self) {
+        while let Some(command) = self.pending.front() {
+            if !self.connection.send(command.clone()) {
+                break;
+            }
+            self.pending.pop_front();
+        }
+    }
+
+    fn answered(&mut self, ask: Ask, answer: Option<PathBuf>) {
+        let Some(path) = answer else {
+            self.notices.say(
+                Level::Info,
+                "nothing was chosen; where no file dialog opens, type the path instead",
+            );
+            match ask {
+                Ask::Capture => self.start_page = true,
+                Ask::Object => self.bring_forward = Some(Pane::Insert),
+                Ask::SaveFolder | Ask::ExportFile => {}
+            }
+            return;
+        };
+        match ask {
+            Ask::Capture => self.open(Source::Folder(path)),
+            Ask::SaveFolder | Ask::ExportFile => self.sheet.chosen(ask, path),
+            Ask::Object => self.insertions.add(path, None),
+        }
+    }
+
+    /// Opens a dropped folder, or inserts a dropped object.
+    pub fn dropped(&mut self, path: PathBuf) {
+        if crate::app::insertion::is_object(&path) {
+            self.insertions.add(path, None);
+            self.bring_forward = Some(Pane::Insert);
+            return;
+        }
+        // The folder of a dropped transforms.json is the capture.
+        let folder = if path.is_file() {
+            path.parent().map_or(path.clone(), PathBuf::from)
+        } else {
+            path
+        };
+        self.open(Source::Folder(folder));
+    }
+
+    /// Whether an action makes sense now.
+    pub fn can(&self, action: Action) -> bool {
+        let open = self.capture().is_some();
+        match action {
+            Action::Undo => self.insertions.can_undo(),
+            Action::Redo => self.insertions.can_redo(),
+            Action::Place | Action::Duplicate | Action::Delete => self.insertions.chosen.is_some(),
+            Action::Finish => matches!(self.snapshot.phase, Phase::Solving | Phase::Paused),
+            Action::Save
+            | Action::Export
+            | Action::InsertObject
+            | Action::RunPause
+            | Action::Step
+            | Action::Reset
+            | Action::PreviousFrame
+            | Action::NextFrame
+            | Action::FrameSelection
+            | Action::JumpToFrame
+            | Action::RenderFromHere
+            | Action::AutoExposure => open,
+            _ => true,
+        }
+    }
+}
+
+/// The smallest of a few sizes that fills the panes, and no more than the photograph has.
+fn render_size(camera: &Camera, needed: f32) -> u32 {
+    let full = camera.intrinsics.width.max(camera.intrinsics.height);
+    [256, 384, 512, 768, 1024, 1536, 2048]
+        .into_iter()
+        .find(|&size| size as f32 >= needed)
+        .unwrap_or(u32::MAX)
+        .min(full)
+}

@@ -1,0 +1,145 @@
+//! The window as eframe sees it: one pass draws bars, panes and what floats over them.
+
+use crate::app::layout::{self, Pane, Panes};
+use crate::app::picture::inspect;
+use crate::app::preferences::Preferences;
+use crate::app::shell::{files, keys, menu, palette, start, status, thumbnails, toolbar};
+use crate::app::state::App;
+use crate::app::{action, model, picture, theme};
+use egui::{CentralPanel, Frame, Margin, Panel, Ui};
+use egui_tiles::Tree;
+use std::path::PathBuf;
+
+/// The window.
+pub struct Window {
+    /// Its state.
+    pub app: App,
+    /// Where its panes are.
+    pub tree: Tree<Pane>,
+    kept: Option<PathBuf>,
+    saved: Preferences,
+}
+
+impl Window {
+    /// A window; `kept` is where its preferences are written.
+    pub fn new(cc: &eframe::CreationContext<'_>, app: App, kept: Option<PathBuf>) -> Self {
+        theme::install(&cc.egui_ctx);
+        app.apply_theme(&cc.egui_ctx);
+        if let Some(render_state) = &cc.wgpu_render_state {
+            picture::gpu::install(render_state);
+            model::gpu::install(render_state);
+        }
+        let tree = app
+            .preferences
+            .layout
+            .clone()
+            .filter(|tree| !tree.is_empty())
+            .unwrap_or_else(layout::first_layout);
+        let saved = app.preferences.clone();
+        Self {
+            app,
+            tree,
+            kept,
+            saved,
+        }
+    }
+
+    fn bars(&mut self, ui: &mut Ui) {
+        let frame = |ui: &Ui, x: i8, y: i8| {
+            Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(x, y))
+        };
+        let app = &mut self.app;
+        Panel::top("menu")
+            .frame(frame(ui, 6, 2))
+            .show(ui, |ui| menu::bar(ui, app, &mut self.tree));
+        Panel::top("tools")
+            .frame(frame(ui, 8, 4))
+            .show(ui, |ui| toolbar::bar(ui, app));
+        Panel::bottom("status")
+            .exact_size(24.0)
+            .frame(frame(ui, 8, 2))
+            .show(ui, |ui| status::bar(ui, app));
+        if app.shows_start_page() {
+            return;
+        }
+        Panel::bottom("inspector")
+            .exact_size(22.0)
+            .frame(frame(ui, 8, 2))
+            .show(ui, |ui| inspect::bar(ui, app));
+        if app.preferences.thumbnails && app.frames() > 0 {
+            Panel::bottom("thumbnails")
+                .exact_size(theme::THUMBNAIL + 18.0)
+                .frame(frame(ui, 8, 4))
+                .show(ui, |ui| thumbnails::strip(ui, app));
+        }
+    }
+
+    fn panes(&mut self, ui: &mut Ui) {
+        if std::mem::take(&mut self.app.reset_layout) {
+            self.tree = layout::first_layout();
+        }
+        if let Some(pane) = self.app.bring_forward.take() {
+            layout::show(&mut self.tree, pane);
+        }
+        let fill = theme::tokens(ui).sunken;
+        CentralPanel::no_frame().frame(Frame::NONE.fill(fill)).show(ui, |ui| {
+            if self.app.shows_start_page() {
+                start::page(ui, &mut self.app);
+                return;
+            }
+            self.app.pixels_needed = 0.0;
+            let mut panes = Panes { app: &mut self.app };
+            self.tree.ui(&mut panes, ui);
+        });
+    }
+
+    /// Writes the preferences where they differ from what was written last.
+    fn save(&mut self) {
+        self.app.preferences.layout = Some(self.tree.clone());
+        if self.app.preferences == self.saved {
+            return;
+        }
+        self.saved = self.app.preferences.clone();
+        if let Some(path) = &self.kept
+            && let Err(error) = self.saved.save(path)
+        {
+            eprintln!("{}: {error}; the layout is not remembered", path.display());
+        }
+    }
+}
+
+impl eframe::App for Window {
+    fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        self.app.update(ctx);
+    }
+
+    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        let ctx = ui.ctx().clone();
+        if self.app.palette.is_none() {
+            for action in action::pressed(&ctx) {
+                self.app.perform(action, &ctx);
+            }
+        }
+        let dropped = ctx.input(|input| input.raw.dropped_files.clone());
+        for path in dropped.iter().map(|file| file.path().to_owned()) {
+            self.app.dropped(path);
+        }
+        if !ctx.input(|input| input.pointer.has_pointer()) {
+            self.app.look.cursor = None;
+        }
+        self.bars(ui);
+        self.panes(ui);
+        files::show(&ctx, &mut self.app);
+        keys::show(&ctx, &mut self.app);
+        palette::show(&ctx, &mut self.app);
+        self.app.notices.show(&ctx);
+        // A drag is saved once it has ended.
+        if !ctx.input(|input| input.pointer.any_down()) {
+            self.save();
+        }
+    }
+
+    fn on_exit(&mut self) {
+        self.save();
+    }
+}
