@@ -188,10 +188,22 @@ mod tests {
             assert!(texts.insert(action.text()), "{}", action.text());
             assert!(!action.help().is_empty());
             if let Some(shortcut) = action.shortcut() {
-                let press = (shortcut.modifiers.command, shortcut.modifiers.shift, shortcut.logical_key);
-                assert!(keys.insert(press), "{} has keys of another action", action.text());
+                let press = (
+                    shortcut.modifiers.command,
+                    shortcut.modifiers.shift,
+                    shortcut.logical_key,
+                );
+                assert!(
+                    keys.insert(press),
+                    "{} has keys of another action",
+                    action.text()
+                );
             }
         }
-        assert!(Menu::ALL.iter().all(|menu| Action::ALL.iter().any(|a| a.menu() == *menu)));
+        assert!(
+            Menu::ALL
+                .iter()
+                .all(|menu| Action::ALL.iter().any(|a| a.menu() == *menu))
+        );
     }
 }

@@ -17,10 +17,10 @@ pub struct Inserted {
 impl Inserted {
     /// The file's name without its ending.
     pub fn name(&self) -> String {
-        self.placement
-            .file
-            .file_stem()
-            .map_or_else(|| "object".to_owned(), |stem| stem.to_string_lossy().into_owned())
+        self.placement.file.file_stem().map_or_else(
+            || "object".to_owned(),
+            |stem| stem.to_string_lossy().into_owned(),
+        )
     }
 }
 
@@ -92,7 +92,11 @@ impl Insertions {
     pub fn delete(&mut self) {
         if let Some(index) = self.chosen.filter(|&index| index < self.objects.len()) {
             self.objects.remove(index);
-            self.chosen = self.objects.len().checked_sub(1).map(|last| index.min(last));
+            self.chosen = self
+                .objects
+                .len()
+                .checked_sub(1)
+                .map(|last| index.min(last));
             self.placing = false;
         }
     }
@@ -100,7 +104,10 @@ impl Insertions {
     /// Takes everything away and forgets the history, for a new capture.
     pub fn clear(&mut self) {
         let path = std::mem::take(&mut self.path);
-        *self = Self { path, ..Self::default() };
+        *self = Self {
+            path,
+            ..Self::default()
+        };
     }
 
     /// What the worker is to show.
@@ -169,7 +176,10 @@ mod tests {
         insertions.settle();
         assert!(insertions.objects.is_empty() && insertions.chosen.is_none());
         insertions.undo();
-        assert_eq!((insertions.objects.len(), insertions.placements().len()), (2, 1));
+        assert_eq!(
+            (insertions.objects.len(), insertions.placements().len()),
+            (2, 1)
+        );
         insertions.undo();
         assert_eq!(insertions.placements().len(), 2);
         insertions.redo();

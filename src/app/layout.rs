@@ -108,7 +108,9 @@ pub fn show(tree: &mut Tree<Pane>, pane: Pane) {
     let Some(tile) = found else {
         let tile = tree.tiles.insert_pane(pane);
         match tree.root {
-            Some(root) => tree.move_tile_to_container(tile, largest_tabs(tree, root), usize::MAX, true),
+            Some(root) => {
+                tree.move_tile_to_container(tile, largest_tabs(tree, root), usize::MAX, true)
+            }
             None => tree.root = Some(tile),
         }
         tree.make_active(|id, _| id == tile);
@@ -135,7 +137,10 @@ fn largest_tabs(tree: &Tree<Pane>, root: TileId) -> TileId {
     tree.tiles
         .iter()
         .filter(|(_, tile)| {
-            matches!(tile, egui_tiles::Tile::Container(egui_tiles::Container::Tabs(_)))
+            matches!(
+                tile,
+                egui_tiles::Tile::Container(egui_tiles::Container::Tabs(_))
+            )
         })
         .max_by(|(a, _), (b, _)| {
             let area = |id: TileId| tree.tiles.rect(id).map_or(0.0, |rect| rect.area());
@@ -211,7 +216,11 @@ impl Behavior<Pane> for Panes<'_> {
         state: &egui_tiles::TabState,
     ) -> egui::Color32 {
         let tokens = theme::of(visuals);
-        if state.active { tokens.strong } else { tokens.weak }
+        if state.active {
+            tokens.strong
+        } else {
+            tokens.weak
+        }
     }
 
     fn tab_outline_stroke(

@@ -106,7 +106,8 @@ impl App {
     }
 
     fn capture_name(&self) -> &str {
-        self.capture().map_or("relit", |capture| capture.name.as_str())
+        self.capture()
+            .map_or("relit", |capture| capture.name.as_str())
     }
 
     fn duplicate(&mut self) {
@@ -150,14 +151,22 @@ impl App {
             .map(|n| std::path::PathBuf::from(format!("relit-{n}.png")))
             .find(|path| !path.exists())
             .unwrap_or_default();
-        self.notices.say(Level::Info, format!("screenshot: {}", path.display()));
+        self.notices
+            .say(Level::Info, format!("screenshot: {}", path.display()));
         let finished = egui::ScreenshotCallback::new(move |image| {
-            let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| [p.r(), p.g(), p.b()]).collect();
+            let bytes: Vec<u8> = image
+                .pixels
+                .iter()
+                .flat_map(|p| [p.r(), p.g(), p.b()])
+                .collect();
             let [width, height] = image.size.map(|side| side as u32);
             if let Some(picture) = image::RgbImage::from_raw(width, height, bytes)
                 && let Err(error) = picture.save(&path)
             {
-                eprintln!("{}: {error}; choose a folder that can be written", path.display());
+                eprintln!(
+                    "{}: {error}; choose a folder that can be written",
+                    path.display()
+                );
             }
         });
         ctx.send_viewport_cmd(ViewportCommand::Screenshot(finished));

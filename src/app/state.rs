@@ -171,7 +171,8 @@ impl App {
 
     /// Number of photographs.
     pub fn frames(&self) -> usize {
-        self.capture().map_or(0, |capture| capture.scene.cameras.len())
+        self.capture()
+            .map_or(0, |capture| capture.scene.cameras.len())
     }
 
     /// Goes `by` photographs on, around the ends.
@@ -275,7 +276,9 @@ impl App {
         if matches!(&self.photograph, Some((frame, _)) if *frame == self.frame) {
             return;
         }
-        let photograph = self.capture().and_then(|capture| capture.photographs.get(self.frame));
+        let photograph = self
+            .capture()
+            .and_then(|capture| capture.photographs.get(self.frame));
         self.photograph = photograph.map(|photograph| {
             let picture = Picture {
                 width: photograph.width,

@@ -115,11 +115,23 @@ pub fn install(ctx: &egui::Context) {
         ctx.style_mut_of(theme, |style| {
             style.visuals = visuals(theme, tokens);
             style.text_styles = [
-                (TextStyle::Small, FontId::new(10.5, FontFamily::Proportional)),
+                (
+                    TextStyle::Small,
+                    FontId::new(10.5, FontFamily::Proportional),
+                ),
                 (TextStyle::Body, FontId::new(13.0, FontFamily::Proportional)),
-                (TextStyle::Button, FontId::new(13.0, FontFamily::Proportional)),
-                (TextStyle::Heading, FontId::new(19.0, FontFamily::Proportional)),
-                (TextStyle::Monospace, FontId::new(12.0, FontFamily::Monospace)),
+                (
+                    TextStyle::Button,
+                    FontId::new(13.0, FontFamily::Proportional),
+                ),
+                (
+                    TextStyle::Heading,
+                    FontId::new(19.0, FontFamily::Proportional),
+                ),
+                (
+                    TextStyle::Monospace,
+                    FontId::new(12.0, FontFamily::Monospace),
+                ),
             ]
             .into();
             style.spacing.item_spacing = egui::vec2(GAP, 4.0);

@@ -18,7 +18,8 @@ impl<T: Clone + PartialEq> History<T> {
         if *value == self.settled {
             return;
         }
-        self.past.push(std::mem::replace(&mut self.settled, value.clone()));
+        self.past
+            .push(std::mem::replace(&mut self.settled, value.clone()));
         if self.past.len() > DEPTH {
             self.past.remove(0);
         }
@@ -41,7 +42,8 @@ impl<T: Clone + PartialEq> History<T> {
         let Some(before) = self.past.pop() else {
             return false;
         };
-        self.future.push(std::mem::replace(&mut self.settled, before));
+        self.future
+            .push(std::mem::replace(&mut self.settled, before));
         *value = self.settled.clone();
         true
     }

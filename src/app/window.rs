@@ -82,15 +82,17 @@ impl Window {
             layout::show(&mut self.tree, pane);
         }
         let fill = theme::tokens(ui).sunken;
-        CentralPanel::no_frame().frame(Frame::NONE.fill(fill)).show(ui, |ui| {
-            if self.app.shows_start_page() {
-                start::page(ui, &mut self.app);
-                return;
-            }
-            self.app.pixels_needed = 0.0;
-            let mut panes = Panes { app: &mut self.app };
-            self.tree.ui(&mut panes, ui);
-        });
+        CentralPanel::no_frame()
+            .frame(Frame::NONE.fill(fill))
+            .show(ui, |ui| {
+                if self.app.shows_start_page() {
+                    start::page(ui, &mut self.app);
+                    return;
+                }
+                self.app.pixels_needed = 0.0;
+                let mut panes = Panes { app: &mut self.app };
+                self.tree.ui(&mut panes, ui);
+            });
     }
 
     /// Writes the preferences where they differ from what was written last.

@@ -130,14 +130,18 @@ pub fn install(render_state: &RenderState) {
         usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     });
-    render_state.renderer.write().callback_resources.insert(Meshes {
-        mesh_pipeline,
-        screen_pipeline,
-        uniform,
-        corners: None,
-        colors: None,
-        target: None,
-    });
+    render_state
+        .renderer
+        .write()
+        .callback_resources
+        .insert(Meshes {
+            mesh_pipeline,
+            screen_pipeline,
+            uniform,
+            corners: None,
+            colors: None,
+            target: None,
+        });
 }
 
 impl CallbackTrait for MeshPaint {

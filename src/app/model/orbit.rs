@@ -71,7 +71,9 @@ impl Orbit {
     pub fn clip_from_scene(&self, scene: &Scene) -> Mat4 {
         let rotation = self.rotation();
         let view = Mat4::from_mat3(rotation.transpose()) * Mat4::from_translation(-self.eye());
-        let near = (scene.diameter * 1e-3).min(self.distance * 0.05).max(f32::MIN_POSITIVE);
+        let near = (scene.diameter * 1e-3)
+            .min(self.distance * 0.05)
+            .max(f32::MIN_POSITIVE);
         let focal = 1.0 / (self.fov * 0.5).tan();
         let projection = Mat4::from_cols_array_2d(&[
             [focal * self.size.y / self.size.x, 0.0, 0.0, 0.0],
@@ -160,7 +162,11 @@ impl Orbit {
         let (east, north) = self.horizon();
         let forward = camera.forward();
         self.yaw = forward.dot(north).atan2(forward.dot(east));
-        self.pitch = forward.dot(self.up).clamp(-1.0, 1.0).asin().clamp(-MAX_PITCH, MAX_PITCH);
+        self.pitch = forward
+            .dot(self.up)
+            .clamp(-1.0, 1.0)
+            .asin()
+            .clamp(-MAX_PITCH, MAX_PITCH);
         self.fov = 2.0 * (f64::from(k.height) * 0.5 / k.fy).atan() as f32;
         self.distance = distance;
         self.target = camera.center + self.forward() * distance;
@@ -192,7 +198,9 @@ mod tests {
         let (scene, orbit) = framed();
         let camera = orbit.camera(&scene);
         for &point in &scene.positions {
-            let pixel = camera.project(point).expect("framed, so inside the picture");
+            let pixel = camera
+                .project(point)
+                .expect("framed, so inside the picture");
             assert!((pixel - on_screen(&orbit, &scene, point)).length() < 0.05);
         }
     }
@@ -201,7 +209,10 @@ mod tests {
     fn zooming_keeps_the_point_and_halves_its_distance() {
         let (scene, mut orbit) = framed();
         let point = scene.positions[0];
-        let (before, distance) = (on_screen(&orbit, &scene, point), point.distance(orbit.eye()));
+        let (before, distance) = (
+            on_screen(&orbit, &scene, point),
+            point.distance(orbit.eye()),
+        );
         orbit.zoom_to(point, 0.5, &scene);
         assert!((on_screen(&orbit, &scene, point) - before).length() < 0.05);
         assert!((point.distance(orbit.eye()) / distance - 0.5).abs() < 1e-4);

@@ -59,7 +59,13 @@ pub fn draw(ui: &Ui, app: &App, capture: &OpenCapture, rect: Rect) {
                 } else {
                     Stroke::new(1.0, tokens.camera.gamma_multiply(0.8))
                 };
-                frustum(&projection, &painter, camera, scene.diameter * 0.025, stroke);
+                frustum(
+                    &projection,
+                    &painter,
+                    camera,
+                    scene.diameter * 0.025,
+                    stroke,
+                );
             }
         }
     }
@@ -77,7 +83,13 @@ pub fn draw(ui: &Ui, app: &App, capture: &OpenCapture, rect: Rect) {
         }
         if let Some(at) = projection.at(top) {
             let font = FontId::proportional(11.0);
-            painter.text(at, Align2::CENTER_BOTTOM, object.name(), font, tokens.inserted);
+            painter.text(
+                at,
+                Align2::CENTER_BOTTOM,
+                object.name(),
+                font,
+                tokens.inserted,
+            );
         }
     }
 }
@@ -93,7 +105,13 @@ fn corners(camera: &Camera, depth: f32) -> [Vec3; 4] {
     })
 }
 
-fn frustum(projection: &Projection, painter: &Painter, camera: &Camera, depth: f32, stroke: Stroke) {
+fn frustum(
+    projection: &Projection,
+    painter: &Painter,
+    camera: &Camera,
+    depth: f32,
+    stroke: Stroke,
+) {
     let far = corners(camera, depth);
     for i in 0..4 {
         projection.line(painter, camera.center, far[i], stroke);

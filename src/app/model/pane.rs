@@ -85,9 +85,8 @@ fn controls(ui: &mut Ui, app: &mut App) {
                 }
             })
             .response;
-        response.widget_info(|| {
-            egui::WidgetInfo::labeled(egui::Role::ComboBox, true, "Coloured by")
-        });
+        response
+            .widget_info(|| egui::WidgetInfo::labeled(egui::Role::ComboBox, true, "Coloured by"));
         ui.toggle_value(&mut app.model.cull, "See inside")
             .on_hover_text("Leaves out faces seen from behind");
         ui.toggle_value(&mut app.model.cameras, "Cameras")
@@ -167,7 +166,10 @@ fn steer(ui: &Ui, app: &mut App, scene: &Scene, response: &Response) {
 
 /// A click looks through a camera, places the chosen object, or selects; a double click turns about what is there.
 fn click(ui: &Ui, app: &mut App, scene: &Scene, response: &Response) {
-    let Some(pointer) = response.interact_pointer_pos().filter(|_| response.clicked()) else {
+    let Some(pointer) = response
+        .interact_pointer_pos()
+        .filter(|_| response.clicked())
+    else {
         return;
     };
     if !app.insertions.placing

@@ -30,9 +30,12 @@ impl Surface {
             let whole = scene.corners(triangle);
             let mut stack = vec![[Vec2::ZERO, Vec2::X, Vec2::Y]];
             while let Some(face) = stack.pop() {
-                let corners = face.map(|b| whole[0] + (whole[1] - whole[0]) * b.x + (whole[2] - whole[0]) * b.y);
+                let corners = face
+                    .map(|b| whole[0] + (whole[1] - whole[0]) * b.x + (whole[2] - whole[0]) * b.y);
                 let length = |i: usize| corners[i].distance(corners[(i + 1) % 3]);
-                let edge = (0..3).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0);
+                let edge = (0..3)
+                    .max_by(|&a, &b| length(a).total_cmp(&length(b)))
+                    .unwrap_or(0);
                 if length(edge) > longest && cuts < budget {
                     // Halve the longest edge.
                     let (a, b, c) = (face[edge], face[(edge + 1) % 3], face[(edge + 2) % 3]);

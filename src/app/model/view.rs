@@ -75,12 +75,11 @@ impl ModelView {
         {
             return Some((surface, colors.clone()));
         }
-        let colors = Arc::new(self.coloring.colors(
-            &surface,
-            &capture.scene,
-            estimate,
-            &self.photographed,
-        ));
+        let colors =
+            Arc::new(
+                self.coloring
+                    .colors(&surface, &capture.scene, estimate, &self.photographed),
+            );
         self.colors = Some((self.coloring, estimate.clone(), colors.clone()));
         Some((surface, colors))
     }
@@ -96,7 +95,11 @@ fn make(ctx: &egui::Context, capture: &Arc<OpenCapture>) -> Receiver<Made> {
             let surface = Arc::new(Surface::new(&capture.scene));
             let sent = sender.send(Made::Surface(surface.clone()));
             ctx.request_repaint();
-            if sent.is_ok() && sender.send(Made::Photographed(surface.photographed(&capture))).is_ok() {
+            if sent.is_ok()
+                && sender
+                    .send(Made::Photographed(surface.photographed(&capture)))
+                    .is_ok()
+            {
                 ctx.request_repaint();
             }
         });

@@ -16,7 +16,10 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         for line in &capture.summary {
             ui.label(line);
         }
-        let warnings = capture.warnings.iter().chain(&app.snapshot.progress.warnings);
+        let warnings = capture
+            .warnings
+            .iter()
+            .chain(&app.snapshot.progress.warnings);
         for warning in warnings {
             ui.colored_label(tokens.warning, warning);
         }

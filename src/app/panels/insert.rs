@@ -42,7 +42,8 @@ fn add(ui: &mut Ui, app: &mut App) {
             .hint_text("chair.glb")
             .desired_width(width);
         let response = ui.add(field).labelled_by(label.id);
-        let entered = response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+        let entered =
+            response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
         let add = ui
             .button("Add")
             .on_hover_text("Adds the object whose path is typed");
@@ -70,7 +71,12 @@ fn list(ui: &mut Ui, app: &mut App) {
                 .add(Checkbox::without_text(&mut object.visible))
                 .on_hover_text("Shows or hides the object");
             shown.widget_info(|| {
-                egui::WidgetInfo::selected(egui::Role::CheckBox, true, object.visible, format!("Show {name} {}", index + 1))
+                egui::WidgetInfo::selected(
+                    egui::Role::CheckBox,
+                    true,
+                    object.visible,
+                    format!("Show {name} {}", index + 1),
+                )
             });
             let chosen = app.insertions.chosen == Some(index);
             let text = format!("{}  {name}", index + 1);
@@ -90,7 +96,11 @@ fn actions(ui: &mut Ui, app: &mut App) {
     let ctx = ui.ctx().clone();
     ui.horizontal_wrapped(|ui| {
         let placing = app.insertions.placing;
-        let text = if placing { "Click in a view…" } else { "Place by click" };
+        let text = if placing {
+            "Click in a view…"
+        } else {
+            "Place by click"
+        };
         let place = ui
             .selectable_label(placing, text)
             .on_hover_text(Action::Place.help());
@@ -118,8 +128,9 @@ fn edit(ui: &mut Ui, app: &mut App, diameter: f64) {
     };
     let placement = &mut object.placement;
     Grid::new("placement").num_columns(2).show(ui, |ui| {
-        ui.label("Place")
-            .on_hover_text("Where the middle of the object's base stands, in the capture's coordinates");
+        ui.label("Place").on_hover_text(
+            "Where the middle of the object's base stands, in the capture's coordinates",
+        );
         ui.horizontal(|ui| {
             let mut at = placement.at.unwrap_or(DVec3::ZERO);
             let mut changed = false;
@@ -158,7 +169,11 @@ fn edit(ui: &mut Ui, app: &mut App, diameter: f64) {
             ),
         ] {
             ui.label(title).on_hover_text(help);
-            let speed = if title == "Scale" { value.abs() * speed } else { speed };
+            let speed = if title == "Scale" {
+                value.abs() * speed
+            } else {
+                speed
+            };
             let drag = DragValue::new(value)
                 .range(range)
                 .speed(speed)
@@ -175,9 +190,24 @@ fn edit(ui: &mut Ui, app: &mut App, diameter: f64) {
 fn results(ui: &mut Ui, app: &mut App) {
     ui.horizontal_wrapped(|ui| {
         for (text, mode, left, right) in [
-            ("Naive | ours", Mode::SideBySide, Quantity::Naive, Quantity::Composite),
-            ("Wipe naive / ours", Mode::Wipe, Quantity::Naive, Quantity::Composite),
-            ("Before / after", Mode::Wipe, Quantity::Photograph, Quantity::Composite),
+            (
+                "Naive | ours",
+                Mode::SideBySide,
+                Quantity::Naive,
+                Quantity::Composite,
+            ),
+            (
+                "Wipe naive / ours",
+                Mode::Wipe,
+                Quantity::Naive,
+                Quantity::Composite,
+            ),
+            (
+                "Before / after",
+                Mode::Wipe,
+                Quantity::Photograph,
+                Quantity::Composite,
+            ),
         ] {
             if ui.button(text).clicked() {
                 app.compare.mode = mode;

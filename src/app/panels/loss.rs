@@ -27,11 +27,19 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         marks.push((end, stage.name.clone()));
     }
     Plot::new("loss")
-        .legend(Legend::default().position(Corner::RightTop).background_alpha(0.6))
+        .legend(
+            Legend::default()
+                .position(Corner::RightTop)
+                .background_alpha(0.6),
+        )
         .y_axis_formatter(|mark, _| power_of_ten(mark.value))
         .x_axis_formatter(|mark, _| format!("{} s", mark.value))
         .label_formatter(|position| match position {
-            HoverPosition::NearDataPoint { plot_name, position, .. } => Some(format!(
+            HoverPosition::NearDataPoint {
+                plot_name,
+                position,
+                ..
+            } => Some(format!(
                 "{plot_name}\n{:.1} s: {}",
                 position.x,
                 number(10f64.powf(position.y) as f32)
@@ -55,7 +63,11 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
                 if points.len() == 1 {
                     plot.points(Points::new(name, points).color(color).radius(3.0));
                 } else {
-                    plot.line(Line::new(name, PlotPoints::from(points)).color(color).width(1.8));
+                    plot.line(
+                        Line::new(name, PlotPoints::from(points))
+                            .color(color)
+                            .width(1.8),
+                    );
                 }
             }
         });

@@ -27,9 +27,17 @@ pub enum SortBy {
 const COLUMNS: [(SortBy, &str, &str); 5] = [
     (SortBy::Name, "Object", "The capture's name for it"),
     (SortBy::Albedo, "Albedo", "Diffuse reflectance"),
-    (SortBy::Error, "±", "Standard error of the albedo, mean over RGB"),
+    (
+        SortBy::Error,
+        "±",
+        "Standard error of the albedo, mean over RGB",
+    ),
     (SortBy::Emission, "Emission", "Emitted radiance, W/(sr·m²)"),
-    (SortBy::Pixels, "Pixels", "Pixels of all photographs that see it"),
+    (
+        SortBy::Pixels,
+        "Pixels",
+        "Pixels of all photographs that see it",
+    ),
 ];
 
 /// How the table is shown.
@@ -73,8 +81,14 @@ impl ObjectsTable {
             })
         };
         rows.sort_by(|&a, &b| {
-            let by_key = key(a).total_cmp(&key(b)).then_with(|| names[a].cmp(names[b]));
-            if self.descending { by_key.reverse() } else { by_key }
+            let by_key = key(a)
+                .total_cmp(&key(b))
+                .then_with(|| names[a].cmp(names[b]));
+            if self.descending {
+                by_key.reverse()
+            } else {
+                by_key
+            }
         });
         rows
     }
@@ -87,7 +101,12 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         return;
     };
     let estimate = app.snapshot.estimate.clone();
-    let names: Vec<&str> = capture.scene.objects.iter().map(|o| o.name.as_str()).collect();
+    let names: Vec<&str> = capture
+        .scene
+        .objects
+        .iter()
+        .map(|o| o.name.as_str())
+        .collect();
     ui.horizontal(|ui| {
         let label = ui.label("Filter");
         ui.add(TextEdit::singleline(&mut app.objects.filter).desired_width(120.0))
@@ -152,8 +171,8 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
 fn head(ui: &mut Ui, table: &mut ObjectsTable, sort: SortBy, title: &str, help: &str) {
     let active = table.sort == sort;
     let arrow = match (active, table.descending) {
-        (true, true) => " ⏷",
-        (true, false) => " ⏶",
+        (true, true) => " ▼",
+        (true, false) => " ▲",
         (false, _) => "",
     };
     let response = ui
@@ -163,7 +182,11 @@ fn head(ui: &mut Ui, table: &mut ObjectsTable, sort: SortBy, title: &str, help: 
         egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Sort by {title}"))
     });
     if response.clicked() {
-        table.descending = if active { !table.descending } else { sort != SortBy::Name };
+        table.descending = if active {
+            !table.descending
+        } else {
+            sort != SortBy::Name
+        };
         table.sort = sort;
     }
 }
@@ -171,13 +194,21 @@ fn head(ui: &mut Ui, table: &mut ObjectsTable, sort: SortBy, title: &str, help: 
 fn cells(row: &mut egui_extras::TableRow<'_, '_>, name: &str, object: &ObjectEstimate) {
     row.col(|ui| {
         let text = egui::RichText::new(name);
-        let text = if object.identifiable { text } else { text.weak().italics() };
+        let text = if object.identifiable {
+            text
+        } else {
+            text.weak().italics()
+        };
         ui.add(egui::Label::new(text).truncate().selectable(false));
     });
     row.col(|ui| {
         swatch(ui, object.albedo);
         let known = object.albedo_identifiable;
-        let mean = if known { number(object.albedo.element_sum() / 3.0) } else { "?".to_owned() };
+        let mean = if known {
+            number(object.albedo.element_sum() / 3.0)
+        } else {
+            "?".to_owned()
+        };
         ui.add(egui::Label::new(mean).selectable(false));
     });
     row.col(|ui| {
@@ -200,14 +231,22 @@ fn cells(row: &mut egui_extras::TableRow<'_, '_>, name: &str, object: &ObjectEst
 
 fn details(ui: &mut Ui, name: &str, object: &ObjectEstimate) {
     ui.strong(name);
-    ui.label(format!("albedo {} ± {}", triple(object.albedo), triple(object.albedo_stderr)));
+    ui.label(format!(
+        "albedo {} ± {}",
+        triple(object.albedo),
+        triple(object.albedo_stderr)
+    ));
     ui.label(format!(
         "emission {} ± {} W/(sr·m²)",
         triple(object.emission),
         triple(object.emission_stderr)
     ));
     if let Some((roughness, specular)) = object.roughness.zip(object.specular) {
-        ui.label(format!("roughness {}, specular {}", number(roughness), number(specular)));
+        ui.label(format!(
+            "roughness {}, specular {}",
+            number(roughness),
+            number(specular)
+        ));
     }
     ui.label(format!("seen by {} pixels", object.seen_pixels));
     if !object.note.is_empty() {
@@ -218,7 +257,11 @@ fn details(ui: &mut Ui, name: &str, object: &ObjectEstimate) {
 /// A square of a linear colour.
 fn swatch(ui: &mut Ui, color: Vec3) {
     let (rect, _) = ui.allocate_exact_size(vec2(theme::SWATCH, theme::SWATCH), Sense::hover());
-    let fill = if color.is_finite() { theme::swatch(color) } else { Color32::TRANSPARENT };
+    let fill = if color.is_finite() {
+        theme::swatch(color)
+    } else {
+        Color32::TRANSPARENT
+    };
     let stroke = (1.0, theme::tokens(ui).outline);
     ui.painter()
         .rect(rect, 2.0, fill, stroke, egui::StrokeKind::Inside);

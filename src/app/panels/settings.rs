@@ -10,34 +10,37 @@ use egui::{Checkbox, ComboBox, DragValue, Grid, ScrollArea, Ui};
 pub fn pane(ui: &mut Ui, app: &mut App) {
     let mut settings = app.settings.clone();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        Grid::new("settings").num_columns(3).striped(true).show(ui, |ui| {
-            for parameter in PARAMETERS {
-                let before = parameter.get(&settings);
-                let title = title(parameter);
-                let help = help(parameter);
-                ui.label(&title).on_hover_text(&help);
-                let mut value = before.clone();
-                ui.push_id(parameter.name, |ui| {
-                    widget(ui, parameter, &title, &mut value);
-                });
-                ui.horizontal(|ui| {
-                    if !parameter.unit.is_empty() {
-                        ui.weak(parameter.unit);
+        Grid::new("settings")
+            .num_columns(3)
+            .striped(true)
+            .show(ui, |ui| {
+                for parameter in PARAMETERS {
+                    let before = parameter.get(&settings);
+                    let title = title(parameter);
+                    let help = help(parameter);
+                    ui.label(&title).on_hover_text(&help);
+                    let mut value = before.clone();
+                    ui.push_id(parameter.name, |ui| {
+                        widget(ui, parameter, &title, &mut value);
+                    });
+                    ui.horizontal(|ui| {
+                        if !parameter.unit.is_empty() {
+                            ui.weak(parameter.unit);
+                        }
+                        if parameter.live {
+                            ui.colored_label(theme::tokens(ui).good, "live")
+                                .on_hover_text("Takes effect at once");
+                        }
+                    });
+                    ui.end_row();
+                    if value != before
+                        && let Err(message) = parameter.set(&mut settings, &value)
+                    {
+                        app.notices
+                            .say(crate::session::snapshot::Level::Warning, message);
                     }
-                    if parameter.live {
-                        ui.colored_label(theme::tokens(ui).good, "live")
-                            .on_hover_text("Takes effect at once");
-                    }
-                });
-                ui.end_row();
-                if value != before
-                    && let Err(message) = parameter.set(&mut settings, &value)
-                {
-                    app.notices
-                        .say(crate::session::snapshot::Level::Warning, message);
                 }
-            }
-        });
+            });
         ui.add_space(theme::GAP);
         ui.weak("What is not live takes effect at the next reset.");
     });
@@ -75,8 +78,19 @@ fn widget(ui: &mut Ui, parameter: &Parameter, title: &str, value: &mut Value) {
             let response = ui.add(DragValue::new(n).range(min..=max).speed(0.1));
             name(response, egui::Role::SpinButton);
         }
-        (Kind::Real { min, max, logarithmic }, Value::Real(x)) => {
-            let speed = if logarithmic { (x.abs() * 0.01).max(1e-6) } else { (max - min) * 1e-3 };
+        (
+            Kind::Real {
+                min,
+                max,
+                logarithmic,
+            },
+            Value::Real(x),
+        ) => {
+            let speed = if logarithmic {
+                (x.abs() * 0.01).max(1e-6)
+            } else {
+                (max - min) * 1e-3
+            };
             let response = ui.add(
                 DragValue::new(x)
                     .range(min..=max)

@@ -22,7 +22,10 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
                     ui.colored_label(tokens.weak, "dropped");
                 }
                 ui.strong(&stage.name);
-                ui.weak(format!("{:.1} s, {} iterations", stage.seconds, stage.iterations));
+                ui.weak(format!(
+                    "{:.1} s, {} iterations",
+                    stage.seconds, stage.iterations
+                ));
             });
             ui.add(Label::new(&stage.why).wrap());
             let loss = |name: &str, loss: Option<f64>| {

@@ -30,17 +30,18 @@ impl App {
             Shown::Frame => Some(self.frame),
             Shown::Free(..) => None,
         };
-        self.snapshot.view.as_ref().filter(|view| view.frame == frame)
+        self.snapshot
+            .view
+            .as_ref()
+            .filter(|view| view.frame == frame)
     }
 
     /// A picture of the shown view.
     pub fn drawn(&self, quantity: Quantity) -> Option<Drawn> {
         let view = self.view();
-        let insertion = self
-            .snapshot
-            .insertion
-            .as_ref()
-            .filter(|insertion| matches!(self.shown, Shown::Frame) && insertion.frame == self.frame);
+        let insertion = self.snapshot.insertion.as_ref().filter(|insertion| {
+            matches!(self.shown, Shown::Frame) && insertion.frame == self.frame
+        });
         let picture = match quantity {
             Quantity::Photograph => view
                 .and_then(|view| view.photograph.clone())
@@ -84,8 +85,20 @@ pub fn pane(ui: &mut Ui, app: &mut App, quantity: Quantity) {
         missing(ui, app, shown);
         return;
     };
-    interact(ui, app, rect, &drawn, &format!("{} picture", quantity.name()));
-    paint(ui, app, rect, &drawn, egui::Id::unique(("picture", quantity)));
+    interact(
+        ui,
+        app,
+        rect,
+        &drawn,
+        &format!("{} picture", quantity.name()),
+    );
+    paint(
+        ui,
+        app,
+        rect,
+        &drawn,
+        egui::Id::unique(("picture", quantity)),
+    );
     overlay(ui, app, rect, &drawn);
 }
 
@@ -94,7 +107,9 @@ pub fn missing(ui: &mut Ui, app: &App, quantity: Quantity) {
     let text = match quantity {
         _ if app.capture().is_none() => "No capture is open",
         Quantity::Photograph => "No photograph was taken from here",
-        Quantity::Error if !matches!(app.shown, Shown::Frame) => "No photograph was taken from here",
+        Quantity::Error if !matches!(app.shown, Shown::Frame) => {
+            "No photograph was taken from here"
+        }
         Quantity::Naive | Quantity::NaiveEstimate | Quantity::Composite => {
             if app.insertions.objects.is_empty() {
                 "Insert an object to see the composite"
@@ -150,7 +165,10 @@ fn click(app: &mut App, at: Pos2) {
     let Some((capture, camera)) = app.capture().cloned().zip(app.camera()) else {
         return;
     };
-    let size = glam::vec2(camera.intrinsics.width as f32, camera.intrinsics.height as f32);
+    let size = glam::vec2(
+        camera.intrinsics.width as f32,
+        camera.intrinsics.height as f32,
+    );
     let ray = camera.ray(glam::vec2(at.x, at.y) * size);
     let Some(hit) = capture.scene.intersect(&ray) else {
         app.selected = None;
@@ -215,7 +233,10 @@ pub fn overlay(ui: &Ui, app: &App, rect: Rect, drawn: &Drawn) {
             }
         }
     }
-    if matches!(drawn.quantity.shading(), Shading::Signed | Shading::Positive) {
+    if matches!(
+        drawn.quantity.shading(),
+        Shading::Signed | Shading::Positive
+    ) {
         inspect::legend(ui, rect, drawn);
     }
 }
@@ -226,7 +247,9 @@ fn numbers(painter: &egui::Painter, rect: Rect, placement: Rect, picture: &Pictu
     if side < 44.0 {
         return;
     }
-    let first = ((rect.min - placement.min) / side).floor().max(vec2(0.0, 0.0));
+    let first = ((rect.min - placement.min) / side)
+        .floor()
+        .max(vec2(0.0, 0.0));
     let last = ((rect.max - placement.min) / side).ceil();
     let font = FontId::monospace((side * 0.17).min(13.0));
     for j in first.y as u32..(last.y.max(0.0) as u32).min(picture.height) {
@@ -268,16 +291,27 @@ fn anchors(ui: &Ui, app: &App, rect: Rect, placement: Rect) {
     };
     let painter = ui.painter().with_clip_rect(rect);
     let tokens = theme::tokens(ui);
-    let size = vec2(camera.intrinsics.width as f32, camera.intrinsics.height as f32);
+    let size = vec2(
+        camera.intrinsics.width as f32,
+        camera.intrinsics.height as f32,
+    );
     for (index, object) in app.insertions.objects.iter().enumerate() {
-        let insertion::Inserted { placement: at, visible: true } = object else {
+        let insertion::Inserted {
+            placement: at,
+            visible: true,
+        } = object
+        else {
             continue;
         };
         let Some(point) = at.at else { continue };
         let local = (point - capture.scene.origin).as_vec3();
         if let Some(pixel) = camera.project(local) {
             let at = placement.min + vec2(pixel.x, pixel.y) / size * placement.size();
-            let radius = if app.insertions.chosen == Some(index) { 5.0 } else { 3.0 };
+            let radius = if app.insertions.chosen == Some(index) {
+                5.0
+            } else {
+                3.0
+            };
             painter.circle(at, radius, tokens.inserted, (1.0, Color32::BLACK));
         }
     }

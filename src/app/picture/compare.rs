@@ -86,7 +86,13 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         Mode::Flip => one(ui, app, rect, left, "compared picture"),
         Mode::SideBySide => {
             let (a, b) = rect.split_left_right_at_fraction(0.5);
-            one(ui, app, a.with_max_x(a.right() - 1.0), left, "first picture");
+            one(
+                ui,
+                app,
+                a.with_max_x(a.right() - 1.0),
+                left,
+                "first picture",
+            );
             one(ui, app, b, app.compare.right, "second picture");
         }
         Mode::Wipe => wipe(ui, app, rect, left),
@@ -142,7 +148,11 @@ fn one(ui: &mut Ui, app: &mut App, rect: Rect, quantity: Quantity, name: &str) {
 fn wipe(ui: &mut Ui, app: &mut App, rect: Rect, left: Quantity) {
     let right = app.compare.right;
     let (Some(a), Some(b)) = (app.drawn(left), app.drawn(right)) else {
-        let absent = if app.drawn(left).is_none() { left } else { right };
+        let absent = if app.drawn(left).is_none() {
+            left
+        } else {
+            right
+        };
         let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(rect));
         canvas::missing(&mut ui, app, absent);
         return;
@@ -179,7 +189,12 @@ fn wipe(ui: &mut Ui, app: &mut App, rect: Rect, left: Quantity) {
     let painter = ui.painter();
     painter.vline(x, rect.y_range(), (3.0, Color32::from_black_alpha(140)));
     painter.vline(x, rect.y_range(), (1.0, tokens.strong));
-    painter.circle(pos2(x, rect.center().y), 5.0, tokens.accent, (1.0, Color32::BLACK));
+    painter.circle(
+        pos2(x, rect.center().y),
+        5.0,
+        tokens.accent,
+        (1.0, Color32::BLACK),
+    );
 }
 
 /// Names a picture in a corner of its pane.
@@ -193,6 +208,10 @@ fn title(ui: &Ui, rect: Rect, quantity: Quantity, align: Align2) {
         Color32::WHITE,
     );
     let text = align.anchor_size(at, galley.size());
-    painter.rect_filled(text.expand2(vec2(5.0, 2.0)), 3.0, Color32::from_black_alpha(170));
+    painter.rect_filled(
+        text.expand2(vec2(5.0, 2.0)),
+        3.0,
+        Color32::from_black_alpha(170),
+    );
     painter.galley(text.min, galley, Color32::WHITE);
 }

@@ -187,11 +187,15 @@ pub fn install(render_state: &eframe::egui_wgpu::RenderState) {
         multiview_mask: None,
         cache: None,
     });
-    render_state.renderer.write().callback_resources.insert(Pictures {
-        pipeline,
-        layout,
-        slots: HashMap::new(),
-    });
+    render_state
+        .renderer
+        .write()
+        .callback_resources
+        .insert(Pictures {
+            pipeline,
+            layout,
+            slots: HashMap::new(),
+        });
 }
 
 impl CallbackTrait for PicturePaint {

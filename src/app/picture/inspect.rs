@@ -56,7 +56,11 @@ pub fn bar(ui: &mut Ui, app: &App) {
     let mut text = egui::text::LayoutJob::default();
     let mut part = |label: &str, value: &str| {
         let font = |color| egui::TextFormat::simple(FontId::monospace(11.5), color);
-        text.append(label, if label.is_empty() { 0.0 } else { 12.0 }, font(tokens.weak));
+        text.append(
+            label,
+            if label.is_empty() { 0.0 } else { 12.0 },
+            font(tokens.weak),
+        );
         text.append(value, 4.0, font(tokens.strong));
     };
     part("", &format!("({x}, {y})"));
@@ -65,11 +69,23 @@ pub fn bar(ui: &mut Ui, app: &App) {
         &format!("{} {}", triple(value), cursor.over.unit()),
     );
     if cursor.over.shading() == Shading::Radiance {
-        let shown = (value * app.look.exposure.exp2()).to_array().map(linear_to_srgb);
-        part("sRGB", &shown.map(|v| ((v * 255.0 + 0.5) as u8).to_string()).join(" "));
+        let shown = (value * app.look.exposure.exp2())
+            .to_array()
+            .map(linear_to_srgb);
+        part(
+            "sRGB",
+            &shown
+                .map(|v| ((v * 255.0 + 0.5) as u8).to_string())
+                .join(" "),
+        );
     } else if cursor.over == Quantity::Albedo {
         let shown = value.to_array().map(linear_to_srgb);
-        part("sRGB", &shown.map(|v| ((v * 255.0 + 0.5) as u8).to_string()).join(" "));
+        part(
+            "sRGB",
+            &shown
+                .map(|v| ((v * 255.0 + 0.5) as u8).to_string())
+                .join(" "),
+        );
     }
     let object = drawn
         .objects
@@ -83,7 +99,10 @@ pub fn bar(ui: &mut Ui, app: &App) {
     if let Some((name, estimate)) = named {
         part("object", name);
         let error = (estimate.albedo_stderr.element_sum()) / 3.0;
-        part("albedo", &format!("{} ± {}", triple(estimate.albedo), number(error)));
+        part(
+            "albedo",
+            &format!("{} ± {}", triple(estimate.albedo), number(error)),
+        );
         if estimate.emission != Vec3::ZERO {
             part("emission", &triple(estimate.emission));
         }
@@ -97,7 +116,10 @@ pub fn legend(ui: &Ui, pane: Rect, drawn: &Drawn) {
     let font = FontId::proportional(11.0);
     let width = (pane.width() - 24.0).clamp(60.0, 180.0);
     let box_size = vec2(width + 16.0, 32.0);
-    let frame = Rect::from_min_size(pos2(pane.left() + 6.0, pane.bottom() - box_size.y - 6.0), box_size);
+    let frame = Rect::from_min_size(
+        pos2(pane.left() + 6.0, pane.bottom() - box_size.y - 6.0),
+        box_size,
+    );
     let painter = ui.painter().with_clip_rect(pane);
     painter.rect_filled(frame, 3.0, Color32::from_black_alpha(190));
     let strip = Rect::from_min_size(frame.min + vec2(8.0, 5.0), vec2(width, 8.0));
@@ -125,7 +147,13 @@ pub fn legend(ui: &Ui, pane: Rect, drawn: &Drawn) {
         (strip.center().x, middle, Align2::CENTER_CENTER),
         (strip.right(), drawn.range, Align2::RIGHT_CENTER),
     ] {
-        painter.text(pos2(x, y), align, number(value), font.clone(), Color32::WHITE);
+        painter.text(
+            pos2(x, y),
+            align,
+            number(value),
+            font.clone(),
+            Color32::WHITE,
+        );
     }
 }
 

@@ -156,7 +156,10 @@ mod tests {
     #[test]
     fn panning_moves_the_picture_by_as_many_points() {
         let pane = Rect::from_min_size(Pos2::ZERO, Vec2::new(100.0, 100.0));
-        let mut look = Look { zoom: 4.0, ..Look::default() };
+        let mut look = Look {
+            zoom: 4.0,
+            ..Look::default()
+        };
         let before = look.placement(pane, [50, 50]).min;
         look.pan(pane, [50, 50], Vec2::new(7.0, -5.0));
         let moved = look.placement(pane, [50, 50]).min - before;

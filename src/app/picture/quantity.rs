@@ -77,7 +77,9 @@ impl Quantity {
             Self::Error => "Re-render minus photograph: blue is too dark, red is too bright",
             Self::StandardError => "Standard error of the estimated albedo",
             Self::Naive => "Objects lit by harmonics of the photographs, pasted without shadow",
-            Self::NaiveEstimate => "Objects lit by harmonics of our estimate, pasted without shadow",
+            Self::NaiveEstimate => {
+                "Objects lit by harmonics of our estimate, pasted without shadow"
+            }
             Self::Composite => "Objects lit and shadowed by the estimate",
         }
     }

@@ -104,13 +104,19 @@ mod tests {
             assert!((round_up(value) - range).abs() < 1e-6 * range, "{value}");
         }
         let pixels = (0..1000).map(|i| Vec3::splat(i as f32 / 1000.0)).collect();
-        let picture = Picture { width: 1000, height: 1, pixels };
+        let picture = Picture {
+            width: 1000,
+            height: 1,
+            pixels,
+        };
         assert_eq!(range(&picture), 1.0);
     }
 
     #[test]
     fn automatic_exposure_puts_the_99th_percentile_at_one() {
-        let pixels: Vec<Vec3> = (0..=1000).map(|i| Vec3::new(0.0, i as f32 / 250.0, 0.0)).collect();
+        let pixels: Vec<Vec3> = (0..=1000)
+            .map(|i| Vec3::new(0.0, i as f32 / 250.0, 0.0))
+            .collect();
         let exposure = automatic_exposure(&pixels);
         assert!((exposure.exp2() * 3.96 - 1.0).abs() < 1e-3);
         assert_eq!(automatic_exposure(&[Vec3::ZERO; 4]), 0.0);

@@ -42,13 +42,15 @@ impl Dialogs {
             return;
         }
         let sender = self.sender.clone();
-        let spawned = std::thread::Builder::new().name("file dialog".to_owned()).spawn(move || {
-            // Where there is no portal and no dialog program the answer is the same as for Cancel.
-            let answer = std::panic::catch_unwind(|| choose(ask)).ok().flatten();
-            if sender.send((ask, answer)).is_ok() {
-                answered();
-            }
-        });
+        let spawned = std::thread::Builder::new()
+            .name("file dialog".to_owned())
+            .spawn(move || {
+                // Where there is no portal and no dialog program the answer is the same as for Cancel.
+                let answer = std::panic::catch_unwind(|| choose(ask)).ok().flatten();
+                if sender.send((ask, answer)).is_ok() {
+                    answered();
+                }
+            });
         self.open = spawned.is_ok();
     }
 

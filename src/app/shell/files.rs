@@ -105,7 +105,13 @@ impl Sheet {
 /// A capture's name without what file systems object to.
 fn file_name(name: &str) -> String {
     name.chars()
-        .map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '-' })
+        .map(|c| {
+            if c.is_alphanumeric() || c == '-' || c == '_' {
+                c
+            } else {
+                '-'
+            }
+        })
         .collect()
 }
 
@@ -164,7 +170,9 @@ fn export(ui: &mut Ui, app: &mut App, file: &mut String, chosen: &mut usize) -> 
     let (go, cancel) = buttons(ui, "Export", !file.trim().is_empty());
     if go {
         let format = match format.format {
-            ExportFormat::Probe { .. } => ExportFormat::Probe { at: probe_point(app) },
+            ExportFormat::Probe { .. } => ExportFormat::Probe {
+                at: probe_point(app),
+            },
             other => other,
         };
         app.send(Command::Export(ExportRequest {
@@ -177,7 +185,9 @@ fn export(ui: &mut Ui, app: &mut App, file: &mut String, chosen: &mut usize) -> 
 
 /// Where a probe is taken: at the chosen inserted object, or at the 3D view's target.
 fn probe_point(app: &mut App) -> DVec3 {
-    let origin = app.capture().map_or(DVec3::ZERO, |capture| capture.scene.origin);
+    let origin = app
+        .capture()
+        .map_or(DVec3::ZERO, |capture| capture.scene.origin);
     app.insertions
         .chosen()
         .and_then(|object| object.placement.at)

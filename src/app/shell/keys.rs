@@ -6,9 +6,15 @@ use egui::{Grid, ScrollArea, Window};
 
 /// What the mouse does: where, how, what.
 const MOUSE: [(&str, &str); 11] = [
-    ("Picture: wheel", "Zoom to the pointer, in all pictures at once"),
+    (
+        "Picture: wheel",
+        "Zoom to the pointer, in all pictures at once",
+    ),
     ("Picture: drag", "Pan"),
-    ("Picture: click", "Select the object, or place the chosen one"),
+    (
+        "Picture: click",
+        "Select the object, or place the chosen one",
+    ),
     ("Picture: double click", "Fit"),
     ("3D view: drag", "Orbit"),
     ("3D view: right drag, middle drag, Shift + drag", "Pan"),
@@ -31,24 +37,30 @@ pub fn show(ctx: &egui::Context, app: &mut App) {
             ScrollArea::vertical().max_height(560.0).show(ui, |ui| {
                 for menu in Menu::ALL {
                     ui.strong(menu.title());
-                    Grid::new(menu.title()).num_columns(2).striped(true).show(ui, |ui| {
-                        let actions = Action::ALL.iter().filter(|a| a.menu() == menu);
-                        for action in actions.filter(|a| a.shortcut().is_some()) {
-                            ui.monospace(action.keys(ctx));
-                            ui.label(action.text()).on_hover_text(action.help());
-                            ui.end_row();
-                        }
-                    });
+                    Grid::new(menu.title())
+                        .num_columns(2)
+                        .striped(true)
+                        .show(ui, |ui| {
+                            let actions = Action::ALL.iter().filter(|a| a.menu() == menu);
+                            for action in actions.filter(|a| a.shortcut().is_some()) {
+                                ui.monospace(action.keys(ctx));
+                                ui.label(action.text()).on_hover_text(action.help());
+                                ui.end_row();
+                            }
+                        });
                     ui.add_space(6.0);
                 }
                 ui.strong("Mouse");
-                Grid::new("mouse").num_columns(2).striped(true).show(ui, |ui| {
-                    for (how, what) in MOUSE {
-                        ui.label(how);
-                        ui.label(what);
-                        ui.end_row();
-                    }
-                });
+                Grid::new("mouse")
+                    .num_columns(2)
+                    .striped(true)
+                    .show(ui, |ui| {
+                        for (how, what) in MOUSE {
+                            ui.label(how);
+                            ui.label(what);
+                            ui.end_row();
+                        }
+                    });
             });
         });
     app.keys = open;

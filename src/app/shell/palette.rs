@@ -55,9 +55,7 @@ pub fn show(ctx: &egui::Context, app: &mut App) {
             .hint_text("Type a command")
             .desired_width(f32::INFINITY);
         let response = ui.add(field);
-        response.widget_info(|| {
-            egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Command")
-        });
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Command"));
         if response.changed() {
             palette.marked = 0;
         }

@@ -32,31 +32,40 @@ pub fn page(ui: &mut Ui, app: &mut App) {
 }
 
 fn typed_path(ui: &mut Ui, app: &mut App) {
-    ui.allocate_ui_with_layout(vec2(540.0, 24.0), Layout::left_to_right(Align::Center), |ui| {
-        let label = ui.label("Capture folder");
-        let field = TextEdit::singleline(&mut app.path)
-            .hint_text("a folder with transforms.json")
-            .desired_width(300.0);
-        let response = ui.add(field).labelled_by(label.id);
-        let entered = response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
-        let open = ui.add_enabled(!app.path.trim().is_empty(), Button::new("Open"));
-        if entered || open.clicked() {
-            app.open_typed();
-        }
-        if ui
-            .button("Browse…")
-            .on_hover_text(Action::OpenFolder.help())
-            .clicked()
-        {
-            app.perform(Action::OpenFolder, &ui.ctx().clone());
-        }
-    });
+    ui.allocate_ui_with_layout(
+        vec2(540.0, 24.0),
+        Layout::left_to_right(Align::Center),
+        |ui| {
+            let label = ui.label("Capture folder");
+            let field = TextEdit::singleline(&mut app.path)
+                .hint_text("a folder with transforms.json")
+                .desired_width(300.0);
+            let response = ui.add(field).labelled_by(label.id);
+            let entered =
+                response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+            let open = ui.add_enabled(!app.path.trim().is_empty(), Button::new("Open"));
+            if entered || open.clicked() {
+                app.open_typed();
+            }
+            if ui
+                .button("Browse…")
+                .on_hover_text(Action::OpenFolder.help())
+                .clicked()
+            {
+                app.perform(Action::OpenFolder, &ui.ctx().clone());
+            }
+        },
+    );
 }
 
 fn drop_area(ui: &mut Ui) {
     let tokens = theme::tokens(ui);
     let hovering = ui.input(|input| !input.raw.hovered_files.is_empty());
-    let color = if hovering { tokens.accent } else { tokens.outline };
+    let color = if hovering {
+        tokens.accent
+    } else {
+        tokens.outline
+    };
     Frame::NONE
         .stroke(Stroke::new(1.5, color))
         .fill(tokens.sunken)

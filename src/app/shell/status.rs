@@ -69,20 +69,33 @@ pub fn bar(ui: &mut Ui, app: &mut App) {
         Phase::Paused | Phase::Idle => tokens.weak,
     };
     ui.horizontal_centered(|ui| {
-        ui.label(RichText::new(phase_word(&snapshot.phase)).color(color).strong());
+        ui.label(
+            RichText::new(phase_word(&snapshot.phase))
+                .color(color)
+                .strong(),
+        );
         let progress = &snapshot.progress;
         if app.is_running() {
             if let Some(fraction) = progress.fraction {
-                ui.add(ProgressBar::new(fraction).desired_width(90.0).desired_height(8.0));
+                ui.add(
+                    ProgressBar::new(fraction)
+                        .desired_width(90.0)
+                        .desired_height(8.0),
+                );
             }
             ui.label(&progress.phase);
         }
         if let Some(stage) = progress.stages.last() {
             ui.separator();
-            ui.label(format!("after stage {}: {}", progress.stages.len(), stage.name));
+            ui.label(format!(
+                "after stage {}: {}",
+                progress.stages.len(),
+                stage.name
+            ));
         }
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            ui.label(format!("{} MB", bytes / 1_000_000)).on_hover_text("Memory in use");
+            ui.label(format!("{} MB", bytes / 1_000_000))
+                .on_hover_text("Memory in use");
             ui.separator();
             if let Some(left) = snapshot.seconds_left {
                 ui.label(format!("{} left", duration(left)));
@@ -93,7 +106,10 @@ pub fn bar(ui: &mut Ui, app: &mut App) {
             ui.separator();
             ui.label(format!("{} rays/s", magnitude(snapshot.rays_per_second)));
             ui.separator();
-            ui.label(format!("{} iterations/s", number(snapshot.iterations_per_second as f32)));
+            ui.label(format!(
+                "{} iterations/s",
+                number(snapshot.iterations_per_second as f32)
+            ));
             ui.separator();
             ui.label(format!("iteration {}", progress.iterations));
         });
@@ -106,9 +122,17 @@ fn duration(seconds: f64) -> String {
     if whole < 60.0 {
         format!("{whole:.1} s")
     } else if whole < 3600.0 {
-        format!("{:.0} min {:02.0} s", (whole / 60.0).floor(), (whole % 60.0).floor())
+        format!(
+            "{:.0} min {:02.0} s",
+            (whole / 60.0).floor(),
+            (whole % 60.0).floor()
+        )
     } else {
-        format!("{:.0} h {:02.0} min", (whole / 3600.0).floor(), (whole % 3600.0 / 60.0).floor())
+        format!(
+            "{:.0} h {:02.0} min",
+            (whole / 3600.0).floor(),
+            (whole % 3600.0 / 60.0).floor()
+        )
     }
 }
 

@@ -69,7 +69,11 @@ pub fn strip(ui: &mut Ui, app: &mut App) {
                 let size = vec2(theme::THUMBNAIL * aspect, theme::THUMBNAIL);
                 let (rect, response) = ui.allocate_exact_size(size, Sense::click());
                 response.widget_info(|| {
-                    egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Photograph {frame}"))
+                    egui::WidgetInfo::labeled(
+                        egui::Role::Button,
+                        true,
+                        format!("Photograph {frame}"),
+                    )
                 });
                 let current = frame == app.frame && matches!(app.shown, Shown::Frame);
                 if current && app.thumbnails.followed != frame {
@@ -90,7 +94,9 @@ pub fn strip(ui: &mut Ui, app: &mut App) {
                         .rect_stroke(rect, 0.0, (2.0, color), egui::StrokeKind::Inside);
                 }
                 if response
-                    .on_hover_text(format!("Photograph {frame:03}; double click to look through its camera"))
+                    .on_hover_text(format!(
+                        "Photograph {frame:03}; double click to look through its camera"
+                    ))
                     .clicked()
                 {
                     chosen = Some(frame);

@@ -15,7 +15,7 @@ pub fn bar(ui: &mut Ui, app: &mut App) {
         button(ui, app, Action::Finish, "Finish", 0.0);
         button(ui, app, Action::Reset, "Reset", 0.0);
         ui.separator();
-        button(ui, app, Action::PreviousFrame, "⏴", 22.0);
+        button(ui, app, Action::PreviousFrame, "◀", 22.0);
         let frames = app.frames();
         let text = match app.shown {
             Shown::Free(..) => "3D view".to_owned(),
@@ -27,19 +27,25 @@ pub fn bar(ui: &mut Ui, app: &mut App) {
             egui::Layout::centered_and_justified(egui::Direction::LeftToRight),
             |ui| ui.label(text),
         );
-        button(ui, app, Action::NextFrame, "⏵", 22.0);
+        button(ui, app, Action::NextFrame, "▶", 22.0);
         ui.separator();
         exposure(ui, app);
         ui.separator();
         button(ui, app, Action::FitPictures, "Fit", 0.0);
         let hold = ui
             .add(Button::new("Hold: photograph").sense(egui::Sense::drag()))
-            .on_hover_text("While the button or the key P is down all pictures show the photograph");
-        let key = !ui.ctx().text_edit_focused() && ui.input(|input| input.key_down(egui::Key::P) && !input.modifiers.command);
+            .on_hover_text(
+                "While the button or the key P is down all pictures show the photograph",
+            );
+        let key = !ui.ctx().text_edit_focused()
+            && ui.input(|input| input.key_down(egui::Key::P) && !input.modifiers.command);
         app.look.photograph = hold.is_pointer_button_down_on() || key;
         let free = matches!(app.shown, Shown::Free(..));
         let response = ui
-            .add_enabled(app.can(Action::RenderFromHere), Button::selectable(free, "From 3D view"))
+            .add_enabled(
+                app.can(Action::RenderFromHere),
+                Button::selectable(free, "From 3D view"),
+            )
             .on_hover_text(Action::RenderFromHere.help());
         if response.clicked() {
             app.perform(Action::RenderFromHere, &ui.ctx().clone());
@@ -61,9 +67,7 @@ fn button(ui: &mut Ui, app: &mut App, action: Action, text: &str, width: f32) {
         Button::new(text).min_size(vec2(width, theme::ROW)),
     );
     if !text.is_ascii() {
-        response.widget_info(|| {
-            egui::WidgetInfo::labeled(egui::Role::Button, true, action.text())
-        });
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, action.text()));
     }
     if response.on_hover_text(help).clicked() {
         app.perform(action, &ctx);
@@ -91,7 +95,6 @@ fn exposure(ui: &mut Ui, app: &mut App) {
             }
         })
         .response;
-    response
-        .widget_info(|| egui::WidgetInfo::labeled(egui::Role::ComboBox, true, "Tone curve"));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ComboBox, true, "Tone curve"));
     app.preferences.tone = app.look.tone;
 }
