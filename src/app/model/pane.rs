@@ -32,7 +32,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
     }
 
     let response = ui.allocate_rect(rect, Sense::click_and_drag());
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "3D view"));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "3D view picture"));
     let before = app.model.orbit.clone();
     steer(ui, app, scene, &response);
     click(ui, app, scene, &response);

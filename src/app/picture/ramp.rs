@@ -83,7 +83,7 @@ fn percentile(values: &mut [f32], share: f32) -> f32 {
 }
 
 fn round_up(value: f32) -> f32 {
-    if !(value > 0.0) {
+    if value.is_nan() || value <= 0.0 {
         return 1e-3;
     }
     let power = 10f32.powf(value.log10().floor());

@@ -1,0 +1,363 @@
+//! Flows without a graphics adapter.
+
+use crate::connection::{Recorder, idle, insertion, solve, solving, view};
+use egui::{Key, Modifiers};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+use relit::app::layout::{Pane, is_open};
+use relit::app::panels::objects::SortBy;
+use relit::app::picture::quantity::Quantity;
+use relit::app::window::Window;
+use relit::session::command::{Command, ExportFormat, Source, ViewCamera};
+use relit::session::snapshot::{Event, Level, Phase};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+fn click(harness: &mut Harness<'_, Window>, label: &str) {
+    harness.get_by_label(label).click();
+    harness.run_steps(3);
+}
+
+fn press(harness: &mut Harness<'_, Window>, modifiers: Modifiers, key: Key) {
+    harness.key_press_modifiers(modifiers, key);
+    harness.run_steps(3);
+}
+
+fn type_into(harness: &mut Harness<'_, Window>, label: &str, text: &str) {
+    harness.get_by_label(label).focus();
+    harness.run_steps(2);
+    harness.get_by_label(label).type_text(text);
+    harness.run_steps(2);
+}
+
+fn placements(recorder: &Recorder) -> Option<usize> {
+    let sent = recorder.sent();
+    sent.iter().rev().find_map(|command| match command {
+        Command::Insert(placements) => Some(placements.len()),
+        _ => None,
+    })
+}
+
+#[test]
+fn the_start_page_opens_the_room_and_a_typed_path() {
+    let (mut harness, recorder) = idle(Harness::builder());
+    click(&mut harness, "Open the built-in room");
+    assert!(matches!(
+        recorder.sent()[..],
+        [Command::Open(Source::BuiltInRoom)]
+    ));
+
+    let (mut harness, recorder) = idle(Harness::builder());
+    type_into(&mut harness, "Capture folder", "/captures/office");
+    click(&mut harness, "Open");
+    let sent = recorder.sent();
+    let folder = PathBuf::from("/captures/office");
+    assert!(matches!(&sent[..], [Command::Open(Source::Folder(path))] if *path == folder));
+    recorder.show(solve);
+    harness.run_steps(3);
+    assert_eq!(harness.state().app.preferences.recent, [folder]);
+    assert!(harness.query_by_label("Open the built-in room").is_none());
+}
+
+#[test]
+fn a_failed_open_is_said_and_leads_back_to_the_start_page() {
+    let (mut harness, recorder) = idle(Harness::builder());
+    type_into(&mut harness, "Capture folder", "/nowhere");
+    click(&mut harness, "Open");
+    recorder.show(|snapshot| {
+        snapshot.phase = Phase::Failed;
+        snapshot.events = Arc::new(vec![Event {
+            level: Level::Error,
+            message: "/nowhere: no such folder; check the path".into(),
+        }]);
+    });
+    harness.run_steps(3);
+    harness.get_by_label("/nowhere: no such folder; check the path");
+    harness.get_by_label("Open the built-in room");
+}
+
+#[test]
+fn pause_run_step_reset_and_finish_reach_the_worker_and_a_full_queue_loses_none() {
+    let (mut harness, recorder) = solving(Harness::builder());
+    click(&mut harness, "Pause");
+    assert!(matches!(recorder.sent()[..], [Command::Pause]));
+    recorder.show(|snapshot| snapshot.phase = Phase::Paused);
+    harness.run_steps(2);
+    press(&mut harness, Modifiers::NONE, Key::Space);
+    assert!(matches!(recorder.sent()[..], [Command::Run]));
+
+    recorder.refuse(true);
+    click(&mut harness, "Step");
+    click(&mut harness, "Reset");
+    click(&mut harness, "Finish");
+    assert!(recorder.sent().is_empty());
+    recorder.refuse(false);
+    harness.run_steps(2);
+    assert!(matches!(
+        recorder.sent()[..],
+        [Command::Step, Command::Reset, Command::Finish]
+    ));
+}
+
+#[test]
+fn photographs_are_stepped_through_around_the_ends() {
+    let (mut harness, recorder) = solving(Harness::builder());
+    let asked = |recorder: &Recorder| {
+        recorder
+            .sent()
+            .iter()
+            .rev()
+            .find_map(|command| match command {
+                Command::View(request) => match request.camera {
+                    ViewCamera::Frame(frame) => Some(frame),
+                    ViewCamera::Free(_) => None,
+                },
+                _ => None,
+            })
+    };
+    press(&mut harness, Modifiers::NONE, Key::OpenBracket);
+    harness.get_by_label("photograph 3 of 3");
+    assert_eq!(asked(&recorder), Some(2));
+    click(&mut harness, "Next photograph");
+    harness.get_by_label("photograph 1 of 3");
+    assert_eq!(asked(&recorder), Some(0));
+    click(&mut harness, "Photograph 1");
+    assert_eq!(asked(&recorder), Some(1));
+    // The photograph is there at once, the re-render when the worker has sent it.
+    let app = &harness.state().app;
+    assert!(app.drawn(Quantity::Photograph).is_some() && app.drawn(Quantity::Render).is_none());
+    recorder.show(|snapshot| {
+        let capture = snapshot.capture.clone().expect("open");
+        snapshot.view = Some(Arc::new(view(&capture, 1)));
+    });
+    harness.run_steps(2);
+    assert!(harness.state().app.drawn(Quantity::Render).is_some());
+}
+
+#[test]
+fn the_table_is_sorted_and_selects() {
+    let (mut harness, _recorder) = solving(Harness::builder());
+    assert_eq!(harness.state().app.objects.sort, SortBy::Pixels);
+    click(&mut harness, "Sort by Emission");
+    assert_eq!(harness.state().app.objects.sort, SortBy::Emission);
+    assert!(harness.state().app.objects.descending);
+    let height = |harness: &Harness<'_, Window>, name: &str| {
+        harness.get_by_label(&format!("Select {name}")).rect().top()
+    };
+    assert!(height(&harness, "lamp") < height(&harness, "floor"));
+    click(&mut harness, "Sort by Emission");
+    assert!(height(&harness, "lamp") > height(&harness, "floor"));
+    click(&mut harness, "Select wall");
+    assert_eq!(harness.state().app.selected, Some(1));
+    press(&mut harness, Modifiers::NONE, Key::Escape);
+    assert_eq!(harness.state().app.selected, None);
+}
+
+#[test]
+fn a_click_in_a_picture_selects_the_object_there() {
+    let (mut harness, _recorder) = solving(Harness::builder());
+    let pane = harness.get_by_label("Albedo picture").rect();
+    for (fraction, object) in [(0.36, 1), (0.8, 0)] {
+        let app = &harness.state().app;
+        let placement = app.look.placement(pane, [64, 48]);
+        let at = placement.min + placement.size() * egui::vec2(0.5, fraction);
+        harness.hover_at(at);
+        harness.run_steps(1);
+        harness.drag_at(at);
+        harness.run_steps(1);
+        harness.drop_at(at);
+        harness.run_steps(3);
+        assert_eq!(harness.state().app.selected, Some(object), "at {fraction}");
+    }
+}
+
+#[test]
+fn exposure_and_tone_curve_follow_their_keys() {
+    let (mut harness, _recorder) = solving(Harness::builder());
+    let before = harness.state().app.look.exposure;
+    press(&mut harness, Modifiers::NONE, Key::Plus);
+    assert_eq!(harness.state().app.look.exposure, before + 0.5);
+    press(&mut harness, Modifiers::NONE, Key::Minus);
+    press(&mut harness, Modifiers::NONE, Key::Minus);
+    assert_eq!(harness.state().app.look.exposure, before - 0.5);
+    click(&mut harness, "Auto");
+    assert_eq!(harness.state().app.look.exposure, before);
+    let tone = harness.state().app.look.tone;
+    press(&mut harness, Modifiers::NONE, Key::T);
+    assert_ne!(harness.state().app.look.tone, tone);
+}
+
+#[test]
+fn two_pictures_are_wiped_flipped_and_shown_side_by_side() {
+    let (mut harness, _recorder) = solving(Harness::builder());
+    click(&mut harness, "Compare");
+    harness.get_by_label("Wipe position");
+    let pane = harness.get_by_label("wiped pictures").rect();
+    let line = pane.center();
+    harness.hover_at(line);
+    harness.run_steps(1);
+    harness.drag_at(line);
+    harness.run_steps(1);
+    harness.hover_at(line + egui::vec2(pane.width() * 0.25, 0.0));
+    harness.run_steps(1);
+    harness.drop_at(line + egui::vec2(pane.width() * 0.25, 0.0));
+    harness.run_steps(2);
+    let split = harness.state().app.compare.split;
+    assert!((split - 0.75).abs() < 0.02, "{split}");
+    click(&mut harness, "Swap");
+    assert_eq!(harness.state().app.compare.left, Quantity::Render);
+    click(&mut harness, "Side by side");
+    harness.get_by_label("second picture");
+    press(&mut harness, Modifiers::NONE, Key::C);
+    press(&mut harness, Modifiers::NONE, Key::C);
+    harness.get_by_label("compared picture");
+}
+
+#[test]
+fn objects_are_inserted_moved_duplicated_deleted_and_brought_back() {
+    let (mut harness, recorder) = solving(Harness::builder());
+    click(&mut harness, "Insert");
+    type_into(&mut harness, "Object file", "/objects/chair.glb");
+    click(&mut harness, "Add");
+    assert_eq!(placements(&recorder), Some(1));
+    assert!(harness.state().app.insertions.placing);
+
+    // A click on the floor places it.
+    let pane = harness.get_by_label("Photograph picture").rect();
+    let placement = harness.state().app.look.placement(pane, [64, 48]);
+    let at = placement.min + placement.size() * egui::vec2(0.5, 0.8);
+    harness.hover_at(at);
+    harness.run_steps(1);
+    harness.drag_at(at);
+    harness.run_steps(1);
+    harness.drop_at(at);
+    harness.run_steps(3);
+    let point = harness.state().app.insertions.objects[0].placement.at;
+    assert!(point.is_some_and(|p| p.y.abs() < 1e-5), "{point:?}");
+    assert!(!harness.state().app.insertions.placing);
+
+    click(&mut harness, "Duplicate");
+    assert_eq!(placements(&recorder), Some(2));
+    click(&mut harness, "Delete");
+    click(&mut harness, "Delete");
+    assert_eq!(placements(&recorder), Some(0));
+    press(&mut harness, Modifiers::COMMAND, Key::Z);
+    assert_eq!(placements(&recorder), Some(1));
+    press(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
+    assert_eq!(placements(&recorder), Some(0));
+    press(&mut harness, Modifiers::COMMAND, Key::Z);
+    click(&mut harness, "Show chair 1");
+    assert_eq!(placements(&recorder), Some(0));
+
+    recorder.show(|snapshot| snapshot.insertion = Some(Arc::new(insertion(0))));
+    harness.run_steps(2);
+    click(&mut harness, "Naive | ours");
+    let compare = &harness.state().app.compare;
+    assert_eq!(
+        (compare.left, compare.right),
+        (Quantity::Naive, Quantity::Composite)
+    );
+    harness.get_by_label("first picture");
+}
+
+#[test]
+fn a_drag_is_one_step_of_undo() {
+    let (mut harness, recorder) = solving(Harness::builder());
+    click(&mut harness, "Insert");
+    type_into(&mut harness, "Object file", "chair.obj");
+    click(&mut harness, "Add");
+    let turn = harness.get_by_label("Turn").rect().center();
+    harness.hover_at(turn);
+    harness.run_steps(1);
+    harness.drag_at(turn);
+    for step in 1..=5 {
+        harness.hover_at(turn + egui::vec2(8.0 * step as f32, 0.0));
+        harness.run_steps(1);
+    }
+    harness.drop_at(turn + egui::vec2(40.0, 0.0));
+    harness.run_steps(3);
+    assert!(harness.state().app.insertions.objects[0].placement.rotate > 10.0);
+    press(&mut harness, Modifiers::COMMAND, Key::Z);
+    assert_eq!(
+        harness.state().app.insertions.objects[0].placement.rotate,
+        0.0
+    );
+    assert_eq!(placements(&recorder), Some(1));
+}
+
+#[test]
+fn the_palette_finds_and_does() {
+    let (mut harness, recorder) = solving(Harness::builder());
+    press(&mut harness, Modifiers::COMMAND, Key::P);
+    type_into(&mut harness, "Command", "built room");
+    press(&mut harness, Modifiers::NONE, Key::Enter);
+    assert!(matches!(
+        recorder.sent()[..],
+        [Command::Open(Source::BuiltInRoom)]
+    ));
+    assert!(harness.state().app.palette.is_none());
+}
+
+#[test]
+fn results_are_saved_and_exported_to_typed_paths() {
+    let (mut harness, recorder) = solving(Harness::builder());
+    press(&mut harness, Modifiers::COMMAND, Key::S);
+    click(&mut harness, "Save");
+    let sent = recorder.sent();
+    assert!(matches!(&sent[..], [Command::Save(folder)] if folder.ends_with("small-room")));
+    press(&mut harness, Modifiers::COMMAND, Key::E);
+    click(&mut harness, "Mitsuba 3");
+    click(&mut harness, "Export");
+    let sent = recorder.sent();
+    let [Command::Export(request)] = &sent[..] else {
+        panic!("{sent:?}");
+    };
+    assert_eq!(request.format, ExportFormat::Mitsuba);
+    assert_eq!(request.path, PathBuf::from("small-room.xml"));
+}
+
+#[test]
+fn a_changed_parameter_is_sent() {
+    let (mut harness, recorder) = solving(Harness::builder());
+    click(&mut harness, "Settings");
+    type_into(&mut harness, "Batch", "32");
+    press(&mut harness, Modifiers::NONE, Key::Enter);
+    let sent = recorder.sent();
+    let batch = sent.iter().rev().find_map(|command| match command {
+        Command::Set(settings) => Some(settings.batch),
+        _ => None,
+    });
+    assert_eq!(batch, Some(32), "{sent:?}");
+}
+
+#[test]
+fn every_pane_draws_in_both_themes_with_the_fonts_shipped() {
+    let (mut harness, recorder) = solving(Harness::builder());
+    recorder.show(|snapshot| snapshot.insertion = Some(Arc::new(insertion(0))));
+    for _ in 0..2 {
+        for pane in Pane::all() {
+            harness.state_mut().app.bring_forward = Some(pane);
+            harness.run_steps(2);
+            assert!(is_open(&harness.state().tree, pane), "{pane:?}");
+        }
+        press(&mut harness, Modifiers::COMMAND, Key::L);
+    }
+    press(&mut harness, Modifiers::NONE, Key::Questionmark);
+    harness.get_by_label("Keys and mouse");
+    harness.state_mut().app.keys = false;
+    for menu in ["File", "Edit", "Solve", "View", "Help", "Window"] {
+        click(&mut harness, menu);
+        click(&mut harness, menu);
+    }
+}
+
+#[test]
+fn the_layout_is_reset() {
+    let (mut harness, _recorder) = solving(Harness::builder());
+    relit::app::layout::close(&mut harness.state_mut().tree, Pane::Model);
+    harness.run_steps(2);
+    assert!(harness.query_by_label("3D view").is_none());
+    harness.state_mut().app.reset_layout = true;
+    harness.run_steps(2);
+    assert!(is_open(&harness.state().tree, Pane::Model));
+}

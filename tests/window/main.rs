@@ -1,0 +1,6 @@
+//! The window's flows, driven by the labels that people see, on a connection that only keeps what it is sent.
+#![cfg(feature = "gui")]
+
+mod connection;
+mod flows;
+mod rendering;
