@@ -3,7 +3,10 @@
 pub mod bvh;
 pub mod camera;
 pub mod geometry;
+pub mod prepare;
 pub mod texels;
+pub mod visibility;
+pub mod winding;
 
 use crate::capture::Capture;
 use crate::error::{Error, Result};
