@@ -4,7 +4,7 @@ use crate::compose::object::ObjectModel;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::scene::bvh::Bvh;
-use crate::scene::geometry::Hit;
+use crate::scene::geometry::{Hit, Ray};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -72,6 +72,8 @@ pub struct PlacedObject {
     pub corner_normals: Vec<[Vec3; 3]>,
     /// Middle of the bounding box.
     pub center: Vec3,
+    /// Half the bounding box's diagonal.
+    pub radius: f32,
     /// Closest-hit and any-hit queries.
     pub bvh: Bvh,
 }
@@ -124,7 +126,16 @@ impl PlacedObject {
             normals,
             corner_normals,
             center: (low + high) * 0.5,
+            radius: (high - low).length() * 0.5,
         })
+    }
+
+    /// Whether a ray, widened by an angle in radians, could meet the object.
+    pub fn is_near(&self, ray: &Ray, angle: f32) -> bool {
+        let to_center = self.center - ray.origin;
+        let distance = to_center.cross(ray.direction.normalize_or_zero()).length();
+        let behind = to_center.dot(ray.direction) < 0.0 && to_center.length() > self.radius;
+        distance <= self.radius + angle * to_center.length() && !behind
     }
 
     /// The unit shading normal at a hit, on the front side.

@@ -34,6 +34,17 @@ impl<'a> FurnishedScene<'a> {
         self.touched.swap(false, Ordering::Relaxed)
     }
 
+    /// Whether the first surface along a ray is an object's.
+    pub fn sees_object(&self, ray: &Ray) -> bool {
+        self.nearest_object(ray, ray.t_max).is_some_and(|(_, hit)| {
+            let before = Ray {
+                t_max: hit.t,
+                ..*ray
+            };
+            !self.lit.scene.occluded(&before)
+        })
+    }
+
     /// The nearest object in front of `t_max`.
     fn nearest_object(&self, ray: &Ray, t_max: f32) -> Option<(usize, Hit)> {
         let mut nearest = None;

@@ -1,0 +1,86 @@
+//! The photograph that objects are put into, and how light becomes its values.
+
+use crate::capture::photograph::Photograph;
+use crate::error::{Error, Result};
+use crate::math::picture::Picture;
+use crate::scene::camera::Camera;
+use glam::Vec3;
+use std::sync::Arc;
+
+/// A photograph with its camera.
+#[derive(Debug, Clone)]
+pub struct Backdrop {
+    /// Index of the frame; keys the random numbers.
+    pub frame: u64,
+    /// Where the photograph was taken from; its size is the photograph's.
+    pub camera: Camera,
+    /// The photograph's values, linear.
+    pub photograph: Arc<Picture>,
+    /// Factor from the estimate's radiance to the photograph's values, per channel.
+    pub exposure: Vec3,
+    /// The value at which the photograph saturates; infinite for linear files.
+    pub saturation: f32,
+}
+
+impl Backdrop {
+    /// The backdrop of a frame; `exposure` is the estimate's for it, where it has one.
+    ///
+    /// # Errors
+    /// Camera and photograph differ in size.
+    pub fn new(
+        frame: usize,
+        camera: &Camera,
+        photograph: &Photograph,
+        exposure: Option<Vec3>,
+    ) -> Result<Self> {
+        let picture = Picture {
+            width: photograph.width,
+            height: photograph.height,
+            pixels: photograph.pixels.clone(),
+        };
+        let size = (camera.intrinsics.width, camera.intrinsics.height);
+        if !picture.is_whole() || size != (picture.width, picture.height) {
+            return Err(Error::new(
+                format!("frame {frame}"),
+                format!(
+                    "the photograph is {} × {}, its camera {} × {}",
+                    picture.width, picture.height, size.0, size.1
+                ),
+                "give both one size",
+            ));
+        }
+        Ok(Self {
+            frame: frame as u64,
+            camera: camera.clone(),
+            photograph: Arc::new(picture),
+            exposure: exposure.unwrap_or(Vec3::ONE),
+            saturation: photograph.saturation,
+        })
+    }
+
+    /// The pixel with a surface over `alpha` of it: α · over + (1 − α) · (photograph + over − under), where `over` and
+    /// `under` are radiances with and without.
+    ///
+    /// A channel that is saturated in the photograph was at least as bright as the estimate says, and a saturating
+    /// photograph's composite saturates with it.
+    pub fn blend(&self, pixel: usize, alpha: f32, over: Vec3, under: Vec3) -> Vec3 {
+        let photograph = self.photograph.pixels[pixel];
+        let (over, under) = (over * self.exposure, under * self.exposure);
+        if self.saturation.is_infinite() {
+            return over * alpha + (photograph + over - under) * (1.0 - alpha);
+        }
+        let saturated = photograph.cmpge(Vec3::splat(self.saturation));
+        let behind = Vec3::select(saturated, photograph.max(under), photograph);
+        (over * alpha + (behind + over - under) * (1.0 - alpha))
+            .clamp(Vec3::ZERO, Vec3::splat(self.saturation))
+    }
+
+    /// The exposure at which the photograph is shown as 8-bit sRGB: its own, or the 99th percentile at 1.
+    pub fn display_exposure(&self) -> f32 {
+        if self.saturation.is_finite() {
+            self.saturation.recip()
+        } else {
+            crate::export::picture::percentile_exposure(&self.photograph.pixels)
+        }
+    }
+}

@@ -1,0 +1,332 @@
+//! Differential rendering (Debevec 1998): the photograph changed by what the objects change.
+//!
+//! The scene is rendered with and without the objects from the same random numbers, so that paths that no object
+//! touches cancel to the bit, and the photograph stays what it was wherever the objects do nothing.
+
+use crate::compose::backdrop::Backdrop;
+use crate::compose::placement::PlacedObject;
+use crate::compose::world::FurnishedScene;
+use crate::math::picture::Picture;
+use crate::math::rng::Stream;
+use crate::scene::geometry::Ray;
+use crate::transport::lit::Lit;
+use crate::transport::path::{PathOptions, PathSample, radiance};
+use crate::transport::world::World;
+use glam::{DVec3, Vec2, Vec3};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Blocks of pixels that the first, coarse result is made of, at most.
+const COARSE_BLOCKS: usize = 40_000;
+
+/// A photograph with objects in it, refined pass by pass.
+#[derive(Debug)]
+pub struct Insertion {
+    backdrop: Backdrop,
+    lit: Arc<Lit>,
+    objects: Vec<Arc<PlacedObject>>,
+    options: PathOptions,
+    seed: u64,
+    pixels: Vec<PixelSums>,
+    /// Paths of each row's pixels so far.
+    row_samples: Vec<u32>,
+    next_row: usize,
+    rays: u64,
+    rejected: u64,
+}
+
+/// What has been found out about one pixel.
+#[derive(Debug, Clone, Copy, Default)]
+struct PixelSums {
+    with: DVec3,
+    without: DVec3,
+    /// Samples that saw an object first.
+    covered: u32,
+    /// Whether any sample differed.
+    changed: bool,
+    rays: u32,
+    rejected: u32,
+}
+
+/// Everything that a composite is made from, one entry a pixel.
+#[derive(Debug, Clone)]
+pub struct Layers {
+    /// Radiance with the objects.
+    pub with: Picture,
+    /// Radiance without.
+    pub without: Picture,
+    /// Radiance that the objects add or take away.
+    pub delta: Picture,
+    /// Share of the pixel that the objects cover, 0 to 1.
+    pub alpha: Vec<f32>,
+    /// Depth along the viewing direction at the pixel's centre, in metres; infinite where nothing is met.
+    pub depth: Vec<f32>,
+    /// Object index at the pixel's centre, inserted objects after the scene's; `u32::MAX` where nothing is met.
+    pub object: Vec<u32>,
+}
+
+impl Insertion {
+    /// Starts an insertion and makes its first, coarse result: exact outlines, light by blocks of pixels.
+    pub fn new(
+        backdrop: Backdrop,
+        lit: Arc<Lit>,
+        objects: Vec<Arc<PlacedObject>>,
+        options: PathOptions,
+        seed: u64,
+    ) -> Self {
+        let (width, height) = (backdrop.photograph.width, backdrop.photograph.height);
+        let mut insertion = Self {
+            backdrop,
+            lit,
+            objects,
+            options,
+            seed,
+            pixels: vec![PixelSums::default(); width as usize * height as usize],
+            row_samples: vec![0; height as usize],
+            next_row: 0,
+            rays: 0,
+            rejected: 0,
+        };
+        if !insertion.objects.is_empty() {
+            insertion.coarse();
+        }
+        insertion
+    }
+
+    /// Adds `samples` paths to every pixel, in parallel. Any split into calls, on any number of threads, gives the
+    /// same bits.
+    pub fn pass(&mut self, samples: u32) {
+        self.pass_while(samples, || true);
+    }
+
+    /// As [`Insertion::pass`], but stops early, between two bands of rows, once `go_on` says no; the next call takes
+    /// up the work there. Returns whether all was done.
+    pub fn pass_while(&mut self, samples: u32, go_on: impl Fn() -> bool) -> bool {
+        if self.objects.is_empty() {
+            return true;
+        }
+        let height = self.row_samples.len();
+        let mut rows_left = samples as usize * height;
+        let band = 16.max(2 * rayon::current_num_threads());
+        while rows_left > 0 {
+            if !go_on() {
+                return false;
+            }
+            let rows = band.min(rows_left).min(height - self.next_row);
+            self.add_rows(self.next_row, rows);
+            self.next_row = (self.next_row + rows) % height;
+            rows_left -= rows;
+        }
+        true
+    }
+
+    /// The photograph with the objects, in the photograph's values.
+    ///
+    /// Pixels that no object changes, and all of them where none is inserted, are the photograph's to the bit.
+    pub fn composite(&self) -> Picture {
+        self.picture(|pixel| {
+            let sums = &self.pixels[pixel];
+            if !sums.changed {
+                return self.backdrop.photograph.pixels[pixel];
+            }
+            let (with, without, alpha) = self.means(pixel);
+            self.backdrop.blend(pixel, alpha, with, without)
+        })
+    }
+
+    /// What the composite is made from.
+    pub fn layers(&self) -> Layers {
+        let world = FurnishedScene::new(&self.lit, &self.objects);
+        let camera = &self.backdrop.camera;
+        let forward = camera.forward();
+        let (depth, object) = (0..self.pixels.len())
+            .into_par_iter()
+            .map(|pixel| {
+                let ray = self.ray(pixel, [0.5; 2]);
+                world
+                    .intersect(&ray)
+                    .map_or((f32::INFINITY, u32::MAX), |s| {
+                        ((s.point - camera.center).dot(forward), s.object)
+                    })
+            })
+            .unzip();
+        Layers {
+            with: self.picture(|pixel| self.means(pixel).0),
+            without: self.picture(|pixel| self.means(pixel).1),
+            delta: self.picture(|pixel| {
+                let (with, without, _) = self.means(pixel);
+                with - without
+            }),
+            alpha: (0..self.pixels.len()).map(|p| self.means(p).2).collect(),
+            depth,
+            object,
+        }
+    }
+
+    /// The photograph inserted into.
+    pub fn backdrop(&self) -> &Backdrop {
+        &self.backdrop
+    }
+
+    /// The scene and its light.
+    pub fn lit(&self) -> &Arc<Lit> {
+        &self.lit
+    }
+
+    /// The objects inserted.
+    pub fn objects(&self) -> &[Arc<PlacedObject>] {
+        &self.objects
+    }
+
+    /// Paths a pixel, at least; 0 while the result is coarse.
+    pub fn samples(&self) -> u32 {
+        self.row_samples.iter().copied().min().unwrap_or(0)
+    }
+
+    /// Rays cast.
+    pub fn rays(&self) -> u64 {
+        self.rays
+    }
+
+    /// Samples dropped because they came out non-finite.
+    pub fn rejected(&self) -> u64 {
+        self.rejected
+    }
+
+    fn width(&self) -> usize {
+        self.backdrop.photograph.width as usize
+    }
+
+    fn picture(&self, color: impl Fn(usize) -> Vec3) -> Picture {
+        Picture {
+            width: self.backdrop.photograph.width,
+            height: self.backdrop.photograph.height,
+            pixels: (0..self.pixels.len()).map(color).collect(),
+        }
+    }
+
+    /// Mean radiance with and without, and coverage.
+    fn means(&self, pixel: usize) -> (Vec3, Vec3, f32) {
+        let sums = &self.pixels[pixel];
+        // The coarse result counts as one sample.
+        let n = f64::from(self.row_samples[pixel / self.width()].max(1));
+        (
+            (sums.with / n).as_vec3(),
+            (sums.without / n).as_vec3(),
+            (f64::from(sums.covered) / n) as f32,
+        )
+    }
+
+    /// The ray through a pixel, at an offset in [0, 1)² from its corner.
+    fn ray(&self, pixel: usize, offset: [f32; 2]) -> Ray {
+        let corner = Vec2::new((pixel % self.width()) as f32, (pixel / self.width()) as f32);
+        self.backdrop.camera.ray(corner + Vec2::from(offset))
+    }
+
+    fn stream(&self, pixel: usize, sample: u32) -> Stream {
+        let frame = self.backdrop.frame;
+        Stream::new(self.seed, frame, pixel as u64, u64::from(sample))
+    }
+
+    /// One pair of paths through a pixel, both from the same random numbers.
+    fn pair(&self, world: &FurnishedScene<'_>, pixel: usize, sample: u32) -> PixelSums {
+        let mut stream = self.stream(pixel, sample);
+        let ray = self.ray(pixel, stream.uniform2());
+        let mut again = stream.clone();
+        let covered = world.sees_object(&ray);
+        world.take_touched();
+        let with = radiance(world, &ray, &mut stream, &self.options);
+        // A path that met no object would be the same without them.
+        let without = if world.take_touched() {
+            radiance(&*self.lit, &ray, &mut again, &self.options)
+        } else {
+            PathSample { rays: 0, ..with }
+        };
+        let rejected = with.rejected || without.rejected;
+        // A pair is dropped as a whole, or the difference would be biased.
+        let keep = |sample: PathSample| {
+            if rejected {
+                DVec3::ZERO
+            } else {
+                sample.radiance.as_dvec3()
+            }
+        };
+        PixelSums {
+            with: keep(with),
+            without: keep(without),
+            covered: u32::from(covered),
+            changed: covered || keep(with) != keep(without),
+            rays: with.rays + without.rays,
+            rejected: u32::from(rejected),
+        }
+    }
+
+    /// Adds one sample to every pixel of some rows.
+    fn add_rows(&mut self, first: usize, rows: usize) {
+        let width = self.width();
+        let added: Vec<Vec<PixelSums>> = (first..first + rows)
+            .into_par_iter()
+            .map(|row| {
+                let world = FurnishedScene::new(&self.lit, &self.objects);
+                let sample = self.row_samples[row];
+                (row * width..(row + 1) * width)
+                    .map(|pixel| self.pair(&world, pixel, sample))
+                    .collect()
+            })
+            .collect();
+        for (row, added) in (first..).zip(added) {
+            for (sums, pair) in self.pixels[row * width..].iter_mut().zip(added) {
+                // The first true sample takes the coarse result's place.
+                if self.row_samples[row] == 0 {
+                    *sums = PixelSums::default();
+                }
+                sums.with += pair.with;
+                sums.without += pair.without;
+                sums.covered += pair.covered;
+                sums.changed |= pair.changed;
+                self.rays += u64::from(pair.rays);
+                self.rejected += u64::from(pair.rejected);
+            }
+            self.row_samples[row] += 1;
+        }
+    }
+
+    /// The coarse result: in each block one pair of paths where an object is seen and one where none is.
+    fn coarse(&mut self) {
+        let (width, height) = (self.width(), self.row_samples.len());
+        let side = (1..)
+            .find(|side| width.div_ceil(*side) * height.div_ceil(*side) <= COARSE_BLOCKS)
+            .unwrap_or(1);
+        let bands: Vec<Vec<PixelSums>> = (0..height.div_ceil(side))
+            .into_par_iter()
+            .map(|band| self.coarse_band(band * side, side))
+            .collect();
+        self.pixels = bands.concat();
+        self.rays = self.pixels.iter().map(|p| u64::from(p.rays)).sum();
+    }
+
+    /// The coarse result's rows from `top` on.
+    fn coarse_band(&self, top: usize, side: usize) -> Vec<PixelSums> {
+        let (width, height) = (self.width(), self.row_samples.len());
+        let rows = side.min(height - top);
+        let world = FurnishedScene::new(&self.lit, &self.objects);
+        let mut band = vec![PixelSums::default(); rows * width];
+        for left in (0..width).step_by(side) {
+            // Indexed by whether an object is seen.
+            let mut found: [Option<PixelSums>; 2] = [None; 2];
+            for index in 0..rows * side.min(width - left) {
+                let columns = side.min(width - left);
+                let (row, column) = (index / columns, left + index % columns);
+                let pixel = (top + row) * width + column;
+                let offset = self.stream(pixel, 0).uniform2();
+                let covered = world.sees_object(&self.ray(pixel, offset));
+                let sums = &mut found[usize::from(covered)];
+                band[row * width + column] = match *sums {
+                    Some(known) => PixelSums { rays: 0, ..known },
+                    None => *sums.insert(self.pair(&world, pixel, 0)),
+                };
+            }
+        }
+        band
+    }
+}

@@ -1,0 +1,172 @@
+//! What augmented reality does without knowing the room: an object lit by nine harmonics and pasted over the
+//! photograph with a depth test. It casts no shadow and takes no part in the light of the room.
+
+use crate::compose::backdrop::Backdrop;
+use crate::compose::placement::PlacedObject;
+use crate::compose::world::FurnishedScene;
+use crate::math::picture::Picture;
+use crate::math::rng::Stream;
+use crate::math::sh::Harmonics;
+use crate::math::warp;
+use crate::scene::camera::Camera;
+use crate::scene::geometry::Ray;
+use crate::transport::lit::Lit;
+use crate::transport::path::{PathOptions, radiance};
+use crate::transport::world::World;
+use glam::{DVec3, Vec2, Vec3};
+use rayon::prelude::*;
+use std::f32::consts::{FRAC_1_PI, PI};
+use std::sync::Arc;
+
+/// Columns and rows of the panorama that photographs are gathered on.
+const PANORAMA: (usize, usize) = (64, 32);
+/// Most pixels of a photograph that are looked at, along each side.
+const LOOKS: u32 = 256;
+/// Directions that a probe looks along, on a square lattice.
+const PROBE_SIDE: usize = 64;
+/// Sub-pixels along a side, for coverage.
+const GRID: usize = 4;
+
+/// The light as the photographs show it, taken as coming from infinitely far away: all their pixels by direction, and
+/// the mean of what was seen wherever no photograph looked.
+pub fn harmonics_of_photographs<'a>(
+    frames: impl IntoIterator<Item = (&'a Camera, &'a Picture)>,
+) -> Harmonics {
+    let (columns, rows) = PANORAMA;
+    let mut cells = vec![(DVec3::ZERO, 0u32); columns * rows];
+    for (camera, picture) in frames {
+        let stride = |length: u32| length.div_ceil(LOOKS).max(1) as usize;
+        for y in (0..picture.height).step_by(stride(picture.height)) {
+            for x in (0..picture.width).step_by(stride(picture.width)) {
+                let color = picture.pixels[(y * picture.width + x) as usize];
+                if !color.is_finite() {
+                    continue;
+                }
+                let d = camera
+                    .ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5))
+                    .direction;
+                // Rows of equal height on the sphere have equal solid angle.
+                let row = ((d.z + 1.0) * 0.5 * rows as f32) as usize;
+                let turn = (d.y.atan2(d.x) / (2.0 * PI)).rem_euclid(1.0);
+                let column = (turn * columns as f32) as usize;
+                let cell = &mut cells[row.min(rows - 1) * columns + column.min(columns - 1)];
+                cell.0 += color.as_dvec3();
+                cell.1 += 1;
+            }
+        }
+    }
+    let means: Vec<Option<DVec3>> = cells
+        .iter()
+        .map(|(sum, n)| (*n > 0).then(|| *sum / f64::from(*n)))
+        .collect();
+    let seen = means.iter().flatten().count().max(1) as f64;
+    let mean = means.iter().flatten().sum::<DVec3>() / seen;
+
+    let mut harmonics = Harmonics::default();
+    let solid_angle = 4.0 * std::f64::consts::PI / means.len() as f64;
+    for (index, color) in means.iter().enumerate() {
+        let u = [
+            1.0 - ((index / columns) as f32 + 0.5) / rows as f32,
+            ((index % columns) as f32 + 0.5) / columns as f32,
+        ];
+        harmonics.add(
+            warp::uniform_sphere(u),
+            color.unwrap_or(mean).as_vec3(),
+            solid_angle,
+        );
+    }
+    harmonics
+}
+
+/// The light at a point of the estimated scene, by paths in all directions.
+pub fn harmonics_of_estimate(
+    lit: &Lit,
+    point: Vec3,
+    options: &PathOptions,
+    seed: u64,
+) -> Harmonics {
+    let count = PROBE_SIDE * PROBE_SIDE;
+    let found: Vec<(Vec3, Vec3)> = (0..count)
+        .into_par_iter()
+        .map(|index| {
+            let mut stream = Stream::new(seed, 0, index as u64, 0);
+            let [du, dv] = stream.uniform2();
+            let u = [
+                ((index / PROBE_SIDE) as f32 + du) / PROBE_SIDE as f32,
+                ((index % PROBE_SIDE) as f32 + dv) / PROBE_SIDE as f32,
+            ];
+            let direction = warp::uniform_sphere(u);
+            let ray = Ray::new(point, direction);
+            (
+                direction,
+                radiance(lit, &ray, &mut stream, options).radiance,
+            )
+        })
+        .collect();
+    let mut harmonics = Harmonics::default();
+    for (direction, color) in found {
+        harmonics.add(direction, color, 4.0 * std::f64::consts::PI / count as f64);
+    }
+    harmonics
+}
+
+/// Pastes the objects into the photograph. Each has its own harmonics; `exposure` turns their light into the
+/// photograph's values (one for harmonics of the photographs, the backdrop's for those of the estimate).
+pub fn paste(
+    backdrop: &Backdrop,
+    lit: &Lit,
+    objects: &[Arc<PlacedObject>],
+    harmonics: &[Harmonics],
+    exposure: Vec3,
+) -> Picture {
+    let width = backdrop.photograph.width as usize;
+    let world = FurnishedScene::new(lit, objects);
+    let first = lit.scene.objects.len() as u32;
+    let lens = &backdrop.camera.intrinsics;
+    let pixel_angle = (1.0 / lens.fx.abs().min(lens.fy.abs())) as f32;
+    let pixels = backdrop
+        .photograph
+        .pixels
+        .par_iter()
+        .enumerate()
+        .map(|(pixel, &photograph)| {
+            let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+            let middle = backdrop.camera.ray(corner + 0.5);
+            if !objects.iter().any(|o| o.is_near(&middle, pixel_angle)) {
+                return photograph;
+            }
+            let (mut covered, mut sum) = (0, Vec3::ZERO);
+            for cell in 0..GRID * GRID {
+                let inside = Vec2::new((cell % GRID) as f32, (cell / GRID) as f32) + 0.5;
+                let ray = backdrop.camera.ray(corner + inside / GRID as f32);
+                let seen = world.intersect(&ray).filter(|s| s.object >= first);
+                let light =
+                    seen.and_then(|s| Some((s, harmonics.get((s.object - first) as usize)?)));
+                if let Some((surface, harmonics)) = light {
+                    let side = surface.normal.dot(ray.direction);
+                    let normal = if side > 0.0 {
+                        -surface.shading_normal
+                    } else {
+                        surface.shading_normal
+                    };
+                    // Gloss is beyond nine harmonics: what a lobe reflects is spread as if diffuse.
+                    let specular = surface.lobe.map_or(Vec3::ZERO, |lobe| lobe.specular);
+                    let reflectance = specular + surface.albedo * (Vec3::ONE - specular);
+                    sum += reflectance * harmonics.irradiance(normal) * FRAC_1_PI * exposure;
+                    covered += 1;
+                }
+            }
+            if covered == 0 {
+                return photograph;
+            }
+            let alpha = covered as f32 / (GRID * GRID) as f32;
+            let pasted = sum / (GRID * GRID) as f32 + photograph * (1.0 - alpha);
+            pasted.min(Vec3::splat(backdrop.saturation))
+        })
+        .collect();
+    Picture {
+        width: backdrop.photograph.width,
+        height: backdrop.photograph.height,
+        pixels,
+    }
+}

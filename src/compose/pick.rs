@@ -1,0 +1,64 @@
+//! From a pixel to the place it shows, and from a place to the surface below it.
+
+use crate::compose::placement::PlacedObject;
+use crate::scene::Scene;
+use crate::scene::camera::Camera;
+use crate::scene::geometry::{Ray, offset_origin};
+use glam::{Vec2, Vec3};
+
+/// Most corners of an object that are let fall.
+const MAX_FALLING: usize = 4096;
+
+/// A point of the scene's surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pick {
+    /// Position in scene coordinates.
+    pub point: Vec3,
+    /// Unit normal on the side that is seen.
+    pub normal: Vec3,
+    /// Object index.
+    pub object: u32,
+}
+
+/// The surface that a camera sees at a point of its image, in pixels from the top-left corner.
+pub fn pick(scene: &Scene, camera: &Camera, pixel: Vec2) -> Option<Pick> {
+    let ray = camera.ray(pixel);
+    let hit = scene.intersect(&ray)?;
+    let normal = scene.normals[hit.triangle as usize];
+    Some(Pick {
+        point: scene.point(&hit),
+        normal: if normal.dot(ray.direction) > 0.0 {
+            -normal
+        } else {
+            normal
+        },
+        object: scene.object_of[hit.triangle as usize],
+    })
+}
+
+/// The point of the surface nearest below a point, starting clear of a surface that the point lies on.
+pub fn below(scene: &Scene, pick: &Pick) -> Option<Vec3> {
+    let down = -scene.up;
+    let from = offset_origin(pick.point, pick.normal, &[pick.point; 3], pick.normal);
+    scene
+        .intersect(&Ray::new(from, down))
+        .map(|hit| scene.point(&hit))
+}
+
+/// How far an object falls along the scene's down direction until one of its corners meets a surface.
+///
+/// `None` where nothing is below it. An object that starts a little inside a surface is first lifted by `lift`.
+pub fn fall(scene: &Scene, object: &PlacedObject, lift: f32) -> Option<f32> {
+    let corners = object.corners.len() * 3;
+    let stride = corners.div_ceil(MAX_FALLING).max(1);
+    object
+        .corners
+        .iter()
+        .flatten()
+        .step_by(stride)
+        .filter_map(|&corner| {
+            let ray = Ray::new(corner + scene.up * lift, -scene.up);
+            scene.intersect(&ray).map(|hit| hit.t - lift)
+        })
+        .min_by(f32::total_cmp)
+}
