@@ -96,26 +96,24 @@ impl Insertion {
     /// Adds `samples` paths to every pixel, in parallel. Any split into calls, on any number of threads, gives the
     /// same bits.
     pub fn pass(&mut self, samples: u32) {
-        self.pass_while(samples, || true);
+        self.refine_to(self.samples() + samples, || true);
     }
 
-    /// As [`Insertion::pass`], but stops early, between two bands of rows, once `go_on` says no; the next call takes
-    /// up the work there. Returns whether all was done.
-    pub fn pass_while(&mut self, samples: u32, go_on: impl Fn() -> bool) -> bool {
+    /// Brings every pixel to `samples` paths, but stops early, between two bands of rows, once `go_on` says no; the
+    /// next call takes up the work there. Returns whether all was done.
+    pub fn refine_to(&mut self, samples: u32, go_on: impl Fn() -> bool) -> bool {
         if self.objects.is_empty() {
             return true;
         }
         let height = self.row_samples.len();
-        let mut rows_left = samples as usize * height;
         let band = 16.max(2 * rayon::current_num_threads());
-        while rows_left > 0 {
+        while self.samples() < samples {
             if !go_on() {
                 return false;
             }
-            let rows = band.min(rows_left).min(height - self.next_row);
+            let rows = band.min(height - self.next_row);
             self.add_rows(self.next_row, rows);
             self.next_row = (self.next_row + rows) % height;
-            rows_left -= rows;
         }
         true
     }

@@ -66,8 +66,8 @@ pub fn write_insertion(
         &compare,
         &[
             ("photograph", &insertion.backdrop().photograph),
-            ("naive, light of the photographs", naive),
-            ("naive, light of the estimate", naive_estimate),
+            ("naive", naive),
+            ("naive (estimate)", naive_estimate),
             ("composite", &composite),
         ],
         exposure,
