@@ -22,6 +22,7 @@
 #[cfg(feature = "gui")]
 pub mod app;
 pub mod capture;
+pub mod cli;
 pub mod compose;
 pub mod error;
 pub mod export;

@@ -1,0 +1,133 @@
+//! The commands and their options.
+
+use crate::cli::parameters::Parameters;
+use crate::error::{Error, Result};
+use crate::inverse::settings::Settings;
+use crate::session::command::OpenOptions;
+use clap::{Args, Parser, Subcommand};
+use glam::DVec3;
+use std::path::PathBuf;
+
+/// Recovers the lights and materials of a scanned room from photographs, and puts new objects into them.
+#[derive(Debug, Parser)]
+#[command(
+    version,
+    args_conflicts_with_subcommands = true,
+    disable_help_subcommand = true
+)]
+pub struct Arguments {
+    /// Folder of the capture to open in the window; the built-in room if none is named
+    pub capture: Option<PathBuf>,
+    #[command(flatten)]
+    pub solve: SolveOptions,
+    #[command(subcommand)]
+    pub action: Option<Action>,
+}
+
+/// What to do instead of opening the window.
+#[derive(Debug, Subcommand)]
+pub enum Action {
+    /// Solve a capture without a window and write the results
+    Solve(SolveArguments),
+}
+
+/// `relit solve`.
+#[derive(Debug, Args)]
+pub struct SolveArguments {
+    /// Folder of the capture
+    pub capture: PathBuf,
+    #[command(flatten)]
+    pub solve: SolveOptions,
+}
+
+/// How to solve, and what to write.
+#[derive(Debug, Args)]
+pub struct SolveOptions {
+    /// Folder to write into [default: relit-out/<capture>]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Threads to work with [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+    /// Go on from what an earlier solve left in the output folder
+    #[arg(long)]
+    pub resume: bool,
+    /// Pictures to write: all frames at full size, N frames, or none [default: 16, long side 1024]
+    #[arg(long, value_name = "all|N|none", value_parser = frames)]
+    pub views: Option<Frames>,
+    #[command(flatten)]
+    pub read: ReadOptions,
+    #[command(flatten)]
+    pub parameters: Parameters,
+}
+
+/// How to read a capture.
+#[derive(Debug, Args)]
+pub struct ReadOptions {
+    /// Up axis of the capture [default: the cameras' mean up]
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
+    pub up: Option<DVec3>,
+    /// Segments that a mesh without objects is cut into, about
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub segments: Option<u64>,
+}
+
+/// Which frames get pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Frames {
+    /// Every frame, at the photograph's size.
+    All,
+    /// At most so many, evenly spaced, of limited size.
+    AtMost(usize),
+}
+
+impl SolveOptions {
+    /// The parameters that the options give, over the defaults.
+    pub fn settings(&self) -> Settings {
+        self.parameters.over(&Settings::default())
+    }
+}
+
+impl ReadOptions {
+    /// The same for the session.
+    pub fn open(&self) -> OpenOptions {
+        OpenOptions {
+            up: self.up,
+            segments: self.segments,
+        }
+    }
+}
+
+fn frames(text: &str) -> std::result::Result<Frames, String> {
+    match text {
+        "all" => Ok(Frames::All),
+        "none" => Ok(Frames::AtMost(0)),
+        _ => text
+            .parse()
+            .map(Frames::AtMost)
+            .map_err(|_| "a number of frames, all or none is wanted".to_owned()),
+    }
+}
+
+/// Three numbers with commas between.
+pub fn triple(text: &str) -> std::result::Result<DVec3, String> {
+    let numbers: Vec<f64> = text
+        .split(',')
+        .map(|part| part.trim().parse().ok().filter(|v: &f64| v.is_finite()))
+        .collect::<Option<_>>()
+        .unwrap_or_default();
+    match numbers[..] {
+        [x, y, z] => Ok(DVec3::new(x, y, z)),
+        _ => Err("three numbers are wanted, e.g. 0,1,0".to_owned()),
+    }
+}
+
+/// A colour for a named object, `NAME=r,g,b`.
+pub fn named_color(text: &str) -> Result<(String, DVec3)> {
+    let wrong = |problem: String| Error::usage(text, problem, "write NAME=r,g,b");
+    let (name, color) = text
+        .rsplit_once('=')
+        .ok_or_else(|| wrong("there is no = in it".to_owned()))?;
+    let color = triple(color).map_err(wrong)?;
+    Ok((name.to_owned(), color))
+}

@@ -1,0 +1,94 @@
+//! The command line: commands, progress, errors on one line.
+
+mod arguments;
+mod interrupt;
+mod parameters;
+mod progress;
+mod report;
+mod solve;
+
+use crate::error::{Error, Result};
+use crate::inverse::settings::Settings;
+use crate::session::command::Source;
+use arguments::{Action, Arguments};
+use clap::Parser;
+use clap::error::ErrorKind;
+
+/// Opens the window on a source and returns when it is closed.
+pub type Window = fn(Source, Settings) -> Result<()>;
+
+/// Runs the program with the process's arguments; the exit code: 0 done, 1 an error, 2 wrong usage.
+///
+/// `window` is absent from builds without one; every command but the plain `relit` does without.
+pub fn run(window: Option<Window>) -> i32 {
+    let outcome = match Arguments::try_parse() {
+        Ok(arguments) => act(arguments, window),
+        Err(error) => match error.kind() {
+            ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
+                print!("{}", error.render().ansi());
+                return 0;
+            }
+            _ => Err(misuse(&error)),
+        },
+    };
+    match outcome {
+        Ok(()) => 0,
+        Err(error) => {
+            eprintln!("error: {error}");
+            error.exit_code()
+        }
+    }
+}
+
+fn act(arguments: Arguments, window: Option<Window>) -> Result<()> {
+    match arguments.action {
+        None => open(&arguments, window),
+        Some(Action::Solve(capture)) => {
+            solve::solve(&Source::Folder(capture.capture.clone()), &capture.solve)
+        }
+    }
+}
+
+/// `relit [CAPTURE]`: the window, or where none can be opened the same work headless.
+fn open(arguments: &Arguments, window: Option<Window>) -> Result<()> {
+    let source = arguments
+        .capture
+        .clone()
+        .map_or(Source::BuiltInRoom, Source::Folder);
+    let reason = match window {
+        None => "this build has no window".to_owned(),
+        Some(_) if !display() => "no display".to_owned(),
+        Some(window) => match window(source.clone(), arguments.solve.settings()) {
+            Ok(()) => return Ok(()),
+            Err(error) => error.to_string(),
+        },
+    };
+    eprintln!("relit: {reason}; solving without a window");
+    solve::solve(&source, &arguments.solve)
+}
+
+/// Whether there may be a display to open a window on.
+fn display() -> bool {
+    let named = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    !cfg!(all(unix, not(target_os = "macos")))
+        || named("DISPLAY")
+        || named("WAYLAND_DISPLAY")
+        || named("WAYLAND_SOCKET")
+}
+
+/// A usage error on one line: what clap says before its usage text.
+fn misuse(error: &clap::Error) -> Error {
+    let text = error.render().to_string();
+    let said: Vec<&str> = text
+        .lines()
+        .map(str::trim)
+        .take_while(|line| !line.starts_with("Usage:"))
+        .filter(|line| !line.is_empty() && !line.starts_with("For more information"))
+        .collect();
+    let said = said.join(" ");
+    Error::usage(
+        "command line",
+        said.strip_prefix("error: ").unwrap_or(&said),
+        "see relit --help",
+    )
+}

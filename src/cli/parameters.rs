@@ -1,0 +1,157 @@
+//! The table of parameters as options of the command line.
+
+use crate::inverse::settings::{Kind, PARAMETERS, Parameter, Settings, Value};
+use clap::builder::ValueParser;
+use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
+
+/// Parameters that the command line gives.
+#[derive(Debug, Clone, Default)]
+pub struct Parameters(Vec<(&'static Parameter, Value)>);
+
+impl Parameters {
+    /// `settings` with the given values in place.
+    pub fn over(&self, settings: &Settings) -> Settings {
+        let mut settings = settings.clone();
+        for (parameter, value) in &self.0 {
+            // Values were tried when they were parsed.
+            let accepted = parameter.set(&mut settings, value);
+            debug_assert_eq!(accepted, Ok(()));
+        }
+        // An explicit 0 holds nothing out; by default single pixels are.
+        let explicit = |name: &str| self.0.iter().any(|(p, _)| p.name == name);
+        if explicit("hold_out") && settings.hold_out == 0 && !explicit("held_out") {
+            settings.held_out = 0.0;
+        }
+        settings
+    }
+}
+
+/// Reads a value as typed: `auto` bounces, and times with s, m or h behind, are written so for people alone.
+fn parse(parameter: &'static Parameter, text: &str) -> Result<Value, String> {
+    let value = match (parameter.name, parameter.unit) {
+        ("bounces", _) if text == "auto" => Value::Whole(0),
+        (_, "s") => duration(text).map(Value::Real).ok_or_else(|| {
+            format!(
+                "{} must be a time such as 90, 60s, 5m or 1h",
+                parameter.name
+            )
+        })?,
+        _ => parameter.parse(text)?,
+    };
+    parameter.set(&mut Settings::default(), &value)?;
+    Ok(value)
+}
+
+/// Seconds of a time such as 90, 60s, 1.5m or 2h.
+fn duration(text: &str) -> Option<f64> {
+    let split = text.find(|c: char| c.is_ascii_alphabetic() && c != 'e');
+    let (number, unit) = text.split_at(split.unwrap_or(text.len()));
+    let factor = match unit {
+        "" | "s" => 1.0,
+        "m" | "min" => 60.0,
+        "h" => 3600.0,
+        _ => return None,
+    };
+    let seconds = number.parse::<f64>().ok()? * factor;
+    (seconds.is_finite() && seconds >= 0.0).then_some(seconds)
+}
+
+fn option(parameter: &'static Parameter) -> Arg {
+    let mut help = parameter.help.to_owned();
+    help += &match parameter.get(&Settings::default()) {
+        Value::Flag(flag) => format!(" [default: {flag}]"),
+        Value::Whole(n) => format!(" [default: {n}]"),
+        Value::Real(x) => format!(" [default: {x}]"),
+        Value::Choice(word) => format!(" [default: {word}]"),
+    };
+    let value_name = match parameter.kind {
+        Kind::Flag => "true|false".to_owned(),
+        Kind::Choice(words) => words.join("|"),
+        _ if parameter.unit == "s" => "TIME".to_owned(),
+        _ if parameter.name == "bounces" => "N|auto".to_owned(),
+        Kind::Whole { .. } => "N".to_owned(),
+        Kind::Real { .. } => "X".to_owned(),
+    };
+    Arg::new(parameter.name)
+        .long(parameter.name.replace('_', "-"))
+        .value_name(value_name)
+        .help(help)
+        .help_heading("Parameters of the solve")
+        .value_parser(ValueParser::new(move |text: &str| parse(parameter, text)))
+}
+
+impl Args for Parameters {
+    fn augment_args(command: Command) -> Command {
+        command.args(PARAMETERS.iter().map(option))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for Parameters {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let given = |parameter: &'static Parameter| {
+            let value = matches.get_one::<Value>(parameter.name)?;
+            Some((parameter, value.clone()))
+        };
+        Ok(Self(PARAMETERS.iter().filter_map(given).collect()))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn given(arguments: &[&str]) -> Result<Settings, clap::Error> {
+        let command = Parameters::augment_args(Command::new("relit"));
+        let all = std::iter::once(&"relit").chain(arguments);
+        let matches = command.try_get_matches_from(all)?;
+        Ok(Parameters::from_arg_matches(&matches)?.over(&Settings::default()))
+    }
+
+    #[test]
+    fn every_parameter_is_an_option_and_its_default_round_trips() {
+        for parameter in PARAMETERS {
+            let text = match parameter.get(&Settings::default()) {
+                Value::Flag(flag) => flag.to_string(),
+                Value::Whole(n) => n.to_string(),
+                Value::Real(x) => x.to_string(),
+                Value::Choice(word) => word,
+            };
+            let option = format!("--{}", parameter.name.replace('_', "-"));
+            let mut settings = given(&[&option, &text]).expect("the default is allowed");
+            settings.held_out = Settings::default().held_out;
+            assert_eq!(settings, Settings::default(), "{option}");
+        }
+    }
+
+    #[test]
+    fn times_bounces_and_held_out_frames_are_read_as_people_write_them() {
+        let time = |text| given(&["--time", text]).map(|s| s.time).ok();
+        assert_eq!(time("60s"), Some(60.0));
+        assert_eq!(time("1.5m"), Some(90.0));
+        assert_eq!(time("2h"), Some(7200.0));
+        assert_eq!(time("5"), Some(5.0));
+        for wrong in ["", "s", "5 parsecs", "-1", "nan", "inf"] {
+            assert_eq!(time(wrong), None, "{wrong}");
+        }
+        let bounces = |text| given(&["--bounces", text]).map(|s| s.bounces).ok();
+        assert_eq!(bounces("auto"), Some(0));
+        assert_eq!(bounces("3"), Some(3));
+        assert_eq!(bounces("many"), None);
+        let held_out = |arguments: &[&str]| given(arguments).map(|s| s.held_out).ok();
+        assert_eq!(held_out(&[]), Some(Settings::default().held_out));
+        assert_eq!(held_out(&["--hold-out", "0"]), Some(0.0));
+        assert_eq!(
+            held_out(&["--hold-out", "4"]),
+            Some(Settings::default().held_out)
+        );
+    }
+}

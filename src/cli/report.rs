@@ -1,0 +1,85 @@
+//! The table at the end of a solve.
+
+use crate::inverse::estimate::{Estimate, ObjectEstimate};
+use crate::inverse::solver::{Progress, Termination};
+use crate::scene::Scene;
+use glam::Vec3;
+use std::fmt::Write;
+
+/// Rows shown at most; the rest is in report.json.
+const ROWS: usize = 24;
+
+/// Objects by emission, then by pixels seen, with standard errors.
+pub fn objects(scene: &Scene, estimate: &Estimate) -> String {
+    let mut rows: Vec<(&str, &ObjectEstimate)> = scene
+        .objects
+        .iter()
+        .map(|o| o.name.as_str())
+        .zip(&estimate.objects)
+        .collect();
+    rows.sort_by(|(_, a), (_, b)| {
+        let brightness = |o: &ObjectEstimate| o.emission.element_sum();
+        brightness(b)
+            .total_cmp(&brightness(a))
+            .then(b.seen_pixels.cmp(&a.seen_pixels))
+    });
+    let shown = rows.len().min(ROWS);
+    let width = rows[..shown]
+        .iter()
+        .map(|(name, _)| name.chars().count())
+        .max()
+        .unwrap_or(0)
+        .max(6);
+    let mut text = format!(
+        "{:width$}  {:>24}  {:>9}  {:>17}  {:>7}  {:>8}\n",
+        "object", "emission", "±", "albedo", "±", "pixels"
+    );
+    for (name, object) in &rows[..shown] {
+        let [r, g, b] = object.emission.to_array();
+        let emission = format!("{r:.4} {g:.4} {b:.4}");
+        let [r, g, b] = object.albedo.to_array();
+        let albedo = if object.albedo_identifiable {
+            format!("{r:.3} {g:.3} {b:.3}")
+        } else {
+            "not determined".to_owned()
+        };
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "{name:width$}  {emission:>24}  {:>9}  {albedo:>17}  {:>7}  {:>8}",
+            error(object.emission_stderr, 4),
+            error(object.albedo_stderr, 3),
+            object.seen_pixels
+        );
+    }
+    if rows.len() > shown {
+        let _ = writeln!(text, "… and {} more in report.json", rows.len() - shown);
+    }
+    text
+}
+
+fn error(stderr: Vec3, digits: usize) -> String {
+    let worst = stderr.max_element();
+    if worst.is_finite() {
+        format!("{worst:.digits$}")
+    } else {
+        "?".to_owned()
+    }
+}
+
+/// One line on how the solve ended.
+pub fn ending(progress: &Progress, termination: Termination) -> String {
+    let why = match termination {
+        Termination::Converged => "converged",
+        Termination::Time => "the time is up",
+        Termination::Steps => "the steps are done",
+        Termination::Cancelled => "stopped",
+        Termination::Diverged => "diverged; this is the last finite estimate",
+    };
+    format!(
+        "{why} after {:.1} s, {} iterations, {:.1} million rays",
+        progress.seconds,
+        progress.iterations,
+        progress.rays as f64 * 1e-6
+    )
+}

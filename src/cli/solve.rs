@@ -1,0 +1,155 @@
+//! `relit solve`: headless, with progress, saving what there is when interrupted.
+
+use crate::cli::arguments::SolveOptions;
+use crate::cli::interrupt::Interrupt;
+use crate::cli::progress::Meter;
+use crate::cli::report;
+use crate::error::{Error, Result};
+use crate::inverse::estimate::Estimate;
+use crate::inverse::settings::Settings;
+use crate::inverse::solver::{self, Control, Observer, Problem, Progress};
+use crate::session::command::Source;
+use crate::session::open::open;
+use crate::session::save::{self, Results};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Time between two checkpoints written while solving.
+const CHECKPOINT: Duration = Duration::from_secs(10);
+
+/// Solves a source and writes the results.
+///
+/// # Errors
+/// The capture cannot be read or solved, or the results cannot be written.
+pub fn solve(source: &Source, options: &SolveOptions) -> Result<()> {
+    let started = Instant::now();
+    use_threads(options.threads)?;
+    let interrupt = Interrupt::listen()?;
+
+    // Take up earlier work.
+    let folder = options.out.clone().unwrap_or_else(|| default_out(source));
+    let earlier = if options.resume {
+        Some(save::load_checkpoint(&folder)?)
+    } else {
+        None
+    };
+    let base = earlier.as_ref().map(|e| e.settings.clone());
+    let settings = options.parameters.over(&base.unwrap_or_default());
+
+    // Read the capture.
+    let capture = Arc::new(open(source, &options.read.open())?);
+    let seconds_load = started.elapsed().as_secs_f64();
+    eprintln!("{}: {}", capture.name, capture.summary.join(", "));
+    for warning in &capture.warnings {
+        eprintln!("warning: {warning}");
+    }
+    let checkpoint = match &earlier {
+        Some(earlier) => {
+            earlier.estimate_for(&capture)?;
+            if earlier.checkpoint.is_none() {
+                eprintln!("warning: the earlier solve left nothing to go on from; starting over");
+            }
+            earlier.checkpoint.as_ref()
+        }
+        None => None,
+    };
+
+    // Solve.
+    let problem = Problem {
+        scene: capture.scene.clone(),
+        photographs: capture.photographs.clone(),
+    };
+    let mut watch = Watch {
+        results: Results {
+            capture: capture.clone(),
+            settings: settings.clone(),
+            estimate: Arc::default(),
+            progress: Arc::default(),
+            stopped_because: None,
+            checkpoint: checkpoint.cloned(),
+            started,
+            seconds_load,
+        },
+        folder: &folder,
+        settings: &settings,
+        interrupt: &interrupt,
+        meter: Meter::new(),
+        written: Instant::now(),
+    };
+    let solution = solver::solve(&problem, &settings, checkpoint, &mut watch);
+    watch.meter.finish();
+    let solution = solution?;
+
+    // Write.
+    if interrupt.asked() {
+        eprintln!("interrupted: saving what there is (again Ctrl-C to abort)");
+    }
+    let results = Results {
+        estimate: Arc::new(solution.estimate),
+        progress: Arc::new(solution.progress),
+        stopped_because: Some(solution.termination),
+        checkpoint: solution.checkpoint,
+        ..watch.results
+    };
+    save::write(&folder, &results)?;
+    println!("{}", report::objects(&capture.scene, &results.estimate));
+    println!(
+        "{}",
+        report::ending(&results.progress, solution.termination)
+    );
+    println!("results in {}", folder.display());
+    Ok(())
+}
+
+/// Listens to the solver: shows progress, writes checkpoints, hears Ctrl-C.
+struct Watch<'a> {
+    results: Results,
+    folder: &'a Path,
+    settings: &'a Settings,
+    interrupt: &'a Interrupt,
+    meter: Meter,
+    written: Instant,
+}
+
+impl Observer for Watch<'_> {
+    fn observe(&mut self, progress: &Progress, estimate: &Estimate) -> Control {
+        self.meter.show(progress, self.settings);
+        if self.written.elapsed() >= CHECKPOINT && !estimate.objects.is_empty() {
+            self.results.estimate = Arc::new(estimate.clone());
+            self.results.progress = Arc::new(progress.clone());
+            // The solve goes on without a checkpoint; the results are written in any case.
+            if let Err(error) = save::write_checkpoint(self.folder, &self.results) {
+                self.meter.say(&format!("warning: {error}"));
+            }
+            self.written = Instant::now();
+        }
+        if self.interrupt.asked() {
+            return Control::Stop;
+        }
+        Control::Continue
+    }
+}
+
+/// Sets the number of worker threads for the whole process.
+pub fn use_threads(threads: Option<u16>) -> Result<()> {
+    let Some(threads) = threads else {
+        return Ok(());
+    };
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(usize::from(threads))
+        .build_global()
+        .map_err(|error| Error::new("--threads", error, "name fewer threads"))
+}
+
+/// relit-out/<capture>.
+fn default_out(source: &Source) -> PathBuf {
+    let name = match source {
+        Source::BuiltInRoom => "built-in-room".into(),
+        Source::Folder(folder) => std::path::absolute(folder)
+            .ok()
+            .and_then(|path| Some(path.file_name()?.to_owned()))
+            .unwrap_or_else(|| "capture".into()),
+    };
+    Path::new("relit-out").join(name)
+}
