@@ -4,6 +4,7 @@ use crate::cli::parameters::Parameters;
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
 use crate::session::command::OpenOptions;
+use crate::session::save::pictures::Frames;
 use clap::{Args, Parser, Subcommand};
 use glam::DVec3;
 use std::path::PathBuf;
@@ -70,15 +71,6 @@ pub struct ReadOptions {
     /// Segments that a mesh without objects is cut into, about
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub segments: Option<u64>,
-}
-
-/// Which frames get pictures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Frames {
-    /// Every frame, at the photograph's size.
-    All,
-    /// At most so many, evenly spaced, of limited size.
-    AtMost(usize),
 }
 
 impl SolveOptions {

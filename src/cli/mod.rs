@@ -25,7 +25,8 @@ pub fn run(window: Option<Window>) -> i32 {
         Ok(arguments) => act(arguments, window),
         Err(error) => match error.kind() {
             ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
-                print!("{}", error.render().ansi());
+                // Help that cannot be printed has no reader.
+                let _ = error.print();
                 return 0;
             }
             _ => Err(misuse(&error)),

@@ -68,6 +68,7 @@ pub fn solve(source: &Source, options: &SolveOptions) -> Result<()> {
             progress: Arc::default(),
             stopped_because: None,
             checkpoint: checkpoint.cloned(),
+            views: options.views.unwrap_or_default(),
             started,
             seconds_load,
         },

@@ -2,6 +2,7 @@
 
 pub mod command;
 pub mod inbox;
+pub mod light;
 pub mod open;
 pub mod rates;
 pub mod save;

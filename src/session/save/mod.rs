@@ -5,17 +5,21 @@ pub mod maps;
 mod memory;
 pub mod named;
 pub mod objects;
+pub mod pictures;
 pub mod report;
 pub mod staging;
 
 use crate::error::{Error, Result};
+use crate::export::plot::loss_plot;
+use crate::export::table::{Cell, Table};
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
-use crate::inverse::solver::{Checkpoint, Progress, Termination};
+use crate::inverse::solver::{Checkpoint, LossPoint, Progress, Termination};
 use crate::session::command::{OpenOptions, Source};
 use crate::session::snapshot::OpenCapture;
 use estimate::EstimateFile;
 use maps::Maps;
+use pictures::Frames;
 use report::{Report, Seconds};
 use serde::{Deserialize, Serialize};
 use staging::Staging;
@@ -46,6 +50,8 @@ pub struct Results {
     pub stopped_because: Option<Termination>,
     /// Where to go on from.
     pub checkpoint: Option<Checkpoint>,
+    /// Which frames get pictures.
+    pub views: Frames,
     /// When the work began.
     pub started: Instant,
     /// Seconds spent reading the capture.
@@ -67,6 +73,10 @@ struct CheckpointFile {
 pub fn write(folder: &Path, results: &Results) -> Result<()> {
     let started = Instant::now();
     let mut staging = Staging::new(folder)?;
+    pictures::write(&mut staging, results)?;
+    losses(&results.progress.losses).write(&staging.file("loss.csv")?)?;
+    loss_plot(&results.progress.losses, &results.progress.stages)
+        .write(&staging.file("loss.png")?)?;
     let (file, maps) = results.file(folder)?;
     if let (Some(name), Some(bytes)) = (&file.maps, &maps) {
         staging.write(name, bytes)?;
@@ -125,9 +135,25 @@ impl Results {
     }
 }
 
+/// The loss curve as a table: seconds, iterations, loss in the fit and on held-out pixels.
+fn losses(points: &[LossPoint]) -> Table {
+    let mut table = Table::new(&["seconds", "iteration", "train", "held_out"]);
+    let cell = |value: Option<f64>| value.map_or(Cell::Empty, Cell::from);
+    for point in points {
+        table.row(&[
+            Cell::from(point.seconds),
+            Cell::from(point.iteration),
+            cell(point.train),
+            cell(point.held_out),
+        ]);
+    }
+    table
+}
+
 /// Files of an earlier run that a new one replaces: those that it may not write again under the same name.
 fn earlier(folder: &Path) -> Vec<PathBuf> {
-    let mut names = vec![PathBuf::from(CHECKPOINT)];
+    let mut names = pictures::earlier(folder);
+    names.push(PathBuf::from(CHECKPOINT));
     let list = |path: &Path| {
         let entries = fs::read_dir(path).into_iter().flatten().flatten();
         entries.filter_map(|entry| entry.file_name().into_string().ok())

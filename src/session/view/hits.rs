@@ -80,6 +80,19 @@ impl Hits {
         })
     }
 
+    /// How many pixels of all photographs saw what each pixel sees: its texel, else its object.
+    pub fn seen(&self, scene: &Scene, estimate: &Estimate) -> Picture {
+        self.paint(scene, |object, hit| {
+            let texels = estimate.texels.as_ref();
+            let texel = texels
+                .filter(|texels| texels.textured.get(object) == Some(&true))
+                .and_then(|t| t.seen.get(t.colors.layout.texel(hit) as usize))
+                .map(|&n| n as f32);
+            let whole = estimate.objects.get(object).map(|o| o.seen_pixels as f32);
+            Vec3::splat(texel.or(whole).unwrap_or(0.0))
+        })
+    }
+
     fn paint(&self, scene: &Scene, color: impl Fn(usize, &Hit) -> Vec3 + Sync) -> Picture {
         let pixels = self
             .hits

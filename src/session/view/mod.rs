@@ -1,6 +1,6 @@
 //! Pictures of the requested view, drawn a slice at a time between other work.
 
-mod hits;
+pub mod hits;
 pub mod progressive;
 pub mod sized;
 mod target;

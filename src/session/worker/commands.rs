@@ -1,6 +1,7 @@
 //! What each command does.
 
 use crate::session::command::{Command, ExportRequest};
+use crate::session::save::pictures::Frames;
 use crate::session::save::{self, Results};
 use crate::session::snapshot::{Level, Phase};
 use crate::session::worker::state::{Next, Worker};
@@ -64,6 +65,7 @@ impl Worker {
                 _ => None,
             },
             checkpoint: self.checkpoint.clone(),
+            views: Frames::default(),
             started: self.started,
             seconds_load: self.seconds_load,
         })

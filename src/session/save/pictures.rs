@@ -1,0 +1,252 @@
+//! Pictures of each frame beside the results: what the estimate says that the camera sees.
+
+use crate::capture::photograph::Photograph;
+use crate::error::{Error, Result};
+use crate::export::exr::{Precision, write_rgb, write_scalar};
+use crate::export::falsecolor::{write_magnitude, write_signed};
+use crate::export::picture::{percentile_exposure, write_png};
+use crate::math::picture::Picture;
+use crate::scene::camera::Camera;
+use crate::session::light::path_options;
+use crate::session::save::Results;
+use crate::session::save::staging::Staging;
+use crate::session::view::hits::Hits;
+use crate::session::view::sized::{box_filter, shrink};
+use crate::transport::film::Film;
+use crate::transport::lit::Lit;
+use glam::Vec3;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Folder of the pictures within the results.
+pub const FOLDER: &str = "views";
+/// What is written of each frame.
+pub const KINDS: [&str; 6] = ["render", "albedo", "emission", "error", "stderr", "seen"];
+
+/// Long side of the pictures where their number is limited.
+const LONG_SIDE: u32 = 1024;
+/// Paths over all pictures, shared out to their pixels …
+const PATHS: u64 = 8_000_000;
+/// … within these samples a pixel.
+const SAMPLES: (u64, u64) = (4, 64);
+
+/// Which frames get pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Frames {
+    /// Every frame, at the photograph's size.
+    All,
+    /// At most so many, evenly spaced, of limited size.
+    AtMost(usize),
+}
+
+impl Default for Frames {
+    fn default() -> Self {
+        Self::AtMost(16)
+    }
+}
+
+impl Frames {
+    /// The chosen frames of `count`.
+    pub fn chosen(self, count: usize) -> Vec<usize> {
+        match self {
+            Self::AtMost(most) if most < count => (0..most).map(|i| i * count / most).collect(),
+            _ => (0..count).collect(),
+        }
+    }
+
+    fn long_side(self) -> u32 {
+        match self {
+            Self::All => u32::MAX,
+            Self::AtMost(_) => LONG_SIDE,
+        }
+    }
+}
+
+/// Renders and writes the pictures of the chosen frames, `views/NNN.KIND.{exr,png}`.
+///
+/// # Errors
+/// A photograph cannot be read again, or a file cannot be written.
+pub fn write(staging: &mut Staging, results: &Results) -> Result<()> {
+    let capture = &results.capture;
+    let chosen = results.views.chosen(capture.scene.cameras.len());
+    let cameras: Vec<(usize, Camera)> = chosen
+        .into_iter()
+        .filter_map(|index| Some((index, capture.full_camera(index)?)))
+        .map(|(index, camera)| (index, shrink(&camera, results.views.long_side())))
+        .collect();
+    let pixels: u64 = cameras
+        .iter()
+        .map(|(_, c)| u64::from(c.intrinsics.width) * u64::from(c.intrinsics.height))
+        .sum();
+    let samples = (PATHS / pixels.max(1)).clamp(SAMPLES.0, SAMPLES.1) as u32;
+    let lit = results.estimate.lit(&capture.scene);
+    for (index, camera) in &cameras {
+        frame(staging, results, &lit, *index, camera, samples)?;
+    }
+    Ok(())
+}
+
+fn frame(
+    staging: &mut Staging,
+    results: &Results,
+    lit: &Lit,
+    index: usize,
+    camera: &Camera,
+    samples: u32,
+) -> Result<()> {
+    let (capture, estimate) = (&results.capture, &results.estimate);
+    let scene = &capture.scene;
+    let (photograph, shown_at) = capture.full_photograph(index, camera)?;
+
+    // The render in the photograph's values, so that the two can be subtracted.
+    let mut film = Film::new(camera);
+    let options = path_options(&results.settings);
+    film.add(
+        lit,
+        camera,
+        &options,
+        results.settings.seed,
+        index as u64,
+        samples,
+    );
+    let exposure = estimate
+        .exposures
+        .as_ref()
+        .and_then(|e| e.get(index).copied())
+        .unwrap_or(Vec3::ONE);
+    let radiance = film.mean();
+    let render = Picture {
+        pixels: radiance.iter().map(|&r| r * exposure).collect(),
+        ..photograph.clone()
+    };
+    let error = Picture {
+        pixels: (render.pixels.iter().zip(&photograph.pixels))
+            .map(|(r, p)| *r - *p)
+            .collect(),
+        ..photograph
+    };
+    let hits = Hits::new(scene, camera);
+    let albedo = hits.albedo(scene, &lit.materials);
+    let emission = hits.emission(scene, camera, estimate);
+    let stderr = hits.stderr(scene, estimate);
+    let seen = hits.seen(scene, estimate);
+
+    let mut path =
+        |kind: &str, ending: &str| staging.file(format!("{FOLDER}/{index:03}.{kind}.{ending}"));
+    for (kind, picture) in [
+        ("render", &render),
+        ("albedo", &albedo),
+        ("emission", &emission),
+        ("error", &error),
+        ("stderr", &stderr),
+    ] {
+        write_rgb(&path(kind, "exr")?, picture, Precision::Float)?;
+    }
+    write_png(&path("render", "png")?, &render, shown_at)?;
+    write_png(&path("albedo", "png")?, &albedo, 1.0)?;
+    let emission_at = percentile_exposure(&emission.pixels);
+    write_png(&path("emission", "png")?, &emission, emission_at)?;
+    write_signed(&path("error", "png")?, &error, "radiance")?;
+    write_magnitude(&path("stderr", "png")?, &stderr, "albedo")?;
+    write_scalar(
+        &path("seen", "exr")?,
+        seen.width,
+        seen.height,
+        &channel(&seen),
+    )?;
+    write_magnitude(&path("seen", "png")?, &seen, "pixels")
+}
+
+fn channel(picture: &Picture) -> Vec<f32> {
+    picture.pixels.iter().map(|p| p.x).collect()
+}
+
+impl crate::session::snapshot::OpenCapture {
+    /// A frame's camera at the size of its photograph's file.
+    pub fn full_camera(&self, index: usize) -> Option<Camera> {
+        let frame = self.capture.frames.get(index)?;
+        Some(Camera::new(
+            &frame.intrinsics,
+            &frame.pose,
+            self.scene.origin,
+        ))
+    }
+
+    /// A frame's photograph box-filtered to a camera's size, in its own values, and the exposure at which it is shown.
+    ///
+    /// # Errors
+    /// The file cannot be read again.
+    pub fn full_photograph(&self, index: usize, camera: &Camera) -> Result<(Picture, f32)> {
+        let frame = self.capture.frames.get(index).ok_or_else(|| {
+            Error::usage(
+                "frame",
+                format!(
+                    "{index} does not exist; the capture has {}",
+                    self.capture.frames.len()
+                ),
+                "count from 0",
+            )
+        })?;
+        let photograph: &Photograph = &*frame.load()?;
+        let picture = box_filter(
+            &Picture {
+                width: photograph.width,
+                height: photograph.height,
+                pixels: photograph.pixels.clone(),
+            },
+            camera.intrinsics.width,
+            camera.intrinsics.height,
+        );
+        let shown_at = if photograph.saturation.is_finite() {
+            photograph.saturation.recip()
+        } else {
+            percentile_exposure(&picture.pixels)
+        };
+        Ok((picture, shown_at))
+    }
+}
+
+/// The pictures of an earlier run in a folder of results.
+pub fn earlier(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder.join(FOLDER)).into_iter().flatten();
+    entries
+        .flatten()
+        .filter_map(|entry| entry.file_name().into_string().ok())
+        .filter(|name| ours(name))
+        .map(|name| Path::new(FOLDER).join(name))
+        .collect()
+}
+
+/// Whether a file is named NNN.KIND.exr or NNN.KIND.png.
+fn ours(name: &str) -> bool {
+    let parts: Vec<&str> = name.split('.').collect();
+    matches!(parts[..], [number, kind, "exr" | "png"]
+        if number.len() >= 3 && number.bytes().all(|b| b.is_ascii_digit()) && KINDS.contains(&kind))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_spread_evenly_and_never_more_than_there_are() {
+        assert_eq!(Frames::AtMost(3).chosen(7), [0, 2, 4]);
+        assert_eq!(Frames::AtMost(16).chosen(5), [0, 1, 2, 3, 4]);
+        assert_eq!(Frames::AtMost(0).chosen(5), [0; 0]);
+        assert_eq!(Frames::All.chosen(3), [0, 1, 2]);
+    }
+
+    #[test]
+    fn only_our_own_pictures_count_as_earlier_ones() {
+        assert!(ours("000.render.exr") && ours("1234.seen.png"));
+        for other in [
+            "notes.txt",
+            "000.render.jpg",
+            "00.render.png",
+            "abc.render.png",
+            "000.mine.png",
+        ] {
+            assert!(!ours(other), "{other}");
+        }
+    }
+}
