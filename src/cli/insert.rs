@@ -1,0 +1,225 @@
+//! `relit insert`: objects into a photograph, naively and by differential rendering.
+
+use crate::cli::arguments::triple;
+use crate::cli::saved::{Loaded, SavedOptions};
+use crate::compose::backdrop::Backdrop;
+use crate::compose::placement::{PlacedObject, Placement};
+use crate::compose::write::write_insertion;
+use crate::error::{Error, Result};
+use crate::session::insertion::{Inserted, Library};
+use crate::session::light::path_options;
+use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
+use glam::DVec3;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// `relit insert`.
+#[derive(Debug, Args)]
+pub struct InsertArguments {
+    #[command(flatten)]
+    saved: SavedOptions,
+    /// The photograph, counted from 0
+    #[arg(long, value_name = "N")]
+    frame: usize,
+    #[command(flatten)]
+    objects: Objects,
+    /// Samples a pixel
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
+    spp: u32,
+    /// Beginning of the names of the files to write
+    #[arg(long, value_name = "PREFIX")]
+    out: PathBuf,
+}
+
+/// Inserts objects and writes the composites.
+///
+/// # Errors
+/// The results or an object cannot be read, the frame does not exist, or a file cannot be written.
+pub fn insert(arguments: &InsertArguments) -> Result<()> {
+    let Loaded {
+        saved,
+        capture,
+        estimate,
+    } = arguments.saved.load()?;
+    let camera = capture.full_camera(arguments.frame)?;
+    let photograph = capture.capture.frames[arguments.frame].load()?;
+    let exposure = estimate.exposure(arguments.frame);
+    let backdrop = Backdrop::new(arguments.frame, &camera, &photograph, exposure)?;
+
+    let mut library = Library::default();
+    let mut objects = Vec::new();
+    for placement in &arguments.objects.0 {
+        let model = library.model(&placement.file)?;
+        for warning in &model.warnings {
+            eprintln!("warning: {warning}");
+        }
+        objects.push(Arc::new(PlacedObject::new(
+            model,
+            placement,
+            &capture.scene,
+        )?));
+    }
+    let Inserted {
+        mut composite,
+        naive,
+        naive_estimate,
+    } = library.insert(
+        &capture,
+        &estimate,
+        backdrop,
+        objects,
+        &path_options(&saved.settings),
+        saved.settings.seed,
+    );
+    composite.pass(arguments.spp);
+    for path in write_insertion(&arguments.out, &composite, &naive, &naive_estimate)? {
+        println!("{}", path.display());
+    }
+    Ok(())
+}
+
+/// The objects with their placements, in the order of the command line.
+#[derive(Debug, Clone, Default)]
+struct Objects(Vec<Placement>);
+
+impl Args for Objects {
+    fn augment_args(command: Command) -> Command {
+        let option = |name: &'static str, value: &'static str, help: &'static str| {
+            Arg::new(name)
+                .long(name)
+                .value_name(value)
+                .help(help)
+                .action(ArgAction::Append)
+                .help_heading("Objects; each option is for the --object before it")
+        };
+        command
+            .arg(
+                option("object", "FILE", "OBJ or GLB file; may repeat")
+                    .required(true)
+                    .value_parser(clap::value_parser!(PathBuf)),
+            )
+            .arg(
+                option("at", "X,Y,Z", "Where the middle of its base stands, in the capture's coordinates")
+                    .allow_hyphen_values(true)
+                    .value_parser(triple),
+            )
+            .arg(
+                option("as-modelled", "", "Take the file's coordinates for the capture's")
+                    .num_args(0)
+                    .default_missing_value("true")
+                    .value_parser(clap::value_parser!(bool)),
+            )
+            .arg(
+                option("scale", "S", "Factor on the file's size [default: 1]")
+                    .value_parser(clap::value_parser!(f64)),
+            )
+            .arg(
+                option("rotate", "DEG", "Turn about the up axis, counter-clockwise from above [default: 0]")
+                    .allow_hyphen_values(true)
+                    .value_parser(clap::value_parser!(f64)),
+            )
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+/// The values of an option with their places on the command line.
+fn given<T: Clone + Send + Sync + 'static>(matches: &ArgMatches, name: &str) -> Vec<(usize, T)> {
+    let values = matches.get_many::<T>(name).into_iter().flatten().cloned();
+    let places = matches.indices_of(name).into_iter().flatten();
+    places.zip(values).collect()
+}
+
+impl FromArgMatches for Objects {
+    fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
+        let files = given::<PathBuf>(matches, "object");
+        let wrong = |problem: String| clap::Error::raw(clap::error::ErrorKind::ArgumentConflict, problem);
+        // The object that an option at a place on the command line belongs to.
+        let owner = |place: usize, name: &str| {
+            let before = files.iter().filter(|(at, _)| *at < place).count();
+            before
+                .checked_sub(1)
+                .ok_or_else(|| wrong(format!("--{name} stands before any --object")))
+        };
+        let mut placements: Vec<(Placement, bool)> = files
+            .iter()
+            .map(|(_, file)| {
+                let placement = Placement {
+                    file: file.clone(),
+                    at: None,
+                    scale: 1.0,
+                    rotate: 0.0,
+                };
+                (placement, false)
+            })
+            .collect();
+        for (place, at) in given::<DVec3>(matches, "at") {
+            placements[owner(place, "at")?].0.at = Some(at);
+        }
+        for (place, flag) in given::<bool>(matches, "as-modelled") {
+            placements[owner(place, "as-modelled")?].1 = flag;
+        }
+        for (place, scale) in given::<f64>(matches, "scale") {
+            placements[owner(place, "scale")?].0.scale = scale;
+        }
+        for (place, rotate) in given::<f64>(matches, "rotate") {
+            placements[owner(place, "rotate")?].0.rotate = rotate;
+        }
+        for (placement, as_modelled) in &placements {
+            if placement.at.is_some() == *as_modelled {
+                return Err(wrong(format!(
+                    "--object {} needs either --at x,y,z or --as-modelled",
+                    placement.file.display()
+                )));
+            }
+        }
+        Ok(Self(placements.into_iter().map(|(p, _)| p).collect()))
+    }
+
+    fn update_from_arg_matches(
+        &mut self,
+        matches: &ArgMatches,
+    ) -> std::result::Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(arguments: &[&str]) -> std::result::Result<Vec<Placement>, String> {
+        let command = Objects::augment_args(Command::new("insert"));
+        let all = std::iter::once(&"insert").chain(arguments);
+        let matches = command.try_get_matches_from(all).map_err(|e| e.to_string())?;
+        Objects::from_arg_matches(&matches)
+            .map(|objects| objects.0)
+            .map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn each_option_belongs_to_the_object_before_it() {
+        let parsed = parse(&[
+            "--object", "a.obj", "--at", "-1,0,2", "--rotate", "-90", "--object", "b.glb", "--scale",
+            "0.01", "--as-modelled",
+        ])
+        .expect("valid");
+        assert_eq!(parsed.len(), 2);
+        assert_eq!(parsed[0].at, Some(DVec3::new(-1.0, 0.0, 2.0)));
+        assert_eq!((parsed[0].scale, parsed[0].rotate), (1.0, -90.0));
+        assert_eq!(parsed[1].at, None);
+        assert_eq!((parsed[1].scale, parsed[1].rotate), (0.01, 0.0));
+    }
+
+    #[test]
+    fn an_object_without_a_place_and_an_option_without_an_object_are_refused() {
+        assert!(parse(&["--object", "a.obj"]).is_err_and(|e| e.contains("a.obj needs either")));
+        let both = parse(&["--object", "a.obj", "--as-modelled", "--at", "0,0,0"]);
+        assert!(both.is_err_and(|e| e.contains("needs either")));
+        let early = parse(&["--scale", "2", "--object", "a.obj", "--as-modelled"]);
+        assert!(early.is_err_and(|e| e.contains("before any")));
+    }
+}

@@ -1,0 +1,167 @@
+//! `relit render`: a picture of the room in its estimated light, from a photograph's camera or any other.
+
+use crate::capture::camera::{Intrinsics, Pose};
+use crate::cli::saved::{Loaded, SavedOptions};
+use crate::error::{Error, Result};
+use crate::export::exr::{Precision, write_rgb};
+use crate::export::picture::{percentile_exposure, write_png};
+use crate::math::picture::Picture;
+use crate::scene::camera::Camera;
+use crate::session::light::path_options;
+use crate::transport::film::Film;
+use clap::Args;
+use glam::{DMat3, DMat4, DVec3};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// `relit render`.
+#[derive(Debug, Args)]
+pub struct RenderArguments {
+    #[command(flatten)]
+    saved: SavedOptions,
+    /// The camera of a photograph, counted from 0
+    #[arg(long, value_name = "N", required_unless_present = "camera", conflicts_with = "camera")]
+    frame: Option<usize>,
+    /// A camera of its own: JSON with w, h, fl_x, fl_y, cx, cy and transform_matrix as in transforms.json
+    #[arg(long, value_name = "FILE")]
+    camera: Option<PathBuf>,
+    /// Samples a pixel
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
+    spp: u32,
+    /// Picture to write, .exr (radiance) or .png
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+/// How a picture is written, by its name's ending.
+enum Format {
+    Exr,
+    Png,
+}
+
+/// Renders one picture.
+///
+/// # Errors
+/// The results, the camera or the picture cannot be read or written.
+pub fn render(arguments: &RenderArguments) -> Result<()> {
+    let ending = arguments.out.extension().and_then(|e| e.to_str());
+    let format = match ending.map(str::to_ascii_lowercase).as_deref() {
+        Some("exr") => Format::Exr,
+        Some("png") => Format::Png,
+        _ => {
+            return Err(Error::usage(
+                arguments.out.display(),
+                "is neither .exr nor .png",
+                "choose one of these",
+            ));
+        }
+    };
+    let Loaded {
+        saved,
+        capture,
+        estimate,
+    } = arguments.saved.load()?;
+    let (camera, frame) = match (arguments.frame, &arguments.camera) {
+        (_, Some(path)) => (read_camera(path, capture.scene.origin)?, 0),
+        (frame, None) => {
+            let frame = frame.unwrap_or(0);
+            (capture.full_camera(frame)?, frame)
+        }
+    };
+    let lit = estimate.lit(&capture.scene);
+    let mut film = Film::new(&camera);
+    film.add(
+        &lit,
+        &camera,
+        &path_options(&saved.settings),
+        saved.settings.seed,
+        frame as u64,
+        arguments.spp,
+    );
+    let picture = Picture {
+        width: film.width,
+        height: film.height,
+        pixels: film.mean(),
+    };
+    match format {
+        Format::Exr => write_rgb(&arguments.out, &picture, Precision::Float),
+        Format::Png => write_png(
+            &arguments.out,
+            &picture,
+            percentile_exposure(&picture.pixels),
+        ),
+    }
+}
+
+/// The fields of one frame of transforms.json.
+#[derive(Debug, Deserialize)]
+struct CameraFile {
+    w: u32,
+    h: u32,
+    fl_x: f64,
+    fl_y: f64,
+    cx: f64,
+    cy: f64,
+    #[serde(default)]
+    k1: f64,
+    #[serde(default)]
+    k2: f64,
+    #[serde(default)]
+    p1: f64,
+    #[serde(default)]
+    p2: f64,
+    transform_matrix: [[f64; 4]; 4],
+}
+
+/// Largest picture in pixels.
+const MOST_PIXELS: u64 = 1 << 28;
+
+fn read_camera(path: &Path, origin: DVec3) -> Result<Camera> {
+    let bytes = std::fs::read(path).map_err(|error| Error::io(path, &error))?;
+    let file: CameraFile = serde_json::from_slice(&bytes).map_err(|error| {
+        Error::file(
+            path,
+            error,
+            "write w, h, fl_x, fl_y, cx, cy and transform_matrix as in transforms.json",
+        )
+    })?;
+    let field = |name: &str, problem: &str, remedy: &str| {
+        Err(Error::new(
+            format!("{}: {name}", path.display()),
+            problem,
+            remedy,
+        ))
+    };
+    let pixels = u64::from(file.w) * u64::from(file.h);
+    if pixels == 0 || pixels > MOST_PIXELS {
+        return field("w, h", "no size for a picture", "give sizes from 1 to 16384");
+    }
+    if !(file.fl_x > 0.0 && file.fl_y > 0.0) {
+        return field("fl_x, fl_y", "no focal length", "give lengths in pixels");
+    }
+    let matrix = DMat4::from_cols_array_2d(&file.transform_matrix).transpose();
+    let rotation = DMat3::from_mat4(matrix);
+    let drift = rotation.transpose() * rotation - DMat3::IDENTITY;
+    let rigid = drift.to_cols_array().iter().all(|v| v.abs() < 1e-3) && rotation.determinant() > 0.0;
+    if !rigid || !matrix.is_finite() {
+        return field(
+            "transform_matrix",
+            "is no rigid motion",
+            "give camera-to-world with x right, y up, looking down -z",
+        );
+    }
+    let intrinsics = Intrinsics {
+        width: file.w,
+        height: file.h,
+        fx: file.fl_x,
+        fy: file.fl_y,
+        cx: file.cx,
+        cy: file.cy,
+        distortion: [file.k1, file.k2, file.p1, file.p2],
+    };
+    let pose = Pose {
+        rotation,
+        center: matrix.w_axis.truncate(),
+    };
+    Ok(Camera::new(&intrinsics, &pose, origin))
+}

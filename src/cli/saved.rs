@@ -1,0 +1,53 @@
+//! Commands on the results of an earlier solve.
+
+use crate::error::Result;
+use crate::inverse::estimate::Estimate;
+use crate::session::command::Source;
+use crate::session::open::open;
+use crate::session::save::{self, Saved};
+use crate::session::snapshot::OpenCapture;
+use clap::Args;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Which results.
+#[derive(Debug, Args)]
+pub struct SavedOptions {
+    /// Folder that relit solve wrote
+    pub dir: PathBuf,
+    /// Where the capture is now, if it was moved
+    #[arg(long, value_name = "DIR")]
+    pub capture: Option<PathBuf>,
+    /// Threads to work with [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+}
+
+/// Results with the capture that they belong to.
+pub struct Loaded {
+    /// What the folder holds.
+    pub saved: Saved,
+    /// The capture, read again.
+    pub capture: Arc<OpenCapture>,
+    /// The estimate of its objects.
+    pub estimate: Estimate,
+}
+
+impl SavedOptions {
+    /// Reads both.
+    ///
+    /// # Errors
+    /// One of them is missing or broken, or they do not belong together.
+    pub fn load(&self) -> Result<Loaded> {
+        crate::cli::solve::use_threads(self.threads)?;
+        let saved = save::load(&self.dir)?;
+        let moved = self.capture.clone().map(Source::Folder);
+        let capture = open(moved.as_ref().unwrap_or(&saved.source), &saved.options)?;
+        let estimate = saved.estimate_for(&capture)?;
+        Ok(Loaded {
+            saved,
+            capture: Arc::new(capture),
+            estimate,
+        })
+    }
+}
