@@ -1,7 +1,9 @@
 //! The commands and their options.
 
+use crate::cli::edit::EditArguments;
+use crate::cli::insert::InsertArguments;
 use crate::cli::parameters::Parameters;
-use crate::error::{Error, Result};
+use crate::cli::render::RenderArguments;
 use crate::inverse::settings::Settings;
 use crate::session::command::OpenOptions;
 use crate::session::save::pictures::Frames;
@@ -30,6 +32,12 @@ pub struct Arguments {
 pub enum Action {
     /// Solve a capture without a window and write the results
     Solve(SolveArguments),
+    /// Render the room in its estimated light
+    Render(RenderArguments),
+    /// Put objects into a photograph
+    Insert(InsertArguments),
+    /// Switch lamps, recolour walls, and render the result
+    Edit(EditArguments),
 }
 
 /// `relit solve`.
@@ -90,7 +98,8 @@ impl ReadOptions {
     }
 }
 
-fn frames(text: &str) -> std::result::Result<Frames, String> {
+/// Which frames get pictures: `all`, `none` or how many.
+pub fn frames(text: &str) -> std::result::Result<Frames, String> {
     match text {
         "all" => Ok(Frames::All),
         "none" => Ok(Frames::AtMost(0)),
@@ -112,14 +121,4 @@ pub fn triple(text: &str) -> std::result::Result<DVec3, String> {
         [x, y, z] => Ok(DVec3::new(x, y, z)),
         _ => Err("three numbers are wanted, e.g. 0,1,0".to_owned()),
     }
-}
-
-/// A colour for a named object, `NAME=r,g,b`.
-pub fn named_color(text: &str) -> Result<(String, DVec3)> {
-    let wrong = |problem: String| Error::usage(text, problem, "write NAME=r,g,b");
-    let (name, color) = text
-        .rsplit_once('=')
-        .ok_or_else(|| wrong("there is no = in it".to_owned()))?;
-    let color = triple(color).map_err(wrong)?;
-    Ok((name.to_owned(), color))
 }

@@ -42,7 +42,7 @@ pub fn insert(arguments: &InsertArguments) -> Result<()> {
         estimate,
     } = arguments.saved.load()?;
     let camera = capture.full_camera(arguments.frame)?;
-    let photograph = capture.capture.frames[arguments.frame].load()?;
+    let photograph = capture.full_photograph(arguments.frame)?;
     let exposure = estimate.exposure(arguments.frame);
     let backdrop = Backdrop::new(arguments.frame, &camera, &photograph, exposure)?;
 
@@ -99,24 +99,36 @@ impl Args for Objects {
                     .value_parser(clap::value_parser!(PathBuf)),
             )
             .arg(
-                option("at", "X,Y,Z", "Where the middle of its base stands, in the capture's coordinates")
-                    .allow_hyphen_values(true)
-                    .value_parser(triple),
+                option(
+                    "at",
+                    "X,Y,Z",
+                    "Where the middle of its base stands, in the capture's coordinates",
+                )
+                .allow_hyphen_values(true)
+                .value_parser(triple),
             )
             .arg(
-                option("as-modelled", "", "Take the file's coordinates for the capture's")
-                    .num_args(0)
-                    .default_missing_value("true")
-                    .value_parser(clap::value_parser!(bool)),
+                option(
+                    "as-modelled",
+                    "",
+                    "Take the file's coordinates for the capture's",
+                )
+                .num_args(0)
+                .default_missing_value("true")
+                .value_parser(clap::value_parser!(bool)),
             )
             .arg(
                 option("scale", "S", "Factor on the file's size [default: 1]")
                     .value_parser(clap::value_parser!(f64)),
             )
             .arg(
-                option("rotate", "DEG", "Turn about the up axis, counter-clockwise from above [default: 0]")
-                    .allow_hyphen_values(true)
-                    .value_parser(clap::value_parser!(f64)),
+                option(
+                    "rotate",
+                    "DEG",
+                    "Turn about the up axis, counter-clockwise from above [default: 0]",
+                )
+                .allow_hyphen_values(true)
+                .value_parser(clap::value_parser!(f64)),
             )
     }
 
@@ -135,7 +147,8 @@ fn given<T: Clone + Send + Sync + 'static>(matches: &ArgMatches, name: &str) -> 
 impl FromArgMatches for Objects {
     fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
         let files = given::<PathBuf>(matches, "object");
-        let wrong = |problem: String| clap::Error::raw(clap::error::ErrorKind::ArgumentConflict, problem);
+        let wrong =
+            |problem: String| clap::Error::raw(clap::error::ErrorKind::ArgumentConflict, problem);
         // The object that an option at a place on the command line belongs to.
         let owner = |place: usize, name: &str| {
             let before = files.iter().filter(|(at, _)| *at < place).count();
@@ -194,7 +207,9 @@ mod tests {
     fn parse(arguments: &[&str]) -> std::result::Result<Vec<Placement>, String> {
         let command = Objects::augment_args(Command::new("insert"));
         let all = std::iter::once(&"insert").chain(arguments);
-        let matches = command.try_get_matches_from(all).map_err(|e| e.to_string())?;
+        let matches = command
+            .try_get_matches_from(all)
+            .map_err(|e| e.to_string())?;
         Objects::from_arg_matches(&matches)
             .map(|objects| objects.0)
             .map_err(|e| e.to_string())
@@ -203,8 +218,17 @@ mod tests {
     #[test]
     fn each_option_belongs_to_the_object_before_it() {
         let parsed = parse(&[
-            "--object", "a.obj", "--at", "-1,0,2", "--rotate", "-90", "--object", "b.glb", "--scale",
-            "0.01", "--as-modelled",
+            "--object",
+            "a.obj",
+            "--at",
+            "-1,0,2",
+            "--rotate",
+            "-90",
+            "--object",
+            "b.glb",
+            "--scale",
+            "0.01",
+            "--as-modelled",
         ])
         .expect("valid");
         assert_eq!(parsed.len(), 2);

@@ -1,10 +1,14 @@
 //! The command line: commands, progress, errors on one line.
 
 mod arguments;
+mod edit;
+mod insert;
 mod interrupt;
 mod parameters;
 mod progress;
+mod render;
 mod report;
+mod saved;
 mod solve;
 
 use crate::error::{Error, Result};
@@ -15,7 +19,7 @@ use clap::Parser;
 use clap::error::ErrorKind;
 
 /// Opens the window on a source and returns when it is closed.
-pub type Window = fn(Source, Settings) -> Result<()>;
+pub type Window = fn(Option<Source>, Settings) -> Result<()>;
 
 /// Runs the program with the process's arguments; the exit code: 0 done, 1 an error, 2 wrong usage.
 ///
@@ -44,6 +48,9 @@ pub fn run(window: Option<Window>) -> i32 {
 fn act(arguments: Arguments, window: Option<Window>) -> Result<()> {
     match arguments.action {
         None => open(&arguments, window),
+        Some(Action::Render(render)) => render::render(&render),
+        Some(Action::Insert(insert)) => insert::insert(&insert),
+        Some(Action::Edit(edit)) => edit::edit(&edit),
         Some(Action::Solve(capture)) => {
             solve::solve(&Source::Folder(capture.capture.clone()), &capture.solve)
         }
@@ -59,7 +66,7 @@ fn open(arguments: &Arguments, window: Option<Window>) -> Result<()> {
     let reason = match window {
         None => "this build has no window".to_owned(),
         Some(_) if !display() => "no display".to_owned(),
-        Some(window) => match window(source.clone(), arguments.solve.settings()) {
+        Some(window) => match window(Some(source.clone()), arguments.solve.settings()) {
             Ok(()) => return Ok(()),
             Err(error) => error.to_string(),
         },

@@ -20,7 +20,12 @@ pub struct RenderArguments {
     #[command(flatten)]
     saved: SavedOptions,
     /// The camera of a photograph, counted from 0
-    #[arg(long, value_name = "N", required_unless_present = "camera", conflicts_with = "camera")]
+    #[arg(
+        long,
+        value_name = "N",
+        required_unless_present = "camera",
+        conflicts_with = "camera"
+    )]
     frame: Option<usize>,
     /// A camera of its own: JSON with w, h, fl_x, fl_y, cx, cy and transform_matrix as in transforms.json
     #[arg(long, value_name = "FILE")]
@@ -134,7 +139,11 @@ fn read_camera(path: &Path, origin: DVec3) -> Result<Camera> {
     };
     let pixels = u64::from(file.w) * u64::from(file.h);
     if pixels == 0 || pixels > MOST_PIXELS {
-        return field("w, h", "no size for a picture", "give sizes from 1 to 16384");
+        return field(
+            "w, h",
+            "no size for a picture",
+            "give sizes from 1 to 16384",
+        );
     }
     if !(file.fl_x > 0.0 && file.fl_y > 0.0) {
         return field("fl_x, fl_y", "no focal length", "give lengths in pixels");
@@ -142,7 +151,8 @@ fn read_camera(path: &Path, origin: DVec3) -> Result<Camera> {
     let matrix = DMat4::from_cols_array_2d(&file.transform_matrix).transpose();
     let rotation = DMat3::from_mat4(matrix);
     let drift = rotation.transpose() * rotation - DMat3::IDENTITY;
-    let rigid = drift.to_cols_array().iter().all(|v| v.abs() < 1e-3) && rotation.determinant() > 0.0;
+    let rigid =
+        drift.to_cols_array().iter().all(|v| v.abs() < 1e-3) && rotation.determinant() > 0.0;
     if !rigid || !matrix.is_finite() {
         return field(
             "transform_matrix",

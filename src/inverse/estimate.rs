@@ -89,6 +89,11 @@ pub struct Outside {
 }
 
 impl Estimate {
+    /// A frame's linear exposure and white balance, where they were estimated.
+    pub fn exposure(&self, frame: usize) -> Option<Vec3> {
+        self.exposures.as_ref()?.get(frame).copied()
+    }
+
     /// The scene in the light and the materials of this estimate.
     pub fn lit(&self, scene: &Arc<Scene>) -> Lit {
         let mut materials = self.materials();

@@ -1,7 +1,9 @@
 //! The worker thread: commands in, snapshots out, save and resume. Knows no window; wakes it by a callback.
 
 pub mod command;
+mod full;
 pub mod inbox;
+pub mod insertion;
 pub mod light;
 pub mod open;
 pub mod rates;

@@ -73,22 +73,10 @@ struct CheckpointFile {
 pub fn write(folder: &Path, results: &Results) -> Result<()> {
     let started = Instant::now();
     let mut staging = Staging::new(folder)?;
-    pictures::write(&mut staging, results)?;
+    stage_estimate(&mut staging, folder, results)?;
     losses(&results.progress.losses).write(&staging.file("loss.csv")?)?;
     loss_plot(&results.progress.losses, &results.progress.stages)
         .write(&staging.file("loss.png")?)?;
-    let (file, maps) = results.file(folder)?;
-    if let (Some(name), Some(bytes)) = (&file.maps, &maps) {
-        staging.write(name, bytes)?;
-    }
-    let checkpoint = results.checkpoint.is_some().then(|| CheckpointFile {
-        estimate: file.clone(),
-        checkpoint: results.checkpoint.clone(),
-    });
-    if let Some(checkpoint) = &checkpoint {
-        staging.write(CHECKPOINT, &json(CHECKPOINT, checkpoint)?)?;
-    }
-    staging.write(ESTIMATE, &json(ESTIMATE, &file)?)?;
     let report = Report::new(
         &results.capture,
         &results.settings,
@@ -103,6 +91,32 @@ pub fn write(folder: &Path, results: &Results) -> Result<()> {
     );
     staging.write(REPORT, &json(REPORT, &report)?)?;
     staging.commit(&earlier(folder))
+}
+
+/// Writes the estimate and its pictures alone, as after an edit.
+///
+/// # Errors
+/// The folder cannot be written.
+pub fn write_estimate(folder: &Path, results: &Results) -> Result<()> {
+    let mut staging = Staging::new(folder)?;
+    stage_estimate(&mut staging, folder, results)?;
+    staging.commit(&earlier(folder))
+}
+
+fn stage_estimate(staging: &mut Staging, folder: &Path, results: &Results) -> Result<()> {
+    pictures::write(staging, results)?;
+    let (file, maps) = results.file(folder)?;
+    if let (Some(name), Some(bytes)) = (&file.maps, &maps) {
+        staging.write(name, bytes)?;
+    }
+    if results.checkpoint.is_some() {
+        let checkpoint = CheckpointFile {
+            estimate: file.clone(),
+            checkpoint: results.checkpoint.clone(),
+        };
+        staging.write(CHECKPOINT, &json(CHECKPOINT, &checkpoint)?)?;
+    }
+    staging.write(ESTIMATE, &json(ESTIMATE, &file)?)
 }
 
 /// Writes `checkpoint.json` alone, while the solve runs.

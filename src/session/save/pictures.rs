@@ -1,7 +1,6 @@
 //! Pictures of each frame beside the results: what the estimate says that the camera sees.
 
-use crate::capture::photograph::Photograph;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::export::exr::{Precision, write_rgb, write_scalar};
 use crate::export::falsecolor::{write_magnitude, write_signed};
 use crate::export::picture::{percentile_exposure, write_png};
@@ -11,7 +10,7 @@ use crate::session::light::path_options;
 use crate::session::save::Results;
 use crate::session::save::staging::Staging;
 use crate::session::view::hits::Hits;
-use crate::session::view::sized::{box_filter, shrink};
+use crate::session::view::sized::shrink;
 use crate::transport::film::Film;
 use crate::transport::lit::Lit;
 use glam::Vec3;
@@ -71,9 +70,11 @@ pub fn write(staging: &mut Staging, results: &Results) -> Result<()> {
     let chosen = results.views.chosen(capture.scene.cameras.len());
     let cameras: Vec<(usize, Camera)> = chosen
         .into_iter()
-        .filter_map(|index| Some((index, capture.full_camera(index)?)))
-        .map(|(index, camera)| (index, shrink(&camera, results.views.long_side())))
-        .collect();
+        .map(|index| {
+            let camera = capture.full_camera(index)?;
+            Ok((index, shrink(&camera, results.views.long_side())))
+        })
+        .collect::<Result<_>>()?;
     let pixels: u64 = cameras
         .iter()
         .map(|(_, c)| u64::from(c.intrinsics.width) * u64::from(c.intrinsics.height))
@@ -96,7 +97,7 @@ fn frame(
 ) -> Result<()> {
     let (capture, estimate) = (&results.capture, &results.estimate);
     let scene = &capture.scene;
-    let (photograph, shown_at) = capture.full_photograph(index, camera)?;
+    let (photograph, shown_at) = capture.sized_photograph(index, camera)?;
 
     // The render in the photograph's values, so that the two can be subtracted.
     let mut film = Film::new(camera);
@@ -109,11 +110,7 @@ fn frame(
         index as u64,
         samples,
     );
-    let exposure = estimate
-        .exposures
-        .as_ref()
-        .and_then(|e| e.get(index).copied())
-        .unwrap_or(Vec3::ONE);
+    let exposure = estimate.exposure(index).unwrap_or(Vec3::ONE);
     let radiance = film.mean();
     let render = Picture {
         pixels: radiance.iter().map(|&r| r * exposure).collect(),
@@ -159,51 +156,6 @@ fn frame(
 
 fn channel(picture: &Picture) -> Vec<f32> {
     picture.pixels.iter().map(|p| p.x).collect()
-}
-
-impl crate::session::snapshot::OpenCapture {
-    /// A frame's camera at the size of its photograph's file.
-    pub fn full_camera(&self, index: usize) -> Option<Camera> {
-        let frame = self.capture.frames.get(index)?;
-        Some(Camera::new(
-            &frame.intrinsics,
-            &frame.pose,
-            self.scene.origin,
-        ))
-    }
-
-    /// A frame's photograph box-filtered to a camera's size, in its own values, and the exposure at which it is shown.
-    ///
-    /// # Errors
-    /// The file cannot be read again.
-    pub fn full_photograph(&self, index: usize, camera: &Camera) -> Result<(Picture, f32)> {
-        let frame = self.capture.frames.get(index).ok_or_else(|| {
-            Error::usage(
-                "frame",
-                format!(
-                    "{index} does not exist; the capture has {}",
-                    self.capture.frames.len()
-                ),
-                "count from 0",
-            )
-        })?;
-        let photograph: &Photograph = &*frame.load()?;
-        let picture = box_filter(
-            &Picture {
-                width: photograph.width,
-                height: photograph.height,
-                pixels: photograph.pixels.clone(),
-            },
-            camera.intrinsics.width,
-            camera.intrinsics.height,
-        );
-        let shown_at = if photograph.saturation.is_finite() {
-            photograph.saturation.recip()
-        } else {
-            percentile_exposure(&picture.pixels)
-        };
-        Ok((picture, shown_at))
-    }
 }
 
 /// The pictures of an earlier run in a folder of results.

@@ -6,8 +6,9 @@ pub mod sized;
 mod target;
 
 use crate::inverse::estimate::Estimate;
-use crate::session::command::{Placement, ViewCamera, ViewRequest};
+use crate::session::command::{ViewCamera, ViewRequest};
 use crate::session::snapshot::{OpenCapture, View};
+use crate::transport::path::PathOptions;
 use std::sync::Arc;
 use std::time::Instant;
 use target::Target;
@@ -30,7 +31,6 @@ pub struct Views {
     credit: f32,
     last: Option<Instant>,
     looked: Option<Instant>,
-    placements: Vec<Placement>,
 }
 
 impl Views {
@@ -38,11 +38,6 @@ impl Views {
     pub fn look(&mut self, request: ViewRequest) {
         self.request = Some(request);
         self.changed = true;
-    }
-
-    /// Replaces the inserted objects.
-    pub fn insert(&mut self, placements: Vec<Placement>) {
-        self.placements = placements;
     }
 
     /// The newest pictures.
@@ -85,6 +80,7 @@ impl Views {
         &mut self,
         capture: &OpenCapture,
         estimate: &Arc<Estimate>,
+        options: &PathOptions,
         share: f32,
     ) -> (bool, bool) {
         let now = Instant::now();
@@ -98,14 +94,14 @@ impl Views {
             let request = self.request.as_ref();
             self.target = request.and_then(|r| Target::new(capture, estimate, r, FIRST_LONG_SIDE));
             self.looked = Some(now);
-            let drawn = self.sharpen();
+            let drawn = self.sharpen(options);
             return (drawn, self.target.is_some());
         }
         if share < 1.0 && self.credit <= 0.0 {
             return (false, self.target.is_some());
         }
         self.follow(estimate, now);
-        let drawn = self.sharpen();
+        let drawn = self.sharpen(options);
         self.credit -= now.elapsed().as_secs_f32();
         let more = self.target.as_ref().is_some_and(|t| !t.is_done());
         (drawn, more)
@@ -122,11 +118,11 @@ impl Views {
         }
     }
 
-    fn sharpen(&mut self) -> bool {
+    fn sharpen(&mut self, options: &PathOptions) -> bool {
         let Some(target) = &mut self.target else {
             return false;
         };
-        let Some(view) = target.sharpen(self.sequence + 1) else {
+        let Some(view) = target.sharpen(options, self.sequence + 1) else {
             return false;
         };
         self.sequence += 1;

@@ -106,9 +106,9 @@ impl Target {
     }
 
     /// Draws the next slice; the pictures, if one of them is new.
-    pub fn sharpen(&mut self, sequence: u64) -> Option<View> {
+    pub fn sharpen(&mut self, options: &PathOptions, sequence: u64) -> Option<View> {
         if let Some(coarse) = self.coarse.take() {
-            self.sketch(&coarse);
+            self.sketch(&coarse, options);
         } else if self.stale {
             self.stale = false;
             let hits = self
@@ -119,25 +119,23 @@ impl Target {
             self.objects = Some(Arc::new(hits.objects(&self.scene)));
             self.hits = Some(hits);
         } else if self.render.samples() >= ENOUGH
-            || !self
-                .render
-                .add(&self.world, &self.camera, &PathOptions::default())
+            || !self.render.add(&self.world, &self.camera, options)
         {
             return None;
         } else {
-            let picture = self.render.picture(&self.camera);
+            let picture = self.exposed(self.render.picture(&self.camera));
             self.rendered = Some((Arc::new(picture), self.render.samples()));
         }
         Some(self.view(sequence))
     }
 
     /// All pictures at once, coarsely.
-    fn sketch(&mut self, coarse: &Camera) {
+    fn sketch(&mut self, coarse: &Camera, options: &PathOptions) {
         let hits = Hits::new(&self.scene, coarse);
         self.map(&hits, coarse);
         let mut render = Progressive::new(coarse);
-        while !render.add(&self.world, coarse, &PathOptions::default()) {}
-        let picture = self.enlarged(render.picture(coarse));
+        while !render.add(&self.world, coarse, options) {}
+        let picture = self.enlarged(self.exposed(render.picture(coarse)));
         self.rendered = Some((picture, 1));
     }
 
@@ -148,6 +146,15 @@ impl Target {
             hits.stderr(&self.scene, &self.estimate),
         ];
         self.maps = maps.map(|picture| Some(self.enlarged(picture)));
+    }
+
+    /// Radiance in the values of the frame's photograph.
+    fn exposed(&self, mut radiance: Picture) -> Picture {
+        let frame = self.frame;
+        if let Some(exposure) = frame.and_then(|frame| self.estimate.exposure(frame)) {
+            radiance.pixels.iter_mut().for_each(|p| *p *= exposure);
+        }
+        radiance
     }
 
     fn enlarged(&self, picture: Picture) -> Arc<Picture> {

@@ -1,6 +1,6 @@
 //! What each command does.
 
-use crate::session::command::{Command, ExportRequest};
+use crate::session::command::{Command, ExportRequest, ViewCamera};
 use crate::session::save::pictures::Frames;
 use crate::session::save::{self, Results};
 use crate::session::snapshot::{Level, Phase};
@@ -31,8 +31,13 @@ impl Worker {
             // Without a running solve there is nothing to finish.
             Command::Finish => return self.solving.then_some(Next::Wait),
             Command::Set(settings) => self.settings = *settings,
-            Command::View(request) => self.views.look(request),
-            Command::Insert(placements) => self.views.insert(placements),
+            Command::View(request) => {
+                if let ViewCamera::Frame(frame) = request.camera {
+                    self.inserting.look(frame);
+                }
+                self.views.look(request);
+            }
+            Command::Insert(placements) => self.inserting.place(placements),
             Command::Save(folder) => self.save(&folder),
             Command::Export(request) => self.export(&request),
         }

@@ -6,6 +6,8 @@ use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Problem, Progress};
 use crate::session::command::{OpenOptions, Source};
 use crate::session::inbox::{Inbox, Mail};
+use crate::session::insertion::Inserting;
+use crate::session::light::path_options;
 use crate::session::rates::Rates;
 use crate::session::save;
 use crate::session::slot::Slot;
@@ -51,6 +53,7 @@ pub(super) struct Worker {
     pub events: Arc<Vec<Event>>,
     pub rates: Rates,
     pub views: Views,
+    pub inserting: Inserting,
     pub solving: bool,
     pub paused: bool,
     pub step: bool,
@@ -83,6 +86,7 @@ impl Worker {
             events: Arc::default(),
             rates: Rates::default(),
             views: Views::default(),
+            inserting: Inserting::default(),
             solving: false,
             paused: false,
             step: false,
@@ -130,6 +134,7 @@ impl Worker {
         self.paused = false;
         self.step = false;
         self.views.stop();
+        self.inserting.reset();
         self.phase = Phase::Failed;
         self.fail(&Error::new(
             "worker",
@@ -190,6 +195,7 @@ impl Worker {
         self.capture = Some(Arc::new(capture));
         self.forget();
         self.views.reset();
+        self.inserting.reset();
     }
 
     /// Forgets the estimate and everything that led to it.
@@ -271,6 +277,7 @@ impl Worker {
                 self.checkpoint = solution.checkpoint;
                 self.phase = Phase::Finished(solution.termination);
                 self.views.refresh(&self.estimate);
+                self.inserting.update();
             }
             Ok(Err(error)) => {
                 self.phase = Phase::Failed;
@@ -305,9 +312,17 @@ impl Worker {
         let Some(capture) = self.capture.clone() else {
             return false;
         };
-        let (drawn, more) = self.views.draw(&capture, &self.estimate, share);
+        let options = path_options(&self.settings);
+        let (drawn, more) = self.views.draw(&capture, &self.estimate, &options, share);
         self.changed |= drawn;
-        more
+        if self.estimate.objects.is_empty() || !self.inserting.is_busy() {
+            return more;
+        }
+        match self.inserting.draw(&capture, &self.estimate, &options) {
+            Ok(drawn) => self.changed |= drawn,
+            Err(error) => self.fail(&error),
+        }
+        true
     }
 
     /// Hands out a snapshot if something changed: at once if `now`, else at most about 30 times a second.
@@ -335,7 +350,7 @@ impl Worker {
                 .flatten(),
             estimate: self.estimate.clone(),
             view: self.views.shown(),
-            insertion: None,
+            insertion: self.inserting.shown(),
             events: self.events.clone(),
         }));
         (self.wake)();

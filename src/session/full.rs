@@ -1,0 +1,77 @@
+//! Frames of an open capture, at the working resolution and at the size of their files.
+
+use crate::capture::Frame;
+use crate::capture::photograph::Photograph;
+use crate::error::{Error, Result};
+use crate::export::picture::percentile_exposure;
+use crate::math::picture::Picture;
+use crate::scene::camera::Camera;
+use crate::session::snapshot::OpenCapture;
+use crate::session::view::sized::box_filter;
+use std::sync::Arc;
+
+impl OpenCapture {
+    /// A frame's camera and photograph at the working resolution.
+    ///
+    /// # Errors
+    /// The frame does not exist.
+    pub fn frame(&self, index: usize) -> Result<(&Camera, &Arc<Photograph>)> {
+        let camera = self.scene.cameras.get(index);
+        let pair = camera.zip(self.photographs.get(index));
+        pair.ok_or_else(|| self.no_frame(index))
+    }
+
+    /// A frame's camera at the size of its photograph's file.
+    ///
+    /// # Errors
+    /// The frame does not exist.
+    pub fn full_camera(&self, index: usize) -> Result<Camera> {
+        let frame = self.full_frame(index)?;
+        let origin = self.scene.origin;
+        Ok(Camera::new(&frame.intrinsics, &frame.pose, origin))
+    }
+
+    /// A frame's photograph at the size of its file.
+    ///
+    /// # Errors
+    /// The frame does not exist, or the file cannot be read again.
+    pub fn full_photograph(&self, index: usize) -> Result<Arc<Photograph>> {
+        self.full_frame(index)?.load()
+    }
+
+    /// A frame's photograph box-filtered to a camera's size, and the exposure at which it is shown: its own where it
+    /// saturates, else the one that puts the 99th percentile at 1.
+    ///
+    /// # Errors
+    /// As [`OpenCapture::full_photograph`].
+    pub fn sized_photograph(&self, index: usize, camera: &Camera) -> Result<(Picture, f32)> {
+        let photograph = self.full_photograph(index)?;
+        let whole = Picture {
+            width: photograph.width,
+            height: photograph.height,
+            pixels: photograph.pixels.clone(),
+        };
+        let k = &camera.intrinsics;
+        let picture = box_filter(&whole, k.width, k.height);
+        let shown_at = if photograph.saturation.is_finite() {
+            photograph.saturation.recip()
+        } else {
+            percentile_exposure(&picture.pixels)
+        };
+        Ok((picture, shown_at))
+    }
+
+    fn full_frame(&self, index: usize) -> Result<&Frame> {
+        let frame = self.capture.frames.get(index);
+        frame.ok_or_else(|| self.no_frame(index))
+    }
+
+    fn no_frame(&self, index: usize) -> Error {
+        let count = self.capture.frames.len();
+        Error::usage(
+            "--frame",
+            format!("{index} does not exist; {} has {count} frames", self.name),
+            format!("count from 0 to {}", count.saturating_sub(1)),
+        )
+    }
+}
