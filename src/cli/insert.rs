@@ -5,7 +5,7 @@ use crate::cli::saved::{Loaded, SavedOptions};
 use crate::compose::backdrop::Backdrop;
 use crate::compose::placement::{PlacedObject, Placement};
 use crate::compose::write::write_insertion;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::session::insertion::{Inserted, Library};
 use crate::session::light::path_options;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};

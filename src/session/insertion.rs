@@ -19,8 +19,6 @@ use std::time::{Duration, Instant};
 
 /// Samples a pixel after which a composite counts as done.
 const ENOUGH: u32 = 256;
-/// How long a slice of work may take.
-const SLICE: Duration = Duration::from_millis(15);
 /// Shortest time between two pictures of the same composite.
 const PICTURE: Duration = Duration::from_millis(250);
 
@@ -74,7 +72,7 @@ impl Library {
             &backdrop,
             &lit,
             &objects,
-            &vec![photographed.clone(); objects.len()],
+            &vec![*photographed; objects.len()],
             Vec3::ONE,
         );
         let estimated: Vec<Harmonics> = objects
@@ -195,10 +193,9 @@ impl Inserting {
         if inserted.composite.samples() >= ENOUGH {
             return Ok(false);
         }
-        let end = Instant::now() + SLICE;
-        let whole = inserted.composite.pass_while(1, || Instant::now() < end);
+        inserted.composite.pass(1);
         let due = self.pictured.is_none_or(|at| at.elapsed() >= PICTURE);
-        if due || (whole && inserted.composite.samples() >= ENOUGH) {
+        if due || inserted.composite.samples() >= ENOUGH {
             self.picture();
             return Ok(true);
         }

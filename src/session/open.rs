@@ -3,13 +3,16 @@
 use crate::capture::Capture;
 use crate::capture::photograph::PhotographSource;
 use crate::capture::read::{ReadOptions, read};
+use crate::capture::working::load_working;
 use crate::error::{Error, Result};
-use crate::scene::Scene;
+use crate::scene::prepare::prepare;
 use crate::session::command::{OpenOptions, Source};
 use crate::session::snapshot::OpenCapture;
-use rayon::prelude::*;
 use std::fs;
 use std::sync::Arc;
+
+/// Most pixels that are solved for; larger photographs are reduced together.
+const WORKING_PIXELS: u64 = 4_000_000;
 
 /// Reads a capture and its photographs.
 ///
@@ -40,30 +43,17 @@ impl OpenCapture {
     /// # Errors
     /// The mesh holds nothing to solve, or a photograph cannot be read.
     pub fn new(source: Source, options: OpenOptions, capture: Capture) -> Result<Self> {
-        let photographs = capture
-            .frames
-            .par_iter()
-            .map(|frame| frame.load())
-            .collect::<Result<Vec<_>>>()?;
-        let scene = Scene::new(&capture)?;
-        let count = |n: usize, one: &str| match n {
-            1 => format!("1 {one}"),
-            _ => format!("{n} {one}s"),
-        };
-        let summary = vec![
-            count(scene.triangles.len(), "triangle"),
-            count(scene.objects.len(), "object"),
-            count(photographs.len(), "photograph"),
-        ];
+        let working = load_working(&capture, WORKING_PIXELS)?;
+        let prepared = prepare(&capture, &working)?;
         Ok(Self {
             name: capture.name.clone(),
             hash: hash(&capture)?,
             source,
             options,
-            summary,
-            warnings: capture.warnings.clone(),
-            scene: Arc::new(scene),
-            photographs,
+            summary: prepared.summary(),
+            warnings: prepared.warnings,
+            scene: Arc::new(prepared.scene),
+            photographs: prepared.photographs,
             capture: Arc::new(capture),
         })
     }

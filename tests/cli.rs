@@ -1,0 +1,437 @@
+//! The command line as a person meets it: exit codes, one-line errors, complete results, nothing lost.
+
+mod common;
+
+use relit::capture::photograph::PhotographSource;
+use relit::export::exr::{Precision, write_rgb};
+use relit::math::picture::Picture;
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+/// Writes the tiny room as a capture with its truth.
+fn write_capture(folder: &Path) {
+    let capture = common::room();
+    fs::create_dir_all(folder.join("images")).expect("writes");
+    let mut obj = String::new();
+    for p in &capture.mesh.positions {
+        obj += &format!("v {} {} {}\n", p.x, p.y, p.z);
+    }
+    for (index, name) in capture.mesh.objects.iter().enumerate() {
+        obj += &format!("o {name}\n");
+        for (t, _) in (capture.mesh.triangles.iter().zip(&capture.mesh.object_of))
+            .filter(|(_, object)| **object as usize == index)
+        {
+            obj += &format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
+        }
+    }
+    fs::write(folder.join("mesh.obj"), obj).expect("writes");
+
+    let mut frames = Vec::new();
+    for (index, frame) in capture.frames.iter().enumerate() {
+        let name = format!("images/{index:03}.exr");
+        let PhotographSource::Memory(photograph) = &frame.photograph else {
+            panic!("the room is in memory");
+        };
+        let picture = Picture {
+            width: photograph.width,
+            height: photograph.height,
+            pixels: photograph.pixels.clone(),
+        };
+        write_rgb(&folder.join(&name), &picture, Precision::Float).expect("writes");
+        let (r, c) = (frame.pose.rotation, frame.pose.center);
+        let row = |i: usize| vec![r.x_axis[i], r.y_axis[i], r.z_axis[i], c[i]];
+        let matrix = [row(0), row(1), row(2), vec![0.0, 0.0, 0.0, 1.0]];
+        frames.push(serde_json::json!({"file_path": name, "transform_matrix": matrix}));
+    }
+    let k = &capture.frames[0].intrinsics;
+    let transforms = serde_json::json!({
+        "camera_model": "PINHOLE", "w": k.width, "h": k.height, "fl_x": k.fx, "fl_y": k.fy,
+        "cx": k.cx, "cy": k.cy, "mesh_path": "mesh.obj", "frames": frames,
+    });
+    fs::write(folder.join("transforms.json"), transforms.to_string()).expect("writes");
+
+    let mut objects = serde_json::Map::new();
+    for (name, albedo, emission) in common::OBJECTS {
+        objects.insert(
+            name.to_owned(),
+            serde_json::json!({"albedo": albedo, "emission": emission, "roughness": null}),
+        );
+    }
+    let truth = serde_json::json!({ "objects": objects });
+    fs::write(folder.join("truth.json"), truth.to_string()).expect("writes");
+}
+
+struct Place {
+    folder: TempDir,
+}
+
+impl Place {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        write_capture(&folder.path().join("room"));
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> std::path::PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn relit(&self, arguments: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_relit"))
+            .args(arguments)
+            .current_dir(self.folder.path())
+            .env_remove("DISPLAY")
+            .env_remove("WAYLAND_DISPLAY")
+            .output()
+            .expect("relit starts")
+    }
+
+    fn json(&self, name: &str) -> Value {
+        let text = fs::read_to_string(self.path(name)).expect("the file is there");
+        assert!(!text.contains("NaN"), "{name} holds NaN");
+        serde_json::from_str(&text).expect("the file is JSON")
+    }
+}
+
+/// Succeeds, or shows what was said.
+fn done(output: &Output) {
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+}
+
+/// Fails with a code, and with one line that holds each of the words.
+fn refused(output: &Output, code: i32, words: &[&str]) {
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{said}");
+    let errors: Vec<&str> = said.lines().filter(|l| l.starts_with("error: ")).collect();
+    assert_eq!(errors.len(), 1, "{said}");
+    assert!(said.ends_with(&format!("{}\n", errors[0])), "{said}");
+    assert!(!said.contains("panicked"), "{said}");
+    for word in words {
+        assert!(errors[0].contains(word), "{word} is not in: {said}");
+    }
+}
+
+const QUICK: [&str; 4] = ["--preset", "preview", "--time", "20s"];
+
+fn solve<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    let mut all = vec!["solve", "room"];
+    all.extend(QUICK);
+    all.extend(more);
+    all
+}
+
+#[test]
+fn a_solve_writes_everything_and_all_of_it_can_be_read() {
+    let place = Place::new();
+    done(&place.relit(&solve(&[])));
+    let out = "relit-out/room";
+    let report = place.json(&format!("{out}/report.json"));
+    for field in [
+        "seconds",
+        "seconds_load",
+        "seconds_solve",
+        "seconds_write",
+        "seed",
+        "threads",
+        "rays",
+        "rays_per_second",
+        "peak_memory_bytes",
+    ] {
+        assert!(report[field].is_number(), "{field}: {}", report[field]);
+    }
+    assert_eq!(report["capture"]["objects"], 4);
+    assert_eq!(report["capture"]["triangles"], 14);
+    assert_eq!(report["capture"]["frames"], 2);
+    assert_eq!(report["capture"]["pixels"], 2 * 24 * 24);
+    assert!(report["stopped_because"].is_string());
+    for (name, ..) in common::OBJECTS {
+        let object = &report["objects"][name];
+        for field in ["albedo", "emission"] {
+            let rgb = object[field].as_array().expect("a colour");
+            assert!(rgb.iter().all(Value::is_number), "{name} {field}");
+        }
+        for field in ["identifiable", "albedo_identifiable"] {
+            assert!(object[field].is_boolean());
+        }
+    }
+    let estimate = place.json(&format!("{out}/estimate.json"));
+    assert_eq!(estimate["capture"]["relative"], "../../room");
+    for frame in 0..2 {
+        for kind in ["render", "albedo", "emission", "error", "stderr", "seen"] {
+            for ending in ["exr", "png"] {
+                let name = format!("{out}/views/{frame:03}.{kind}.{ending}");
+                let image = image::open(place.path(&name)).expect("an image");
+                assert!(image.width() >= 24 && image.height() >= 24, "{name}");
+            }
+        }
+    }
+    for name in ["loss.csv", "loss.png"] {
+        assert!(place.path(&format!("{out}/{name}")).is_file(), "{name}");
+    }
+    let left: Vec<_> = fs::read_dir(place.path(out))
+        .expect("lists")
+        .map(|e| e.expect("lists").file_name())
+        .filter(|name| name.to_string_lossy().starts_with('.'))
+        .collect();
+    assert!(left.is_empty(), "{left:?}");
+}
+
+#[test]
+fn errors_are_one_line_with_the_file_the_field_and_the_remedy() {
+    let place = Place::new();
+    refused(&place.relit(&["solve", "nowhere"]), 1, &["nowhere", ";"]);
+    refused(
+        &place.relit(&["render", "room", "--frame", "0", "--out", "a.exr"]),
+        1,
+        &["estimate.json"],
+    );
+    refused(
+        &place.relit(&["render", "room", "--frame", "0", "--out", "a.gif"]),
+        2,
+        &["a.gif", ".png"],
+    );
+    refused(&place.relit(&["solve"]), 2, &["CAPTURE"]);
+    refused(&place.relit(&["--frobnicate"]), 2, &["--frobnicate"]);
+    refused(
+        &place.relit(&solve(&["--batch", "0"])),
+        2,
+        &["batch", "from 1 to"],
+    );
+    refused(
+        &place.relit(&["solve", "room", "--preset", "fast"]),
+        2,
+        &["preset", "balanced"],
+    );
+    refused(
+        &place.relit(&["solve", "room", "--time", "soon"]),
+        2,
+        &["time", "60s"],
+    );
+    refused(
+        &place.relit(&["solve", "room", "--views", "few"]),
+        2,
+        &["views"],
+    );
+
+    let transforms = place.path("room/transforms.json");
+    let text = fs::read_to_string(&transforms).expect("reads");
+    fs::write(&transforms, &text[..text.len() / 2]).expect("writes");
+    refused(&place.relit(&solve(&[])), 1, &["transforms.json"]);
+    fs::write(&transforms, text.replace("\"w\":24", "\"w\":23")).expect("writes");
+    refused(&place.relit(&solve(&[])), 1, &["000.exr", "24"]);
+    fs::write(&transforms, text.replace("images/001", "images/007")).expect("writes");
+    refused(&place.relit(&solve(&[])), 1, &["007.exr"]);
+}
+
+#[test]
+fn a_failed_run_leaves_earlier_results_untouched() {
+    let place = Place::new();
+    done(&place.relit(&solve(&["--views", "none"])));
+    let read = || {
+        ["estimate.json", "report.json", "loss.csv"]
+            .map(|name| fs::read(place.path(&format!("relit-out/room/{name}"))).expect("reads"))
+    };
+    let before = read();
+    fs::remove_file(place.path("room/images/001.exr")).expect("removes");
+    refused(&place.relit(&solve(&[])), 1, &["001.exr"]);
+    assert_eq!(before, read());
+    // An unreadable checkpoint does no harm either.
+    fs::write(place.path("relit-out/room/checkpoint.json"), "{").expect("writes");
+    refused(&place.relit(&solve(&["--resume"])), 1, &["checkpoint.json"]);
+    assert_eq!(before, read());
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
+    let place = Place::new();
+    let estimate = |threads: &str, preset: &str, more: &[&str]| {
+        let mut arguments = vec!["solve", "room", "--preset", preset, "--out", "out"];
+        arguments.extend(["--views", "1", "--threads", threads]);
+        arguments.extend(more);
+        done(&place.relit(&arguments));
+        let picture = fs::read(place.path("out/views/000.render.exr")).expect("reads");
+        let mut json = place.json("out/estimate.json");
+        json["capture"].take();
+        (json.to_string(), picture)
+    };
+    for (preset, more) in [("preview", &[][..]), ("paper", &["--steps", "40"])] {
+        let one = estimate("1", preset, more);
+        for threads in ["2", "8"] {
+            assert_eq!(
+                one,
+                estimate(threads, preset, more),
+                "{preset} on {threads}"
+            );
+        }
+    }
+}
+
+#[test]
+fn truth_is_not_read_by_a_solve() {
+    let place = Place::new();
+    let estimate = || {
+        done(&place.relit(&solve(&["--views", "none"])));
+        fs::read(place.path("relit-out/room/estimate.json")).expect("reads")
+    };
+    let with = estimate();
+    fs::remove_file(place.path("room/truth.json")).expect("removes");
+    assert_eq!(with, estimate());
+}
+
+#[test]
+fn results_are_rendered_edited_and_moved() {
+    let place = Place::new();
+    done(&place.relit(&solve(&["--views", "none", "--out", "out"])));
+    done(&place.relit(&[
+        "render", "out", "--frame", "1", "--spp", "4", "--out", "a.exr",
+    ]));
+    let camera = r#"{"w": 8, "h": 6, "fl_x": 4, "fl_y": 4, "cx": 4, "cy": 3,
+        "transform_matrix": [[1,0,0,0],[0,1,0,1],[0,0,1,0.5],[0,0,0,1]]}"#;
+    fs::write(place.path("camera.json"), camera).expect("writes");
+    done(&place.relit(&[
+        "render",
+        "out",
+        "--camera",
+        "camera.json",
+        "--spp",
+        "4",
+        "--out",
+        "b.png",
+    ]));
+    let picture = image::open(place.path("b.png")).expect("an image");
+    assert_eq!((picture.width(), picture.height()), (8, 6));
+    refused(
+        &place.relit(&["render", "out", "--frame", "9", "--out", "c.exr"]),
+        2,
+        &["9", "2 frames"],
+    );
+
+    let dark = [
+        "--emission",
+        "lamp=0,0,0",
+        "--emission",
+        "walls=0,0,0",
+        "--emission",
+        "floor=0,0,0",
+        "--emission",
+        "ceiling=0,0,0",
+    ];
+    let mut edit = vec![
+        "edit",
+        "out",
+        "--out",
+        "dark",
+        "--views",
+        "1",
+        "--albedo",
+        "floor=0.1,0.2,0.3",
+    ];
+    edit.extend(dark);
+    done(&place.relit(&edit));
+    let render = image::open(place.path("dark/views/000.render.exr"))
+        .expect("an image")
+        .to_rgb32f();
+    assert!(
+        render.pixels().all(|p| p.0 == [0.0; 3]),
+        "the lamps are off"
+    );
+    let edited = place.json("dark/estimate.json");
+    assert_eq!(
+        edited["objects"]["floor"]["albedo"],
+        serde_json::json!([0.1, 0.2, 0.3])
+    );
+    refused(
+        &place.relit(&["edit", "out", "--emission", "moon=1,1,1", "--out", "x"]),
+        2,
+        &["moon", "lamp"],
+    );
+    refused(
+        &place.relit(&["edit", "out", "--albedo", "floor=2,0,0", "--out", "x"]),
+        2,
+        &["floor", "0 to 1"],
+    );
+
+    fs::rename(place.path("room"), place.path("elsewhere")).expect("moves");
+    refused(
+        &place.relit(&["render", "out", "--frame", "0", "--out", "c.exr"]),
+        1,
+        &["room"],
+    );
+    done(&place.relit(&[
+        "render",
+        "out",
+        "--capture",
+        "elsewhere",
+        "--frame",
+        "0",
+        "--spp",
+        "1",
+        "--out",
+        "c.exr",
+    ]));
+    // Another mesh is another capture.
+    let mesh = place.path("elsewhere/mesh.obj");
+    let text = fs::read_to_string(&mesh).expect("reads");
+    fs::write(&mesh, text.replace("1.9", "1.8")).expect("writes");
+    refused(
+        &place.relit(&[
+            "render",
+            "out",
+            "--capture",
+            "elsewhere",
+            "--frame",
+            "0",
+            "--out",
+            "d.exr",
+        ]),
+        1,
+        &["estimate.json", "hash"],
+    );
+}
+
+#[test]
+fn without_a_display_the_plain_command_solves_headless_and_says_so() {
+    let place = Place::new();
+    let mut arguments = vec!["room", "--views", "1"];
+    arguments.extend(QUICK);
+    let output = place.relit(&arguments);
+    done(&output);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("solving without a window"), "{said}");
+    assert!(place.path("relit-out/room/report.json").is_file());
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_the_solve_cleanly_with_its_results() {
+    let place = Place::new();
+    let mut relit = Command::new(env!("CARGO_BIN_EXE_relit"))
+        .args([
+            "solve", "room", "--preset", "paper", "--time", "10m", "--views", "none",
+        ])
+        .current_dir(place.folder.path())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("relit starts");
+    // The first line of progress says that the solve is under way.
+    let mut said = String::new();
+    let mut lines = std::io::BufReader::new(relit.stderr.take().expect("piped"));
+    while !said.contains(" s  ") {
+        let read = std::io::BufRead::read_line(&mut lines, &mut said).expect("reads");
+        assert!(read > 0, "{said}");
+    }
+    let sent = Command::new("kill")
+        .args(["-INT", &relit.id().to_string()])
+        .status()
+        .expect("kill runs");
+    assert!(sent.success());
+    std::io::Read::read_to_string(&mut lines, &mut said).expect("reads");
+    assert_eq!(relit.wait().expect("ends").code(), Some(0), "{said}");
+    assert!(said.contains("interrupted"), "{said}");
+    let report = place.json("relit-out/room/report.json");
+    assert_eq!(report["stopped_because"], "cancelled");
+}
