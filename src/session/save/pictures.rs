@@ -1,7 +1,7 @@
 //! Pictures of each frame beside the results: what the estimate says that the camera sees.
 
 use crate::error::Result;
-use crate::export::exr::{Precision, write_rgb, write_scalar};
+use crate::export::exr::{Precision, write_rgb};
 use crate::export::falsecolor::{write_magnitude, write_signed};
 use crate::export::picture::{percentile_exposure, write_png};
 use crate::math::picture::Picture;
@@ -136,6 +136,7 @@ fn frame(
         ("emission", &emission),
         ("error", &error),
         ("stderr", &stderr),
+        ("seen", &seen),
     ] {
         write_rgb(&path(kind, "exr")?, picture, Precision::Float)?;
     }
@@ -145,17 +146,7 @@ fn frame(
     write_png(&path("emission", "png")?, &emission, emission_at)?;
     write_signed(&path("error", "png")?, &error, "radiance")?;
     write_magnitude(&path("stderr", "png")?, &stderr, "albedo")?;
-    write_scalar(
-        &path("seen", "exr")?,
-        seen.width,
-        seen.height,
-        &channel(&seen),
-    )?;
     write_magnitude(&path("seen", "png")?, &seen, "pixels")
-}
-
-fn channel(picture: &Picture) -> Vec<f32> {
-    picture.pixels.iter().map(|p| p.x).collect()
 }
 
 /// The pictures of an earlier run in a folder of results.
