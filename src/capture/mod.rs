@@ -7,6 +7,7 @@ pub mod mesh;
 pub mod photograph;
 pub mod read;
 pub mod segment;
+pub mod truth;
 pub mod working;
 
 use crate::error::Result;

@@ -2,6 +2,7 @@
 
 pub mod atomic;
 pub mod canvas;
+pub mod capture;
 pub mod compare;
 pub mod exr;
 pub mod falsecolor;

@@ -2,7 +2,7 @@
 
 use crate::capture::mesh::Mesh;
 use crate::capture::read::confine::Confine;
-use crate::capture::read::{obj, ply};
+use crate::capture::read::{gltf, obj, ply};
 use crate::error::{Error, Result};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -33,6 +33,7 @@ pub fn read(path: &Path, confine: &Confine, warnings: &mut Vec<String>) -> Resul
     let mut raw = match extension.as_deref() {
         Some("obj") => obj::read(path)?,
         Some("ply") => ply::read(path)?,
+        Some("glb" | "gltf") => gltf::read(path, confine)?,
         _ => {
             return Err(Error::file(
                 path,
@@ -41,7 +42,6 @@ pub fn read(path: &Path, confine: &Confine, warnings: &mut Vec<String>) -> Resul
             ));
         }
     };
-    let _ = confine;
     check(path, &raw.mesh)?;
     for warning in raw.warnings.drain(..) {
         warnings.push(format!("{}: {warning}", path.display()));

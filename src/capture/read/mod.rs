@@ -11,9 +11,12 @@
 //! A capture from someone else is data: nothing outside its folder is opened unless the person allows it, and no
 //! header is believed before it was compared with the file's length or the camera's size.
 
+mod accessor;
 pub mod confine;
 mod exposure;
 mod fields;
+mod gltf;
+pub mod gltf_file;
 pub mod image;
 mod lens;
 mod mesh;

@@ -1,0 +1,142 @@
+//! A capture as a folder that every reader of the format opens: transforms.json, mesh.obj, images/NNN.exr, truth.json.
+
+use crate::capture::Capture;
+use crate::capture::camera::Intrinsics;
+use crate::capture::mesh::Mesh;
+use crate::error::Result;
+use crate::export::atomic::{WriteError, write_atomically, write_bytes};
+use crate::export::exr::{Precision, write_rgb};
+use crate::math::picture::Picture;
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+use std::io::Write;
+use std::path::Path;
+
+/// Writes a capture; photographs become linear EXR files that hold radiance. Transforms come last, so that a folder that has
+/// them is complete.
+///
+/// # Errors
+/// A photograph cannot be read or a file cannot be written.
+pub fn write(folder: &Path, capture: &Capture, precision: Precision) -> Result<()> {
+    write_atomically(&folder.join("mesh.obj"), |out| {
+        write_obj(out, &capture.mesh)
+    })?;
+    for (index, frame) in capture.frames.iter().enumerate() {
+        let photograph = frame.load()?;
+        let picture = Picture {
+            width: photograph.width,
+            height: photograph.height,
+            pixels: photograph.pixels.clone(),
+        };
+        write_rgb(&folder.join(image_name(index)), &picture, precision)?;
+    }
+    let text = format!("{:#}\n", transforms(capture));
+    write_bytes(&folder.join("transforms.json"), text.as_bytes())
+}
+
+/// Writes truth.json (as [`crate::capture::truth::Truth`] reads it) and truth/albedo_NNN.exr, one picture a frame.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write_truth(folder: &Path, truth: &impl Serialize, albedo: &[Picture]) -> Result<()> {
+    for (index, picture) in albedo.iter().enumerate() {
+        let name = format!("truth/albedo_{index:03}.exr");
+        write_rgb(&folder.join(name), picture, Precision::Float)?;
+    }
+    write_atomically(&folder.join("truth.json"), |out| {
+        serde_json::to_writer_pretty(&mut *out, truth)?;
+        Ok(out.write_all(b"\n")?)
+    })
+}
+
+fn image_name(index: usize) -> String {
+    format!("images/{index:03}.exr")
+}
+
+/// Intrinsics, poses and up; numbers are written so that they read back to the bit.
+fn transforms(capture: &Capture) -> Value {
+    let shared = capture.frames.first().map(|frame| frame.intrinsics);
+    let mut file = Map::new();
+    file.insert("camera_model".into(), json!("OPENCV"));
+    if let Some(shared) = shared {
+        file.extend(lens(&shared));
+    }
+    file.insert("mesh_path".into(), json!("mesh.obj"));
+    file.insert("up".into(), json!(capture.up.to_array()));
+    let frames: Vec<Value> = capture
+        .frames
+        .iter()
+        .enumerate()
+        .map(|(index, frame)| {
+            let mut entry = Map::new();
+            entry.insert("file_path".into(), json!(image_name(index)));
+            if Some(frame.intrinsics) != shared {
+                entry.extend(lens(&frame.intrinsics));
+            }
+            let r = frame.pose.rotation;
+            let c = frame.pose.center;
+            entry.insert(
+                "transform_matrix".into(),
+                json!([
+                    [r.x_axis.x, r.y_axis.x, r.z_axis.x, c.x],
+                    [r.x_axis.y, r.y_axis.y, r.z_axis.y, c.y],
+                    [r.x_axis.z, r.y_axis.z, r.z_axis.z, c.z],
+                    [0.0, 0.0, 0.0, 1.0]
+                ]),
+            );
+            Value::Object(entry)
+        })
+        .collect();
+    file.insert("frames".into(), Value::Array(frames));
+    Value::Object(file)
+}
+
+fn lens(k: &Intrinsics) -> impl Iterator<Item = (String, Value)> {
+    let [k1, k2, p1, p2] = k.distortion;
+    [
+        ("w", json!(k.width)),
+        ("h", json!(k.height)),
+        ("fl_x", json!(k.fx)),
+        ("fl_y", json!(k.fy)),
+        ("cx", json!(k.cx)),
+        ("cy", json!(k.cy)),
+        ("k1", json!(k1)),
+        ("k2", json!(k2)),
+        ("p1", json!(p1)),
+        ("p2", json!(p2)),
+    ]
+    .into_iter()
+    .map(|(name, value)| (name.to_owned(), value))
+}
+
+/// Objects with `o`, texture coordinates a corner, vertex colours; positions read back to the bit.
+fn write_obj(out: &mut impl Write, mesh: &Mesh) -> std::result::Result<(), WriteError> {
+    for (index, p) in mesh.positions.iter().enumerate() {
+        match mesh.vertex_colors.get(index) {
+            Some(c) => writeln!(out, "v {} {} {} {} {} {}", p.x, p.y, p.z, c.x, c.y, c.z)?,
+            None => writeln!(out, "v {} {} {}", p.x, p.y, p.z)?,
+        }
+    }
+    for uv in mesh.corner_uvs.iter().flatten() {
+        writeln!(out, "vt {} {}", uv.x, uv.y)?;
+    }
+    let textured = !mesh.corner_uvs.is_empty();
+    let mut own = vec![Vec::new(); mesh.objects.len()];
+    for (triangle, &object) in mesh.object_of.iter().enumerate() {
+        own[object as usize].push(triangle);
+    }
+    for (name, triangles) in mesh.objects.iter().zip(own) {
+        writeln!(out, "o {}", name.replace(char::is_control, " "))?;
+        for triangle in triangles {
+            write!(out, "f")?;
+            for (corner, vertex) in mesh.triangles[triangle].iter().enumerate() {
+                match textured {
+                    true => write!(out, " {}/{}", vertex + 1, 3 * triangle + corner + 1)?,
+                    false => write!(out, " {}", vertex + 1)?,
+                }
+            }
+            writeln!(out)?;
+        }
+    }
+    Ok(())
+}

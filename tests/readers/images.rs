@@ -1,0 +1,151 @@
+//! Photographs of every format come out in linear light, and no header is believed.
+
+use crate::{folder, open, transforms, write};
+use glam::Vec3;
+use image::{DynamicImage, ImageBuffer, ImageFormat, Rgb, Rgba};
+use relit::capture::camera::Intrinsics;
+use relit::capture::photograph::{Encoding, Photograph};
+use relit::capture::read::image::read;
+use std::io::Cursor;
+use std::path::Path;
+
+fn lens(width: u32, height: u32) -> Intrinsics {
+    Intrinsics {
+        width,
+        height,
+        fx: 1.0,
+        fy: 1.0,
+        cx: 0.0,
+        cy: 0.0,
+        distortion: [0.0; 4],
+    }
+}
+
+fn decode(image: &DynamicImage, format: ImageFormat, exposure: Option<f64>) -> (Photograph, usize) {
+    let mut bytes = Cursor::new(Vec::new());
+    image.write_to(&mut bytes, format).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "image", bytes.get_ref());
+    read(
+        &folder.path().join("image"),
+        &lens(image.width(), image.height()),
+        exposure,
+    )
+    .unwrap()
+}
+
+#[test]
+fn every_format_is_decoded_to_linear_light() {
+    let png8 = DynamicImage::ImageRgb8(ImageBuffer::from_pixel(3, 2, Rgb([0, 128, 255])));
+    let png16 = DynamicImage::ImageRgb16(ImageBuffer::from_pixel(3, 2, Rgb([0, 32_768, 65_535])));
+    let float = DynamicImage::ImageRgb32F(ImageBuffer::from_pixel(3, 2, Rgb([0.0, 0.25, 40.0])));
+    let half = 0.214_041_14; // the sRGB curve at one half
+    for (image, format, want, encoding, tolerance) in [
+        (
+            &png8,
+            ImageFormat::Png,
+            [0.0, 0.215_860_5, 1.0],
+            Encoding::Srgb8,
+            1e-6,
+        ),
+        (
+            &png16,
+            ImageFormat::Png,
+            [0.0, half, 1.0],
+            Encoding::Srgb16,
+            1e-4,
+        ),
+        (
+            &png8,
+            ImageFormat::Jpeg,
+            [0.0, 0.215_860_5, 1.0],
+            Encoding::Srgb8,
+            0.02,
+        ),
+        (
+            &float,
+            ImageFormat::OpenExr,
+            [0.0, 0.25, 40.0],
+            Encoding::Linear,
+            1e-6,
+        ),
+        (
+            &float,
+            ImageFormat::Hdr,
+            [0.0, 0.25, 40.0],
+            Encoding::Linear,
+            0.3,
+        ),
+    ] {
+        let (photograph, invalid) = decode(image, format, Some(0.5));
+        assert_eq!((photograph.width, photograph.height, invalid), (3, 2, 0));
+        assert_eq!(photograph.encoding, encoding);
+        assert!(photograph.usable.is_empty());
+        let linear = encoding == Encoding::Linear;
+        assert_eq!(
+            photograph.saturation,
+            if linear { f32::INFINITY } else { 2.0 }
+        );
+        for pixel in &photograph.pixels {
+            let error = (*pixel * 0.5 - Vec3::from(want)).abs().max_element();
+            assert!(error <= tolerance, "{format:?}: {pixel}");
+        }
+    }
+}
+
+#[test]
+fn alpha_and_impossible_values_make_pixels_unusable() {
+    let values = [
+        [1.0, 1.0, 1.0, 1.0],
+        [1.0, 1.0, 1.0, 0.0],
+        [f32::NAN, 1.0, 1.0, 1.0],
+        [1.0, -0.5, 1.0, 1.0],
+    ];
+    let image = ImageBuffer::from_fn(4, 1, |x, _| Rgba(values[x as usize]));
+    let (photograph, invalid) = decode(
+        &DynamicImage::ImageRgba32F(image),
+        ImageFormat::OpenExr,
+        None,
+    );
+    assert_eq!(photograph.usable, [true, false, false, false]);
+    assert_eq!(invalid, 2);
+    assert!(photograph.pixels.iter().all(|p| p.is_finite()));
+}
+
+#[test]
+fn a_header_that_claims_a_huge_picture_is_refused_before_anything_is_allocated() {
+    let folder = folder(&transforms(""));
+    let path = folder.path().join("images/000.png");
+    let mut bytes = std::fs::read(&path).unwrap();
+    for side in [1_000_000_000u32, 65_536] {
+        bytes[16..20].copy_from_slice(&side.to_be_bytes());
+        bytes[20..24].copy_from_slice(&side.to_be_bytes());
+        let checksum = crc32(&bytes[12..29]);
+        bytes[29..33].copy_from_slice(&checksum.to_be_bytes());
+        write(folder.path(), "images/000.png", &bytes);
+        let error = open(folder.path()).unwrap_err();
+        assert!(error.place.contains("000.png"), "{error}");
+        assert!(
+            error.problem.contains("claims") || error.problem.contains("decoded"),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn a_photograph_of_another_size_than_its_camera_is_an_error() {
+    let folder = folder(&transforms(""));
+    let path = folder.path().join("images/000.png");
+    let error = read(&path, &lens(5, 5), None).unwrap_err();
+    assert!(error.problem.contains("4×2") && error.problem.contains("5×5"));
+    assert!(read(Path::new("none.exr"), &lens(1, 1), None).is_err());
+}
+
+/// The checksum of PNG chunks.
+fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(u32::MAX, |crc, &byte| {
+        (0..8).fold(crc ^ u32::from(byte), |crc, _| {
+            (crc >> 1) ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 }
+        })
+    })
+}
