@@ -1,6 +1,6 @@
 //! Insertion against closed forms and against rendering the object as a part of the scene.
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec2, Vec3};
 use relit::capture::camera::{Intrinsics, Pose};
 use relit::capture::mesh::Mesh;
 use relit::capture::photograph::{Encoding, Photograph, PhotographSource};
@@ -9,6 +9,7 @@ use relit::compose::backdrop::Backdrop;
 use relit::compose::insert::Insertion;
 use relit::compose::naive;
 use relit::compose::object::ObjectModel;
+use relit::compose::pick::{below, fall, pick};
 use relit::compose::placement::{PlacedObject, Placement};
 use relit::math::picture::Picture;
 use relit::math::stats::Moments;
@@ -383,4 +384,35 @@ fn naive_pasting_is_lit_by_harmonics_and_hidden_behind_the_scene() {
     let object = placed(&lit, block(), gray(0.25, 0.0), DVec3::new(0.0, -0.5, -3.6));
     let picture = naive::paste(&backdrop, &lit, &[object], &[seen], Vec3::ONE);
     assert!(picture == *backdrop.photograph);
+}
+
+#[test]
+fn a_pixel_leads_to_its_surface_and_objects_fall_onto_what_is_below() {
+    let shelf = cuboid(
+        DVec3::new(-1.0, -2.0, -1.0),
+        DVec3::new(1.0, -1.8, 1.0),
+        false,
+    );
+    let groups = [("walls", walls()), ("shelf", shelf)];
+    let (_, lit) = lit(&groups, vec![gray(0.5, 0.5), gray(0.5, 0.0)]);
+    let scene = &lit.scene;
+    let camera = &scene.cameras[0];
+    let middle = Vec2::splat(SIDE as f32 * 0.5);
+    let seen = pick(scene, camera, middle).expect("the room is closed");
+    assert!((seen.point - Vec3::new(0.0, 0.0, -3.0)).length() < 1e-5);
+    assert_eq!((seen.normal, seen.object), (Vec3::Z, 0));
+    let floor = below(scene, &seen).expect("there is a floor");
+    assert!(
+        (floor - Vec3::new(0.0, -3.0, -3.0)).length() < 1e-4,
+        "{floor}"
+    );
+    let ceiling = pick(scene, camera, Vec2::new(middle.x, 0.5)).expect("the room is closed");
+    assert!(ceiling.normal.y < 0.0 || ceiling.point.z > -3.0 - 1e-5);
+
+    // Half over the shelf's edge it comes to rest on the shelf, beside it on the floor.
+    for (x, height) in [(1.2, 1.8), (2.0, 3.0)] {
+        let object = placed(&lit, block(), gray(0.5, 0.0), DVec3::new(x, 0.0, 0.0));
+        let distance = fall(scene, &object, 0.0).expect("there is a floor");
+        assert!((distance - height).abs() < 1e-4, "{distance} for {height}");
+    }
 }

@@ -17,8 +17,11 @@ const KEPT_SIDE: u32 = 4096;
 
 /// Reads a whole file of bounded size.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
-    let length = std::fs::metadata(path).map_err(|e| Error::io(path, &e))?;
-    if length.len() > MAX_BYTES {
+    let metadata = std::fs::metadata(path).map_err(|e| Error::io(path, &e))?;
+    if !metadata.is_file() {
+        return Err(Error::file(path, "is no regular file", "name a file"));
+    }
+    if metadata.len() > MAX_BYTES {
         return Err(Error::file(
             path,
             "is larger than 1 GiB",

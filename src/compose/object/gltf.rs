@@ -27,8 +27,15 @@ pub(super) fn read(path: &Path) -> Result<Parts> {
         )
     };
     let bytes = files::read_bytes(path)?;
-    let Gltf { document, mut blob } =
-        Gltf::from_slice(&bytes).map_err(|e| broken(format!("is no readable glTF file: {e}")))?;
+    let unreadable = |e: ::gltf::Error| broken(format!("is no readable glTF file: {e}"));
+    // The crate's own validation takes the accessors of positions for granted.
+    let unchecked = Gltf::from_slice_without_validation(&bytes).map_err(unreadable)?;
+    if !accessors_exist(&unchecked.document) {
+        return Err(broken(
+            "is no readable glTF file: an accessor is missing".to_owned(),
+        ));
+    }
+    let Gltf { document, mut blob } = Gltf::from_slice(&bytes).map_err(unreadable)?;
     let mut buffers = Vec::new();
     for buffer in document.buffers() {
         let data = match buffer.source() {
@@ -71,6 +78,16 @@ pub(super) fn read(path: &Path) -> Result<Parts> {
         }
     }
     Ok(parts)
+}
+
+/// Whether every attribute names an accessor that is there.
+fn accessors_exist(document: &Document) -> bool {
+    let root = document.as_json();
+    root.meshes
+        .iter()
+        .flat_map(|mesh| &mesh.primitives)
+        .flat_map(|primitive| primitive.attributes.values())
+        .all(|accessor| accessor.value() < root.accessors.len())
 }
 
 /// The bytes behind a URI: inline data, or a file of the same folder.

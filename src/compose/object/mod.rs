@@ -179,7 +179,7 @@ impl Parts {
         let corner_uvs: Arc<Vec<[Vec2; 3]>> = Arc::new(
             self.triangles
                 .iter()
-                .map(|(c, _)| c.uvs.unwrap_or_default())
+                .map(|(c, _)| c.uvs.unwrap_or_default().map(usable_uv))
                 .collect(),
         );
         let mut model = ObjectModel {
@@ -202,12 +202,30 @@ impl Parts {
             if has_colors {
                 model
                     .corner_colors
-                    .push(corners.colors.unwrap_or([Vec3::ONE; 3]));
+                    .push(corners.colors.unwrap_or([Vec3::ONE; 3]).map(usable_color));
             }
             model.corners.push(corners.positions);
             model.material_of.push(material);
         }
         Ok(model)
+    }
+}
+
+fn usable_color(color: Vec3) -> Vec3 {
+    if color.is_finite() {
+        color.clamp(Vec3::ZERO, Vec3::ONE)
+    } else {
+        Vec3::ONE
+    }
+}
+
+/// Texture coordinates, or zero where they are no place on a repeated image.
+fn usable_uv(uv: Vec2) -> Vec2 {
+    const MANY_REPEATS: f32 = 1e5;
+    if uv.abs().max_element() < MANY_REPEATS && uv.is_finite() {
+        uv
+    } else {
+        Vec2::ZERO
     }
 }
 

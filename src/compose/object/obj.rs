@@ -13,8 +13,7 @@ use crate::math::picture::Picture;
 use glam::{DVec3, Vec2, Vec3};
 use std::cell::RefCell;
 use std::collections::HashMap;
-use std::fs::File;
-use std::io::{BufReader, Cursor};
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -23,7 +22,7 @@ const SPECULAR_OF_KS: f32 = 0.08;
 
 /// Reads an OBJ file and the MTL files and textures that it names.
 pub(super) fn read(path: &Path) -> Result<Parts> {
-    let file = File::open(path).map_err(|e| Error::io(path, &e))?;
+    let bytes = files::read_bytes(path)?;
     let options = tobj::LoadOptions {
         triangulate: true,
         ignore_points: true,
@@ -33,7 +32,7 @@ pub(super) fn read(path: &Path) -> Result<Parts> {
     // Libraries are found by a callback that cannot carry an error of ours, so the first one is kept aside.
     let library_error = RefCell::new(None);
     let library_path = RefCell::new(path.to_path_buf());
-    let loaded = tobj::load_obj_buf(&mut BufReader::new(file), &options, |name| {
+    let loaded = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, |name| {
         open_library(path, name).map_or_else(
             |error| {
                 library_error.borrow_mut().get_or_insert(error);
