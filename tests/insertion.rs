@@ -406,8 +406,6 @@ fn a_pixel_leads_to_its_surface_and_objects_fall_onto_what_is_below() {
         (floor - Vec3::new(0.0, -3.0, -3.0)).length() < 1e-4,
         "{floor}"
     );
-    let ceiling = pick(scene, camera, Vec2::new(middle.x, 0.5)).expect("the room is closed");
-    assert!(ceiling.normal.y < 0.0 || ceiling.point.z > -3.0 - 1e-5);
 
     // Half over the shelf's edge it comes to rest on the shelf, beside it on the floor.
     for (x, height) in [(1.2, 1.8), (2.0, 3.0)] {
