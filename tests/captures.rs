@@ -4,6 +4,7 @@ use relit::capture::photograph::Encoding;
 use relit::capture::read::{ReadOptions, read};
 use relit::capture::working::load_working;
 use relit::scene::Scene;
+use relit::scene::prepare::prepare;
 use std::path::PathBuf;
 
 /// The folder of a capture, or a line saying that it is absent.
@@ -40,7 +41,9 @@ fn rendered_rooms_load_with_objects_and_linear_photographs() {
         assert!(sum.is_finite() && sum > 0.0);
         let scene = Scene::new(&capture).unwrap();
         assert_eq!(scene.cameras.len(), frames);
-        println!("{name}: {:?}", capture.warnings);
+        let prepared = prepare(&capture, &load_working(&capture, u64::MAX).unwrap()).unwrap();
+        println!("{name}: {:#?} {:#?}", prepared.summary(), prepared.warnings);
+        assert_eq!(prepared.capture.mesh.triangles, capture.mesh.triangles);
     }
 }
 
@@ -64,6 +67,7 @@ fn a_scan_without_objects_is_cut_into_segments_and_reduced_to_a_budget() {
     let pixels: usize = working.photographs.iter().map(|p| p.pixels.len()).sum();
     assert!(pixels <= 1 << 20 && working.factor == 4, "{pixels}");
     assert_eq!(working.photographs[0].encoding, Encoding::Srgb8);
-    let scene = Scene::new(&capture.at(&working)).unwrap();
-    assert_eq!(scene.cameras[0].intrinsics, working.intrinsics[0]);
+    let prepared = prepare(&capture, &working).unwrap();
+    assert_eq!(prepared.scene.cameras[0].intrinsics, working.intrinsics[0]);
+    println!("{:#?} {:#?}", prepared.summary(), prepared.warnings);
 }

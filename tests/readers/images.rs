@@ -133,6 +133,83 @@ fn a_header_that_claims_a_huge_picture_is_refused_before_anything_is_allocated()
 }
 
 #[test]
+fn an_exr_that_claims_huge_windows_is_refused_before_anything_is_allocated() {
+    let folder = folder(&transforms(""));
+    let mut bytes = Cursor::new(Vec::new());
+    let picture = DynamicImage::ImageRgb32F(ImageBuffer::from_pixel(4, 2, Rgb([1.0; 3])));
+    picture.write_to(&mut bytes, ImageFormat::OpenExr).unwrap();
+    for window in ["dataWindow\0box2i\0", "displayWindow\0box2i\0"] {
+        let mut bytes = bytes.get_ref().clone();
+        let name = window.as_bytes();
+        let found = bytes.windows(name.len()).position(|w| w == name).unwrap();
+        let corner = found + name.len() + 4 + 8;
+        bytes[corner..corner + 4].copy_from_slice(&999_999_999i32.to_le_bytes());
+        bytes[corner + 4..corner + 8].copy_from_slice(&999_999_999i32.to_le_bytes());
+        write(folder.path(), "images/000.png", &bytes);
+        let error = open(folder.path()).unwrap_err();
+        assert!(
+            error.problem.contains("claims 1000000000"),
+            "{window}: {error}"
+        );
+    }
+}
+
+/// A grey JPEG whose EXIF states an exposure time and a sensitivity.
+fn jpeg(time: [u32; 2], iso: u16) -> Vec<u8> {
+    let mut jpeg = Cursor::new(Vec::new());
+    let picture = DynamicImage::ImageRgb8(ImageBuffer::from_pixel(4, 2, Rgb([128; 3])));
+    picture.write_to(&mut jpeg, ImageFormat::Jpeg).unwrap();
+    let mut block = b"Exif\0\0II*\0\x08\0\0\0".to_vec();
+    let mut directory = |entries: &[(u16, u16, u32)]| {
+        block.extend((entries.len() as u16).to_le_bytes());
+        for &(tag, kind, value) in entries {
+            block.extend([tag, kind].map(u16::to_le_bytes).concat());
+            block.extend([1, value].map(u32::to_le_bytes).concat());
+        }
+        block.extend(0u32.to_le_bytes());
+    };
+    // The first directory, at 8, points to the second, at 26, whose exposure time lies behind it, at 56.
+    directory(&[(0x8769, 4, 26)]);
+    directory(&[(0x829a, 5, 56), (0x8827, 3, u32::from(iso))]);
+    block.extend(time.map(u32::to_le_bytes).concat());
+    let mut bytes = vec![0xff, 0xd8, 0xff, 0xe1];
+    bytes.extend((block.len() as u16 + 2).to_be_bytes());
+    bytes.extend(block);
+    bytes.extend(&jpeg.get_ref()[2..]);
+    bytes
+}
+
+#[test]
+fn exposures_come_from_exif_relative_to_the_median_frame_if_all_have_them() {
+    let pose = "[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]";
+    let frames: Vec<String> = (0..3)
+        .map(|i| format!(r#"{{"file_path": "{i}.jpg", "transform_matrix": {pose}}}"#))
+        .collect();
+    let text = format!(
+        r#"{{"fl_x": 3, "fl_y": 3, "frames": [{}]}}"#,
+        frames.join(",")
+    );
+    let folder = folder(&text);
+    for (index, (time, iso)) in [([1, 100], 100), ([1, 100], 400), ([1, 50], 100)]
+        .iter()
+        .enumerate()
+    {
+        write(folder.path(), &format!("{index}.jpg"), &jpeg(*time, *iso));
+    }
+    let exposures = || -> Vec<Option<f64>> {
+        let capture = open(folder.path()).unwrap();
+        capture.frames.iter().map(|frame| frame.exposure).collect()
+    };
+    assert_eq!(exposures(), [Some(0.5), Some(2.0), Some(1.0)]);
+    std::fs::copy(
+        folder.path().join("images/000.png"),
+        folder.path().join("1.jpg"),
+    )
+    .unwrap();
+    assert_eq!(exposures(), [None, None, None]);
+}
+
+#[test]
 fn a_photograph_of_another_size_than_its_camera_is_an_error() {
     let folder = folder(&transforms(""));
     let path = folder.path().join("images/000.png");

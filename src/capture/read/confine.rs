@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use std::path::{Component, Path, PathBuf};
 
-/// Files of other formats are refused beyond this many bytes before they are read.
+/// Longer files are refused unread.
 const MAX_FILE_BYTES: u64 = 1 << 36;
 
 /// A folder that file paths may not leave.

@@ -3,8 +3,7 @@
 use crate::capture::read::mesh::RawMesh;
 use crate::error::{Error, Result};
 use glam::{DVec3, Vec2, Vec3};
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, Read};
 use std::path::Path;
 
 /// The name tobj gives to faces before the first `o` or `g`.
@@ -15,8 +14,9 @@ const UNNAMED: &str = "unnamed_object";
 /// # Errors
 /// The file cannot be read or breaks the format, with the number of the line where that showed.
 pub fn read(path: &Path) -> Result<RawMesh> {
-    let file = File::open(path).map_err(|e| Error::io(path, &e))?;
-    parse(path, BufReader::new(file))
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+    // Comments and names in other encodings than UTF-8 are no reason to fail.
+    parse(path, String::from_utf8_lossy(&bytes).as_bytes())
 }
 
 fn parse(path: &Path, reader: impl BufRead) -> Result<RawMesh> {
