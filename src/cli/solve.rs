@@ -7,7 +7,7 @@ use crate::cli::report;
 use crate::error::{Error, Result};
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
-use crate::inverse::solver::{self, Control, Observer, Problem, Progress};
+use crate::inverse::solver::{self, Checkpoint, Control, Observer, Problem, Progress};
 use crate::session::command::Source;
 use crate::session::open::open;
 use crate::session::save::{self, Results};
@@ -129,6 +129,12 @@ impl Observer for Watch<'_> {
             return Control::Stop;
         }
         Control::Continue
+    }
+
+    fn offer(&mut self, make: &dyn Fn() -> Checkpoint) {
+        if self.written.elapsed() >= CHECKPOINT {
+            self.results.checkpoint = Some(make());
+        }
     }
 }
 

@@ -92,6 +92,12 @@ pub enum Control {
 pub trait Observer {
     /// Hears how far the solve has come and may steer it.
     fn observe(&mut self, progress: &Progress, estimate: &Estimate) -> Control;
+
+    /// Is offered a checkpoint of where the solve stands, just before it hears of it by [`Observer::observe`]; one that
+    /// wants to keep it calls `make`. Solvers that can be taken up again offer it wherever they call `observe`.
+    fn offer(&mut self, make: &dyn Fn() -> Checkpoint) {
+        let _ = make;
+    }
 }
 
 /// Why a solve ended; the word in `report.json`.
