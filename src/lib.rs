@@ -30,4 +30,5 @@ pub mod inverse;
 pub mod math;
 pub mod scene;
 pub mod session;
+pub mod study;
 pub mod transport;

@@ -1,6 +1,7 @@
 //! The commands and their options.
 
 use crate::cli::edit::EditArguments;
+use crate::cli::evaluate::EvaluateArguments;
 use crate::cli::insert::InsertArguments;
 use crate::cli::parameters::Parameters;
 use crate::cli::render::RenderArguments;
@@ -32,6 +33,8 @@ pub struct Arguments {
 pub enum Action {
     /// Solve a capture without a window and write the results
     Solve(SolveArguments),
+    /// Compare results with the truth of a capture
+    Evaluate(EvaluateArguments),
     /// Render the room in its estimated light
     Render(RenderArguments),
     /// Put objects into a photograph

@@ -2,6 +2,7 @@
 
 mod arguments;
 mod edit;
+mod evaluate;
 mod insert;
 mod interrupt;
 mod parameters;
@@ -48,6 +49,7 @@ pub fn run(window: Option<Window>) -> i32 {
 fn act(arguments: Arguments, window: Option<Window>) -> Result<()> {
     match arguments.action {
         None => open(&arguments, window),
+        Some(Action::Evaluate(evaluate)) => evaluate::evaluate(&evaluate),
         Some(Action::Render(render)) => render::render(&render),
         Some(Action::Insert(insert)) => insert::insert(&insert),
         Some(Action::Edit(edit)) => edit::edit(&edit),

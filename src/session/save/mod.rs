@@ -273,6 +273,14 @@ impl Saved {
                 "name that capture with --capture, or solve again",
             ));
         }
+        self.estimate_by_name(capture)
+    }
+
+    /// The estimate for a capture with the same objects and mesh, wherever its photographs come from.
+    ///
+    /// # Errors
+    /// An object is missing, or the maps belong to another mesh.
+    pub fn estimate_by_name(&self, capture: &OpenCapture) -> Result<Estimate> {
         self.file.estimate(&self.path, &self.maps, capture)
     }
 }

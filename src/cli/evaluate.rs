@@ -1,0 +1,99 @@
+//! `relit evaluate`: the errors of an estimate against the truth.
+
+use crate::error::{Error, Result};
+use crate::session::command::Source;
+use crate::session::open::open;
+use crate::session::save;
+use crate::study::evaluate::{Evaluation, evaluate as compare};
+use clap::Args;
+use std::path::PathBuf;
+
+/// `relit evaluate`.
+#[derive(Debug, Args)]
+pub struct EvaluateArguments {
+    /// Folder that relit solve wrote
+    dir: PathBuf,
+    /// Capture with truth.json, and truth/albedo_NNN.exr where there are such
+    #[arg(long, value_name = "CAPTURE")]
+    truth: PathBuf,
+    /// Write JSON instead of a table
+    #[arg(long)]
+    json: bool,
+    /// Threads to work with [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+}
+
+/// Prints the errors.
+///
+/// # Errors
+/// The results or the truth cannot be read, or belong to other objects.
+pub fn evaluate(arguments: &EvaluateArguments) -> Result<()> {
+    crate::cli::solve::use_threads(arguments.threads)?;
+    let saved = save::load(&arguments.dir)?;
+    let capture = open(&Source::Folder(arguments.truth.clone()), &saved.options)?;
+    let estimate = saved.estimate_by_name(&capture)?;
+    let evaluation = compare(
+        &arguments.truth,
+        &capture.capture,
+        &capture.scene,
+        &capture.photographs,
+        &estimate,
+    )?;
+    if arguments.json {
+        let text = serde_json::to_string_pretty(&evaluation)
+            .map_err(|error| Error::new("evaluate", error, ""))?;
+        println!("{text}");
+    } else {
+        print!("{}", table(&evaluation));
+    }
+    Ok(())
+}
+
+fn table(evaluation: &Evaluation) -> String {
+    let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.4}"));
+    let rows = [
+        ("objects scored", Some(evaluation.objects as f64)),
+        ("albedo, mean absolute error", evaluation.albedo_mae),
+        (
+            "albedo, median relative error",
+            evaluation.albedo_rel_median,
+        ),
+        ("albedo, 95th percentile", evaluation.albedo_rel_p95),
+        ("albedo pictures, PSNR in dB", evaluation.albedo_psnr),
+        (
+            "  at best with one colour an object",
+            evaluation.albedo_psnr_constant_per_object,
+        ),
+        ("emitters, intersection over union", evaluation.emission_iou),
+        (
+            "emission, mean squared log error",
+            evaluation.emission_log_mse,
+        ),
+        (
+            "emission, median relative error",
+            evaluation.emission_rel_median,
+        ),
+        ("scale fitted to the light", Some(evaluation.emission_scale)),
+    ];
+    let mut text = String::new();
+    for (name, value) in rows {
+        text += &format!("{name:38} {:>10}\n", number(value));
+    }
+    let names = evaluation.per_object.iter().map(|(n, _)| n.chars().count());
+    let width = names.max().unwrap_or(0).max(6);
+    text += &format!(
+        "\n{:width$}  {:>8}  {:>10}  {:>12}\n",
+        "object", "pixels", "albedo err", "emission err"
+    );
+    for (name, errors) in &evaluation.per_object {
+        let albedo = errors.albedo_rel.filter(|_| errors.scored);
+        text += &format!(
+            "{name:width$}  {:>8}  {:>10}  {:>12}\n",
+            errors.pixels,
+            number(albedo),
+            number(errors.emission_rel)
+        );
+    }
+    text
+}

@@ -1,0 +1,173 @@
+//! Albedo against true albedo pictures, pixel by pixel.
+
+use crate::capture::Capture;
+use crate::capture::truth::{Truth, read_albedo};
+use crate::error::Result;
+use crate::inverse::estimate::Estimate;
+use crate::scene::Scene;
+use crate::scene::camera::Camera;
+use crate::transport::material::Material;
+use glam::{DVec3, Vec2, Vec3};
+use rayon::prelude::*;
+use std::path::Path;
+
+/// Points along a pixel's side over which the estimate is box-filtered, as the truth is.
+const SIDE: u32 = 4;
+
+/// Squared errors pooled over frames, and what was seen of each object.
+#[derive(Debug, Clone, Default)]
+pub struct PictureErrors {
+    /// For each object, the pixels whose centre sees it.
+    pub seen_pixels: Vec<u64>,
+    squares: f64,
+    values: u64,
+    /// For each object: pixels compared, and the sums of the true albedo and of its square.
+    objects: Vec<(u64, DVec3, f64)>,
+}
+
+impl PictureErrors {
+    /// Peak signal-to-noise ratio in dB; `None` without true pictures. Infinite where there is no error.
+    pub fn psnr(&self) -> Option<f64> {
+        decibel(self.squares, self.values)
+    }
+
+    /// The same for the best choice of one colour an object: its mean.
+    pub fn psnr_constant_per_object(&self) -> Option<f64> {
+        let squares = self
+            .objects
+            .iter()
+            .filter(|(pixels, ..)| *pixels > 0)
+            .map(|(pixels, sum, squares)| squares - sum.length_squared() / *pixels as f64)
+            .sum::<f64>();
+        decibel(squares.max(0.0), self.values)
+    }
+}
+
+/// Peak 1 over the mean square; a perfect score has no finite number and is `None`.
+fn decibel(squares: f64, values: u64) -> Option<f64> {
+    (values > 0 && squares > 0.0).then(|| -10.0 * (squares / values as f64).log10())
+}
+
+/// What the estimate says of one pixel.
+#[derive(Clone, Copy)]
+struct Seen {
+    /// Object at the centre.
+    object: Option<u32>,
+    /// Mean albedo over the pixel; `None` where a part of it is an emitter or leaves the mesh.
+    albedo: Option<Vec3>,
+}
+
+/// Compares the estimated albedo with truth/albedo_NNN.exr of each frame that has one, and counts seen pixels in all.
+///
+/// # Errors
+/// A true picture is broken or of another size than its frame.
+pub fn compare(
+    folder: &Path,
+    capture: &Capture,
+    scene: &Scene,
+    estimate: &Estimate,
+    truth: &Truth,
+) -> Result<PictureErrors> {
+    let materials = estimate.materials();
+    let emitters: Vec<bool> = scene
+        .objects
+        .iter()
+        .map(|o| truth.objects.get(&o.name).is_some_and(|t| t.is_emitter()))
+        .collect();
+    let mut errors = PictureErrors {
+        seen_pixels: vec![0; scene.objects.len()],
+        objects: vec![(0, DVec3::ZERO, 0.0); scene.objects.len()],
+        ..PictureErrors::default()
+    };
+    for (index, frame) in capture.frames.iter().enumerate() {
+        let camera = Camera::new(&frame.intrinsics, &frame.pose, scene.origin);
+        let known = read_albedo(folder, index, &frame.intrinsics)?;
+        let grid = if known.is_some() { SIDE } else { 0 };
+        let seen = look(scene, &camera, &materials, &emitters, grid);
+        for (pixel, seen) in seen.iter().enumerate() {
+            let Some(object) = seen.object.map(|o| o as usize) else {
+                continue;
+            };
+            errors.seen_pixels[object] += 1;
+            let known = known.as_ref().and_then(|k| k.pixels.get(pixel));
+            if let Some((albedo, known)) = seen.albedo.zip(known) {
+                let known = known.as_dvec3();
+                errors.squares += (albedo.as_dvec3() - known).length_squared();
+                errors.values += 3;
+                let (pixels, sum, squares) = &mut errors.objects[object];
+                *pixels += 1;
+                *sum += known;
+                *squares += known.length_squared();
+            }
+        }
+    }
+    Ok(errors)
+}
+
+/// Looks through every pixel: at its centre, and at `grid` × `grid` points for the mean albedo.
+fn look(
+    scene: &Scene,
+    camera: &Camera,
+    materials: &[Material],
+    emitters: &[bool],
+    grid: u32,
+) -> Vec<Seen> {
+    let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
+    let at = |x: f32, y: f32| {
+        let hit = scene.intersect(&camera.ray(Vec2::new(x, y)))?;
+        Some((scene.object_of[hit.triangle as usize], hit))
+    };
+    let albedo = |x: u32, y: u32| {
+        let mut sum = Vec3::ZERO;
+        for i in 0..grid * grid {
+            let offset = |i: u32| (i as f32 + 0.5) / grid as f32;
+            let (object, hit) = at(x as f32 + offset(i % grid), y as f32 + offset(i / grid))?;
+            if emitters[object as usize] {
+                return None;
+            }
+            sum += materials.get(object as usize)?.albedo_at(&hit);
+        }
+        (grid > 0).then(|| sum / (grid * grid) as f32)
+    };
+    (0..u64::from(width) * u64::from(height))
+        .into_par_iter()
+        .map(|pixel| {
+            let (x, y) = (
+                (pixel % u64::from(width)) as u32,
+                (pixel / u64::from(width)) as u32,
+            );
+            Seen {
+                object: at(x as f32 + 0.5, y as f32 + 0.5).map(|(object, _)| object),
+                albedo: albedo(x, y),
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tenth_of_error_is_twenty_decibel_and_the_best_constant_is_the_mean() {
+        let known = [0.2, 0.4];
+        let objects = vec![(
+            2,
+            DVec3::splat(0.6),
+            3.0 * known.iter().map(|v| v * v).sum::<f64>(),
+        )];
+        let errors = PictureErrors {
+            squares: 6.0 * 0.01,
+            values: 6,
+            objects,
+            ..PictureErrors::default()
+        };
+        assert!(errors.psnr().is_some_and(|d| (d - 20.0).abs() < 1e-9));
+        let constant = errors.psnr_constant_per_object();
+        assert!(
+            constant.is_some_and(|d| (d - 20.0).abs() < 1e-9),
+            "{constant:?}"
+        );
+        assert_eq!(PictureErrors::default().psnr(), None);
+    }
+}

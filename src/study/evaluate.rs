@@ -1,0 +1,210 @@
+//! The errors of an estimate against the truth of a capture.
+
+use crate::capture::Capture;
+use crate::capture::photograph::Photograph;
+use crate::capture::truth::{ObjectTruth, Truth};
+use crate::error::Result;
+use crate::inverse::estimate::{Estimate, ObjectEstimate};
+use crate::math::stats::quantile;
+use crate::scene::Scene;
+use crate::study::albedo_pictures::{self, PictureErrors};
+use crate::study::emission::{self, EmissionErrors};
+use glam::DVec3;
+use serde::{Serialize, Serializer};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Pixels that must see an object for its albedo to be scored.
+const ENOUGH_PIXELS: u64 = 50;
+
+/// The errors of an estimate; `null` where nothing could be compared.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Evaluation {
+    /// Objects scored for their albedo: no emitter in the truth, seen by 50 or more pixels, not textured.
+    pub objects: usize,
+    /// Mean absolute error of albedo over scored objects and RGB.
+    pub albedo_mae: Option<f64>,
+    /// Median over scored objects of ‖ρ̂ − ρ‖₂ / ‖ρ‖₂ over RGB.
+    pub albedo_rel_median: Option<f64>,
+    /// Its 95th percentile.
+    pub albedo_rel_p95: Option<f64>,
+    /// Peak signal-to-noise ratio in dB against the true albedo pictures, peak 1.
+    pub albedo_psnr: Option<f64>,
+    /// The best that one colour an object could score.
+    pub albedo_psnr_constant_per_object: Option<f64>,
+    /// Intersection over union of the emitters by area; an emitter is brighter than 1 % of the brightest.
+    pub emission_iou: Option<f64>,
+    /// Mean over true emitters and RGB of ln² of the ratio, both sides raised by 1 % of the brightest.
+    pub emission_log_mse: Option<f64>,
+    /// Median over true emitters of the relative error over RGB.
+    pub emission_rel_median: Option<f64>,
+    /// The scale on the estimated light that fits the truth best; 1 but for 8-bit photographs, which leave it open.
+    pub emission_scale: f64,
+    /// Every object of the truth.
+    #[serde(serialize_with = "as_map")]
+    pub per_object: Vec<(String, ObjectErrors)>,
+}
+
+/// The errors of one object.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ObjectErrors {
+    /// Pixels whose centre sees it.
+    pub pixels: u64,
+    /// Whether it emits in the truth.
+    pub emitter: bool,
+    /// Whether its true albedo varies.
+    pub textured: bool,
+    /// Whether its albedo is scored.
+    pub scored: bool,
+    /// Estimated albedo.
+    pub albedo: [f32; 3],
+    /// True albedo, the mean where textured.
+    pub albedo_true: [f64; 3],
+    /// Relative error of albedo over RGB.
+    pub albedo_rel: Option<f64>,
+    /// Estimated emission, or exitance where that is all that is determined, times the scale.
+    pub emission: [f64; 3],
+    /// The truth to compare it with.
+    pub emission_true: [f64; 3],
+    /// Relative error of emission over RGB, for emitters.
+    pub emission_rel: Option<f64>,
+}
+
+/// Compares an estimate with the truth of the capture in `folder`, whose `capture` and `scene` it belongs to;
+/// `photographs` say whether the scale of the light is open.
+///
+/// # Errors
+/// The truth is missing or broken.
+pub fn evaluate(
+    folder: &Path,
+    capture: &Capture,
+    scene: &Scene,
+    photographs: &[Arc<Photograph>],
+    estimate: &Estimate,
+) -> Result<Evaluation> {
+    let truth = Truth::read(folder)?;
+    let pictures = albedo_pictures::compare(folder, capture, scene, estimate, &truth)?;
+    let open_scale = photographs.iter().any(|p| p.saturation.is_finite());
+    let emission = emission::compare(scene, estimate, &truth, open_scale);
+    let per_object = objects(scene, estimate, &truth, &pictures, &emission);
+
+    let scored: Vec<&ObjectErrors> = per_object
+        .iter()
+        .map(|(_, errors)| errors)
+        .filter(|errors| errors.scored)
+        .collect();
+    let absolute: Vec<f64> = scored
+        .iter()
+        .flat_map(|o| (0..3).map(|c| (f64::from(o.albedo[c]) - o.albedo_true[c]).abs()))
+        .collect();
+    let mut relative: Vec<f64> = scored.iter().filter_map(|o| o.albedo_rel).collect();
+    let mut lamps: Vec<f64> = (per_object.iter())
+        .filter_map(|(_, o)| o.emission_rel)
+        .collect();
+    Ok(Evaluation {
+        objects: scored.len(),
+        albedo_mae: mean(&absolute),
+        albedo_rel_median: quantile(&mut relative, 0.5),
+        albedo_rel_p95: quantile(&mut relative, 0.95),
+        albedo_psnr: pictures.psnr(),
+        albedo_psnr_constant_per_object: pictures.psnr_constant_per_object(),
+        emission_iou: emission.iou,
+        emission_log_mse: emission.log_mse,
+        emission_rel_median: quantile(&mut lamps, 0.5),
+        emission_scale: emission.scale,
+        per_object,
+    })
+}
+
+fn objects(
+    scene: &Scene,
+    estimate: &Estimate,
+    truth: &Truth,
+    pictures: &PictureErrors,
+    emission: &EmissionErrors,
+) -> Vec<(String, ObjectErrors)> {
+    let estimates = estimate.objects.iter().zip(&pictures.seen_pixels);
+    (scene.objects.iter().zip(estimates))
+        .filter_map(|(object, (estimated, &pixels))| {
+            let known = truth.objects.get(&object.name)?;
+            let errors = of_object(estimated, known, pixels, emission.scale);
+            Some((object.name.clone(), errors))
+        })
+        .collect()
+}
+
+fn of_object(
+    estimated: &ObjectEstimate,
+    known: &ObjectTruth,
+    pixels: u64,
+    scale: f64,
+) -> ObjectErrors {
+    let emitter = known.is_emitter();
+    let light = estimated.emission.as_dvec3() * scale;
+    let light_true = emission::comparable(estimated, known);
+    ObjectErrors {
+        pixels,
+        emitter,
+        textured: known.textured,
+        scored: !emitter && !known.textured && pixels >= ENOUGH_PIXELS,
+        albedo: estimated.albedo.to_array(),
+        albedo_true: known.albedo.to_array(),
+        albedo_rel: relative(estimated.albedo.as_dvec3(), known.albedo),
+        emission: light.to_array(),
+        emission_true: light_true.to_array(),
+        emission_rel: relative(light, light_true).filter(|_| emitter),
+    }
+}
+
+/// ‖a − b‖₂ / ‖b‖₂; `None` where b is zero.
+fn relative(a: DVec3, b: DVec3) -> Option<f64> {
+    (b != DVec3::ZERO).then(|| (a - b).length() / b.length())
+}
+
+/// The mean; `None` of nothing.
+pub(super) fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+fn as_map<S: Serializer>(
+    pairs: &[(String, ObjectErrors)],
+    serializer: S,
+) -> std::result::Result<S::Ok, S::Error> {
+    serializer.collect_map(pairs.iter().map(|(name, errors)| (name, errors)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lamps_are_scored_by_their_light_and_surfaces_by_their_albedo() {
+        let estimated = ObjectEstimate {
+            albedo: glam::Vec3::new(0.3, 0.4, 0.0),
+            emission: glam::Vec3::new(3.0, 4.0, 0.0),
+            albedo_identifiable: false,
+            ..ObjectEstimate::default()
+        };
+        let lamp = ObjectTruth {
+            emission: DVec3::new(2.0, 3.0, 0.0),
+            exitance: Some(DVec3::new(3.0, 4.0, 1.0)),
+            ..ObjectTruth::default()
+        };
+        let errors = of_object(&estimated, &lamp, 1000, 1.0);
+        assert!(!errors.scored && errors.emitter);
+        assert!((errors.emission_rel.expect("an emitter") - 1.0 / 26f64.sqrt()).abs() < 1e-6);
+        let wall = ObjectTruth {
+            albedo: DVec3::new(0.3, 0.0, 0.0),
+            ..ObjectTruth::default()
+        };
+        let errors = of_object(&estimated, &wall, 50, 1.0);
+        assert!(errors.scored && errors.emission_rel.is_none());
+        assert!((errors.albedo_rel.expect("not black") - 0.4 / 0.3).abs() < 1e-6);
+        assert!(!of_object(&estimated, &wall, 49, 1.0).scored);
+        let textured = ObjectTruth {
+            textured: true,
+            ..wall
+        };
+        assert!(!of_object(&estimated, &textured, 50, 1.0).scored);
+    }
+}
