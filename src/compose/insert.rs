@@ -289,31 +289,41 @@ impl Insertion {
         }
     }
 
-    /// The coarse result: in each block one pair of paths where an object is seen and one where none is.
+    /// The coarse result: in each block one pair of paths where an object is seen and one where none is, whose
+    /// differences are then averaged over neighbouring blocks.
     fn coarse(&mut self) {
         let (width, height) = (self.width(), self.row_samples.len());
         let side = (1..)
             .find(|side| width.div_ceil(*side) * height.div_ceil(*side) <= COARSE_BLOCKS)
             .unwrap_or(1);
-        let bands: Vec<Vec<PixelSums>> = (0..height.div_ceil(side))
+        let bands: Vec<(Vec<PixelSums>, Vec<Option<DVec3>>)> = (0..height.div_ceil(side))
             .into_par_iter()
             .map(|band| self.coarse_band(band * side, side))
             .collect();
-        self.pixels = bands.concat();
+        let (pixels, deltas): (Vec<_>, Vec<_>) = bands.into_iter().unzip();
+        self.pixels = pixels.concat();
         self.rays = self.pixels.iter().map(|p| u64::from(p.rays)).sum();
+        for (band, row) in self.pixels.chunks_mut(side * width).zip(smooth(&deltas)) {
+            for (index, sums) in band.iter_mut().enumerate().filter(|(_, s)| s.covered == 0) {
+                let delta = row[index % width / side];
+                sums.with = sums.without + delta;
+                sums.changed = delta != DVec3::ZERO;
+            }
+        }
     }
 
-    /// The coarse result's rows from `top` on.
-    fn coarse_band(&self, top: usize, side: usize) -> Vec<PixelSums> {
+    /// The coarse result's rows from `top` on, and each block's difference where no object is seen.
+    fn coarse_band(&self, top: usize, side: usize) -> (Vec<PixelSums>, Vec<Option<DVec3>>) {
         let (width, height) = (self.width(), self.row_samples.len());
         let rows = side.min(height - top);
         let world = FurnishedScene::new(&self.lit, &self.objects);
         let mut band = vec![PixelSums::default(); rows * width];
+        let mut deltas = Vec::with_capacity(width.div_ceil(side));
         for left in (0..width).step_by(side) {
             // Indexed by whether an object is seen.
             let mut found: [Option<PixelSums>; 2] = [None; 2];
-            for index in 0..rows * side.min(width - left) {
-                let columns = side.min(width - left);
+            let columns = side.min(width - left);
+            for index in 0..rows * columns {
                 let (row, column) = (index / columns, left + index % columns);
                 let pixel = (top + row) * width + column;
                 let offset = self.stream(pixel, 0).uniform2();
@@ -324,7 +334,32 @@ impl Insertion {
                     None => *sums.insert(self.pair(&world, pixel, 0)),
                 };
             }
+            deltas.push(found[0].map(|sums| sums.with - sums.without));
         }
-        band
+        (band, deltas)
     }
+}
+
+/// Means over squares of blocks around each, of the blocks that have a value.
+fn smooth(deltas: &[Vec<Option<DVec3>>]) -> Vec<Vec<DVec3>> {
+    /// Blocks to each side.
+    const REACH: usize = 3;
+    let around = |i: usize, len: usize| i.saturating_sub(REACH)..len.min(i + REACH + 1);
+    (0..deltas.len())
+        .into_par_iter()
+        .map(|y| {
+            let near = &deltas[around(y, deltas.len())];
+            let columns = deltas[y].len();
+            (0..columns)
+                .map(|x| {
+                    let values = || {
+                        near.iter()
+                            .flat_map(|row| &row[around(x, columns)])
+                            .flatten()
+                    };
+                    values().sum::<DVec3>() / values().count().max(1) as f64
+                })
+                .collect()
+        })
+        .collect()
 }
