@@ -54,6 +54,24 @@ impl TexelLayout {
         self.first[triangle] + before + 2 * column + u32::from(inverted)
     }
 
+    /// Barycentric (b1, b2) of a texel's corners, counted within its triangle and wound as the triangle is.
+    pub fn corners(&self, triangle: usize, texel: u32) -> [[f32; 2]; 3] {
+        let n = 1u32 << self.levels[triangle];
+        let mut row = 0;
+        while row + 1 < n && (row + 1) * (2 * n - row - 1) <= texel {
+            row += 1;
+        }
+        let within = texel - row * (2 * n - row);
+        let (x, y) = ((within / 2) as f32, row as f32);
+        let scale = 1.0 / n as f32;
+        let corners = if within.is_multiple_of(2) {
+            [[x, y], [x + 1.0, y], [x, y + 1.0]]
+        } else {
+            [[x + 1.0, y], [x + 1.0, y + 1.0], [x, y + 1.0]]
+        };
+        corners.map(|corner| corner.map(|v| v * scale))
+    }
+
     /// Barycentric (b1, b2) of the middle of a texel, counted within its triangle.
     pub fn center(&self, triangle: usize, texel: u32) -> [f32; 2] {
         let n = 1u32 << self.levels[triangle];
@@ -93,6 +111,11 @@ mod tests {
                     b2,
                 };
                 assert_eq!(layout.texel(&hit), layout.first[triangle] + texel);
+                let corners = layout.corners(triangle, texel);
+                for axis in 0..2 {
+                    let mean = corners.iter().map(|c| c[axis]).sum::<f32>() / 3.0;
+                    assert!((mean - [b1, b2][axis]).abs() < 1e-6);
+                }
             }
         }
     }

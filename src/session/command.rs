@@ -1,6 +1,7 @@
 //! What the window or the command line asks of the worker.
 
 pub use crate::compose::placement::Placement;
+pub use crate::export::scene::Format as ExportFormat;
 use crate::inverse::settings::Settings;
 use crate::scene::camera::Camera;
 use glam::DVec3;
@@ -72,26 +73,6 @@ pub struct ExportRequest {
     pub format: ExportFormat,
     /// Where.
     pub path: PathBuf,
-}
-
-/// Formats that other programs read.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ExportFormat {
-    /// Scene with base colours and emissive strength.
-    Glb,
-    /// Scene as OBJ and MTL.
-    Obj,
-    /// Scene as PLY with vertex colours.
-    Ply,
-    /// Scene as a Mitsuba 3 XML file.
-    Mitsuba,
-    /// Table of objects.
-    Csv,
-    /// The light at a point as a panorama.
-    Probe {
-        /// The point, in the capture's coordinates.
-        at: DVec3,
-    },
 }
 
 /// How a capture is read.

@@ -1,5 +1,6 @@
 //! What each command does.
 
+use crate::export::scene;
 use crate::session::command::{Command, ExportRequest, ViewCamera};
 use crate::session::save::pictures::Frames;
 use crate::session::save::{self, Results};
@@ -88,9 +89,17 @@ impl Worker {
     }
 
     fn export(&mut self, request: &ExportRequest) {
-        self.say(
-            Level::Error,
-            format!("{}: cannot be written yet", request.path.display()),
-        );
+        let Some(capture) = self.capture.clone() else {
+            self.say(
+                Level::Error,
+                "export: nothing is open; open a capture first",
+            );
+            return;
+        };
+        let path = &request.path;
+        match scene::write(&capture.scene, &self.estimate, request.format, path) {
+            Ok(()) => self.say(Level::Info, format!("exported to {}", path.display())),
+            Err(error) => self.fail(&error),
+        }
     }
 }

@@ -1,0 +1,259 @@
+//! Binary glTF 2.0: one node, mesh and material an object, and the cameras.
+
+use crate::error::{Error, Result};
+use crate::export::atomic::write_atomically;
+use crate::export::scene::Part;
+use crate::scene::Scene;
+use crate::scene::camera::Camera;
+use glam::{Mat4, Vec3};
+use gltf_json as json;
+use json::validation::Checked::Valid;
+use json::validation::USize64;
+use std::path::Path;
+
+/// Writes parts and cameras as a GLB file.
+///
+/// Base colour is the albedo, per vertex (COLOR_0) where it varies; emission is emissiveFactor ×
+/// KHR_materials_emissive_strength; glTF's roughness is √α, and 1 where no specular lobe was found. Positions are
+/// the capture's, in f32. Cameras have no distortion there and their principal point in the middle.
+///
+/// # Errors
+/// The file cannot be written, or it would be larger than the format's 4 GiB.
+pub fn write(path: &Path, scene: &Scene, parts: &[Part]) -> Result<()> {
+    let mut file = Document::default();
+    let mut nodes = Vec::new();
+    for part in parts {
+        nodes.push(file.part(part));
+    }
+    for (index, camera) in scene.cameras.iter().enumerate() {
+        nodes.push(file.camera(index, camera, scene));
+    }
+    file.finish(nodes);
+
+    let text = json::serialize::to_vec(&file.root)
+        .map_err(|error| Error::file(path, error, "nothing was written there"))?;
+    if u32::try_from(text.len() + file.bytes.len() + 64).is_err() {
+        let remedy = "export as ply or obj, or estimate with fewer texels";
+        return Err(Error::file(
+            path,
+            "the scene is larger than a GLB file can be",
+            remedy,
+        ));
+    }
+    let glb = gltf::binary::Glb {
+        header: gltf::binary::Header {
+            magic: *b"glTF",
+            version: 2,
+            length: 0,
+        },
+        json: text.into(),
+        bin: Some(file.bytes.into()),
+    };
+    write_atomically(path, |writer| Ok(glb.to_writer(writer)?))
+}
+
+/// The JSON and the binary chunk under construction.
+#[derive(Default)]
+struct Document {
+    root: json::Root,
+    bytes: Vec<u8>,
+}
+
+impl Document {
+    fn part(&mut self, part: &Part) -> json::Index<json::Node> {
+        let mut primitive = json::mesh::Primitive {
+            attributes: Default::default(),
+            extensions: None,
+            extras: Default::default(),
+            indices: None,
+            material: Some(self.material(part)),
+            mode: Valid(json::mesh::Mode::Triangles),
+            targets: None,
+        };
+        let positions: Vec<Vec3> = part.positions.iter().map(|p| p.as_vec3()).collect();
+        let bounds = positions
+            .iter()
+            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &p| {
+                (low.min(p), high.max(p))
+            });
+        let accessor = self.vectors(&positions, Some(bounds));
+        let semantics = &mut primitive.attributes;
+        semantics.insert(Valid(json::mesh::Semantic::Positions), accessor);
+        if !part.colors.is_empty() {
+            let accessor = self.vectors(&part.colors, None);
+            semantics.insert(Valid(json::mesh::Semantic::Colors(0)), accessor);
+        }
+        primitive.indices = Some(self.indices(&part.triangles));
+
+        let mesh = self.root.push(json::Mesh {
+            extensions: None,
+            extras: Default::default(),
+            name: Some(part.name.clone()),
+            primitives: vec![primitive],
+            weights: None,
+        });
+        self.root.push(json::Node {
+            mesh: Some(mesh),
+            name: Some(part.name.clone()),
+            ..Default::default()
+        })
+    }
+
+    fn material(&mut self, part: &Part) -> json::Index<json::Material> {
+        let estimate = &part.estimate;
+        let color = if part.colors.is_empty() {
+            estimate.albedo.clamp(Vec3::ZERO, Vec3::ONE)
+        } else {
+            Vec3::ONE
+        };
+        let brightest = estimate.emission.max_element();
+        let strength = brightest.max(1.0);
+        let factor = (estimate.emission / strength).clamp(Vec3::ZERO, Vec3::ONE);
+        let extension = (brightest > 1.0).then_some(json::extensions::material::EmissiveStrength {
+            emissive_strength: json::extensions::material::EmissiveStrengthFactor(strength),
+        });
+        if extension.is_some() {
+            let name = "KHR_materials_emissive_strength".to_owned();
+            if !self.root.extensions_used.contains(&name) {
+                self.root.extensions_used.push(name);
+            }
+        }
+        let roughness = estimate
+            .roughness
+            .map_or(1.0, |alpha| alpha.max(0.0).sqrt().min(1.0));
+        self.root.push(json::Material {
+            name: Some(part.name.clone()),
+            double_sided: true,
+            emissive_factor: json::material::EmissiveFactor(factor.to_array()),
+            pbr_metallic_roughness: json::material::PbrMetallicRoughness {
+                base_color_factor: json::material::PbrBaseColorFactor(color.extend(1.0).to_array()),
+                metallic_factor: json::material::StrengthFactor(0.0),
+                roughness_factor: json::material::StrengthFactor(roughness),
+                ..Default::default()
+            },
+            extensions: Some(json::extensions::material::Material {
+                emissive_strength: extension,
+            }),
+            ..Default::default()
+        })
+    }
+
+    fn camera(&mut self, index: usize, camera: &Camera, scene: &Scene) -> json::Index<json::Node> {
+        let lens = &camera.intrinsics;
+        let name = Some(format!("camera {index:03}"));
+        let perspective = json::camera::Perspective {
+            aspect_ratio: Some(
+                (f64::from(lens.width) / f64::from(lens.height) * lens.fy / lens.fx) as f32,
+            ),
+            yfov: (2.0 * (f64::from(lens.height) * 0.5 / lens.fy).atan()) as f32,
+            zfar: None,
+            znear: scene.diameter * 1e-4,
+            extensions: None,
+            extras: Default::default(),
+        };
+        let camera_index = self.root.push(json::Camera {
+            name: name.clone(),
+            orthographic: None,
+            perspective: Some(perspective),
+            type_: Valid(json::camera::Type::Perspective),
+            extensions: None,
+            extras: Default::default(),
+        });
+        let center = (camera.center.as_dvec3() + scene.origin).as_vec3();
+        let pose = Mat4::from_translation(center) * Mat4::from_mat3(camera.rotation);
+        self.root.push(json::Node {
+            camera: Some(camera_index),
+            matrix: Some(pose.to_cols_array()),
+            name,
+            ..Default::default()
+        })
+    }
+
+    /// Appends an array of vectors; `bounds` are its least and greatest components.
+    fn vectors(
+        &mut self,
+        values: &[Vec3],
+        bounds: Option<(Vec3, Vec3)>,
+    ) -> json::Index<json::Accessor> {
+        let start = self.bytes.len();
+        let floats = values.iter().flat_map(|v| v.to_array());
+        self.bytes.extend(floats.flat_map(f32::to_le_bytes));
+        let mut accessor = self.accessor(
+            start,
+            values.len(),
+            json::accessor::ComponentType::F32,
+            json::accessor::Type::Vec3,
+            json::buffer::Target::ArrayBuffer,
+        );
+        accessor.min = bounds.map(|(low, _)| json::Value::from(low.to_array().to_vec()));
+        accessor.max = bounds.map(|(_, high)| json::Value::from(high.to_array().to_vec()));
+        self.root.push(accessor)
+    }
+
+    fn indices(&mut self, triangles: &[[u32; 3]]) -> json::Index<json::Accessor> {
+        let start = self.bytes.len();
+        let indices = triangles.iter().flatten();
+        self.bytes.extend(indices.flat_map(|i| i.to_le_bytes()));
+        let accessor = self.accessor(
+            start,
+            triangles.len() * 3,
+            json::accessor::ComponentType::U32,
+            json::accessor::Type::Scalar,
+            json::buffer::Target::ElementArrayBuffer,
+        );
+        self.root.push(accessor)
+    }
+
+    /// An accessor of `count` elements over the bytes from `start` to the end.
+    fn accessor(
+        &mut self,
+        start: usize,
+        count: usize,
+        component: json::accessor::ComponentType,
+        type_: json::accessor::Type,
+        target: json::buffer::Target,
+    ) -> json::Accessor {
+        let view = self.root.push(json::buffer::View {
+            buffer: json::Index::new(0),
+            byte_length: USize64::from(self.bytes.len() - start),
+            byte_offset: Some(USize64::from(start)),
+            byte_stride: None,
+            name: None,
+            target: Some(Valid(target)),
+            extensions: None,
+            extras: Default::default(),
+        });
+        json::Accessor {
+            buffer_view: Some(view),
+            byte_offset: None,
+            count: USize64::from(count),
+            component_type: Valid(json::accessor::GenericComponentType(component)),
+            extensions: None,
+            extras: Default::default(),
+            type_: Valid(type_),
+            min: None,
+            max: None,
+            name: None,
+            normalized: false,
+            sparse: None,
+        }
+    }
+
+    fn finish(&mut self, nodes: Vec<json::Index<json::Node>>) {
+        self.root.push(json::Buffer {
+            byte_length: USize64::from(self.bytes.len()),
+            name: None,
+            uri: None,
+            extensions: None,
+            extras: Default::default(),
+        });
+        let scene = self.root.push(json::Scene {
+            extensions: None,
+            extras: Default::default(),
+            name: None,
+            nodes,
+        });
+        self.root.scene = Some(scene);
+        self.root.asset.generator = Some(concat!("relit ", env!("CARGO_PKG_VERSION")).to_owned());
+    }
+}

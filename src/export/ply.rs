@@ -1,0 +1,107 @@
+//! Binary PLY with vertex colours.
+
+use crate::error::Result;
+use crate::export::atomic::write_atomically;
+use crate::export::scene::Part;
+use glam::Vec3;
+use std::io::Write;
+use std::path::Path;
+
+/// Writes all parts as one mesh: positions, albedo as linear 8-bit `red green blue`, and for each face `object_id`,
+/// whose names are in the comments, and the emitted radiance. [`crate::capture::read`] reads it back.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_scene(path: &Path, parts: &[Part]) -> Result<()> {
+    let vertices: usize = parts.iter().map(|p| p.positions.len()).sum();
+    let faces: usize = parts.iter().map(|p| p.triangles.len()).sum();
+    write_atomically(path, |out| {
+        writeln!(out, "ply\nformat binary_little_endian 1.0")?;
+        for (index, part) in parts.iter().enumerate() {
+            let name: String = part.name.chars().filter(|c| !c.is_control()).collect();
+            writeln!(out, "comment object_id {index} {name}")?;
+        }
+        writeln!(out, "element vertex {vertices}")?;
+        for axis in ["x", "y", "z"] {
+            writeln!(out, "property double {axis}")?;
+        }
+        for color in ["red", "green", "blue"] {
+            writeln!(out, "property uchar {color}")?;
+        }
+        writeln!(out, "element face {faces}")?;
+        writeln!(
+            out,
+            "property list uchar int vertex_indices\nproperty int object_id"
+        )?;
+        for color in ["red", "green", "blue"] {
+            writeln!(out, "property float emission_{color}")?;
+        }
+        writeln!(out, "end_header")?;
+
+        for part in parts {
+            for (vertex, position) in part.positions.iter().enumerate() {
+                let albedo = part.colors.get(vertex).unwrap_or(&part.estimate.albedo);
+                for v in position.to_array() {
+                    out.write_all(&v.to_le_bytes())?;
+                }
+                let linear8 = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
+                out.write_all(&albedo.to_array().map(linear8))?;
+            }
+        }
+        let mut first = 0;
+        for (index, part) in parts.iter().enumerate() {
+            for triangle in &part.triangles {
+                write_face(out, triangle.map(|i| i + first))?;
+                out.write_all(&(index as i32).to_le_bytes())?;
+                write_color(out, part.estimate.emission)?;
+            }
+            first += part.positions.len() as u32;
+        }
+        Ok(())
+    })
+}
+
+/// Writes one part with linear vertex colours `r g b` where its albedo varies, as Mitsuba's mesh attributes want it.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_part(path: &Path, part: &Part) -> Result<()> {
+    write_atomically(path, |out| {
+        writeln!(out, "ply\nformat binary_little_endian 1.0")?;
+        writeln!(out, "element vertex {}", part.positions.len())?;
+        let colors: &[&str] = if part.colors.is_empty() {
+            &[]
+        } else {
+            &["r", "g", "b"]
+        };
+        for property in ["x", "y", "z"].iter().chain(colors) {
+            writeln!(out, "property float {property}")?;
+        }
+        writeln!(out, "element face {}", part.triangles.len())?;
+        writeln!(out, "property list uchar int vertex_indices\nend_header")?;
+        for (vertex, position) in part.positions.iter().enumerate() {
+            write_color(out, position.as_vec3())?;
+            if let Some(&color) = part.colors.get(vertex) {
+                write_color(out, color)?;
+            }
+        }
+        for &triangle in &part.triangles {
+            write_face(out, triangle)?;
+        }
+        Ok(())
+    })
+}
+
+fn write_color(out: &mut impl Write, color: Vec3) -> std::io::Result<()> {
+    color
+        .to_array()
+        .into_iter()
+        .try_for_each(|v| out.write_all(&v.to_le_bytes()))
+}
+
+fn write_face(out: &mut impl Write, corners: [u32; 3]) -> std::io::Result<()> {
+    out.write_all(&[3])?;
+    corners
+        .into_iter()
+        .try_for_each(|i| out.write_all(&i.to_le_bytes()))
+}

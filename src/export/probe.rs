@@ -1,0 +1,91 @@
+//! The light at a point, as a panorama for other renderers.
+
+use crate::error::{Error, Result};
+use crate::export::atomic::write_atomically;
+use crate::export::exr::{Precision, write_rgb};
+use crate::math::picture::Picture;
+use crate::math::rng::Stream;
+use crate::scene::geometry::Ray;
+use crate::transport::lit::Lit;
+use crate::transport::path::{PathOptions, radiance};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use std::f32::consts::PI;
+use std::path::Path;
+
+/// Rows of a written panorama; it has twice as many columns.
+const HEIGHT: u32 = 128;
+/// Paths a pixel of a written panorama.
+const SAMPLES: u32 = 64;
+
+/// Writes the radiance that arrives at a point of the capture as an equirectangular panorama (.exr or .hdr).
+///
+/// # Errors
+/// The file cannot be written or has another ending, or the point is not finite.
+pub fn write(path: &Path, world: &Lit, at: DVec3) -> Result<()> {
+    if !at.is_finite() {
+        return Err(Error::usage(
+            "--at",
+            "is no point",
+            "give x,y,z in the capture's coordinates",
+        ));
+    }
+    let point = (at - world.scene.origin).as_vec3();
+    let picture = || panorama(world, point, HEIGHT, SAMPLES, 1);
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("exr") => write_rgb(path, &picture(), Precision::Float),
+        Some("hdr") => {
+            let picture = picture();
+            let (width, height) = (picture.width as usize, picture.height as usize);
+            let pixels: Vec<image::Rgb<f32>> = picture
+                .pixels
+                .iter()
+                .map(|c| image::Rgb(c.to_array()))
+                .collect();
+            write_atomically(path, |out| {
+                Ok(image::codecs::hdr::HdrEncoder::new(out).encode(&pixels, width, height)?)
+            })
+        }
+        _ => Err(Error::file(
+            path,
+            "a panorama is written as .exr or .hdr",
+            "change the ending",
+        )),
+    }
+}
+
+/// Radiance arriving at a point in scene coordinates, over all directions: the mean over each pixel in angle.
+///
+/// Row 0 is around +y and columns turn from +x to +z, as in [`crate::transport::environment::Environment`].
+pub fn panorama(world: &Lit, point: Vec3, height: u32, samples: u32, seed: u64) -> Picture {
+    let width = 2 * height;
+    let options = PathOptions::default();
+    let pixels = (0..width * height)
+        .into_par_iter()
+        .map(|pixel| {
+            let (row, column) = (pixel / width, pixel % width);
+            let mut sum = DVec3::ZERO;
+            for index in 0..samples {
+                let mut stream = Stream::new(seed, 0, u64::from(pixel), u64::from(index));
+                let [u, v] = stream.uniform2();
+                let theta = PI * (row as f32 + v) / height as f32;
+                let phi = 2.0 * PI * (column as f32 + u) / width as f32;
+                let direction = Vec3::new(
+                    theta.sin() * phi.cos(),
+                    theta.cos(),
+                    theta.sin() * phi.sin(),
+                );
+                let ray = Ray::new(point, direction);
+                sum += radiance(world, &ray, &mut stream, &options)
+                    .radiance
+                    .as_dvec3();
+            }
+            (sum / f64::from(samples.max(1))).as_vec3()
+        })
+        .collect();
+    Picture {
+        width,
+        height,
+        pixels,
+    }
+}

@@ -1,0 +1,139 @@
+//! A scene and its estimate, cut into parts as other programs want them.
+
+use crate::error::Result;
+use crate::export::{glb, mitsuba, obj, objects, ply, probe};
+use crate::inverse::estimate::{Estimate, ObjectEstimate, TexelEstimate};
+use crate::scene::Scene;
+use glam::{DVec3, Vec3};
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Formats that other programs read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Format {
+    /// Scene with base colours and emissive strength.
+    Glb,
+    /// Scene as OBJ and MTL.
+    Obj,
+    /// Scene as PLY with vertex colours.
+    Ply,
+    /// Scene as a Mitsuba 3 XML file.
+    Mitsuba,
+    /// Table of objects.
+    Csv,
+    /// The light at a point as a panorama.
+    Probe {
+        /// The point, in the capture's coordinates.
+        at: DVec3,
+    },
+}
+
+/// One object with its own vertices, in the capture's coordinates.
+#[derive(Debug, Clone)]
+pub struct Part {
+    /// The object's name.
+    pub name: String,
+    /// What is known of it. `albedo` is the mean where there are `colors`.
+    pub estimate: ObjectEstimate,
+    /// Vertex positions.
+    pub positions: Vec<DVec3>,
+    /// Vertex indices, counter-clockwise seen from the emitting side.
+    pub triangles: Vec<[u32; 3]>,
+    /// Albedo of each vertex where it varies over the object, else empty. Each texel is then three vertices of its own.
+    pub colors: Vec<Vec3>,
+}
+
+/// Writes a scene and its estimate for another program.
+///
+/// # Errors
+/// The file cannot be written, its ending does not fit a panorama, or the format cannot hold the scene.
+pub fn write(scene: &Arc<Scene>, estimate: &Estimate, format: Format, path: &Path) -> Result<()> {
+    match format {
+        Format::Glb => glb::write(path, scene, &parts(scene, estimate)),
+        Format::Obj => obj::write(path, &parts(scene, estimate)),
+        Format::Ply => ply::write_scene(path, &parts(scene, estimate)),
+        Format::Mitsuba => mitsuba::write(path, scene, &parts(scene, estimate)),
+        Format::Csv => objects::table(scene, estimate).write(path),
+        Format::Probe { at } => probe::write(path, &estimate.lit(scene), at),
+    }
+}
+
+/// Cuts a scene into one part an object; objects without triangles are left out.
+pub fn parts(scene: &Scene, estimate: &Estimate) -> Vec<Part> {
+    let unknown = ObjectEstimate::default();
+    scene
+        .objects
+        .iter()
+        .enumerate()
+        .filter(|(_, object)| !object.triangles.is_empty())
+        .map(|(index, object)| {
+            let texels = estimate
+                .texels
+                .as_deref()
+                .filter(|texels| texels.textured.get(index) == Some(&true));
+            let mut part = Part {
+                name: object.name.clone(),
+                estimate: estimate.objects.get(index).unwrap_or(&unknown).clone(),
+                positions: Vec::new(),
+                triangles: Vec::new(),
+                colors: Vec::new(),
+            };
+            match texels {
+                Some(texels) => part.add_texels(scene, &object.triangles, texels),
+                None => part.add_triangles(scene, &object.triangles),
+            }
+            part
+        })
+        .collect()
+}
+
+impl Part {
+    /// Triangles as they are, vertices shared.
+    fn add_triangles(&mut self, scene: &Scene, triangles: &[u32]) {
+        let mut vertex_of = HashMap::new();
+        for &triangle in triangles {
+            let corners = scene.triangles[triangle as usize].map(|vertex| {
+                *vertex_of.entry(vertex).or_insert_with(|| {
+                    let local = scene.positions[vertex as usize];
+                    self.positions.push(local.as_dvec3() + scene.origin);
+                    self.positions.len() as u32 - 1
+                })
+            });
+            self.triangles.push(corners);
+        }
+    }
+
+    /// Triangles cut into their texels, each of one colour.
+    fn add_texels(&mut self, scene: &Scene, triangles: &[u32], texels: &TexelEstimate) {
+        let layout = &texels.colors.layout;
+        for &triangle in triangles {
+            let [a, b, c] = scene.corners(triangle).map(|p| p.as_dvec3());
+            let first = layout.first[triangle as usize];
+            for texel in 0..layout.first[triangle as usize + 1] - first {
+                let start = self.positions.len() as u32;
+                for [b1, b2] in layout.corners(triangle as usize, texel) {
+                    let local = a + (b - a) * f64::from(b1) + (c - a) * f64::from(b2);
+                    self.positions.push(local + scene.origin);
+                    self.colors
+                        .push(texels.colors.colors[(first + texel) as usize]);
+                }
+                self.triangles.push([start, start + 1, start + 2]);
+            }
+        }
+    }
+
+    /// The name without what would break a line or a path of a text format.
+    pub fn plain_name(&self) -> String {
+        self.name
+            .chars()
+            .map(|c| {
+                if c.is_alphanumeric() || "-_.".contains(c) {
+                    c
+                } else {
+                    '_'
+                }
+            })
+            .collect()
+    }
+}
