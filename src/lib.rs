@@ -28,6 +28,7 @@ pub mod error;
 pub mod export;
 pub mod inverse;
 pub mod math;
+pub mod room;
 pub mod scene;
 pub mod session;
 pub mod study;

@@ -5,6 +5,7 @@ use crate::capture::photograph::PhotographSource;
 use crate::capture::read::{ReadOptions, read};
 use crate::capture::working::load_working;
 use crate::error::{Error, Result};
+use crate::room;
 use crate::scene::prepare::prepare;
 use crate::session::command::{OpenOptions, Source};
 use crate::session::snapshot::OpenCapture;
@@ -20,11 +21,7 @@ const WORKING_PIXELS: u64 = 4_000_000;
 /// Something in it is missing or broken.
 pub fn open(source: &Source, options: &OpenOptions) -> Result<OpenCapture> {
     let capture = match source {
-        Source::BuiltInRoom => Err(Error::new(
-            "built-in room",
-            "not there yet",
-            "name a capture",
-        )),
+        Source::BuiltInRoom => room::capture(),
         Source::Folder(folder) => read(
             folder,
             &ReadOptions {

@@ -1,0 +1,62 @@
+//! Where the room's photographs are taken from.
+
+use crate::capture::camera::{Intrinsics, Pose};
+use glam::{DMat3, DVec3};
+
+/// Width and height of the embedded photographs in pixels.
+pub const SIZE: [u32; 2] = [160, 120];
+
+/// Half the horizontal field of view, as a tangent.
+const HALF_FIELD: f64 = 0.82;
+
+/// Eye and target of each photograph, in room coordinates.
+const VIEWS: [[[f64; 3]; 2]; 16] = [
+    // The four corners, across the room.
+    [[1.95, 1.55, 1.75], [-0.6, 0.75, -0.9]],
+    [[-2.1, 1.60, 1.05], [0.9, 0.75, -0.9]],
+    [[-1.2, 1.65, -1.75], [0.7, 0.65, 1.2]],
+    [[1.75, 1.60, -1.55], [-0.9, 0.7, 1.0]],
+    // The walls.
+    [[0.1, 1.25, 1.5], [0.05, 1.1, -2.0]],
+    [[1.6, 1.2, -0.2], [-2.5, 0.62, -0.1]],
+    [[-0.2, 1.25, -0.85], [0.3, 0.95, 2.0]],
+    [[-0.9, 1.30, 0.1], [2.5, 1.30, -0.15]],
+    // Ceiling and floor.
+    [[-0.9, 0.55, 1.75], [0.5, 2.15, -0.9]],
+    [[1.9, 0.70, -1.6], [-0.5, 2.15, 0.8]],
+    [[0.9, 2.2, 1.1], [-0.1, 0.0, -0.1]],
+    [[-1.3, 2.15, -0.6], [0.1, 0.1, 0.4]],
+    // Furniture from nearby.
+    [[1.0, 0.95, 1.25], [-0.4, 0.45, -0.9]],
+    [[0.4, 1.05, -0.7], [2.3, 1.05, -0.6]],
+    [[-0.4, 1.1, -0.7], [-1.9, 0.75, 1.5]],
+    [[-0.6, 0.85, 1.5], [1.5, 0.5, 0.2]],
+];
+
+/// Lens and pose of each photograph at a size in pixels.
+pub fn cameras([width, height]: [u32; 2]) -> Vec<(Intrinsics, Pose)> {
+    let focal = f64::from(width) * 0.5 / HALF_FIELD;
+    let intrinsics = Intrinsics {
+        width,
+        height,
+        fx: focal,
+        fy: focal,
+        cx: f64::from(width) * 0.5,
+        cy: f64::from(height) * 0.5,
+        distortion: [0.0; 4],
+    };
+    VIEWS
+        .iter()
+        .map(|&[eye, target]| (intrinsics, look_at(eye.into(), target.into())))
+        .collect()
+}
+
+/// A level camera at `eye` whose optical axis goes through `target`.
+fn look_at(eye: DVec3, target: DVec3) -> Pose {
+    let back = (eye - target).normalize_or_zero();
+    let right = DVec3::Y.cross(back).normalize_or_zero();
+    Pose {
+        rotation: DMat3::from_cols(right, back.cross(right), back),
+        center: eye,
+    }
+}

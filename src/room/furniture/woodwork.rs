@@ -1,0 +1,167 @@
+//! Tables, cabinets, frames and the door.
+
+use crate::room::furniture::pad;
+use crate::room::shape::{Modeller, Projection};
+use crate::room::texture::{SPINES, hash};
+use glam::{DVec2, DVec3};
+
+/// A table with a slab and four round legs.
+pub fn table(m: &mut Modeller, width: f64, depth: f64, height: f64) {
+    pad(
+        m,
+        [-width * 0.5, height - 0.035, -depth * 0.5],
+        [width, 0.035, depth],
+        0.012,
+    );
+    pad(
+        m,
+        [-width * 0.5 + 0.09, 0.15, -depth * 0.5 + 0.07],
+        [width - 0.18, 0.02, depth - 0.14],
+        0.006,
+    );
+    for x in [-1.0, 1.0] {
+        for z in [-1.0, 1.0] {
+            let top = DVec3::new(
+                x * (width * 0.5 - 0.09),
+                height - 0.03,
+                z * (depth * 0.5 - 0.08),
+            );
+            let foot = DVec3::new(top.x + 0.03 * x, 0.0, top.z + 0.02 * z);
+            m.bar(foot, top, [0.014, 0.022], 8);
+        }
+    }
+}
+
+/// Heights of the boards of [`bookcase`], floor to top.
+const BOARDS: [f64; 6] = [0.06, 0.43, 0.78, 1.12, 1.45, 1.76];
+
+/// An open bookcase with a back panel.
+pub fn bookcase(m: &mut Modeller, width: f64, depth: f64) {
+    let half = width * 0.5;
+    let top = BOARDS[BOARDS.len() - 1];
+    for x in [-half, half - 0.025] {
+        m.cuboid(
+            DVec3::new(x, 0.0, -depth * 0.5),
+            DVec3::new(x + 0.025, top + 0.025, depth * 0.5),
+        );
+    }
+    m.cuboid(
+        DVec3::new(-half + 0.025, 0.06, -depth * 0.5),
+        DVec3::new(half - 0.025, top, -depth * 0.5 + 0.012),
+    );
+    for y in BOARDS {
+        m.cuboid(
+            DVec3::new(-half + 0.025, y, -depth * 0.5 + 0.012),
+            DVec3::new(half - 0.025, y + 0.025, depth * 0.5 - 0.002),
+        );
+    }
+}
+
+/// Books on the boards of [`bookcase`], each with its column of the spine picture.
+pub fn books(m: &mut Modeller, width: f64, depth: f64) {
+    let mut spine = 0;
+    for (shelf, pair) in BOARDS.windows(2).enumerate() {
+        let shelf = shelf as u32;
+        let (floor, room) = (pair[0] + 0.025, pair[1] - pair[0] - 0.025);
+        // Some shelves are filled from the left, some from the right, none completely.
+        let fill = (0.55 + 0.4 * f64::from(hash(shelf, 99))) * (width - 0.06);
+        let from_right = shelf % 2 == 1;
+        let mut along = 0.0;
+        while along < fill {
+            let thick = 0.028 + 0.034 * f64::from(hash(spine, shelf));
+            let tall = room * (0.62 + 0.30 * f64::from(hash(spine, shelf + 10)));
+            let deep = depth * (0.62 + 0.2 * f64::from(hash(spine, shelf + 20)));
+            let x = if from_right {
+                width * 0.5 - 0.028 - along - thick
+            } else {
+                -width * 0.5 + 0.028 + along
+            };
+            let column = (f64::from(spine % SPINES) + 0.5) / f64::from(SPINES);
+            m.projection = Some(Projection {
+                origin: m.placement.transform_point3(DVec3::new(x, floor, 0.0)),
+                u_axis: DVec3::ZERO,
+                v_axis: DVec3::Y / tall,
+                offset: DVec2::new(column, 0.0),
+            });
+            let front = depth * 0.5 - 0.03;
+            m.cuboid(
+                DVec3::new(x, floor, front - deep),
+                DVec3::new(x + thick - 0.001, floor + tall, front),
+            );
+            along += thick + 0.001;
+            spine += 1;
+        }
+    }
+}
+
+/// A low cabinet with two door panels on slender feet.
+pub fn sideboard(m: &mut Modeller, width: f64, depth: f64, height: f64) {
+    pad(
+        m,
+        [-width * 0.5, 0.16, -depth * 0.5],
+        [width, height - 0.16, depth - 0.015],
+        0.01,
+    );
+    let panel = width * 0.5 - 0.03;
+    for x in [-width * 0.5 + 0.02, 0.01] {
+        pad(
+            m,
+            [x, 0.19, depth * 0.5 - 0.02],
+            [panel, height - 0.22, 0.02],
+            0.006,
+        );
+    }
+    for x in [-1.0, 1.0] {
+        for z in [-1.0, 1.0] {
+            let top = DVec3::new(x * (width * 0.5 - 0.12), 0.165, z * (depth * 0.5 - 0.08));
+            m.bar(DVec3::new(top.x, 0.0, top.z), top, [0.012, 0.018], 8);
+        }
+    }
+}
+
+/// A door leaf with two raised fields and a handle in its casing, its face near z = 0.
+pub fn door(m: &mut Modeller) {
+    let (width, height) = (0.86, 2.02);
+    m.cuboid(
+        DVec3::new(-width * 0.5, 0.0, -0.02),
+        DVec3::new(width * 0.5, height, 0.02),
+    );
+    for (low, high) in [(0.15, 0.85), (1.0, 1.87)] {
+        pad(m, [-0.30, low, 0.015], [0.60, high - low, 0.017], 0.006);
+    }
+    let casing = 0.07;
+    for x in [-width * 0.5 - casing, width * 0.5] {
+        m.cuboid(
+            DVec3::new(x, 0.0, -0.02),
+            DVec3::new(x + casing, height + casing, 0.035),
+        );
+    }
+    m.cuboid(
+        DVec3::new(-width * 0.5, height, -0.02),
+        DVec3::new(width * 0.5, height + casing, 0.035),
+    );
+    let handle = DVec3::new(-0.36, 1.02, 0.0);
+    m.bar(handle, handle + DVec3::Z * 0.07, [0.012, 0.012], 8);
+    let grip = handle + DVec3::new(-0.01, 0.0, 0.065);
+    m.bar(grip, grip + DVec3::X * 0.13, [0.011, 0.009], 8);
+}
+
+/// Four bars around a rectangle in the xy plane, lying on the side of +z.
+pub fn rim(m: &mut Modeller, width: f64, height: f64, thick: f64, deep: f64) {
+    let (x, y) = (width * 0.5, height * 0.5);
+    for sign in [-1.0, 1.0] {
+        let bars = [
+            (
+                DVec3::new(sign * (x - thick * 0.5), 0.0, deep * 0.5),
+                DVec3::new(thick, height, deep),
+            ),
+            (
+                DVec3::new(0.0, sign * (y - thick * 0.5), deep * 0.5),
+                DVec3::new(width - 2.0 * thick, thick, deep),
+            ),
+        ];
+        for (center, size) in bars {
+            m.rounded_box(center, size * 0.5, 0.0, 0);
+        }
+    }
+}

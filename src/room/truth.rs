@@ -1,0 +1,183 @@
+//! The truth about the room, as `relit evaluate` reads it.
+
+use crate::math::frame::Frame;
+use crate::math::picture::Picture;
+use crate::math::rng::Stream;
+use crate::math::warp::{cosine_hemisphere, uniform_triangle};
+use crate::scene::camera::Camera;
+use crate::scene::geometry::{Hit, Ray, offset_origin};
+use crate::transport::lit::Lit;
+use crate::transport::material::Albedo;
+use crate::transport::path::{PathOptions, radiance};
+use glam::{DVec3, Vec2, Vec3};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Points per object for its mean albedo, and paths per emitter for its irradiance.
+const SAMPLES: u64 = 1 << 16;
+
+/// The content of truth.json.
+#[derive(Debug, Clone, Serialize)]
+pub struct Truth {
+    /// The capture's name.
+    pub name: &'static str,
+    /// The program that rendered the photographs.
+    pub renderer: String,
+    /// Every bounce is in the photographs, with unbiased termination.
+    pub max_bounces: Option<u32>,
+    /// Paths a pixel in the photographs.
+    pub spp: u32,
+    /// Key of the photographs' noise.
+    pub seed: u64,
+    /// Nothing shines in from outside.
+    pub outside_light: Option<[f32; 3]>,
+    /// By name.
+    pub objects: BTreeMap<String, ObjectTruth>,
+}
+
+/// What is true of one object.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ObjectTruth {
+    /// Diffuse reflectance, its mean over the area where it is textured.
+    pub albedo: [f32; 3],
+    /// Emitted radiance.
+    pub emission: [f32; 3],
+    /// Mean radiance that leaves an emitter, its own and what it reflects: emission + albedo · irradiance / π.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exitance: Option<[f32; 3]>,
+    /// Every surface is diffuse.
+    pub roughness: Option<f32>,
+    /// Whether the albedo varies over the object.
+    pub textured: bool,
+    /// Number of triangles.
+    pub triangles: usize,
+    /// Pixels of all photographs whose centre sees the object.
+    pub pixels: u64,
+    /// Area in square metres.
+    pub area: f64,
+}
+
+/// The truth about each object of a lit scene.
+pub fn objects(world: &Lit) -> BTreeMap<String, ObjectTruth> {
+    let scene = &world.scene;
+    let seen = seen_pixels(world);
+    (0..scene.objects.len())
+        .map(|index| {
+            let object = &scene.objects[index];
+            let material = &world.materials[index];
+            let textured = !matches!(material.albedo, Albedo::Constant(_));
+            let albedo = match material.albedo {
+                Albedo::Constant(color) => color,
+                _ => mean_over_area(world, index, |hit, _| material.albedo_at(hit)),
+            };
+            let emits = material.emission != Vec3::ZERO;
+            let reflected = || {
+                let arriving =
+                    |hit: &Hit, stream: &mut Stream| arriving_radiance(world, hit, stream);
+                albedo * mean_over_area(world, index, arriving)
+            };
+            let truth = ObjectTruth {
+                albedo: albedo.to_array(),
+                emission: material.emission.to_array(),
+                exitance: emits.then(|| (material.emission + reflected()).to_array()),
+                roughness: None,
+                textured,
+                triangles: object.triangles.len(),
+                pixels: seen[index],
+                area: object.area,
+            };
+            (object.name.clone(), truth)
+        })
+        .collect()
+}
+
+/// Pixels of all cameras whose centre sees each object.
+pub fn seen_pixels(world: &Lit) -> Vec<u64> {
+    let scene = &world.scene;
+    let mut seen = vec![0; scene.objects.len()];
+    for camera in &scene.cameras {
+        for y in 0..camera.intrinsics.height {
+            for x in 0..camera.intrinsics.width {
+                let center = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+                if let Some(hit) = scene.intersect(&camera.ray(center)) {
+                    seen[scene.object_of[hit.triangle as usize] as usize] += 1;
+                }
+            }
+        }
+    }
+    seen
+}
+
+/// The true albedo that a camera sees, the mean over 4 × 4 points of each pixel.
+pub fn albedo_picture(world: &Lit, camera: &Camera) -> Picture {
+    const SIDE: u32 = 4;
+    let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
+    Picture::from_fn(width, height, |x, y| {
+        let points = (0..SIDE * SIDE).map(|i| {
+            let offset = Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5);
+            let hit = world
+                .scene
+                .intersect(&camera.ray(Vec2::new(x as f32, y as f32) + offset / SIDE as f32));
+            hit.map_or(Vec3::ZERO, |hit| world.surface(&hit).albedo)
+        });
+        points.sum::<Vec3>() / (SIDE * SIDE) as f32
+    })
+}
+
+/// The mean of a quantity over an object's area, from keyed random points.
+fn mean_over_area(
+    world: &Lit,
+    object: usize,
+    quantity: impl Fn(&Hit, &mut Stream) -> Vec3 + Sync,
+) -> Vec3 {
+    let scene = &world.scene;
+    let triangles = &scene.objects[object].triangles;
+    let ends: Vec<f64> = triangles
+        .iter()
+        .scan(0.0, |sum, &t| {
+            *sum += f64::from(scene.areas[t as usize]);
+            Some(*sum)
+        })
+        .collect();
+    let total = ends.last().copied().unwrap_or(0.0);
+    let values: Vec<Vec3> = (0..SAMPLES)
+        .into_par_iter()
+        .map(|index| {
+            let mut stream = Stream::new(0, object as u64, 0, index);
+            // Equal steps along the area, so that every triangle gets its share.
+            let along = (index as f64 + stream.uniform_f64()) / SAMPLES as f64 * total;
+            let chosen = ends
+                .partition_point(|&end| end <= along)
+                .min(triangles.len() - 1);
+            let [b1, b2] = uniform_triangle(stream.uniform2());
+            let triangle = triangles[chosen];
+            quantity(
+                &Hit {
+                    t: 0.0,
+                    triangle,
+                    b1,
+                    b2,
+                },
+                &mut stream,
+            )
+        })
+        .collect();
+    let sum: DVec3 = values.iter().map(|v| v.as_dvec3()).sum();
+    (sum / SAMPLES as f64).as_vec3()
+}
+
+/// Radiance arriving along a cosine-distributed direction on the front of a hit: its mean is irradiance / π.
+fn arriving_radiance(world: &Lit, hit: &Hit, stream: &mut Stream) -> Vec3 {
+    let normal = world.scene.normals[hit.triangle as usize];
+    let direction = Frame::around(normal).to_world(cosine_hemisphere(stream.uniform2()));
+    let corners = world.scene.corners(hit.triangle);
+    let origin = offset_origin(world.scene.point(hit), normal, &corners, direction);
+    radiance(
+        world,
+        &Ray::new(origin, direction),
+        stream,
+        &PathOptions::default(),
+    )
+    .radiance
+}
