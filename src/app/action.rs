@@ -105,6 +105,9 @@ actions! {
     Place, Edit, "Place by click", "The next click in a view puts the chosen object there", key(Key::G);
     Duplicate, Edit, "Duplicate object", "Copies the chosen inserted object", ctrl(Key::D);
     Delete, Edit, "Delete object", "Takes the chosen inserted object away", key(Key::Delete);
+    NaiveBesideOurs, Edit, "Naive beside ours", "Shows the naive composite and ours side by side", None;
+    WipeNaiveOurs, Edit, "Wipe naive and ours", "Shows the naive composite and ours under a wipe", ctrl(Key::W);
+    BeforeAfter, Edit, "Before and after", "Shows the photograph and the composite under a wipe", ctrl(Key::B);
     Deselect, Edit, "Deselect", "Selects nothing and ends placing", key(Key::Escape);
 
     RunPause, Solve, "Run / Pause", "Starts, holds or goes on with the solve", key(Key::Space);

@@ -2,6 +2,8 @@
 
 use crate::app::action::Action;
 use crate::app::layout::Pane;
+use crate::app::picture::compare::Mode;
+use crate::app::picture::quantity::Quantity;
 use crate::app::shell::dialogs::Ask;
 use crate::app::shell::files::Sheet;
 use crate::app::shell::palette::Palette;
@@ -31,6 +33,15 @@ impl App {
             Action::Place => self.insertions.placing = !self.insertions.placing,
             Action::Duplicate => self.duplicate(),
             Action::Delete => self.insertions.delete(),
+            Action::NaiveBesideOurs => {
+                self.compare_pictures(Mode::SideBySide, Quantity::Naive, Quantity::Composite);
+            }
+            Action::WipeNaiveOurs => {
+                self.compare_pictures(Mode::Wipe, Quantity::Naive, Quantity::Composite);
+            }
+            Action::BeforeAfter => {
+                self.compare_pictures(Mode::Wipe, Quantity::Photograph, Quantity::Composite);
+            }
             Action::Deselect => {
                 self.selected = None;
                 self.insertions.placing = false;
@@ -103,6 +114,13 @@ impl App {
             Command::Run
         };
         self.send(command);
+    }
+
+    fn compare_pictures(&mut self, mode: Mode, left: Quantity, right: Quantity) {
+        self.compare.mode = mode;
+        self.compare.left = left;
+        self.compare.right = right;
+        self.bring_forward = Some(Pane::Compare);
     }
 
     fn capture_name(&self) -> &str {

@@ -20,6 +20,7 @@ use crate::inverse::settings::Settings;
 use crate::scene::camera::Camera;
 use crate::session::command::{Command, Placement, Source, ViewCamera, ViewRequest};
 use crate::session::snapshot::{Level, OpenCapture, Phase, Picture, Snapshot};
+use glam::DVec3;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -210,6 +211,7 @@ impl App {
             self.insertions.settle();
         }
         self.convert_photograph();
+        self.take_models(ctx);
         self.request();
         self.flush();
         if !self.pending.is_empty() {
@@ -346,14 +348,55 @@ impl App {
         match ask {
             Ask::Capture => self.open(Source::Folder(path)),
             Ask::SaveFolder | Ask::ExportFile => self.sheet.chosen(ask, path),
-            Ask::Object => self.insertions.add(path, None),
+            Ask::Object => self.insert(path),
+        }
+    }
+
+    /// Adds an object, at first where the middle of the view meets the scene.
+    pub fn insert(&mut self, file: PathBuf) {
+        let below_middle = egui::pos2(0.5, 0.65);
+        let at = self.surface_at(below_middle).map(|(point, _)| point);
+        self.insertions.add(file, at);
+    }
+
+    /// The surface at a point of the shown view, given in fractions of its size: its place in the capture's
+    /// coordinates, and its object.
+    pub fn surface_at(&self, at: egui::Pos2) -> Option<(DVec3, u32)> {
+        let scene = &self.capture()?.scene;
+        let camera = self.camera()?;
+        let k = &camera.intrinsics;
+        let ray = camera.ray(glam::vec2(at.x * k.width as f32, at.y * k.height as f32));
+        let hit = scene.intersect(&ray)?;
+        let object = *scene.object_of.get(hit.triangle as usize)?;
+        Some((scene.point(&hit).as_dvec3() + scene.origin, object))
+    }
+
+    /// Takes in the shapes of inserted objects, and scales down what is larger than the scene as modelled.
+    fn take_models(&mut self, ctx: &egui::Context) {
+        let Some(capture) = self.capture().cloned() else {
+            return;
+        };
+        for file in self.insertions.models.update(ctx, &self.insertions.objects) {
+            let Some(scale) = self.insertions.models.fitting_scale(&file, &capture.scene) else {
+                continue;
+            };
+            for object in &mut self.insertions.objects {
+                if object.placement.file == file && object.placement.scale == 1.0 {
+                    object.placement.scale = scale;
+                    let message = format!(
+                        "{} is larger than the scene, so it was scaled by {scale}",
+                        object.name()
+                    );
+                    self.notices.say(Level::Info, message);
+                }
+            }
         }
     }
 
     /// Opens a dropped folder, or inserts a dropped object.
     pub fn dropped(&mut self, path: PathBuf) {
         if crate::app::insertion::is_object(&path) {
-            self.insertions.add(path, None);
+            self.insert(path);
             self.bring_forward = Some(Pane::Insert);
             return;
         }

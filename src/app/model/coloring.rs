@@ -18,6 +18,9 @@ pub enum Coloring {
     Object,
 }
 
+/// Marks faces that no photograph sees; the shader gives them a colour that no exposure changes.
+const UNSEEN: Vec3 = Vec3::splat(-1.0);
+
 impl Coloring {
     /// All, in order.
     pub const ALL: [Coloring; 4] = [Self::Photograph, Self::Albedo, Self::Emission, Self::Object];
@@ -55,11 +58,7 @@ impl Coloring {
                 let color = match self {
                     Self::Object => of_object(object),
                     Self::Emission => found.map_or(Vec3::ZERO, |o| o.emission),
-                    Self::Photograph => photographed
-                        .get(face)
-                        .copied()
-                        .flatten()
-                        .unwrap_or(Vec3::ZERO),
+                    Self::Photograph => photographed.get(face).copied().flatten().unwrap_or(UNSEEN),
                     Self::Albedo => match &estimate.texels {
                         Some(texels) if texels.textured.get(object as usize) == Some(&true) => {
                             texels.colors.colors[texels.colors.layout.texel(middle) as usize]

@@ -57,7 +57,11 @@ fn fragment(corner: Corner, @builtin(front_facing) front: bool) -> @location(0) 
         discard;
     }
     var color = corner.color.rgb;
-    if scene.radiance == 1u {
+    if color.r < 0.0 {
+        // No photograph sees the face: stripes across the screen.
+        let stripe = fract((corner.clip.x + corner.clip.y) / 8.0) < 0.5;
+        color = mix(scene.background.rgb, vec3f(0.5), select(0.18, 0.30, stripe));
+    } else if scene.radiance == 1u {
         color = srgb(toned(color * scene.exposure));
     } else {
         let to_eye = normalize(scene.eye - corner.point);

@@ -1,5 +1,6 @@
 //! Lines over the 3D view: the photographs' cameras and the places of inserted objects.
 
+use crate::app::insertion::models::draw_box;
 use crate::app::state::App;
 use crate::app::theme;
 use crate::scene::Scene;
@@ -74,24 +75,43 @@ pub fn draw(ui: &Ui, app: &App, capture: &OpenCapture, rect: Rect) {
             continue;
         };
         let foot = (at - scene.origin).as_vec3();
-        let top = foot + scene.up * scene.diameter * 0.06;
-        let chosen = app.insertions.chosen == Some(index);
-        let stroke = Stroke::new(if chosen { 2.5 } else { 1.5 }, tokens.inserted);
-        projection.line(&painter, foot, top, stroke);
+        let width = if app.insertions.chosen == Some(index) {
+            2.0
+        } else {
+            1.0
+        };
+        if let Some(corners) = app.insertions.models.corners(&object.placement, scene) {
+            draw_box(
+                &painter,
+                &corners,
+                |p| projection.at(p),
+                tokens.inserted,
+                width,
+            );
+        }
         if let Some(at) = projection.at(foot) {
             painter.circle(at, 4.0, tokens.inserted, (1.0, Color32::BLACK));
-        }
-        if let Some(at) = projection.at(top) {
             let font = FontId::proportional(11.0);
+            let below = at + egui::vec2(0.0, 6.0);
             painter.text(
-                at,
-                Align2::CENTER_BOTTOM,
+                below,
+                Align2::CENTER_TOP,
                 object.name(),
                 font,
                 tokens.inserted,
             );
         }
     }
+}
+
+/// The inserted object whose foot is drawn under the pointer.
+pub fn foot_at(app: &App, scene: &Scene, rect: Rect, pointer: Pos2) -> Option<usize> {
+    let projection = Projection::new(app, scene, rect);
+    app.insertions.objects.iter().position(|object| {
+        let foot = object.placement.at.filter(|_| object.visible);
+        foot.and_then(|at| projection.at((at - scene.origin).as_vec3()))
+            .is_some_and(|foot| foot.distance(pointer) < 10.0)
+    })
 }
 
 /// The corners of the far end of a camera's pyramid.

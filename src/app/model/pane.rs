@@ -122,6 +122,9 @@ fn steer(ui: &Ui, app: &mut App, scene: &Scene, response: &Response) {
     let drag = response.drag_delta() * per_point;
     let drag = Vec2::new(drag.x, drag.y);
     let shift = ui.input(|input| input.modifiers.shift);
+    if move_object(ui, app, scene, response) {
+        return;
+    }
     if response.dragged_by(PointerButton::Primary) && !shift {
         app.model.orbit.turn(drag);
     } else if response.dragged() {
@@ -162,6 +165,29 @@ fn steer(ui: &Ui, app: &mut App, scene: &Scene, response: &Response) {
         app.model.orbit.fly(steps * speed * dt);
         ui.ctx().request_repaint();
     }
+}
+
+/// Moves an inserted object over the surfaces by its foot; false while none is dragged.
+fn move_object(ui: &Ui, app: &mut App, scene: &Scene, response: &Response) -> bool {
+    if response.drag_started_by(PointerButton::Primary) {
+        let press = ui.input(|input| input.pointer.press_origin());
+        app.insertions.dragged =
+            press.and_then(|press| overlay::foot_at(app, scene, response.rect, press));
+    }
+    if response.drag_stopped() {
+        app.insertions.dragged = None;
+    }
+    let Some(index) = app.insertions.dragged.filter(|_| response.dragged()) else {
+        return false;
+    };
+    app.insertions.chosen = Some(index);
+    if let Some(pointer) = response.interact_pointer_pos()
+        && let Some(hit) = under(app, scene, pixel(ui, response.rect, pointer))
+    {
+        app.insertions
+            .place(scene.point(&hit).as_dvec3() + scene.origin);
+    }
+    true
 }
 
 /// A click looks through a camera, places the chosen object, or selects; a double click turns about what is there.

@@ -1,13 +1,10 @@
 //! Putting objects into the photographs: adding, placing, moving, turning, scaling, and the two results.
 
 use crate::app::action::Action;
-use crate::app::layout::Pane;
-use crate::app::picture::compare::Mode;
-use crate::app::picture::quantity::Quantity;
 use crate::app::shell::dialogs::Ask;
 use crate::app::state::App;
 use crate::app::theme;
-use egui::{Checkbox, DragValue, Grid, ScrollArea, TextEdit, Ui};
+use egui::{Button, Checkbox, DragValue, Grid, ScrollArea, TextEdit, Ui};
 use glam::DVec3;
 use std::path::PathBuf;
 
@@ -49,7 +46,7 @@ fn add(ui: &mut Ui, app: &mut App) {
             .on_hover_text("Adds the object whose path is typed");
         if (entered || add.clicked()) && !app.insertions.path.trim().is_empty() {
             let path = PathBuf::from(app.insertions.path.trim());
-            app.insertions.add(path, None);
+            app.insert(path);
         }
         if ui
             .button("Browse…")
@@ -113,7 +110,7 @@ fn actions(ui: &mut Ui, app: &mut App) {
             (Action::Undo, "Undo"),
             (Action::Redo, "Redo"),
         ] {
-            let button = ui.add_enabled(app.can(action), egui::Button::new(text));
+            let button = ui.add_enabled(app.can(action), Button::new(text));
             if button.on_hover_text(action.help()).clicked() {
                 app.perform(action, &ctx);
             }
@@ -147,6 +144,13 @@ fn edit(ui: &mut Ui, app: &mut App, diameter: f64) {
             }
             if changed {
                 placement.at = Some(at);
+            }
+            if ui
+                .add_enabled(placement.at.is_some(), Button::new("As modelled"))
+                .on_hover_text("Takes the file's own coordinates for the capture's")
+                .clicked()
+            {
+                placement.at = None;
             }
         });
         ui.end_row();
@@ -188,32 +192,19 @@ fn edit(ui: &mut Ui, app: &mut App, diameter: f64) {
 
 /// The ways to look at what came out.
 fn results(ui: &mut Ui, app: &mut App) {
+    let ctx = ui.ctx().clone();
     ui.horizontal_wrapped(|ui| {
-        for (text, mode, left, right) in [
-            (
-                "Naive | ours",
-                Mode::SideBySide,
-                Quantity::Naive,
-                Quantity::Composite,
-            ),
-            (
-                "Wipe naive / ours",
-                Mode::Wipe,
-                Quantity::Naive,
-                Quantity::Composite,
-            ),
-            (
-                "Before / after",
-                Mode::Wipe,
-                Quantity::Photograph,
-                Quantity::Composite,
-            ),
+        for action in [
+            Action::NaiveBesideOurs,
+            Action::WipeNaiveOurs,
+            Action::BeforeAfter,
         ] {
-            if ui.button(text).clicked() {
-                app.compare.mode = mode;
-                app.compare.left = left;
-                app.compare.right = right;
-                app.bring_forward = Some(Pane::Compare);
+            if ui
+                .button(action.text())
+                .on_hover_text(action.help())
+                .clicked()
+            {
+                app.perform(action, &ctx);
             }
         }
     });

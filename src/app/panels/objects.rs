@@ -170,14 +170,27 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
 /// A title that sorts by its column, and the other way round when clicked again.
 fn head(ui: &mut Ui, table: &mut ObjectsTable, sort: SortBy, title: &str, help: &str) {
     let active = table.sort == sort;
-    let arrow = match (active, table.descending) {
-        (true, true) => " ▼",
-        (true, false) => " ▲",
-        (false, _) => "",
+    let text = if active {
+        format!("{title}    ")
+    } else {
+        title.to_owned()
     };
     let response = ui
-        .selectable_label(active, format!("{title}{arrow}"))
+        .selectable_label(active, text)
         .on_hover_text(format!("{help}. Click to sort."));
+    if active {
+        // The shipped fonts have no arrows.
+        let middle = response.rect.right_center() - vec2(11.0, 0.0);
+        let down = if table.descending { 1.0 } else { -1.0 };
+        let corners = [vec2(-4.0, -2.5), vec2(4.0, -2.5), vec2(0.0, 3.5)]
+            .map(|v| middle + v * vec2(1.0, down));
+        let color = theme::tokens(ui).strong;
+        ui.painter().add(egui::Shape::convex_polygon(
+            corners.to_vec(),
+            color,
+            egui::Stroke::NONE,
+        ));
+    }
     response.widget_info(|| {
         egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Sort by {title}"))
     });

@@ -1,11 +1,12 @@
 //! A pane with one picture: zoom and pan shared by all, clicks that select or place, numbers inside large pixels.
 
+use crate::app::insertion::models::draw_box;
 use crate::app::picture::gpu::PicturePaint;
 use crate::app::picture::look::{Cursor, fraction};
 use crate::app::picture::quantity::{Quantity, Shading};
 use crate::app::picture::{inspect, ramp};
 use crate::app::state::{App, Shown};
-use crate::app::{insertion, theme};
+use crate::app::theme;
 use crate::session::snapshot::{Picture, View};
 use egui::{Align2, Color32, FontId, Pos2, Rect, Sense, Ui, vec2};
 use std::sync::Arc;
@@ -145,9 +146,7 @@ pub fn interact(ui: &mut Ui, app: &mut App, rect: Rect, drawn: &Drawn, name: &st
             });
         }
     }
-    if response.dragged() {
-        app.look.pan(rect, size, response.drag_delta());
-    }
+    drag(ui, app, rect, size, &response);
     if response.double_clicked() {
         app.look.fit();
     } else if response.clicked()
@@ -155,33 +154,51 @@ pub fn interact(ui: &mut Ui, app: &mut App, rect: Rect, drawn: &Drawn, name: &st
     {
         click(app, fraction(app.look.placement(rect, size), pointer));
     }
-    if app.insertions.placing {
+    if app.insertions.placing || app.insertions.dragged.is_some() {
         response.on_hover_cursor(egui::CursorIcon::Crosshair);
+    }
+}
+
+/// Moves an inserted object over the surfaces by its foot, or pans.
+fn drag(ui: &Ui, app: &mut App, rect: Rect, size: [u32; 2], response: &egui::Response) {
+    let placement = app.look.placement(rect, size);
+    if response.drag_started()
+        && let Some(press) = ui.input(|input| input.pointer.press_origin())
+    {
+        app.insertions.dragged = feet(app, placement)
+            .into_iter()
+            .find(|(_, foot)| foot.distance(press) < 10.0)
+            .map(|(index, _)| index);
+    }
+    if response.drag_stopped() {
+        app.insertions.dragged = None;
+    }
+    if !response.dragged() {
+        return;
+    }
+    let Some(index) = app.insertions.dragged else {
+        app.look.pan(rect, size, response.drag_delta());
+        return;
+    };
+    app.insertions.chosen = Some(index);
+    if let Some(pointer) = response.interact_pointer_pos()
+        && let Some((point, _)) = app.surface_at(fraction(placement, pointer))
+    {
+        app.insertions.place(point);
     }
 }
 
 /// A click at a point of the view: places the chosen object, or selects what is there.
 fn click(app: &mut App, at: Pos2) {
-    let Some((capture, camera)) = app.capture().cloned().zip(app.camera()) else {
-        return;
-    };
-    let size = glam::vec2(
-        camera.intrinsics.width as f32,
-        camera.intrinsics.height as f32,
-    );
-    let ray = camera.ray(glam::vec2(at.x, at.y) * size);
-    let Some(hit) = capture.scene.intersect(&ray) else {
+    let Some((point, object)) = app.surface_at(at) else {
         app.selected = None;
         return;
     };
-    if app.insertions.placing {
-        let point = capture.scene.point(&hit).as_dvec3() + capture.scene.origin;
-        if app.insertions.place(point) {
-            app.insertions.placing = false;
-            return;
-        }
+    if app.insertions.placing && app.insertions.place(point) {
+        app.insertions.placing = false;
+        return;
     }
-    app.select(capture.scene.object_of.get(hit.triangle as usize).copied());
+    app.select(Some(object));
 }
 
 impl App {
@@ -284,7 +301,30 @@ fn numbers(painter: &egui::Painter, rect: Rect, placement: Rect, picture: &Pictu
     }
 }
 
-/// Marks where inserted objects stand.
+/// Where the visible inserted objects stand on the screen, by index.
+fn feet(app: &App, placement: Rect) -> Vec<(usize, Pos2)> {
+    let Some((capture, camera)) = app.capture().zip(app.camera()) else {
+        return Vec::new();
+    };
+    let size = vec2(
+        camera.intrinsics.width as f32,
+        camera.intrinsics.height as f32,
+    );
+    let objects = app.insertions.objects.iter().enumerate();
+    objects
+        .filter(|(_, object)| object.visible)
+        .filter_map(|(index, object)| {
+            let foot = (object.placement.at? - capture.scene.origin).as_vec3();
+            let pixel = camera.project(foot)?;
+            Some((
+                index,
+                placement.min + vec2(pixel.x, pixel.y) / size * placement.size(),
+            ))
+        })
+        .collect()
+}
+
+/// Boxes around inserted objects while they are placed or moved, and their feet, by which they can be dragged.
 fn anchors(ui: &Ui, app: &App, rect: Rect, placement: Rect) {
     let Some((capture, camera)) = app.capture().zip(app.camera()) else {
         return;
@@ -295,24 +335,24 @@ fn anchors(ui: &Ui, app: &App, rect: Rect, placement: Rect) {
         camera.intrinsics.width as f32,
         camera.intrinsics.height as f32,
     );
-    for (index, object) in app.insertions.objects.iter().enumerate() {
-        let insertion::Inserted {
-            placement: at,
-            visible: true,
-        } = object
-        else {
-            continue;
-        };
-        let Some(point) = at.at else { continue };
-        let local = (point - capture.scene.origin).as_vec3();
-        if let Some(pixel) = camera.project(local) {
-            let at = placement.min + vec2(pixel.x, pixel.y) / size * placement.size();
-            let radius = if app.insertions.chosen == Some(index) {
-                5.0
-            } else {
-                3.0
-            };
-            painter.circle(at, radius, tokens.inserted, (1.0, Color32::BLACK));
+    let project = |point| {
+        let pixel = camera.project(point)?;
+        Some(placement.min + vec2(pixel.x, pixel.y) / size * placement.size())
+    };
+    for (index, foot) in feet(app, placement) {
+        let chosen = app.insertions.chosen == Some(index);
+        let moving = app.insertions.placing || ui.input(|input| input.pointer.any_down());
+        if chosen
+            && moving
+            && let Some(object) = app.insertions.objects.get(index)
+            && let Some(corners) = app
+                .insertions
+                .models
+                .corners(&object.placement, &capture.scene)
+        {
+            draw_box(&painter, &corners, project, tokens.inserted, 1.5);
         }
+        let radius = if chosen { 5.0 } else { 3.0 };
+        painter.circle(foot, radius, tokens.inserted, (1.0, Color32::BLACK));
     }
 }

@@ -139,8 +139,9 @@ pub fn show(ctx: &egui::Context, app: &mut App) {
 fn save(ui: &mut Ui, app: &mut App, folder: &mut String) -> bool {
     ui.heading("Save results");
     ui.label("Estimate, report, loss, scene and pictures, as `relit solve` writes them.");
-    path_field(ui, app, "Folder", folder, Ask::SaveFolder);
-    let (go, cancel) = buttons(ui, "Save", !folder.trim().is_empty());
+    let entered = path_field(ui, app, "Folder", folder, Ask::SaveFolder);
+    let (clicked, cancel) = buttons(ui, "Save", !folder.trim().is_empty());
+    let go = (clicked || entered) && !folder.trim().is_empty();
     if go {
         app.send(Command::Save(PathBuf::from(folder.trim())));
     }
@@ -166,8 +167,9 @@ fn export(ui: &mut Ui, app: &mut App, file: &mut String, chosen: &mut usize) -> 
     });
     let format = &FORMATS[(*chosen).min(FORMATS.len() - 1)];
     ui.weak(format.help);
-    path_field(ui, app, "File", file, Ask::ExportFile);
-    let (go, cancel) = buttons(ui, "Export", !file.trim().is_empty());
+    let entered = path_field(ui, app, "File", file, Ask::ExportFile);
+    let (clicked, cancel) = buttons(ui, "Export", !file.trim().is_empty());
+    let go = (clicked || entered) && !file.trim().is_empty();
     if go {
         let format = match format.format {
             ExportFormat::Probe { .. } => ExportFormat::Probe {
@@ -194,15 +196,22 @@ fn probe_point(app: &mut App) -> DVec3 {
         .unwrap_or(app.model.orbit.target.as_dvec3() + origin)
 }
 
-fn path_field(ui: &mut Ui, app: &mut App, name: &str, path: &mut String, ask: Ask) {
+/// A field for a path, which takes the keys at once; true when Enter is pressed in it.
+fn path_field(ui: &mut Ui, app: &mut App, name: &str, path: &mut String, ask: Ask) -> bool {
     ui.horizontal(|ui| {
         let label = ui.label(name);
-        ui.add(TextEdit::singleline(path).desired_width(270.0))
+        let response = ui
+            .add(TextEdit::singleline(path).desired_width(270.0))
             .labelled_by(label.id);
+        if ui.memory(|memory| memory.focused().is_none()) {
+            response.request_focus();
+        }
         if ui.button("Browse…").clicked() {
             app.ask(ask, &ui.ctx().clone());
         }
-    });
+        response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter))
+    })
+    .inner
 }
 
 /// The two buttons at the end: whether each was clicked.

@@ -15,7 +15,7 @@ pub fn bar(ui: &mut Ui, app: &mut App) {
         button(ui, app, Action::Finish, "Finish", 0.0);
         button(ui, app, Action::Reset, "Reset", 0.0);
         ui.separator();
-        button(ui, app, Action::PreviousFrame, "◀", 22.0);
+        button(ui, app, Action::PreviousFrame, "‹", 22.0);
         let frames = app.frames();
         let text = match app.shown {
             Shown::Free(..) => "3D view".to_owned(),
@@ -27,7 +27,7 @@ pub fn bar(ui: &mut Ui, app: &mut App) {
             egui::Layout::centered_and_justified(egui::Direction::LeftToRight),
             |ui| ui.label(text),
         );
-        button(ui, app, Action::NextFrame, "▶", 22.0);
+        button(ui, app, Action::NextFrame, "›", 22.0);
         ui.separator();
         exposure(ui, app);
         ui.separator();

@@ -1,8 +1,11 @@
 //! The inserted objects as the window edits them: placed, moved, duplicated, hidden, with undo.
 
+pub mod models;
+
 use crate::app::undo::History;
 use crate::session::command::Placement;
 use glam::DVec3;
+use models::Models;
 use std::path::{Path, PathBuf};
 
 /// An inserted object.
@@ -25,7 +28,7 @@ impl Inserted {
 }
 
 /// All inserted objects and how they are being edited.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub struct Insertions {
     /// The objects, in the order in which they were added.
     pub objects: Vec<Inserted>,
@@ -33,8 +36,12 @@ pub struct Insertions {
     pub chosen: Option<usize>,
     /// Whether the next click in a view places the chosen object.
     pub placing: bool,
+    /// The object whose foot is being dragged.
+    pub dragged: Option<usize>,
     /// The path as typed.
     pub path: String,
+    /// The shapes of the objects' files.
+    pub models: Models,
     history: History<Vec<Inserted>>,
 }
 
@@ -49,7 +56,7 @@ pub fn is_object(path: &Path) -> bool {
 }
 
 impl Insertions {
-    /// Adds an object at `at`, chooses it, and waits for a click that places it where `at` is unknown.
+    /// Adds an object at `at`, chooses it, and waits for a click that places it.
     pub fn add(&mut self, file: PathBuf, at: Option<DVec3>) {
         self.objects.push(Inserted {
             placement: Placement {
@@ -103,11 +110,11 @@ impl Insertions {
 
     /// Takes everything away and forgets the history, for a new capture.
     pub fn clear(&mut self) {
-        let path = std::mem::take(&mut self.path);
-        *self = Self {
-            path,
-            ..Self::default()
-        };
+        self.objects.clear();
+        self.chosen = None;
+        self.placing = false;
+        self.dragged = None;
+        self.history = History::default();
     }
 
     /// What the worker is to show.

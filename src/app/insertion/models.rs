@@ -1,0 +1,177 @@
+//! The shapes of inserted objects, read on threads of their own, for boxes in the views.
+
+use crate::app::insertion::Inserted;
+use crate::compose::object::ObjectModel;
+use crate::compose::object::surface::Surface;
+use crate::scene::Scene;
+use crate::session::command::Placement;
+use egui::{Color32, Painter, Pos2, Stroke};
+use glam::{DVec3, Vec3};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+/// An object's file, and its shape unless it cannot be read (the worker says why).
+type Read = (PathBuf, Option<ObjectModel>);
+
+/// Shapes by file.
+pub struct Models {
+    known: HashMap<PathBuf, Option<ObjectModel>>,
+    sender: Sender<Read>,
+    receiver: Receiver<Read>,
+}
+
+impl Default for Models {
+    fn default() -> Self {
+        let (sender, receiver) = channel();
+        Self {
+            known: HashMap::new(),
+            sender,
+            receiver,
+        }
+    }
+}
+
+impl Models {
+    /// Starts reading what is not known yet; gives the files that have been read since the last call.
+    pub fn update(&mut self, ctx: &egui::Context, objects: &[Inserted]) -> Vec<PathBuf> {
+        for object in objects {
+            let file = &object.placement.file;
+            if !self.known.contains_key(file) {
+                self.known.insert(file.clone(), None);
+                self.read(ctx, file.clone());
+            }
+        }
+        let mut read = Vec::new();
+        while let Ok((file, model)) = self.receiver.try_recv() {
+            self.known.insert(file.clone(), model);
+            read.push(file);
+        }
+        read
+    }
+
+    fn read(&self, ctx: &egui::Context, file: PathBuf) {
+        let (sender, ctx) = (self.sender.clone(), ctx.clone());
+        // Without a thread there is no box, and nothing else is lost.
+        let _ = std::thread::Builder::new()
+            .name("object".to_owned())
+            .spawn(move || {
+                let model = ObjectModel::read(&file)
+                    .ok()
+                    .and_then(|model| extent(&model));
+                if sender.send((file, model)).is_ok() {
+                    ctx.request_repaint();
+                }
+            });
+    }
+
+    /// A power of ten that makes an object smaller than the scene, where it is larger as modelled.
+    pub fn fitting_scale(&self, file: &Path, scene: &Scene) -> Option<f64> {
+        let (low, high) = self.known.get(file)?.as_ref()?.bounds();
+        let size = (high - low).max_element();
+        let diameter = f64::from(scene.diameter);
+        if size <= diameter || !size.is_finite() {
+            return None;
+        }
+        Some(10f64.powf((diameter / size).log10().floor()))
+    }
+
+    /// The corners of the box around a placed object, in scene coordinates; bit 0 of the index is x, 1 is y, 2 is z.
+    pub fn corners(&self, placement: &Placement, scene: &Scene) -> Option<[Vec3; 8]> {
+        let model = self.known.get(&placement.file)?.as_ref()?;
+        let (low, high) = model.bounds();
+        let transform = placement.transform(model, scene.up.as_dvec3()).ok()?;
+        Some(std::array::from_fn(|index| {
+            let pick =
+                |bit: usize, low: f64, high: f64| if index >> bit & 1 == 0 { low } else { high };
+            let corner = DVec3::new(
+                pick(0, low.x, high.x),
+                pick(1, low.y, high.y),
+                pick(2, low.z, high.z),
+            );
+            (transform.transform_point3(corner) - scene.origin).as_vec3()
+        }))
+    }
+}
+
+/// The least model that has the bounds of another, since those of a large one take a while.
+fn extent(model: &ObjectModel) -> Option<ObjectModel> {
+    let (low, high) = model.bounds();
+    let corners = vec![[low, high, DVec3::new(low.x, high.y, low.z)]];
+    let material = Surface::diffuse(Vec3::ZERO).material(None);
+    ObjectModel::from_corners(&model.name, corners, material).ok()
+}
+
+/// Draws the edges of a box.
+pub fn draw_box(
+    painter: &Painter,
+    corners: &[Vec3; 8],
+    project: impl Fn(Vec3) -> Option<Pos2>,
+    color: Color32,
+    width: f32,
+) {
+    let points = corners.map(project);
+    for from in 0..8usize {
+        for bit in 0..3 {
+            let to = from | 1 << bit;
+            if to == from {
+                continue;
+            }
+            if let Some((a, b)) = points[from].zip(points[to]) {
+                painter.line_segment(
+                    [a, b],
+                    Stroke::new(width + 1.5, Color32::from_black_alpha(120)),
+                );
+                painter.line_segment([a, b], Stroke::new(width, color));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::model::tests::scene;
+
+    fn models(size: f64) -> Models {
+        let corners = vec![[
+            DVec3::ZERO,
+            DVec3::new(size, 0.0, size),
+            DVec3::new(0.0, size, 0.0),
+        ]];
+        let material = Surface::diffuse(Vec3::splat(0.5)).material(None);
+        let model = ObjectModel::from_corners("cube", corners, material).expect("a model");
+        let model = extent(&model).expect("it has a size");
+        let mut models = Models::default();
+        models.known.insert("cube.obj".into(), Some(model));
+        models
+    }
+
+    #[test]
+    fn boxes_stand_where_the_object_was_placed() {
+        let scene = scene();
+        let placement = Placement {
+            file: "cube.obj".into(),
+            at: Some(DVec3::new(0.5, 0.0, -0.2)),
+            scale: 2.0,
+            rotate: 0.0,
+        };
+        let corners = models(0.1).corners(&placement, &scene).expect("known");
+        let points = corners.map(|p| p.as_dvec3() + scene.origin);
+        let low = points.iter().fold(DVec3::INFINITY, |low, p| low.min(*p));
+        let high = points
+            .iter()
+            .fold(DVec3::NEG_INFINITY, |high, p| high.max(*p));
+        assert!(low.distance(DVec3::new(0.4, 0.0, -0.3)) < 1e-5, "{low}");
+        assert!(high.distance(DVec3::new(0.6, 0.2, -0.1)) < 1e-5, "{high}");
+    }
+
+    #[test]
+    fn only_what_is_larger_than_the_scene_is_scaled() {
+        let scene = scene();
+        let file = Path::new("cube.obj");
+        assert_eq!(models(1.0).fitting_scale(file, &scene), None);
+        let scale = models(90.0).fitting_scale(file, &scene).expect("too large");
+        assert!((scale - 0.01).abs() < 1e-9, "{scale}");
+    }
+}
