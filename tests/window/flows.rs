@@ -358,6 +358,7 @@ fn every_pane_draws_in_both_themes_with_the_fonts_shipped() {
     press(&mut harness, Modifiers::NONE, Key::Questionmark);
     assert!(harness.query_all_by_label("Keys and mouse").count() > 0);
     harness.state_mut().app.keys = false;
+    harness.run_steps(2);
     for menu in ["File", "Edit", "Solve", "View", "Help", "Window"] {
         click(&mut harness, menu);
         click(&mut harness, menu);
