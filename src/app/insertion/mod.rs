@@ -1,10 +1,12 @@
 //! The inserted objects as the window edits them: placed, moved, duplicated, hidden, with undo.
 
+pub mod handles;
 pub mod models;
 
 use crate::app::undo::History;
 use crate::session::command::Placement;
 use glam::DVec3;
+use handles::Handle;
 use models::Models;
 use std::path::{Path, PathBuf};
 
@@ -36,8 +38,8 @@ pub struct Insertions {
     pub chosen: Option<usize>,
     /// Whether the next click in a view places the chosen object.
     pub placing: bool,
-    /// The object whose foot is being dragged.
-    pub dragged: Option<usize>,
+    /// The handle that is being dragged.
+    pub dragged: Option<Handle>,
     /// The path as typed.
     pub path: String,
     /// The shapes of the objects' files.

@@ -65,7 +65,7 @@ impl Models {
             });
     }
 
-    /// A power of ten that makes an object smaller than the scene, where it is larger as modelled.
+    /// A power of ten that makes an object at most a third of the scene, where it is larger than that as modelled.
     pub fn fitting_scale(&self, file: &Path, scene: &Scene) -> Option<f64> {
         let (low, high) = self.known.get(file)?.as_ref()?.bounds();
         let size = (high - low).max_element();
@@ -73,7 +73,7 @@ impl Models {
         if size <= diameter || !size.is_finite() {
             return None;
         }
-        Some(10f64.powf((diameter / size).log10().floor()))
+        Some(10f64.powf((diameter / (3.0 * size)).log10().floor()))
     }
 
     /// The corners of the box around a placed object, in scene coordinates; bit 0 of the index is x, 1 is y, 2 is z.

@@ -140,15 +140,31 @@ impl Orbit {
             Some(triangles) => triangles.iter().flat_map(|&t| scene.corners(t)).collect(),
             None => scene.positions.clone(),
         };
-        let bounds = corners.iter().fold(None, |bounds, &p| match bounds {
-            None => Some((p, p)),
-            Some((low, high)) => Some((p.min(low), p.max(high))),
-        });
-        let Some((low, high)) = bounds else { return };
+        if corners.is_empty() {
+            return;
+        }
+        // A scan has stray triangles far out, which one corner in fifty may be.
+        let mut axes = [Vec::new(), Vec::new(), Vec::new()];
+        for corner in &corners {
+            (0..3).for_each(|axis| axes[axis].push(corner[axis]));
+        }
+        let last = (corners.len() - 1) as f32;
+        let mut at = |share: f32, axis: usize| {
+            let index = if share < 0.5 {
+                (last * share).floor()
+            } else {
+                (last * share).ceil()
+            };
+            *axes[axis]
+                .select_nth_unstable_by(index as usize, f32::total_cmp)
+                .1
+        };
+        let low = Vec3::new(at(0.01, 0), at(0.01, 1), at(0.01, 2));
+        let high = Vec3::new(at(0.99, 0), at(0.99, 1), at(0.99, 2));
         let radius = ((high - low).length() * 0.5).max(scene.diameter * 1e-3);
         self.up = scene.up;
         self.target = (low + high) * 0.5;
-        self.distance = radius / (self.fov * 0.5).sin() * 1.05;
+        self.distance = radius / (self.fov * 0.5).tan();
     }
 
     /// Takes over a photograph's camera, turning about what it sees in its middle.

@@ -6,7 +6,7 @@ use crate::app::theme;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::session::snapshot::OpenCapture;
-use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, pos2};
+use egui::{Painter, Pos2, Rect, Stroke, Ui, pos2};
 use glam::{Mat4, Vec2, Vec3};
 
 /// Cameras drawn at most.
@@ -64,54 +64,27 @@ pub fn draw(ui: &Ui, app: &App, capture: &OpenCapture, rect: Rect) {
                     &projection,
                     &painter,
                     camera,
-                    scene.diameter * 0.025,
+                    scene.diameter * 0.018,
                     stroke,
                 );
             }
         }
     }
-    for (index, object) in app.insertions.objects.iter().enumerate() {
-        let Some(at) = object.placement.at.filter(|_| object.visible) else {
-            continue;
-        };
-        let foot = (at - scene.origin).as_vec3();
-        let width = if app.insertions.chosen == Some(index) {
-            2.0
-        } else {
-            1.0
-        };
+    for object in app.insertions.objects.iter().filter(|o| o.visible) {
         if let Some(corners) = app.insertions.models.corners(&object.placement, scene) {
-            draw_box(
-                &painter,
-                &corners,
-                |p| projection.at(p),
-                tokens.inserted,
-                width,
-            );
-        }
-        if let Some(at) = projection.at(foot) {
-            painter.circle(at, 4.0, tokens.inserted, (1.0, Color32::BLACK));
-            let font = FontId::proportional(11.0);
-            let below = at + egui::vec2(0.0, 6.0);
-            painter.text(
-                below,
-                Align2::CENTER_TOP,
-                object.name(),
-                font,
-                tokens.inserted,
-            );
+            let project = |p| projection.at(p);
+            draw_box(&painter, &corners, project, tokens.inserted, 1.0);
         }
     }
+    app.insertions
+        .draw_handles(&painter, scene, tokens, true, |p| projection.at(p));
 }
 
-/// The inserted object whose foot is drawn under the pointer.
-pub fn foot_at(app: &App, scene: &Scene, rect: Rect, pointer: Pos2) -> Option<usize> {
+/// Takes the handle of an inserted object under the pointer.
+pub fn take_handle(app: &mut App, scene: &Scene, rect: Rect, pointer: Pos2) {
     let projection = Projection::new(app, scene, rect);
-    app.insertions.objects.iter().position(|object| {
-        let foot = object.placement.at.filter(|_| object.visible);
-        foot.and_then(|at| projection.at((at - scene.origin).as_vec3()))
-            .is_some_and(|foot| foot.distance(pointer) < 10.0)
-    })
+    app.insertions
+        .take_handle(scene, pointer, |p| projection.at(p));
 }
 
 /// The corners of the far end of a camera's pyramid.

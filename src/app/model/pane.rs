@@ -167,27 +167,26 @@ fn steer(ui: &Ui, app: &mut App, scene: &Scene, response: &Response) {
     }
 }
 
-/// Moves an inserted object over the surfaces by its foot; false while none is dragged.
+/// Drags a handle of an inserted object; false while none is held.
 fn move_object(ui: &Ui, app: &mut App, scene: &Scene, response: &Response) -> bool {
-    if response.drag_started_by(PointerButton::Primary) {
-        let press = ui.input(|input| input.pointer.press_origin());
-        app.insertions.dragged =
-            press.and_then(|press| overlay::foot_at(app, scene, response.rect, press));
+    if response.drag_started_by(PointerButton::Primary)
+        && let Some(press) = ui.input(|input| input.pointer.press_origin())
+    {
+        overlay::take_handle(app, scene, response.rect, press);
     }
     if response.drag_stopped() {
         app.insertions.dragged = None;
     }
-    let Some(index) = app.insertions.dragged.filter(|_| response.dragged()) else {
+    let Some(pointer) = response
+        .interact_pointer_pos()
+        .filter(|_| response.dragged())
+    else {
         return false;
     };
-    app.insertions.chosen = Some(index);
-    if let Some(pointer) = response.interact_pointer_pos()
-        && let Some(hit) = under(app, scene, pixel(ui, response.rect, pointer))
-    {
-        app.insertions
-            .place(scene.point(&hit).as_dvec3() + scene.origin);
-    }
-    true
+    let at = pixel(ui, response.rect, pointer);
+    let ray = app.model.orbit.camera(scene).ray(at);
+    let surface = under(app, scene, at).map(|hit| scene.point(&hit).as_dvec3() + scene.origin);
+    app.insertions.drag_handle(scene, &ray, surface)
 }
 
 /// A click looks through a camera, places the chosen object, or selects; a double click turns about what is there.

@@ -34,7 +34,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
 fn add(ui: &mut Ui, app: &mut App) {
     ui.horizontal(|ui| {
         let label = ui.label("Object file");
-        let width = (ui.available_width() - 112.0).max(60.0);
+        let width = (ui.available_width() - 136.0).max(60.0);
         let field = TextEdit::singleline(&mut app.insertions.path)
             .hint_text("chair.glb")
             .desired_width(width);
@@ -99,7 +99,7 @@ fn actions(ui: &mut Ui, app: &mut App) {
             "Place by click"
         };
         let place = ui
-            .selectable_label(placing, text)
+            .add(Button::new(text).selected(placing))
             .on_hover_text(Action::Place.help());
         if place.clicked() {
             app.perform(Action::Place, &ctx);

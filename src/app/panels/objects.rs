@@ -81,14 +81,17 @@ impl ObjectsTable {
             })
         };
         rows.sort_by(|&a, &b| {
-            let by_key = key(a)
-                .total_cmp(&key(b))
-                .then_with(|| names[a].cmp(names[b]));
-            if self.descending {
+            let by_key = match self.sort {
+                SortBy::Name => names[a].cmp(names[b]),
+                _ => key(a).total_cmp(&key(b)),
+            };
+            let by_key = if self.descending {
                 by_key.reverse()
             } else {
                 by_key
-            }
+            };
+            // Equal ones stay in the capture's order.
+            by_key.then(a.cmp(&b))
         });
         rows
     }

@@ -1,12 +1,12 @@
 //! A pane with one picture: zoom and pan shared by all, clicks that select or place, numbers inside large pixels.
 
-use crate::app::insertion::models::draw_box;
 use crate::app::picture::gpu::PicturePaint;
 use crate::app::picture::look::{Cursor, fraction};
 use crate::app::picture::quantity::{Quantity, Shading};
 use crate::app::picture::{inspect, ramp};
 use crate::app::state::{App, Shown};
 use crate::app::theme;
+use crate::scene::camera::Camera;
 use crate::session::snapshot::{Picture, View};
 use egui::{Align2, Color32, FontId, Pos2, Rect, Sense, Ui, vec2};
 use std::sync::Arc;
@@ -159,33 +159,41 @@ pub fn interact(ui: &mut Ui, app: &mut App, rect: Rect, drawn: &Drawn, name: &st
     }
 }
 
-/// Moves an inserted object over the surfaces by its foot, or pans.
+/// Drags a handle of an inserted object, or pans.
 fn drag(ui: &Ui, app: &mut App, rect: Rect, size: [u32; 2], response: &egui::Response) {
     let placement = app.look.placement(rect, size);
+    let Some((capture, camera)) = app.capture().cloned().zip(app.camera().cloned()) else {
+        return;
+    };
     if response.drag_started()
         && let Some(press) = ui.input(|input| input.pointer.press_origin())
     {
-        app.insertions.dragged = feet(app, placement)
-            .into_iter()
-            .find(|(_, foot)| foot.distance(press) < 10.0)
-            .map(|(index, _)| index);
+        let project = |point| on_screen(&camera, placement, point);
+        app.insertions.take_handle(&capture.scene, press, project);
     }
     if response.drag_stopped() {
         app.insertions.dragged = None;
     }
-    if !response.dragged() {
-        return;
-    }
-    let Some(index) = app.insertions.dragged else {
-        app.look.pan(rect, size, response.drag_delta());
-        return;
-    };
-    app.insertions.chosen = Some(index);
-    if let Some(pointer) = response.interact_pointer_pos()
-        && let Some((point, _)) = app.surface_at(fraction(placement, pointer))
+    if let Some(pointer) = response
+        .interact_pointer_pos()
+        .filter(|_| response.dragged())
     {
-        app.insertions.place(point);
+        let at = fraction(placement, pointer);
+        let k = &camera.intrinsics;
+        let ray = camera.ray(glam::vec2(at.x * k.width as f32, at.y * k.height as f32));
+        let surface = app.surface_at(at).map(|(point, _)| point);
+        if !app.insertions.drag_handle(&capture.scene, &ray, surface) {
+            app.look.pan(rect, size, response.drag_delta());
+        }
     }
+}
+
+/// Where a scene point is on the screen, when the camera's picture lies at `placement`.
+fn on_screen(camera: &Camera, placement: Rect, point: glam::Vec3) -> Option<Pos2> {
+    let k = &camera.intrinsics;
+    let pixel = camera.project(point)?;
+    let share = vec2(pixel.x / k.width as f32, pixel.y / k.height as f32);
+    Some(placement.min + share * placement.size())
 }
 
 /// A click at a point of the view: places the chosen object, or selects what is there.
@@ -301,58 +309,17 @@ fn numbers(painter: &egui::Painter, rect: Rect, placement: Rect, picture: &Pictu
     }
 }
 
-/// Where the visible inserted objects stand on the screen, by index.
-fn feet(app: &App, placement: Rect) -> Vec<(usize, Pos2)> {
-    let Some((capture, camera)) = app.capture().zip(app.camera()) else {
-        return Vec::new();
-    };
-    let size = vec2(
-        camera.intrinsics.width as f32,
-        camera.intrinsics.height as f32,
-    );
-    let objects = app.insertions.objects.iter().enumerate();
-    objects
-        .filter(|(_, object)| object.visible)
-        .filter_map(|(index, object)| {
-            let foot = (object.placement.at? - capture.scene.origin).as_vec3();
-            let pixel = camera.project(foot)?;
-            Some((
-                index,
-                placement.min + vec2(pixel.x, pixel.y) / size * placement.size(),
-            ))
-        })
-        .collect()
-}
-
-/// Boxes around inserted objects while they are placed or moved, and their feet, by which they can be dragged.
+/// Handles of inserted objects, and a box around the chosen one while it is placed or moved.
 fn anchors(ui: &Ui, app: &App, rect: Rect, placement: Rect) {
-    let Some((capture, camera)) = app.capture().zip(app.camera()) else {
-        return;
-    };
-    let painter = ui.painter().with_clip_rect(rect);
-    let tokens = theme::tokens(ui);
-    let size = vec2(
-        camera.intrinsics.width as f32,
-        camera.intrinsics.height as f32,
-    );
-    let project = |point| {
-        let pixel = camera.project(point)?;
-        Some(placement.min + vec2(pixel.x, pixel.y) / size * placement.size())
-    };
-    for (index, foot) in feet(app, placement) {
-        let chosen = app.insertions.chosen == Some(index);
-        let moving = app.insertions.placing || ui.input(|input| input.pointer.any_down());
-        if chosen
-            && moving
-            && let Some(object) = app.insertions.objects.get(index)
-            && let Some(corners) = app
-                .insertions
-                .models
-                .corners(&object.placement, &capture.scene)
-        {
-            draw_box(&painter, &corners, project, tokens.inserted, 1.5);
-        }
-        let radius = if chosen { 5.0 } else { 3.0 };
-        painter.circle(foot, radius, tokens.inserted, (1.0, Color32::BLACK));
+    if let Some((capture, camera)) = app.capture().zip(app.camera()) {
+        let painter = ui.painter().with_clip_rect(rect);
+        let boxed = app.insertions.placing || app.insertions.dragged.is_some();
+        app.insertions.draw_handles(
+            &painter,
+            &capture.scene,
+            theme::tokens(ui),
+            boxed,
+            |point| on_screen(camera, placement, point),
+        );
     }
 }

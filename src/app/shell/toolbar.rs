@@ -44,7 +44,7 @@ pub fn bar(ui: &mut Ui, app: &mut App) {
         let response = ui
             .add_enabled(
                 app.can(Action::RenderFromHere),
-                Button::selectable(free, "From 3D view"),
+                Button::new("From 3D view").selected(free),
             )
             .on_hover_text(Action::RenderFromHere.help());
         if response.clicked() {
