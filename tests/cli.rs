@@ -169,7 +169,7 @@ fn a_solve_writes_everything_and_all_of_it_can_be_read() {
             }
         }
     }
-    for name in ["loss.csv", "loss.png"] {
+    for name in ["loss.csv", "loss.png", "scene.glb"] {
         assert!(place.path(&format!("{out}/{name}")).is_file(), "{name}");
     }
     let left: Vec<_> = fs::read_dir(place.path(out))
@@ -474,4 +474,86 @@ fn an_estimate_is_measured_against_the_truth() {
         1,
         &["truth.json"],
     );
+}
+
+#[test]
+fn results_are_exported_and_objects_inserted() {
+    let place = Place::new();
+    done(&place.relit(&solve(&["--views", "none", "--out", "out"])));
+    for (format, file) in [
+        ("glb", "a.glb"),
+        ("obj", "a.obj"),
+        ("ply", "a.ply"),
+        ("mitsuba", "a.xml"),
+        ("csv", "a.csv"),
+    ] {
+        done(&place.relit(&["export", "out", "--format", format, "--out", file]));
+        assert!(
+            place.path(file).metadata().is_ok_and(|m| m.len() > 100),
+            "{file}"
+        );
+    }
+    refused(
+        &place.relit(&["export", "out", "--format", "probe", "--out", "p.exr"]),
+        2,
+        &["--at"],
+    );
+
+    let block = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    fs::write(place.path("block.obj"), block).expect("writes");
+    done(&place.relit(&[
+        "insert",
+        "out",
+        "--frame",
+        "0",
+        "--object",
+        "block.obj",
+        "--at",
+        "0,0,-0.3",
+        "--scale",
+        "0.5",
+        "--spp",
+        "4",
+        "--out",
+        "with",
+    ]));
+    for ending in [
+        "composite.exr",
+        "composite.png",
+        "naive.exr",
+        "naive.png",
+        "delta.exr",
+        "layers.exr",
+        "compare.png",
+    ] {
+        assert!(place.path(&format!("with.{ending}")).is_file(), "{ending}");
+    }
+    refused(
+        &place.relit(&[
+            "insert",
+            "out",
+            "--frame",
+            "0",
+            "--object",
+            "block.obj",
+            "--out",
+            "x",
+        ]),
+        2,
+        &["block.obj", "--at"],
+    );
+}
+
+#[test]
+fn the_built_in_room_is_written_with_its_truth() {
+    let place = Place::new();
+    done(&place.relit(&["demo", "--out", "demo"]));
+    for name in [
+        "transforms.json",
+        "mesh.obj",
+        "truth.json",
+        "truth/albedo_000.exr",
+    ] {
+        assert!(place.path("demo").join(name).is_file(), "{name}");
+    }
 }

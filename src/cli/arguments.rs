@@ -2,6 +2,7 @@
 
 use crate::cli::edit::EditArguments;
 use crate::cli::evaluate::EvaluateArguments;
+use crate::cli::export::{DemoArguments, ExportArguments};
 use crate::cli::insert::InsertArguments;
 use crate::cli::parameters::Parameters;
 use crate::cli::render::RenderArguments;
@@ -41,6 +42,10 @@ pub enum Action {
     Insert(InsertArguments),
     /// Switch lamps, recolour walls, and render the result
     Edit(EditArguments),
+    /// Write the scene or its light for another program
+    Export(ExportArguments),
+    /// Write the built-in room as a capture, with its truth
+    Demo(DemoArguments),
 }
 
 /// `relit solve`.

@@ -3,6 +3,7 @@
 mod arguments;
 mod edit;
 mod evaluate;
+mod export;
 mod insert;
 mod interrupt;
 mod parameters;
@@ -52,6 +53,8 @@ fn act(arguments: Arguments, window: Option<Window>) -> Result<()> {
         Some(Action::Evaluate(evaluate)) => evaluate::evaluate(&evaluate),
         Some(Action::Render(render)) => render::render(&render),
         Some(Action::Insert(insert)) => insert::insert(&insert),
+        Some(Action::Export(files)) => export::export(&files),
+        Some(Action::Demo(demo)) => export::demo(&demo),
         Some(Action::Edit(edit)) => edit::edit(&edit),
         Some(Action::Solve(capture)) => {
             solve::solve(&Source::Folder(capture.capture.clone()), &capture.solve)

@@ -19,6 +19,8 @@ use std::time::{Duration, Instant};
 
 /// Samples a pixel after which a composite counts as done.
 const ENOUGH: u32 = 256;
+/// How long a slice of work may take, about.
+const SLICE: Duration = Duration::from_millis(15);
 /// Shortest time between two pictures of the same composite.
 const PICTURE: Duration = Duration::from_millis(250);
 
@@ -119,6 +121,8 @@ pub struct Inserting {
     stale: Option<Instant>,
     inserted: Option<Inserted>,
     begun: Option<Instant>,
+    /// When the last slice of refinement ended, and how long it took.
+    slice: Option<(Instant, Duration)>,
     pictured: Option<Instant>,
     shown: Option<Arc<Insertion>>,
     sequence: u64,
@@ -167,7 +171,7 @@ impl Inserting {
         self.stale.is_some() || self.inserted.as_ref().is_some_and(refining)
     }
 
-    /// Draws for a moment; whether the pictures changed.
+    /// Draws for a moment, refining for at most about `share` of the time; whether the pictures changed.
     ///
     /// # Errors
     /// An object cannot be read or placed; the objects are then taken away.
@@ -176,7 +180,9 @@ impl Inserting {
         capture: &OpenCapture,
         estimate: &Estimate,
         options: &PathOptions,
+        share: f32,
     ) -> Result<bool> {
+        let started = Instant::now();
         if let Some(asked) = self.stale.take() {
             self.begun = Some(asked);
             self.inserted = None;
@@ -187,13 +193,20 @@ impl Inserting {
             }
             return begun.map(|()| true);
         }
-        let Some(inserted) = &mut self.inserted else {
+        let rested = self.slice.is_none_or(|(end, took)| {
+            end.elapsed().as_secs_f32() * share >= took.as_secs_f32() * (1.0 - share)
+        });
+        let Some(inserted) = self.inserted.as_mut().filter(|_| rested) else {
             return Ok(false);
         };
         if inserted.composite.samples() >= ENOUGH {
             return Ok(false);
         }
-        inserted.composite.pass(1);
+        let next = inserted.composite.samples() + 1;
+        inserted
+            .composite
+            .refine_to(next, || started.elapsed() < SLICE);
+        self.slice = Some((Instant::now(), started.elapsed()));
         let due = self.pictured.is_none_or(|at| at.elapsed() >= PICTURE);
         if due || inserted.composite.samples() >= ENOUGH {
             self.picture();

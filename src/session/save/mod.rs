@@ -11,6 +11,7 @@ pub mod staging;
 
 use crate::error::{Error, Result};
 use crate::export::plot::loss_plot;
+use crate::export::scene::{self, Format};
 use crate::export::table::{Cell, Table};
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
@@ -105,6 +106,13 @@ pub fn write_estimate(folder: &Path, results: &Results) -> Result<()> {
 
 fn stage_estimate(staging: &mut Staging, folder: &Path, results: &Results) -> Result<()> {
     pictures::write(staging, results)?;
+    let scene = staging.file("scene.glb")?;
+    scene::write(
+        &results.capture.scene,
+        &results.estimate,
+        Format::Glb,
+        &scene,
+    )?;
     let (file, maps) = results.file(folder)?;
     if let (Some(name), Some(bytes)) = (&file.maps, &maps) {
         staging.write(name, bytes)?;

@@ -318,7 +318,10 @@ impl Worker {
         if self.estimate.objects.is_empty() || !self.inserting.is_busy() {
             return more;
         }
-        match self.inserting.draw(&capture, &self.estimate, &options) {
+        match self
+            .inserting
+            .draw(&capture, &self.estimate, &options, share)
+        {
             Ok(drawn) => self.changed |= drawn,
             Err(error) => self.fail(&error),
         }

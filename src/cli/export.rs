@@ -1,0 +1,89 @@
+//! `relit export` and `relit demo`: files for other programs, and the built-in room as a capture.
+
+use crate::cli::arguments::triple;
+use crate::cli::saved::{Loaded, SavedOptions};
+use crate::error::{Error, Result};
+use crate::export::scene::{self, Format};
+use crate::room;
+use clap::{Args, ValueEnum};
+use glam::DVec3;
+use std::path::PathBuf;
+
+/// `relit export`.
+#[derive(Debug, Args)]
+pub struct ExportArguments {
+    #[command(flatten)]
+    saved: SavedOptions,
+    /// What to write
+    #[arg(long, value_enum)]
+    format: Word,
+    /// For a probe: where, in the capture's coordinates
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
+    at: Option<DVec3>,
+    /// File to write
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+/// The formats by name.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Word {
+    /// Scene with base colours and emissive strength
+    Glb,
+    /// Scene as OBJ and MTL
+    Obj,
+    /// Scene as PLY with vertex colours
+    Ply,
+    /// Scene for Mitsuba 3
+    Mitsuba,
+    /// Table of objects
+    Csv,
+    /// The light at a point as a panorama
+    Probe,
+}
+
+/// `relit demo`.
+#[derive(Debug, Args)]
+pub struct DemoArguments {
+    /// Folder to write the capture into
+    #[arg(long, value_name = "CAPTURE")]
+    out: PathBuf,
+}
+
+/// Writes one file for another program.
+///
+/// # Errors
+/// The results cannot be read, or the file cannot be written.
+pub fn export(arguments: &ExportArguments) -> Result<()> {
+    let format = match (arguments.format, arguments.at) {
+        (Word::Glb, _) => Format::Glb,
+        (Word::Obj, _) => Format::Obj,
+        (Word::Ply, _) => Format::Ply,
+        (Word::Mitsuba, _) => Format::Mitsuba,
+        (Word::Csv, _) => Format::Csv,
+        (Word::Probe, Some(at)) => Format::Probe { at },
+        (Word::Probe, None) => {
+            return Err(Error::usage(
+                "--format probe",
+                "a probe needs a place",
+                "add --at x,y,z",
+            ));
+        }
+    };
+    let Loaded {
+        capture, estimate, ..
+    } = arguments.saved.load()?;
+    scene::write(&capture.scene, &estimate, format, &arguments.out)?;
+    println!("{}", arguments.out.display());
+    Ok(())
+}
+
+/// Writes the built-in room with its truth.
+///
+/// # Errors
+/// The folder cannot be written.
+pub fn demo(arguments: &DemoArguments) -> Result<()> {
+    room::write(&arguments.out, None)?;
+    println!("{}", arguments.out.display());
+    Ok(())
+}
