@@ -1,5 +1,13 @@
 //! From photographs to an estimate: the solvers, what they estimate, and how sure they are.
 
+pub mod cache;
 pub mod estimate;
+pub mod held_out;
+pub mod loss;
+pub mod measured;
+pub mod monitor;
+pub mod paper;
+pub mod parameters;
 pub mod settings;
 pub mod solver;
+pub mod survey;

@@ -214,9 +214,9 @@ parameters! {
     hold_out: u64 = 0, Kind::Whole { min: 0, max: 1_000_000 }, "frames", false,
         "Keep every K-th frame out of the fit instead of single pixels; 0 keeps single pixels";
     learning_rate: f64 = 5e-3, Kind::Real { min: 1e-6, max: 10.0, logarithmic: true }, "", true,
-        "Paper solver: step size of ADAM";
+        "Paper solver: initial step size of ADAM";
     batch: u64 = 8, Kind::Whole { min: 1, max: 1_000_000 }, "pixels", true,
-        "Paper solver: pixels drawn for each step";
+        "Paper solver: pixels drawn for each step at first";
     samples: u64 = 1, Kind::Whole { min: 1, max: 65536 }, "a pixel", true,
         "Paper solver: paths for each pixel's colour, and as many for its derivative";
     loss: Loss = Loss::L1, Kind::Choice(Loss::WORDS), "", true,
@@ -227,6 +227,8 @@ parameters! {
         "How light is found at a bounce";
     decay: f64 = 0.0, Kind::Real { min: 0.0, max: 1.0, logarithmic: false }, "a 1000 steps", true,
         "Paper solver: share by which the learning rate falls every thousand steps";
+    anneal: bool = true, Kind::Flag, "", true,
+        "Paper solver: halve the learning rate and double the batch whenever the loss stands still";
     steps: u64 = 0, Kind::Whole { min: 0, max: 1_000_000_000 }, "", true,
         "Paper solver: stop after this many steps; 0 goes on until the time is up or the loss stands still";
 }

@@ -1,10 +1,12 @@
 //! What a solver is given, what it reports while it runs, and how it ends.
 
 use crate::capture::photograph::Photograph;
+use crate::inverse::cache::ladder;
 use crate::inverse::estimate::Estimate;
-use crate::inverse::settings::Settings;
+use crate::inverse::monitor::Monitor;
+use crate::inverse::paper;
+use crate::inverse::settings::{Preset, Settings};
 use crate::scene::Scene;
-use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -152,32 +154,18 @@ pub struct Solution {
 /// Runs the solver that the settings' preset names.
 ///
 /// # Errors
-/// No photograph sees the mesh, or the checkpoint belongs to another capture or preset.
+/// The checkpoint belongs to another capture or preset.
 pub fn solve(
     problem: &Problem,
-    _settings: &Settings,
-    _resume: Option<&Checkpoint>,
+    settings: &Settings,
+    resume: Option<&Checkpoint>,
     observer: &mut dyn Observer,
 ) -> crate::error::Result<Solution> {
-    // Placeholder until the solvers land: one grey estimate.
-    let mut estimate = Estimate::default();
-    for _ in &problem.scene.objects {
-        estimate
-            .objects
-            .push(crate::inverse::estimate::ObjectEstimate {
-                albedo: Vec3::splat(0.5),
-                ..Default::default()
-            });
+    let monitor = Monitor::new(settings, observer, Progress::default());
+    match settings.preset {
+        Preset::Paper => paper::solve(problem, settings, resume, monitor),
+        Preset::Preview | Preset::Balanced | Preset::Reference => {
+            ladder::solve(problem, settings, resume, monitor)
+        }
     }
-    let progress = Progress {
-        phase: "placeholder".into(),
-        ..Default::default()
-    };
-    observer.observe(&progress, &estimate);
-    Ok(Solution {
-        estimate,
-        progress,
-        termination: Termination::Converged,
-        checkpoint: None,
-    })
 }

@@ -1,0 +1,119 @@
+//! Which pixels are fitted, gathered in clusters: neighbouring pixels of one object in one photograph.
+//!
+//! Light varies little within a cluster, so its mean holds nearly all that its pixels know of the unknowns, while the
+//! noise of photographs and of paths averages out before products are taken.
+
+use crate::inverse::solver::Problem;
+use crate::inverse::survey::Survey;
+use glam::{DVec3, Vec3};
+use std::collections::BTreeMap;
+
+/// Pixels of a cluster aimed at.
+const CLUSTER_PIXELS: f64 = 48.0;
+/// Objects seen by fewer pixels than this are also fitted at their edges.
+const SMALL: u64 = 400;
+/// Below this share of a typical photograph's level, pixels weigh no more for being darker.
+const DARK: f32 = 0.5;
+
+/// Neighbouring pixels of one object in one photograph.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cluster {
+    /// Frame index.
+    pub frame: u32,
+    /// Object behind the pixels' centres.
+    pub object: u32,
+    /// The pixels, row by row from the top left.
+    pub pixels: Vec<u32>,
+    /// Paths a pixel in each of the two sets.
+    pub paths: u32,
+    /// Mean radiance of the pixels in the photograph.
+    pub measured: Vec3,
+    /// Weight of the squared difference of the means, per channel: pixels / level².
+    pub weight: Vec3,
+}
+
+/// Gathers the pixels that are in the fit. `most_pixels` bounds how many are used; small objects keep all of theirs.
+pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cluster> {
+    // Usable pixels: inside one object, or anywhere on objects that have few.
+    let seen = |object: u32| survey.seen.get(object as usize).copied().unwrap_or(0);
+    let usable: Vec<_> = survey
+        .pixels
+        .iter()
+        .filter(|p| !p.held_out && p.object != u32::MAX && (p.pure || seen(p.object) < SMALL))
+        .collect();
+    let thinning = (usable.len() as f64 / most_pixels.max(1) as f64).max(1.0);
+    let tile = (CLUSTER_PIXELS * thinning).sqrt().round().max(1.0) as u32;
+
+    // Tiles of each photograph, apart for each object.
+    let mut tiles: BTreeMap<(u32, u32, u32, u32), Vec<u32>> = BTreeMap::new();
+    for pixel in usable {
+        let width = problem.photographs[pixel.frame as usize].width;
+        let place = (pixel.pixel / width / tile, pixel.pixel % width / tile);
+        tiles
+            .entry((pixel.frame, place.0, place.1, pixel.object))
+            .or_default()
+            .push(pixel.pixel);
+    }
+
+    // Thin out large objects, evenly over each tile.
+    let floor = typical_level(problem, survey) * DARK;
+    tiles
+        .into_iter()
+        .map(|((frame, _, _, object), all)| {
+            let keep = if seen(object) < SMALL { 1.0 } else { thinning };
+            let count = ((all.len() as f64 / keep).round() as usize).clamp(1, all.len());
+            let pixels: Vec<u32> = (0..count).map(|i| all[i * all.len() / count]).collect();
+            let photograph = &problem.photographs[frame as usize];
+            let sum: DVec3 = pixels
+                .iter()
+                .map(|&p| photograph.pixels[p as usize].as_dvec3())
+                .sum();
+            let measured = (sum / pixels.len() as f64).as_vec3();
+            let level = measured * measured + floor * floor;
+            let weight = level.recip() * pixels.len() as f32;
+            Cluster {
+                frame,
+                object,
+                pixels,
+                paths: 1,
+                measured,
+                weight,
+            }
+        })
+        .collect()
+}
+
+/// Median over photographed pixels, per channel; one where all are black.
+fn typical_level(problem: &Problem, survey: &Survey) -> Vec3 {
+    let channel = |c: usize| {
+        let mut values: Vec<f32> = survey
+            .pixels
+            .iter()
+            .filter(|p| p.object != u32::MAX)
+            .map(|p| problem.photographs[p.frame as usize].pixels[p.pixel as usize][c])
+            .filter(|&v| v > 0.0)
+            .collect();
+        if values.is_empty() {
+            return 1.0;
+        }
+        let middle = values.len() / 2;
+        *values.select_nth_unstable_by(middle, f32::total_cmp).1
+    };
+    Vec3::new(channel(0), channel(1), channel(2))
+}
+
+/// Shares a number of paths out over clusters: to objects in proportion to the square root of their pixels, so that
+/// small ones become known well without starving large ones; at least one path a pixel and set.
+pub fn share_paths(clusters: &mut [Cluster], objects: usize, total: u64) {
+    let mut pixels = vec![0u64; objects];
+    for cluster in clusters.iter() {
+        pixels[cluster.object as usize] += cluster.pixels.len() as u64;
+    }
+    let sum: f64 = pixels.iter().map(|&n| (n as f64).sqrt()).sum();
+    for cluster in clusters {
+        let n = pixels[cluster.object as usize] as f64;
+        // Half of the paths go to each set.
+        let per_pixel = total as f64 * 0.5 / (sum * n.sqrt());
+        cluster.paths = per_pixel.round().clamp(1.0, 4096.0) as u32;
+    }
+}

@@ -1,0 +1,109 @@
+//! From fitted unknowns to the estimate that people see, saying what could not be known.
+
+use super::errors::StandardErrors;
+use super::fit::PRIOR_DEVIATION;
+use super::roles::Role;
+use crate::inverse::estimate::{Estimate, ObjectEstimate};
+use crate::inverse::parameters::Unknowns;
+use crate::inverse::survey::Survey;
+use crate::math::color::luminance;
+use crate::scene::Scene;
+use glam::{DVec3, Vec3};
+
+/// An albedo with a larger standard error than this is as good as unknown.
+const UNKNOWN_ALBEDO: f32 = 0.2 * PRIOR_DEVIATION as f32;
+/// An emitting object that fewer pixels see is known only through its light.
+const FEW_PIXELS: u64 = 19;
+
+/// The estimate of some unknowns.
+pub fn estimate(
+    scene: &Scene,
+    survey: &Survey,
+    roles: &[Role],
+    unknowns: &Unknowns,
+    errors: &StandardErrors,
+) -> Estimate {
+    let typical = typical_albedo(scene, roles, unknowns, errors);
+    let objects = (0..roles.len())
+        .map(|k| {
+            let seen = survey.seen[k];
+            let mut object = ObjectEstimate {
+                albedo: unknowns.albedo[k],
+                albedo_stderr: errors.albedo[k],
+                emission: unknowns.emission[k],
+                emission_stderr: finite(errors.emission[k]),
+                seen_pixels: seen,
+                ..Default::default()
+            };
+            match roles[k] {
+                Role::Reflector | Role::Glowing => {
+                    if errors.albedo[k].max_element() > UNKNOWN_ALBEDO {
+                        object.albedo_identifiable = false;
+                        object.identifiable = false;
+                        object.note =
+                            "too few paths through its pixels meet light to tell its albedo".into();
+                    }
+                }
+                Role::Emitter => {
+                    object.albedo = Vec3::ZERO;
+                    object.albedo_stderr = Vec3::splat(PRIOR_DEVIATION as f32);
+                    object.albedo_identifiable = false;
+                    object.note =
+                        "its own light hides what it reflects; emission is all that leaves it"
+                            .into();
+                    if seen < FEW_PIXELS {
+                        object.note.push_str("; only a few pixels see it");
+                    }
+                }
+                Role::Unseen => {
+                    object.albedo = Vec3::ZERO;
+                    object.identifiable = false;
+                    object.albedo_identifiable = false;
+                    object.note =
+                        "no photograph sees it; its light is inferred from what it does to others"
+                            .into();
+                }
+                Role::Dark => {
+                    object.albedo = typical;
+                    object.albedo_stderr = Vec3::splat(PRIOR_DEVIATION as f32);
+                    object.identifiable = false;
+                    object.albedo_identifiable = false;
+                    object.note = "no photograph sees it; its albedo is the room's mean".into();
+                }
+            }
+            object
+        })
+        .collect();
+    Estimate {
+        objects,
+        ..Default::default()
+    }
+}
+
+/// Area-weighted mean of the albedos that are known.
+fn typical_albedo(
+    scene: &Scene,
+    roles: &[Role],
+    unknowns: &Unknowns,
+    errors: &StandardErrors,
+) -> Vec3 {
+    let mut sum = DVec3::ZERO;
+    let mut area = 0.0;
+    for (k, object) in scene.objects.iter().enumerate() {
+        let known = roles[k] == Role::Reflector && errors.albedo[k].max_element() <= UNKNOWN_ALBEDO;
+        if known && luminance(unknowns.albedo[k]).is_finite() {
+            sum += unknowns.albedo[k].as_dvec3() * object.area;
+            area += object.area;
+        }
+    }
+    if area > 0.0 {
+        (sum / area).as_vec3()
+    } else {
+        Vec3::splat(0.5)
+    }
+}
+
+/// Infinite errors as the largest finite number, which every file format can hold.
+fn finite(error: Vec3) -> Vec3 {
+    error.min(Vec3::splat(f32::MAX))
+}

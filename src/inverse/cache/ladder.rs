@@ -1,0 +1,545 @@
+//! The transport-cache solver: a light-field start, then rounds of full paths until the errors are small enough.
+
+use super::accumulate::Accumulated;
+use super::budget::Budget;
+use super::clusters::{Cluster, cluster, share_paths};
+use super::errors::{Released, StandardErrors, release, standard_errors};
+use super::fit::{Fit, fit, propose};
+use super::roles::{self, Role};
+use super::trace::Tracer;
+use super::{PathCache, describe};
+use crate::error;
+use crate::inverse::estimate::Estimate;
+use crate::inverse::loss::LossProbe;
+use crate::inverse::measured::MeasuredRadiance;
+use crate::inverse::monitor::Monitor;
+use crate::inverse::parameters::Unknowns;
+use crate::inverse::settings::Settings;
+use crate::inverse::solver::{Checkpoint, Problem, Solution, Stage, Termination};
+use crate::inverse::survey::Survey;
+use crate::math::color::luminance;
+use crate::transport::emitters::Emitters;
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+use std::time::{Duration, Instant};
+
+/// Gauss–Newton steps at most in one fit.
+const MOST_STEPS: u64 = 30;
+/// χ² (three channels) above which a light is there, and below which it is not.
+const SIGNIFICANT: f64 = 25.0;
+/// Share of the area-weighted light samples that go to objects with no light found yet but none excluded either.
+const EXPLORATION: f64 = 0.05;
+/// A step larger than this (in albedo, or relative in emission) asks for linearising anew.
+const NONLINEAR: f32 = 0.005;
+/// Relative error of albedo that the light field's resolution is trusted to stay below, where edges blur: a
+/// cautious assumption until full paths have replaced it.
+const LIGHT_FIELD_BIAS: f32 = 0.01;
+/// Work between two reports to the observer.
+const SLICE: Duration = Duration::from_millis(25);
+
+/// What a checkpoint holds: the outcome of the stages before the rounds.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Found {
+    albedo: Vec<Vec3>,
+    emission: Vec<Vec3>,
+    roles: Vec<Role>,
+}
+
+/// The state of a solve.
+pub struct Ladder<'a, 'o> {
+    problem: &'a Problem,
+    budget: Budget,
+    monitor: Monitor<'o>,
+    survey: Survey,
+    clusters: Vec<Cluster>,
+    widths: Vec<u32>,
+    losses: LossProbe,
+    max_bounces: u32,
+    roles: Vec<Role>,
+    unknowns: Unknowns,
+    errors: StandardErrors,
+    estimate: Estimate,
+}
+
+/// Solves a problem with the transport cache.
+///
+/// # Errors
+/// The checkpoint belongs to another capture.
+pub fn solve(
+    problem: &Problem,
+    settings: &Settings,
+    resume: Option<&Checkpoint>,
+    mut monitor: Monitor,
+) -> error::Result<Solution> {
+    let budget = Budget::of(settings.preset);
+    let objects = problem.scene.objects.len();
+    monitor.phase("looking through the pixels");
+    let survey = Survey::new(problem, settings, budget.survey_pixels);
+    monitor.progress.rays += survey.rays;
+    let max_bounces = if settings.bounces == 0 {
+        1000
+    } else {
+        settings.bounces as u32
+    };
+    let mut ladder = Ladder {
+        problem,
+        budget,
+        losses: LossProbe::new(problem, settings, 400, 16, max_bounces),
+        monitor,
+        clusters: cluster(problem, &survey, budget.pixels),
+        survey,
+        widths: problem.photographs.iter().map(|p| p.width).collect(),
+        max_bounces,
+        roles: vec![Role::Reflector; objects],
+        unknowns: Unknowns::new(objects),
+        errors: StandardErrors {
+            albedo: vec![Vec3::splat(0.5); objects],
+            emission: vec![Vec3::INFINITY; objects],
+        },
+        estimate: Estimate::default(),
+    };
+    ladder.describe();
+    let found = resume.and_then(|c| serde_json::from_value::<Found>(c.state.clone()).ok());
+    let termination = match ladder.run(found) {
+        Ok(termination) | Err(termination) => termination,
+    };
+    Ok(ladder.finish(termination))
+}
+
+impl Ladder<'_, '_> {
+    fn run(&mut self, found: Option<Found>) -> Result<Termination, Termination> {
+        match found {
+            Some(found) if found.roles.len() == self.roles.len() => {
+                self.unknowns = Unknowns {
+                    albedo: found.albedo,
+                    emission: found.emission,
+                };
+                self.roles = found.roles;
+            }
+            _ => self.light_field()?,
+        }
+        if self.budget.round_paths == 0 {
+            return Ok(Termination::Converged);
+        }
+        self.objects()?;
+        self.rounds()
+    }
+
+    /// First stage: paths end where a photograph measured the radiance, so each object is nearly a linear fit of its
+    /// own: what it sends against what it receives.
+    fn light_field(&mut self) -> Result<(), Termination> {
+        let started = self.monitor.seconds();
+        self.monitor.phase("gathering light from the photographs");
+        let measured = MeasuredRadiance::new(self.problem, &self.survey);
+        share_paths(
+            &mut self.clusters,
+            self.roles.len(),
+            self.budget.light_field_paths,
+        );
+
+        // Light samples go where the photographs are bright: in proportion to area × radiance².
+        let scene = &self.problem.scene;
+        let bright: Vec<f64> = (scene.objects.iter().zip(&measured.object_means))
+            .map(|(object, mean)| {
+                mean.map_or(0.0, |m| object.area * f64::from(luminance(m)).powi(2))
+            })
+            .collect();
+        let lights = Emitters::new(scene, &self.explore(&bright));
+        let cache = self.trace(&lights, Some(&measured), 0)?;
+
+        // All objects reflect; then those that plainly give light; then what is left of the unseen ones' light.
+        for (k, role) in self.roles.iter_mut().enumerate() {
+            *role = if self.survey.seen[k] == 0 {
+                Role::Unseen
+            } else {
+                Role::Reflector
+            };
+        }
+        self.monitor.phase("telling lamps from walls");
+        let reflecting = self.fit(&cache)?.unknowns;
+        let (chosen, radiance) = roles::choose(&cache, &reflecting, &self.survey.seen);
+        self.roles = chosen;
+        self.unknowns = reflecting;
+        self.take_roles(&radiance);
+        let fitted = self.fit(&cache)?;
+        self.take(fitted);
+        self.prune_unseen(&cache)?;
+        self.test_dark(&cache);
+        for (error, albedo) in self.errors.albedo.iter_mut().zip(&self.unknowns.albedo) {
+            *error = (*error * *error + *albedo * *albedo * (LIGHT_FIELD_BIAS * LIGHT_FIELD_BIAS))
+                .powf(0.5);
+        }
+        self.describe();
+        self.monitor
+            .progress
+            .seconds_to_first_estimate
+            .get_or_insert(self.monitor.seconds());
+        let lamps = self.roles.iter().filter(|&&r| r != Role::Reflector).count();
+        self.finish_stage("light field", started, format!("each object fitted to the light that the photographs measured around it; {lamps} give light"))
+    }
+
+    /// Second stage: full paths to the lamps found. Lights that the first stage missed or imagined are tested here,
+    /// where nothing but the model enters.
+    fn objects(&mut self) -> Result<(), Termination> {
+        let started = self.monitor.seconds();
+        self.monitor.phase("tracing paths to the lamps");
+        share_paths(
+            &mut self.clusters,
+            self.roles.len(),
+            self.budget.round_paths,
+        );
+        let lights = self.lights();
+        let cache = self.trace(&lights, None, 1 << 20)?;
+        self.monitor.phase("fitting albedo and emission");
+        let fitted = self.fit(&cache)?;
+        self.take(fitted);
+        self.prune_unseen(&cache)?;
+        let added = self.test_glow(&cache)?;
+        let why = match added.as_slice() {
+            [] => "one albedo or one emission an object; no further light is called for".to_owned(),
+            names => format!(
+                "light added to {} where the photographs called for it",
+                names.join(", ")
+            ),
+        };
+        self.finish_stage("objects", started, why)
+    }
+
+    /// Last stage: rounds of independent paths, added up until the reported errors are small enough.
+    fn rounds(&mut self) -> Result<Termination, Termination> {
+        let started = self.monitor.seconds();
+        self.monitor.phase("refining");
+        let lights = self.lights();
+        let free = roles::free(&self.roles);
+        let all: Vec<usize> = (0..free.len()).collect();
+        let place = self.places(&free);
+        let mut about = self.unknowns.clone();
+        let mut sums = Accumulated::default();
+        let mut outcome = Termination::Steps;
+        for round in 0..self.budget.rounds {
+            // Path lengths are steered by what is believed at the start, the same in every round.
+            let cache = self.trace(&lights, None, (2 + u64::from(round)) << 20)?;
+            sums.add(cache.linearise(&about, &place));
+            let equations = sums.equations(free.len());
+            let (proposal, _) = propose(&equations, &free, &about, 1e-10);
+            let errors = standard_errors(&equations, &free, &all, self.roles.len());
+            let step = largest_step(&about, &proposal);
+            self.monitor.progress.iterations += 1;
+            self.unknowns = proposal;
+            self.merge_errors(errors);
+            self.describe();
+            self.monitor.report(&self.estimate)?;
+            if step > NONLINEAR && round < self.budget.rounds / 4 {
+                about = self.unknowns.clone();
+                sums = Accumulated::default();
+                continue;
+            }
+            let (median, tail) = self.relative_errors();
+            self.monitor.progress.fraction =
+                Some((self.budget.median_error / median).powi(2).min(1.0) as f32);
+            if median < self.budget.median_error && tail < self.budget.tail_error {
+                outcome = Termination::Converged;
+                break;
+            }
+        }
+        let (median, tail) = self.relative_errors();
+        let why = format!(
+            "{} rounds of independent paths: relative standard error of albedo {:.2} % (median), {:.2} % (95 of 100 objects)",
+            sums.rounds(),
+            median * 100.0,
+            tail * 100.0
+        );
+        self.finish_stage("refine", started, why)?;
+        Ok(outcome)
+    }
+
+    /// Traces the clusters' paths in slices, reporting between them.
+    fn trace(
+        &mut self,
+        lights: &Emitters,
+        measured: Option<&MeasuredRadiance>,
+        first_sample: u64,
+    ) -> Result<PathCache, Termination> {
+        let believed: Vec<f32> = self
+            .unknowns
+            .albedo
+            .iter()
+            .map(|a| a.max_element())
+            .collect();
+        let tracer = Tracer {
+            scene: &self.problem.scene,
+            lights,
+            measured,
+            surface_of: &self.problem.scene.object_of,
+            believed_albedo: &believed,
+            sampling: self.monitor.settings.light_sampling,
+            max_bounces: self.max_bounces,
+            seed: self.monitor.settings.seed,
+            first_sample,
+        };
+        let mut cache = PathCache::default();
+        let mut next = 0;
+        let mut slice = 16;
+        while next < self.clusters.len() {
+            let end = (next + slice).min(self.clusters.len());
+            let begun = Instant::now();
+            let traced = tracer.trace(&self.clusters[next..end], &self.widths);
+            let elapsed = begun.elapsed();
+            self.monitor.progress.rays += traced.rays;
+            self.monitor
+                .rejected("path weight not finite", traced.rejected);
+            cache.append(traced);
+            self.monitor.tick(&self.estimate)?;
+            slice = if elapsed > SLICE {
+                (slice / 2).max(4)
+            } else {
+                slice + slice / 2
+            };
+            next = end;
+        }
+        Ok(cache)
+    }
+
+    fn fit(&mut self, cache: &PathCache) -> Result<Fit, Termination> {
+        let free = roles::free(&self.roles);
+        let (monitor, estimate) = (&mut self.monitor, &self.estimate);
+        let fitted = fit(cache, &self.unknowns, &free, MOST_STEPS, |_| {
+            monitor.progress.iterations += 1;
+            monitor.tick(estimate)
+        })?;
+        Ok(fitted)
+    }
+
+    /// Takes over a fit under the present roles, with its errors.
+    fn take(&mut self, fitted: Fit) {
+        let free = roles::free(&self.roles);
+        let rows: Vec<usize> = (0..free.len()).collect();
+        let errors = standard_errors(&fitted.equations, &free, &rows, self.roles.len());
+        self.unknowns = fitted.unknowns;
+        self.merge_errors(errors);
+        self.describe();
+    }
+
+    /// Takes over the errors of what is fitted; what is held keeps those that its tests gave it.
+    fn merge_errors(&mut self, errors: StandardErrors) {
+        for (k, role) in self.roles.iter().enumerate() {
+            if role.reflects() {
+                self.errors.albedo[k] = errors.albedo[k];
+            }
+            if role.emits() {
+                self.errors.emission[k] = errors.emission[k];
+            }
+        }
+    }
+
+    /// What the paths say of light from objects that are held dark.
+    fn test_dark(&mut self, cache: &PathCache) -> Vec<Released> {
+        let objects = self.roles.len();
+        let mut free = roles::free(&self.roles);
+        let active: Vec<usize> = (0..free.len()).collect();
+        free.extend(
+            (0..objects)
+                .filter(|&k| !self.roles[k].emits())
+                .map(|k| objects + k),
+        );
+        let equations = cache.normal_equations(&self.unknowns, &free);
+        let released = release(&equations, &free, &active, &self.unknowns);
+        for test in &released {
+            self.errors.emission[test.index - objects] =
+                Vec3::from_array(test.stderr.map(|e| e as f32));
+        }
+        self.describe();
+        released
+    }
+
+    /// Gives emitters their photographed radiance and no albedo, and reflectors no light.
+    fn take_roles(&mut self, radiance: &[Vec3]) {
+        for (k, role) in self.roles.iter().enumerate() {
+            match role {
+                Role::Reflector => self.unknowns.emission[k] = Vec3::ZERO,
+                Role::Emitter => {
+                    self.unknowns.albedo[k] = Vec3::ZERO;
+                    self.unknowns.emission[k] = radiance[k];
+                }
+                Role::Unseen => self.unknowns.albedo[k] = Vec3::splat(0.5),
+                Role::Dark | Role::Glowing => {}
+            }
+        }
+    }
+
+    /// Drops the light of unseen objects where nothing speaks for it, least significant first, refitting in between.
+    fn prune_unseen(&mut self, cache: &PathCache) -> Result<(), Termination> {
+        loop {
+            let significance = |k: usize| {
+                let z = self.unknowns.emission[k]
+                    / self.errors.emission[k].max(Vec3::splat(f32::MIN_POSITIVE));
+                f64::from(z.length_squared())
+            };
+            let doubtful: Vec<usize> = (0..self.roles.len())
+                .filter(|&k| self.roles[k] == Role::Unseen && significance(k) < SIGNIFICANT)
+                .collect();
+            if doubtful.is_empty() {
+                return Ok(());
+            }
+            for k in doubtful {
+                self.roles[k] = Role::Dark;
+                self.unknowns.emission[k] = Vec3::ZERO;
+            }
+            let fitted = self.fit(cache)?;
+            self.take(fitted);
+        }
+    }
+
+    /// Tests whether any reflector or dark object gives light after all: the one that the paths call for most is set
+    /// free, refitted, and kept if it stays significant. Returns their names.
+    fn test_glow(&mut self, cache: &PathCache) -> Result<Vec<String>, Termination> {
+        let objects = self.roles.len();
+        let mut added = Vec::new();
+        while added.len() < 8 {
+            let strongest = (self.test_dark(cache).into_iter())
+                .max_by(|a, b| a.significance().total_cmp(&b.significance()));
+            let Some(candidate) = strongest.filter(|c| c.significance() > SIGNIFICANT) else {
+                break;
+            };
+            let k = candidate.index - objects;
+            let before = (
+                self.unknowns.clone(),
+                self.errors.clone(),
+                self.roles.clone(),
+            );
+            self.roles[k] = if self.roles[k] == Role::Dark {
+                Role::Unseen
+            } else {
+                Role::Glowing
+            };
+            let fitted = self.fit(cache)?;
+            self.take(fitted);
+            let z = self.unknowns.emission[k]
+                / self.errors.emission[k].max(Vec3::splat(f32::MIN_POSITIVE));
+            if f64::from(z.length_squared()) < SIGNIFICANT {
+                (self.unknowns, self.errors, self.roles) = before;
+                break;
+            }
+            added.push(self.problem.scene.objects[k].name.clone());
+        }
+        Ok(added)
+    }
+
+    /// Emitters as they are known now, drawn by area × luminance.
+    fn lights(&self) -> Emitters {
+        let scene = &self.problem.scene;
+        let weights: Vec<f64> = (scene.objects.iter().zip(&self.unknowns.emission))
+            .map(|(object, emission)| object.area * f64::from(luminance(*emission)))
+            .collect();
+        Emitters::new(scene, &weights)
+    }
+
+    /// Weights with a share spread over all objects by area.
+    fn explore(&self, weights: &[f64]) -> Vec<f64> {
+        let scene = &self.problem.scene;
+        let (total, area) = (
+            weights.iter().sum::<f64>(),
+            scene.objects.iter().map(|o| o.area).sum::<f64>(),
+        );
+        let base = if total > 0.0 {
+            total * EXPLORATION / area
+        } else {
+            1.0
+        };
+        weights
+            .iter()
+            .zip(&scene.objects)
+            .map(|(w, o)| w + base * o.area)
+            .collect()
+    }
+
+    /// Where each parameter stands among the free ones.
+    fn places(&self, free: &[usize]) -> Vec<usize> {
+        let mut place = vec![usize::MAX; 2 * self.roles.len()];
+        for (row, &index) in free.iter().enumerate() {
+            place[index] = row;
+        }
+        place
+    }
+
+    /// Median and 95th percentile of the relative standard error of seen albedos.
+    fn relative_errors(&self) -> (f64, f64) {
+        let mut relative: Vec<f64> = (0..self.roles.len())
+            .filter(|&k| {
+                matches!(self.roles[k], Role::Reflector | Role::Glowing)
+                    && self.survey.seen[k] >= 50
+            })
+            .map(|k| {
+                f64::from(
+                    self.errors.albedo[k].length() / self.unknowns.albedo[k].length().max(1e-3),
+                )
+            })
+            .collect();
+        let at = |relative: &mut [f64], q| crate::math::stats::quantile(relative, q).unwrap_or(0.0);
+        (at(&mut relative, 0.5), at(&mut relative, 0.95))
+    }
+
+    fn describe(&mut self) {
+        self.estimate = describe::estimate(
+            &self.problem.scene,
+            &self.survey,
+            &self.roles,
+            &self.unknowns,
+            &self.errors,
+        );
+    }
+
+    fn finish_stage(&mut self, name: &str, started: f64, why: String) -> Result<(), Termination> {
+        let losses = self.losses.measure(self.problem, &self.estimate);
+        self.monitor.progress.rays += losses.rays;
+        self.monitor.loss(losses.train, losses.held_out);
+        let stage = Stage {
+            name: name.to_owned(),
+            seconds: self.monitor.seconds() - started,
+            iterations: self.monitor.progress.iterations,
+            train_loss: losses.train,
+            held_out_loss: losses.held_out,
+            kept: true,
+            why,
+        };
+        self.monitor.stage(stage);
+        self.monitor.report(&self.estimate)
+    }
+
+    fn finish(mut self, termination: Termination) -> Solution {
+        self.monitor.phase("done");
+        self.monitor.progress.seconds = self.monitor.seconds();
+        let found = Found {
+            albedo: self.unknowns.albedo,
+            emission: self.unknowns.emission,
+            roles: self.roles,
+        };
+        let checkpoint = serde_json::to_value(&found)
+            .ok()
+            .map(|state| Checkpoint { state });
+        Solution {
+            estimate: self.estimate,
+            progress: self.monitor.progress,
+            termination,
+            checkpoint,
+        }
+    }
+}
+
+/// Largest change of an albedo, or relative change of an emission.
+fn largest_step(from: &Unknowns, to: &Unknowns) -> f32 {
+    let albedo = from
+        .albedo
+        .iter()
+        .zip(&to.albedo)
+        .map(|(a, b)| (*a - *b).abs().max_element());
+    let emission = from.emission.iter().zip(&to.emission).map(|(a, b)| {
+        let size = a.max_element();
+        if size > 0.0 {
+            (*a - *b).abs().max_element() / size
+        } else {
+            0.0
+        }
+    });
+    albedo.chain(emission).fold(0.0, f32::max)
+}

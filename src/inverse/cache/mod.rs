@@ -1,0 +1,77 @@
+//! The transport cache: paths traced once, stored with everything that does not depend on the unknowns.
+//!
+//! For diffuse surfaces and cosine sampling a path's contribution is a product of albedos times one emission (or one
+//! measured radiance) times a weight. Any values of the unknowns are then evaluated, and differentiated, with no ray.
+
+pub mod accumulate;
+pub mod budget;
+pub mod clusters;
+pub mod derivative;
+mod describe;
+pub mod errors;
+pub mod evaluate;
+pub mod fit;
+pub mod ladder;
+pub mod roles;
+pub mod step;
+pub mod trace;
+
+use clusters::Cluster;
+use glam::Vec3;
+
+/// No lamp was reached from this vertex.
+pub const NO_LAMP: u32 = u32::MAX;
+
+/// One vertex of a stored path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Vertex {
+    /// The surface (set of triangles sharing unknowns) that the vertex lies on.
+    pub surface: u32,
+    /// The surface whose emission a light sample from here reached, or [`NO_LAMP`].
+    pub lamp: u32,
+    /// Weight of that emission, after this vertex's albedo.
+    pub lamp_weight: f32,
+    /// Weight of this surface's own emission, before its albedo.
+    pub emission_weight: f32,
+    /// Known radiance that arrives here and is scattered by this vertex's albedo, weights included.
+    pub known: Vec3,
+}
+
+/// The paths of one cluster of pixels: for each pixel those of set A, then those of set B.
+#[derive(Debug, Clone)]
+pub struct CachedCluster {
+    /// The pixels and what the photographs say of them.
+    pub cluster: Cluster,
+    /// Vertices of all paths, one path after the other, from the camera outwards.
+    pub vertices: Vec<Vertex>,
+    /// End of each path in `vertices`.
+    pub ends: Vec<u32>,
+}
+
+/// Two independent sets of paths through the same pixels.
+#[derive(Debug, Clone, Default)]
+pub struct PathCache {
+    /// In the order in which they were given.
+    pub clusters: Vec<CachedCluster>,
+    /// Rays that were cast.
+    pub rays: u64,
+    /// Paths dropped because a weight was not finite.
+    pub rejected: u64,
+}
+
+impl PathCache {
+    /// Bytes in use.
+    pub fn bytes(&self) -> usize {
+        self.clusters
+            .iter()
+            .map(|c| c.vertices.len() * size_of::<Vertex>() + c.ends.len() * size_of::<u32>())
+            .sum()
+    }
+
+    /// Adds another cache's clusters.
+    pub fn append(&mut self, mut other: Self) {
+        self.clusters.append(&mut other.clusters);
+        self.rays += other.rays;
+        self.rejected += other.rejected;
+    }
+}

@@ -1,0 +1,288 @@
+//! Tracing the paths of a cache.
+
+use super::clusters::Cluster;
+use super::{CachedCluster, NO_LAMP, PathCache, Vertex};
+use crate::inverse::measured::MeasuredRadiance;
+use crate::inverse::settings::LightSampling;
+use crate::inverse::survey::SurveyPoint;
+use crate::math::frame::Frame;
+use crate::math::rng::Stream;
+use crate::math::warp;
+use crate::scene::Scene;
+use crate::scene::camera::Camera;
+use crate::scene::geometry::{Hit, Ray, offset_origin};
+use crate::transport::emitters::Emitters;
+use crate::transport::path::power_heuristic;
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use std::f32::consts::FRAC_1_PI;
+
+/// Bounces before Russian roulette may end a path.
+const ROULETTE_AFTER: u32 = 2;
+/// Paths are never ended with a higher chance than this at one vertex.
+const LEAST_SURVIVAL: f32 = 0.1;
+
+/// Everything that a path needs and that stays the same while a cache is traced.
+pub struct Tracer<'a> {
+    /// Geometry.
+    pub scene: &'a Scene,
+    /// Where light samples go.
+    pub lights: &'a Emitters,
+    /// Radiance known from photographs, where paths may end; `None` traces them to the lamps.
+    pub measured: Option<&'a MeasuredRadiance>,
+    /// The surface that each triangle belongs to: triangles of one surface share their unknowns.
+    pub surface_of: &'a [u32],
+    /// For each surface, the largest channel of its albedo as believed now; only steers where paths end.
+    pub believed_albedo: &'a [f32],
+    /// How light is found at a vertex.
+    pub sampling: LightSampling,
+    /// Longest path in bounces.
+    pub max_bounces: u32,
+    /// Key of the random streams.
+    pub seed: u64,
+    /// Sample index of the first path; caches with other ranges are independent.
+    pub first_sample: u64,
+}
+
+impl Tracer<'_> {
+    /// Traces the paths of every cluster, two independent sets of them.
+    pub fn trace(&self, clusters: &[Cluster], widths: &[u32]) -> PathCache {
+        let traced: Vec<(CachedCluster, u64, u64)> = clusters
+            .par_iter()
+            .map(|cluster| self.cluster(cluster, widths[cluster.frame as usize]))
+            .collect();
+        let mut cache = PathCache::default();
+        for (cluster, rays, rejected) in traced {
+            cache.clusters.push(cluster);
+            cache.rays += rays;
+            cache.rejected += rejected;
+        }
+        cache
+    }
+
+    fn cluster(&self, cluster: &Cluster, width: u32) -> (CachedCluster, u64, u64) {
+        let (mut vertices, mut ends) = (Vec::new(), Vec::new());
+        let (mut rays, mut rejected) = (0, 0);
+        for &pixel in &cluster.pixels {
+            let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+            for index in 0..2 * u64::from(cluster.paths) {
+                let sample = self.first_sample + index;
+                let mut stream = Stream::new(
+                    self.seed,
+                    u64::from(cluster.frame),
+                    u64::from(pixel),
+                    sample,
+                );
+                let camera = &self.scene.cameras[cluster.frame as usize];
+                let traced = self.pixel_path(camera, corner, &mut stream, &mut vertices);
+                rays += traced.0;
+                rejected += u64::from(!traced.1);
+                ends.push(vertices.len() as u32);
+            }
+        }
+        (
+            CachedCluster {
+                cluster: cluster.clone(),
+                vertices,
+                ends,
+            },
+            rays,
+            rejected,
+        )
+    }
+
+    /// Appends the vertices of one path through a pixel whose upper left corner is given; returns the number of rays,
+    /// and whether all weights are finite (else nothing was appended).
+    pub fn pixel_path(
+        &self,
+        camera: &Camera,
+        corner: Vec2,
+        stream: &mut Stream,
+        vertices: &mut Vec<Vertex>,
+    ) -> (u64, bool) {
+        let start = vertices.len();
+        let [dx, dy] = stream.uniform2();
+        let rays = self.path(&camera.ray(corner + Vec2::new(dx, dy)), stream, vertices);
+        let finite = vertices[start..].iter().all(|v| {
+            v.lamp_weight.is_finite() && v.emission_weight.is_finite() && v.known.is_finite()
+        });
+        if !finite {
+            vertices.truncate(start);
+        }
+        (rays, finite)
+    }
+
+    /// Appends the vertices of one path; returns the number of rays.
+    fn path(&self, camera_ray: &Ray, stream: &mut Stream, vertices: &mut Vec<Vertex>) -> u64 {
+        let mut rays = 1;
+        let Some(mut hit) = self.scene.intersect(camera_ray) else {
+            return rays;
+        };
+        let mut wo = -camera_ray.direction;
+        // Weight of everything from here on: the inverse of the chances of having come so far.
+        let mut scale = 1.0f32;
+        let mut emission_weight = 1.0;
+        let mut believed = 1.0f32;
+        let mut bounce = 0;
+        loop {
+            // Describe the vertex.
+            let surface = self.surface(&hit, wo);
+            let mut vertex = Vertex {
+                surface: surface.id,
+                lamp: NO_LAMP,
+                lamp_weight: 0.0,
+                emission_weight: if surface.front {
+                    emission_weight * scale
+                } else {
+                    0.0
+                },
+                known: Vec3::ZERO,
+            };
+            if bounce >= self.max_bounces {
+                vertices.push(vertex);
+                return rays;
+            }
+
+            // Sample light directly.
+            if self.sampling != LightSampling::Bsdf {
+                rays += self.light_sample(&surface, scale, stream, &mut vertex);
+            }
+
+            // Decide whether to go on, by what is believed of the albedo and never by the unknowns themselves.
+            let believed_here = believed * self.believed_albedo[surface.id as usize];
+            let mut survival = 1.0;
+            if bounce >= ROULETTE_AFTER {
+                survival = believed_here.clamp(LEAST_SURVIVAL, 0.95);
+                if stream.uniform() >= survival {
+                    vertices.push(vertex);
+                    return rays;
+                }
+                believed = believed_here / survival;
+            } else {
+                believed = believed_here;
+            }
+            scale /= survival;
+
+            // Scatter with density cosθ/π, so that the weight is the albedo alone.
+            let frame = Frame::around(surface.seen.normal);
+            let local = warp::cosine_hemisphere(stream.uniform2());
+            let wi = frame.to_world(local);
+            let corners = self.scene.corners(hit.triangle);
+            let origin = offset_origin(surface.seen.point, surface.seen.normal, &corners, wi);
+            rays += 1;
+            let next = self.scene.intersect(&Ray::new(origin, wi));
+            let Some(next) = next else {
+                vertices.push(vertex);
+                return rays;
+            };
+
+            // Weigh what is found against light sampling.
+            let met = self.surface(&next, -wi);
+            let bsdf_pdf = warp::cosine_hemisphere_pdf(local.z);
+            let light_pdf = if met.front {
+                let cosine = met.seen.normal.dot(-wi);
+                self.lights.pdf(met.seen.object) * next.t * next.t / cosine.max(f32::MIN_POSITIVE)
+            } else {
+                0.0
+            };
+            emission_weight = match self.sampling {
+                LightSampling::Mis => power_heuristic(bsdf_pdf, light_pdf),
+                LightSampling::Bsdf => 1.0,
+                // What light sampling cannot draw is left to BSDF sampling.
+                LightSampling::Emitter => f32::from(light_pdf <= 0.0),
+            };
+
+            // End at a surface whose radiance a photograph measured.
+            if let Some(radiance) = self.measured.and_then(|m| m.at(&met.seen)) {
+                vertex.known += radiance * (emission_weight * scale);
+                vertices.push(vertex);
+                return rays;
+            }
+            vertices.push(vertex);
+            hit = next;
+            wo = -wi;
+            bounce += 1;
+        }
+    }
+
+    /// Adds a light sample to a vertex; returns the number of rays.
+    fn light_sample(
+        &self,
+        surface: &Surface,
+        scale: f32,
+        stream: &mut Stream,
+        vertex: &mut Vertex,
+    ) -> u64 {
+        let (choice, u) = (stream.uniform_f64(), stream.uniform2());
+        let Some((object, sample)) = self.lights.sample(self.scene, choice, u) else {
+            return 0;
+        };
+        let light_normal = self.scene.normals[sample.triangle as usize];
+        let to_light = sample.point - surface.seen.point;
+        let distance2 = to_light.length_squared();
+        let wi = to_light.normalize_or_zero();
+        let (cos_surface, cos_light) = (surface.seen.normal.dot(wi), -light_normal.dot(wi));
+        if cos_surface <= 0.0 || cos_light <= 0.0 {
+            return 0;
+        }
+        let from = offset_origin(
+            surface.seen.point,
+            surface.seen.normal,
+            &surface.corners,
+            wi,
+        );
+        let to = offset_origin(
+            sample.point,
+            light_normal,
+            &self.scene.corners(sample.triangle),
+            -wi,
+        );
+        if self.scene.occluded(&Ray::between(from, to)) {
+            return 1;
+        }
+        let light_pdf = self.lights.pdf(object) * distance2 / cos_light;
+        let bsdf_pdf = cos_surface * FRAC_1_PI;
+        let share = match self.sampling {
+            LightSampling::Mis => power_heuristic(light_pdf, bsdf_pdf),
+            LightSampling::Emitter | LightSampling::Bsdf => 1.0,
+        };
+        let weight = bsdf_pdf / light_pdf * share * scale;
+        let seen = SurveyPoint {
+            point: sample.point,
+            normal: light_normal,
+            object,
+        };
+        match self.measured.and_then(|m| m.at(&seen)) {
+            Some(radiance) => vertex.known += radiance * weight,
+            None => {
+                vertex.lamp = self.surface_of[sample.triangle as usize];
+                vertex.lamp_weight = weight;
+            }
+        }
+        1
+    }
+
+    fn surface(&self, hit: &Hit, wo: Vec3) -> Surface {
+        let normal = self.scene.normals[hit.triangle as usize];
+        let front = normal.dot(wo) > 0.0;
+        Surface {
+            seen: SurveyPoint {
+                point: self.scene.point(hit),
+                normal: if front { normal } else { -normal },
+                object: self.scene.object_of[hit.triangle as usize],
+            },
+            corners: self.scene.corners(hit.triangle),
+            id: self.surface_of[hit.triangle as usize],
+            front,
+        }
+    }
+}
+
+/// A surface point as a path sees it.
+struct Surface {
+    seen: SurveyPoint,
+    corners: [Vec3; 3],
+    /// Index of its unknowns.
+    id: u32,
+    front: bool,
+}

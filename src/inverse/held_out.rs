@@ -1,0 +1,37 @@
+//! Which pixels are kept out of every fit, to test it.
+
+use crate::inverse::settings::Settings;
+use crate::math::rng::splitmix64;
+
+/// Whether a pixel is held out: a keyed share of all pixels, or every K-th frame whole (frames 0, K, 2K, …).
+///
+/// The choice does not depend on the seed, so that solves with different seeds are tested on the same pixels.
+pub fn is_held_out(settings: &Settings, frame: u32, pixel: u32) -> bool {
+    if settings.hold_out > 0 {
+        return u64::from(frame).is_multiple_of(settings.hold_out);
+    }
+    let hash = splitmix64(splitmix64(u64::from(frame)) ^ u64::from(pixel));
+    ((hash >> 11) as f64) < settings.held_out * (1u64 << 53) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_share_is_as_asked_and_frames_can_be_held_out_whole() {
+        let mut settings = Settings::default();
+        let count = |settings: &Settings| {
+            (0..100_000)
+                .filter(|&p| is_held_out(settings, 3, p))
+                .count()
+        };
+        // Binomial with standard deviation 69: five of them.
+        assert!((count(&settings) as i64 - 5_000).abs() < 345);
+        settings.held_out = 0.0;
+        assert_eq!(count(&settings), 0);
+        settings.hold_out = 4;
+        let held: Vec<u32> = (0..10).filter(|&f| is_held_out(&settings, f, 17)).collect();
+        assert_eq!(held, [0, 4, 8]);
+    }
+}

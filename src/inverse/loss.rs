@@ -1,0 +1,137 @@
+//! The loss that is shown: mean absolute difference between photographs and re-renders on fixed sets of pixels.
+
+use crate::inverse::estimate::Estimate;
+use crate::inverse::held_out::is_held_out;
+use crate::inverse::settings::Settings;
+use crate::inverse::solver::Problem;
+use crate::math::rng::{Stream, splitmix64};
+use crate::transport::lit::Lit;
+use crate::transport::path::{PathOptions, radiance};
+use glam::{DVec3, Vec2};
+use rayon::prelude::*;
+
+/// First of the sample keys of loss paths, far from those of the fit.
+const KEY: u64 = 1 << 61;
+
+/// Two fixed sets of pixels, in the fit and held out.
+#[derive(Debug, Clone)]
+pub struct LossProbe {
+    train: Vec<(u32, u32)>,
+    held_out: Vec<(u32, u32)>,
+    samples: u64,
+    max_bounces: u32,
+    seed: u64,
+}
+
+/// Losses of one estimate.
+#[derive(Debug, Clone, Copy)]
+pub struct Losses {
+    /// On pixels in the fit; `None` where there are none.
+    pub train: Option<f64>,
+    /// On held-out pixels; `None` where there are none.
+    pub held_out: Option<f64>,
+    /// Rays cast.
+    pub rays: u64,
+}
+
+impl LossProbe {
+    /// Draws up to `pixels` usable pixels for each set, spread evenly over all photographs, to be rendered with
+    /// `samples` paths each of at most `max_bounces` bounces.
+    pub fn new(
+        problem: &Problem,
+        settings: &Settings,
+        pixels: usize,
+        samples: u64,
+        max_bounces: u32,
+    ) -> Self {
+        let mut sets = [Vec::new(), Vec::new()];
+        let total: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
+        // Look at some forty times as many pixels as are wanted: enough to find the held-out ones.
+        let stride = (total / (pixels * 40).max(1)).max(1);
+        let mut next = 0;
+        let mut before = 0;
+        for (frame, photograph) in problem.photographs.iter().enumerate() {
+            let end = before + photograph.pixels.len();
+            while next < end {
+                let pixel = next - before;
+                if photograph.usable.is_empty() || photograph.usable[pixel] {
+                    let held = is_held_out(settings, frame as u32, pixel as u32);
+                    sets[usize::from(held)].push((frame as u32, pixel as u32));
+                }
+                next += 1 + splitmix64(next as u64) as usize % (2 * stride - 1).max(1);
+            }
+            before = end;
+        }
+        let [train, held_out] = sets.map(|all| {
+            let count = all.len().min(pixels);
+            (0..count)
+                .map(|i| all[i * all.len() / count.max(1)])
+                .collect()
+        });
+        Self {
+            train,
+            held_out,
+            samples,
+            max_bounces,
+            seed: settings.seed,
+        }
+    }
+
+    /// Renders both sets with an estimate.
+    pub fn measure(&self, problem: &Problem, estimate: &Estimate) -> Losses {
+        let lit = Lit::new(problem.scene.clone(), estimate.materials(), None);
+        let (train, train_rays) = self.difference(problem, &lit, &self.train);
+        let (held_out, held_out_rays) = self.difference(problem, &lit, &self.held_out);
+        Losses {
+            train,
+            held_out,
+            rays: train_rays + held_out_rays,
+        }
+    }
+
+    fn difference(
+        &self,
+        problem: &Problem,
+        lit: &Lit,
+        pixels: &[(u32, u32)],
+    ) -> (Option<f64>, u64) {
+        let options = PathOptions {
+            max_bounces: self.max_bounces,
+            ..Default::default()
+        };
+        let each: Vec<(f64, u64)> = pixels
+            .par_iter()
+            .map(|&(frame, pixel)| {
+                let camera = &problem.scene.cameras[frame as usize];
+                let photograph = &problem.photographs[frame as usize];
+                let corner = Vec2::new(
+                    (pixel % photograph.width) as f32,
+                    (pixel / photograph.width) as f32,
+                );
+                let mut sum = DVec3::ZERO;
+                let mut rays = 0;
+                for sample in 0..self.samples {
+                    let mut stream =
+                        Stream::new(self.seed, u64::from(frame), u64::from(pixel), KEY + sample);
+                    let [dx, dy] = stream.uniform2();
+                    let path = radiance(
+                        lit,
+                        &camera.ray(corner + Vec2::new(dx, dy)),
+                        &mut stream,
+                        &options,
+                    );
+                    sum += path.radiance.as_dvec3();
+                    rays += u64::from(path.rays);
+                }
+                let measured = photograph.pixels[pixel as usize].as_dvec3();
+                (
+                    (sum / self.samples as f64 - measured).abs().element_sum() / 3.0,
+                    rays,
+                )
+            })
+            .collect();
+        let rays = each.iter().map(|e| e.1).sum();
+        let mean = each.iter().map(|e| e.0).sum::<f64>() / each.len() as f64;
+        ((!each.is_empty()).then_some(mean), rays)
+    }
+}

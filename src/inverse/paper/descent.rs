@@ -1,0 +1,290 @@
+//! The state of the descent and one step of it.
+
+use super::adam::Adam;
+use crate::inverse::cache::derivative::{Gradient, differentiate};
+use crate::inverse::cache::trace::Tracer;
+use crate::inverse::held_out::is_held_out;
+use crate::inverse::parameters::Unknowns;
+use crate::inverse::settings::{Loss, Settings};
+use crate::inverse::solver::Problem;
+use crate::math::color::luminance;
+use crate::math::rng::Stream;
+use crate::scene::Scene;
+use crate::transport::emitters::Emitters;
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Batches from this size on are spread over threads.
+const PARALLEL: u64 = 256;
+/// Draws of a pixel before giving up on finding one that may be used.
+const TRIES: u32 = 64;
+
+/// What shares its unknowns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Grain {
+    /// All triangles of an object.
+    Objects,
+    /// Nothing: each triangle has an albedo of its own; lights are fixed.
+    Triangles,
+}
+
+/// Everything that a step changes.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Descent {
+    /// What shares its unknowns.
+    pub grain: Grain,
+    /// Present values, one entry a surface.
+    pub unknowns: Unknowns,
+    /// Emission of each object.
+    pub lights: Vec<Vec3>,
+    /// How often the learning rate was halved and the batch doubled.
+    pub halvings: u32,
+    adam: Adam,
+    steps: u64,
+    #[serde(skip)]
+    emitters: Option<Emitters>,
+}
+
+/// What one step did.
+#[derive(Debug, Clone, Copy)]
+pub struct StepOutcome {
+    /// Rays cast.
+    pub rays: u64,
+    /// Paths dropped because a weight was not finite.
+    pub rejected: u64,
+    /// Whether all parameters stayed finite.
+    pub finite: bool,
+}
+
+/// Gradient of the data term of one pixel, per parameter.
+struct PixelGradient {
+    entries: Vec<(u32, Vec3)>,
+    rays: u64,
+    rejected: u64,
+}
+
+impl Descent {
+    /// Everything at zero.
+    pub fn new(problem: &Problem, grain: Grain) -> Self {
+        let objects = problem.scene.objects.len();
+        let surfaces = match grain {
+            Grain::Objects => objects,
+            Grain::Triangles => problem.scene.triangles.len(),
+        };
+        Self {
+            grain,
+            unknowns: Unknowns {
+                albedo: vec![Vec3::ZERO; surfaces],
+                emission: vec![Vec3::ZERO; surfaces],
+            },
+            lights: vec![Vec3::ZERO; objects],
+            halvings: 0,
+            adam: Adam::new(2 * surfaces),
+            steps: 0,
+            emitters: None,
+        }
+    }
+
+    /// Whether the state is one of this scene's.
+    pub fn fits(&self, scene: &Scene) -> bool {
+        let surfaces = match self.grain {
+            Grain::Objects => scene.objects.len(),
+            Grain::Triangles => scene.triangles.len(),
+        };
+        self.unknowns.albedo.len() == surfaces && self.lights.len() == scene.objects.len()
+    }
+
+    /// The same state with an albedo for each triangle, and the lights fixed.
+    pub fn refine(&self, problem: &Problem) -> Self {
+        let scene = &problem.scene;
+        let spread = |values: &[Vec3]| {
+            scene
+                .object_of
+                .iter()
+                .map(|&k| values[k as usize])
+                .collect::<Vec<_>>()
+        };
+        let surfaces = scene.triangles.len();
+        Self {
+            grain: Grain::Triangles,
+            unknowns: Unknowns {
+                albedo: spread(&self.unknowns.albedo),
+                emission: spread(&self.unknowns.emission),
+            },
+            lights: self.lights.clone(),
+            halvings: 0,
+            adam: Adam::new(2 * surfaces),
+            steps: self.steps,
+            emitters: None,
+        }
+    }
+
+    /// One step: a batch of pixels, its gradient, ADAM, and the bounds.
+    pub fn step(&mut self, problem: &Problem, settings: &Settings, bounces: u32) -> StepOutcome {
+        let scene = &*problem.scene;
+        let surfaces = self.unknowns.surfaces();
+
+        // Emitters are drawn in proportion to area × luminance of their present emission.
+        let lights = &self.lights;
+        let emitters = self.emitters.get_or_insert_with(|| {
+            let weights: Vec<f64> = (scene.objects.iter().zip(lights))
+                .map(|(object, emission)| object.area * f64::from(luminance(*emission)))
+                .collect();
+            Emitters::new(scene, &weights)
+        });
+        let per_triangle: Vec<u32>;
+        let surface_of = match self.grain {
+            Grain::Objects => &scene.object_of,
+            Grain::Triangles => {
+                per_triangle = (0..surfaces as u32).collect();
+                &per_triangle
+            }
+        };
+        // No path ends on the present albedo, or zero would be a fixed point.
+        let believed = vec![1.0; surfaces];
+        let tracer = Tracer {
+            scene,
+            lights: emitters,
+            measured: None,
+            surface_of,
+            believed_albedo: &believed,
+            sampling: settings.light_sampling,
+            max_bounces: bounces,
+            seed: settings.seed,
+            first_sample: 0,
+        };
+
+        // Gradient of the batch's mean.
+        let batch = settings.batch << self.halvings;
+        let (unknowns, step) = (&self.unknowns, self.steps);
+        let pixel = |index: u64| pixel_gradient(problem, settings, &tracer, unknowns, step, index);
+        let pixels: Vec<PixelGradient> = if batch >= PARALLEL {
+            (0..batch).into_par_iter().map(pixel).collect()
+        } else {
+            (0..batch).map(pixel).collect()
+        };
+        let mut gradient = vec![Vec3::ZERO; 2 * surfaces];
+        for entry in pixels.iter().flat_map(|p| &p.entries) {
+            gradient[entry.0 as usize] += entry.1 / batch as f32;
+        }
+
+        // Step every parameter; lights only while they are not fixed.
+        let decay = (1.0 - settings.decay).powf(self.steps as f64 / 1000.0)
+            * 0.5f64.powi(self.halvings as i32);
+        let rate = (settings.learning_rate * decay) as f32;
+        self.adam.begin();
+        self.steps += 1;
+        for (surface, albedo) in self.unknowns.albedo.iter_mut().enumerate() {
+            let change = self.adam.step(surface, gradient[surface], rate);
+            *albedo = (*albedo + change).clamp(Vec3::ZERO, Vec3::ONE);
+        }
+        if self.grain == Grain::Objects {
+            for k in 0..surfaces {
+                let regulariser = Vec3::splat(settings.emission_weight as f32);
+                let change =
+                    self.adam
+                        .step(surfaces + k, gradient[surfaces + k] + regulariser, rate);
+                let before = self.lights[k];
+                self.lights[k] = (before + change).max(Vec3::ZERO);
+                self.unknowns.emission[k] = self.lights[k];
+                if self.lights[k] != before {
+                    emitters.set_weight(
+                        k,
+                        scene.objects[k].area * f64::from(luminance(self.lights[k])),
+                    );
+                }
+            }
+        }
+        StepOutcome {
+            rays: pixels.iter().map(|p| p.rays).sum(),
+            rejected: pixels.iter().map(|p| p.rejected).sum(),
+            finite: gradient.iter().all(|g| g.is_finite()),
+        }
+    }
+}
+
+/// Draws one pixel uniformly from all pixels of all photographs that are not held out, and differentiates its loss:
+/// colour and derivative from independent paths.
+fn pixel_gradient(
+    problem: &Problem,
+    settings: &Settings,
+    tracer: &Tracer,
+    unknowns: &Unknowns,
+    step: u64,
+    index: u64,
+) -> PixelGradient {
+    let mut stream = Stream::new(settings.seed, u64::MAX, step, index);
+    let mut result = PixelGradient {
+        entries: Vec::new(),
+        rays: 0,
+        rejected: 0,
+    };
+    let Some((frame, pixel)) = draw(problem, settings, &mut stream) else {
+        return result;
+    };
+    let photograph = &problem.photographs[frame as usize];
+    let camera = &problem.scene.cameras[frame as usize];
+    let corner = Vec2::new(
+        (pixel % photograph.width) as f32,
+        (pixel / photograph.width) as f32,
+    );
+
+    let mut gradients = [
+        Gradient::new(2 * unknowns.surfaces()),
+        Gradient::new(2 * unknowns.surfaces()),
+    ];
+    let (mut vertices, mut gathered) = (Vec::new(), Vec::new());
+    let mut colour = Vec3::ZERO;
+    for (set, gradient) in gradients.iter_mut().enumerate() {
+        let mut sum = Vec3::ZERO;
+        for _ in 0..settings.samples {
+            vertices.clear();
+            let (rays, finite) = tracer.pixel_path(camera, corner, &mut stream, &mut vertices);
+            result.rays += rays;
+            result.rejected += u64::from(!finite);
+            sum += differentiate(&vertices, unknowns, &mut gathered, gradient);
+        }
+        if set == 0 {
+            colour = sum / settings.samples as f32;
+        }
+    }
+
+    let residual = colour - photograph.pixels[pixel as usize];
+    let slope = match settings.loss {
+        Loss::L1 => {
+            residual.signum() * Vec3::from_array(residual.to_array().map(|r| f32::from(r != 0.0)))
+        }
+        Loss::L2 => residual * 2.0,
+    } / settings.samples as f32;
+    let derivative = &gradients[1];
+    result.entries = derivative
+        .touched
+        .iter()
+        .map(|&t| (t, derivative.values[t as usize] * slope))
+        .collect();
+    result
+}
+
+/// A pixel uniform over all photographs; `None` where none may be used.
+fn draw(problem: &Problem, settings: &Settings, stream: &mut Stream) -> Option<(u32, u32)> {
+    let total: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
+    if total == 0 {
+        return None;
+    }
+    for _ in 0..TRIES {
+        let mut at = stream.below(total);
+        for (frame, photograph) in problem.photographs.iter().enumerate() {
+            if at >= photograph.pixels.len() {
+                at -= photograph.pixels.len();
+                continue;
+            }
+            let usable = photograph.usable.is_empty() || photograph.usable[at];
+            if usable && !is_held_out(settings, frame as u32, at as u32) {
+                return Some((frame as u32, at as u32));
+            }
+            break;
+        }
+    }
+    None
+}
