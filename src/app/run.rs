@@ -57,6 +57,11 @@ pub fn run(source: Option<Source>, settings: Settings) -> Result<()> {
 
     match ended {
         Ok(Ok(())) => Ok(()),
+        Ok(Err(eframe::Error::Wgpu(_))) => Err(Error::new(
+            "window",
+            "no graphics adapter can draw on this display",
+            "install a graphics driver (a software one will do, such as Mesa's for Vulkan)",
+        )),
         Ok(Err(error)) => Err(no_window(&error.to_string())),
         Err(panic) if opened.load(Ordering::Relaxed) => resume_unwind(panic),
         Err(panic) => {

@@ -236,7 +236,7 @@ pub fn overlay(ui: &Ui, app: &App, rect: Rect, drawn: &Drawn) {
     let tokens = theme::tokens(ui);
     let size = [drawn.picture.width, drawn.picture.height];
     let placement = app.look.placement(rect, size);
-    let painter = ui.painter().with_clip_rect(rect);
+    let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
 
     numbers(&painter, rect, placement, &drawn.picture);
     anchors(ui, app, rect, placement);
@@ -312,8 +312,12 @@ fn numbers(painter: &egui::Painter, rect: Rect, placement: Rect, picture: &Pictu
 /// Handles of inserted objects, and a box around the chosen one while it is placed or moved.
 fn anchors(ui: &Ui, app: &App, rect: Rect, placement: Rect) {
     if let Some((capture, camera)) = app.capture().zip(app.camera()) {
-        let painter = ui.painter().with_clip_rect(rect);
+        let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
         let boxed = app.insertions.placing || app.insertions.dragged.is_some();
+        // Nothing covers a result that is only looked at.
+        if !boxed && !ui.rect_contains_pointer(rect) {
+            return;
+        }
         app.insertions.draw_handles(
             &painter,
             &capture.scene,

@@ -101,12 +101,12 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
 
 fn controls(ui: &mut Ui, app: &mut App) {
     ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 3.0;
+        ui.spacing_mut().button_padding.x = 6.0;
         pick(ui, "First picture", &mut app.compare.left);
-        if ui
-            .button("Swap")
-            .on_hover_text("Swaps the two pictures (X)")
-            .clicked()
-        {
+        let swap = ui.button("‹ ›").on_hover_text("Swaps the two pictures (X)");
+        swap.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Swap"));
+        if swap.clicked() {
             app.compare.flip();
         }
         pick(ui, "Second picture", &mut app.compare.right);
@@ -119,7 +119,7 @@ fn controls(ui: &mut Ui, app: &mut App) {
 fn pick(ui: &mut Ui, name: &str, quantity: &mut Quantity) {
     let response = ComboBox::from_id_salt(name)
         .selected_text(quantity.name())
-        .width(112.0)
+        .width(88.0)
         .show_ui(ui, |ui| {
             for choice in Quantity::ALL {
                 ui.selectable_value(quantity, choice, choice.name())
@@ -182,9 +182,9 @@ fn wipe(ui: &mut Ui, app: &mut App, rect: Rect, left: Quantity) {
         let mut half = ui.new_child(egui::UiBuilder::new().max_rect(rect));
         half.shrink_clip_rect(clip);
         canvas::paint(&half, app, rect, drawn, egui::Id::unique(slot));
+        canvas::overlay(&half, app, rect, drawn);
         title(&half, rect, drawn.quantity, align);
     }
-    canvas::overlay(ui, app, rect, &a);
     let tokens = theme::tokens(ui);
     let painter = ui.painter();
     painter.vline(x, rect.y_range(), (3.0, Color32::from_black_alpha(140)));

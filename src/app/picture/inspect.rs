@@ -120,7 +120,7 @@ pub fn legend(ui: &Ui, pane: Rect, drawn: &Drawn) {
         pos2(pane.left() + 6.0, pane.bottom() - box_size.y - 6.0),
         box_size,
     );
-    let painter = ui.painter().with_clip_rect(pane);
+    let painter = ui.painter().with_clip_rect(pane.intersect(ui.clip_rect()));
     painter.rect_filled(frame, 3.0, Color32::from_black_alpha(190));
     let strip = Rect::from_min_size(frame.min + vec2(8.0, 5.0), vec2(width, 8.0));
     let mut mesh = Mesh::default();

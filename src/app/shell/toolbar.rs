@@ -8,7 +8,7 @@ use egui::{Button, ComboBox, Slider, Ui, vec2};
 
 /// Draws the bar.
 pub fn bar(ui: &mut Ui, app: &mut App) {
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let run = if app.is_running() { "Pause" } else { "Run" };
         button(ui, app, Action::RunPause, run, 52.0);
         button(ui, app, Action::Step, "Step", 0.0);
