@@ -19,7 +19,8 @@ pub fn number(v: f32) -> String {
     } else if !(1e-3..1e4).contains(&magnitude) {
         format!("{v:.1e}")
     } else if magnitude < 1.0 {
-        format!("{v:.3}")
+        let decimals = (2.0 - magnitude.log10().floor()) as usize;
+        format!("{v:.decimals$}")
     } else if magnitude < 100.0 {
         format!("{v:.2}")
     } else {
@@ -166,6 +167,7 @@ mod tests {
         for (value, text) in [
             (0.0, "0"),
             (0.12345, "0.123"),
+            (0.02345, "0.0234"),
             (-3.456, "-3.46"),
             (1234.5, "1234"),
             (1e-5, "1.0e-5"),

@@ -3,7 +3,7 @@
 use crate::app::shell::dialogs::Ask;
 use crate::app::state::App;
 use crate::session::command::{Command, ExportFormat, ExportRequest};
-use egui::{Id, Modal, TextEdit, Ui};
+use egui::{Id, Key, Modal, TextEdit, Ui};
 use glam::DVec3;
 use std::path::PathBuf;
 
@@ -203,13 +203,14 @@ fn path_field(ui: &mut Ui, app: &mut App, name: &str, path: &mut String, ask: As
         let response = ui
             .add(TextEdit::singleline(path).desired_width(270.0))
             .labelled_by(label.id);
+        let entered = response.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
         if ui.memory(|memory| memory.focused().is_none()) {
             response.request_focus();
         }
         if ui.button("Browse…").clicked() {
             app.ask(ask, &ui.ctx().clone());
         }
-        response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter))
+        entered
     })
     .inner
 }
