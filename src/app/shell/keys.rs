@@ -34,34 +34,37 @@ pub fn show(ctx: &egui::Context, app: &mut App) {
         .resizable(false)
         .anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0])
         .show(ctx, |ui| {
-            ScrollArea::vertical().max_height(560.0).show(ui, |ui| {
-                for menu in Menu::ALL {
-                    ui.strong(menu.title());
-                    Grid::new(menu.title())
+            ScrollArea::vertical()
+                .max_height(560.0)
+                .min_scrolled_height(560.0)
+                .show(ui, |ui| {
+                    for menu in Menu::ALL {
+                        ui.strong(menu.title());
+                        Grid::new(menu.title())
+                            .num_columns(2)
+                            .striped(true)
+                            .show(ui, |ui| {
+                                let actions = Action::ALL.iter().filter(|a| a.menu() == menu);
+                                for action in actions.filter(|a| a.shortcut().is_some()) {
+                                    ui.monospace(action.keys(ctx));
+                                    ui.label(action.text()).on_hover_text(action.help());
+                                    ui.end_row();
+                                }
+                            });
+                        ui.add_space(6.0);
+                    }
+                    ui.strong("Mouse");
+                    Grid::new("mouse")
                         .num_columns(2)
                         .striped(true)
                         .show(ui, |ui| {
-                            let actions = Action::ALL.iter().filter(|a| a.menu() == menu);
-                            for action in actions.filter(|a| a.shortcut().is_some()) {
-                                ui.monospace(action.keys(ctx));
-                                ui.label(action.text()).on_hover_text(action.help());
+                            for (how, what) in MOUSE {
+                                ui.label(how);
+                                ui.label(what);
                                 ui.end_row();
                             }
                         });
-                    ui.add_space(6.0);
-                }
-                ui.strong("Mouse");
-                Grid::new("mouse")
-                    .num_columns(2)
-                    .striped(true)
-                    .show(ui, |ui| {
-                        for (how, what) in MOUSE {
-                            ui.label(how);
-                            ui.label(what);
-                            ui.end_row();
-                        }
-                    });
-            });
+                });
         });
     app.keys = open;
 }

@@ -60,21 +60,24 @@ pub fn show(ctx: &egui::Context, app: &mut App) {
             palette.marked = 0;
         }
         response.request_focus();
-        ScrollArea::vertical().max_height(320.0).show(ui, |ui| {
-            ui.with_layout(egui::Layout::top_down_justified(Align::Min), |ui| {
-                for (index, &action) in found.iter().enumerate() {
-                    let button = Button::selectable(index == palette.marked, action.text())
-                        .right_text(egui::RichText::new(action.keys(ctx)).weak());
-                    let response = ui.add_enabled(app.can(action), button);
-                    if index == palette.marked && (up || down) {
-                        response.scroll_to_me(None);
+        ScrollArea::vertical()
+            .max_height(320.0)
+            .min_scrolled_height(320.0)
+            .show(ui, |ui| {
+                ui.with_layout(egui::Layout::top_down_justified(Align::Min), |ui| {
+                    for (index, &action) in found.iter().enumerate() {
+                        let button = Button::selectable(index == palette.marked, action.text())
+                            .right_text(egui::RichText::new(action.keys(ctx)).weak());
+                        let response = ui.add_enabled(app.can(action), button);
+                        if index == palette.marked && (up || down) {
+                            response.scroll_to_me(None);
+                        }
+                        if response.on_hover_text(action.help()).clicked() {
+                            chosen = Some(action);
+                        }
                     }
-                    if response.on_hover_text(action.help()).clicked() {
-                        chosen = Some(action);
-                    }
-                }
+                });
             });
-        });
     });
     if let Some(action) = chosen {
         app.perform(action, ctx);
