@@ -557,3 +557,34 @@ fn the_built_in_room_is_written_with_its_truth() {
         assert!(place.path("demo").join(name).is_file(), "{name}");
     }
 }
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_the_solve_cleanly_with_its_results() {
+    let place = Place::new();
+    let mut relit = Command::new(env!("CARGO_BIN_EXE_relit"))
+        .args([
+            "solve", "room", "--preset", "paper", "--time", "10m", "--views", "none",
+        ])
+        .current_dir(place.folder.path())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("relit starts");
+    // The first line of progress says that the solve is under way.
+    let mut said = String::new();
+    let mut lines = std::io::BufReader::new(relit.stderr.take().expect("piped"));
+    while !said.contains(" s  ") {
+        let read = std::io::BufRead::read_line(&mut lines, &mut said).expect("reads");
+        assert!(read > 0, "{said}");
+    }
+    let sent = Command::new("kill")
+        .args(["-INT", &relit.id().to_string()])
+        .status()
+        .expect("kill runs");
+    assert!(sent.success());
+    std::io::Read::read_to_string(&mut lines, &mut said).expect("reads");
+    assert_eq!(relit.wait().expect("ends").code(), Some(0), "{said}");
+    assert!(said.contains("interrupted"), "{said}");
+    let report = place.json("relit-out/room/report.json");
+    assert_eq!(report["stopped_because"], "cancelled");
+}
