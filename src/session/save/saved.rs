@@ -1,0 +1,127 @@
+//! Results read back from their folder.
+
+use crate::error::{Error, Result};
+use crate::inverse::estimate::Estimate;
+use crate::inverse::settings::Settings;
+use crate::inverse::solver::{Checkpoint, Termination};
+use crate::session::command::{OpenOptions, Source};
+use crate::session::save::estimate::EstimateFile;
+use crate::session::save::maps::Maps;
+use crate::session::save::{CHECKPOINT, CheckpointFile, ESTIMATE};
+use crate::session::snapshot::OpenCapture;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A folder of results, read back.
+#[derive(Debug, Clone)]
+pub struct Saved {
+    path: PathBuf,
+    file: EstimateFile,
+    maps: Maps,
+    /// Which capture it belongs to.
+    pub source: Source,
+    /// How the capture was read.
+    pub options: OpenOptions,
+    /// The parameters.
+    pub settings: Settings,
+    /// Where to go on from; `None` where the solve converged.
+    pub checkpoint: Option<Checkpoint>,
+    /// Why the solve ended.
+    pub termination: Termination,
+}
+
+/// Reads the results in a folder, or where a solve did not come to its end, the checkpoint that it left.
+///
+/// # Errors
+/// There are none, or they are broken.
+pub fn load(folder: &Path) -> Result<Saved> {
+    let path = folder.join(ESTIMATE);
+    let at = folder.join(CHECKPOINT);
+    let checkpoint: Option<CheckpointFile> = at.exists().then(|| read_json(&at)).transpose()?;
+    let (path, file) = match (path.exists(), &checkpoint) {
+        (false, Some(checkpoint)) => (at, checkpoint.estimate.clone()),
+        _ => {
+            let file = read_json(&path)?;
+            (path, file)
+        }
+    };
+    Saved::new(folder, path, file, checkpoint.and_then(|c| c.checkpoint))
+}
+
+/// Reads the newest checkpoint in a folder; the results where there is none.
+///
+/// # Errors
+/// There is neither, or it is broken.
+pub fn load_checkpoint(folder: &Path) -> Result<Saved> {
+    let at = folder.join(CHECKPOINT);
+    if !at.exists() {
+        return load(folder);
+    }
+    let file: CheckpointFile = read_json(&at)?;
+    Saved::new(folder, at, file.estimate, file.checkpoint)
+}
+
+impl Saved {
+    fn new(
+        folder: &Path,
+        path: PathBuf,
+        file: EstimateFile,
+        checkpoint: Option<Checkpoint>,
+    ) -> Result<Self> {
+        file.check(&path)?;
+        Ok(Self {
+            maps: file.read_maps(folder)?,
+            source: file.capture.source(folder),
+            options: file.capture.options.clone(),
+            settings: file.settings.clone(),
+            checkpoint,
+            termination: file.stopped_because.unwrap_or(Termination::Cancelled),
+            path,
+            file,
+        })
+    }
+
+    /// The contents of `estimate.json`.
+    pub fn file(&self) -> &EstimateFile {
+        &self.file
+    }
+
+    /// The estimate for the capture that it was made from.
+    ///
+    /// # Errors
+    /// The capture is another one, or has changed.
+    pub fn estimate_for(&self, capture: &OpenCapture) -> Result<Estimate> {
+        if self.file.capture.hash != capture.hash {
+            return Err(Error::new(
+                format!("{}: capture.hash", self.path.display()),
+                format!(
+                    "the mesh, the cameras or the photographs of {} are not those it was made from",
+                    capture.name
+                ),
+                "name that capture with --capture, or solve again",
+            ));
+        }
+        self.estimate_by_name(capture)
+    }
+
+    /// The estimate for a capture with the same objects and mesh, wherever its photographs come from.
+    ///
+    /// # Errors
+    /// An object is missing, or the maps belong to another mesh.
+    pub fn estimate_by_name(&self, capture: &OpenCapture) -> Result<Estimate> {
+        self.file.estimate(&self.path, &self.maps, capture)
+    }
+}
+
+fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
+    let bytes = fs::read(path).map_err(|error| match error.kind() {
+        std::io::ErrorKind::NotFound => Error::file(
+            path,
+            "there are no results here",
+            "name a folder that relit solve wrote",
+        ),
+        _ => Error::io(path, &error),
+    })?;
+    serde_json::from_slice(&bytes)
+        .map_err(|error| Error::file(path, error, "restore the file, or solve again"))
+}
