@@ -262,7 +262,7 @@ fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
         json["capture"].take();
         (json.to_string(), picture)
     };
-    for (preset, more) in [("preview", &[][..]), ("paper", &["--steps", "40"])] {
+    for (preset, more) in [("preview", &[][..]), ("paper", &["--steps", "200"])] {
         let one = estimate("1", preset, more);
         for threads in ["2", "8"] {
             assert_eq!(
@@ -277,13 +277,49 @@ fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
 #[test]
 fn truth_is_not_read_by_a_solve() {
     let place = Place::new();
-    let estimate = || {
-        done(&place.relit(&solve(&["--views", "none"])));
+    fs::create_dir(place.path("room/truth")).expect("writes");
+    fs::write(place.path("room/truth/albedo_000.exr"), "no picture").expect("writes");
+    let estimate = |preset: &str| {
+        let arguments = ["--preset", preset, "--steps", "200", "--views", "none"];
+        done(&place.relit(&[&["solve", "room"], &arguments[..]].concat()));
         fs::read(place.path("relit-out/room/estimate.json")).expect("reads")
     };
-    let with = estimate();
+    let with = ["preview", "paper"].map(estimate);
     fs::remove_file(place.path("room/truth.json")).expect("removes");
-    assert_eq!(with, estimate());
+    fs::remove_dir_all(place.path("room/truth")).expect("removes");
+    assert_eq!(with, ["preview", "paper"].map(estimate));
+}
+
+#[test]
+fn a_resumed_solve_ends_like_one_that_was_never_interrupted() {
+    let place = Place::new();
+    let solve = |out: &str, steps: &str, more: &[&str]| {
+        let arguments = [
+            "solve", "room", "--preset", "paper", "--views", "none", "--out", out, "--steps", steps,
+        ];
+        done(&place.relit(&[&arguments, more].concat()));
+        let read = |name: &str| fs::read(place.path(&format!("{out}/{name}"))).expect("reads");
+        (read("estimate.json"), read("checkpoint.json"))
+    };
+    let whole = solve("whole", "40", &[]);
+    let half = solve("parts", "20", &[]);
+    assert_ne!(half.0, whole.0);
+    let resumed = solve("parts", "40", &["--resume"]);
+    assert_eq!(resumed.0, whole.0);
+    let state = |file: &[u8]| {
+        let file: Value = serde_json::from_slice(file).expect("JSON");
+        let checkpoint = &file["checkpoint"];
+        (
+            checkpoint["state"]["descent"].clone(),
+            checkpoint["progress"]["iterations"].clone(),
+        )
+    };
+    assert_eq!(state(&resumed.1), state(&whole.1));
+    let losses = fs::read_to_string(place.path("parts/loss.csv")).expect("reads");
+    let iterations: Vec<&str> = (losses.lines().skip(1))
+        .filter_map(|line| line.split(',').nth(1))
+        .collect();
+    assert_eq!(iterations, ["0", "20", "40"]);
 }
 
 #[test]
@@ -567,6 +603,7 @@ fn an_interrupt_ends_the_solve_cleanly_with_its_results() {
             "solve", "room", "--preset", "paper", "--time", "10m", "--views", "none",
         ])
         .current_dir(place.folder.path())
+        .stdout(std::process::Stdio::null())
         .stderr(std::process::Stdio::piped())
         .spawn()
         .expect("relit starts");

@@ -5,7 +5,7 @@ mod common;
 use relit::inverse::estimate::Estimate;
 use relit::inverse::settings::Settings;
 use relit::inverse::solver::{
-    Control, LossPoint, Observer, Problem, Progress, Solution, Termination,
+    Checkpoint, Control, LossPoint, Observer, Problem, Solution, Termination,
 };
 use relit::session::Session;
 use relit::session::command::{Command, Source, ViewCamera, ViewRequest};
@@ -18,8 +18,13 @@ use std::time::{Duration, Instant};
 static ROOM: LazyLock<relit::capture::Capture> = LazyLock::new(common::room);
 
 /// Iterates until told to stop, counting its steps; the estimate says how many.
-fn count_up(observer: &mut dyn Observer, steps: &AtomicU64, panic_at: Option<u64>) -> Solution {
-    let mut progress = Progress::default();
+fn count_up(
+    observer: &mut dyn Observer,
+    steps: &AtomicU64,
+    panic_at: Option<u64>,
+    resume: Option<&Checkpoint>,
+) -> Solution {
+    let mut progress = resume.map(|c| c.progress.clone()).unwrap_or_default();
     let mut estimate = common::truth();
     loop {
         progress.iterations += 1;
@@ -35,6 +40,7 @@ fn count_up(observer: &mut dyn Observer, steps: &AtomicU64, panic_at: Option<u64
         steps.store(progress.iterations, Ordering::SeqCst);
         assert!(panic_at != Some(progress.iterations), "injected fault");
         std::thread::sleep(Duration::from_millis(1));
+        observer.offer(&|| Checkpoint::new(&progress, &progress.iterations));
         if observer.observe(&progress, &estimate) == Control::Stop {
             return Solution {
                 estimate,
@@ -61,8 +67,8 @@ impl Rig {
             open: Box::new(|source, options| {
                 OpenCapture::new(source.clone(), options.clone(), ROOM.clone())
             }),
-            solve: Box::new(move |_: &Problem, _: &Settings, _, observer| {
-                Ok(count_up(observer, &shared, fault.take()))
+            solve: Box::new(move |_: &Problem, _: &Settings, resume, observer| {
+                Ok(count_up(observer, &shared, fault.take(), resume))
             }),
         };
         let session = Session::spawn_with(
@@ -210,6 +216,37 @@ fn save_writes_the_workers_own_estimate_and_resume_brings_it_back() {
     assert_eq!(resumed.estimate.objects, done.estimate.objects);
     let same = |a: &Estimate, b: &Estimate| a.objects[1].seen_pixels == b.objects[1].seen_pixels;
     assert!(same(&resumed.estimate, &done.estimate));
+}
+
+#[test]
+fn a_save_during_a_solve_holds_the_solvers_state_and_a_resume_goes_on_from_it() {
+    let rig = Rig::new(None);
+    rig.until("some steps", |s| iterations(s) > 100);
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (paused, name) in [(false, "running"), (true, "paused")] {
+        if paused {
+            assert!(rig.session.send(Command::Pause));
+            rig.until("the pause", |s| s.phase == Phase::Paused);
+        }
+        let path = folder.path().join(name);
+        assert!(rig.session.send(Command::Save(path.clone())));
+        rig.until("the save", |s| {
+            s.events.iter().any(|e| e.message.ends_with(name))
+        });
+        let saved = relit::session::save::load(&path).expect("reads");
+        let checkpoint = saved.checkpoint.as_ref().expect("a checkpoint");
+        // The estimate that was saved with it is that of the same step.
+        let object = saved.file().objects.get("floor").expect("the floor");
+        assert_eq!(checkpoint.progress.iterations, object.seen_pixels);
+    }
+    let at = iterations(&rig.session.latest());
+    let other = Rig::new(None);
+    let first = other.until("a few steps", |s| s.phase == Phase::Solving);
+    assert!(iterations(&first) < at);
+    let command = Command::Resume(folder.path().join("paused"));
+    assert!(other.session.send(command));
+    let resumed = other.until("going on", |s| iterations(s) >= at);
+    assert!(iterations(&resumed) < at + 50, "{}", iterations(&resumed));
 }
 
 #[test]

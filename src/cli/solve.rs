@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Time between two checkpoints written while solving.
-const CHECKPOINT: Duration = Duration::from_secs(10);
+const CHECKPOINT: Duration = Duration::from_secs(8);
 
 /// Solves a source and writes the results.
 ///
@@ -76,6 +76,7 @@ pub fn solve(source: &Source, options: &SolveOptions) -> Result<()> {
         settings: &settings,
         interrupt: &interrupt,
         meter: Meter::new(),
+        offered: None,
         written: Instant::now(),
     };
     let solution = solver::solve(&problem, &settings, checkpoint, &mut watch);
@@ -110,13 +111,16 @@ struct Watch<'a> {
     settings: &'a Settings,
     interrupt: &'a Interrupt,
     meter: Meter,
+    /// A checkpoint to be written at the next report.
+    offered: Option<Checkpoint>,
     written: Instant,
 }
 
 impl Observer for Watch<'_> {
     fn observe(&mut self, progress: &Progress, estimate: &Estimate) -> Control {
         self.meter.show(progress, self.settings);
-        if self.written.elapsed() >= CHECKPOINT && !estimate.objects.is_empty() {
+        if let Some(checkpoint) = self.offered.take() {
+            self.results.checkpoint = Some(checkpoint);
             self.results.estimate = Arc::new(estimate.clone());
             self.results.progress = Arc::new(progress.clone());
             // The solve goes on without a checkpoint; the results are written in any case.
@@ -133,7 +137,7 @@ impl Observer for Watch<'_> {
 
     fn offer(&mut self, make: &dyn Fn() -> Checkpoint) {
         if self.written.elapsed() >= CHECKPOINT {
-            self.results.checkpoint = Some(make());
+            self.offered = Some(make());
         }
     }
 }

@@ -2,7 +2,9 @@
 
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
-use crate::inverse::solver::{Control, LossPoint, Observer, Progress, Stage, Termination};
+use crate::inverse::solver::{
+    Checkpoint, Control, LossPoint, Observer, Progress, Stage, Termination,
+};
 use std::time::{Duration, Instant};
 
 /// Counts time without pauses, reports to the observer, and says when to stop.
@@ -49,17 +51,27 @@ impl<'a> Monitor<'a> {
     }
 
     /// Tells the observer, if a report is due, and obeys; the error says why to stop.
-    pub fn tick(&mut self, estimate: &Estimate) -> Result<(), Termination> {
+    pub fn tick(
+        &mut self,
+        estimate: &Estimate,
+        checkpoint: &dyn Fn(&Progress) -> Checkpoint,
+    ) -> Result<(), Termination> {
         if self.due() {
-            self.report(estimate)?;
+            self.report(estimate, checkpoint)?;
         }
         Ok(())
     }
 
-    /// Tells the observer now.
-    pub fn report(&mut self, estimate: &Estimate) -> Result<(), Termination> {
+    /// Tells the observer now; `checkpoint` is called only if the observer wants to keep one.
+    pub fn report(
+        &mut self,
+        estimate: &Estimate,
+        checkpoint: &dyn Fn(&Progress) -> Checkpoint,
+    ) -> Result<(), Termination> {
         self.progress.seconds = self.seconds();
         let called = Instant::now();
+        let progress = &self.progress;
+        self.observer.offer(&|| checkpoint(progress));
         let control = self.observer.observe(&self.progress, estimate);
         self.away += called.elapsed();
         self.last_report = Some(Instant::now());

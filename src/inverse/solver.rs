@@ -1,12 +1,14 @@
 //! What a solver is given, what it reports while it runs, and how it ends.
 
 use crate::capture::photograph::Photograph;
+use crate::error::{Error, Result};
 use crate::inverse::cache::ladder;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::monitor::Monitor;
 use crate::inverse::paper;
 use crate::inverse::settings::{Preset, Settings};
 use crate::scene::Scene;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -21,7 +23,7 @@ pub struct Problem {
 }
 
 /// How far a solve has come. Handed out between iterations.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Progress {
     /// What is being done now, e.g. "tracing paths".
     pub phase: String,
@@ -131,11 +133,38 @@ impl Termination {
     }
 }
 
-/// Where a solve can be taken up again. Opaque to everyone but the solver that wrote it.
+/// Where a solve can be taken up again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Checkpoint {
-    /// The solver's own state, as JSON.
+    /// How far it had come: clock, counters and loss curve go on from here.
+    pub progress: Progress,
+    /// The solver's own state, as JSON; opaque to everyone but the solver that wrote it.
     pub state: serde_json::Value,
+}
+
+impl Checkpoint {
+    /// Writes a solver's state down. A state that cannot be written becomes `null`, which no solver takes up.
+    pub fn new(progress: &Progress, state: &impl Serialize) -> Self {
+        Self {
+            progress: progress.clone(),
+            state: serde_json::to_value(state).unwrap_or_default(),
+        }
+    }
+
+    /// The state, if it is one that `fits` accepts.
+    ///
+    /// # Errors
+    /// It belongs to another capture or another solver.
+    pub fn state<T: DeserializeOwned>(&self, fits: impl FnOnce(&T) -> bool) -> Result<T> {
+        let state = T::deserialize(&self.state).ok().filter(fits);
+        state.ok_or_else(|| {
+            Error::new(
+                "checkpoint",
+                "belongs to another capture or another solver",
+                "name the preset that it was made with, or start a new solve",
+            )
+        })
+    }
 }
 
 /// How a solve ended.
@@ -147,7 +176,7 @@ pub struct Solution {
     pub progress: Progress,
     /// Why it ended.
     pub termination: Termination,
-    /// Where to go on from, unless it converged for good.
+    /// Where to go on from, unless there is nothing left to do.
     pub checkpoint: Option<Checkpoint>,
 }
 
@@ -160,8 +189,9 @@ pub fn solve(
     settings: &Settings,
     resume: Option<&Checkpoint>,
     observer: &mut dyn Observer,
-) -> crate::error::Result<Solution> {
-    let monitor = Monitor::new(settings, observer, Progress::default());
+) -> Result<Solution> {
+    let progress = resume.map(|c| c.progress.clone()).unwrap_or_default();
+    let monitor = Monitor::new(settings, observer, progress);
     match settings.preset {
         Preset::Paper => paper::solve(problem, settings, resume, monitor),
         Preset::Preview | Preset::Balanced | Preset::Reference => {

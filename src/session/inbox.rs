@@ -2,6 +2,7 @@
 
 use crate::session::command::{Command, Placement, ViewRequest};
 use crossbeam_channel::{Receiver, Sender, TryRecvError, TrySendError, bounded};
+use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Commands that may wait at a time. Views and insertions do not count: of each only the newest waits.
@@ -31,6 +32,8 @@ pub struct Outbox {
 pub struct Inbox {
     queue: Receiver<Message>,
     latest: Arc<Mutex<Latest>>,
+    /// Taken from the queue to be looked at, not yet handed out.
+    ahead: VecDeque<Mail>,
 }
 
 /// What waits in the inbox.
@@ -55,6 +58,7 @@ pub fn queue() -> (Outbox, Inbox) {
         Inbox {
             queue: receiver,
             latest,
+            ahead: VecDeque::new(),
         },
     )
 }
@@ -87,7 +91,25 @@ impl Outbox {
 
 impl Inbox {
     /// The next command, if one waits.
-    pub fn poll(&self) -> Mail {
+    pub fn poll(&mut self) -> Mail {
+        self.ahead.pop_front().unwrap_or_else(|| self.receive())
+    }
+
+    /// Everything that waits, without handing it out; [`Inbox::poll`] does that.
+    pub fn look_ahead(&mut self) -> &VecDeque<Mail> {
+        loop {
+            match self.receive() {
+                Mail::Nothing => return &self.ahead,
+                Mail::Closed => {
+                    self.ahead.push_back(Mail::Closed);
+                    return &self.ahead;
+                }
+                mail => self.ahead.push_back(mail),
+            }
+        }
+    }
+
+    fn receive(&self) -> Mail {
         loop {
             match self.queue.try_recv() {
                 Ok(Message::Command(command)) => return Mail::Command(command),
@@ -105,7 +127,7 @@ impl Inbox {
     }
 
     /// The next command; sleeps until there is one.
-    pub fn wait(&self) -> Mail {
+    pub fn wait(&mut self) -> Mail {
         loop {
             match self.poll() {
                 Mail::Nothing => {}
@@ -121,7 +143,7 @@ impl Inbox {
 
     /// Whether nothing waits.
     pub fn is_empty(&self) -> bool {
-        self.queue.is_empty()
+        self.ahead.is_empty() && self.queue.is_empty()
     }
 
     fn newest(&self) -> Option<Command> {
@@ -147,7 +169,7 @@ mod tests {
 
     #[test]
     fn a_flood_of_views_leaves_room_for_commands_and_only_the_newest_arrives() {
-        let (outbox, inbox) = queue();
+        let (outbox, mut inbox) = queue();
         for frame in 0..10 * CAPACITY {
             assert!(outbox.send(view(frame)));
         }
@@ -160,8 +182,26 @@ mod tests {
     }
 
     #[test]
+    fn looking_ahead_hands_nothing_out_and_keeps_the_order() {
+        let (outbox, mut inbox) = queue();
+        assert!(outbox.send(Command::Pause));
+        assert!(outbox.send(Command::Step));
+        assert_eq!(inbox.look_ahead().len(), 2);
+        assert!(outbox.send(Command::Run));
+        assert!(!inbox.is_empty());
+        assert!(matches!(inbox.poll(), Mail::Command(Command::Pause)));
+        assert!(matches!(inbox.poll(), Mail::Command(Command::Step)));
+        assert!(matches!(inbox.poll(), Mail::Command(Command::Run)));
+        assert!(inbox.is_empty());
+        drop(outbox);
+        assert_eq!(inbox.look_ahead().len(), 1);
+        assert!(matches!(inbox.poll(), Mail::Closed));
+        assert!(matches!(inbox.wait(), Mail::Closed));
+    }
+
+    #[test]
     fn a_full_queue_refuses_commands_without_waiting_and_a_closed_one_says_so() {
-        let (outbox, inbox) = queue();
+        let (outbox, mut inbox) = queue();
         for _ in 0..CAPACITY {
             assert!(outbox.send(Command::Step));
         }

@@ -12,6 +12,7 @@ pub mod errors;
 pub mod evaluate;
 pub mod fit;
 pub mod ladder;
+mod reached;
 pub mod roles;
 pub mod step;
 pub mod trace;

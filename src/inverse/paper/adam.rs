@@ -25,6 +25,11 @@ impl Adam {
         }
     }
 
+    /// Number of parameters; `None` where the moments of a broken file differ in number.
+    pub fn parameters(&self) -> Option<usize> {
+        (self.first.len() == self.second.len()).then_some(self.first.len())
+    }
+
     /// Begins the next step: moments of all parameters decay. Call [`Adam::step`] for each parameter after it.
     pub fn begin(&mut self) {
         self.steps += 1;

@@ -51,6 +51,8 @@ pub struct Descent {
 pub struct StepOutcome {
     /// Rays cast.
     pub rays: u64,
+    /// Paths traced.
+    pub paths: u64,
     /// Paths dropped because a weight was not finite.
     pub rejected: u64,
     /// Whether all parameters stayed finite.
@@ -92,7 +94,10 @@ impl Descent {
             Grain::Objects => scene.objects.len(),
             Grain::Triangles => scene.triangles.len(),
         };
-        self.unknowns.albedo.len() == surfaces && self.lights.len() == scene.objects.len()
+        self.unknowns.albedo.len() == surfaces
+            && self.unknowns.emission.len() == surfaces
+            && self.adam.parameters() == Some(2 * surfaces)
+            && self.lights.len() == scene.objects.len()
     }
 
     /// The same state with an albedo for each triangle, and the lights fixed.
@@ -198,6 +203,7 @@ impl Descent {
         }
         StepOutcome {
             rays: pixels.iter().map(|p| p.rays).sum(),
+            paths: 2 * batch * settings.samples,
             rejected: pixels.iter().map(|p| p.rejected).sum(),
             finite: gradient.iter().all(|g| g.is_finite()),
         }

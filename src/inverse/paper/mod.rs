@@ -3,6 +3,7 @@
 
 pub mod adam;
 pub mod descent;
+mod schedule;
 
 use crate::error;
 use crate::inverse::estimate::{Estimate, ObjectEstimate, TexelEstimate};
@@ -16,17 +17,34 @@ use crate::scene::texels::TexelLayout;
 use crate::transport::material::TexelColors;
 use descent::{Descent, Grain};
 use glam::{DVec3, Vec3};
+use schedule::Schedule;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Seconds between two measurements of the loss.
-const MEASURE_EVERY: f64 = 1.0;
-/// The loss stands still when the mean of this many measurements is no better than that of as many before, by a share.
-const WINDOW: usize = 4;
-const STANDSTILL: f64 = 0.01;
 /// Halvings of the learning rate (and doublings of the batch), after each of which the loss may stand still once.
 const HALVINGS: u32 = 7;
 /// Bounces where the settings leave the choice.
 const BOUNCES: u32 = 2;
+
+/// What a checkpoint holds: everything that decides how the descent goes on.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct State {
+    descent: Descent,
+    schedule: Schedule,
+    /// Seconds and iterations at the start of the present stage.
+    stage_started: (f64, u64),
+}
+
+/// A descent under way.
+struct Run<'a, 'o> {
+    problem: &'a Problem,
+    monitor: Monitor<'o>,
+    survey: Survey,
+    losses: LossProbe,
+    bounces: u32,
+    state: State,
+    estimate: Estimate,
+}
 
 /// Runs the paper's optimiser until time, steps or a standstill end it.
 ///
@@ -36,7 +54,7 @@ pub fn solve(
     problem: &Problem,
     settings: &Settings,
     resume: Option<&Checkpoint>,
-    mut monitor: Monitor,
+    monitor: Monitor,
 ) -> error::Result<Solution> {
     let survey = Survey::new(problem, settings, 400_000);
     let bounces = if settings.bounces == 0 {
@@ -44,148 +62,139 @@ pub fn solve(
     } else {
         settings.bounces as u32
     };
-    let losses = LossProbe::new(problem, settings, 400, 16, bounces);
-    let mut descent = match resume {
-        None => Descent::new(problem, Grain::Objects),
-        Some(checkpoint) => serde_json::from_value(checkpoint.state.clone())
-            .ok()
-            .filter(|d: &Descent| d.fits(&problem.scene))
-            .ok_or_else(|| {
-                error::Error::new(
-                    "checkpoint",
-                    "belongs to another capture or solver",
-                    "start a new solve",
-                )
-            })?,
+    let state = match resume {
+        None => State {
+            descent: Descent::new(problem, Grain::Objects),
+            schedule: Schedule::default(),
+            stage_started: (0.0, 0),
+        },
+        Some(checkpoint) => checkpoint.state(|state: &State| {
+            state.descent.fits(&problem.scene) && state.descent.halvings <= HALVINGS
+        })?,
     };
-    let mut estimate = describe(problem, &survey, &descent);
-    let termination = match run(
+    let mut run = Run {
+        estimate: describe(problem, &survey, &state.descent),
+        losses: LossProbe::new(problem, settings, 400, 16, bounces),
         problem,
-        &survey,
-        &losses,
+        monitor,
+        survey,
         bounces,
-        &mut descent,
-        &mut estimate,
-        &mut monitor,
-    ) {
+        state,
+    };
+    let termination = match run.descend() {
         Ok(termination) | Err(termination) => termination,
     };
-    monitor.phase("done");
-    monitor.progress.seconds = monitor.seconds();
-    let checkpoint = serde_json::to_value(&descent)
-        .ok()
-        .map(|state| Checkpoint { state });
+    run.monitor.phase("done");
+    run.monitor.progress.seconds = run.monitor.seconds();
+    let resumable = !matches!(termination, Termination::Converged | Termination::Diverged);
     Ok(Solution {
-        estimate,
-        progress: monitor.progress,
+        checkpoint: resumable.then(|| Checkpoint::new(&run.monitor.progress, &run.state)),
+        estimate: run.estimate,
+        progress: run.monitor.progress,
         termination,
-        checkpoint,
     })
 }
 
-fn run(
-    problem: &Problem,
-    survey: &Survey,
-    losses: &LossProbe,
-    bounces: u32,
-    descent: &mut Descent,
-    estimate: &mut Estimate,
-    monitor: &mut Monitor,
-) -> Result<Termination, Termination> {
-    loop {
-        let (name, why) = match descent.grain {
-            Grain::Objects => ("objects", "one albedo and one emission an object"),
-            Grain::Triangles => (
-                "triangles",
-                "one albedo a triangle; lights keep their place and value",
-            ),
-        };
-        monitor.phase(&format!("descending per {}", name.trim_end_matches('s')));
-        let started = (monitor.seconds(), monitor.progress.iterations);
-        let ended = stage(problem, survey, losses, bounces, descent, estimate, monitor);
-        let last = monitor.progress.losses.last().copied();
-        monitor.stage(Stage {
+impl Run<'_, '_> {
+    /// Descends per object, then per triangle.
+    fn descend(&mut self) -> Result<Termination, Termination> {
+        loop {
+            let (name, why) = match self.state.descent.grain {
+                Grain::Objects => ("objects", "one albedo and one emission an object"),
+                Grain::Triangles => (
+                    "triangles",
+                    "one albedo a triangle; lights keep their place and value",
+                ),
+            };
+            self.monitor
+                .phase(&format!("descending per {}", name.trim_end_matches('s')));
+            let ended = self.stage();
+            self.finish_stage(name, why);
+            ended?;
+            let scene = &self.problem.scene;
+            let finer = scene.triangles.len() > scene.objects.len();
+            if self.state.descent.grain == Grain::Triangles || !finer {
+                return Ok(Termination::Converged);
+            }
+            self.state = State {
+                descent: self.state.descent.refine(self.problem),
+                schedule: Schedule::default(),
+                stage_started: (self.monitor.seconds(), self.monitor.progress.iterations),
+            };
+        }
+    }
+
+    /// Descends until the loss stands still.
+    fn stage(&mut self) -> Result<(), Termination> {
+        loop {
+            // Step until the observer is due, measuring now and then.
+            let settings = self.monitor.settings.clone();
+            while !self.monitor.due() {
+                let iterations = self.monitor.progress.iterations;
+                if settings.steps > 0 && iterations >= settings.steps {
+                    self.measure();
+                    return Err(Termination::Steps);
+                }
+                if self.state.schedule.due() {
+                    let loss = self.measure();
+                    if self.state.schedule.measured(loss) {
+                        if !settings.anneal || self.state.descent.halvings >= HALVINGS {
+                            return Ok(());
+                        }
+                        self.state.descent.halvings += 1;
+                        self.state.schedule.start_over();
+                    }
+                }
+                let outcome = (self.state.descent).step(self.problem, &settings, self.bounces);
+                self.state.schedule.traced(outcome.paths);
+                self.monitor.progress.rays += outcome.rays;
+                self.monitor.progress.iterations += 1;
+                self.monitor
+                    .rejected("path weight not finite", outcome.rejected);
+                if !outcome.finite {
+                    return Err(Termination::Diverged);
+                }
+            }
+            self.describe();
+            self.monitor
+                .progress
+                .seconds_to_first_estimate
+                .get_or_insert(self.monitor.seconds());
+            let state = &self.state;
+            self.monitor
+                .report(&self.estimate, &|progress| Checkpoint::new(progress, state))?;
+        }
+    }
+
+    fn describe(&mut self) {
+        self.estimate = describe(self.problem, &self.survey, &self.state.descent);
+    }
+
+    /// Adds a point to the loss curve; returns the loss in the fit.
+    fn measure(&mut self) -> Option<f64> {
+        self.describe();
+        let loss = self.losses.measure(self.problem, &self.estimate);
+        self.monitor.progress.rays += loss.rays;
+        self.monitor.loss(loss.train, loss.held_out);
+        loss.train
+    }
+
+    /// Records the stage; one that an earlier run had broken off takes the place of its first part.
+    fn finish_stage(&mut self, name: &str, why: &str) {
+        let (seconds, iterations) = self.state.stage_started;
+        let progress = &mut self.monitor.progress;
+        progress.stages.retain(|stage| stage.name != name);
+        let last = progress.losses.last().copied();
+        self.monitor.stage(Stage {
             name: name.to_owned(),
-            seconds: monitor.seconds() - started.0,
-            iterations: monitor.progress.iterations - started.1,
+            seconds: self.monitor.seconds() - seconds,
+            iterations: self.monitor.progress.iterations.saturating_sub(iterations),
             train_loss: last.and_then(|l| l.train),
             held_out_loss: last.and_then(|l| l.held_out),
             kept: true,
             why: why.to_owned(),
         });
-        ended?;
-        let finer = problem.scene.triangles.len() > problem.scene.objects.len();
-        if descent.grain == Grain::Triangles || !finer {
-            return Ok(Termination::Converged);
-        }
-        *descent = descent.refine(problem);
     }
-}
-
-/// Descends until the loss stands still.
-fn stage(
-    problem: &Problem,
-    survey: &Survey,
-    losses: &LossProbe,
-    bounces: u32,
-    descent: &mut Descent,
-    estimate: &mut Estimate,
-    monitor: &mut Monitor,
-) -> Result<(), Termination> {
-    let mut measured_at = f64::NEG_INFINITY;
-    let mut history: Vec<f64> = Vec::new();
-    loop {
-        // Measure now and then.
-        if monitor.seconds() - measured_at >= MEASURE_EVERY {
-            *estimate = describe(problem, survey, descent);
-            let loss = losses.measure(problem, estimate);
-            monitor.progress.rays += loss.rays;
-            monitor.loss(loss.train, loss.held_out);
-            measured_at = monitor.seconds();
-            history.extend(loss.train);
-            if stands_still(&history) {
-                if !monitor.settings.anneal || descent.halvings >= HALVINGS {
-                    return Ok(());
-                }
-                descent.halvings += 1;
-                history.clear();
-            }
-        }
-
-        // Step until the observer is due.
-        let settings = monitor.settings.clone();
-        while !monitor.due() {
-            let outcome = descent.step(problem, &settings, bounces);
-            monitor.progress.rays += outcome.rays;
-            monitor.progress.iterations += 1;
-            monitor.rejected("path weight not finite", outcome.rejected);
-            if !outcome.finite {
-                return Err(Termination::Diverged);
-            }
-            if settings.steps > 0 && monitor.progress.iterations >= settings.steps {
-                *estimate = describe(problem, survey, descent);
-                let loss = losses.measure(problem, estimate);
-                monitor.loss(loss.train, loss.held_out);
-                return Err(Termination::Steps);
-            }
-        }
-        *estimate = describe(problem, survey, descent);
-        monitor
-            .progress
-            .seconds_to_first_estimate
-            .get_or_insert(monitor.seconds());
-        monitor.report(estimate)?;
-    }
-}
-
-/// Whether the last window of losses is no better than the one before.
-fn stands_still(history: &[f64]) -> bool {
-    if history.len() < 2 * WINDOW {
-        return false;
-    }
-    let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
-    let (before, last) = history[history.len() - 2 * WINDOW..].split_at(WINDOW);
-    mean(last) > mean(before) * (1.0 - STANDSTILL)
 }
 
 /// The estimate of the present parameters. The paper's descent knows no errors: they are reported as the width of

@@ -5,7 +5,8 @@ use crate::session::command::{Command, ExportRequest, ViewCamera};
 use crate::session::save::pictures::Frames;
 use crate::session::save::{self, Results};
 use crate::session::snapshot::{Level, Phase};
-use crate::session::worker::state::{Next, Worker};
+use crate::session::worker::state::Worker;
+use crate::session::worker::work::Next;
 use std::path::Path;
 
 impl Worker {
@@ -56,7 +57,7 @@ impl Worker {
         self.capture.as_ref()?;
         self.paused = one;
         self.step = one;
-        Some(Next::Solve(self.checkpoint.take()))
+        Some(Next::Solve(self.checkpoint.clone()))
     }
 
     /// What `Save` writes now.

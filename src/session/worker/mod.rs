@@ -3,6 +3,7 @@
 mod commands;
 mod state;
 mod steering;
+mod work;
 
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
@@ -11,9 +12,10 @@ use crate::session::command::{Command, OpenOptions, Source};
 use crate::session::inbox::{self, Outbox};
 use crate::session::slot::Slot;
 use crate::session::snapshot::{OpenCapture, Snapshot};
-use state::{Next, Worker};
+use state::Worker;
 use std::sync::Arc;
 use std::thread::JoinHandle;
+use work::Next;
 
 /// Called by the worker after a new snapshot, at most about 30 times a second.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;

@@ -2,14 +2,18 @@
 
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
-use crate::inverse::solver::{Control, Observer, Progress};
+use crate::inverse::solver::{Checkpoint, Control, Observer, Progress};
+use crate::session::command::Command;
 use crate::session::inbox::Mail;
-use crate::session::worker::state::{FRAME, Next, Worker};
+use crate::session::worker::state::{FRAME, Worker};
+use crate::session::worker::work::Next;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Share of the solver's time that views may take.
 const VIEW_SHARE: f32 = 0.15;
+/// Time between two checkpoints that are kept in case the solver fails.
+const CHECKPOINT: Duration = Duration::from_secs(8);
 
 /// Observes a solve on behalf of the worker.
 pub(super) struct Steering<'a> {
@@ -17,6 +21,10 @@ pub(super) struct Steering<'a> {
     recorded: Option<Instant>,
     settings: Settings,
     next: Option<Next>,
+    /// When a checkpoint was last kept.
+    kept: Instant,
+    /// Pieces of mail that had come when a checkpoint was offered.
+    seen: Option<usize>,
 }
 
 impl<'a> Steering<'a> {
@@ -27,6 +35,8 @@ impl<'a> Steering<'a> {
             recorded: None,
             settings,
             next: None,
+            kept: Instant::now(),
+            seen: None,
         }
     }
 
@@ -65,9 +75,11 @@ impl<'a> Steering<'a> {
 impl Observer for Steering<'_> {
     fn observe(&mut self, progress: &Progress, estimate: &Estimate) -> Control {
         self.record(progress, estimate);
+        // Nothing may come between a checkpoint and this report: what has come since then waits for the next one.
+        let mut ready = self.seen.take().unwrap_or(usize::MAX);
         loop {
-            // Take what waits.
-            loop {
+            // Carry out what waits.
+            while ready > 0 {
                 let mail = self.worker.inbox.poll();
                 if matches!(mail, Mail::Nothing) {
                     break;
@@ -75,6 +87,7 @@ impl Observer for Steering<'_> {
                 if self.take(mail) {
                     return Control::Stop;
                 }
+                ready -= 1;
             }
             if self.worker.step {
                 self.worker.step = false;
@@ -95,11 +108,24 @@ impl Observer for Steering<'_> {
                     return Control::Stop;
                 }
             }
+            ready = usize::MAX;
         }
         if self.settings == self.worker.settings {
             return Control::Continue;
         }
         self.settings = self.worker.settings.clone();
         Control::Change(Box::new(self.settings.clone()))
+    }
+
+    /// Keeps a checkpoint now and then, and whenever what is about to be carried out may save it.
+    fn offer(&mut self, make: &dyn Fn() -> Checkpoint) {
+        let saves = |mail: &Mail| matches!(mail, Mail::Command(Command::Save(_) | Command::Pause));
+        let waiting = self.worker.inbox.look_ahead();
+        self.seen = Some(waiting.len());
+        let wanted = waiting.iter().any(saves) || self.worker.paused;
+        if wanted || self.kept.elapsed() >= CHECKPOINT {
+            self.worker.checkpoint = Some(make());
+            self.kept = Instant::now();
+        }
     }
 }

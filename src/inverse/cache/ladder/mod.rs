@@ -1,10 +1,13 @@
 //! The transport-cache solver: a light-field start, then rounds of full paths until the errors are small enough.
 
+mod lamps;
+
 use super::accumulate::Accumulated;
 use super::budget::Budget;
 use super::clusters::{Cluster, cluster, share_paths};
-use super::errors::{Released, StandardErrors, release, standard_errors};
+use super::errors::{StandardErrors, standard_errors};
 use super::fit::{Fit, fit, propose};
+use super::reached::Reached;
 use super::roles::{self, Role};
 use super::trace::Tracer;
 use super::{PathCache, describe};
@@ -20,15 +23,10 @@ use crate::inverse::survey::Survey;
 use crate::math::color::luminance;
 use crate::transport::emitters::Emitters;
 use glam::Vec3;
-use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 
 /// Gauss–Newton steps at most in one fit.
 const MOST_STEPS: u64 = 30;
-/// χ² (three channels) above which a light is there, and below which it is not.
-const SIGNIFICANT: f64 = 25.0;
-/// Share of the area-weighted light samples that go to objects with no light found yet but none excluded either.
-const EXPLORATION: f64 = 0.05;
 /// A step larger than this (in albedo, or relative in emission) asks for linearising anew.
 const NONLINEAR: f32 = 0.005;
 /// Relative error of albedo that the light field's resolution is trusted to stay below, where edges blur: a
@@ -36,14 +34,6 @@ const NONLINEAR: f32 = 0.005;
 const LIGHT_FIELD_BIAS: f32 = 0.01;
 /// Work between two reports to the observer.
 const SLICE: Duration = Duration::from_millis(25);
-
-/// What a checkpoint holds: the outcome of the stages before the rounds.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-struct Found {
-    albedo: Vec<Vec3>,
-    emission: Vec<Vec3>,
-    roles: Vec<Role>,
-}
 
 /// The state of a solve.
 pub struct Ladder<'a, 'o> {
@@ -59,6 +49,10 @@ pub struct Ladder<'a, 'o> {
     unknowns: Unknowns,
     errors: StandardErrors,
     estimate: Estimate,
+    /// Stages finished.
+    stages: u32,
+    /// Where the last of them ended.
+    checkpoint: Checkpoint,
 }
 
 /// Solves a problem with the transport cache.
@@ -81,48 +75,56 @@ pub fn solve(
     } else {
         settings.bounces as u32
     };
+    let start = match resume {
+        Some(checkpoint) => checkpoint.state(|reached: &Reached| reached.fits(objects))?,
+        None => Reached::new(
+            0,
+            &vec![Role::Reflector; objects],
+            &Unknowns::new(objects),
+            &StandardErrors {
+                albedo: vec![Vec3::splat(0.5); objects],
+                emission: vec![Vec3::INFINITY; objects],
+            },
+        ),
+    };
     let mut ladder = Ladder {
         problem,
         budget,
         losses: LossProbe::new(problem, settings, 400, 16, max_bounces),
+        checkpoint: Checkpoint::new(&monitor.progress, &start),
         monitor,
         clusters: cluster(problem, &survey, budget.pixels),
         survey,
         widths: problem.photographs.iter().map(|p| p.width).collect(),
         max_bounces,
-        roles: vec![Role::Reflector; objects],
-        unknowns: Unknowns::new(objects),
-        errors: StandardErrors {
-            albedo: vec![Vec3::splat(0.5); objects],
-            emission: vec![Vec3::INFINITY; objects],
-        },
+        errors: start.errors(),
+        roles: start.roles,
+        unknowns: start.unknowns,
         estimate: Estimate::default(),
+        stages: start.stages,
     };
     ladder.describe();
-    let found = resume.and_then(|c| serde_json::from_value::<Found>(c.state.clone()).ok());
-    let termination = match ladder.run(found) {
+    let termination = match ladder.run() {
         Ok(termination) | Err(termination) => termination,
     };
     Ok(ladder.finish(termination))
 }
 
 impl Ladder<'_, '_> {
-    fn run(&mut self, found: Option<Found>) -> Result<Termination, Termination> {
-        match found {
-            Some(found) if found.roles.len() == self.roles.len() => {
-                self.unknowns = Unknowns {
-                    albedo: found.albedo,
-                    emission: found.emission,
-                };
-                self.roles = found.roles;
-            }
-            _ => self.light_field()?,
+    fn run(&mut self) -> Result<Termination, Termination> {
+        if self.stages < 1 {
+            self.light_field()?;
         }
         if self.budget.round_paths == 0 {
             return Ok(Termination::Converged);
         }
-        self.objects()?;
-        self.rounds()
+        if self.stages < 2 {
+            self.objects()?;
+        }
+        if self.stages < 3 {
+            return self.rounds();
+        }
+        Ok(Termination::Converged)
     }
 
     /// First stage: paths end where a photograph measured the radiance, so each object is nearly a linear fit of its
@@ -209,6 +211,11 @@ impl Ladder<'_, '_> {
     fn rounds(&mut self) -> Result<Termination, Termination> {
         let started = self.monitor.seconds();
         self.monitor.phase("refining");
+        share_paths(
+            &mut self.clusters,
+            self.roles.len(),
+            self.budget.round_paths,
+        );
         let lights = self.lights();
         let free = roles::free(&self.roles);
         let all: Vec<usize> = (0..free.len()).collect();
@@ -228,7 +235,8 @@ impl Ladder<'_, '_> {
             self.unknowns = proposal;
             self.merge_errors(errors);
             self.describe();
-            self.monitor.report(&self.estimate)?;
+            self.monitor
+                .report(&self.estimate, &|_| self.checkpoint.clone())?;
             if step > NONLINEAR && round < self.budget.rounds / 4 {
                 about = self.unknowns.clone();
                 sums = Accumulated::default();
@@ -289,7 +297,8 @@ impl Ladder<'_, '_> {
             self.monitor
                 .rejected("path weight not finite", traced.rejected);
             cache.append(traced);
-            self.monitor.tick(&self.estimate)?;
+            self.monitor
+                .tick(&self.estimate, &|_| self.checkpoint.clone())?;
             slice = if elapsed > SLICE {
                 (slice / 2).max(4)
             } else {
@@ -302,10 +311,10 @@ impl Ladder<'_, '_> {
 
     fn fit(&mut self, cache: &PathCache) -> Result<Fit, Termination> {
         let free = roles::free(&self.roles);
-        let (monitor, estimate) = (&mut self.monitor, &self.estimate);
+        let (monitor, estimate, checkpoint) = (&mut self.monitor, &self.estimate, &self.checkpoint);
         let fitted = fit(cache, &self.unknowns, &free, MOST_STEPS, |_| {
             monitor.progress.iterations += 1;
-            monitor.tick(estimate)
+            monitor.tick(estimate, &|_| checkpoint.clone())
         })?;
         Ok(fitted)
     }
@@ -332,26 +341,6 @@ impl Ladder<'_, '_> {
         }
     }
 
-    /// What the paths say of light from objects that are held dark.
-    fn test_dark(&mut self, cache: &PathCache) -> Vec<Released> {
-        let objects = self.roles.len();
-        let mut free = roles::free(&self.roles);
-        let active: Vec<usize> = (0..free.len()).collect();
-        free.extend(
-            (0..objects)
-                .filter(|&k| !self.roles[k].emits())
-                .map(|k| objects + k),
-        );
-        let equations = cache.normal_equations(&self.unknowns, &free);
-        let released = release(&equations, &free, &active, &self.unknowns);
-        for test in &released {
-            self.errors.emission[test.index - objects] =
-                Vec3::from_array(test.stderr.map(|e| e as f32));
-        }
-        self.describe();
-        released
-    }
-
     /// Gives emitters their photographed radiance and no albedo, and reflectors no light.
     fn take_roles(&mut self, radiance: &[Vec3]) {
         for (k, role) in self.roles.iter().enumerate() {
@@ -365,92 +354,6 @@ impl Ladder<'_, '_> {
                 Role::Dark | Role::Glowing => {}
             }
         }
-    }
-
-    /// Drops the light of unseen objects where nothing speaks for it, least significant first, refitting in between.
-    fn prune_unseen(&mut self, cache: &PathCache) -> Result<(), Termination> {
-        loop {
-            let significance = |k: usize| {
-                let z = self.unknowns.emission[k]
-                    / self.errors.emission[k].max(Vec3::splat(f32::MIN_POSITIVE));
-                f64::from(z.length_squared())
-            };
-            let doubtful: Vec<usize> = (0..self.roles.len())
-                .filter(|&k| self.roles[k] == Role::Unseen && significance(k) < SIGNIFICANT)
-                .collect();
-            if doubtful.is_empty() {
-                return Ok(());
-            }
-            for k in doubtful {
-                self.roles[k] = Role::Dark;
-                self.unknowns.emission[k] = Vec3::ZERO;
-            }
-            let fitted = self.fit(cache)?;
-            self.take(fitted);
-        }
-    }
-
-    /// Tests whether any reflector or dark object gives light after all: the one that the paths call for most is set
-    /// free, refitted, and kept if it stays significant. Returns their names.
-    fn test_glow(&mut self, cache: &PathCache) -> Result<Vec<String>, Termination> {
-        let objects = self.roles.len();
-        let mut added = Vec::new();
-        while added.len() < 8 {
-            let strongest = (self.test_dark(cache).into_iter())
-                .max_by(|a, b| a.significance().total_cmp(&b.significance()));
-            let Some(candidate) = strongest.filter(|c| c.significance() > SIGNIFICANT) else {
-                break;
-            };
-            let k = candidate.index - objects;
-            let before = (
-                self.unknowns.clone(),
-                self.errors.clone(),
-                self.roles.clone(),
-            );
-            self.roles[k] = if self.roles[k] == Role::Dark {
-                Role::Unseen
-            } else {
-                Role::Glowing
-            };
-            let fitted = self.fit(cache)?;
-            self.take(fitted);
-            let z = self.unknowns.emission[k]
-                / self.errors.emission[k].max(Vec3::splat(f32::MIN_POSITIVE));
-            if f64::from(z.length_squared()) < SIGNIFICANT {
-                (self.unknowns, self.errors, self.roles) = before;
-                break;
-            }
-            added.push(self.problem.scene.objects[k].name.clone());
-        }
-        Ok(added)
-    }
-
-    /// Emitters as they are known now, drawn by area × luminance.
-    fn lights(&self) -> Emitters {
-        let scene = &self.problem.scene;
-        let weights: Vec<f64> = (scene.objects.iter().zip(&self.unknowns.emission))
-            .map(|(object, emission)| object.area * f64::from(luminance(*emission)))
-            .collect();
-        Emitters::new(scene, &weights)
-    }
-
-    /// Weights with a share spread over all objects by area.
-    fn explore(&self, weights: &[f64]) -> Vec<f64> {
-        let scene = &self.problem.scene;
-        let (total, area) = (
-            weights.iter().sum::<f64>(),
-            scene.objects.iter().map(|o| o.area).sum::<f64>(),
-        );
-        let base = if total > 0.0 {
-            total * EXPLORATION / area
-        } else {
-            1.0
-        };
-        weights
-            .iter()
-            .zip(&scene.objects)
-            .map(|(w, o)| w + base * o.area)
-            .collect()
     }
 
     /// Where each parameter stands among the free ones.
@@ -503,25 +406,23 @@ impl Ladder<'_, '_> {
             why,
         };
         self.monitor.stage(stage);
-        self.monitor.report(&self.estimate)
+        self.stages += 1;
+        self.monitor.progress.seconds = self.monitor.seconds();
+        let reached = Reached::new(self.stages, &self.roles, &self.unknowns, &self.errors);
+        self.checkpoint = Checkpoint::new(&self.monitor.progress, &reached);
+        self.monitor
+            .report(&self.estimate, &|_| self.checkpoint.clone())
     }
 
     fn finish(mut self, termination: Termination) -> Solution {
         self.monitor.phase("done");
         self.monitor.progress.seconds = self.monitor.seconds();
-        let found = Found {
-            albedo: self.unknowns.albedo,
-            emission: self.unknowns.emission,
-            roles: self.roles,
-        };
-        let checkpoint = serde_json::to_value(&found)
-            .ok()
-            .map(|state| Checkpoint { state });
+        let done = self.stages >= 3 || termination == Termination::Converged;
         Solution {
             estimate: self.estimate,
             progress: self.monitor.progress,
             termination,
-            checkpoint,
+            checkpoint: (!done).then_some(self.checkpoint),
         }
     }
 }

@@ -1,0 +1,123 @@
+//! Which objects give light: tests on traced paths, and how light samples are shared out.
+
+use super::Ladder;
+use crate::inverse::cache::PathCache;
+use crate::inverse::cache::errors::{Released, release};
+use crate::inverse::cache::roles::{self, Role};
+use crate::inverse::solver::Termination;
+use crate::math::color::luminance;
+use crate::transport::emitters::Emitters;
+use glam::Vec3;
+
+/// χ² (three channels) above which a light is there, and below which it is not.
+const SIGNIFICANT: f64 = 25.0;
+/// Share of the area-weighted light samples that go to objects with no light found yet but none excluded either.
+const EXPLORATION: f64 = 0.05;
+
+impl Ladder<'_, '_> {
+    /// What the paths say of light from objects that are held dark.
+    pub(super) fn test_dark(&mut self, cache: &PathCache) -> Vec<Released> {
+        let objects = self.roles.len();
+        let mut free = roles::free(&self.roles);
+        let active: Vec<usize> = (0..free.len()).collect();
+        free.extend(
+            (0..objects)
+                .filter(|&k| !self.roles[k].emits())
+                .map(|k| objects + k),
+        );
+        let equations = cache.normal_equations(&self.unknowns, &free);
+        let released = release(&equations, &free, &active, &self.unknowns);
+        for test in &released {
+            self.errors.emission[test.index - objects] =
+                Vec3::from_array(test.stderr.map(|e| e as f32));
+        }
+        self.describe();
+        released
+    }
+
+    /// Drops the light of unseen objects where nothing speaks for it, least significant first, refitting in between.
+    pub(super) fn prune_unseen(&mut self, cache: &PathCache) -> Result<(), Termination> {
+        loop {
+            let significance = |k: usize| {
+                let z = self.unknowns.emission[k]
+                    / self.errors.emission[k].max(Vec3::splat(f32::MIN_POSITIVE));
+                f64::from(z.length_squared())
+            };
+            let doubtful: Vec<usize> = (0..self.roles.len())
+                .filter(|&k| self.roles[k] == Role::Unseen && significance(k) < SIGNIFICANT)
+                .collect();
+            if doubtful.is_empty() {
+                return Ok(());
+            }
+            for k in doubtful {
+                self.roles[k] = Role::Dark;
+                self.unknowns.emission[k] = Vec3::ZERO;
+            }
+            let fitted = self.fit(cache)?;
+            self.take(fitted);
+        }
+    }
+
+    /// Tests whether any reflector or dark object gives light after all: the one that the paths call for most is set
+    /// free, refitted, and kept if it stays significant. Returns their names.
+    pub(super) fn test_glow(&mut self, cache: &PathCache) -> Result<Vec<String>, Termination> {
+        let objects = self.roles.len();
+        let mut added = Vec::new();
+        while added.len() < 8 {
+            let strongest = (self.test_dark(cache).into_iter())
+                .max_by(|a, b| a.significance().total_cmp(&b.significance()));
+            let Some(candidate) = strongest.filter(|c| c.significance() > SIGNIFICANT) else {
+                break;
+            };
+            let k = candidate.index - objects;
+            let before = (
+                self.unknowns.clone(),
+                self.errors.clone(),
+                self.roles.clone(),
+            );
+            self.roles[k] = if self.roles[k] == Role::Dark {
+                Role::Unseen
+            } else {
+                Role::Glowing
+            };
+            let fitted = self.fit(cache)?;
+            self.take(fitted);
+            let z = self.unknowns.emission[k]
+                / self.errors.emission[k].max(Vec3::splat(f32::MIN_POSITIVE));
+            if f64::from(z.length_squared()) < SIGNIFICANT {
+                (self.unknowns, self.errors, self.roles) = before;
+                break;
+            }
+            added.push(self.problem.scene.objects[k].name.clone());
+        }
+        Ok(added)
+    }
+
+    /// Emitters as they are known now, drawn by area × luminance.
+    pub(super) fn lights(&self) -> Emitters {
+        let scene = &self.problem.scene;
+        let weights: Vec<f64> = (scene.objects.iter().zip(&self.unknowns.emission))
+            .map(|(object, emission)| object.area * f64::from(luminance(*emission)))
+            .collect();
+        Emitters::new(scene, &weights)
+    }
+
+    /// Weights with a share spread over all objects by area.
+    pub(super) fn explore(&self, weights: &[f64]) -> Vec<f64> {
+        let scene = &self.problem.scene;
+        let (total, area) = (
+            weights.iter().sum::<f64>(),
+            scene.objects.iter().map(|o| o.area).sum::<f64>(),
+        );
+        let base = if total > 0.0 {
+            total * EXPLORATION / area
+        } else {
+            1.0
+        };
+        weights
+            .iter()
+            .zip(&scene.objects)
+            .map(|(w, o)| w + base * o.area)
+            .collect()
+    }
+}

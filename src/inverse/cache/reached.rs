@@ -1,0 +1,61 @@
+//! What the stages so far have found: all that the next stage starts from, and what a checkpoint holds.
+
+use super::errors::StandardErrors;
+use super::roles::Role;
+use crate::inverse::parameters::Unknowns;
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+/// The outcome of the finished stages.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Reached {
+    /// Stages finished.
+    pub stages: u32,
+    /// What each object is taken for.
+    pub roles: Vec<Role>,
+    /// Values of all unknowns.
+    pub unknowns: Unknowns,
+    albedo_errors: Vec<[Option<f32>; 3]>,
+    emission_errors: Vec<[Option<f32>; 3]>,
+}
+
+impl Reached {
+    /// Writes down what was found; an infinite error becomes `null`.
+    pub fn new(stages: u32, roles: &[Role], unknowns: &Unknowns, errors: &StandardErrors) -> Self {
+        let finite = |errors: &[Vec3]| {
+            let finite = |e: f32| e.is_finite().then_some(e);
+            errors.iter().map(|e| e.to_array().map(finite)).collect()
+        };
+        Self {
+            stages,
+            roles: roles.to_vec(),
+            unknowns: unknowns.clone(),
+            albedo_errors: finite(&errors.albedo),
+            emission_errors: finite(&errors.emission),
+        }
+    }
+
+    /// Whether it speaks of as many objects as there are.
+    pub fn fits(&self, objects: usize) -> bool {
+        self.roles.len() == objects
+            && self.unknowns.albedo.len() == objects
+            && self.unknowns.emission.len() == objects
+            && self.albedo_errors.len() == objects
+            && self.emission_errors.len() == objects
+    }
+
+    /// Standard errors of all parameters.
+    pub fn errors(&self) -> StandardErrors {
+        let read = |errors: &[[Option<f32>; 3]]| {
+            let known = |e: Option<f32>| e.unwrap_or(f32::INFINITY);
+            errors
+                .iter()
+                .map(|e| Vec3::from_array(e.map(known)))
+                .collect()
+        };
+        StandardErrors {
+            albedo: read(&self.albedo_errors),
+            emission: read(&self.emission_errors),
+        }
+    }
+}
