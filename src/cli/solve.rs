@@ -55,6 +55,16 @@ pub fn solve(source: &Source, options: &SolveOptions) -> Result<()> {
         None => None,
     };
 
+    if let Some(checkpoint) = checkpoint
+        && settings.time > 0.0
+        && checkpoint.progress.seconds >= settings.time
+    {
+        eprintln!(
+            "warning: --time counts from the start of the earlier solve, which took {:.1} s; give more to go on",
+            checkpoint.progress.seconds
+        );
+    }
+
     // Solve.
     let problem = Problem {
         scene: capture.scene.clone(),

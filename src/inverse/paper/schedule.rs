@@ -3,8 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Paths between two measurements: some eight times as many as a measurement takes.
-const MEASURE_EVERY: u64 = 100_000;
+/// Paths between two measurements: some forty times as many as a measurement takes.
+const MEASURE_EVERY: u64 = 500_000;
 /// The loss stands still when the mean of this many measurements is no better than that of as many before, by a share.
 const WINDOW: usize = 4;
 const STANDSTILL: f64 = 0.01;
