@@ -13,7 +13,7 @@ use super::trace::Tracer;
 use super::{PathCache, describe};
 use crate::error;
 use crate::inverse::estimate::Estimate;
-use crate::inverse::loss::LossProbe;
+use crate::inverse::loss::{LossProbe, Losses};
 use crate::inverse::measured::MeasuredRadiance;
 use crate::inverse::monitor::Monitor;
 use crate::inverse::parameters::Unknowns;
@@ -392,10 +392,16 @@ impl Ladder<'_, '_> {
         );
     }
 
-    fn finish_stage(&mut self, name: &str, started: f64, why: String) -> Result<(), Termination> {
+    /// Adds a point to the loss curve.
+    fn measure(&mut self) -> Losses {
         let losses = self.losses.measure(self.problem, &self.estimate);
         self.monitor.progress.rays += losses.rays;
         self.monitor.loss(losses.train, losses.held_out);
+        losses
+    }
+
+    fn finish_stage(&mut self, name: &str, started: f64, why: String) -> Result<(), Termination> {
+        let losses = self.measure();
         let stage = Stage {
             name: name.to_owned(),
             seconds: self.monitor.seconds() - started,
@@ -415,9 +421,13 @@ impl Ladder<'_, '_> {
     }
 
     fn finish(mut self, termination: Termination) -> Solution {
+        // A finished stage has measured its loss already.
+        let done = self.stages >= 3 || termination == Termination::Converged;
+        if !done {
+            self.measure();
+        }
         self.monitor.phase("done");
         self.monitor.progress.seconds = self.monitor.seconds();
-        let done = self.stages >= 3 || termination == Termination::Converged;
         Solution {
             estimate: self.estimate,
             progress: self.monitor.progress,
