@@ -1,94 +1,15 @@
 //! The path tracer against closed forms and against itself.
 
-use glam::{DMat3, DVec3, Vec3};
-use relit::capture::camera::{Intrinsics, Pose};
-use relit::capture::mesh::Mesh;
-use relit::capture::photograph::{Encoding, Photograph, PhotographSource};
-use relit::capture::{Capture, Frame};
+mod scenes;
+
+use glam::{DVec3, Vec3};
 use relit::math::rng::Stream;
 use relit::math::stats::Moments;
-use relit::scene::Scene;
 use relit::scene::geometry::Ray;
 use relit::transport::lit::Lit;
 use relit::transport::material::Material;
 use relit::transport::path::{PathOptions, radiance};
-use std::sync::Arc;
-
-/// Adds a quad, counter-clockwise seen from its front.
-fn quad(mesh: &mut Mesh, name: &str, corners: [DVec3; 4]) {
-    let first = mesh.positions.len() as u32;
-    mesh.positions.extend(corners);
-    mesh.triangles
-        .extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
-    let object = mesh.objects.len() as u32;
-    mesh.object_of.extend([object, object]);
-    mesh.objects.push(name.to_owned());
-}
-
-/// A closed box of half size `half` about `center`, its six faces looking inwards.
-fn room(half: f64, center: DVec3) -> Mesh {
-    let mut mesh = Mesh::default();
-    for (name, axis, sign) in [
-        ("left", 0, -1.0),
-        ("right", 0, 1.0),
-        ("floor", 1, -1.0),
-        ("ceiling", 1, 1.0),
-        ("back", 2, -1.0),
-        ("front", 2, 1.0),
-    ] {
-        let mut n = DVec3::ZERO;
-        n[axis] = sign;
-        let mut u = DVec3::ZERO;
-        u[(axis + 1) % 3] = 1.0;
-        let v = n.cross(u);
-        // u × (n × u) = n for unit u ⟂ n, so the order that looks along −n is v before u.
-        let at = |a: f64, b: f64| center + (n + v * a + u * b) * half;
-        quad(
-            &mut mesh,
-            name,
-            [at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)],
-        );
-    }
-    mesh
-}
-
-fn scene_of(mesh: Mesh) -> Arc<Scene> {
-    let intrinsics = Intrinsics {
-        width: 4,
-        height: 4,
-        fx: 4.0,
-        fy: 4.0,
-        cx: 2.0,
-        cy: 2.0,
-        distortion: [0.0; 4],
-    };
-    let photograph = Photograph {
-        width: 4,
-        height: 4,
-        pixels: vec![Vec3::ZERO; 16],
-        usable: Vec::new(),
-        encoding: Encoding::Linear,
-        saturation: f32::INFINITY,
-    };
-    let capture = Capture {
-        name: "test".into(),
-        folder: None,
-        mesh,
-        frames: vec![Frame {
-            intrinsics,
-            pose: Pose {
-                rotation: DMat3::IDENTITY,
-                center: DVec3::ZERO,
-            },
-            exposure: None,
-            photograph: PhotographSource::Memory(Arc::new(photograph)),
-            depth: None,
-        }],
-        up: DVec3::Y,
-        warnings: Vec::new(),
-    };
-    Arc::new(Scene::new(&capture).expect("the test scene is sound"))
-}
+use scenes::{closed_box, lamp, scene_of};
 
 fn mean_radiance(lit: &Lit, options: &PathOptions, seed: u64, paths: u64) -> [Moments; 3] {
     let mut moments = [Moments::default(); 3];
@@ -120,7 +41,7 @@ fn closed_furnace_has_its_closed_form_radiance_at_any_size_and_place() {
         (1.0, DVec3::splat(1e5)),
     ] {
         for albedo in [0.0, 0.5, 0.9, 0.99] {
-            let mesh = room(half, center);
+            let mesh = closed_box(half, center);
             let material = Material::diffuse(Vec3::splat(albedo), Vec3::new(1.0, 2.0, 1e-6));
             let lit = Lit::new(scene_of(mesh), vec![material; 6], None);
             for (emitters, bsdf) in [(true, true), (true, false), (false, true)] {
@@ -148,7 +69,7 @@ fn closed_furnace_has_its_closed_form_radiance_at_any_size_and_place() {
 #[test]
 fn a_truncated_path_holds_exactly_its_bounces() {
     let lit = Lit::new(
-        scene_of(room(1.0, DVec3::ZERO)),
+        scene_of(closed_box(1.0, DVec3::ZERO)),
         vec![Material::diffuse(Vec3::splat(0.5), Vec3::ONE); 6],
         None,
     );
@@ -177,18 +98,8 @@ fn a_truncated_path_holds_exactly_its_bounces() {
 /// A lamp on the ceiling: light sampling alone, BSDF sampling alone and MIS have equal means. Significance 6e-5 a pair.
 #[test]
 fn the_three_ways_of_finding_light_agree() {
-    let mut mesh = room(1.0, DVec3::ZERO);
-    let y = 0.9;
-    quad(
-        &mut mesh,
-        "lamp",
-        [
-            DVec3::new(-0.3, y, -0.3),
-            DVec3::new(0.3, y, -0.3),
-            DVec3::new(0.3, y, 0.3),
-            DVec3::new(-0.3, y, 0.3),
-        ],
-    );
+    let mut mesh = closed_box(1.0, DVec3::ZERO);
+    lamp(&mut mesh, 0.3, DVec3::new(0.0, 0.9, 0.0));
     let mut materials = vec![Material::diffuse(Vec3::new(0.7, 0.5, 0.2), Vec3::ZERO); 6];
     materials.push(Material::diffuse(
         Vec3::splat(0.3),

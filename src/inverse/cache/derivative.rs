@@ -84,3 +84,136 @@ pub fn differentiate(
     }
     beyond
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::rng::Stream;
+    use glam::DVec3;
+
+    const SURFACES: usize = 4;
+
+    fn color(stream: &mut Stream) -> Vec3 {
+        Vec3::from_array(std::array::from_fn(|_| 0.1 + 0.8 * stream.uniform()))
+    }
+
+    /// A path over few surfaces, so that they repeat, with lamps, emission seen and known radiance.
+    fn random_path(stream: &mut Stream) -> Vec<Vertex> {
+        (0..1 + stream.below(7))
+            .map(|_| Vertex {
+                surface: stream.below(SURFACES) as u32,
+                lamp: if stream.uniform() < 0.5 {
+                    stream.below(SURFACES) as u32
+                } else {
+                    NO_LAMP
+                },
+                lamp_weight: stream.uniform(),
+                emission_weight: if stream.uniform() < 0.3 {
+                    0.0
+                } else {
+                    stream.uniform()
+                },
+                known: if stream.uniform() < 0.3 {
+                    color(stream)
+                } else {
+                    Vec3::ZERO
+                },
+            })
+            .collect()
+    }
+
+    fn random_unknowns(stream: &mut Stream) -> Unknowns {
+        let mut colors = || (0..SURFACES).map(|_| color(stream)).collect();
+        Unknowns {
+            albedo: colors(),
+            emission: colors(),
+        }
+    }
+
+    /// The sum over all ways of the path to find light, term by term in f64.
+    fn radiance(vertices: &[Vertex], albedo: &[DVec3], emission: &[DVec3]) -> DVec3 {
+        let mut sum = DVec3::ZERO;
+        for (i, vertex) in vertices.iter().enumerate() {
+            let before: DVec3 = (vertices[..i].iter())
+                .map(|v| albedo[v.surface as usize])
+                .product();
+            let after = before * albedo[vertex.surface as usize];
+            sum += before * emission[vertex.surface as usize] * f64::from(vertex.emission_weight);
+            sum += after * vertex.known.as_dvec3();
+            if vertex.lamp != NO_LAMP {
+                sum += after * emission[vertex.lamp as usize] * f64::from(vertex.lamp_weight);
+            }
+        }
+        sum
+    }
+
+    #[test]
+    fn derivatives_agree_with_central_differences_for_every_parameter() {
+        let (mut gathered, mut gradient) = (Vec::new(), Gradient::new(2 * SURFACES));
+        for index in 0..200 {
+            let mut stream = Stream::new(11, 0, 0, index);
+            let (path, unknowns) = (random_path(&mut stream), random_unknowns(&mut stream));
+            let widen = |values: &[Vec3]| values.iter().map(|v| v.as_dvec3()).collect::<Vec<_>>();
+            let (albedo, emission) = (widen(&unknowns.albedo), widen(&unknowns.emission));
+            gradient.clear();
+            let found = differentiate(&path, &unknowns, &mut gathered, &mut gradient).as_dvec3();
+            let wanted = radiance(&path, &albedo, &emission);
+            assert!((found - wanted).length() < 1e-5 * (1.0 + wanted.length()));
+            for parameter in 0..2 * SURFACES {
+                // The polynomial's third derivative leaves an error of the order of h².
+                let h = 1e-5;
+                let at = |step: f64| {
+                    let (mut albedo, mut emission) = (albedo.clone(), emission.clone());
+                    match parameter.checked_sub(SURFACES) {
+                        None => albedo[parameter] += step,
+                        Some(surface) => emission[surface] += step,
+                    }
+                    radiance(&path, &albedo, &emission)
+                };
+                let difference = (at(h) - at(-h)) / (2.0 * h);
+                let derivative = gradient.values[parameter].as_dvec3();
+                assert!(
+                    (derivative - difference).length() < 1e-5 * (1.0 + difference.length()),
+                    "path {index}, parameter {parameter}: {derivative} against {difference}"
+                );
+                assert!(gradient.marked[parameter] || difference == DVec3::ZERO);
+            }
+        }
+    }
+
+    #[test]
+    fn gradients_add_up_over_paths_and_are_gone_when_cleared() {
+        let mut stream = Stream::new(12, 0, 0, 0);
+        let unknowns = random_unknowns(&mut stream);
+        let paths = [random_path(&mut stream), random_path(&mut stream)];
+        let (mut gathered, mut both) = (Vec::new(), Gradient::new(2 * SURFACES));
+        let mut each = vec![Vec3::ZERO; 2 * SURFACES];
+        for path in &paths {
+            differentiate(path, &unknowns, &mut gathered, &mut both);
+            let mut alone = Gradient::new(2 * SURFACES);
+            differentiate(path, &unknowns, &mut gathered, &mut alone);
+            each.iter_mut()
+                .zip(&alone.values)
+                .for_each(|(sum, v)| *sum += *v);
+        }
+        for (sum, value) in each.iter().zip(&both.values) {
+            assert!((*sum - *value).length() < 1e-5, "{sum} {value}");
+        }
+        both.clear();
+        assert!(both.values.iter().all(|v| *v == Vec3::ZERO));
+        assert!(both.touched.is_empty() && !both.marked.contains(&true));
+    }
+
+    #[test]
+    fn a_path_that_met_nothing_is_dark() {
+        let mut gradient = Gradient::new(2 * SURFACES);
+        let dark = differentiate(
+            &[],
+            &Unknowns::new(SURFACES),
+            &mut Vec::new(),
+            &mut gradient,
+        );
+        assert_eq!(dark, Vec3::ZERO);
+        assert!(gradient.touched.is_empty());
+    }
+}

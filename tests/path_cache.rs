@@ -1,0 +1,261 @@
+//! Cached paths, evaluated for given unknowns, against the path tracer with those materials.
+
+mod scenes;
+
+use glam::{DVec3, Vec2, Vec3};
+use rayon::prelude::*;
+use relit::inverse::cache::PathCache;
+use relit::inverse::cache::clusters::Cluster;
+use relit::inverse::cache::trace::Tracer;
+use relit::inverse::measured::MeasuredRadiance;
+use relit::inverse::parameters::Unknowns;
+use relit::inverse::settings::{LightSampling, Settings};
+use relit::inverse::solver::Problem;
+use relit::inverse::survey::Survey;
+use relit::math::rng::Stream;
+use relit::math::stats::Moments;
+use relit::scene::Scene;
+use relit::transport::emitters::Emitters;
+use relit::transport::lit::Lit;
+use relit::transport::material::Material;
+use relit::transport::path::{PathOptions, radiance};
+use std::sync::Arc;
+
+const SIZE: [u32; 2] = [6, 4];
+const ROUNDS: u64 = 200;
+
+fn room() -> Arc<Scene> {
+    let (mesh, _) = scenes::lamp_room();
+    let capture = scenes::capture(mesh, &scenes::room_views()[..1], SIZE);
+    Arc::new(Scene::new(&capture).expect("the room is sound"))
+}
+
+/// Random values, some emissions zero: what was believed when the paths were traced is none of them.
+fn unknowns(surfaces: usize, key: u64) -> Unknowns {
+    let mut stream = Stream::new(31, 0, 0, key);
+    let mut color = || Vec3::from_array(std::array::from_fn(|_| stream.uniform()));
+    let mut unknowns = Unknowns {
+        albedo: (0..surfaces).map(|_| color() * 0.9).collect(),
+        emission: (0..surfaces).map(|k| color() * (k % 3) as f32).collect(),
+    };
+    unknowns.emission[6] = color() * 10.0;
+    unknowns
+}
+
+fn materials(unknowns: &Unknowns) -> Vec<Material> {
+    (unknowns.albedo.iter().zip(&unknowns.emission))
+        .map(|(albedo, emission)| Material::diffuse(*albedo, *emission))
+        .collect()
+}
+
+/// The rows of the picture, each a cluster whose photograph is black: its residual is minus the cached radiance.
+fn rows() -> Vec<Cluster> {
+    let [width, height] = SIZE;
+    let row = |y: u32| Cluster {
+        frame: 0,
+        object: 0,
+        pixels: (y * width..(y + 1) * width).collect(),
+        paths: 2,
+        measured: Vec3::ZERO,
+        weight: Vec3::ONE,
+    };
+    (0..height).map(row).collect()
+}
+
+/// Rounds of independent paths; light samples go mostly to the lamp and a little everywhere.
+fn rounds(scene: &Scene, sampling: LightSampling) -> Vec<PathCache> {
+    let weights = [0.05, 0.05, 0.05, 0.05, 0.05, 0.05, 1.0, 0.05];
+    let lights = Emitters::new(scene, &weights);
+    let believed = vec![0.6; scene.objects.len()];
+    let tracer = |round: u64| Tracer {
+        scene,
+        lights: &lights,
+        measured: None,
+        surface_of: &scene.object_of,
+        believed_albedo: &believed,
+        sampling,
+        max_bounces: 1000,
+        seed: sampling as u64,
+        first_sample: round << 20,
+    };
+    let clusters = rows();
+    (0..ROUNDS)
+        .into_par_iter()
+        .map(|round| tracer(round).trace(&clusters, &[SIZE[0]]))
+        .collect()
+}
+
+/// Mean radiance of each row in each channel, over rounds and both sets.
+fn cached(rounds: &[PathCache], unknowns: &Unknowns) -> Vec<[Moments; 3]> {
+    let mut moments = vec![[Moments::default(); 3]; SIZE[1] as usize];
+    for cache in rounds {
+        for (row, sets) in moments.iter_mut().zip(cache.residuals(unknowns)) {
+            for (channel, row) in row.iter_mut().enumerate() {
+                sets.iter().for_each(|set| row.push(-set[channel]));
+            }
+        }
+    }
+    moments
+}
+
+fn rendered(scene: &Arc<Scene>, unknowns: &Unknowns) -> Vec<[Moments; 3]> {
+    let lit = Lit::new(scene.clone(), materials(unknowns), None);
+    let row = |y: u32| {
+        let mut moments = [Moments::default(); 3];
+        for sample in 0..800 {
+            let mut sum = DVec3::ZERO;
+            for x in 0..SIZE[0] {
+                let mut stream = Stream::new(32, u64::from(y), u64::from(x), sample);
+                let [dx, dy] = stream.uniform2();
+                let ray = scene.cameras[0].ray(Vec2::new(x as f32 + dx, y as f32 + dy));
+                let path = radiance(&lit, &ray, &mut stream, &PathOptions::default());
+                sum += path.radiance.as_dvec3();
+            }
+            for (channel, m) in moments.iter_mut().enumerate() {
+                m.push(sum[channel] / f64::from(SIZE[0]));
+            }
+        }
+        moments
+    };
+    (0..SIZE[1]).into_par_iter().map(row).collect()
+}
+
+/// Three sets of unknowns × three ways of finding light × 4 rows × 3 channels are 108 tests at 4.5 standard errors:
+/// together a false alarm in 1,400 seeds.
+#[test]
+fn one_cache_gives_the_radiance_of_any_unknowns_however_light_is_sampled() {
+    let scene = room();
+    let surfaces = scene.objects.len();
+    let values = [0, 1, 2].map(|key| unknowns(surfaces, key));
+    let truth = values.each_ref().map(|unknowns| rendered(&scene, unknowns));
+    for sampling in [
+        LightSampling::Mis,
+        LightSampling::Emitter,
+        LightSampling::Bsdf,
+    ] {
+        let rounds = rounds(&scene, sampling);
+        for (key, (unknowns, truth)) in values.iter().zip(&truth).enumerate() {
+            for (row, (found, truth)) in cached(&rounds, unknowns).iter().zip(truth).enumerate() {
+                for channel in 0..3 {
+                    let (found, truth) = (&found[channel], &truth[channel]);
+                    let error = found.standard_error().hypot(truth.standard_error());
+                    let z = (found.mean - truth.mean) / error;
+                    assert!(
+                        z.abs() < 4.5 && error < 0.2 * truth.mean,
+                        "{sampling:?}, unknowns {key}, row {row}, channel {channel}: {} against {} ± {error}, z {z}",
+                        found.mean,
+                        truth.mean
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// The correlation of the two sets, over rounds and rows, is that of chance: 4 of its standard errors, 6e-5.
+#[test]
+fn the_two_sets_are_independent() {
+    let scene = room();
+    let unknowns = unknowns(scene.objects.len(), 0);
+    let rounds = rounds(&scene, LightSampling::Mis);
+    let means = cached(&rounds, &unknowns);
+    let (mut product, mut squares, mut count) = (0.0, [0.0; 2], 0.0f64);
+    for cache in &rounds {
+        for (row, sets) in cache.residuals(&unknowns).iter().enumerate() {
+            let [a, b] = sets.map(|set| -set[0] - means[row][0].mean);
+            assert_ne!(a, b);
+            let variance = means[row][0].variance();
+            product += a * b / variance;
+            squares[0] += a * a / variance;
+            squares[1] += b * b / variance;
+            count += 1.0;
+        }
+    }
+    let correlation = product / (squares[0] * squares[1]).sqrt();
+    assert!(
+        correlation.abs() < 4.0 / count.sqrt(),
+        "correlation {correlation}"
+    );
+}
+
+#[test]
+fn other_samples_give_other_paths_and_the_same_samples_the_same() {
+    let scene = room();
+    let unknowns = unknowns(scene.objects.len(), 0);
+    let (first, again) = (
+        rounds(&scene, LightSampling::Mis),
+        rounds(&scene, LightSampling::Mis),
+    );
+    assert_eq!(first[0].residuals(&unknowns), again[0].residuals(&unknowns));
+    assert_ne!(first[0].residuals(&unknowns), first[1].residuals(&unknowns));
+}
+
+/// In a closed box that emits E everywhere and reflects ρ, photographs show L = E/(1 − ρ), and a path that ends there
+/// is worth exactly E + ρL.
+#[test]
+fn paths_that_end_in_photographed_radiance_hold_one_bounce_and_that_radiance() {
+    let mesh = scenes::closed_box(1.0, DVec3::ZERO);
+    let views: Vec<scenes::View> = (0..6)
+        .map(|i| {
+            let mut target = DVec3::new(0.0, 0.0, 1e-3);
+            target[i / 2] = [-1.0, 1.0][i % 2];
+            (DVec3::ZERO, target)
+        })
+        .collect();
+    let capture = scenes::capture(mesh, &views, [24, 24]);
+    let scene = Arc::new(Scene::new(&capture).expect("the box is sound"));
+    let (albedo, emission) = (Vec3::new(0.7, 0.5, 0.1), Vec3::new(1.0, 2.0, 0.5));
+    let level = emission / (Vec3::ONE - albedo);
+    let photograph = Arc::new(scenes::photograph([24, 24], vec![level; 576]));
+    let problem = Problem {
+        scene: scene.clone(),
+        photographs: vec![photograph; 6],
+    };
+    let survey = Survey::new(&problem, &Settings::default(), usize::MAX);
+    let measured = MeasuredRadiance::new(&problem, &survey);
+    let lights = Emitters::new(&scene, &[1.0; 6]);
+    let tracer = Tracer {
+        scene: &scene,
+        lights: &lights,
+        measured: Some(&measured),
+        surface_of: &scene.object_of,
+        believed_albedo: &[0.5; 6],
+        sampling: LightSampling::Bsdf,
+        max_bounces: 1000,
+        seed: 1,
+        first_sample: 0,
+    };
+    let clusters = [Cluster {
+        frame: 0,
+        object: 0,
+        pixels: (0..576).collect(),
+        paths: 4,
+        measured: Vec3::ZERO,
+        weight: Vec3::ONE,
+    }];
+    let cache = tracer.trace(&clusters, &[24; 6]);
+    let unknowns = Unknowns {
+        albedo: vec![albedo; 6],
+        emission: vec![emission; 6],
+    };
+    let [a, b] = cache.residuals(&unknowns)[0];
+    for radiance in [-a, -b] {
+        assert!(
+            (radiance - level.as_dvec3()).length() < 2e-3 * f64::from(level.length()),
+            "{radiance} {level}"
+        );
+    }
+    // Nearly all paths end after one bounce: the photographs see the whole box.
+    let vertices = cache.clusters[0].vertices.len() as f64 / cache.clusters[0].ends.len() as f64;
+    assert!(vertices < 1.1, "{vertices} vertices a path");
+    // Half the light there, seen from a surface that reflects all of it.
+    let unknowns = Unknowns {
+        albedo: vec![Vec3::ONE; 6],
+        emission: vec![Vec3::ZERO; 6],
+    };
+    let [a, _] = cache.residuals(&unknowns)[0];
+    assert!(
+        (-a).cmplt(level.as_dvec3() * 1.001).all() && (-a).cmpgt(level.as_dvec3() * 0.9).all(),
+        "{a} {level}"
+    );
+}

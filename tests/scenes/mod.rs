@@ -1,0 +1,176 @@
+//! Rooms made by code, and photographs of them rendered in memory, for tests of light transport and of solvers.
+#![allow(dead_code, reason = "each test uses its own part")]
+
+use glam::{DMat3, DVec3, Vec3};
+use relit::capture::camera::{Intrinsics, Pose};
+use relit::capture::mesh::Mesh;
+use relit::capture::photograph::{Encoding, Photograph, PhotographSource};
+use relit::capture::{Capture, Frame};
+use relit::inverse::solver::Problem;
+use relit::scene::Scene;
+use relit::transport::film::Film;
+use relit::transport::lit::Lit;
+use relit::transport::material::Material;
+use relit::transport::path::PathOptions;
+use std::sync::Arc;
+
+/// Adds a quad, counter-clockwise seen from its front, to the object of that name.
+pub fn quad(mesh: &mut Mesh, name: &str, corners: [DVec3; 4]) {
+    let object = mesh.objects.iter().position(|o| o == name);
+    let object = object.unwrap_or_else(|| {
+        mesh.objects.push(name.to_owned());
+        mesh.objects.len() - 1
+    }) as u32;
+    let first = mesh.positions.len() as u32;
+    mesh.positions.extend(corners);
+    mesh.triangles
+        .extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    mesh.object_of.extend([object, object]);
+}
+
+/// The six faces of a box, each with its name; their fronts look inwards, or outwards.
+fn faces(mesh: &mut Mesh, names: [&str; 6], half: DVec3, center: DVec3, inwards: bool) {
+    for (index, name) in names.into_iter().enumerate() {
+        let (axis, sign) = (index / 2, [-1.0, 1.0][index % 2]);
+        let mut n = DVec3::ZERO;
+        n[axis] = sign;
+        let mut u = DVec3::ZERO;
+        u[(axis + 1) % 3] = 1.0;
+        let v = n.cross(u);
+        // u × (n × u) = n for unit u ⟂ n, so the order that looks along −n is v before u.
+        let at = |a: f64, b: f64| center + (n + v * a + u * b) * half;
+        let mut corners = [at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)];
+        if !inwards {
+            corners.reverse();
+        }
+        quad(mesh, name, corners);
+    }
+}
+
+/// A closed box of half size `half` about `center`, its six faces looking inwards.
+pub fn closed_box(half: f64, center: DVec3) -> Mesh {
+    let mut mesh = Mesh::default();
+    let names = ["left", "right", "floor", "ceiling", "back", "front"];
+    faces(&mut mesh, names, DVec3::splat(half), center, true);
+    mesh
+}
+
+/// Adds a square lamp that looks down.
+pub fn lamp(mesh: &mut Mesh, half: f64, center: DVec3) {
+    let at = |x: f64, z: f64| center + DVec3::new(x, 0.0, z) * half;
+    quad(
+        mesh,
+        "lamp",
+        [at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)],
+    );
+}
+
+/// A room of 2 units with walls of six colours, a lamp below the ceiling, and a block on the floor.
+pub fn lamp_room() -> (Mesh, Vec<Material>) {
+    let mut mesh = closed_box(1.0, DVec3::ZERO);
+    lamp(&mut mesh, 0.35, DVec3::new(0.1, 0.9, -0.1));
+    let (half, center) = (DVec3::new(0.25, 0.3, 0.2), DVec3::new(-0.35, -0.69, -0.3));
+    faces(&mut mesh, ["block"; 6], half, center, false);
+    let materials = [
+        ([0.62, 0.10, 0.08], [0.0; 3]),
+        ([0.12, 0.45, 0.15], [0.0; 3]),
+        ([0.40, 0.32, 0.25], [0.0; 3]),
+        ([0.80, 0.80, 0.78], [0.0; 3]),
+        ([0.70, 0.68, 0.60], [0.0; 3]),
+        ([0.55, 0.58, 0.65], [0.0; 3]),
+        // What a lamp reflects cannot be told from what it emits, so this one reflects nothing.
+        ([0.0; 3], [14.0, 12.0, 9.0]),
+        ([0.25, 0.30, 0.60], [0.0; 3]),
+    ]
+    .map(|(albedo, emission)| Material::diffuse(albedo.into(), emission.into()));
+    (mesh, materials.to_vec())
+}
+
+/// A camera's place and the point in the middle of its picture.
+pub type View = (DVec3, DVec3);
+
+/// Six views of [`lamp_room`] that see all of its objects.
+pub fn room_views() -> [View; 6] {
+    [
+        ([0.7, 0.1, 0.8], [-0.4, -0.3, -0.8]),
+        ([-0.7, 0.2, 0.8], [0.5, 0.0, -0.8]),
+        ([0.8, 0.0, -0.8], [-0.3, 0.2, 0.9]),
+        ([-0.8, -0.1, 0.5], [0.9, -0.5, 0.3]),
+        ([0.6, -0.6, 0.6], [-0.1, 0.9, -0.2]),
+        ([0.85, 0.5, 0.0], [-0.9, -0.6, 0.0]),
+    ]
+    .map(|(center, target)| (DVec3::from_array(center), DVec3::from_array(target)))
+}
+
+/// A capture with a black photograph a view, of a wide lens.
+pub fn capture(mesh: Mesh, views: &[View], [width, height]: [u32; 2]) -> Capture {
+    let focal = 0.6 * f64::from(width);
+    let intrinsics = Intrinsics {
+        width,
+        height,
+        fx: focal,
+        fy: focal,
+        cx: 0.5 * f64::from(width),
+        cy: 0.5 * f64::from(height),
+        distortion: [0.0; 4],
+    };
+    let black = Arc::new(photograph(
+        [width, height],
+        vec![Vec3::ZERO; (width * height) as usize],
+    ));
+    let frames = views.iter().map(|&(center, target)| {
+        let z = (center - target).normalize_or_zero();
+        let x = DVec3::Y.cross(z).normalize_or_zero();
+        Frame {
+            intrinsics,
+            pose: Pose {
+                rotation: DMat3::from_cols(x, z.cross(x), z),
+                center,
+            },
+            exposure: None,
+            photograph: PhotographSource::Memory(black.clone()),
+            depth: None,
+        }
+    });
+    Capture {
+        name: "test".into(),
+        folder: None,
+        frames: frames.collect(),
+        mesh,
+        up: DVec3::Y,
+        warnings: Vec::new(),
+    }
+}
+
+/// A linear photograph that may be used everywhere.
+pub fn photograph([width, height]: [u32; 2], pixels: Vec<Vec3>) -> Photograph {
+    Photograph {
+        width,
+        height,
+        pixels,
+        usable: Vec::new(),
+        encoding: Encoding::Linear,
+        saturation: f32::INFINITY,
+    }
+}
+
+/// A mesh as a scene, with one small camera at the origin.
+pub fn scene_of(mesh: Mesh) -> Arc<Scene> {
+    let capture = capture(mesh, &[(DVec3::ZERO, DVec3::NEG_Z)], [4, 4]);
+    Arc::new(Scene::new(&capture).expect("the test scene is sound"))
+}
+
+/// The photographs of a capture's cameras under given materials, `samples` paths a pixel, all bounces.
+pub fn photographed(capture: &Capture, materials: &[Material], samples: u32, seed: u64) -> Problem {
+    let scene = Arc::new(Scene::new(capture).expect("the test scene is sound"));
+    let lit = Lit::new(scene.clone(), materials.to_vec(), None);
+    let photographs = (0u64..)
+        .zip(&scene.cameras)
+        .map(|(frame, camera)| {
+            let mut film = Film::new(camera);
+            film.add(&lit, camera, &PathOptions::default(), seed, frame, samples);
+            Arc::new(photograph([film.width, film.height], film.mean()))
+        })
+        .collect();
+    Problem { scene, photographs }
+}
