@@ -115,3 +115,96 @@ impl<'a> Monitor<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Answers with what it is told to, after a pause.
+    struct Puppet {
+        answer: Control,
+        pause: Duration,
+    }
+
+    impl Observer for Puppet {
+        fn observe(&mut self, _: &Progress, _: &Estimate) -> Control {
+            std::thread::sleep(self.pause);
+            self.answer.clone()
+        }
+    }
+
+    fn puppet(answer: Control) -> Puppet {
+        Puppet {
+            answer,
+            pause: Duration::ZERO,
+        }
+    }
+
+    fn report(monitor: &mut Monitor) -> Result<(), Termination> {
+        monitor.report(&Estimate::default(), &|progress| {
+            Checkpoint::new(progress, &())
+        })
+    }
+
+    #[test]
+    fn answers_are_obeyed() {
+        let settings = Settings::default();
+        let mut observer = puppet(Control::Stop);
+        let mut monitor = Monitor::new(&settings, &mut observer, Progress::default());
+        let stopped = report(&mut monitor);
+        assert_eq!(stopped, Err(Termination::Cancelled));
+
+        let changed = Settings {
+            batch: 99,
+            ..settings.clone()
+        };
+        let mut observer = puppet(Control::Change(Box::new(changed)));
+        let mut monitor = Monitor::new(&settings, &mut observer, Progress::default());
+        assert_eq!(report(&mut monitor), Ok(()));
+        assert_eq!(monitor.settings.batch, 99);
+    }
+
+    #[test]
+    fn earlier_runs_count_towards_the_time_limit() {
+        let settings = Settings {
+            time: 100.0,
+            ..Settings::default()
+        };
+        for (earlier, end) in [(0.0, Ok(())), (100.0, Err(Termination::Time))] {
+            let progress = Progress {
+                seconds: earlier,
+                ..Progress::default()
+            };
+            let mut observer = puppet(Control::Continue);
+            let mut monitor = Monitor::new(&settings, &mut observer, progress);
+            assert_eq!(report(&mut monitor), end);
+            assert!(monitor.progress.seconds >= earlier);
+        }
+    }
+
+    #[test]
+    fn the_observers_time_is_not_the_solvers() {
+        let pause = Duration::from_millis(50);
+        let begun = Instant::now();
+        let mut observer = Puppet {
+            answer: Control::Continue,
+            pause,
+        };
+        let mut monitor = Monitor::new(&Settings::default(), &mut observer, Progress::default());
+        assert!(monitor.due());
+        assert_eq!(report(&mut monitor), Ok(()));
+        let seconds = monitor.seconds();
+        assert!(seconds <= (begun.elapsed() - pause).as_secs_f64());
+    }
+
+    #[test]
+    fn only_samples_that_were_dropped_are_counted() {
+        let mut observer = puppet(Control::Continue);
+        let mut monitor = Monitor::new(&Settings::default(), &mut observer, Progress::default());
+        monitor.rejected("a", 0);
+        monitor.rejected("b", 2);
+        monitor.rejected("b", 3);
+        let counts: Vec<_> = monitor.progress.rejected.into_iter().collect();
+        assert_eq!(counts, [("b".to_owned(), 5)]);
+    }
+}

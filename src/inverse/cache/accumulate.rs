@@ -61,3 +61,110 @@ impl Accumulated {
         NormalEquations::new(&mean, n)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inverse::cache::clusters::Cluster;
+    use crate::inverse::cache::{CachedCluster, NO_LAMP, PathCache, Vertex};
+    use crate::inverse::parameters::Unknowns;
+    use crate::math::rng::Stream;
+    use glam::Vec3;
+
+    const SURFACES: usize = 3;
+    const PIXELS: usize = 2;
+    const PATHS: usize = 2;
+    const ROUNDS: usize = 3;
+
+    fn random_path(key: u64) -> Vec<Vertex> {
+        let mut stream = Stream::new(51, 0, 0, key);
+        (0..1 + stream.below(4))
+            .map(|_| Vertex {
+                surface: stream.below(SURFACES) as u32,
+                lamp: [NO_LAMP, stream.below(SURFACES) as u32][stream.below(2)],
+                lamp_weight: stream.uniform(),
+                emission_weight: stream.uniform(),
+                known: Vec3::splat(stream.uniform()),
+            })
+            .collect()
+    }
+
+    /// One cluster with the given paths for each pixel and set.
+    fn cache(paths: impl Fn(usize, usize) -> Vec<Vec<Vertex>>) -> PathCache {
+        let (mut vertices, mut ends, mut count) = (Vec::new(), Vec::new(), 0);
+        for (pixel, set) in (0..PIXELS).flat_map(|p| [(p, 0), (p, 1)]) {
+            let paths = paths(pixel, set);
+            count = paths.len() as u32;
+            for path in paths {
+                vertices.extend(path);
+                ends.push(vertices.len() as u32);
+            }
+        }
+        let cluster = Cluster {
+            frame: 0,
+            object: 0,
+            pixels: (0..PIXELS as u32).collect(),
+            paths: count,
+            measured: Vec3::new(0.5, 0.6, 0.7),
+            weight: Vec3::new(1.0, 2.0, 3.0),
+        };
+        PathCache {
+            clusters: vec![CachedCluster {
+                cluster,
+                vertices,
+                ends,
+            }],
+            ..Default::default()
+        }
+    }
+
+    /// The paths of one round through a pixel, of one set.
+    fn round(round: usize, pixel: usize, set: usize) -> Vec<Vec<Vertex>> {
+        (0..PATHS)
+            .map(|path| random_path((((round * PIXELS + pixel) * 2 + set) * PATHS + path) as u64))
+            .collect()
+    }
+
+    #[test]
+    fn rounds_add_up_to_the_normal_equations_of_all_their_paths() {
+        let unknowns = Unknowns {
+            albedo: vec![Vec3::new(0.3, 0.5, 0.8); SURFACES],
+            emission: vec![Vec3::new(1.0, 2.0, 0.5); SURFACES],
+        };
+        // All but one parameter are free.
+        let free: Vec<usize> = (0..2 * SURFACES).filter(|&p| p != 4).collect();
+        let mut place = vec![usize::MAX; 2 * SURFACES];
+        free.iter().enumerate().for_each(|(row, &p)| place[p] = row);
+
+        let mut sums = Accumulated::default();
+        for r in 0..ROUNDS {
+            let cache = cache(|pixel, set| round(r, pixel, set));
+            sums.add(cache.linearise(&unknowns, &place));
+        }
+        assert_eq!(sums.rounds(), ROUNDS as u32);
+        let found = sums.equations(free.len());
+        let together = cache(|pixel, set| (0..ROUNDS).flat_map(|r| round(r, pixel, set)).collect());
+        let wanted = together.normal_equations(&unknowns, &free);
+
+        assert_eq!(found.clusters, wanted.clusters);
+        assert!((found.objective - wanted.objective).length() < 1e-5);
+        for c in 0..3 {
+            let largest = wanted.hessian[c].amax();
+            assert!(largest > 0.0);
+            assert!((&found.hessian[c] - &wanted.hessian[c]).amax() < 1e-5 * largest);
+            let largest = wanted.scatter[c].amax();
+            assert!((&found.scatter[c] - &wanted.scatter[c]).amax() < 1e-5 * largest);
+            let largest = wanted.descent[c].amax();
+            assert!((&found.descent[c] - &wanted.descent[c]).amax() < 1e-5 * largest);
+            let largest = wanted.information[c].amax();
+            assert!((&found.information[c] - &wanted.information[c]).amax() < 1e-5 * largest);
+        }
+    }
+
+    #[test]
+    fn without_rounds_there_is_nothing_to_know() {
+        let equations = Accumulated::default().equations(2);
+        assert_eq!(equations.clusters, 0);
+        assert_eq!(equations.hessian[0].amax(), 0.0);
+    }
+}

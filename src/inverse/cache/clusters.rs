@@ -83,13 +83,13 @@ pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cl
         .collect()
 }
 
-/// Median over photographed pixels, per channel; one where all are black.
+/// Median over photographed pixels that are in the fit, per channel; one where all are black.
 fn typical_level(problem: &Problem, survey: &Survey) -> Vec3 {
     let channel = |c: usize| {
         let mut values: Vec<f32> = survey
             .pixels
             .iter()
-            .filter(|p| p.object != u32::MAX)
+            .filter(|p| !p.held_out && p.object != u32::MAX)
             .map(|p| problem.photographs[p.frame as usize].pixels[p.pixel as usize][c])
             .filter(|&v| v > 0.0)
             .collect();
@@ -115,5 +115,45 @@ pub fn share_paths(clusters: &mut [Cluster], objects: usize, total: u64) {
         // Half of the paths go to each set.
         let per_pixel = total as f64 * 0.5 / (sum * n.sqrt());
         cluster.paths = per_pixel.round().clamp(1.0, 4096.0) as u32;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pixels(object: u32, count: u32) -> Cluster {
+        Cluster {
+            frame: 0,
+            object,
+            pixels: (0..count).collect(),
+            paths: 1,
+            measured: Vec3::ZERO,
+            weight: Vec3::ONE,
+        }
+    }
+
+    #[test]
+    fn small_objects_get_more_paths_a_pixel_and_all_together_what_was_asked() {
+        let mut clusters = vec![pixels(0, 5_000), pixels(0, 5_000), pixels(1, 100)];
+        share_paths(&mut clusters, 2, 1_100_000);
+        // Objects share as √10,000 to √100, half of it in each set.
+        assert_eq!(clusters[0].paths, 50);
+        assert_eq!(clusters[1].paths, 50);
+        assert_eq!(clusters[2].paths, 500);
+        let total: usize = (clusters.iter())
+            .map(|c| 2 * c.pixels.len() * c.paths as usize)
+            .sum();
+        assert_eq!(total, 1_100_000);
+    }
+
+    #[test]
+    fn every_pixel_gets_a_path_however_few_there_are() {
+        for total in [0, 1, 1000] {
+            let mut clusters = vec![pixels(0, 5_000), pixels(1, 1)];
+            share_paths(&mut clusters, 3, total);
+            assert!(clusters.iter().all(|c| c.paths >= 1));
+        }
+        share_paths(&mut [], 0, 100);
     }
 }

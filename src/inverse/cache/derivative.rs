@@ -187,7 +187,7 @@ mod tests {
         let unknowns = random_unknowns(&mut stream);
         let paths = [random_path(&mut stream), random_path(&mut stream)];
         let (mut gathered, mut both) = (Vec::new(), Gradient::new(2 * SURFACES));
-        let mut each = vec![Vec3::ZERO; 2 * SURFACES];
+        let mut each = [Vec3::ZERO; 2 * SURFACES];
         for path in &paths {
             differentiate(path, &unknowns, &mut gathered, &mut both);
             let mut alone = Gradient::new(2 * SURFACES);

@@ -97,10 +97,10 @@ pub fn standard_errors(
             let index = free[row];
             let error = covariance[(a, a)].max(0.0).sqrt() as f32;
             let known = equations.hessian[channel][(row, row)] > 0.0;
-            match (index < objects, known) {
-                (true, _) => errors.albedo[index][channel] = error,
-                (false, true) => errors.emission[index - objects][channel] = error,
-                (false, false) => {}
+            match (known, index.checked_sub(objects)) {
+                (true, None) => errors.albedo[index][channel] = error,
+                (true, Some(emitter)) => errors.emission[emitter][channel] = error,
+                (false, _) => {}
             }
         }
     }

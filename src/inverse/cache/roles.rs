@@ -105,3 +105,70 @@ pub fn choose(cache: &PathCache, reflecting: &Unknowns, seen: &[u64]) -> (Vec<Ro
         .collect();
     (roles, mean.iter().map(|m| m.as_vec3()).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inverse::cache::clusters::Cluster;
+    use crate::inverse::cache::{CachedCluster, NO_LAMP, Vertex};
+
+    /// A cluster of an object whose paths gather `light` with some noise and whose photograph shows `measured`.
+    fn cluster(object: u32, index: usize, light: f32, measured: f32) -> CachedCluster {
+        let path = |set: usize| Vertex {
+            surface: object,
+            lamp: NO_LAMP,
+            lamp_weight: 0.0,
+            emission_weight: 1.0,
+            known: Vec3::splat(light * (1.0 + 0.02 * ((index * 7 + set * 3) % 5) as f32 - 0.04)),
+        };
+        CachedCluster {
+            cluster: Cluster {
+                frame: 0,
+                object,
+                pixels: vec![0],
+                paths: 1,
+                measured: Vec3::splat(measured),
+                weight: Vec3::splat(1.0 / (measured * measured + 0.25)),
+            },
+            vertices: vec![path(0), path(1)],
+            ends: vec![1, 2],
+        }
+    }
+
+    /// A wall in uneven light that reflects 0.6, a lamp far brighter than what reaches it, an object that no pixel sees.
+    fn room() -> PathCache {
+        let mut cache = PathCache::default();
+        for index in 0..40 {
+            let light = 0.5 + 0.05 * index as f32;
+            cache.clusters.push(cluster(0, index, light, 0.6 * light));
+            cache.clusters.push(cluster(1, index, 0.3, 8.0));
+        }
+        cache
+    }
+
+    #[test]
+    fn a_lamp_is_an_emitter_of_its_radiance_and_a_wall_a_reflector() {
+        let mut reflecting = Unknowns::new(3);
+        reflecting.albedo[0] = Vec3::splat(0.6);
+        reflecting.albedo[1] = Vec3::ONE;
+        let (roles, radiance) = choose(&room(), &reflecting, &[40, 40, 0]);
+        assert_eq!(roles, [Role::Reflector, Role::Emitter, Role::Unseen]);
+        assert!((radiance[1] - Vec3::splat(8.0)).length() < 1e-5);
+        assert_eq!(free(&roles), [0, 3 + 1, 3 + 2]);
+    }
+
+    #[test]
+    fn an_evenly_lit_wall_stays_a_reflector_though_one_radiance_would_explain_it_too() {
+        let mut cache = PathCache::default();
+        (0..40).for_each(|index| cache.clusters.push(cluster(0, index, 1.0, 0.6)));
+        let mut reflecting = Unknowns::new(1);
+        reflecting.albedo[0] = Vec3::splat(0.6);
+        assert_eq!(choose(&cache, &reflecting, &[40]).0, [Role::Reflector]);
+    }
+
+    #[test]
+    fn nothing_to_look_at_leaves_reflectors() {
+        let roles = choose(&PathCache::default(), &Unknowns::new(2), &[5, 0]).0;
+        assert_eq!(roles, [Role::Reflector, Role::Unseen]);
+    }
+}
