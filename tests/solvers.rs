@@ -337,7 +337,7 @@ fn time_steps_and_a_stop_end_every_solver_by_their_name() {
         let timed = run(
             &ROOM.0,
             &Settings {
-                time: 0.05,
+                time: 1e-3,
                 ..settings.clone()
             },
         );
