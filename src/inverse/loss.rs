@@ -79,7 +79,7 @@ impl LossProbe {
 
     /// Renders both sets with an estimate.
     pub fn measure(&self, problem: &Problem, estimate: &Estimate) -> Losses {
-        let lit = Lit::new(problem.scene.clone(), estimate.materials(), None);
+        let lit = estimate.lit(&problem.scene);
         let (train, train_rays) = self.difference(problem, &lit, &self.train);
         let (held_out, held_out_rays) = self.difference(problem, &lit, &self.held_out);
         Losses {

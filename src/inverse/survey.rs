@@ -6,11 +6,14 @@ use crate::inverse::solver::Problem;
 use crate::math::rng::{Stream, splitmix64};
 use crate::scene::Scene;
 use crate::scene::geometry::Hit;
+use crate::scene::visibility::IdBuffers;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 /// Rays through a pixel besides the one through its centre: one in each quarter.
 const QUARTERS: usize = 4;
+/// All pixels are looked at of objects that fewer pixels than this see.
+const RARE: u64 = 2_000;
 /// First of the sample keys of survey rays, far from those of paths.
 const KEY: u64 = 1 << 62;
 
@@ -42,12 +45,12 @@ pub struct SurveyPoint {
     pub object: u32,
 }
 
-/// All usable pixels (or a keyed share of very many) and how often each object was seen.
+/// The usable pixels that were looked at, and how often each object was seen.
 #[derive(Debug, Clone)]
 pub struct Survey {
     /// In order of frame and pixel.
     pub pixels: Vec<SurveyedPixel>,
-    /// For each object, pixels whose centre sees it (scaled up where only a share was looked at).
+    /// For each object, pixels whose centre sees it.
     pub seen: Vec<u64>,
     /// Median size of a pixel's footprint on the surfaces, in metres; zero where no pixel sees the mesh.
     pub footprint: f32,
@@ -56,9 +59,16 @@ pub struct Survey {
 }
 
 impl Survey {
-    /// Casts the rays of all pixels, or of a keyed share of about `most_pixels`.
+    /// Casts the rays of all pixels, or of a keyed share of about `most_pixels` and of the objects that few pixels see.
     pub fn new(problem: &Problem, settings: &Settings, most_pixels: usize) -> Self {
         let scene = &*problem.scene;
+        let centers = IdBuffers::new(scene);
+        let seen: Vec<u64> = centers
+            .front_pixels
+            .iter()
+            .zip(&centers.back_pixels)
+            .map(|(f, b)| f + b)
+            .collect();
         let total: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
         let share = (most_pixels as f64 / total.max(1) as f64).min(1.0);
         let frames: Vec<(Vec<SurveyedPixel>, Vec<f32>)> = problem
@@ -70,7 +80,12 @@ impl Survey {
                 let mut footprints = Vec::new();
                 for pixel in 0..photograph.pixels.len() {
                     let usable = photograph.usable.is_empty() || photograph.usable[pixel];
-                    if !usable || !drawn(share, frame as u64, pixel as u64) {
+                    let triangle = centers.triangles[frame][pixel] as usize;
+                    let rare = scene
+                        .object_of
+                        .get(triangle)
+                        .is_some_and(|&k| seen[k as usize] < RARE);
+                    if !usable || !(rare || drawn(share, frame as u64, pixel as u64)) {
                         continue;
                     }
                     let held_out = is_held_out(settings, frame as u32, pixel as u32);
@@ -89,20 +104,11 @@ impl Survey {
             })
             .collect();
 
-        let mut seen = vec![0u64; scene.objects.len()];
         let mut pixels = Vec::with_capacity(frames.iter().map(|f| f.0.len()).sum());
         let mut footprints = Vec::with_capacity(pixels.capacity());
         for (frame_pixels, frame_footprints) in frames {
-            for pixel in &frame_pixels {
-                if let Some(count) = seen.get_mut(pixel.object as usize) {
-                    *count += 1;
-                }
-            }
             pixels.extend(frame_pixels);
             footprints.extend(frame_footprints);
-        }
-        for count in &mut seen {
-            *count = (*count as f64 / share).round() as u64;
         }
         let middle = footprints.len() / 2;
         let footprint = if footprints.is_empty() {
@@ -110,7 +116,7 @@ impl Survey {
         } else {
             *footprints.select_nth_unstable_by(middle, f32::total_cmp).1
         };
-        let rays = pixels.len() as u64 * (QUARTERS as u64 + 1);
+        let rays = total as u64 + pixels.len() as u64 * (QUARTERS as u64 + 1);
         Self {
             pixels,
             seen,

@@ -82,11 +82,7 @@ impl Environment {
     }
 
     fn pixel(&self, direction: Vec3) -> usize {
-        let theta = direction.y.clamp(-1.0, 1.0).acos();
-        let row = ((theta / PI * self.height as f32) as usize).min(self.height - 1);
-        let phi = direction.z.atan2(direction.x).rem_euclid(2.0 * PI);
-        let column = ((phi / (2.0 * PI) * self.width as f32) as usize).min(self.width - 1);
-        row * self.width + column
+        pixel_of(self.width, self.height, direction)
     }
 
     fn pixel_pdf(&self, index: usize) -> f32 {
@@ -102,6 +98,15 @@ impl Environment {
         let solid_angle = row_solid_angle(index / self.width, self.width, self.height);
         ((self.cumulative[index] - low) / total / solid_angle) as f32
     }
+}
+
+/// The pixel of a `width` × `height` map that a unit direction falls into, row by row.
+pub fn pixel_of(width: usize, height: usize, direction: Vec3) -> usize {
+    let theta = direction.y.clamp(-1.0, 1.0).acos();
+    let row = ((theta / PI * height as f32) as usize).min(height - 1);
+    let phi = direction.z.atan2(direction.x).rem_euclid(2.0 * PI);
+    let column = ((phi / (2.0 * PI) * width as f32) as usize).min(width - 1);
+    row * width + column
 }
 
 /// Cosines of the upper and lower edge of a row.

@@ -12,6 +12,8 @@ use std::collections::BTreeMap;
 const CLUSTER_PIXELS: f64 = 48.0;
 /// Objects seen by fewer pixels than this are also fitted at their edges.
 const SMALL: u64 = 400;
+/// Pixels above this share of saturation may have been brighter than they show, and are left out.
+const BELOW_SATURATION: f32 = 0.97;
 /// Below this share of a typical photograph's level, pixels weigh no more for being darker.
 const DARK: f32 = 0.5;
 
@@ -40,6 +42,11 @@ pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cl
         .pixels
         .iter()
         .filter(|p| !p.held_out && p.object != u32::MAX && (p.pure || seen(p.object) < SMALL))
+        .filter(|p| {
+            let photograph = &problem.photographs[p.frame as usize];
+            photograph.pixels[p.pixel as usize].max_element()
+                < photograph.saturation * BELOW_SATURATION
+        })
         .collect();
     let thinning = (usable.len() as f64 / most_pixels.max(1) as f64).max(1.0);
     let tile = (CLUSTER_PIXELS * thinning).sqrt().round().max(1.0) as u32;

@@ -3,7 +3,8 @@
 use super::errors::StandardErrors;
 use super::fit::PRIOR_DEVIATION;
 use super::roles::Role;
-use crate::inverse::estimate::{Estimate, ObjectEstimate};
+use super::trace::OutsideGrid;
+use crate::inverse::estimate::{Estimate, ObjectEstimate, Outside};
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::survey::Survey;
 use crate::math::color::luminance;
@@ -22,9 +23,10 @@ pub fn estimate(
     roles: &[Role],
     unknowns: &Unknowns,
     errors: &StandardErrors,
+    outside: OutsideGrid,
 ) -> Estimate {
     let typical = typical_albedo(scene, roles, unknowns, errors);
-    let objects = (0..roles.len())
+    let objects = (0..scene.objects.len())
         .map(|k| {
             let seen = survey.seen[k];
             let mut object = ObjectEstimate {
@@ -74,8 +76,15 @@ pub fn estimate(
             object
         })
         .collect();
+    let pixels = unknowns.emission[scene.objects.len()..].to_vec();
+    let outside = pixels.iter().any(|&p| p != Vec3::ZERO).then_some(Outside {
+        width: outside.width as u32,
+        height: outside.height as u32,
+        pixels,
+    });
     Estimate {
         objects,
+        outside,
         ..Default::default()
     }
 }

@@ -69,6 +69,21 @@ impl PathCache {
             .sum()
     }
 
+    /// Share of the paths whose last vertex lies on a surface from `first` on.
+    pub fn share_ending_on(&self, first: u32) -> f64 {
+        let (mut ending, mut all) = (0u64, 0u64);
+        for cached in &self.clusters {
+            all += cached.ends.len() as u64;
+            let mut start = 0;
+            for &end in &cached.ends {
+                let path = &cached.vertices[start..end as usize];
+                ending += u64::from(path.last().is_some_and(|v| v.surface >= first));
+                start = end as usize;
+            }
+        }
+        ending as f64 / all.max(1) as f64
+    }
+
     /// Adds another cache's clusters.
     pub fn append(&mut self, mut other: Self) {
         self.clusters.append(&mut other.clusters);

@@ -36,6 +36,18 @@ impl Role {
 /// How many noise variances a squared error must exceed another's by to decide a role.
 const DECISIVE: f64 = 25.0;
 
+/// How many standard deviations of the paths' noise besides.
+const SURE: f64 = 5.0;
+
+/// Roles chosen from photographs.
+#[derive(Debug, Clone)]
+pub struct Choice {
+    /// One a surface.
+    pub roles: Vec<Role>,
+    /// What each emits if it is an emitter.
+    pub radiance: Vec<Vec3>,
+}
+
 /// The parameters that are fitted under some roles: indices into albedos, then emissions.
 pub fn free(roles: &[Role]) -> Vec<usize> {
     let albedo = (0..roles.len()).filter(|&k| roles[k].reflects());
@@ -47,63 +59,127 @@ pub fn free(roles: &[Role]) -> Vec<usize> {
 
 /// Chooses for each object between a reflector, as fitted in `reflecting`, and an emitter of one radiance, by the
 /// squared error over its clusters.
-pub fn choose(cache: &PathCache, reflecting: &Unknowns, seen: &[u64]) -> (Vec<Role>, Vec<Vec3>) {
-    let objects = reflecting.surfaces();
+pub fn choose(cache: &PathCache, reflecting: &Unknowns, seen: &[u64]) -> Choice {
     let residuals = cache.residuals(reflecting);
-
-    // The weighted mean radiance of each object: what it emits if it is an emitter.
-    let mut sums = vec![(DVec3::ZERO, DVec3::ZERO); objects];
-    for cached in &cache.clusters {
-        let (weight, measured) = (
-            cached.cluster.weight.as_dvec3(),
-            cached.cluster.measured.as_dvec3(),
-        );
-        let sum = &mut sums[cached.cluster.object as usize];
-        sum.0 += weight * measured;
-        sum.1 += weight;
-    }
-    let mean: Vec<DVec3> = sums
+    let radiance = mean_radiance(cache, reflecting.surfaces());
+    let emits = plainly_emits(cache, &residuals, &radiance);
+    let roles = emits
         .iter()
-        .map(|&(wm, w)| {
-            if w.min_element() > 0.0 {
-                wm / w
-            } else {
-                DVec3::ZERO
-            }
-        })
-        .collect();
-
-    // Squared error of both hypotheses, and the typical one of a cluster.
-    let mut advantage = vec![0.0; objects];
-    let mut noise: Vec<f64> = Vec::with_capacity(residuals.len());
-    for (cached, [a, b]) in cache.clusters.iter().zip(&residuals) {
-        let object = cached.cluster.object as usize;
-        let weight = cached.cluster.weight.as_dvec3();
-        let emitting = cached.cluster.measured.as_dvec3() - mean[object];
-        advantage[object] += (weight * (*a * *b - emitting * emitting)).element_sum();
-        let both = (*a + *b) * 0.5;
-        noise.push((weight * both * both).element_sum());
-    }
-    let middle = noise.len() / 2;
-    let typical = if noise.is_empty() {
-        0.0
-    } else {
-        *noise.select_nth_unstable_by(middle, f64::total_cmp).1
-    };
-
-    let roles = (0..objects)
-        .map(|k| {
-            match (
-                seen[k],
-                advantage[k] > DECISIVE * typical && mean[k].max_element() > 0.0,
-            ) {
+        .enumerate()
+        .map(
+            |(k, &emits)| match (seen.get(k).copied().unwrap_or(0), emits) {
                 (0, _) => Role::Unseen,
                 (_, true) => Role::Emitter,
                 (_, false) => Role::Reflector,
+            },
+        )
+        .collect();
+    Choice {
+        roles,
+        radiance: radiance.iter().map(|m| m.as_vec3()).collect(),
+    }
+}
+
+/// The emitters that would do as well as reflectors in the light of all the others, with the albedo they would have.
+pub fn doubtful(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<(usize, Vec3)> {
+    let surfaces = unknowns.surfaces();
+    let place: Vec<usize> = (0..2 * surfaces)
+        .map(|i| {
+            if i < surfaces && roles[i] == Role::Emitter {
+                i
+            } else {
+                usize::MAX
             }
         })
         .collect();
-    (roles, mean.iter().map(|m| m.as_vec3()).collect())
+    let linearised = cache.linearise(unknowns, &place);
+
+    // With no albedo of its own, an emitter's derivative is the light that it receives: fit its photographs to that.
+    let received = |cluster: usize, k: usize| {
+        let row = linearised[cluster].rows.iter().find(|r| r.0 == k);
+        row.map_or([DVec3::ZERO; 2], |&(_, a, b)| [a, b])
+    };
+    let mut sums = vec![(DVec3::ZERO, DVec3::ZERO); surfaces];
+    for (index, cached) in cache.clusters.iter().enumerate() {
+        let k = cached.cluster.object as usize;
+        if roles[k] == Role::Emitter {
+            let (weight, [a, b]) = (cached.cluster.weight.as_dvec3(), received(index, k));
+            sums[k].0 += weight * (a + b) * 0.5 * cached.cluster.measured.as_dvec3();
+            sums[k].1 += weight * a * b;
+        }
+    }
+    let albedo: Vec<DVec3> = sums
+        .iter()
+        .map(|&(top, bottom)| {
+            (top / bottom.max(DVec3::splat(f64::MIN_POSITIVE))).clamp(DVec3::ZERO, DVec3::ONE)
+        })
+        .collect();
+    let residuals: Vec<[DVec3; 2]> = (cache.clusters.iter().enumerate())
+        .map(|(index, cached)| {
+            let k = cached.cluster.object as usize;
+            if roles[k] == Role::Emitter {
+                received(index, k)
+                    .map(|light| cached.cluster.measured.as_dvec3() - albedo[k] * light)
+            } else {
+                linearised[index].residuals
+            }
+        })
+        .collect();
+    let emits = plainly_emits(cache, &residuals, &mean_radiance(cache, surfaces));
+    (0..surfaces)
+        .filter(|&k| roles[k] == Role::Emitter && !emits[k])
+        .map(|k| (k, albedo[k].as_vec3()))
+        .collect()
+}
+
+/// The weighted mean radiance of each surface: what it emits if it is an emitter.
+fn mean_radiance(cache: &PathCache, surfaces: usize) -> Vec<DVec3> {
+    let mut sums = vec![(DVec3::ZERO, DVec3::ZERO); surfaces];
+    for cached in &cache.clusters {
+        let weight = cached.cluster.weight.as_dvec3();
+        let sum = &mut sums[cached.cluster.object as usize];
+        sum.0 += weight * cached.cluster.measured.as_dvec3();
+        sum.1 += weight;
+    }
+    let mean = |(top, bottom): (DVec3, DVec3)| {
+        if bottom.min_element() > 0.0 {
+            top / bottom
+        } else {
+            DVec3::ZERO
+        }
+    };
+    sums.into_iter().map(mean).collect()
+}
+
+/// For each surface, whether one emitted radiance explains its clusters plainly better than what it would reflect,
+/// given the residuals of the latter.
+fn plainly_emits(cache: &PathCache, reflecting: &[[DVec3; 2]], radiance: &[DVec3]) -> Vec<bool> {
+    let mut advantage = vec![0.0; radiance.len()];
+    let mut doubt = vec![0.0f64; radiance.len()];
+    let mut errors: Vec<f64> = Vec::with_capacity(reflecting.len());
+    for (cached, [a, b]) in cache.clusters.iter().zip(reflecting) {
+        let k = cached.cluster.object as usize;
+        let weight = cached.cluster.weight.as_dvec3();
+        let emitting = cached.cluster.measured.as_dvec3() - radiance[k];
+        advantage[k] += (weight * (*a * *b - emitting * emitting)).element_sum();
+        // The product of two residuals of mean r and path variance s² varies by 2 r² s² + s⁴.
+        let both = (*a + *b) * 0.5;
+        let paths = (*a - *b) * (*a - *b) * 0.5;
+        doubt[k] += (weight * weight * paths * (both * both * 2.0 + paths)).element_sum();
+        errors.push((weight * both * both).element_sum());
+    }
+    let middle = errors.len() / 2;
+    let typical = if errors.is_empty() {
+        0.0
+    } else {
+        *errors.select_nth_unstable_by(middle, f64::total_cmp).1
+    };
+    (0..radiance.len())
+        .map(|k| {
+            let threshold = DECISIVE * typical + SURE * doubt[k].sqrt();
+            advantage[k] > threshold && radiance[k].max_element() > 0.0
+        })
+        .collect()
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::geometry::{Hit, Ray, offset_origin};
 use crate::transport::emitters::Emitters;
+use crate::transport::environment::pixel_of;
 use crate::transport::path::power_heuristic;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -34,6 +35,8 @@ pub struct Tracer<'a> {
     pub surface_of: &'a [u32],
     /// For each surface, the largest channel of its albedo as believed now; only steers where paths end.
     pub believed_albedo: &'a [f32],
+    /// Surfaces that stand for light from outside, by direction; `None` lets escaping rays find nothing.
+    pub outside: Option<OutsideGrid>,
     /// How light is found at a vertex.
     pub sampling: LightSampling,
     /// Longest path in bounces.
@@ -42,6 +45,30 @@ pub struct Tracer<'a> {
     pub seed: u64,
     /// Sample index of the first path; caches with other ranges are independent.
     pub first_sample: u64,
+}
+
+/// Directions out of the mesh, cut into the pixels of a map; each is a surface with an emission.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OutsideGrid {
+    /// Index of the first pixel's surface.
+    pub first: u32,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+impl OutsideGrid {
+    /// The vertex at which a path ends that leaves in a unit direction.
+    fn vertex(&self, direction: Vec3, weight: f32) -> Vertex {
+        Vertex {
+            surface: self.first + pixel_of(self.width, self.height, direction) as u32,
+            lamp: NO_LAMP,
+            lamp_weight: 0.0,
+            emission_weight: weight,
+            known: Vec3::ZERO,
+        }
+    }
 }
 
 impl Tracer<'_> {
@@ -116,6 +143,10 @@ impl Tracer<'_> {
     fn path(&self, camera_ray: &Ray, stream: &mut Stream, vertices: &mut Vec<Vertex>) -> u64 {
         let mut rays = 1;
         let Some(mut hit) = self.scene.intersect(camera_ray) else {
+            vertices.extend(
+                self.outside
+                    .map(|grid| grid.vertex(camera_ray.direction, 1.0)),
+            );
             return rays;
         };
         let mut wo = -camera_ray.direction;
@@ -173,6 +204,8 @@ impl Tracer<'_> {
             let next = self.scene.intersect(&Ray::new(origin, wi));
             let Some(next) = next else {
                 vertices.push(vertex);
+                // Light from outside is met by BSDF sampling alone, so it has the whole weight.
+                vertices.extend(self.outside.map(|grid| grid.vertex(wi, scale)));
                 return rays;
             };
 

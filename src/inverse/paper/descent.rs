@@ -154,6 +154,7 @@ impl Descent {
             measured: None,
             surface_of,
             believed_albedo: &believed,
+            outside: None,
             sampling: settings.light_sampling,
             max_bounces: bounces,
             seed: settings.seed,

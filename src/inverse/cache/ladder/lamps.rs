@@ -58,6 +58,23 @@ impl Ladder<'_, '_> {
         }
     }
 
+    /// Takes emitters that would do as well as reflectors for such, and refits.
+    pub(super) fn test_emitters(&mut self, cache: &PathCache) -> Result<(), Termination> {
+        loop {
+            let doubtful = roles::doubtful(cache, &self.unknowns, &self.roles);
+            if doubtful.is_empty() {
+                return Ok(());
+            }
+            for (k, albedo) in doubtful {
+                self.roles[k] = Role::Reflector;
+                self.unknowns.albedo[k] = albedo;
+                self.unknowns.emission[k] = Vec3::ZERO;
+            }
+            let fitted = self.fit(cache)?;
+            self.take(fitted);
+        }
+    }
+
     /// Tests whether any reflector or dark object gives light after all: the one that the paths call for most is set
     /// free, refitted, and kept if it stays significant. Returns their names.
     pub(super) fn test_glow(&mut self, cache: &PathCache) -> Result<Vec<String>, Termination> {
@@ -88,7 +105,13 @@ impl Ladder<'_, '_> {
                 (self.unknowns, self.errors, self.roles) = before;
                 break;
             }
-            added.push(self.problem.scene.objects[k].name.clone());
+            let name = self
+                .problem
+                .scene
+                .objects
+                .get(k)
+                .map_or("outside", |o| &o.name);
+            added.push(name.to_owned());
         }
         Ok(added)
     }

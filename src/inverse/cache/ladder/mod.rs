@@ -1,6 +1,7 @@
 //! The transport-cache solver: a light-field start, then rounds of full paths until the errors are small enough.
 
 mod lamps;
+mod light_field;
 
 use super::accumulate::Accumulated;
 use super::budget::Budget;
@@ -9,7 +10,7 @@ use super::errors::{StandardErrors, standard_errors};
 use super::fit::{Fit, fit, propose};
 use super::reached::Reached;
 use super::roles::{self, Role};
-use super::trace::Tracer;
+use super::trace::{OutsideGrid, Tracer};
 use super::{PathCache, describe};
 use crate::error;
 use crate::inverse::estimate::Estimate;
@@ -20,18 +21,18 @@ use crate::inverse::parameters::Unknowns;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Problem, Solution, Stage, Termination};
 use crate::inverse::survey::Survey;
-use crate::math::color::luminance;
 use crate::transport::emitters::Emitters;
 use glam::Vec3;
 use std::time::{Duration, Instant};
 
 /// Gauss–Newton steps at most in one fit.
 const MOST_STEPS: u64 = 30;
-/// A step larger than this (in albedo, or relative in emission) asks for linearising anew.
-const NONLINEAR: f32 = 0.005;
-/// Relative error of albedo that the light field's resolution is trusted to stay below, where edges blur: a
-/// cautious assumption until full paths have replaced it.
-const LIGHT_FIELD_BIAS: f32 = 0.01;
+/// A step (in albedo, or relative in emission) asks for linearising anew
+/// when it is larger than so many times the median error aimed at.
+const NONLINEAR: f64 = 10.0;
+/// Columns and rows of the map of light from outside.
+const OUTSIDE_WIDTH: usize = 6;
+const OUTSIDE_HEIGHT: usize = 3;
 /// Work between two reports to the observer.
 const SLICE: Duration = Duration::from_millis(25);
 
@@ -45,6 +46,7 @@ pub struct Ladder<'a, 'o> {
     widths: Vec<u32>,
     losses: LossProbe,
     max_bounces: u32,
+    outside: OutsideGrid,
     roles: Vec<Role>,
     unknowns: Unknowns,
     errors: StandardErrors,
@@ -67,6 +69,7 @@ pub fn solve(
 ) -> error::Result<Solution> {
     let budget = Budget::of(settings.preset);
     let objects = problem.scene.objects.len();
+    let surfaces = objects + OUTSIDE_WIDTH * OUTSIDE_HEIGHT;
     monitor.phase("looking through the pixels");
     let survey = Survey::new(problem, settings, budget.survey_pixels);
     monitor.progress.rays += survey.rays;
@@ -76,14 +79,14 @@ pub fn solve(
         settings.bounces as u32
     };
     let start = match resume {
-        Some(checkpoint) => checkpoint.state(|reached: &Reached| reached.fits(objects))?,
+        Some(checkpoint) => checkpoint.state(|reached: &Reached| reached.fits(surfaces))?,
         None => Reached::new(
             0,
-            &vec![Role::Reflector; objects],
-            &Unknowns::new(objects),
+            &vec![Role::Reflector; surfaces],
+            &Unknowns::new(surfaces),
             &StandardErrors {
-                albedo: vec![Vec3::splat(0.5); objects],
-                emission: vec![Vec3::INFINITY; objects],
+                albedo: vec![Vec3::splat(0.5); surfaces],
+                emission: vec![Vec3::INFINITY; surfaces],
             },
         ),
     };
@@ -97,6 +100,11 @@ pub fn solve(
         survey,
         widths: problem.photographs.iter().map(|p| p.width).collect(),
         max_bounces,
+        outside: OutsideGrid {
+            first: objects as u32,
+            width: OUTSIDE_WIDTH,
+            height: OUTSIDE_HEIGHT,
+        },
         errors: start.errors(),
         roles: start.roles,
         unknowns: start.unknowns,
@@ -114,70 +122,21 @@ impl Ladder<'_, '_> {
     fn run(&mut self) -> Result<Termination, Termination> {
         if self.stages < 1 {
             self.light_field()?;
+            self.reached(1);
         }
         if self.budget.round_paths == 0 {
             return Ok(Termination::Converged);
         }
         if self.stages < 2 {
             self.objects()?;
+            self.reached(2);
         }
         if self.stages < 3 {
-            return self.rounds();
+            let ended = self.rounds()?;
+            self.reached(3);
+            return Ok(ended);
         }
         Ok(Termination::Converged)
-    }
-
-    /// First stage: paths end where a photograph measured the radiance, so each object is nearly a linear fit of its
-    /// own: what it sends against what it receives.
-    fn light_field(&mut self) -> Result<(), Termination> {
-        let started = self.monitor.seconds();
-        self.monitor.phase("gathering light from the photographs");
-        let measured = MeasuredRadiance::new(self.problem, &self.survey);
-        share_paths(
-            &mut self.clusters,
-            self.roles.len(),
-            self.budget.light_field_paths,
-        );
-
-        // Light samples go where the photographs are bright: in proportion to area × radiance².
-        let scene = &self.problem.scene;
-        let bright: Vec<f64> = (scene.objects.iter().zip(&measured.object_means))
-            .map(|(object, mean)| {
-                mean.map_or(0.0, |m| object.area * f64::from(luminance(m)).powi(2))
-            })
-            .collect();
-        let lights = Emitters::new(scene, &self.explore(&bright));
-        let cache = self.trace(&lights, Some(&measured), 0)?;
-
-        // All objects reflect; then those that plainly give light; then what is left of the unseen ones' light.
-        for (k, role) in self.roles.iter_mut().enumerate() {
-            *role = if self.survey.seen[k] == 0 {
-                Role::Unseen
-            } else {
-                Role::Reflector
-            };
-        }
-        self.monitor.phase("telling lamps from walls");
-        let reflecting = self.fit(&cache)?.unknowns;
-        let (chosen, radiance) = roles::choose(&cache, &reflecting, &self.survey.seen);
-        self.roles = chosen;
-        self.unknowns = reflecting;
-        self.take_roles(&radiance);
-        let fitted = self.fit(&cache)?;
-        self.take(fitted);
-        self.prune_unseen(&cache)?;
-        self.test_dark(&cache);
-        for (error, albedo) in self.errors.albedo.iter_mut().zip(&self.unknowns.albedo) {
-            *error = (*error * *error + *albedo * *albedo * (LIGHT_FIELD_BIAS * LIGHT_FIELD_BIAS))
-                .powf(0.5);
-        }
-        self.describe();
-        self.monitor
-            .progress
-            .seconds_to_first_estimate
-            .get_or_insert(self.monitor.seconds());
-        let lamps = self.roles.iter().filter(|&&r| r != Role::Reflector).count();
-        self.finish_stage("light field", started, format!("each object fitted to the light that the photographs measured around it; {lamps} give light"))
     }
 
     /// Second stage: full paths to the lamps found. Lights that the first stage missed or imagined are tested here,
@@ -195,6 +154,7 @@ impl Ladder<'_, '_> {
         self.monitor.phase("fitting albedo and emission");
         let fitted = self.fit(&cache)?;
         self.take(fitted);
+        self.test_emitters(&cache)?;
         self.prune_unseen(&cache)?;
         let added = self.test_glow(&cache)?;
         let why = match added.as_slice() {
@@ -237,7 +197,9 @@ impl Ladder<'_, '_> {
             self.describe();
             self.monitor
                 .report(&self.estimate, &|_| self.checkpoint.clone())?;
-            if step > NONLINEAR && round < self.budget.rounds / 4 {
+            if f64::from(step) > NONLINEAR * self.budget.median_error
+                && round < self.budget.rounds / 4
+            {
                 about = self.unknowns.clone();
                 sums = Accumulated::default();
                 continue;
@@ -280,6 +242,7 @@ impl Ladder<'_, '_> {
             measured,
             surface_of: &self.problem.scene.object_of,
             believed_albedo: &believed,
+            outside: Some(self.outside),
             sampling: self.monitor.settings.light_sampling,
             max_bounces: self.max_bounces,
             seed: self.monitor.settings.seed,
@@ -341,21 +304,6 @@ impl Ladder<'_, '_> {
         }
     }
 
-    /// Gives emitters their photographed radiance and no albedo, and reflectors no light.
-    fn take_roles(&mut self, radiance: &[Vec3]) {
-        for (k, role) in self.roles.iter().enumerate() {
-            match role {
-                Role::Reflector => self.unknowns.emission[k] = Vec3::ZERO,
-                Role::Emitter => {
-                    self.unknowns.albedo[k] = Vec3::ZERO;
-                    self.unknowns.emission[k] = radiance[k];
-                }
-                Role::Unseen => self.unknowns.albedo[k] = Vec3::splat(0.5),
-                Role::Dark | Role::Glowing => {}
-            }
-        }
-    }
-
     /// Where each parameter stands among the free ones.
     fn places(&self, free: &[usize]) -> Vec<usize> {
         let mut place = vec![usize::MAX; 2 * self.roles.len()];
@@ -370,7 +318,7 @@ impl Ladder<'_, '_> {
         let mut relative: Vec<f64> = (0..self.roles.len())
             .filter(|&k| {
                 matches!(self.roles[k], Role::Reflector | Role::Glowing)
-                    && self.survey.seen[k] >= 50
+                    && self.survey.seen.get(k).copied().unwrap_or(0) >= 50
             })
             .map(|k| {
                 f64::from(
@@ -389,42 +337,58 @@ impl Ladder<'_, '_> {
             &self.roles,
             &self.unknowns,
             &self.errors,
+            self.outside,
         );
     }
 
-    /// Adds a point to the loss curve.
     fn measure(&mut self) -> Losses {
         let losses = self.losses.measure(self.problem, &self.estimate);
         self.monitor.progress.rays += losses.rays;
-        self.monitor.loss(losses.train, losses.held_out);
         losses
     }
 
     fn finish_stage(&mut self, name: &str, started: f64, why: String) -> Result<(), Termination> {
+        self.record(name, started, true, why)
+    }
+
+    /// Records a stage, with its losses as a point of the loss curve.
+    fn record(
+        &mut self,
+        name: &str,
+        started: f64,
+        kept: bool,
+        why: String,
+    ) -> Result<(), Termination> {
         let losses = self.measure();
+        self.monitor.loss(losses.train, losses.held_out);
         let stage = Stage {
             name: name.to_owned(),
             seconds: self.monitor.seconds() - started,
             iterations: self.monitor.progress.iterations,
             train_loss: losses.train,
             held_out_loss: losses.held_out,
-            kept: true,
+            kept,
             why,
         };
         self.monitor.stage(stage);
-        self.stages += 1;
-        self.monitor.progress.seconds = self.monitor.seconds();
-        let reached = Reached::new(self.stages, &self.roles, &self.unknowns, &self.errors);
-        self.checkpoint = Checkpoint::new(&self.monitor.progress, &reached);
         self.monitor
             .report(&self.estimate, &|_| self.checkpoint.clone())
+    }
+
+    /// Marks the end of a stage, from where a solve can be taken up again.
+    fn reached(&mut self, stages: u32) {
+        self.stages = stages;
+        self.monitor.progress.seconds = self.monitor.seconds();
+        let reached = Reached::new(stages, &self.roles, &self.unknowns, &self.errors);
+        self.checkpoint = Checkpoint::new(&self.monitor.progress, &reached);
     }
 
     fn finish(mut self, termination: Termination) -> Solution {
         // A finished stage has measured its loss already.
         let done = self.stages >= 3 || termination == Termination::Converged;
         if !done {
-            self.measure();
+            let losses = self.measure();
+            self.monitor.loss(losses.train, losses.held_out);
         }
         self.monitor.phase("done");
         self.monitor.progress.seconds = self.monitor.seconds();
