@@ -27,8 +27,8 @@ use std::time::{Duration, Instant};
 
 /// Gauss–Newton steps at most in one fit.
 const MOST_STEPS: u64 = 30;
-/// A step (in albedo, or relative in emission) asks for linearising anew
-/// when it is larger than so many times the median error aimed at.
+/// A step (in albedo, or relative in emission) asks for linearising anew when it is larger than so many times the
+/// median error aimed at.
 const NONLINEAR: f64 = 10.0;
 /// Columns and rows of the map of light from outside.
 const OUTSIDE_WIDTH: usize = 6;
