@@ -227,7 +227,7 @@ mod tests {
         let mut reflecting = Unknowns::new(3);
         reflecting.albedo[0] = Vec3::splat(0.6);
         reflecting.albedo[1] = Vec3::ONE;
-        let (roles, radiance) = choose(&room(), &reflecting, &[40, 40, 0]);
+        let Choice { roles, radiance } = choose(&room(), &reflecting, &[40, 40, 0]);
         assert_eq!(roles, [Role::Reflector, Role::Emitter, Role::Unseen]);
         assert!((radiance[1] - Vec3::splat(8.0)).length() < 1e-5);
         assert_eq!(free(&roles), [0, 3 + 1, 3 + 2]);
@@ -239,12 +239,12 @@ mod tests {
         (0..40).for_each(|index| cache.clusters.push(cluster(0, index, 1.0, 0.6)));
         let mut reflecting = Unknowns::new(1);
         reflecting.albedo[0] = Vec3::splat(0.6);
-        assert_eq!(choose(&cache, &reflecting, &[40]).0, [Role::Reflector]);
+        assert_eq!(choose(&cache, &reflecting, &[40]).roles, [Role::Reflector]);
     }
 
     #[test]
     fn nothing_to_look_at_leaves_reflectors() {
-        let roles = choose(&PathCache::default(), &Unknowns::new(2), &[5, 0]).0;
+        let roles = choose(&PathCache::default(), &Unknowns::new(2), &[5, 0]).roles;
         assert_eq!(roles, [Role::Reflector, Role::Unseen]);
     }
 }
