@@ -82,7 +82,7 @@ pub const LIGHT: Tokens = Tokens {
     warning: Color32::from_rgb(138, 92, 0),
     error: Color32::from_rgb(188, 38, 28),
     train: Color32::from_rgb(21, 98, 176),
-    held_out: Color32::from_rgb(186, 92, 0),
+    held_out: Color32::from_rgb(172, 85, 0),
     surround: Color32::from_rgb(214, 215, 218),
     camera: Color32::from_rgb(21, 98, 176),
     inserted: Color32::from_rgb(0, 120, 78),
