@@ -191,6 +191,8 @@ fn masked_pixels_are_not_even_looked_at() {
             .iter()
             .all(|p| p.frame != 2 || p.pixel % 2 == 0)
     );
+    let counted = survey.pixels.iter().filter(|p| p.object == 3).count();
+    assert_eq!(survey.seen[3], counted as u64);
     let [width, height] = SIZE.map(|n| n as usize);
     assert_eq!(survey.pixels.len(), 6 * width * height - width * height / 2);
 }

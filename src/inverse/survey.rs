@@ -50,7 +50,7 @@ pub struct SurveyPoint {
 pub struct Survey {
     /// In order of frame and pixel.
     pub pixels: Vec<SurveyedPixel>,
-    /// For each object, pixels whose centre sees it.
+    /// For each object, usable pixels whose centre sees it.
     pub seen: Vec<u64>,
     /// Median size of a pixel's footprint on the surfaces, in metres; zero where no pixel sees the mesh.
     pub footprint: f32,
@@ -63,12 +63,17 @@ impl Survey {
     pub fn new(problem: &Problem, settings: &Settings, most_pixels: usize) -> Self {
         let scene = &*problem.scene;
         let centers = IdBuffers::new(scene);
-        let seen: Vec<u64> = centers
-            .front_pixels
-            .iter()
-            .zip(&centers.back_pixels)
-            .map(|(f, b)| f + b)
-            .collect();
+        let mut seen = vec![0u64; scene.objects.len()];
+        for (photograph, triangles) in problem.photographs.iter().zip(&centers.triangles) {
+            for (pixel, &triangle) in triangles.iter().enumerate() {
+                let usable = photograph.usable.is_empty() || photograph.usable[pixel];
+                if let Some(&object) = scene.object_of.get(triangle as usize)
+                    && usable
+                {
+                    seen[object as usize] += 1;
+                }
+            }
+        }
         let total: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
         let share = (most_pixels as f64 / total.max(1) as f64).min(1.0);
         let frames: Vec<(Vec<SurveyedPixel>, Vec<f32>)> = problem
