@@ -228,7 +228,7 @@ parameters! {
     decay: f64 = 0.0, Kind::Real { min: 0.0, max: 1.0, logarithmic: false }, "a 1000 steps", true,
         "Paper solver: share by which the learning rate falls every thousand steps";
     anneal: bool = true, Kind::Flag, "", true,
-        "Paper solver: halve the learning rate and double the batch whenever the loss stands still";
+        "Paper solver: halve the learning rate and double the samples, at first the batch too, whenever the loss stands still";
     steps: u64 = 0, Kind::Whole { min: 0, max: 1_000_000_000 }, "", true,
         "Paper solver: stop after this many steps; 0 goes on until the time is up or the loss stands still";
 }

@@ -17,6 +17,10 @@ use serde::{Deserialize, Serialize};
 
 /// Batches from this size on are spread over threads.
 const PARALLEL: u64 = 256;
+/// Doublings of the batch at most; the samples a pixel, on which the bias of an ℓ1 loss depends, go on doubling.
+const BATCH_DOUBLINGS: u32 = 2;
+/// Halvings taken back when triangles get albedos of their own.
+const REFINED: u32 = 3;
 /// Draws of a pixel before giving up on finding one that may be used.
 const TRIES: u32 = 64;
 
@@ -38,7 +42,7 @@ pub struct Descent {
     pub unknowns: Unknowns,
     /// Emission of each object.
     pub lights: Vec<Vec3>,
-    /// How often the learning rate was halved and the batch doubled.
+    /// How often the learning rate was halved and the samples a pixel, and at first the batch, were doubled.
     pub halvings: u32,
     adam: Adam,
     steps: u64,
@@ -118,7 +122,7 @@ impl Descent {
                 emission: spread(&self.unknowns.emission),
             },
             lights: self.lights.clone(),
-            halvings: 0,
+            halvings: self.halvings.saturating_sub(REFINED),
             adam: Adam::new(2 * surfaces),
             steps: self.steps,
             emitters: None,
@@ -162,9 +166,11 @@ impl Descent {
         };
 
         // Gradient of the batch's mean.
-        let batch = settings.batch << self.halvings;
+        let batch = settings.batch << self.halvings.min(BATCH_DOUBLINGS);
+        let samples = settings.samples << self.halvings;
         let (unknowns, step) = (&self.unknowns, self.steps);
-        let pixel = |index: u64| pixel_gradient(problem, settings, &tracer, unknowns, step, index);
+        let pixel =
+            |index: u64| pixel_gradient(problem, settings, &tracer, unknowns, samples, step, index);
         let pixels: Vec<PixelGradient> = if batch >= PARALLEL {
             (0..batch).into_par_iter().map(pixel).collect()
         } else {
@@ -204,7 +210,7 @@ impl Descent {
         }
         StepOutcome {
             rays: pixels.iter().map(|p| p.rays).sum(),
-            paths: 2 * batch * settings.samples,
+            paths: 2 * batch * samples,
             rejected: pixels.iter().map(|p| p.rejected).sum(),
             finite: gradient.iter().all(|g| g.is_finite()),
         }
@@ -218,6 +224,7 @@ fn pixel_gradient(
     settings: &Settings,
     tracer: &Tracer,
     unknowns: &Unknowns,
+    samples: u64,
     step: u64,
     index: u64,
 ) -> PixelGradient {
@@ -245,7 +252,7 @@ fn pixel_gradient(
     let mut colour = Vec3::ZERO;
     for (set, gradient) in gradients.iter_mut().enumerate() {
         let mut sum = Vec3::ZERO;
-        for _ in 0..settings.samples {
+        for _ in 0..samples {
             vertices.clear();
             let (rays, finite) = tracer.pixel_path(camera, corner, &mut stream, &mut vertices);
             result.rays += rays;
@@ -253,7 +260,7 @@ fn pixel_gradient(
             sum += differentiate(&vertices, unknowns, &mut gathered, gradient);
         }
         if set == 0 {
-            colour = sum / settings.samples as f32;
+            colour = sum / samples as f32;
         }
     }
 
@@ -263,7 +270,7 @@ fn pixel_gradient(
             residual.signum() * Vec3::from_array(residual.to_array().map(|r| f32::from(r != 0.0)))
         }
         Loss::L2 => residual * 2.0,
-    } / settings.samples as f32;
+    } / samples as f32;
     let derivative = &gradients[1];
     result.entries = derivative
         .touched

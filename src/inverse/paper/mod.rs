@@ -21,7 +21,7 @@ use schedule::Schedule;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Halvings of the learning rate (and doublings of the batch), after each of which the loss may stand still once.
+/// Halvings of the learning rate (and doublings of the samples), after each of which the loss may stand still once.
 const HALVINGS: u32 = 7;
 /// Bounces where the settings leave the choice.
 const BOUNCES: u32 = 2;
