@@ -6,6 +6,7 @@ use crate::cli::export::{DemoArguments, ExportArguments};
 use crate::cli::insert::InsertArguments;
 use crate::cli::parameters::Parameters;
 use crate::cli::render::RenderArguments;
+use crate::cli::trade::TradeArguments;
 use crate::inverse::settings::Settings;
 use crate::session::command::OpenOptions;
 use crate::session::save::pictures::Frames;
@@ -46,6 +47,8 @@ pub enum Action {
     Export(ExportArguments),
     /// Write the built-in room as a capture, with its truth
     Demo(DemoArguments),
+    /// Measure what exactness costs in seconds, over presets and settings
+    Trade(TradeArguments),
 }
 
 /// `relit solve`.

@@ -12,6 +12,7 @@ mod render;
 mod report;
 mod saved;
 mod solve;
+mod trade;
 
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
@@ -56,6 +57,7 @@ fn act(arguments: Arguments, window: Option<Window>) -> Result<()> {
         Some(Action::Export(files)) => export::export(&files),
         Some(Action::Demo(demo)) => export::demo(&demo),
         Some(Action::Edit(edit)) => edit::edit(&edit),
+        Some(Action::Trade(measured)) => trade::trade(&measured),
         Some(Action::Solve(capture)) => {
             solve::solve(&Source::Folder(capture.capture.clone()), &capture.solve)
         }

@@ -36,6 +36,7 @@ fn parse(parameter: &'static Parameter, text: &str) -> Result<Value, String> {
                 parameter.name
             )
         })?,
+        (_, "%") => parameter.parse(text.strip_suffix('%').unwrap_or(text))?,
         _ => parameter.parse(text)?,
     };
     parameter.set(&mut Settings::default(), &value)?;
@@ -43,7 +44,7 @@ fn parse(parameter: &'static Parameter, text: &str) -> Result<Value, String> {
 }
 
 /// Seconds of a time such as 90, 60s, 1.5m or 2h.
-fn duration(text: &str) -> Option<f64> {
+pub fn duration(text: &str) -> Option<f64> {
     let split = text.find(|c: char| c.is_ascii_alphabetic() && c != 'e');
     let (number, unit) = text.split_at(split.unwrap_or(text.len()));
     let factor = match unit {
@@ -146,6 +147,14 @@ mod tests {
         assert_eq!(bounces("auto"), Some(0));
         assert_eq!(bounces("3"), Some(3));
         assert_eq!(bounces("many"), None);
+        let target = |text| {
+            given(&["--target-error", text])
+                .map(|s| s.target_error)
+                .ok()
+        };
+        assert_eq!(target("1%"), Some(1.0));
+        assert_eq!(target("0.5"), Some(0.5));
+        assert_eq!(target("101"), None);
         let held_out = |arguments: &[&str]| given(arguments).map(|s| s.held_out).ok();
         assert_eq!(held_out(&[]), Some(Settings::default().held_out));
         assert_eq!(held_out(&["--hold-out", "0"]), Some(0.0));

@@ -71,6 +71,7 @@ fn error(stderr: Vec3, digits: usize) -> String {
 pub fn ending(progress: &Progress, termination: Termination) -> String {
     let why = match termination {
         Termination::Converged => "converged",
+        Termination::Target => "the target error is reached",
         Termination::Time => "the time is up",
         Termination::Steps => "the steps are done",
         Termination::Cancelled => "stopped",

@@ -11,7 +11,7 @@ use crate::inverse::solver::{self, Checkpoint, Control, Observer, Problem, Progr
 use crate::session::command::Source;
 use crate::session::open::open;
 use crate::session::save::{self, Results};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -28,7 +28,7 @@ pub fn solve(source: &Source, options: &SolveOptions) -> Result<()> {
     let interrupt = Interrupt::listen()?;
 
     // Take up earlier work.
-    let folder = options.out.clone().unwrap_or_else(|| default_out(source));
+    let folder = options.out.clone().unwrap_or_else(|| source.default_out());
     let earlier = if options.resume {
         Some(save::load_checkpoint(&folder)?)
     } else {
@@ -161,16 +161,4 @@ pub fn use_threads(threads: Option<u16>) -> Result<()> {
         .num_threads(usize::from(threads))
         .build_global()
         .map_err(|error| Error::new("--threads", error, "name fewer threads"))
-}
-
-/// relit-out/<capture>.
-fn default_out(source: &Source) -> PathBuf {
-    let name = match source {
-        Source::BuiltInRoom => "built-in-room".into(),
-        Source::Folder(folder) => std::path::absolute(folder)
-            .ok()
-            .and_then(|path| Some(path.file_name()?.to_owned()))
-            .unwrap_or_else(|| "capture".into()),
-    };
-    Path::new("relit-out").join(name)
 }

@@ -34,6 +34,18 @@ pub struct Axis {
     pub logarithmic: bool,
 }
 
+/// How a series is drawn.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Draw {
+    /// Straight lines from point to point, with dots where there are few.
+    #[default]
+    Line,
+    /// Dots alone.
+    Dots,
+    /// Level from each point to below the next, in black: what is reached, and kept.
+    Steps,
+}
+
 /// One named curve.
 #[derive(Debug, Clone, Default)]
 pub struct Series {
@@ -43,6 +55,8 @@ pub struct Series {
     pub points: Vec<[f64; 2]>,
     /// Lower and upper end of each point's error, or empty.
     pub band: Vec<[f64; 2]>,
+    /// How it is drawn.
+    pub draw: Draw,
 }
 
 /// A plot of several curves.
@@ -58,6 +72,8 @@ pub struct Plot {
     pub series: Vec<Series>,
     /// Named vertical lines.
     pub marks: Vec<(f64, String)>,
+    /// Named points.
+    pub labels: Vec<([f64; 2], String)>,
 }
 
 impl Plot {
@@ -128,17 +144,38 @@ impl Plot {
                 .filter(|p| shown(p))
                 .map(|p| (p[0], p[1]))
                 .collect();
-            if points.len() <= 40 {
-                let dots = points.iter().map(|&p| Circle::new(p, 4, color.filled()));
+            let (color, points) = match series.draw {
+                Draw::Steps => (BLACK, steps(&points)),
+                Draw::Line | Draw::Dots => (*color, points),
+            };
+            let radius = match series.draw {
+                Draw::Line if points.len() <= 40 => 4,
+                Draw::Dots => 2,
+                Draw::Line | Draw::Steps => 0,
+            };
+            if radius > 0 {
+                let dots = points
+                    .iter()
+                    .map(|&p| Circle::new(p, radius, color.filled()));
                 chart.draw_series(dots)?;
             }
-            let color = *color;
+            let line = match series.draw {
+                Draw::Dots => Vec::new(),
+                Draw::Line | Draw::Steps => points,
+            };
+            let width = if series.draw == Draw::Steps { 1 } else { 2 };
             chart
-                .draw_series(LineSeries::new(points, color.stroke_width(2)))?
+                .draw_series(LineSeries::new(line, color.stroke_width(width)))?
                 .label(&series.name)
                 .legend(move |(x, y)| {
                     Rectangle::new([(x, y - 2), (x + 18, y + 2)], color.filled())
                 });
+        }
+        for (point, name) in self.labels.iter().filter(|(point, _)| shown(point)) {
+            let at = (point[0], point[1]);
+            chart.draw_series([Circle::new(at, 6, BLACK.stroke_width(2))])?;
+            let style = (FONT, 17).into_font().color(&BLACK);
+            chart.draw_series([Text::new(format!("   {name}"), at, style)])?;
         }
         if !self.series.is_empty() {
             chart
@@ -178,6 +215,15 @@ impl Axis {
     }
 }
 
+/// Corners of the staircase through points in order: level to the next point's place, then up or down to it.
+fn steps(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let turns = points.windows(2).flat_map(|pair| {
+        let [from, to] = [pair[0], pair[1]];
+        [(to.0, from.1), to]
+    });
+    points.first().copied().into_iter().chain(turns).collect()
+}
+
 /// The loss curve of a solve: loss in the fit and on held-out pixels over seconds, with its stages marked.
 pub fn loss_plot(losses: &[LossPoint], stages: &[Stage]) -> Plot {
     let curve = |name: &str, value: fn(&LossPoint) -> Option<f64>| Series {
@@ -186,7 +232,7 @@ pub fn loss_plot(losses: &[LossPoint], stages: &[Stage]) -> Plot {
             .iter()
             .filter_map(|p| Some([p.seconds, value(p)?]))
             .collect(),
-        band: Vec::new(),
+        ..Series::default()
     };
     let mut start = 0.0;
     let marks = stages
@@ -209,6 +255,7 @@ pub fn loss_plot(losses: &[LossPoint], stages: &[Stage]) -> Plot {
             .filter(|s| !s.points.is_empty())
             .collect(),
         marks,
+        labels: Vec::new(),
     }
 }
 
@@ -255,6 +302,14 @@ mod tests {
     }
 
     #[test]
+    fn steps_are_level_up_to_the_next_point() {
+        let corners = steps(&[(1.0, 8.0), (2.0, 4.0), (4.0, 1.0)]);
+        let expected = [(1.0, 8.0), (2.0, 8.0), (2.0, 4.0), (4.0, 4.0), (4.0, 1.0)];
+        assert_eq!(corners, expected);
+        assert!(steps(&[]).is_empty());
+    }
+
+    #[test]
     fn hostile_values_are_left_out_and_an_empty_plot_is_still_a_picture() {
         draw(&Plot::default());
         let odd = [
@@ -273,11 +328,13 @@ mod tests {
                 name: "odd".into(),
                 points: odd.to_vec(),
                 band: vec![[f64::NAN, 1.0]; 5],
+                draw: Draw::Steps,
             };
             let plot = Plot {
                 y,
                 series: vec![series],
                 marks: vec![(f64::NAN, "never".into()), (1e300, "far".into())],
+                labels: vec![([f64::NAN, 1.0], "nowhere".into())],
                 ..Default::default()
             };
             draw(&plot);

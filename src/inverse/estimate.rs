@@ -1,5 +1,6 @@
 //! What comes out: emission, materials, outside light, exposures, each with a confidence.
 
+use crate::math::stats::quantile;
 use crate::scene::Scene;
 use crate::transport::environment::Environment;
 use crate::transport::lit::Lit;
@@ -7,6 +8,11 @@ use crate::transport::material::{Albedo, Lobe, Material, TexelColors};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+
+/// Pixels that must see an object for its albedo to count in an error over objects.
+pub const ENOUGH_PIXELS: u64 = 50;
+/// Albedos are taken for at least this large when an error is relative to them.
+const SMALLEST_ALBEDO: f32 = 1e-3;
 
 /// Everything that a solver has found out about a scene.
 #[derive(Debug, Clone, Default)]
@@ -89,6 +95,19 @@ pub struct Outside {
 }
 
 impl Estimate {
+    /// The error that the estimate claims of itself: median over objects of the relative standard error of albedo over
+    /// RGB, of those whose albedo is determined and that [`ENOUGH_PIXELS`] see; `None` where there are none.
+    pub fn relative_error(&self) -> Option<f64> {
+        let mut relative: Vec<f64> = (self.objects.iter())
+            .filter(|object| object.albedo_identifiable && object.seen_pixels >= ENOUGH_PIXELS)
+            .map(|object| {
+                let size = object.albedo.length().max(SMALLEST_ALBEDO);
+                f64::from(object.albedo_stderr.length() / size)
+            })
+            .collect();
+        quantile(&mut relative, 0.5)
+    }
+
     /// A frame's linear exposure and white balance, where they were estimated.
     pub fn exposure(&self, frame: usize) -> Option<Vec3> {
         self.exposures.as_ref()?.get(frame).copied()

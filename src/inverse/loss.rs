@@ -89,6 +89,12 @@ impl LossProbe {
         }
     }
 
+    /// Mean absolute difference on the held-out pixels alone; `None` where there are none.
+    pub fn held_out(&self, problem: &Problem, estimate: &Estimate) -> Option<f64> {
+        let lit = estimate.lit(&problem.scene);
+        self.difference(problem, &lit, &self.held_out).0
+    }
+
     fn difference(
         &self,
         problem: &Problem,

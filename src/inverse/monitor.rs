@@ -83,7 +83,17 @@ impl<'a> Monitor<'a> {
         if self.settings.time > 0.0 && self.seconds() >= self.settings.time {
             return Err(Termination::Time);
         }
+        if self.settings.target_error > 0.0 && self.claims(estimate) <= self.settings.target_error {
+            return Err(Termination::Target);
+        }
         Ok(())
+    }
+
+    /// The error that an estimate claims of itself in percent; infinite before the first that can be shown.
+    fn claims(&self, estimate: &Estimate) -> f64 {
+        let first = self.progress.seconds_to_first_estimate;
+        let error = first.and_then(|_| estimate.relative_error());
+        error.map_or(f64::INFINITY, |error| error * 100.0)
     }
 
     /// Names what is being done now.
@@ -119,6 +129,8 @@ impl<'a> Monitor<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::inverse::estimate::{ENOUGH_PIXELS, ObjectEstimate};
+    use glam::Vec3;
 
     /// Answers with what it is told to, after a pause.
     struct Puppet {
@@ -180,6 +192,35 @@ mod tests {
             assert_eq!(report(&mut monitor), end);
             assert!(monitor.progress.seconds >= earlier);
         }
+    }
+
+    #[test]
+    fn a_target_ends_the_solve_once_the_first_estimate_claims_it() {
+        let settings = Settings {
+            target_error: 2.0,
+            ..Settings::default()
+        };
+        let object = |stderr| ObjectEstimate {
+            albedo: Vec3::splat(0.5),
+            albedo_stderr: Vec3::splat(stderr),
+            seen_pixels: ENOUGH_PIXELS,
+            ..ObjectEstimate::default()
+        };
+        let estimate = Estimate {
+            objects: vec![object(0.2), object(0.009), object(0.001)],
+            ..Estimate::default()
+        };
+        let mut observer = puppet(Control::Continue);
+        let mut monitor = Monitor::new(&settings, &mut observer, Progress::default());
+        let mut ends = |first, target_error| {
+            monitor.progress.seconds_to_first_estimate = first;
+            monitor.settings.target_error = target_error;
+            monitor.report(&estimate, &|progress| Checkpoint::new(progress, &()))
+        };
+        assert_eq!(ends(None, 2.0), Ok(()));
+        assert_eq!(ends(Some(1.0), 1.0), Ok(()));
+        assert_eq!(ends(Some(1.0), 2.0), Err(Termination::Target));
+        assert_eq!(ends(Some(1.0), 0.0), Ok(()));
     }
 
     #[test]

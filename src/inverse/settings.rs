@@ -207,6 +207,8 @@ parameters! {
         "Key of all random numbers: the same seed gives the same result";
     time: f64 = 0.0, Kind::Real { min: 0.0, max: 1e9, logarithmic: true }, "s", true,
         "Wall time after which the solve stops; 0 sets no limit";
+    target_error: f64 = 0.0, Kind::Real { min: 0.0, max: 100.0, logarithmic: true }, "%", true,
+        "Stop once the median relative standard error of the albedos seen is below this; 0 leaves it to the preset";
     bounces: u64 = 0, Kind::Whole { min: 0, max: 1000 }, "", false,
         "Longest path in bounces; 0 chooses (2 for the paper solver, by the albedo found for the others)";
     held_out: f64 = 0.05, Kind::Real { min: 0.0, max: 0.9, logarithmic: false }, "of the pixels", false,
@@ -231,6 +233,20 @@ parameters! {
         "Paper solver: halve the learning rate and double the samples, at first the batch too, whenever the loss stands still";
     steps: u64 = 0, Kind::Whole { min: 0, max: 1_000_000_000 }, "", true,
         "Paper solver: stop after this many steps; 0 goes on until the time is up or the loss stands still";
+}
+
+/// Bounces that the paper's solver takes when none are set.
+const PAPER_BOUNCES: u32 = 2;
+
+impl Settings {
+    /// Longest path in bounces: what is set, else the paper solver's two, else all that roulette leaves.
+    pub fn max_bounces(&self) -> u32 {
+        match (self.bounces, self.preset) {
+            (0, Preset::Paper) => PAPER_BOUNCES,
+            (0, _) => u32::MAX,
+            (bounces, _) => u32::try_from(bounces).unwrap_or(u32::MAX),
+        }
+    }
 }
 
 impl Parameter {

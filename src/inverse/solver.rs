@@ -110,6 +110,8 @@ pub trait Observer {
 pub enum Termination {
     /// The estimate stands still within its reported error.
     Converged,
+    /// The reported error is as small as was asked for.
+    Target,
     /// The time is up.
     Time,
     /// The step limit is reached.
@@ -125,6 +127,7 @@ impl Termination {
     pub fn word(self) -> &'static str {
         match self {
             Self::Converged => "converged",
+            Self::Target => "target",
             Self::Time => "time",
             Self::Steps => "steps",
             Self::Cancelled => "cancelled",

@@ -9,7 +9,10 @@ pub const SIZE: [u32; 2] = [160, 120];
 /// Half the horizontal field of view, as a tangent.
 const HALF_FIELD: f64 = 0.82;
 
-/// Eye and target of each photograph, in room coordinates.
+/// Eye and target of a photograph, in room coordinates.
+pub type View = [DVec3; 2];
+
+/// The views of the built-in room.
 const VIEWS: [[[f64; 3]; 2]; 16] = [
     // The four corners, across the room.
     [[1.95, 1.55, 1.75], [-0.6, 0.75, -0.9]],
@@ -33,8 +36,13 @@ const VIEWS: [[[f64; 3]; 2]; 16] = [
     [[-0.6, 0.85, 1.5], [1.5, 0.5, 0.2]],
 ];
 
-/// Lens and pose of each photograph at a size in pixels.
-pub fn cameras([width, height]: [u32; 2]) -> Vec<(Intrinsics, Pose)> {
+/// The views of the built-in room.
+pub fn built_in() -> Vec<View> {
+    VIEWS.iter().map(|view| view.map(DVec3::from)).collect()
+}
+
+/// Lens and pose of each view's photograph at a size in pixels.
+pub fn cameras(views: &[View], [width, height]: [u32; 2]) -> Vec<(Intrinsics, Pose)> {
     let focal = f64::from(width) * 0.5 / HALF_FIELD;
     let intrinsics = Intrinsics {
         width,
@@ -45,9 +53,9 @@ pub fn cameras([width, height]: [u32; 2]) -> Vec<(Intrinsics, Pose)> {
         cy: f64::from(height) * 0.5,
         distortion: [0.0; 4],
     };
-    VIEWS
+    views
         .iter()
-        .map(|&[eye, target]| (intrinsics, look_at(eye.into(), target.into())))
+        .map(|&[eye, target]| (intrinsics, look_at(eye, target)))
         .collect()
 }
 

@@ -1,4 +1,5 @@
-//! The built-in room: our own geometry, lights and materials, with photographs of them and the truth.
+//! The built-in room: our own geometry, lights and materials, with photographs of them and the truth. And rooms like
+//! it, furnished at random.
 //!
 //! Everything but the photographs is computed at start-up. The photographs are this room's own path-traced
 //! renderings, kept in `assets/room` so that the program starts at once; `relit demo --render` makes them again.
@@ -6,6 +7,7 @@
 pub mod build;
 pub mod cameras;
 mod furniture;
+pub mod generated;
 pub mod photographs;
 pub mod shape;
 mod texture;
@@ -16,37 +18,48 @@ pub use write::write;
 
 use crate::capture::mesh::Mesh;
 use crate::capture::photograph::PhotographSource;
+use crate::capture::truth::Truth;
 use crate::capture::{Capture, Frame};
 use crate::error::Result;
 use crate::scene::Scene;
 use crate::transport::lit::Lit;
 use crate::transport::material::Material;
+use cameras::View;
 use glam::DVec3;
 use photographs::Rendering;
 use std::sync::Arc;
 
-/// Geometry and truth of the room, before any photograph.
+/// Geometry and truth of a room, before any photograph.
 #[derive(Debug, Clone)]
 pub struct Room {
+    /// The name shown to people.
+    pub name: String,
     /// Triangles in named objects, each object closed or facing the room.
     pub mesh: Mesh,
     /// The true material of each object.
     pub materials: Vec<Material>,
+    /// From where it is photographed.
+    pub views: Vec<View>,
 }
 
 impl Room {
-    /// Builds the room.
+    /// Builds the built-in room.
     pub fn new() -> Self {
         let (mesh, materials) = build::build();
-        Self { mesh, materials }
+        Self {
+            name: "built-in room".to_owned(),
+            mesh,
+            materials,
+            views: cameras::built_in(),
+        }
     }
 
     /// The room as a capture with the given photographs, one a camera and all of one size.
     pub fn capture(&self, photographs: Vec<PhotographSource>, size: [u32; 2]) -> Capture {
-        let cameras = cameras::cameras(size);
+        let cameras = cameras::cameras(&self.views, size);
         let up: DVec3 = cameras.iter().map(|(_, pose)| pose.rotation.y_axis).sum();
         Capture {
-            name: "built-in room".to_owned(),
+            name: self.name.clone(),
             folder: None,
             mesh: self.mesh.clone(),
             frames: cameras
@@ -71,9 +84,20 @@ impl Room {
     /// Never for the room as it is; the signature is the scene's.
     pub fn lit(&self, size: [u32; 2]) -> Result<Lit> {
         let dark = photographs::black(size);
-        let sources = vec![PhotographSource::Memory(dark); cameras::cameras(size).len()];
+        let sources = vec![PhotographSource::Memory(dark); self.views.len()];
         let scene = Scene::new(&self.capture(sources, size))?;
         Ok(Lit::new(Arc::new(scene), self.materials.clone(), None))
+    }
+
+    /// What is true of it.
+    ///
+    /// # Errors
+    /// As [`Room::lit`].
+    pub fn truth(&self, size: [u32; 2]) -> Result<Truth> {
+        let objects = truth::objects(&self.lit(size)?);
+        Ok(Truth {
+            objects: objects.into_iter().map(|(n, o)| (n, o.into())).collect(),
+        })
     }
 
     /// The room with the photographs kept in the program.

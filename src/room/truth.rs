@@ -58,6 +58,19 @@ pub struct ObjectTruth {
     pub area: f64,
 }
 
+impl From<ObjectTruth> for crate::capture::truth::ObjectTruth {
+    fn from(truth: ObjectTruth) -> Self {
+        let wide = |color: [f32; 3]| Vec3::from(color).as_dvec3();
+        Self {
+            albedo: wide(truth.albedo),
+            emission: wide(truth.emission),
+            exitance: truth.exitance.map(wide),
+            roughness: truth.roughness.map(f64::from),
+            textured: truth.textured,
+        }
+    }
+}
+
 /// The truth about each object of a lit scene.
 pub fn objects(world: &Lit) -> BTreeMap<String, ObjectTruth> {
     let scene = &world.scene;

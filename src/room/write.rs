@@ -1,5 +1,6 @@
 //! The room as a capture folder, with its truth.
 
+use crate::capture::camera::{Intrinsics, Pose};
 use crate::error::{Error, Result};
 use crate::export::atomic::{write_atomically, write_bytes};
 use crate::export::exr::{Precision, write_rgb};
@@ -48,7 +49,8 @@ pub fn write(out: &Path, rendering: Option<&Rendering>) -> Result<()> {
     };
     write_json(&out.join("truth.json"), &truth)?;
     // Last, so that a folder with transforms.json is a whole capture.
-    write_transforms(&out.join("transforms.json"), made.size, &world.scene)
+    let cameras = cameras::cameras(&room.views, made.size);
+    write_transforms(&out.join("transforms.json"), &cameras, &world.scene)
 }
 
 fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
@@ -57,8 +59,7 @@ fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     write_bytes(path, text.as_bytes())
 }
 
-fn write_transforms(path: &Path, size: [u32; 2], scene: &Scene) -> Result<()> {
-    let cameras = cameras::cameras(size);
+fn write_transforms(path: &Path, cameras: &[(Intrinsics, Pose)], scene: &Scene) -> Result<()> {
     let Some((lens, _)) = cameras.first() else {
         return Err(Error::file(path, "the room has no cameras", ""));
     };

@@ -6,7 +6,7 @@ use crate::inverse::settings::Settings;
 use crate::scene::camera::Camera;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Where a capture comes from.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,6 +15,20 @@ pub enum Source {
     BuiltInRoom,
     /// A capture's folder.
     Folder(PathBuf),
+}
+
+impl Source {
+    /// The folder that results go into where none is named: relit-out/<capture>.
+    pub fn default_out(&self) -> PathBuf {
+        let name = match self {
+            Self::BuiltInRoom => "built-in-room".into(),
+            Self::Folder(folder) => std::path::absolute(folder)
+                .ok()
+                .and_then(|path| Some(path.file_name()?.to_owned()))
+                .unwrap_or_else(|| "capture".into()),
+        };
+        Path::new("relit-out").join(name)
+    }
 }
 
 /// A request to the worker, taken between iterations.

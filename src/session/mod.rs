@@ -4,6 +4,7 @@ pub mod command;
 mod full;
 pub mod inbox;
 pub mod insertion;
+mod judge;
 pub mod light;
 pub mod open;
 pub mod rates;

@@ -104,6 +104,21 @@ pub fn compare(
     Ok(errors)
 }
 
+/// For each object, the pixels of all photographs whose centre sees it.
+pub fn seen_pixels(capture: &Capture, scene: &Scene) -> Vec<u64> {
+    let mut seen = vec![0; scene.objects.len()];
+    for frame in &capture.frames {
+        let camera = Camera::new(&frame.intrinsics, &frame.pose, scene.origin);
+        for object in look(scene, &camera, &[], &[], 0)
+            .into_iter()
+            .filter_map(|seen| seen.object)
+        {
+            seen[object as usize] += 1;
+        }
+    }
+    seen
+}
+
 /// Looks through every pixel: at its centre, and at `grid` × `grid` points for the mean albedo.
 fn look(
     scene: &Scene,

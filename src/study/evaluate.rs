@@ -4,18 +4,15 @@ use crate::capture::Capture;
 use crate::capture::photograph::Photograph;
 use crate::capture::truth::{ObjectTruth, Truth};
 use crate::error::Result;
-use crate::inverse::estimate::{Estimate, ObjectEstimate};
+use crate::inverse::estimate::{ENOUGH_PIXELS, Estimate, ObjectEstimate};
 use crate::math::stats::quantile;
 use crate::scene::Scene;
-use crate::study::albedo_pictures::{self, PictureErrors};
+use crate::study::albedo_pictures;
 use crate::study::emission::{self, EmissionErrors};
 use glam::DVec3;
 use serde::{Serialize, Serializer};
 use std::path::Path;
 use std::sync::Arc;
-
-/// Pixels that must see an object for its albedo to be scored.
-const ENOUGH_PIXELS: u64 = 50;
 
 /// The errors of an estimate; `null` where nothing could be compared.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -70,6 +67,86 @@ pub struct ObjectErrors {
     pub emission_rel: Option<f64>,
 }
 
+/// The truth of a capture and what its photographs see: what estimates are compared with again and again.
+#[derive(Debug, Clone)]
+pub struct Reference {
+    truth: Truth,
+    /// Pixels of all photographs, at the size of their files, whose centre sees each object.
+    seen_pixels: Vec<u64>,
+    /// Whether the photographs leave the scale of the light open.
+    open_scale: bool,
+}
+
+/// The errors that need no pictures.
+#[derive(Debug, Clone)]
+pub struct ObjectSummary {
+    /// Objects scored for their albedo.
+    pub objects: usize,
+    /// Mean absolute error of albedo over scored objects and RGB.
+    pub albedo_mae: Option<f64>,
+    /// Median over scored objects of the relative error over RGB.
+    pub albedo_rel_median: Option<f64>,
+    /// Its 95th percentile.
+    pub albedo_rel_p95: Option<f64>,
+    /// Median over true emitters of the relative error over RGB.
+    pub emission_rel_median: Option<f64>,
+    /// Emitters found and missed.
+    pub emission: EmissionErrors,
+    /// Every object of the truth.
+    pub per_object: Vec<(String, ObjectErrors)>,
+}
+
+impl Reference {
+    /// The truth about `scene`, whose `capture` has cameras at the full size of their `photographs`.
+    pub fn new(
+        truth: Truth,
+        capture: &Capture,
+        scene: &Scene,
+        photographs: &[Arc<Photograph>],
+    ) -> Self {
+        Self {
+            truth,
+            seen_pixels: albedo_pictures::seen_pixels(capture, scene),
+            open_scale: open_scale(photographs),
+        }
+    }
+
+    /// Compares an estimate object by object.
+    pub fn errors(&self, scene: &Scene, estimate: &Estimate) -> ObjectSummary {
+        let emission = emission::compare(scene, estimate, &self.truth, self.open_scale);
+        let estimates = estimate.objects.iter().zip(&self.seen_pixels);
+        let per_object: Vec<(String, ObjectErrors)> = (scene.objects.iter().zip(estimates))
+            .filter_map(|(object, (estimated, &pixels))| {
+                let known = self.truth.objects.get(&object.name)?;
+                let errors = of_object(estimated, known, pixels, emission.scale);
+                Some((object.name.clone(), errors))
+            })
+            .collect();
+        let scored: Vec<&ObjectErrors> = per_object
+            .iter()
+            .map(|(_, errors)| errors)
+            .filter(|errors| errors.scored)
+            .collect();
+        let absolute: Vec<f64> = scored
+            .iter()
+            .flat_map(|o| (0..3).map(|c| (f64::from(o.albedo[c]) - o.albedo_true[c]).abs()))
+            .collect();
+        let mut relative: Vec<f64> = scored.iter().filter_map(|o| o.albedo_rel).collect();
+        let mut lamps: Vec<f64> = (per_object.iter())
+            .filter_map(|(_, o)| o.emission_rel)
+            .collect();
+        ObjectSummary {
+            objects: scored.len(),
+            albedo_mae: mean(&absolute),
+            albedo_rel_median: quantile(&mut relative, 0.5),
+            albedo_rel_p95: quantile(&mut relative, 0.95),
+            emission_rel_median: quantile(&mut lamps, 0.5),
+            emission,
+            per_object,
+        }
+    }
+}
+
 /// Compares an estimate with the truth of the capture in `folder`, whose `capture` and `scene` it belongs to;
 /// `photographs` say whether the scale of the light is open.
 ///
@@ -84,53 +161,30 @@ pub fn evaluate(
 ) -> Result<Evaluation> {
     let truth = Truth::read(folder)?;
     let pictures = albedo_pictures::compare(folder, capture, scene, estimate, &truth)?;
-    let open_scale = photographs.iter().any(|p| p.saturation.is_finite());
-    let emission = emission::compare(scene, estimate, &truth, open_scale);
-    let per_object = objects(scene, estimate, &truth, &pictures, &emission);
-
-    let scored: Vec<&ObjectErrors> = per_object
-        .iter()
-        .map(|(_, errors)| errors)
-        .filter(|errors| errors.scored)
-        .collect();
-    let absolute: Vec<f64> = scored
-        .iter()
-        .flat_map(|o| (0..3).map(|c| (f64::from(o.albedo[c]) - o.albedo_true[c]).abs()))
-        .collect();
-    let mut relative: Vec<f64> = scored.iter().filter_map(|o| o.albedo_rel).collect();
-    let mut lamps: Vec<f64> = (per_object.iter())
-        .filter_map(|(_, o)| o.emission_rel)
-        .collect();
+    let reference = Reference {
+        truth,
+        seen_pixels: pictures.seen_pixels.clone(),
+        open_scale: open_scale(photographs),
+    };
+    let errors = reference.errors(scene, estimate);
     Ok(Evaluation {
-        objects: scored.len(),
-        albedo_mae: mean(&absolute),
-        albedo_rel_median: quantile(&mut relative, 0.5),
-        albedo_rel_p95: quantile(&mut relative, 0.95),
+        objects: errors.objects,
+        albedo_mae: errors.albedo_mae,
+        albedo_rel_median: errors.albedo_rel_median,
+        albedo_rel_p95: errors.albedo_rel_p95,
         albedo_psnr: pictures.psnr(),
         albedo_psnr_constant_per_object: pictures.psnr_constant_per_object(),
-        emission_iou: emission.iou,
-        emission_log_mse: emission.log_mse,
-        emission_rel_median: quantile(&mut lamps, 0.5),
-        emission_scale: emission.scale,
-        per_object,
+        emission_iou: errors.emission.iou,
+        emission_log_mse: errors.emission.log_mse,
+        emission_rel_median: errors.emission_rel_median,
+        emission_scale: errors.emission.scale,
+        per_object: errors.per_object,
     })
 }
 
-fn objects(
-    scene: &Scene,
-    estimate: &Estimate,
-    truth: &Truth,
-    pictures: &PictureErrors,
-    emission: &EmissionErrors,
-) -> Vec<(String, ObjectErrors)> {
-    let estimates = estimate.objects.iter().zip(&pictures.seen_pixels);
-    (scene.objects.iter().zip(estimates))
-        .filter_map(|(object, (estimated, &pixels))| {
-            let known = truth.objects.get(&object.name)?;
-            let errors = of_object(estimated, known, pixels, emission.scale);
-            Some((object.name.clone(), errors))
-        })
-        .collect()
+/// Photographs that saturate were exposed by a camera that does not say how long.
+fn open_scale(photographs: &[Arc<Photograph>]) -> bool {
+    photographs.iter().any(|p| p.saturation.is_finite())
 }
 
 fn of_object(

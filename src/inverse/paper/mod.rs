@@ -23,8 +23,6 @@ use std::sync::Arc;
 
 /// Halvings of the learning rate (and doublings of the samples), after each of which the loss may stand still once.
 const HALVINGS: u32 = 7;
-/// Bounces where the settings leave the choice.
-const BOUNCES: u32 = 2;
 
 /// What a checkpoint holds: everything that decides how the descent goes on.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -57,11 +55,7 @@ pub fn solve(
     monitor: Monitor,
 ) -> error::Result<Solution> {
     let survey = Survey::new(problem, settings, 400_000);
-    let bounces = if settings.bounces == 0 {
-        BOUNCES
-    } else {
-        settings.bounces as u32
-    };
+    let bounces = settings.max_bounces();
     let state = match resume {
         None => State {
             descent: Descent::new(problem, Grain::Objects),

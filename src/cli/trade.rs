@@ -1,0 +1,168 @@
+//! `relit trade`: what exactness costs on a capture, or on generated rooms.
+
+use crate::cli::arguments::ReadOptions;
+use crate::cli::interrupt::Interrupt;
+use crate::cli::parameters::duration;
+use crate::cli::solve::use_threads;
+use crate::error::Result;
+use crate::inverse::settings::Settings;
+use crate::inverse::solver::Problem;
+use crate::session::command::Source;
+use crate::session::open::open;
+use crate::session::snapshot::OpenCapture;
+use crate::study::trade::plan::{self, Run};
+use crate::study::trade::{Curve, Heard, Trade, combine, measure, rooms};
+use clap::Args;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// `relit trade`.
+#[derive(Debug, Args)]
+pub struct TradeArguments {
+    /// Folder of the capture; the built-in room if none is named
+    capture: Option<PathBuf>,
+    /// Folder to write into [default: relit-out/<capture>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Measure on N generated rooms instead of a capture, and take the mean
+    #[arg(long, value_name = "N", conflicts_with = "capture", value_parser = clap::value_parser!(u64).range(1..))]
+    rooms: Option<u64>,
+    /// Time for all solves together, loading excluded
+    #[arg(long, value_name = "TIME", default_value = "5m", value_parser = time)]
+    time: Duration,
+    /// The presets alone, without the settings around them
+    #[arg(long)]
+    presets: bool,
+    /// Key of all random numbers, and of the first generated room
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Threads to work with [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    #[command(flatten)]
+    read: ReadOptions,
+}
+
+fn time(text: &str) -> std::result::Result<Duration, String> {
+    let seconds = duration(text).filter(|seconds| *seconds > 0.0);
+    let time = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    time.ok_or_else(|| "a time such as 90, 60s, 5m or 1h is wanted".to_owned())
+}
+
+/// Measures, writes trade.csv, trade.png and trade.json, and prints what was found.
+///
+/// # Errors
+/// The capture cannot be read or solved, or the results cannot be written.
+pub fn trade(arguments: &TradeArguments) -> Result<()> {
+    use_threads(arguments.threads)?;
+    let interrupt = Interrupt::listen()?;
+    let base = Settings {
+        seed: arguments.seed,
+        ..Settings::default()
+    };
+    let runs = if arguments.presets {
+        plan::presets(&base)
+    } else {
+        plan::everything(&base)
+    };
+    let (trade, folder) = match arguments.rooms {
+        Some(count) => {
+            let trade = over_rooms(arguments, count, &runs, &interrupt)?;
+            (trade, Path::new("relit-out").join("generated-rooms"))
+        }
+        None => {
+            let folder = arguments.capture.clone();
+            let source = folder.map_or(Source::BuiltInRoom, Source::Folder);
+            let capture = open(&source, &arguments.read.open())?;
+            let trade = of_capture(arguments, &capture, &runs, &interrupt)?;
+            (trade, source.default_out())
+        }
+    };
+    let folder = arguments.out.clone().unwrap_or(folder);
+    trade.write(&folder)?;
+    print!("{}", trade.words());
+    println!("results in {}", folder.display());
+    Ok(())
+}
+
+fn of_capture(
+    arguments: &TradeArguments,
+    capture: &OpenCapture,
+    runs: &[Run],
+    interrupt: &Interrupt,
+) -> Result<Trade> {
+    eprintln!("{}: {}", capture.name, capture.summary.join(", "));
+    let judge = capture.judge()?;
+    let problem = Problem {
+        scene: capture.scene.clone(),
+        photographs: capture.photographs.clone(),
+    };
+    let begun = Instant::now();
+    let curves = measure(
+        &problem,
+        &judge,
+        runs,
+        arguments.time,
+        &|| interrupt.asked(),
+        &mut say,
+    )?;
+    Ok(Trade::new(
+        &capture.name,
+        Some(capture.hash.clone()),
+        judge.measure(),
+        begun.elapsed(),
+        curves,
+    ))
+}
+
+fn over_rooms(
+    arguments: &TradeArguments,
+    count: u64,
+    runs: &[Run],
+    interrupt: &Interrupt,
+) -> Result<Trade> {
+    let mut measured = Vec::new();
+    let mut seconds = Duration::ZERO;
+    for seed in (0..count).map(|index| arguments.seed.wrapping_add(index)) {
+        eprintln!("generated room {seed}");
+        let (problem, judge) = rooms::problem(seed, rooms::SIZE)?;
+        let begun = Instant::now();
+        let limit = arguments.time.div_f64(count as f64);
+        let stopped = || interrupt.asked();
+        let curves = measure(&problem, &judge, runs, limit, &stopped, &mut say)?;
+        seconds += begun.elapsed();
+        // A room that was broken off would stand for solves that it does not have.
+        if interrupt.asked() {
+            break;
+        }
+        measured.push(curves);
+    }
+    let name = format!("generated rooms from {}", arguments.seed);
+    let measure = crate::study::trade::Measure::Albedo;
+    let curves = combine::combine(&measured);
+    let trade = Trade::new(&name, None, measure, seconds, curves);
+    Ok(Trade {
+        captures: measured.len() as u64,
+        ..trade
+    })
+}
+
+/// A line a solve.
+fn say(heard: Heard) {
+    match heard {
+        Heard::Begins(run) => eprintln!("{} …", run.name),
+        Heard::Ended(curve) => eprintln!("{}: {}", curve.name, ending(curve)),
+    }
+}
+
+fn ending(curve: &Curve) -> String {
+    match (curve.points.last(), curve.ended) {
+        (Some(end), Some(why)) => format!(
+            "error {:.5} after {:.2} s ({})",
+            end.error,
+            end.seconds,
+            why.word()
+        ),
+        _ => "no estimate in its time".to_owned(),
+    }
+}

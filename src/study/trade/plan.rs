@@ -1,0 +1,104 @@
+//! Which solves are measured: every preset, and around them one setting changed at a time.
+
+use crate::inverse::settings::{PARAMETERS, Preset, Settings};
+
+/// A solve to be measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// Name of the preset, followed by what differs from it.
+    pub name: String,
+    /// Whether nothing differs from the preset.
+    pub is_preset: bool,
+    /// The parameters.
+    pub settings: Settings,
+    /// Share of the time that it may take, against the weights of the others.
+    pub weight: f64,
+}
+
+/// The presets with their shares of the time: those that go further get more.
+const PRESETS: [(Preset, f64); 4] = [
+    (Preset::Preview, 3.0),
+    (Preset::Balanced, 6.0),
+    (Preset::Reference, 8.0),
+    (Preset::Paper, 8.0),
+];
+/// Share of the time of a solve with one setting changed.
+const VARIED_WEIGHT: f64 = 2.0;
+
+/// The settings that are changed, with the values tried.
+const VARIED: &[(Preset, &str, &[&str])] = &[
+    (Preset::Balanced, "bounces", &["2", "4", "8"]),
+    (Preset::Balanced, "light_sampling", &["emitter", "bsdf"]),
+    (Preset::Paper, "bounces", &["8"]),
+    (Preset::Paper, "learning_rate", &["0.02"]),
+    (Preset::Paper, "samples", &["8"]),
+    (Preset::Paper, "loss", &["l2"]),
+    (Preset::Paper, "decay", &["0.1"]),
+];
+
+/// The presets, over the other parameters of `base`.
+pub fn presets(base: &Settings) -> Vec<Run> {
+    let run = |&(preset, weight): &(Preset, f64)| Run {
+        name: preset.word().to_owned(),
+        is_preset: true,
+        settings: Settings {
+            preset,
+            ..base.clone()
+        },
+        weight,
+    };
+    PRESETS.iter().map(run).collect()
+}
+
+/// The presets, then all variations, over the other parameters of `base`.
+pub fn everything(base: &Settings) -> Vec<Run> {
+    let mut runs = presets(base);
+    for &(preset, name, values) in VARIED {
+        for text in values {
+            let mut settings = Settings {
+                preset,
+                ..base.clone()
+            };
+            let parameter = PARAMETERS.iter().find(|p| p.name == name);
+            let set = parameter.is_some_and(|parameter| {
+                let value = parameter.parse(text);
+                value.is_ok_and(|value| parameter.set(&mut settings, &value).is_ok())
+            });
+            debug_assert!(set, "{name} {text}");
+            runs.push(Run {
+                name: format!("{}, {} {text}", preset.word(), name.replace('_', " ")),
+                is_preset: false,
+                settings,
+                weight: VARIED_WEIGHT,
+            });
+        }
+    }
+    runs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_variation_differs_from_its_preset_in_one_parameter() {
+        let base = Settings {
+            seed: 9,
+            ..Settings::default()
+        };
+        let runs = everything(&base);
+        let names: std::collections::HashSet<&str> = runs.iter().map(|r| r.name.as_str()).collect();
+        assert_eq!(names.len(), runs.len());
+        for run in &runs {
+            let preset = Settings {
+                preset: run.settings.preset,
+                ..base.clone()
+            };
+            let changed = PARAMETERS
+                .iter()
+                .filter(|p| p.get(&preset) != p.get(&run.settings))
+                .count();
+            assert_eq!(changed, usize::from(!run.is_preset), "{}", run.name);
+        }
+    }
+}

@@ -1,0 +1,35 @@
+//! The trade over generated rooms: what presets are chosen on.
+
+use crate::capture::truth::Truth;
+use crate::error::Result;
+use crate::inverse::solver::Problem;
+use crate::room::generated::generate;
+use crate::scene::Scene;
+use crate::study::evaluate::Reference;
+use crate::study::trade::judge::Judge;
+use std::sync::Arc;
+
+/// Width and height of the photographs of generated rooms in pixels.
+pub const SIZE: [u32; 2] = [96, 72];
+
+/// Generated room `seed`, photographed, with a judge that knows its truth.
+///
+/// # Errors
+/// Never for rooms as they are generated; the signature is the scene's.
+pub fn problem(seed: u64, size: [u32; 2]) -> Result<(Problem, Judge)> {
+    let (room, rendering) = generate(seed, size);
+    let capture = room.photographed(&rendering)?;
+    let photographs: Vec<_> = capture
+        .frames
+        .iter()
+        .map(|frame| frame.load())
+        .collect::<Result<_>>()?;
+    let scene = Scene::new(&capture)?;
+    let truth: Truth = room.truth(size)?;
+    let reference = Reference::new(truth, &capture, &scene, &photographs);
+    let problem = Problem {
+        scene: Arc::new(scene),
+        photographs,
+    };
+    Ok((problem, Judge::Truth(Box::new(reference))))
+}
