@@ -85,10 +85,13 @@ fn ids_sides_and_the_share_of_the_mesh_are_those_of_the_geometry() {
     );
     let prepared = prepared(&capture);
     let half = u64::from(SIZE * SIZE / 2);
-    assert_eq!(prepared.ids.front_pixels, [half, 0, 0]);
-    assert_eq!(prepared.ids.back_pixels, [0, half, 0]);
-    assert!(!prepared.ids.triangles[0].contains(&NOTHING));
-    assert!(prepared.ids.triangles[0][0] < 2 && prepared.ids.triangles[0][SIZE as usize - 1] >= 2);
+    assert_eq!(prepared.scene.ids().front_pixels, [half, 0, 0]);
+    assert_eq!(prepared.scene.ids().back_pixels, [0, half, 0]);
+    assert!(!prepared.scene.ids().triangles[0].contains(&NOTHING));
+    assert!(
+        prepared.scene.ids().triangles[0][0] < 2
+            && prepared.scene.ids().triangles[0][SIZE as usize - 1] >= 2
+    );
     let share = prepared.seen_area_share;
     assert!((share - 2.0 / 3.0).abs() < 0.02, "{share}");
     assert!(prepared.warnings.iter().any(|w| w.contains("rectangle 2")));
@@ -101,7 +104,7 @@ fn an_object_that_shines_on_its_back_is_turned_over_and_a_dim_one_is_not() {
     let rectangles = [(-2.0, 0.0, -2.0, true), (0.0, 2.0, -2.0, false)];
     let bright = capture(&rectangles, frame(1.0, 10.0));
     let turned = prepared(&bright);
-    assert_eq!(turned.ids.back_pixels, [0, 0]);
+    assert_eq!(turned.scene.ids().back_pixels, [0, 0]);
     assert_eq!(
         turned.capture.mesh.triangles[..2],
         bright.mesh.triangles[..2]
@@ -124,7 +127,7 @@ fn a_mesh_wound_the_other_way_round_is_turned_over_except_what_no_photograph_see
         frame(1.0, 0.1),
     );
     let turned = prepared(&backwards);
-    assert_eq!(turned.ids.back_pixels, [0, 0, 0]);
+    assert_eq!(turned.scene.ids().back_pixels, [0, 0, 0]);
     assert_eq!(
         turned.capture.mesh.triangles[4..],
         backwards.mesh.triangles[4..]

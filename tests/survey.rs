@@ -91,6 +91,36 @@ fn pure_pixels_see_one_surface_of_one_object_and_most_are_pure() {
     assert!(survey.pixels.iter().filter(mixed).count() > 100);
 }
 
+/// Points on planes are found without rays; they are where rays would have met the mesh.
+#[test]
+fn points_lie_where_the_quarters_of_their_pixel_see_the_mesh() {
+    let problem = room();
+    let survey = survey(&problem);
+    let scene = &problem.scene;
+    for pixel in &survey.pixels {
+        let camera = &scene.cameras[pixel.frame as usize];
+        let corner = Vec2::new(
+            (pixel.pixel % SIZE[0]) as f32,
+            (pixel.pixel / SIZE[0]) as f32,
+        );
+        for (quarter, point) in pixel.points.iter().enumerate() {
+            let point = point.expect("the room is closed");
+            let place = camera.project(point.point).expect("in the picture") - corner;
+            let low = Vec2::new((quarter % 2) as f32, (quarter / 2) as f32) * 0.5;
+            let inside = (place - low).min_element() > -1e-3 && (place - low).max_element() < 0.501;
+            assert!(inside, "{place} in quarter {quarter}");
+            let hit = scene
+                .intersect(&camera.ray(place + corner))
+                .expect("closed");
+            let off = (scene.point(&hit) - point.point).length() / scene.diameter;
+            assert!(off < 1e-3, "{off}");
+            assert!((point.point - camera.center).dot(point.normal) <= 0.0);
+        }
+    }
+    let all = survey.pixels.len() as u64 * 5;
+    assert!(survey.rays < all * 3 / 4, "{} of {all}", survey.rays);
+}
+
 #[test]
 fn footprints_grow_with_the_room() {
     let footprint = |scale: f64| {

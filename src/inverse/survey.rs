@@ -5,8 +5,8 @@ use crate::inverse::settings::Settings;
 use crate::inverse::solver::Problem;
 use crate::math::rng::{Stream, splitmix64};
 use crate::scene::Scene;
-use crate::scene::geometry::Hit;
-use crate::scene::visibility::IdBuffers;
+use crate::scene::camera::Camera;
+use crate::scene::visibility::NOTHING;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -14,6 +14,8 @@ use rayon::prelude::*;
 const QUARTERS: usize = 4;
 /// All pixels are looked at of objects that fewer pixels than this see.
 const RARE: u64 = 2_000;
+/// Corners that lie within this share of the scene's diameter of a plane lie on it.
+const COPLANAR: f32 = 1e-6;
 /// First of the sample keys of survey rays, far from those of paths.
 const KEY: u64 = 1 << 62;
 
@@ -62,7 +64,7 @@ impl Survey {
     /// Casts the rays of all pixels, or of a keyed share of about `most_pixels` and of the objects that few pixels see.
     pub fn new(problem: &Problem, settings: &Settings, most_pixels: usize) -> Self {
         let scene = &*problem.scene;
-        let centers = IdBuffers::new(scene);
+        let centers = scene.ids();
         let mut seen = vec![0u64; scene.objects.len()];
         for (photograph, triangles) in problem.photographs.iter().zip(&centers.triangles) {
             for (pixel, &triangle) in triangles.iter().enumerate() {
@@ -76,13 +78,17 @@ impl Survey {
         }
         let total: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
         let share = (most_pixels as f64 / total.max(1) as f64).min(1.0);
-        let frames: Vec<(Vec<SurveyedPixel>, Vec<f32>)> = problem
+        let frames: Vec<Surveyed> = problem
             .photographs
             .par_iter()
             .enumerate()
             .map(|(frame, photograph)| {
-                let mut pixels = Vec::new();
-                let mut footprints = Vec::new();
+                let view = FrameView {
+                    scene,
+                    camera: &scene.cameras[frame],
+                    triangles: &centers.triangles[frame],
+                };
+                let mut surveyed = Surveyed::default();
                 for pixel in 0..photograph.pixels.len() {
                     let usable = photograph.usable.is_empty() || photograph.usable[pixel];
                     let triangle = centers.triangles[frame][pixel] as usize;
@@ -93,27 +99,30 @@ impl Survey {
                     if !usable || !(rare || drawn(share, frame as u64, pixel as u64)) {
                         continue;
                     }
-                    let held_out = is_held_out(settings, frame as u32, pixel as u32);
-                    let (surveyed, footprint) = look(
-                        scene,
-                        settings.seed,
-                        frame,
-                        pixel,
-                        photograph.width,
-                        held_out,
-                    );
-                    footprints.extend(footprint);
-                    pixels.push(surveyed);
+                    let key = Stream::new(settings.seed, frame as u64, pixel as u64, KEY);
+                    let looked = view.look(pixel, key);
+                    surveyed.footprints.extend(looked.footprint);
+                    surveyed.rays += looked.rays;
+                    surveyed.pixels.push(SurveyedPixel {
+                        frame: frame as u32,
+                        pixel: pixel as u32,
+                        object: looked.object,
+                        pure: looked.pure,
+                        held_out: is_held_out(settings, frame as u32, pixel as u32),
+                        points: looked.points,
+                    });
                 }
-                (pixels, footprints)
+                surveyed
             })
             .collect();
 
-        let mut pixels = Vec::with_capacity(frames.iter().map(|f| f.0.len()).sum());
+        let mut pixels = Vec::with_capacity(frames.iter().map(|f| f.pixels.len()).sum());
         let mut footprints = Vec::with_capacity(pixels.capacity());
-        for (frame_pixels, frame_footprints) in frames {
-            pixels.extend(frame_pixels);
-            footprints.extend(frame_footprints);
+        let mut rays = total as u64;
+        for frame in frames {
+            pixels.extend(frame.pixels);
+            footprints.extend(frame.footprints);
+            rays += frame.rays;
         }
         let middle = footprints.len() / 2;
         let footprint = if footprints.is_empty() {
@@ -121,7 +130,6 @@ impl Survey {
         } else {
             *footprints.select_nth_unstable_by(middle, f32::total_cmp).1
         };
-        let rays = total as u64 + pixels.len() as u64 * (QUARTERS as u64 + 1);
         Self {
             pixels,
             seen,
@@ -131,6 +139,14 @@ impl Survey {
     }
 }
 
+/// What was found in one frame.
+#[derive(Default)]
+struct Surveyed {
+    pixels: Vec<SurveyedPixel>,
+    footprints: Vec<f32>,
+    rays: u64,
+}
+
 /// Whether a pixel belongs to the keyed share that is looked at.
 fn drawn(share: f64, frame: u64, pixel: u64) -> bool {
     share >= 1.0
@@ -138,66 +154,115 @@ fn drawn(share: f64, frame: u64, pixel: u64) -> bool {
             < share * (1u64 << 53) as f64
 }
 
-/// Looks through one pixel; returns it with the size of its footprint.
-fn look(
-    scene: &Scene,
-    seed: u64,
-    frame: usize,
-    pixel: usize,
-    width: u32,
-    held_out: bool,
-) -> (SurveyedPixel, Option<f32>) {
-    let camera = &scene.cameras[frame];
-    let corner = Vec2::new(
-        (pixel % width as usize) as f32,
-        (pixel / width as usize) as f32,
-    );
-    let seen_from = |hit: &Hit| {
-        let normal = scene.normals[hit.triangle as usize];
-        let point = scene.point(hit);
-        let front = normal.dot(camera.center - point) >= 0.0;
+/// A frame, with the triangle that the centre of each of its pixels sees.
+struct FrameView<'a> {
+    scene: &'a Scene,
+    camera: &'a Camera,
+    triangles: &'a [u32],
+}
+
+/// What was found through one pixel.
+struct Looked {
+    object: u32,
+    pure: bool,
+    points: [Option<SurveyPoint>; QUARTERS],
+    /// Width of the pixel on the surface.
+    footprint: Option<f32>,
+    rays: u64,
+}
+
+impl FrameView<'_> {
+    /// Looks through a pixel, at points drawn from `stream`. Where all neighbours see the plane that it sees, the points
+    /// lie on that plane and need no rays.
+    fn look(&self, pixel: usize, mut stream: Stream) -> Looked {
+        let width = self.camera.intrinsics.width as usize;
+        let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+        let triangle = self.triangles[pixel];
+        let center = (triangle != NOTHING)
+            .then(|| self.on_plane(triangle, corner + 0.5))
+            .flatten();
+        let flat = center.is_some() && self.is_flat(pixel, width);
+        let points: [Option<SurveyPoint>; QUARTERS] = std::array::from_fn(|quarter| {
+            let [dx, dy] = stream.uniform2();
+            let offset = Vec2::new((quarter % 2) as f32 + dx, (quarter / 2) as f32 + dy) * 0.5;
+            if flat {
+                return self.on_plane(triangle, corner + offset);
+            }
+            let hit = self.scene.intersect(&self.camera.ray(corner + offset))?;
+            Some(self.seen_from(hit.triangle, self.scene.point(&hit)))
+        });
+
+        // The footprint's area is d² / (f² cosθ).
+        let footprint = center.map(|c| {
+            let to_camera = self.camera.center - c.point;
+            let lens = &self.camera.intrinsics;
+            let focal = (lens.fx * lens.fy) as f32;
+            let cosine = c.normal.dot(to_camera.normalize_or_zero()).max(0.05);
+            (to_camera.length_squared() / (focal * cosine)).sqrt()
+        });
+        let pure = center.zip(footprint).is_some_and(|(center, size)| {
+            points.iter().all(|p| {
+                p.is_some_and(|p| {
+                    p.object == center.object
+                        && p.normal.dot(center.normal) > 0.9
+                        && (p.point - center.point).dot(center.normal).abs() < size
+                })
+            })
+        });
+        Looked {
+            object: center.map_or(u32::MAX, |c| c.object),
+            pure,
+            points,
+            footprint,
+            rays: if flat { 0 } else { QUARTERS as u64 },
+        }
+    }
+
+    /// The point of a triangle's surface, with the side that the camera sees.
+    fn seen_from(&self, triangle: u32, point: Vec3) -> SurveyPoint {
+        let normal = self.scene.normals[triangle as usize];
+        let front = normal.dot(self.camera.center - point) >= 0.0;
         SurveyPoint {
             point,
             normal: if front { normal } else { -normal },
-            object: scene.object_of[hit.triangle as usize],
+            object: self.scene.object_of[triangle as usize],
         }
-    };
-    let center = scene
-        .intersect(&camera.ray(corner + 0.5))
-        .map(|hit| seen_from(&hit));
-    let mut stream = Stream::new(seed, frame as u64, pixel as u64, KEY);
-    let points: [Option<SurveyPoint>; QUARTERS] = std::array::from_fn(|quarter| {
-        let [dx, dy] = stream.uniform2();
-        let offset = Vec2::new((quarter % 2) as f32 + dx, (quarter / 2) as f32 + dy) * 0.5;
-        scene
-            .intersect(&camera.ray(corner + offset))
-            .map(|hit| seen_from(&hit))
-    });
+    }
 
-    // The footprint's area is d² / (f² cosθ).
-    let footprint = center.map(|c| {
-        let to_camera = camera.center - c.point;
-        let focal = (camera.intrinsics.fx * camera.intrinsics.fy) as f32;
-        let cosine = c.normal.dot(to_camera.normalize_or_zero()).max(0.05);
-        (to_camera.length_squared() / (focal * cosine)).sqrt()
-    });
-    let pure = center.zip(footprint).is_some_and(|(center, size)| {
-        points.iter().all(|p| {
-            p.is_some_and(|p| {
-                p.object == center.object
-                    && p.normal.dot(center.normal) > 0.9
-                    && (p.point - center.point).dot(center.normal).abs() < size
-            })
+    /// Where the ray through a place of the picture meets a triangle's plane; `None` where it runs along it.
+    fn on_plane(&self, triangle: u32, at: Vec2) -> Option<SurveyPoint> {
+        let ray = self.camera.ray(at);
+        let normal = self.scene.normals[triangle as usize];
+        let [corner, _, _] = self.scene.corners(triangle);
+        let t = normal.dot(corner - ray.origin) / normal.dot(ray.direction);
+        let point = ray.origin + ray.direction * t;
+        (t > 0.0 && point.is_finite()).then(|| self.seen_from(triangle, point))
+    }
+
+    /// Whether the eight pixels around see the same object on the same plane.
+    fn is_flat(&self, pixel: usize, width: usize) -> bool {
+        let height = self.triangles.len() / width;
+        let (x, y) = (pixel % width, pixel / width);
+        if x == 0 || y == 0 || x + 1 >= width || y + 1 >= height {
+            return false;
+        }
+        let own = self.triangles[pixel];
+        let scene = self.scene;
+        let [on_plane, _, _] = scene.corners(own);
+        let normal = scene.normals[own as usize];
+        let tolerance = COPLANAR * scene.diameter;
+        let same = |other: u32| {
+            other == own
+                || other != NOTHING
+                    && scene.object_of[other as usize] == scene.object_of[own as usize]
+                    && scene
+                        .corners(other)
+                        .iter()
+                        .all(|c| (*c - on_plane).dot(normal).abs() <= tolerance)
+        };
+        (y - 1..=y + 1).all(|y| {
+            let row = &self.triangles[y * width + x - 1..=y * width + x + 1];
+            row.iter().all(|&other| same(other))
         })
-    });
-    let object = center.map_or(u32::MAX, |c| c.object);
-    let surveyed = SurveyedPixel {
-        frame: frame as u32,
-        pixel: pixel as u32,
-        object,
-        pure,
-        held_out,
-        points,
-    };
-    (surveyed, footprint)
+    }
 }

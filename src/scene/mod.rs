@@ -14,6 +14,8 @@ use bvh::Bvh;
 use camera::Camera;
 use geometry::{Hit, Ray};
 use glam::{DVec3, Vec3};
+use std::sync::OnceLock;
+use visibility::IdBuffers;
 
 /// Geometry and cameras of a capture, in metres relative to [`Scene::origin`].
 #[derive(Debug)]
@@ -40,6 +42,7 @@ pub struct Scene {
     pub diameter: f32,
     /// Closest-hit and any-hit queries.
     pub bvh: Bvh,
+    ids: OnceLock<IdBuffers>,
 }
 
 /// A named group of triangles sharing parameters in the coarse stage.
@@ -127,7 +130,21 @@ impl Scene {
             up: capture.up.as_vec3(),
             diameter: (high - low).length() as f32,
             bvh,
+            ids: OnceLock::new(),
         })
+    }
+
+    /// The same scene with id buffers that were found already; they must be its own.
+    pub fn with_ids(self, ids: IdBuffers) -> Self {
+        Self {
+            ids: OnceLock::from(ids),
+            ..self
+        }
+    }
+
+    /// What the centre of each pixel sees; found when first asked for, and kept.
+    pub fn ids(&self) -> &IdBuffers {
+        self.ids.get_or_init(|| IdBuffers::new(self))
     }
 
     /// The nearest hit along a ray.

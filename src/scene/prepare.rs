@@ -5,7 +5,7 @@ use crate::capture::photograph::Photograph;
 use crate::capture::working::Working;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
-use crate::scene::visibility::{IdBuffers, seen_area_share};
+use crate::scene::visibility::seen_area_share;
 use crate::scene::winding::turn_over;
 use std::sync::Arc;
 
@@ -23,8 +23,6 @@ pub struct Prepared {
     pub scene: Scene,
     /// The photographs at the working resolution, one a camera.
     pub photographs: Vec<Arc<Photograph>>,
-    /// What each pixel sees.
-    pub ids: IdBuffers,
     /// Share of the mesh's area that the photographs see, 0 to 1.
     pub seen_area_share: f64,
     /// Warnings of the reader, the photographs and the scene, each a full sentence.
@@ -38,8 +36,7 @@ pub struct Prepared {
 pub fn prepare(capture: &Capture, working: &Working) -> Result<Prepared> {
     let mut capture = capture.at(working);
     let mut scene = Scene::new(&capture)?;
-    let mut ids = IdBuffers::new(&scene);
-    if (0..scene.cameras.len()).all(|frame| ids.pixels_on_mesh(frame) == 0) {
+    if (0..scene.cameras.len()).all(|frame| scene.ids().pixels_on_mesh(frame) == 0) {
         return Err(Error::new(
             &capture.name,
             "no photograph sees the mesh",
@@ -48,19 +45,21 @@ pub fn prepare(capture: &Capture, working: &Working) -> Result<Prepared> {
     }
     let mut warnings = capture.warnings.clone();
     warnings.extend(working.warnings.iter().cloned());
-    let turned = turn_over(&mut capture, &scene, &ids, &working.photographs);
+    let turned = turn_over(&mut capture, &scene, scene.ids(), &working.photographs);
     if !turned.is_empty() {
         warnings.extend(turned);
+        // Only the sides have changed.
+        let mut ids = scene.ids().clone();
         scene = Scene::new(&capture)?;
         ids.count_sides(&scene);
+        scene = scene.with_ids(ids);
     }
-    warnings.extend(oddities(&scene, &ids));
+    warnings.extend(oddities(&scene));
     Ok(Prepared {
         seen_area_share: seen_area_share(&scene, AREA_SAMPLES),
         photographs: working.photographs.clone(),
         capture,
         scene,
-        ids,
         warnings,
     })
 }
@@ -71,7 +70,7 @@ impl Prepared {
         let scene = &self.scene;
         let pixels: usize = self.photographs.iter().map(|p| p.pixels.len()).sum();
         let seen_objects = (0..scene.objects.len())
-            .filter(|&object| self.ids.seen_pixels(object) > 0)
+            .filter(|&object| scene.ids().seen_pixels(object) > 0)
             .count();
         let (low, high) = self.capture.mesh.bounds();
         let size = high - low;
@@ -96,7 +95,8 @@ impl Prepared {
 }
 
 /// Objects that no photograph sees, and photographs that do not see the mesh.
-fn oddities(scene: &Scene, ids: &IdBuffers) -> Vec<String> {
+fn oddities(scene: &Scene) -> Vec<String> {
+    let ids = scene.ids();
     let mut warnings = Vec::new();
     let unseen: Vec<&str> = (0..scene.objects.len())
         .filter(|&object| ids.seen_pixels(object) == 0)
