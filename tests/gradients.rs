@@ -140,7 +140,8 @@ fn independent_samples_give_the_gradient_and_shared_samples_a_biased_one() {
         sampling: LightSampling::Mis,
         max_bounces: BOUNCES,
         seed: 0,
-        first_sample: 0,
+        stage: 0,
+        round: 0,
     };
     let found: Vec<[Vec<DVec3>; 2]> = (0..PASSES)
         .into_par_iter()

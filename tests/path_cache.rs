@@ -23,7 +23,7 @@ use std::sync::Arc;
 
 const SIZE: [u32; 2] = [6, 4];
 /// Rounds of independent paths.
-const ROUNDS: u64 = 1_500;
+const ROUNDS: u32 = 1_500;
 /// Paths a pixel of the renderings.
 const SAMPLES: u64 = 6_000;
 
@@ -70,7 +70,7 @@ fn rounds(scene: &Scene, sampling: LightSampling) -> Vec<PathCache> {
     let weights = [0.05, 0.05, 0.05, 0.05, 0.05, 0.05, 1.0, 0.05];
     let lights = Emitters::new(scene, &weights);
     let believed = vec![0.6; scene.objects.len()];
-    let tracer = |round: u64| Tracer {
+    let tracer = |round: u32| Tracer {
         scene,
         lights: &lights,
         measured: None,
@@ -80,7 +80,8 @@ fn rounds(scene: &Scene, sampling: LightSampling) -> Vec<PathCache> {
         sampling,
         max_bounces: 1000,
         seed: sampling as u64,
-        first_sample: round << 20,
+        stage: 0,
+        round,
     };
     let clusters = rows();
     (0..ROUNDS)
@@ -242,7 +243,8 @@ fn paths_that_end_in_photographed_radiance_hold_one_bounce_and_that_radiance() {
         sampling: LightSampling::Bsdf,
         max_bounces: 1000,
         seed: 1,
-        first_sample: 0,
+        stage: 0,
+        round: 0,
     };
     let clusters = [Cluster {
         frame: 0,

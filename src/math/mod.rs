@@ -4,6 +4,7 @@ pub mod color;
 pub mod frame;
 pub mod picture;
 pub mod rng;
+pub mod sequence;
 pub mod sh;
 pub mod stats;
 pub mod warp;

@@ -1,6 +1,6 @@
 //! Rounds of paths added up without keeping them: linearised about one point, averaged cluster by cluster.
 
-use super::evaluate::{Linearised, NormalEquations};
+use super::evaluate::Linearised;
 use glam::DVec3;
 
 /// Sums of linearised clusters over rounds of independent paths.
@@ -42,14 +42,15 @@ impl Accumulated {
         self.rounds
     }
 
-    /// The normal equations of the mean over rounds, with `n` rows.
-    pub fn equations(&self, n: usize) -> NormalEquations {
+    /// The mean over rounds of each cluster.
+    pub fn mean(&self) -> Vec<Linearised> {
         let scale = 1.0 / f64::from(self.rounds.max(1));
-        let mean: Vec<Linearised> = self
-            .clusters
+        self.clusters
             .iter()
             .map(|c| Linearised {
+                object: c.object,
                 weight: c.weight,
+                floor: c.floor,
                 residuals: c.residuals.map(|r: DVec3| r * scale),
                 rows: c
                     .rows
@@ -57,8 +58,7 @@ impl Accumulated {
                     .map(|&(place, a, b)| (place, a * scale, b * scale))
                     .collect(),
             })
-            .collect();
-        NormalEquations::new(&mean, n)
+            .collect()
     }
 }
 
@@ -66,6 +66,8 @@ impl Accumulated {
 mod tests {
     use super::*;
     use crate::inverse::cache::clusters::Cluster;
+    use crate::inverse::cache::evaluate::NormalEquations;
+    use crate::inverse::cache::trust::Trust;
     use crate::inverse::cache::{CachedCluster, NO_LAMP, PathCache, Vertex};
     use crate::inverse::parameters::Unknowns;
     use crate::math::rng::Stream;
@@ -142,9 +144,10 @@ mod tests {
             sums.add(cache.linearise(&unknowns, &place));
         }
         assert_eq!(sums.rounds(), ROUNDS as u32);
-        let found = sums.equations(free.len());
+        let even = Trust::even(SURFACES);
+        let found = NormalEquations::new(&sums.mean(), free.len(), &even);
         let together = cache(|pixel, set| (0..ROUNDS).flat_map(|r| round(r, pixel, set)).collect());
-        let wanted = together.normal_equations(&unknowns, &free);
+        let wanted = together.normal_equations(&unknowns, &free, &even);
 
         assert_eq!(found.clusters, wanted.clusters);
         assert!((found.objective - wanted.objective).length() < 1e-5);
@@ -163,8 +166,6 @@ mod tests {
 
     #[test]
     fn without_rounds_there_is_nothing_to_know() {
-        let equations = Accumulated::default().equations(2);
-        assert_eq!(equations.clusters, 0);
-        assert_eq!(equations.hessian[0].amax(), 0.0);
+        assert!(Accumulated::default().mean().is_empty());
     }
 }

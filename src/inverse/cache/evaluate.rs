@@ -4,6 +4,7 @@
 //! biased towards darkness. Products are therefore taken across the two independent sets A and B.
 
 use super::derivative::{Gradient, differentiate};
+use super::trust::Trust;
 use super::{CachedCluster, PathCache};
 use crate::inverse::parameters::Unknowns;
 use glam::{DVec3, Vec3};
@@ -13,8 +14,12 @@ use rayon::prelude::*;
 /// One cluster's residual and derivative from both sets.
 #[derive(Debug, Clone)]
 pub struct Linearised {
+    /// Object behind its pixels.
+    pub object: u32,
     /// Weight of the squared residual, per channel.
     pub weight: DVec3,
+    /// What the squared residual would weigh if all of the photographed radiance were wrong.
+    pub floor: DVec3,
     /// Photograph minus model, from set A and from set B.
     pub residuals: [DVec3; 2],
     /// Place among the free parameters, derivative of A, derivative of B.
@@ -40,19 +45,24 @@ pub struct NormalEquations {
 
 impl PathCache {
     /// The normal equations for the parameters in `free` (indices into albedos, then emissions).
-    pub fn normal_equations(&self, unknowns: &Unknowns, free: &[usize]) -> NormalEquations {
+    pub fn normal_equations(
+        &self,
+        unknowns: &Unknowns,
+        free: &[usize],
+        trust: &Trust,
+    ) -> NormalEquations {
         let parameters = 2 * unknowns.surfaces();
         let mut place = vec![usize::MAX; parameters];
         for (i, &index) in free.iter().enumerate() {
             place[index] = i;
         }
-        NormalEquations::new(&self.linearise(unknowns, &place), free.len())
+        NormalEquations::new(&self.linearise(unknowns, &place), free.len(), trust)
     }
 }
 
 impl NormalEquations {
     /// Sums over linearised clusters with `n` rows.
-    pub fn new(linearised: &[Linearised], n: usize) -> Self {
+    pub fn new(linearised: &[Linearised], n: usize, trust: &Trust) -> Self {
         let mut sums = Self {
             hessian: std::array::from_fn(|_| DMatrix::zeros(n, n)),
             descent: std::array::from_fn(|_| DVector::zeros(n)),
@@ -62,7 +72,7 @@ impl NormalEquations {
             clusters: linearised.len(),
         };
         for cluster in linearised {
-            sums.add(cluster);
+            sums.add(cluster, trust.of(cluster.object));
         }
         sums
     }
@@ -132,33 +142,38 @@ fn linearise(
         }
     }
     Linearised {
+        object: cached.cluster.object,
         weight: cached.cluster.weight.as_dvec3(),
+        floor: (cached.cluster.weight * cached.cluster.measured * cached.cluster.measured)
+            .as_dvec3(),
         residuals,
         rows,
     }
 }
 
 impl NormalEquations {
-    fn add(&mut self, cluster: &Linearised) {
+    fn add(&mut self, cluster: &Linearised, trust: DVec3) {
         let Linearised {
             weight,
             residuals,
             rows,
+            ..
         } = cluster;
-        self.objective += *weight * residuals[0] * residuals[1];
+        let weight = *weight * trust;
+        self.objective += weight * residuals[0] * residuals[1];
         let scores: Vec<DVec3> = rows
             .iter()
-            .map(|&(_, ja, jb)| *weight * (ja * residuals[1] + jb * residuals[0]) * 0.5)
+            .map(|&(_, ja, jb)| weight * (ja * residuals[1] + jb * residuals[0]) * 0.5)
             .collect();
         for (&(i, ja, jb), score) in rows.iter().zip(&scores) {
-            let information = *weight * ja * jb;
+            let information = weight * ja * jb;
             for c in 0..3 {
                 self.descent[c][i] += score[c];
                 self.information[c][i] += information[c];
             }
         }
         for (&(i, ia, ib), &si) in rows.iter().zip(&scores) {
-            let row = *weight * (ia + ib) * 0.25;
+            let row = weight * (ia + ib) * 0.25;
             for (&(j, ja, jb), &sj) in rows.iter().zip(&scores) {
                 if j > i {
                     continue;

@@ -3,6 +3,7 @@
 use super::PathCache;
 use super::evaluate::NormalEquations;
 use super::step::Step;
+use super::trust::Trust;
 use crate::inverse::parameters::Unknowns;
 use glam::DVec3;
 use nalgebra::DVector;
@@ -75,16 +76,17 @@ pub fn fit<E>(
     cache: &PathCache,
     start: &Unknowns,
     free: &[usize],
+    trust: &Trust,
     most_steps: u64,
     mut between: impl FnMut(&Unknowns) -> Result<(), E>,
 ) -> Result<Fit, E> {
     let mut unknowns = start.clone();
-    let mut equations = cache.normal_equations(&unknowns, free);
+    let mut equations = cache.normal_equations(&unknowns, free, trust);
     let mut iterations = 0;
     let mut damping = LEAST_DAMPING;
     while iterations < most_steps {
         let (proposal, largest) = propose(&equations, free, &unknowns, damping);
-        let after = cache.normal_equations(&proposal, free);
+        let after = cache.normal_equations(&proposal, free, trust);
         iterations += 1;
         between(&proposal)?;
         // A step from afar may overshoot: the squared error then tells.

@@ -11,11 +11,14 @@ mod describe;
 pub mod errors;
 pub mod evaluate;
 pub mod fit;
+pub mod judge;
 pub mod ladder;
+pub mod path_noise;
 mod reached;
 pub mod roles;
 pub mod step;
 pub mod trace;
+pub mod trust;
 
 use clusters::Cluster;
 use glam::Vec3;

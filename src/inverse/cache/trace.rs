@@ -6,7 +6,7 @@ use crate::inverse::measured::MeasuredRadiance;
 use crate::inverse::settings::LightSampling;
 use crate::inverse::survey::SurveyPoint;
 use crate::math::frame::Frame;
-use crate::math::rng::Stream;
+use crate::math::sequence::{SequencePoint, Uniforms};
 use crate::math::warp;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
@@ -43,8 +43,10 @@ pub struct Tracer<'a> {
     pub max_bounces: u32,
     /// Key of the random streams.
     pub seed: u64,
-    /// Sample index of the first path; caches with other ranges are independent.
-    pub first_sample: u64,
+    /// Caches of other stages are independent.
+    pub stage: u64,
+    /// Rounds of one stage continue each other's sequences of numbers, so that together they are more even than apart.
+    pub round: u32,
 }
 
 /// Directions out of the mesh, cut into the pixels of a map; each is a surface with an emission.
@@ -90,18 +92,18 @@ impl Tracer<'_> {
     fn cluster(&self, cluster: &Cluster, width: u32) -> (CachedCluster, u64, u64) {
         let (mut vertices, mut ends) = (Vec::new(), Vec::new());
         let (mut rays, mut rejected) = (0, 0);
-        for &pixel in &cluster.pixels {
+        let (paths, count) = (u64::from(cluster.paths), cluster.pixels.len() as u64);
+        let first = cluster.pixels.first().copied().map_or(0, u64::from);
+        for (place, &pixel) in cluster.pixels.iter().enumerate() {
             let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
-            for index in 0..2 * u64::from(cluster.paths) {
-                let sample = self.first_sample + index;
-                let mut stream = Stream::new(
-                    self.seed,
-                    u64::from(cluster.frame),
-                    u64::from(pixel),
-                    sample,
-                );
+            for path in 0..2 * paths {
+                // The paths of a set, over all its pixels and rounds, share one sequence.
+                let set = path / paths;
+                let index = (u64::from(self.round) * count + place as u64) * paths + path % paths;
+                let key = [u64::from(cluster.frame), first, 2 * self.stage + set];
+                let mut numbers = SequencePoint::new(self.seed, key, index);
                 let camera = &self.scene.cameras[cluster.frame as usize];
-                let traced = self.pixel_path(camera, corner, &mut stream, &mut vertices);
+                let traced = self.pixel_path(camera, corner, &mut numbers, &mut vertices);
                 rays += traced.0;
                 rejected += u64::from(!traced.1);
                 ends.push(vertices.len() as u32);
@@ -124,12 +126,12 @@ impl Tracer<'_> {
         &self,
         camera: &Camera,
         corner: Vec2,
-        stream: &mut Stream,
+        numbers: &mut impl Uniforms,
         vertices: &mut Vec<Vertex>,
     ) -> (u64, bool) {
         let start = vertices.len();
-        let [dx, dy] = stream.uniform2();
-        let rays = self.path(&camera.ray(corner + Vec2::new(dx, dy)), stream, vertices);
+        let [dx, dy, ..] = numbers.four();
+        let rays = self.path(&camera.ray(corner + Vec2::new(dx, dy)), numbers, vertices);
         let finite = vertices[start..].iter().all(|v| {
             v.lamp_weight.is_finite() && v.emission_weight.is_finite() && v.known.is_finite()
         });
@@ -140,7 +142,12 @@ impl Tracer<'_> {
     }
 
     /// Appends the vertices of one path; returns the number of rays.
-    fn path(&self, camera_ray: &Ray, stream: &mut Stream, vertices: &mut Vec<Vertex>) -> u64 {
+    fn path(
+        &self,
+        camera_ray: &Ray,
+        numbers: &mut impl Uniforms,
+        vertices: &mut Vec<Vertex>,
+    ) -> u64 {
         let mut rays = 1;
         let Some(mut hit) = self.scene.intersect(camera_ray) else {
             vertices.extend(
@@ -175,16 +182,19 @@ impl Tracer<'_> {
             }
 
             // Sample light directly.
+            let [choice, u, v, _] = numbers.four();
             if self.sampling != LightSampling::Bsdf {
-                rays += self.light_sample(&surface, scale, stream, &mut vertex);
+                let choice = numbers.refine(choice);
+                rays += self.light_sample(&surface, scale, choice, [u, v], &mut vertex);
             }
 
             // Decide whether to go on, by what is believed of the albedo and never by the unknowns themselves.
+            let [u, v, end, _] = numbers.four();
             let believed_here = believed * self.believed_albedo[surface.id as usize];
             let mut survival = 1.0;
             if bounce >= ROULETTE_AFTER {
                 survival = believed_here.clamp(LEAST_SURVIVAL, 0.95);
-                if stream.uniform() >= survival {
+                if end >= survival {
                     vertices.push(vertex);
                     return rays;
                 }
@@ -196,7 +206,7 @@ impl Tracer<'_> {
 
             // Scatter with density cosθ/π, so that the weight is the albedo alone.
             let frame = Frame::around(surface.seen.normal);
-            let local = warp::cosine_hemisphere(stream.uniform2());
+            let local = warp::cosine_hemisphere([u, v]);
             let wi = frame.to_world(local);
             let corners = self.scene.corners(hit.triangle);
             let origin = offset_origin(surface.seen.point, surface.seen.normal, &corners, wi);
@@ -243,10 +253,10 @@ impl Tracer<'_> {
         &self,
         surface: &Surface,
         scale: f32,
-        stream: &mut Stream,
+        choice: f64,
+        u: [f32; 2],
         vertex: &mut Vertex,
     ) -> u64 {
-        let (choice, u) = (stream.uniform_f64(), stream.uniform2());
         let Some((object, sample)) = self.lights.sample(self.scene, choice, u) else {
             return 0;
         };

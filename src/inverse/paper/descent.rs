@@ -162,7 +162,8 @@ impl Descent {
             sampling: settings.light_sampling,
             max_bounces: bounces,
             seed: settings.seed,
-            first_sample: 0,
+            stage: 0,
+            round: 0,
         };
 
         // Gradient of the batch's mean.

@@ -3,6 +3,7 @@
 use super::Ladder;
 use crate::inverse::cache::PathCache;
 use crate::inverse::cache::errors::{Released, release};
+use crate::inverse::cache::judge::judge;
 use crate::inverse::cache::roles::{self, Role};
 use crate::inverse::solver::Termination;
 use crate::math::color::luminance;
@@ -11,6 +12,8 @@ use glam::Vec3;
 
 /// χ² (three channels) above which a light is there, and below which it is not.
 const SIGNIFICANT: f64 = 25.0;
+/// Rounds of changing roles at most.
+const MOST_CHANGES: usize = 8;
 /// Share of the area-weighted light samples that go to objects with no light found yet but none excluded either.
 const EXPLORATION: f64 = 0.05;
 
@@ -25,7 +28,7 @@ impl Ladder<'_, '_> {
                 .filter(|&k| !self.roles[k].emits())
                 .map(|k| objects + k),
         );
-        let equations = cache.normal_equations(&self.unknowns, &free);
+        let equations = cache.normal_equations(&self.unknowns, &free, &self.trust);
         let released = release(&equations, &free, &active, &self.unknowns);
         for test in &released {
             self.errors.emission[test.index - objects] =
@@ -36,7 +39,7 @@ impl Ladder<'_, '_> {
     }
 
     /// Drops the light of unseen objects where nothing speaks for it, least significant first, refitting in between.
-    pub(super) fn prune_unseen(&mut self, cache: &PathCache) -> Result<(), Termination> {
+    fn prune_unseen(&mut self, cache: &PathCache) -> Result<(), Termination> {
         loop {
             let significance = |k: usize| {
                 let z = self.unknowns.emission[k]
@@ -58,21 +61,36 @@ impl Ladder<'_, '_> {
         }
     }
 
-    /// Takes emitters that would do as well as reflectors for such, and refits.
-    pub(super) fn test_emitters(&mut self, cache: &PathCache) -> Result<(), Termination> {
-        loop {
-            let doubtful = roles::doubtful(cache, &self.unknowns, &self.roles);
-            if doubtful.is_empty() {
-                return Ok(());
+    /// Lets objects change between reflecting and giving light until the photographs call for no more of it, refitting
+    /// in between; then drops the light of unseen objects that nothing speaks for.
+    pub(super) fn settle_roles(&mut self, cache: &PathCache) -> Result<(), Termination> {
+        let mut returned = vec![false; self.roles.len()];
+        for _ in 0..MOST_CHANGES {
+            let mut changed = false;
+            for change in judge(cache, &self.unknowns, &self.roles) {
+                let k = change.object;
+                // What has gone both ways is left a reflector.
+                if returned[k] {
+                    continue;
+                }
+                changed = true;
+                self.roles[k] = change.role;
+                if change.role == Role::Emitter {
+                    self.unknowns.albedo[k] = Vec3::ZERO;
+                    self.unknowns.emission[k] = change.value;
+                } else {
+                    returned[k] = true;
+                    self.unknowns.albedo[k] = change.value;
+                    self.unknowns.emission[k] = Vec3::ZERO;
+                }
             }
-            for (k, albedo) in doubtful {
-                self.roles[k] = Role::Reflector;
-                self.unknowns.albedo[k] = albedo;
-                self.unknowns.emission[k] = Vec3::ZERO;
+            if !changed {
+                break;
             }
             let fitted = self.fit(cache)?;
             self.take(fitted);
         }
+        self.prune_unseen(cache)
     }
 
     /// Tests whether any reflector or dark object gives light after all: the one that the paths call for most is set

@@ -2,14 +2,14 @@
 
 use super::Ladder;
 use crate::inverse::cache::PathCache;
-use crate::inverse::cache::clusters::share_paths;
-use crate::inverse::cache::roles::{self, Role};
+use crate::inverse::cache::path_noise::share_paths;
+use crate::inverse::cache::roles::Role;
+use crate::inverse::cache::trust::Trust;
 use crate::inverse::measured::MeasuredRadiance;
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::solver::Termination;
 use crate::math::color::luminance;
 use crate::transport::emitters::Emitters;
-use glam::Vec3;
 
 /// Share of paths that must leave the mesh before light from outside is tried.
 const ESCAPING: f64 = 1e-3;
@@ -40,7 +40,7 @@ impl Ladder<'_, '_> {
             })
             .collect();
         let lights = Emitters::new(scene, &self.explore(&bright));
-        let cache = self.trace(&lights, Some(&measured), 0)?;
+        let cache = self.trace(&lights, Some(&measured), 0, 0)?;
 
         // First as if no light came from outside, then, where rays leave the mesh, as if some did.
         self.monitor.phase("telling lamps from walls");
@@ -66,7 +66,6 @@ impl Ladder<'_, '_> {
     /// Fits all seen objects as reflectors, then those that plainly give light as emitters; light from outside is
     /// fitted where `outside` is [`Role::Unseen`].
     fn tell_lamps(&mut self, cache: &PathCache, outside: Role) -> Result<(), Termination> {
-        let objects = self.problem.scene.objects.len();
         for (k, role) in self.roles.iter_mut().enumerate() {
             *role = match self.survey.seen.get(k) {
                 Some(0) => Role::Unseen,
@@ -75,19 +74,11 @@ impl Ladder<'_, '_> {
             };
         }
         self.unknowns = Unknowns::new(self.roles.len());
-        let reflecting = self.fit(cache)?.unknowns;
-        let choice = roles::choose(cache, &reflecting, &self.survey.seen);
-        self.unknowns = reflecting;
-        for (k, (role, chosen)) in self.roles.iter_mut().zip(choice.roles).enumerate() {
-            if k < objects {
-                *role = chosen;
-            }
-        }
-        self.take_roles(&choice.radiance);
+        self.trust = Trust::even(self.roles.len());
         let fitted = self.fit(cache)?;
         self.take(fitted);
-        self.test_emitters(cache)?;
-        self.prune_unseen(cache)?;
+        self.settle_roles(cache)?;
+        self.weigh(cache)?;
         self.test_dark(cache);
         Ok(())
     }
@@ -133,20 +124,5 @@ impl Ladder<'_, '_> {
     /// Objects that give light.
     fn lamps(&self) -> usize {
         self.roles.iter().filter(|r| r.emits()).count()
-    }
-
-    /// Gives emitters their photographed radiance and no albedo, and reflectors no light.
-    fn take_roles(&mut self, radiance: &[Vec3]) {
-        for (k, role) in self.roles.iter().enumerate() {
-            match role {
-                Role::Reflector => self.unknowns.emission[k] = Vec3::ZERO,
-                Role::Emitter => {
-                    self.unknowns.albedo[k] = Vec3::ZERO;
-                    self.unknowns.emission[k] = radiance[k];
-                }
-                Role::Unseen => self.unknowns.albedo[k] = Vec3::splat(0.5),
-                Role::Dark | Role::Glowing => {}
-            }
-        }
     }
 }

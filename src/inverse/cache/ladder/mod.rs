@@ -5,12 +5,15 @@ mod light_field;
 
 use super::accumulate::Accumulated;
 use super::budget::Budget;
-use super::clusters::{Cluster, cluster, share_paths};
+use super::clusters::{Cluster, cluster};
 use super::errors::{StandardErrors, standard_errors};
+use super::evaluate::NormalEquations;
 use super::fit::{Fit, fit, propose};
+use super::path_noise::{self, share_paths};
 use super::reached::Reached;
 use super::roles::{self, Role};
 use super::trace::{OutsideGrid, Tracer};
+use super::trust::Trust;
 use super::{PathCache, describe};
 use crate::error;
 use crate::inverse::estimate::Estimate;
@@ -30,6 +33,8 @@ const MOST_STEPS: u64 = 30;
 /// A step (in albedo, or relative in emission) asks for linearising anew when it is larger than so many times the
 /// median error aimed at.
 const NONLINEAR: f64 = 10.0;
+/// What the paths add to an error is negligible below this share of the error aimed at.
+const NEGLIGIBLE: f64 = 1.0 / 3.0;
 /// Columns and rows of the map of light from outside.
 const OUTSIDE_WIDTH: usize = 6;
 const OUTSIDE_HEIGHT: usize = 3;
@@ -48,6 +53,9 @@ pub struct Ladder<'a, 'o> {
     max_bounces: u32,
     outside: OutsideGrid,
     roles: Vec<Role>,
+    trust: Trust,
+    /// For each surface, the share of the paths' noise in its residuals.
+    path_noise: Vec<f64>,
     unknowns: Unknowns,
     errors: StandardErrors,
     estimate: Estimate,
@@ -107,6 +115,8 @@ pub fn solve(
         },
         errors: start.errors(),
         roles: start.roles,
+        trust: Trust::even(surfaces),
+        path_noise: vec![1.0; surfaces],
         unknowns: start.unknowns,
         estimate: Estimate::default(),
         stages: start.stages,
@@ -150,13 +160,15 @@ impl Ladder<'_, '_> {
             self.budget.round_paths,
         );
         let lights = self.lights();
-        let cache = self.trace(&lights, None, 1 << 20)?;
+        let cache = self.trace(&lights, None, 1, 0)?;
         self.monitor.phase("fitting albedo and emission");
+        // Tests of roles weigh all alike: whatever the residuals of a wrong role say is no measure of trust.
+        self.trust = Trust::even(self.roles.len());
         let fitted = self.fit(&cache)?;
         self.take(fitted);
-        self.test_emitters(&cache)?;
-        self.prune_unseen(&cache)?;
+        self.settle_roles(&cache)?;
         let added = self.test_glow(&cache)?;
+        self.weigh(&cache)?;
         let why = match added.as_slice() {
             [] => "one albedo or one emission an object; no further light is called for".to_owned(),
             names => format!(
@@ -185,9 +197,12 @@ impl Ladder<'_, '_> {
         let mut outcome = Termination::Steps;
         for round in 0..self.budget.rounds {
             // Path lengths are steered by what is believed at the start, the same in every round.
-            let cache = self.trace(&lights, None, (2 + u64::from(round)) << 20)?;
+            let cache = self.trace(&lights, None, 2, round)?;
             sums.add(cache.linearise(&about, &place));
-            let equations = sums.equations(free.len());
+            let mean = sums.mean();
+            self.trust = Trust::from_residuals(&mean, self.roles.len());
+            self.path_noise = path_noise::shares(&mean, self.roles.len());
+            let equations = NormalEquations::new(&mean, free.len(), &self.trust);
             let (proposal, _) = propose(&equations, &free, &about, 1e-10);
             let errors = standard_errors(&equations, &free, &all, self.roles.len());
             let step = largest_step(&about, &proposal);
@@ -204,20 +219,33 @@ impl Ladder<'_, '_> {
                 sums = Accumulated::default();
                 continue;
             }
-            let (median, tail) = self.relative_errors();
+            let [median, tail] = self.relative_errors(|k| self.relative_error(k));
+            let paths = |k: usize| self.relative_error(k) * self.path_noise[k].sqrt();
+            let [median_of_paths, tail_of_paths] = self.relative_errors(paths);
             self.monitor.progress.fraction =
                 Some((self.budget.median_error / median).powi(2).min(1.0) as f32);
-            if median < self.budget.median_error && tail < self.budget.tail_error {
+            // Paths are enough when the error is small, or when next to none of it is theirs.
+            let enough = |error: f64, of_paths: f64, target: f64| {
+                error < target || of_paths < target * NEGLIGIBLE
+            };
+            if enough(median, median_of_paths, self.budget.median_error)
+                && enough(tail, tail_of_paths, self.budget.tail_error)
+            {
                 outcome = Termination::Converged;
                 break;
             }
         }
-        let (median, tail) = self.relative_errors();
+        let [median, tail] = self.relative_errors(|k| self.relative_error(k));
+        let paths = |k: usize| self.relative_error(k) * self.path_noise[k].sqrt();
+        let [median_of_paths, tail_of_paths] = self.relative_errors(paths);
         let why = format!(
-            "{} rounds of independent paths: relative standard error of albedo {:.2} % (median), {:.2} % (95 of 100 objects)",
+            "{} rounds of independent paths: relative standard error of albedo {:.2} % (median), {:.2} % (95 of 100 objects); \
+             of that from the paths {:.2} % and {:.2} %, the rest from the photographs and the model",
             sums.rounds(),
             median * 100.0,
-            tail * 100.0
+            tail * 100.0,
+            median_of_paths * 100.0,
+            tail_of_paths * 100.0,
         );
         self.finish_stage("refine", started, why)?;
         Ok(outcome)
@@ -228,7 +256,8 @@ impl Ladder<'_, '_> {
         &mut self,
         lights: &Emitters,
         measured: Option<&MeasuredRadiance>,
-        first_sample: u64,
+        stage: u64,
+        round: u32,
     ) -> Result<PathCache, Termination> {
         let believed: Vec<f32> = self
             .unknowns
@@ -246,7 +275,8 @@ impl Ladder<'_, '_> {
             sampling: self.monitor.settings.light_sampling,
             max_bounces: self.max_bounces,
             seed: self.monitor.settings.seed,
-            first_sample,
+            stage,
+            round,
         };
         let mut cache = PathCache::default();
         let mut next = 0;
@@ -275,11 +305,27 @@ impl Ladder<'_, '_> {
     fn fit(&mut self, cache: &PathCache) -> Result<Fit, Termination> {
         let free = roles::free(&self.roles);
         let (monitor, estimate, checkpoint) = (&mut self.monitor, &self.estimate, &self.checkpoint);
-        let fitted = fit(cache, &self.unknowns, &free, MOST_STEPS, |_| {
-            monitor.progress.iterations += 1;
-            monitor.tick(estimate, &|_| checkpoint.clone())
-        })?;
+        let fitted = fit(
+            cache,
+            &self.unknowns,
+            &free,
+            &self.trust,
+            MOST_STEPS,
+            |_| {
+                monitor.progress.iterations += 1;
+                monitor.tick(estimate, &|_| checkpoint.clone())
+            },
+        )?;
         Ok(fitted)
+    }
+
+    /// Weighs the clusters by the residuals that the last fit left, and fits again.
+    fn weigh(&mut self, cache: &PathCache) -> Result<(), Termination> {
+        let residuals = cache.linearise(&self.unknowns, &vec![usize::MAX; 2 * self.roles.len()]);
+        self.trust = Trust::from_residuals(&residuals, self.roles.len());
+        let fitted = self.fit(cache)?;
+        self.take(fitted);
+        Ok(())
     }
 
     /// Takes over a fit under the present roles, with its errors.
@@ -313,21 +359,21 @@ impl Ladder<'_, '_> {
         place
     }
 
-    /// Median and 95th percentile of the relative standard error of seen albedos.
-    fn relative_errors(&self) -> (f64, f64) {
-        let mut relative: Vec<f64> = (0..self.roles.len())
+    /// Relative standard error of an albedo.
+    fn relative_error(&self, k: usize) -> f64 {
+        f64::from(self.errors.albedo[k].length() / self.unknowns.albedo[k].length().max(1e-3))
+    }
+
+    /// Median and 95th percentile of an error over the reflectors that enough pixels see.
+    fn relative_errors(&self, error: impl Fn(usize) -> f64) -> [f64; 2] {
+        let mut errors: Vec<f64> = (0..self.roles.len())
             .filter(|&k| {
                 matches!(self.roles[k], Role::Reflector | Role::Glowing)
                     && self.survey.seen.get(k).copied().unwrap_or(0) >= 50
             })
-            .map(|k| {
-                f64::from(
-                    self.errors.albedo[k].length() / self.unknowns.albedo[k].length().max(1e-3),
-                )
-            })
+            .map(error)
             .collect();
-        let at = |relative: &mut [f64], q| crate::math::stats::quantile(relative, q).unwrap_or(0.0);
-        (at(&mut relative, 0.5), at(&mut relative, 0.95))
+        [0.5, 0.95].map(|q| crate::math::stats::quantile(&mut errors, q).unwrap_or(0.0))
     }
 
     fn describe(&mut self) {
