@@ -146,21 +146,51 @@ fn nearest_hits_and_visibility_agree_with_brute_force_in_f64() {
 
 #[test]
 fn vectors_and_plain_arrays_give_the_same_bits() {
-    if InstructionSet::widest() == InstructionSet::Portable {
+    let wider: Vec<_> = [InstructionSet::Avx2, InstructionSet::Avx512]
+        .into_iter()
+        .filter(|&set| set <= InstructionSet::widest())
+        .collect();
+    if wider.is_empty() {
         println!("skipped: this processor has no wider instruction set");
-        return;
     }
     let soup = Soup::random(9, 5000, 0.2);
-    let wide = soup.bvh();
     let plain = soup.bvh().with_instructions(InstructionSet::Portable);
-    let mut stream = Stream::new(9, 1, 0, 0);
-    for _ in 0..20_000 {
+    for set in wider {
+        let wide = soup.bvh().with_instructions(set);
+        let mut stream = Stream::new(9, 1, 0, 0);
+        for _ in 0..20_000 {
+            let ray = random_ray(&mut stream);
+            let bits = |hit: Option<Hit>| {
+                hit.map(|h| (h.t.to_bits(), h.triangle, h.b1.to_bits(), h.b2.to_bits()))
+            };
+            assert_eq!(bits(wide.intersect(&ray)), bits(plain.intersect(&ray)));
+            assert_eq!(wide.occluded(&ray), plain.occluded(&ray));
+        }
+    }
+}
+
+/// More triangles than are built in one piece and than lie on small pages.
+#[test]
+fn a_large_mesh_is_hit_as_by_each_of_its_parts() {
+    let soup = Soup::random(6, 40_000, 0.05);
+    let bvh = soup.bvh();
+    let parts: Vec<Bvh> = (0..4)
+        .map(|part| Bvh::new(&soup.positions, &soup.triangles[part * 10_000..][..10_000]))
+        .collect();
+    let mut stream = Stream::new(6, 1, 0, 0);
+    for _ in 0..5_000 {
         let ray = random_ray(&mut stream);
-        let bits = |hit: Option<Hit>| {
-            hit.map(|h| (h.t.to_bits(), h.triangle, h.b1.to_bits(), h.b2.to_bits()))
-        };
-        assert_eq!(bits(wide.intersect(&ray)), bits(plain.intersect(&ray)));
-        assert_eq!(wide.occluded(&ray), plain.occluded(&ray));
+        let nearest = parts
+            .iter()
+            .enumerate()
+            .filter_map(|(part, bvh)| {
+                let hit = bvh.intersect(&ray)?;
+                let triangle = hit.triangle + part as u32 * 10_000;
+                Some(Hit { triangle, ..hit })
+            })
+            .min_by(|a, b| a.t.total_cmp(&b.t));
+        assert_eq!(bvh.intersect(&ray), nearest);
+        assert_eq!(bvh.occluded(&ray), nearest.is_some());
     }
 }
 

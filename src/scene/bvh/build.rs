@@ -1,34 +1,35 @@
-//! From obvhs's binary hierarchy to nodes of eight children and groups of eight triangles.
+//! From the binary hierarchy to nodes of eight children and groups of four triangles.
 
-use super::{Bvh, Child, Group, InstructionSet, Node, WIDTH};
+use super::binary::{self, Binary};
+use super::pages::Pages;
+use super::split::{Bounds, Primitive};
+use super::{Bvh, Child, GROUP, Group, InstructionSet, Node, WIDTH};
 use glam::{Vec3, Vec3A};
-use obvhs::BvhBuildParams;
-use obvhs::bvh2::builder::build_bvh2_from_tris;
-use obvhs::bvh2::{Bvh2, node::Bvh2Node};
-use obvhs::triangle::Triangle;
-use std::time::Duration;
+use rayon::prelude::*;
 
-/// Above this many triangles the quicker of two presets is used.
-const LARGE: usize = 2_000_000;
+/// Subtrees of more primitives than this, and than a share of all, are built and laid out side by side.
+const ALONE: usize = 8192;
+/// See [`ALONE`].
+const SHARES: usize = 64;
 
 pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Bvh {
+    let corners = |triangle: u32| triangles[triangle as usize].map(|i| positions[i as usize]);
     // Leave out what can never be hit and would spoil the boxes.
-    let corners: Vec<[Vec3; 3]> = triangles
-        .iter()
-        .map(|t| t.map(|i| positions[i as usize]))
-        .collect();
-    let (indices, primitives): (Vec<u32>, Vec<Triangle>) = corners
-        .iter()
-        .enumerate()
+    let mut primitives: Vec<Primitive> = (0..triangles.len() as u32)
+        .map(|triangle| (triangle, corners(triangle)))
         .filter(|(_, c)| c.iter().all(|v| v.is_finite()))
-        .map(|(i, c)| {
-            let [v0, v1, v2] = c.map(Vec3A::from);
-            (i as u32, Triangle { v0, v1, v2 })
+        .map(|(triangle, c)| {
+            let [a, b, c] = c.map(Vec3A::from);
+            Primitive {
+                low: a.min(b).min(c),
+                high: a.max(b).max(c),
+                triangle,
+            }
         })
-        .unzip();
+        .collect();
     let mut bvh = Bvh {
-        nodes: Vec::new(),
-        groups: Vec::new(),
+        nodes: Pages::new(Vec::new()),
+        groups: Pages::new(Vec::new()),
         stack_size: 0,
         triangles: triangles.len(),
         instructions: InstructionSet::widest(),
@@ -36,126 +37,142 @@ pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Bvh {
     if primitives.is_empty() {
         return bvh;
     }
-    let preset = if primitives.len() > LARGE {
-        BvhBuildParams::very_fast_build()
-    } else {
-        BvhBuildParams::medium_build()
-    };
-    let binary = build_bvh2_from_tris(&primitives, preset, &mut Duration::default());
+    let alone = ALONE.max(primitives.len() / SHARES);
+    let binary = binary::build(&mut primitives, alone);
     // Boxes grow by the rounding of the largest coordinate, so that rays within their faces meet them.
-    let largest = primitives
-        .iter()
-        .map(|t| t.v0.abs().max(t.v1.abs()).max(t.v2.abs()).max_element())
-        .fold(0.0, f32::max);
-    let margin = largest * 2.0 * f32::EPSILON;
-    let mut layout = Layout {
-        binary: &binary,
-        indices: &indices,
+    let bounds = binary[0].bounds;
+    let largest = bounds.low.abs().max(bounds.high.abs()).max_element();
+    let layout = Layout {
         corners: &corners,
-        margin,
-        bvh: &mut bvh,
+        primitives: &primitives,
+        binary: &binary,
+        margin: largest * 2.0 * f32::EPSILON,
+        alone: alone as u32,
     };
-    layout.run();
+    let tree = layout.subtree(0);
+    bvh.nodes = Pages::new(tree.nodes);
+    bvh.groups = Pages::new(tree.groups);
+    bvh.stack_size = tree.stack;
     bvh
 }
 
-/// The state of laying out one hierarchy.
-struct Layout<'a> {
-    binary: &'a Bvh2,
-    /// Triangle of each primitive.
-    indices: &'a [u32],
-    corners: &'a [[Vec3; 3]],
+/// What is laid out eight wide.
+struct Layout<'a, C> {
+    corners: &'a C,
+    primitives: &'a [Primitive],
+    binary: &'a [Binary],
     margin: f32,
-    bvh: &'a mut Bvh,
+    alone: u32,
 }
 
-impl Layout<'_> {
-    /// Lays out all nodes, widest first, with an explicit stack: a hierarchy may be deep.
-    fn run(&mut self) {
-        let root = self.binary.nodes[0];
-        self.bvh.nodes.push(Node::empty());
-        // Binary node, index of its wide node, stack entries in use when it is visited.
-        let mut open = vec![(root, 0usize, 0usize)];
-        while let Some((binary, index, stacked)) = open.pop() {
-            let children = self.open_children(binary);
-            let stacked = stacked + children.len().saturating_sub(1);
-            self.bvh.stack_size = self.bvh.stack_size.max(stacked);
-            for (lane, child) in children.into_iter().enumerate() {
-                let reference = if child.is_leaf() {
-                    self.push_leaf(&child)
-                } else {
-                    self.bvh.nodes.push(Node::empty());
-                    open.push((child, self.bvh.nodes.len() - 1, stacked));
-                    Child::inner(self.bvh.nodes.len() - 1)
-                };
-                let node = &mut self.bvh.nodes[index];
-                node.children[lane] = reference;
-                for axis in 0..3 {
-                    node.planes[2 * axis][lane] = child.aabb().min[axis] - self.margin;
-                    node.planes[2 * axis + 1][lane] = child.aabb().max[axis] + self.margin;
-                }
+/// Nodes and groups of a subtree, counted from its own start; the first node is its root.
+#[derive(Default)]
+struct Subtree {
+    nodes: Vec<Node>,
+    groups: Vec<Group>,
+    /// Entries that a traversal's stack can need.
+    stack: usize,
+}
+
+impl Subtree {
+    /// Appends another subtree and returns where its root is now.
+    fn append(&mut self, other: Self) -> Child {
+        let (nodes, groups) = (self.nodes.len(), self.groups.len());
+        self.groups.extend(other.groups);
+        self.nodes.extend(other.nodes.into_iter().map(|mut node| {
+            for child in &mut node.rows[Node::CHILDREN] {
+                *child = Child(*child).moved(nodes, groups).0;
             }
+            node
+        }));
+        Child::inner(nodes)
+    }
+}
+
+impl<C: Fn(u32) -> [Vec3; 3] + Sync> Layout<'_, C> {
+    fn subtree(&self, root: usize) -> Subtree {
+        let mut tree = Subtree::default();
+        if self.binary[root].count <= self.alone {
+            self.place(root, 0, &mut tree);
+            return tree;
         }
+        // Lay the children out side by side and append them in order.
+        tree.nodes.push(Node::empty());
+        let children = binary::open(self.binary, root);
+        let stacked = children.len() - 1;
+        let parts: Vec<Subtree> = children
+            .par_iter()
+            .map(|&child| self.subtree(child))
+            .collect();
+        for (lane, (child, part)) in children.into_iter().zip(parts).enumerate() {
+            tree.stack = tree.stack.max(stacked + part.stack);
+            let reference = tree.append(part);
+            tree.nodes[0].set(lane, reference, &self.binary[child].bounds, self.margin);
+        }
+        tree
     }
 
-    /// Up to eight descendants of a binary node: the child of largest surface is opened until there are eight.
-    fn open_children(&self, root: Bvh2Node) -> Vec<Bvh2Node> {
-        if root.is_leaf() {
-            return vec![root];
-        }
-        let pair = |node: &Bvh2Node| {
-            let first = node.first_index as usize;
-            [self.binary.nodes[first], self.binary.nodes[first + 1]]
-        };
-        let mut children = pair(&root).to_vec();
-        while children.len() < WIDTH {
-            let largest = children
-                .iter()
-                .enumerate()
-                .filter(|(_, c)| !c.is_leaf())
-                .max_by(|(_, a), (_, b)| a.aabb().half_area().total_cmp(&b.aabb().half_area()))
-                .map(|(i, _)| i);
-            let Some(largest) = largest else { break };
-            let [left, right] = pair(&children[largest]);
-            children[largest] = left;
-            children.push(right);
-        }
-        children
-    }
-
-    /// Stores a leaf's triangles in groups of eight; unused lanes repeat the last triangle.
-    fn push_leaf(&mut self, leaf: &Bvh2Node) -> Child {
-        let first = leaf.first_index as usize;
-        let primitives = &self.binary.primitive_indices[first..first + leaf.prim_count as usize];
-        let start = self.bvh.groups.len();
-        for chunk in primitives.chunks(WIDTH).take(Child::MAX_GROUPS) {
-            let mut group = Group {
-                corners: [[[0.0; WIDTH]; 3]; 3],
-                triangles: [0; WIDTH],
+    /// Adds a node for a binary one, and all below it; `stacked` stack entries are in use where it is visited.
+    fn place(&self, root: usize, stacked: usize, tree: &mut Subtree) -> Child {
+        let index = tree.nodes.len();
+        tree.nodes.push(Node::empty());
+        let children = binary::open(self.binary, root);
+        let stacked = stacked + children.len() - 1;
+        tree.stack = tree.stack.max(stacked);
+        for (lane, child_index) in children.into_iter().enumerate() {
+            let child = &self.binary[child_index];
+            let reference = if child.is_leaf() {
+                let first = child.first as usize;
+                let primitives = &self.primitives[first..first + child.count as usize];
+                self.leaf(primitives, &mut tree.groups)
+            } else {
+                self.place(child_index, stacked, tree)
             };
-            for lane in 0..WIDTH {
-                let primitive = chunk[lane.min(chunk.len() - 1)];
-                let triangle = self.indices[primitive as usize];
-                group.triangles[lane] = triangle;
-                for (corner, position) in self.corners[triangle as usize].iter().enumerate() {
+            tree.nodes[index].set(lane, reference, &child.bounds, self.margin);
+        }
+        Child::inner(index)
+    }
+
+    /// Stores a leaf's triangles in groups; unused lanes repeat the last triangle.
+    fn leaf(&self, primitives: &[Primitive], groups: &mut Vec<Group>) -> Child {
+        let start = groups.len();
+        for chunk in primitives.chunks(GROUP) {
+            let mut group = Group {
+                corners: [[[0; GROUP]; 4]; 3],
+            };
+            for lane in 0..GROUP {
+                let triangle = chunk[lane.min(chunk.len() - 1)].triangle;
+                group.corners[0][Group::TRIANGLES][lane] = triangle;
+                for (rows, position) in group.corners.iter_mut().zip((self.corners)(triangle)) {
                     for axis in 0..3 {
-                        group.corners[corner][axis][lane] = position[axis];
+                        rows[axis][lane] = position[axis].to_bits();
                     }
                 }
             }
-            self.bvh.groups.push(group);
+            groups.push(group);
         }
-        Child::leaf(start, self.bvh.groups.len() - start)
+        Child::leaf(start, groups.len() - start)
     }
 }
 
 impl Node {
     /// A node whose boxes no ray meets.
     fn empty() -> Self {
-        let (low, high) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
+        let (low, high) = (
+            [f32::INFINITY.to_bits(); WIDTH],
+            [f32::NEG_INFINITY.to_bits(); WIDTH],
+        );
+        let children = [Child::EMPTY.0; WIDTH];
         Self {
-            planes: [low, high, low, high, low, high],
-            children: [Child::EMPTY; WIDTH],
+            rows: [low, high, low, high, low, high, children, [0; WIDTH]],
+        }
+    }
+
+    fn set(&mut self, lane: usize, child: Child, bounds: &Bounds, margin: f32) {
+        self.rows[Self::CHILDREN][lane] = child.0;
+        for axis in 0..3 {
+            self.rows[2 * axis][lane] = (bounds.low[axis] - margin).to_bits();
+            self.rows[2 * axis + 1][lane] = (bounds.high[axis] + margin).to_bits();
         }
     }
 }

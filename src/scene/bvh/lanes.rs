@@ -1,12 +1,14 @@
-//! Eight floats at once, as AVX2 vectors and as plain arrays with the same results.
+//! Several floats at once, as vectors and as plain arrays with the same results.
 
-use super::WIDTH;
-
-/// Eight f32 lanes. `min` and `max` return the second operand where either is NaN; comparisons are then false.
-pub(super) trait Lanes: Copy {
+/// `N` f32 lanes. `min` and `max` return the second operand where either is NaN; comparisons are then false.
+///
+/// Everything is `#[inline(always)]` and nothing is a closure: what is not inlined into the function that enables
+/// the instructions is compiled without them.
+pub(super) trait Lanes<const N: usize>: Copy {
     fn splat(x: f32) -> Self;
-    fn load(x: &[f32; WIDTH]) -> Self;
-    fn store(self) -> [f32; WIDTH];
+    /// The floats whose bits these are.
+    fn load(bits: &[u32; N]) -> Self;
+    fn store(self) -> [f32; N];
     fn add(self, other: Self) -> Self;
     fn sub(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
@@ -21,9 +23,9 @@ pub(super) trait Lanes: Copy {
 
 /// Plain arrays; the compiler may use whatever vectors the target has.
 #[derive(Clone, Copy)]
-pub(super) struct Portable([f32; WIDTH]);
+pub(super) struct Portable<const N: usize>([f32; N]);
 
-impl Portable {
+impl<const N: usize> Portable<N> {
     #[inline(always)]
     fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
         Self(std::array::from_fn(|i| f(self.0[i], other.0[i])))
@@ -32,24 +34,24 @@ impl Portable {
     #[inline(always)]
     fn mask(self, other: Self, f: impl Fn(f32, f32) -> bool) -> u32 {
         let mut mask = 0;
-        for i in 0..WIDTH {
+        for i in 0..N {
             mask |= u32::from(f(self.0[i], other.0[i])) << i;
         }
         mask
     }
 }
 
-impl Lanes for Portable {
+impl<const N: usize> Lanes<N> for Portable<N> {
     #[inline(always)]
     fn splat(x: f32) -> Self {
-        Self([x; WIDTH])
+        Self([x; N])
     }
     #[inline(always)]
-    fn load(x: &[f32; WIDTH]) -> Self {
-        Self(*x)
+    fn load(bits: &[u32; N]) -> Self {
+        Self(bits.map(f32::from_bits))
     }
     #[inline(always)]
-    fn store(self) -> [f32; WIDTH] {
+    fn store(self) -> [f32; N] {
         self.0
     }
     #[inline(always)]
@@ -86,67 +88,124 @@ impl Lanes for Portable {
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-pub(super) use avx2::Avx2;
+/// Asks for the first four cache lines at an address, which need not be valid; does nothing where there is no such
+/// instruction.
+#[inline(always)]
+pub(super) fn prefetch<T>(address: *const T) {
+    #[cfg(target_arch = "x86_64")]
+    for line in 0..4 {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: a prefetch touches no memory that the program can see, and SSE is always there.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast::<i8>().wrapping_add(64 * line)) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = address;
+}
 
 #[cfg(target_arch = "x86_64")]
-mod avx2 {
-    use super::{Lanes, WIDTH};
+pub(super) use vectors::{Eight, Four};
+
+#[cfg(target_arch = "x86_64")]
+mod vectors {
+    use super::Lanes;
     use std::arch::x86_64::*;
 
-    /// One 256-bit vector. Made only inside functions that are entered after AVX2 was detected.
+    /// A 128-bit vector. Every x86-64 processor has SSE2.
     #[derive(Clone, Copy)]
-    pub(in crate::scene::bvh) struct Avx2(__m256);
+    pub(in crate::scene::bvh) struct Four(__m128);
 
-    // SAFETY of every block below: the methods are reached only through `traverse`'s functions with
-    // `#[target_feature(enable = "avx2")]`, which are called only where `InstructionSet::widest` found AVX2;
-    // loads and stores are unaligned ones on references to arrays of exactly eight floats.
-    impl Lanes for Avx2 {
-        #[inline(always)]
-        fn splat(x: f32) -> Self {
-            Self(unsafe { _mm256_set1_ps(x) })
-        }
-        #[inline(always)]
-        fn load(x: &[f32; WIDTH]) -> Self {
-            Self(unsafe { _mm256_loadu_ps(x.as_ptr()) })
-        }
-        #[inline(always)]
-        fn store(self) -> [f32; WIDTH] {
-            let mut x = [0.0; WIDTH];
-            unsafe { _mm256_storeu_ps(x.as_mut_ptr(), self.0) };
-            x
-        }
-        #[inline(always)]
-        fn add(self, other: Self) -> Self {
-            Self(unsafe { _mm256_add_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn sub(self, other: Self) -> Self {
-            Self(unsafe { _mm256_sub_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn mul(self, other: Self) -> Self {
-            Self(unsafe { _mm256_mul_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn div(self, other: Self) -> Self {
-            Self(unsafe { _mm256_div_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn min(self, other: Self) -> Self {
-            Self(unsafe { _mm256_min_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn max(self, other: Self) -> Self {
-            Self(unsafe { _mm256_max_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn le(self, other: Self) -> u32 {
-            unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)) as u32 }
-        }
-        #[inline(always)]
-        fn lt(self, other: Self) -> u32 {
-            unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
-        }
+    /// A 256-bit vector. Made only inside functions that are entered after AVX2 was detected.
+    #[derive(Clone, Copy)]
+    pub(in crate::scene::bvh) struct Eight(__m256);
+
+    macro_rules! lanes {
+        ($name:ident, $width:literal, $set:ident, $load:ident, $store:ident, $add:ident, $sub:ident, $mul:ident,
+         $div:ident, $min:ident, $max:ident, $le:expr, $lt:expr, $mask:ident) => {
+            // SAFETY of every block below: SSE2 is always there, and methods of `Eight` are reached only through
+            // `traverse`'s functions with `#[target_feature(enable = "avx2")]`, which are called only where
+            // `InstructionSet::widest` found AVX2; loads and stores are unaligned ones on references to arrays of
+            // exactly the vector's size.
+            impl Lanes<$width> for $name {
+                #[inline(always)]
+                fn splat(x: f32) -> Self {
+                    Self(unsafe { $set(x) })
+                }
+                #[inline(always)]
+                fn load(bits: &[u32; $width]) -> Self {
+                    Self(unsafe { $load(bits.as_ptr().cast()) })
+                }
+                #[inline(always)]
+                fn store(self) -> [f32; $width] {
+                    let mut x = [0.0; $width];
+                    unsafe { $store(x.as_mut_ptr(), self.0) };
+                    x
+                }
+                #[inline(always)]
+                fn add(self, other: Self) -> Self {
+                    Self(unsafe { $add(self.0, other.0) })
+                }
+                #[inline(always)]
+                fn sub(self, other: Self) -> Self {
+                    Self(unsafe { $sub(self.0, other.0) })
+                }
+                #[inline(always)]
+                fn mul(self, other: Self) -> Self {
+                    Self(unsafe { $mul(self.0, other.0) })
+                }
+                #[inline(always)]
+                fn div(self, other: Self) -> Self {
+                    Self(unsafe { $div(self.0, other.0) })
+                }
+                #[inline(always)]
+                fn min(self, other: Self) -> Self {
+                    Self(unsafe { $min(self.0, other.0) })
+                }
+                #[inline(always)]
+                fn max(self, other: Self) -> Self {
+                    Self(unsafe { $max(self.0, other.0) })
+                }
+                #[inline(always)]
+                fn le(self, other: Self) -> u32 {
+                    unsafe { $mask(($le)(self.0, other.0)) as u32 }
+                }
+                #[inline(always)]
+                fn lt(self, other: Self) -> u32 {
+                    unsafe { $mask(($lt)(self.0, other.0)) as u32 }
+                }
+            }
+        };
     }
+
+    lanes!(
+        Four,
+        4,
+        _mm_set1_ps,
+        _mm_loadu_ps,
+        _mm_storeu_ps,
+        _mm_add_ps,
+        _mm_sub_ps,
+        _mm_mul_ps,
+        _mm_div_ps,
+        _mm_min_ps,
+        _mm_max_ps,
+        _mm_cmple_ps,
+        _mm_cmplt_ps,
+        _mm_movemask_ps
+    );
+    lanes!(
+        Eight,
+        8,
+        _mm256_set1_ps,
+        _mm256_loadu_ps,
+        _mm256_storeu_ps,
+        _mm256_add_ps,
+        _mm256_sub_ps,
+        _mm256_mul_ps,
+        _mm256_div_ps,
+        _mm256_min_ps,
+        _mm256_max_ps,
+        _mm256_cmp_ps::<_CMP_LE_OQ>,
+        _mm256_cmp_ps::<_CMP_LT_OQ>,
+        _mm256_movemask_ps
+    );
 }

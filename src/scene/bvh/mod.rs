@@ -1,24 +1,41 @@
-//! The hierarchy over triangles: topology by obvhs, laid out eight wide, traversed here.
+//! The hierarchy over triangles, eight children a node.
 //!
 //! A hit does not depend on the hierarchy: among equally near triangles the lowest index wins, and every
 //! instruction set does the same arithmetic in the same order (no fused multiply-add).
 
+mod binary;
 mod build;
 mod lanes;
+mod pages;
+mod split;
 mod traverse;
 
 use crate::scene::geometry::{Hit, Ray};
 use glam::Vec3;
+use pages::Pages;
 
-/// Children of a node and triangles of a group.
+/// Children of a node.
 const WIDTH: usize = 8;
 
-/// Eight child boxes, plane by plane: rows are min x, max x, min y, max y, min z, max z.
-#[derive(Debug, Clone)]
-#[repr(C, align(32))]
+/// Triangles of a group.
+const GROUP: usize = 4;
+
+/// Eight child boxes and the children, all as bits: rows are min x, max x, min y, max y, min z, max z, children, unused.
+///
+/// Four cache lines. With eight rows a masked row index needs no check.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C, align(64))]
 struct Node {
-    planes: [[f32; WIDTH]; 6],
-    children: [Child; WIDTH],
+    rows: [[u32; WIDTH]; 8],
+}
+
+impl Node {
+    const CHILDREN: usize = 6;
+
+    #[inline(always)]
+    fn child(&self, lane: usize) -> Child {
+        Child(self.rows[Self::CHILDREN][lane & (WIDTH - 1)])
+    }
 }
 
 /// A node's child: empty, an inner node, or a run of triangle groups.
@@ -30,7 +47,6 @@ impl Child {
     const LEAF: u32 = 1 << 31;
     /// Bits for the number of groups of a leaf, minus one.
     const COUNT_BITS: u32 = 4;
-    const MAX_GROUPS: usize = 1 << Self::COUNT_BITS;
 
     fn inner(node: usize) -> Self {
         Self(node as u32)
@@ -38,6 +54,17 @@ impl Child {
 
     fn leaf(first: usize, groups: usize) -> Self {
         Self(Self::LEAF | (first as u32) << Self::COUNT_BITS | (groups - 1) as u32)
+    }
+
+    /// The same child after nodes and groups were put behind others.
+    fn moved(self, nodes: usize, groups: usize) -> Self {
+        if self == Self::EMPTY {
+            self
+        } else if self.is_leaf() {
+            Self(self.0 + ((groups as u32) << Self::COUNT_BITS))
+        } else {
+            Self(self.0 + nodes as u32)
+        }
     }
 
     fn is_leaf(self) -> bool {
@@ -50,29 +77,49 @@ impl Child {
     }
 }
 
-/// Eight triangles: coordinates by corner, axis and lane. Unused lanes repeat a triangle.
-#[derive(Debug, Clone)]
-#[repr(C, align(32))]
+/// Four triangles, as bits: for each corner the rows x, y, z, and in the first corner's fourth row the triangles.
+///
+/// Three cache lines. Unused lanes repeat a triangle.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C, align(64))]
 struct Group {
-    corners: [[[f32; WIDTH]; 3]; 3],
-    triangles: [u32; WIDTH],
+    corners: [[[u32; GROUP]; 4]; 3],
 }
 
-/// Which arithmetic the traversal uses; all give the same bits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+impl Group {
+    const TRIANGLES: usize = 3;
+
+    #[inline(always)]
+    fn triangle(&self, lane: usize) -> u32 {
+        self.corners[0][Self::TRIANGLES][lane & (GROUP - 1)]
+    }
+}
+
+/// Which instructions the traversal uses, from the narrowest to the widest; all give the same bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum InstructionSet {
     /// Arrays of eight, on any processor.
     Portable,
     /// 256-bit vectors (x86-64).
     Avx2,
+    /// 256-bit vectors with twice the registers and with mask registers (x86-64).
+    Avx512,
 }
 
 impl InstructionSet {
     /// The widest one that this processor has.
     pub fn widest() -> Self {
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            return Self::Avx2;
+        if std::arch::is_x86_feature_detected!("avx2")
+            && std::arch::is_x86_feature_detected!("bmi1")
+            && std::arch::is_x86_feature_detected!("bmi2")
+            && std::arch::is_x86_feature_detected!("lzcnt")
+        {
+            let wide = std::arch::is_x86_feature_detected!("avx512f")
+                && std::arch::is_x86_feature_detected!("avx512vl")
+                && std::arch::is_x86_feature_detected!("avx512dq")
+                && std::arch::is_x86_feature_detected!("avx512bw");
+            return if wide { Self::Avx512 } else { Self::Avx2 };
         }
         Self::Portable
     }
@@ -80,8 +127,8 @@ impl InstructionSet {
 
 /// Bounding volume hierarchy, eight children a node, with its own copy of the triangles.
 pub struct Bvh {
-    nodes: Vec<Node>,
-    groups: Vec<Group>,
+    nodes: Pages<Node>,
+    groups: Pages<Group>,
     /// Entries that a traversal's stack can need.
     stack_size: usize,
     triangles: usize,
@@ -108,8 +155,7 @@ impl Bvh {
     /// The same hierarchy, traversed with another instruction set (which the processor must have; else portable).
     #[must_use]
     pub fn with_instructions(mut self, instructions: InstructionSet) -> Self {
-        let available = instructions == InstructionSet::widest();
-        self.instructions = if available {
+        self.instructions = if instructions <= InstructionSet::widest() {
             instructions
         } else {
             InstructionSet::Portable

@@ -1,0 +1,128 @@
+//! A binary hierarchy, top-down by the surface area heuristic, and the cheapest way to open it eight wide.
+
+use super::split::{Bounds, Primitive, Split};
+use super::{GROUP, WIDTH};
+
+/// Leaves hold at most this many triangles.
+const LARGEST_LEAF: usize = 4 * GROUP;
+
+/// A node of the binary hierarchy; the left child follows it in the list.
+pub(super) struct Binary {
+    pub bounds: Bounds,
+    /// The first of its primitives.
+    pub first: u32,
+    /// How many primitives lie below.
+    pub count: u32,
+    /// How far behind this node the right child is; zero for a leaf.
+    pub right: u32,
+    /// Least cost of the subtree as at most 1, 2, … 7 children of a wide node (Ylitie, Karras and Laine 2017).
+    costs: [f32; WIDTH - 1],
+}
+
+impl Binary {
+    pub fn is_leaf(&self) -> bool {
+        self.right == 0
+    }
+}
+
+/// The hierarchy over primitives, which it reorders; ranges of more than `alone` are built side by side.
+pub(super) fn build(primitives: &mut [Primitive], alone: usize) -> Vec<Binary> {
+    let mut nodes = Vec::new();
+    grow(primitives, 0, alone, &mut nodes);
+    nodes
+}
+
+fn grow(primitives: &mut [Primitive], first: usize, alone: usize, nodes: &mut Vec<Binary>) {
+    let bounds = Bounds::of(primitives);
+    let count = primitives.len();
+    let node = nodes.len();
+    let leaf = bounds.half_area() * count.div_ceil(GROUP) as f32;
+    nodes.push(Binary {
+        bounds,
+        first: first as u32,
+        count: count as u32,
+        right: 0,
+        costs: [leaf; WIDTH - 1],
+    });
+    if count <= GROUP {
+        return;
+    }
+    let middle = Split::best(primitives).partition(primitives);
+    let (left, right) = primitives.split_at_mut(middle);
+    let second = if count > alone {
+        let (left, right) = rayon::join(
+            || {
+                let mut nodes = Vec::new();
+                grow(left, first, alone, &mut nodes);
+                nodes
+            },
+            || {
+                let mut nodes = Vec::new();
+                grow(right, first + middle, alone, &mut nodes);
+                nodes
+            },
+        );
+        nodes.extend(left);
+        let second = nodes.len();
+        nodes.extend(right);
+        second
+    } else {
+        grow(left, first, alone, nodes);
+        let second = nodes.len();
+        grow(right, first + middle, alone, nodes);
+        second
+    };
+
+    // Visiting a node costs as much as testing a group.
+    let cost = |slots: usize| best_share(&nodes[node + 1], &nodes[second], slots).1;
+    let inner = bounds.half_area() + cost(WIDTH);
+    if count <= LARGEST_LEAF && leaf <= inner {
+        return;
+    }
+    let mut costs = [inner; WIDTH - 1];
+    for slots in 2..WIDTH {
+        costs[slots - 1] = costs[slots - 2].min(cost(slots));
+    }
+    nodes[node].right = (second - node) as u32;
+    nodes[node].costs = costs;
+}
+
+/// How many of the slots the left child gets at least cost, and the cost.
+fn best_share(left: &Binary, right: &Binary, slots: usize) -> (usize, f32) {
+    (1..slots)
+        .map(|share| {
+            let cost = left.costs[share - 1] + right.costs[slots - share - 1];
+            (share, cost)
+        })
+        .fold((1, f32::INFINITY), |best, next| {
+            if next.1 < best.1 { next } else { best }
+        })
+}
+
+/// The children that a wide node has in place of a binary one: at most eight, at least cost.
+pub(super) fn open(nodes: &[Binary], node: usize) -> Vec<usize> {
+    let mut children = Vec::with_capacity(WIDTH);
+    if nodes[node].is_leaf() {
+        children.push(node);
+    } else {
+        share(nodes, node, WIDTH, &mut children);
+    }
+    children
+}
+
+fn share(nodes: &[Binary], node: usize, slots: usize, children: &mut Vec<usize>) {
+    let (left, right) = (node + 1, node + nodes[node].right as usize);
+    let (first, _) = best_share(&nodes[left], &nodes[right], slots);
+    for (child, mut slots) in [(left, first), (right, slots - first)] {
+        // More slots than pay are left empty.
+        let costs = &nodes[child].costs;
+        while slots > 1 && costs[slots - 2] <= costs[slots - 1] {
+            slots -= 1;
+        }
+        if slots == 1 {
+            children.push(child);
+        } else {
+            share(nodes, child, slots, children);
+        }
+    }
+}

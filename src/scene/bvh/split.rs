@@ -1,0 +1,197 @@
+//! Where a set of boxes is best split in two: binned surface area heuristic (Wald 2007).
+
+use super::GROUP;
+use glam::{UVec3, Vec3A};
+
+/// A triangle's box.
+#[derive(Clone, Copy)]
+pub(super) struct Primitive {
+    pub low: Vec3A,
+    pub high: Vec3A,
+    pub triangle: u32,
+}
+
+impl Primitive {
+    /// Twice the box's centre.
+    #[inline(always)]
+    fn center(&self) -> Vec3A {
+        self.low + self.high
+    }
+}
+
+/// An axis-aligned box; the empty one has its corners swapped.
+#[derive(Clone, Copy)]
+pub(super) struct Bounds {
+    pub low: Vec3A,
+    pub high: Vec3A,
+}
+
+impl Bounds {
+    const EMPTY: Self = Self {
+        low: Vec3A::INFINITY,
+        high: Vec3A::NEG_INFINITY,
+    };
+
+    pub fn of(primitives: &[Primitive]) -> Self {
+        primitives.iter().fold(Self::EMPTY, |bounds, p| {
+            bounds.union(&Self {
+                low: p.low,
+                high: p.high,
+            })
+        })
+    }
+
+    #[inline(always)]
+    fn union(&self, other: &Self) -> Self {
+        Self {
+            low: self.low.min(other.low),
+            high: self.high.max(other.high),
+        }
+    }
+
+    /// Half the surface; zero for the empty box.
+    #[inline]
+    pub fn half_area(&self) -> f32 {
+        let size = (self.high - self.low).max(Vec3A::ZERO);
+        size.x * size.y + size.y * size.z + size.z * size.x
+    }
+}
+
+/// Bins of an axis.
+const BINS: usize = 16;
+
+/// How to split a range of primitives.
+#[derive(Clone)]
+pub(super) enum Split {
+    /// Primitives in bins below `bin` of an axis go left.
+    Plane {
+        binning: Binning,
+        axis: usize,
+        bin: u32,
+    },
+    /// No plane tells the boxes apart: the first half goes left.
+    Halves,
+}
+
+/// The bin of a primitive on each axis.
+#[derive(Clone)]
+pub(super) struct Binning {
+    low: Vec3A,
+    scale: Vec3A,
+}
+
+impl Binning {
+    #[inline(always)]
+    fn bins(&self, primitive: &Primitive) -> UVec3 {
+        let bin = (primitive.center() - self.low) * self.scale;
+        bin.min(Vec3A::splat(BINS as f32 - 1.0)).as_uvec3()
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Bin {
+    bounds: Bounds,
+    count: usize,
+}
+
+impl Bin {
+    const EMPTY: Self = Self {
+        bounds: Bounds::EMPTY,
+        count: 0,
+    };
+
+    #[inline(always)]
+    fn join(&self, other: &Self) -> Self {
+        Self {
+            bounds: self.bounds.union(&other.bounds),
+            count: self.count + other.count,
+        }
+    }
+
+    /// Surface times groups to test.
+    fn cost(&self) -> f32 {
+        self.bounds.half_area() * self.count.div_ceil(GROUP) as f32
+    }
+}
+
+impl Split {
+    /// The split of least surface area cost.
+    pub fn best(primitives: &[Primitive]) -> Self {
+        let (low, high) = primitives
+            .iter()
+            .fold((Vec3A::INFINITY, Vec3A::NEG_INFINITY), |(low, high), p| {
+                (low.min(p.center()), high.max(p.center()))
+            });
+        // Count boxes by bins of their centres; an axis without extent has one bin.
+        let size = high - low;
+        let binning = Binning {
+            low,
+            scale: Vec3A::from_array(size.to_array().map(|s| {
+                let scale = BINS as f32 * (1.0 - 1e-6) / s;
+                if scale.is_finite() { scale } else { 0.0 }
+            })),
+        };
+        let mut bins = [[Bin::EMPTY; BINS]; 3];
+        for primitive in primitives {
+            let one = Bin {
+                bounds: Bounds {
+                    low: primitive.low,
+                    high: primitive.high,
+                },
+                count: 1,
+            };
+            let [x, y, z] = binning.bins(primitive).to_array();
+            for (axis, bin) in [x, y, z].into_iter().enumerate() {
+                let bin = &mut bins[axis][bin as usize & (BINS - 1)];
+                *bin = bin.join(&one);
+            }
+        }
+        // Sweep the planes between bins from both sides.
+        let mut best = (f32::INFINITY, 0, 0);
+        for (axis, bins) in bins.iter().enumerate() {
+            let mut right = [Bin::EMPTY; BINS];
+            let mut sum = Bin::EMPTY;
+            for bin in (1..BINS).rev() {
+                sum = sum.join(&bins[bin]);
+                right[bin] = sum;
+            }
+            let mut left = Bin::EMPTY;
+            for bin in 1..BINS {
+                left = left.join(&bins[bin - 1]);
+                if left.count > 0 && right[bin].count > 0 {
+                    let cost = left.cost() + right[bin].cost();
+                    if cost < best.0 {
+                        best = (cost, axis, bin);
+                    }
+                }
+            }
+        }
+        let (_, axis, bin) = best;
+        if bin == 0 {
+            Self::Halves
+        } else {
+            Self::Plane {
+                binning,
+                axis,
+                bin: bin as u32,
+            }
+        }
+    }
+
+    /// Reorders primitives so that the left ones come first, and returns how many they are.
+    pub fn partition(&self, primitives: &mut [Primitive]) -> usize {
+        match self {
+            Self::Halves => primitives.len() / 2,
+            Self::Plane { binning, axis, bin } => {
+                let mut middle = 0;
+                for index in 0..primitives.len() {
+                    if binning.bins(&primitives[index])[*axis] < *bin {
+                        primitives.swap(middle, index);
+                        middle += 1;
+                    }
+                }
+                middle
+            }
+        }
+    }
+}
