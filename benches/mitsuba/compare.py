@@ -246,8 +246,9 @@ def main():
         ours[preset].append(solve(options.relit, options.capture, preset))
 
     print(f"load {os.getloadavg()[0]:.1f} at the end\n\n| albedo error | relit | Mitsuba, best of the grid | ratio |\n| --- | --- | --- | --- |")
+    start = min(curve[0][1] for curve in curves.values())
     lowest = min(curve[-1][1] for curve in curves.values())
-    targets = sorted({0.1, 0.05, 0.03, 0.02, 0.01, round(lowest * 1.0001, 5), 0.003}, reverse=True)
+    targets = sorted({e for e in (0.1, 0.05, 0.03, 0.02, 0.01, round(lowest * 1.0001, 5), 0.003) if e < start}, reverse=True)
     for error in targets:
         # The slower of the two runs of the quickest preset that is good enough in both.
         good = [max(run[0] for run in runs) for runs in ours.values() if max(run[1] for run in runs) <= error]

@@ -3,9 +3,8 @@
 use glam::{Mat3, Vec3};
 use relit::math::rng::Stream;
 use relit::math::warp;
-use relit::room::{Room, cameras};
+use relit::room::Room;
 use relit::scene::bvh::Bvh;
-use relit::scene::camera::Camera;
 use relit::scene::geometry::{Ray, offset_origin};
 
 pub struct Scene {
@@ -21,19 +20,16 @@ pub struct Scene {
 impl Scene {
     /// The built-in room, its triangles split to at most `edge` metres, with spheres, tori and boxes strewn about.
     pub fn room(name: &'static str, edge: f32, clutter: usize) -> Self {
-        let mesh = Room::new().mesh;
-        let positions: Vec<Vec3> = mesh.positions.iter().map(|p| p.as_vec3()).collect();
+        let room = Room::new();
+        let positions: Vec<Vec3> = room.mesh.positions.iter().map(|p| p.as_vec3()).collect();
         let mut scene = Self {
             name,
             positions: Vec::new(),
             triangles: Vec::new(),
-            eyes: cameras::cameras([64, 48])
-                .iter()
-                .map(|(k, pose)| Camera::new(k, pose, glam::DVec3::ZERO).center)
-                .collect(),
+            eyes: room.views.iter().map(|[eye, _]| eye.as_vec3()).collect(),
             lamp: [Vec3::new(-0.6, 2.5, -0.4), Vec3::new(0.6, 2.5, 0.4)],
         };
-        for t in &mesh.triangles {
+        for t in &room.mesh.triangles {
             scene.split(t.map(|i| positions[i as usize]), edge);
         }
         let mut stream = Stream::new(7, 0, 0, 0);
@@ -152,7 +148,7 @@ impl Scene {
                     normal = -normal;
                 }
                 let origin = offset_origin(point, normal, &corners, normal);
-                if bounce >= 1 && bounce < 3 {
+                if (1..3).contains(&bounce) {
                     let [u, v] = stream.uniform2();
                     let [low, high] = self.lamp;
                     let target = Vec3::new(
