@@ -114,6 +114,7 @@ actions! {
     Step, Solve, "Step", "One iteration, then pause", key(Key::Period);
     Finish, Solve, "Finish", "Ends the solve and keeps the estimate", None;
     Reset, Solve, "Reset", "Forgets the estimate and starts over", ctrl(Key::R);
+    MeasureTrade, Solve, "Measure / cancel the trade", "Measures what exactness costs in seconds on this capture, or ends the measurement", ctrl(Key::M);
 
     PreviousFrame, View, "Previous photograph", "Steps to the photograph before", key(Key::OpenBracket);
     NextFrame, View, "Next photograph", "Steps to the next photograph", key(Key::CloseBracket);

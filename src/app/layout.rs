@@ -27,6 +27,8 @@ pub enum Pane {
     Loss,
     /// The ladder of models.
     Stages,
+    /// Error over seconds, and where to stop.
+    Trade,
     /// What happened.
     Log,
 }
@@ -44,6 +46,7 @@ impl Pane {
             Self::Capture,
             Self::Loss,
             Self::Stages,
+            Self::Trade,
             Self::Log,
         ];
         pictures.chain(rest).collect()
@@ -61,6 +64,7 @@ impl Pane {
             Self::Capture => "Capture",
             Self::Loss => "Loss",
             Self::Stages => "Stages",
+            Self::Trade => "Trade",
             Self::Log => "Log",
         }
     }
@@ -79,7 +83,13 @@ pub fn first_layout() -> Tree<Pane> {
     let model = tabs(&[Pane::Model]);
     let albedo = tabs(&[picture(Quantity::Albedo), picture(Quantity::Emission)]);
     let error = tabs(&[picture(Quantity::Error), picture(Quantity::StandardError)]);
-    let side = tabs(&[Pane::Objects, Pane::Insert, Pane::Settings, Pane::Capture]);
+    let side = tabs(&[
+        Pane::Objects,
+        Pane::Insert,
+        Pane::Settings,
+        Pane::Trade,
+        Pane::Capture,
+    ]);
     let course = tabs(&[Pane::Loss, Pane::Stages, Pane::Log]);
     let upper = tiles.insert_horizontal_tile(vec![photograph, render]);
     let lower = tiles.insert_horizontal_tile(vec![model, albedo, error]);
@@ -173,6 +183,7 @@ impl Behavior<Pane> for Panes<'_> {
                         Pane::Capture => panels::capture::pane(ui, self.app),
                         Pane::Loss => panels::loss::pane(ui, self.app),
                         Pane::Stages => panels::stages::pane(ui, self.app),
+                        Pane::Trade => panels::trade::pane(ui, self.app),
                         _ => panels::log::pane(ui, self.app),
                     }
                 });

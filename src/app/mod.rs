@@ -13,6 +13,7 @@ mod run;
 pub mod shell;
 pub mod state;
 pub mod theme;
+pub mod trade;
 pub mod undo;
 pub mod window;
 

@@ -56,6 +56,11 @@ impl App {
             Action::Finish => self.send(Command::Finish),
             Action::Reset => self.send(Command::Reset),
 
+            Action::MeasureTrade => {
+                self.bring_forward = Some(Pane::Trade);
+                self.measure_or_cancel(ctx);
+            }
+
             Action::PreviousFrame => self.step_frame(-1),
             Action::NextFrame => self.step_frame(1),
             Action::ShowPhotograph => self.look.photograph = true,

@@ -16,6 +16,7 @@ use crate::app::shell::notices::Notices;
 use crate::app::shell::palette::Palette;
 use crate::app::shell::status::Memory;
 use crate::app::shell::thumbnails::Thumbnails;
+use crate::app::trade::TradeView;
 use crate::inverse::settings::Settings;
 use crate::scene::camera::Camera;
 use crate::session::command::{Command, Placement, Source, ViewCamera, ViewRequest};
@@ -58,6 +59,8 @@ pub struct App {
     pub model: ModelView,
     /// The table of objects.
     pub objects: ObjectsTable,
+    /// The trade of speed for exactness.
+    pub trade: TradeView,
     /// Events.
     pub notices: Notices,
     /// File dialogs.
@@ -110,6 +113,7 @@ impl App {
             insertions: Insertions::default(),
             model: ModelView::default(),
             objects: ObjectsTable::default(),
+            trade: TradeView::default(),
             notices: Notices::default(),
             dialogs: Dialogs::default(),
             sheet: Sheet::default(),
@@ -211,6 +215,7 @@ impl App {
             self.insertions.settle();
         }
         self.convert_photograph();
+        self.take_trade();
         self.take_models(ctx);
         self.request();
         self.flush();
@@ -255,6 +260,7 @@ impl App {
             self.opening = None;
             self.expose_automatically();
         }
+        self.trade_of_capture();
     }
 
     /// Puts the shown photograph's 99th percentile at 1.
@@ -416,6 +422,7 @@ impl App {
             Action::Undo => self.insertions.can_undo(),
             Action::Redo => self.insertions.can_redo(),
             Action::Place | Action::Duplicate | Action::Delete => self.insertions.chosen.is_some(),
+            Action::MeasureTrade => self.trade.doing().is_some() || self.can_measure(),
             Action::Finish => matches!(self.snapshot.phase, Phase::Solving | Phase::Paused),
             Action::Save
             | Action::Export

@@ -4,3 +4,4 @@
 mod connection;
 mod flows;
 mod rendering;
+mod trade;

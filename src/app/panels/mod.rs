@@ -7,3 +7,4 @@ pub mod loss;
 pub mod objects;
 pub mod settings;
 pub mod stages;
+pub mod trade;

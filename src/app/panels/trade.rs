@@ -1,0 +1,259 @@
+//! The trade of the open capture: error over seconds, where the running solve is on it, and where to stop.
+
+use crate::app::action::Action;
+use crate::app::picture::inspect::number;
+use crate::app::state::App;
+use crate::app::theme::{self, Tokens};
+use crate::app::trade::choice::{Stop, offers, stop_at};
+use crate::app::trade::{Limit, Vertical};
+use crate::inverse::settings::Preset;
+use crate::session::command::Command;
+use crate::study::trade::{Curve, Point, Trade};
+use egui::{Button, Color32, DragValue, Pos2, Ui};
+use egui_plot::{
+    Corner, HoverPosition, Legend, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints,
+    Points, VLine,
+};
+
+/// How near to a point a click must be, in points of the screen.
+const REACH: f32 = 14.0;
+/// Least height of a plot with a legend, in points of the screen.
+const LEGEND: f32 = 160.0;
+
+/// Draws the pane.
+pub fn pane(ui: &mut Ui, app: &mut App) {
+    measuring(ui, app);
+    stops(ui, app);
+    let Some(trade) = app.trade.trade.clone() else {
+        ui.weak("The trade of this capture was not measured yet");
+        return;
+    };
+    let mut chosen = None;
+    ui.horizontal_wrapped(|ui| {
+        for offer in offers(&trade) {
+            if ui
+                .small_button(offer.stop.words())
+                .on_hover_text(&offer.expected)
+                .clicked()
+            {
+                chosen = Some((offer.curve, offer.stop));
+            }
+        }
+    });
+    ui.horizontal(|ui| {
+        let vertical = &mut app.trade.vertical;
+        ui.selectable_value(vertical, Vertical::Claimed, "Claimed error")
+            .on_hover_text("The relative error of albedo that estimates claim of themselves");
+        ui.selectable_value(vertical, Vertical::Measured, "Measured error")
+            .on_hover_text(trade.measure.label());
+    })
+    .response
+    .on_hover_text(trade.machine.words());
+    chosen = plot(ui, app, &trade).or(chosen);
+    if let Some((curve, stop)) = chosen {
+        app.choose_stop(curve, stop);
+    }
+}
+
+/// The button that measures, and what it is at.
+fn measuring(ui: &mut Ui, app: &mut App) {
+    let ctx = ui.ctx().clone();
+    ui.horizontal(|ui| {
+        let doing = app.trade.doing();
+        let text = if doing.is_some() { "Cancel" } else { "Measure" };
+        let button = ui.add_enabled(app.can(Action::MeasureTrade), Button::new(text));
+        let help = Action::MeasureTrade.help();
+        if button
+            .on_hover_text(help)
+            .on_disabled_hover_text("Measured only while no solve runs: pause it or let it end")
+            .clicked()
+        {
+            app.perform(Action::MeasureTrade, &ctx);
+        }
+        match doing {
+            Some(doing) => {
+                ui.spinner();
+                ui.label(doing);
+            }
+            None => {
+                let label = ui.label("in");
+                let Limit(seconds) = &mut app.trade.limit;
+                ui.add(DragValue::new(seconds).range(5.0..=3600.0).suffix(" s"))
+                    .labelled_by(label.id)
+                    .on_hover_text("Time for all presets together");
+                if app.trade.unsaved && ui.button("Keep").on_hover_text(KEEP).clicked() {
+                    app.keep_trade();
+                }
+            }
+        }
+    });
+}
+
+const KEEP: &str = "Writes trade.csv, trade.json and trade.png into the folder where this capture's results are looked for when it is opened";
+
+/// The two stops as numbers.
+fn stops(ui: &mut Ui, app: &mut App) {
+    let mut settings = app.settings.clone();
+    ui.horizontal(|ui| {
+        let label = ui.label("Stop at error");
+        ui.add(
+            DragValue::new(&mut settings.target_error)
+                .range(0.0..=100.0)
+                .speed(0.01)
+                .max_decimals(3)
+                .suffix(" %"),
+        )
+        .labelled_by(label.id)
+        .on_hover_text("Relative error of albedo that the estimate claims of itself; 0 leaves it to the preset");
+        let label = ui.label("Stop at time");
+        ui.add(
+            DragValue::new(&mut settings.time)
+                .range(0.0..=1e9)
+                .speed(0.1)
+                .suffix(" s"),
+        )
+        .labelled_by(label.id)
+        .on_hover_text("Seconds of solving; 0 sets no limit");
+    });
+    if settings != app.settings {
+        app.settings = settings.clone();
+        app.send(Command::Set(Box::new(settings)));
+    }
+}
+
+/// Draws the curves; gives the curve and the stop of a point that was clicked.
+fn plot(ui: &mut Ui, app: &mut App, trade: &Trade) -> Option<(usize, Stop)> {
+    let tokens = theme::tokens(ui);
+    let vertical = app.trade.vertical;
+    let height = move |point: &Point| height(point, vertical);
+    let percent = vertical == Vertical::Claimed;
+    let value = move |log: f64| {
+        let value = number(10f64.powf(log) as f32);
+        if percent { format!("{value} %") } else { value }
+    };
+    let now = live(app);
+    let mut drawn = Plot::new("trade");
+    // A legend would cover a small plot.
+    if ui.available_height() > LEGEND {
+        let legend = Legend::default().position(Corner::LeftBottom);
+        drawn = drawn.legend(legend.background_alpha(0.6));
+    }
+    let response = drawn
+        .x_axis_formatter(|mark, _| format!("{} s", number(10f64.powf(mark.value) as f32)))
+        .y_axis_formatter(move |mark, _| value(mark.value))
+        .label_formatter(move |position| match position {
+            HoverPosition::NearDataPoint {
+                plot_name,
+                position,
+                ..
+            } => Some(format!(
+                "{plot_name}\n{} s: {}",
+                number(10f64.powf(position.x) as f32),
+                value(position.y)
+            )),
+            HoverPosition::Elsewhere { .. } => None,
+        })
+        .y_axis_min_width(44.0)
+        .show(ui, |plot| {
+            let mut places = Vec::new();
+            for (index, curve) in trade.curves.iter().enumerate() {
+                let color = color(curve, tokens);
+                let mut line = Vec::new();
+                for (number, point) in curve.points.iter().enumerate() {
+                    if let Some(y) = height(point) {
+                        line.push([point.seconds.log10(), y]);
+                        places.push(([point.seconds.log10(), y], index, number));
+                    }
+                }
+                if curve.is_preset {
+                    plot.line(
+                        Line::new(&curve.name, PlotPoints::from(line.clone()))
+                            .color(color)
+                            .width(1.6),
+                    );
+                }
+                plot.points(Points::new(&curve.name, line).color(color).radius(2.2));
+            }
+            let front: Vec<[f64; 2]> = (trade.curves.iter().flat_map(|curve| &curve.points))
+                .filter(|point| point.pareto)
+                .filter_map(|point| Some([point.seconds.log10(), height(point)?]))
+                .collect();
+            if !percent {
+                plot.points(
+                    Points::new("Pareto front", front)
+                        .shape(MarkerShape::Circle)
+                        .filled(false)
+                        .color(tokens.strong)
+                        .radius(4.0),
+                );
+            }
+            if let Some((seconds, claim)) = now {
+                let x = seconds.log10();
+                plot.vline(
+                    VLine::new("running solve", x)
+                        .color(tokens.accent)
+                        .style(LineStyle::dashed_loose()),
+                );
+                if let Some(claim) = claim.filter(|_| percent) {
+                    let at = vec![[x, (claim * 100.0).log10()]];
+                    plot.points(
+                        Points::new("running solve", at)
+                            .shape(MarkerShape::Diamond)
+                            .color(tokens.accent)
+                            .radius(6.0),
+                    );
+                }
+            }
+            places
+        });
+    let on_screen = |at: [f64; 2]| {
+        let place = PlotPoint::new(at[0], at[1]);
+        response.transform.position_from_point(&place)
+    };
+    app.trade.places = (response.inner.iter())
+        .map(|&(at, curve, point)| (on_screen(at), curve, point))
+        .collect();
+    if !response.response.clicked() {
+        return None;
+    }
+    let at = response.response.interact_pointer_pos()?;
+    let (curve, point) = nearest(&app.trade.places, at)?;
+    let stop = stop_at(trade.curves.get(curve)?.points.get(point)?, vertical)?;
+    Some((curve, stop))
+}
+
+/// The logarithm of what is plotted; `None` where the point has none.
+fn height(point: &Point, vertical: Vertical) -> Option<f64> {
+    let value = match vertical {
+        Vertical::Claimed => point.reported? * 100.0,
+        Vertical::Measured => point.error,
+    };
+    (value > 0.0 && point.seconds > 0.0).then(|| value.log10())
+}
+
+/// Seconds of the solve that is under way or has ended, and the relative error that it claims.
+fn live(app: &App) -> Option<(f64, Option<f64>)> {
+    let progress = &app.snapshot.progress;
+    progress.seconds_to_first_estimate?;
+    let claim = app.snapshot.estimate.relative_error().filter(|e| *e > 0.0);
+    (progress.seconds > 0.0).then_some((progress.seconds, claim))
+}
+
+/// The point nearest to a place on the screen, if it is near.
+fn nearest(places: &[(Pos2, usize, usize)], at: Pos2) -> Option<(usize, usize)> {
+    let near = places.iter().map(|&(p, c, i)| (p.distance(at), c, i));
+    let (distance, curve, point) = near.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (distance <= REACH).then_some((curve, point))
+}
+
+fn color(curve: &Curve, tokens: &Tokens) -> Color32 {
+    if !curve.is_preset {
+        return tokens.outline;
+    }
+    match curve.settings.preset {
+        Preset::Preview => tokens.good,
+        Preset::Balanced => tokens.train,
+        Preset::Reference => tokens.held_out,
+        Preset::Paper => tokens.weak,
+    }
+}

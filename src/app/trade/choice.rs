@@ -1,0 +1,201 @@
+//! Choosing where on the curve to stop.
+
+use crate::app::state::App;
+use crate::app::trade::Vertical;
+use crate::inverse::settings::{PARAMETERS, Settings};
+use crate::session::command::Command;
+use crate::session::snapshot::Level;
+use crate::study::trade::{Curve, Point, Trade};
+
+/// Claimed errors in percent that are offered.
+const ERRORS: [f64; 7] = [10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1];
+/// Seconds that are offered.
+const SECONDS: [f64; 8] = [1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0];
+
+/// When a solve is to stop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Stop {
+    /// At a relative error in percent that the estimate claims of itself.
+    Error(f64),
+    /// After some seconds.
+    Seconds(f64),
+}
+
+/// A place to stop at, and the solve that is best there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Offer {
+    /// When to stop.
+    pub stop: Stop,
+    /// Index of the curve whose parameters to take.
+    pub curve: usize,
+    /// What to expect, in words.
+    pub expected: String,
+}
+
+impl Stop {
+    /// "Stop at 1 %" or "Stop at 10 s".
+    pub fn words(self) -> String {
+        match self {
+            Self::Error(percent) => format!("Stop at {percent} %"),
+            Self::Seconds(seconds) => format!("Stop at {seconds} s"),
+        }
+    }
+}
+
+/// Round errors that a preset reaches, each with the one that is quickest there, and round seconds, each with the one
+/// that claims least then.
+pub fn offers(trade: &Trade) -> Vec<Offer> {
+    let presets = || {
+        let all = trade.curves.iter().enumerate();
+        all.filter(|(_, curve)| curve.is_preset)
+    };
+    let errors = ERRORS.iter().filter_map(|&percent| {
+        let first = |curve: &Curve| {
+            let claims = |point: &&Point| point.reported.is_some_and(|e| e * 100.0 <= percent);
+            curve.points.iter().find(claims).map(|point| point.seconds)
+        };
+        let reached = presets().filter_map(|(i, curve)| Some((i, first(curve)?)));
+        let (curve, seconds) = reached.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let name = &trade.curves[curve].name;
+        Some(Offer {
+            stop: Stop::Error(percent),
+            curve,
+            expected: format!("{name}: after {seconds:.1} s"),
+        })
+    });
+    let last = (trade.curves.iter())
+        .filter_map(|curve| curve.points.last())
+        .map(|point| point.seconds)
+        .fold(0.0, f64::max);
+    let seconds = SECONDS
+        .iter()
+        .filter(|&&s| s <= last)
+        .filter_map(|&seconds| {
+            let then = |curve: &Curve| {
+                let before = curve.points.iter().rev().find(|p| p.seconds <= seconds)?;
+                Some(before.error)
+            };
+            let there = presets().filter_map(|(i, curve)| Some((i, then(curve)?)));
+            let (curve, error) = there.min_by(|a, b| a.1.total_cmp(&b.1))?;
+            let name = &trade.curves[curve].name;
+            let what = trade.measure.label();
+            Some(Offer {
+                stop: Stop::Seconds(seconds),
+                curve,
+                expected: format!("{name}: {what} {error:.4}"),
+            })
+        });
+    errors.chain(seconds).collect()
+}
+
+/// The stop that a point of a curve stands for, rounded up to two digits so that it is reached.
+pub fn stop_at(point: &Point, vertical: Vertical) -> Option<Stop> {
+    match vertical {
+        Vertical::Claimed => point.reported.map(|e| Stop::Error(round_up(e * 100.0))),
+        Vertical::Measured => Some(Stop::Seconds(round_up(point.seconds))),
+    }
+}
+
+/// The next number of two digits that is no smaller; zero stays.
+fn round_up(value: f64) -> f64 {
+    if value.is_nan() || value <= 0.0 {
+        return 0.0;
+    }
+    let decimals = 1 - value.log10().floor() as i32;
+    let unit = 10f64.powi(decimals.abs());
+    let (scaled, back): (f64, fn(f64, f64) -> f64) = if decimals >= 0 {
+        (value * unit, |v, unit| v / unit)
+    } else {
+        (value / unit, |v, unit| v * unit)
+    };
+    // Products such as 0.7 · 10 are a hair above the whole number that they stand for.
+    back((scaled - 1e-9).ceil(), unit)
+}
+
+impl App {
+    /// Takes over a curve's parameters, as far as they differ from the defaults, and stops where it was chosen.
+    pub fn choose_stop(&mut self, curve: usize, stop: Stop) {
+        let Some(trade) = self.trade.trade.clone() else {
+            return;
+        };
+        let Some(curve) = trade.curves.get(curve) else {
+            return;
+        };
+        let before = self.settings.preset;
+        let mut settings = taken_over(&self.settings, &curve.settings);
+        match stop {
+            Stop::Error(percent) => (settings.target_error, settings.time) = (percent, 0.0),
+            Stop::Seconds(seconds) => (settings.target_error, settings.time) = (0.0, seconds),
+        }
+        let mut message = format!("{} with {}", stop.words(), curve.name);
+        if settings.preset != before && !self.snapshot.progress.phase.is_empty() {
+            message += ": the preset is changed, which takes effect at the next reset";
+        }
+        self.notices.say(Level::Info, message);
+        self.settings = settings.clone();
+        self.send(Command::Set(Box::new(settings)));
+    }
+}
+
+/// `settings` with the preset of `other` and every parameter in which it differs from the defaults; the seed stays.
+fn taken_over(settings: &Settings, other: &Settings) -> Settings {
+    let defaults = Settings::default();
+    let mut taken = Settings {
+        preset: other.preset,
+        ..settings.clone()
+    };
+    for parameter in PARAMETERS.iter().filter(|p| p.name != "seed") {
+        let value = parameter.get(other);
+        if value != parameter.get(&defaults) {
+            // A value that was read from settings is allowed in settings.
+            let set = parameter.set(&mut taken, &value);
+            debug_assert_eq!(set, Ok(()));
+        }
+    }
+    taken
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stops_are_rounded_up_to_two_digits() {
+        for (value, expected) in [
+            (0.7, 0.7),
+            (0.701, 0.71),
+            (1.0, 1.0),
+            (1.23, 1.3),
+            (14.2, 15.0),
+            (9.96, 10.0),
+            (123.0, 130.0),
+            (0.0123, 0.013),
+            (0.0, 0.0),
+            (f64::NAN, 0.0),
+        ] {
+            assert!((round_up(value) - expected).abs() < 1e-9, "{value}");
+        }
+    }
+
+    #[test]
+    fn a_curves_own_parameters_are_taken_over_and_the_persons_others_stay() {
+        let own = Settings {
+            seed: 5,
+            held_out: 0.2,
+            bounces: 3,
+            ..Settings::default()
+        };
+        let curve = Settings {
+            seed: 9,
+            bounces: 8,
+            preset: crate::inverse::settings::Preset::Preview,
+            ..Settings::default()
+        };
+        let expected = Settings {
+            preset: curve.preset,
+            bounces: 8,
+            ..own.clone()
+        };
+        assert_eq!(taken_over(&own, &curve), expected);
+    }
+}
