@@ -2,9 +2,10 @@
 
 mod common;
 
-use glam::{DVec3, Mat4, Vec3};
+use glam::{DVec3, Mat4, Vec2, Vec3};
 use relit::export::scene::{Format, write};
 use relit::inverse::estimate::{Estimate, TexelEstimate};
+use relit::math::color::to_srgb8;
 use relit::scene::Scene;
 use relit::scene::texels::TexelLayout;
 use relit::transport::material::TexelColors;
@@ -80,12 +81,37 @@ fn assert_same_surface(scene: &Scene, name: &str, corners: &[DVec3], tolerance: 
     );
 }
 
+/// The middle of every texel of the floor has its colour in the picture, to the last of 8 bits.
+fn assert_texels_are_found(
+    scene: &Scene,
+    estimate: &Estimate,
+    uvs: &[Vec2],
+    picture: &gltf::image::Data,
+) {
+    assert_eq!(picture.format, gltf::image::Format::R8G8B8);
+    let texels = estimate.texels.as_ref().expect("texels");
+    let layout = &texels.colors.layout;
+    assert_eq!(uvs.len(), 3 * scene.objects[1].triangles.len());
+    for (corners, &triangle) in uvs.chunks(3).zip(&scene.objects[1].triangles) {
+        let first = layout.first[triangle as usize];
+        for texel in 0..layout.first[triangle as usize + 1] - first {
+            let [b1, b2] = layout.center(triangle as usize, texel);
+            let uv = corners[0] * (1.0 - b1 - b2) + corners[1] * b1 + corners[2] * b2;
+            let x = (uv.x * picture.width as f32) as usize;
+            let y = (uv.y * picture.height as f32) as usize;
+            let at = 3 * (y * picture.width as usize + x);
+            let expected = to_srgb8(texels.colors.colors[(first + texel) as usize], 1.0);
+            assert_eq!(picture.pixels[at..at + 3], expected, "{triangle} {texel}");
+        }
+    }
+}
+
 #[test]
 fn glb_holds_nodes_materials_strengths_colours_and_cameras() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let path = folder.path().join("scene.glb");
     let (scene, estimate) = export(Format::Glb, &path);
-    let (document, buffers, _) = gltf::import(&path).expect("valid glTF");
+    let (document, buffers, images) = gltf::import(&path).expect("valid glTF");
 
     for (index, object) in scene.objects.iter().enumerate() {
         let node = document
@@ -119,23 +145,17 @@ fn glb_holds_nodes_materials_strengths_colours_and_cameras() {
         assert_eq!(surface.metallic_factor(), 0.0);
         let roughness = if index == 0 { 0.6 } else { 1.0 };
         assert!((surface.roughness_factor() - roughness).abs() < 1e-6);
-        let colors = reader.read_colors(0).map(|c| c.into_rgb_f32());
-        match colors {
-            Some(colors) => {
-                assert_eq!(index, 1, "only the floor is textured");
-                assert_eq!(surface.base_color_factor(), [1.0; 4]);
-                let texels = estimate.texels.as_ref().expect("texels");
-                let first = texels.colors.layout.first[scene.objects[1].triangles[0] as usize];
-                for (vertex, color) in colors.enumerate() {
-                    let texel = first as usize + vertex / 3;
-                    assert_eq!(Vec3::from(color), texels.colors.colors[texel]);
-                }
-            }
-            None => {
-                let base = Vec3::from_slice(&surface.base_color_factor());
-                assert_eq!(base, known.albedo);
-            }
-        }
+        let Some(uvs) = reader.read_tex_coords(0) else {
+            let base = Vec3::from_slice(&surface.base_color_factor());
+            assert_eq!(base, known.albedo);
+            assert!(surface.base_color_texture().is_none());
+            continue;
+        };
+        assert_eq!(index, 1, "only the floor is textured");
+        assert_eq!(surface.base_color_factor(), [1.0; 4]);
+        let texture = surface.base_color_texture().expect("a texture").texture();
+        let uvs: Vec<Vec2> = uvs.into_f32().map(Vec2::from).collect();
+        assert_texels_are_found(&scene, &estimate, &uvs, &images[texture.source().index()]);
     }
 
     for (index, camera) in scene.cameras.iter().enumerate() {

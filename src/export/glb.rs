@@ -2,10 +2,12 @@
 
 use crate::error::{Error, Result};
 use crate::export::atomic::write_atomically;
+use crate::export::picture::png_bytes;
 use crate::export::scene::Part;
+use crate::math::picture::Picture;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Vec2, Vec3};
 use gltf_json as json;
 use json::validation::Checked::Valid;
 use json::validation::USize64;
@@ -13,14 +15,18 @@ use std::path::Path;
 
 /// Writes parts and cameras as a GLB file.
 ///
-/// Base colour is the albedo, per vertex (COLOR_0) where it varies; emission is emissiveFactor ×
+/// Base colour is the albedo, from the atlas (8-bit sRGB PNG) where it varies; emission is emissiveFactor ×
 /// KHR_materials_emissive_strength; glTF's roughness is √α, and 1 where no specular lobe was found. Positions are
 /// the capture's, in f32. Cameras have no distortion there and their principal point in the middle.
 ///
 /// # Errors
 /// The file cannot be written, or it would be larger than the format's 4 GiB.
-pub fn write(path: &Path, scene: &Scene, parts: &[Part]) -> Result<()> {
+pub fn write(path: &Path, scene: &Scene, parts: &[Part], atlas: Option<&Picture>) -> Result<()> {
     let mut file = Document::default();
+    if let Some(atlas) = atlas {
+        let encoded = png_bytes(atlas, 1.0).map_err(|error| Error::file(path, error, ""))?;
+        file.image(&encoded);
+    }
     let mut nodes = Vec::new();
     for part in parts {
         nodes.push(file.part(part));
@@ -57,6 +63,7 @@ pub fn write(path: &Path, scene: &Scene, parts: &[Part]) -> Result<()> {
 struct Document {
     root: json::Root,
     bytes: Vec<u8>,
+    atlas: Option<json::Index<json::Texture>>,
 }
 
 impl Document {
@@ -79,9 +86,9 @@ impl Document {
         let accessor = self.vectors(&positions, Some(bounds));
         let semantics = &mut primitive.attributes;
         semantics.insert(Valid(json::mesh::Semantic::Positions), accessor);
-        if !part.colors.is_empty() {
-            let accessor = self.vectors(&part.colors, None);
-            semantics.insert(Valid(json::mesh::Semantic::Colors(0)), accessor);
+        if !part.uvs.is_empty() {
+            let accessor = self.coordinates(&part.uvs);
+            semantics.insert(Valid(json::mesh::Semantic::TexCoords(0)), accessor);
         }
         primitive.indices = Some(self.indices(&part.triangles));
 
@@ -101,7 +108,8 @@ impl Document {
 
     fn material(&mut self, part: &Part) -> json::Index<json::Material> {
         let estimate = &part.estimate;
-        let color = if part.colors.is_empty() {
+        let texture = self.atlas.filter(|_| !part.uvs.is_empty());
+        let color = if texture.is_none() {
             estimate.albedo.clamp(Vec3::ZERO, Vec3::ONE)
         } else {
             Vec3::ONE
@@ -127,6 +135,12 @@ impl Document {
             emissive_factor: json::material::EmissiveFactor(factor.to_array()),
             pbr_metallic_roughness: json::material::PbrMetallicRoughness {
                 base_color_factor: json::material::PbrBaseColorFactor(color.extend(1.0).to_array()),
+                base_color_texture: texture.map(|index| json::texture::Info {
+                    index,
+                    tex_coord: 0,
+                    extensions: None,
+                    extras: Default::default(),
+                }),
                 metallic_factor: json::material::StrengthFactor(0.0),
                 roughness_factor: json::material::StrengthFactor(roughness),
                 ..Default::default()
@@ -167,6 +181,62 @@ impl Document {
             name,
             ..Default::default()
         })
+    }
+
+    /// Appends the atlas, to be sampled linearly without repeating.
+    fn image(&mut self, encoded: &[u8]) {
+        let start = self.bytes.len();
+        self.bytes.extend(encoded);
+        // What follows must lie at a multiple of four bytes.
+        let length = encoded.len();
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        let view = self.root.push(json::buffer::View {
+            buffer: json::Index::new(0),
+            byte_length: USize64::from(length),
+            byte_offset: Some(USize64::from(start)),
+            byte_stride: None,
+            name: None,
+            target: None,
+            extensions: None,
+            extras: Default::default(),
+        });
+        let source = self.root.push(json::Image {
+            buffer_view: Some(view),
+            mime_type: Some(json::image::MimeType("image/png".to_owned())),
+            name: Some("albedo".to_owned()),
+            uri: None,
+            extensions: None,
+            extras: Default::default(),
+        });
+        let sampler = self.root.push(json::texture::Sampler {
+            mag_filter: Some(Valid(json::texture::MagFilter::Linear)),
+            min_filter: Some(Valid(json::texture::MinFilter::Linear)),
+            wrap_s: Valid(json::texture::WrappingMode::ClampToEdge),
+            wrap_t: Valid(json::texture::WrappingMode::ClampToEdge),
+            ..Default::default()
+        });
+        self.atlas = Some(self.root.push(json::Texture {
+            name: Some("albedo".to_owned()),
+            sampler: Some(sampler),
+            source,
+            extensions: None,
+            extras: Default::default(),
+        }));
+    }
+
+    /// Appends an array of texture coordinates.
+    fn coordinates(&mut self, values: &[Vec2]) -> json::Index<json::Accessor> {
+        let start = self.bytes.len();
+        let floats = values.iter().flat_map(|v| v.to_array());
+        self.bytes.extend(floats.flat_map(f32::to_le_bytes));
+        let accessor = self.accessor(
+            start,
+            values.len(),
+            json::accessor::ComponentType::F32,
+            json::accessor::Type::Vec2,
+            json::buffer::Target::ArrayBuffer,
+        );
+        self.root.push(accessor)
     }
 
     /// Appends an array of vectors; `bounds` are its least and greatest components.

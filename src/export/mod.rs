@@ -1,5 +1,6 @@
 //! What goes out: pictures, plots, tables, and scenes for other programs. Every file appears whole or not at all.
 
+pub mod atlas;
 pub mod atomic;
 pub mod canvas;
 pub mod capture;

@@ -50,6 +50,21 @@ pub fn write_png(path: &Path, picture: &Picture, exposure: f32) -> Result<()> {
     write_png_bytes(path, picture.width, picture.height, &bytes)
 }
 
+/// A linear picture times an exposure as the bytes of an 8-bit sRGB PNG.
+///
+/// # Errors
+/// The picture has no pixels.
+pub fn png_bytes(picture: &Picture, exposure: f32) -> image::ImageResult<Vec<u8>> {
+    let mut encoded = Vec::new();
+    PngEncoder::new(&mut encoded).write_image(
+        &to_srgb_bytes(picture, exposure),
+        picture.width,
+        picture.height,
+        ExtendedColorType::Rgb8,
+    )?;
+    Ok(encoded)
+}
+
 /// Writes 8-bit sRGB bytes (three a pixel, row by row) as a PNG.
 ///
 /// # Errors

@@ -1,10 +1,11 @@
 //! A scene and its estimate, cut into parts as other programs want them.
 
 use crate::error::Result;
+use crate::export::atlas::Atlas;
 use crate::export::{glb, mitsuba, obj, objects, ply, probe};
 use crate::inverse::estimate::{Estimate, ObjectEstimate, TexelEstimate};
 use crate::scene::Scene;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -42,6 +43,8 @@ pub struct Part {
     pub triangles: Vec<[u32; 3]>,
     /// Albedo of each vertex where it varies over the object, else empty. Each texel is then three vertices of its own.
     pub colors: Vec<Vec3>,
+    /// Texture coordinates of each vertex in an [`Atlas`], where the part was made for one, else empty.
+    pub uvs: Vec<Vec2>,
 }
 
 /// Writes a scene and its estimate for another program.
@@ -50,7 +53,14 @@ pub struct Part {
 /// The file cannot be written, its ending does not fit a panorama, or the format cannot hold the scene.
 pub fn write(scene: &Arc<Scene>, estimate: &Estimate, format: Format, path: &Path) -> Result<()> {
     match format {
-        Format::Glb => glb::write(path, scene, &parts(scene, estimate)),
+        Format::Glb => {
+            let atlas = (estimate.texels.as_deref()).and_then(|texels| Atlas::new(scene, texels));
+            let parts = match &atlas {
+                Some(atlas) => mapped_parts(scene, estimate, atlas),
+                None => parts(scene, estimate),
+            };
+            glb::write(path, scene, &parts, atlas.as_ref().map(|a| &a.picture))
+        }
         Format::Obj => obj::write(path, &parts(scene, estimate)),
         Format::Ply => ply::write_scene(path, &parts(scene, estimate)),
         Format::Mitsuba => mitsuba::write(path, scene, &parts(scene, estimate)),
@@ -61,6 +71,23 @@ pub fn write(scene: &Arc<Scene>, estimate: &Estimate, format: Format, path: &Pat
 
 /// Cuts a scene into one part an object; objects without triangles are left out.
 pub fn parts(scene: &Scene, estimate: &Estimate) -> Vec<Part> {
+    cut(scene, estimate, |part, triangles, texels| {
+        part.add_texels(scene, triangles, texels);
+    })
+}
+
+/// The same with whole triangles and texture coordinates where albedo varies.
+fn mapped_parts(scene: &Scene, estimate: &Estimate, atlas: &Atlas) -> Vec<Part> {
+    cut(scene, estimate, |part, triangles, _| {
+        part.add_mapped(scene, triangles, atlas);
+    })
+}
+
+fn cut(
+    scene: &Scene,
+    estimate: &Estimate,
+    textured: impl Fn(&mut Part, &[u32], &TexelEstimate),
+) -> Vec<Part> {
     let unknown = ObjectEstimate::default();
     scene
         .objects
@@ -78,9 +105,10 @@ pub fn parts(scene: &Scene, estimate: &Estimate) -> Vec<Part> {
                 positions: Vec::new(),
                 triangles: Vec::new(),
                 colors: Vec::new(),
+                uvs: Vec::new(),
             };
             match texels {
-                Some(texels) => part.add_texels(scene, &object.triangles, texels),
+                Some(texels) => textured(&mut part, &object.triangles, texels),
                 None => part.add_triangles(scene, &object.triangles),
             }
             part
@@ -101,6 +129,21 @@ impl Part {
                 })
             });
             self.triangles.push(corners);
+        }
+    }
+
+    /// Triangles as they are, each with corners of its own.
+    fn add_mapped(&mut self, scene: &Scene, triangles: &[u32], atlas: &Atlas) {
+        for &triangle in triangles {
+            let Some(uvs) = atlas.corners[triangle as usize] else {
+                continue;
+            };
+            let start = self.positions.len() as u32;
+            let corners = scene.corners(triangle);
+            self.positions
+                .extend(corners.map(|local| local.as_dvec3() + scene.origin));
+            self.uvs.extend(uvs);
+            self.triangles.push([start, start + 1, start + 2]);
         }
     }
 

@@ -11,3 +11,4 @@ pub mod parameters;
 pub mod settings;
 pub mod solver;
 pub mod survey;
+pub mod texture;

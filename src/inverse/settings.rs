@@ -215,6 +215,10 @@ parameters! {
         "Share of pixels kept out of the fit, to test it";
     hold_out: u64 = 0, Kind::Whole { min: 0, max: 1_000_000 }, "frames", false,
         "Keep every K-th frame out of the fit instead of single pixels; 0 keeps single pixels";
+    outside_light: bool = true, Kind::Flag, "", false,
+        "Try light from outside the mesh, where rays leave it";
+    textures: bool = true, Kind::Flag, "", false,
+        "Try albedo that varies over an object, where its pixels show more than one colour";
     learning_rate: f64 = 5e-3, Kind::Real { min: 1e-6, max: 10.0, logarithmic: true }, "", true,
         "Paper solver: initial step size of ADAM";
     batch: u64 = 8, Kind::Whole { min: 1, max: 1_000_000 }, "pixels", true,

@@ -59,12 +59,88 @@ pub fn radiance(
     stream: &mut Stream,
     options: &PathOptions,
 ) -> PathSample {
+    follow(world, Leg::from_camera(camera_ray), stream, options)
+}
+
+/// Radiance that a white diffuse surface would send from a point to the side of `normal` (irradiance / π), estimated by
+/// one path. The surface's own albedo and emission there do not matter.
+pub fn white_radiance(
+    world: &impl World,
+    surface: &SurfacePoint,
+    normal: Vec3,
+    stream: &mut Stream,
+    options: &PathOptions,
+) -> PathSample {
+    let frame = Frame::around(normal);
+    let white = Bsdf {
+        albedo: Vec3::ONE,
+        lobe: None,
+    };
+    let mut rays = 0;
+    let mut direct = Vec3::ZERO;
+    if options.max_bounces == 0 {
+        return PathSample::default();
+    }
+    if options.sample_emitters {
+        let up = Vec3::Z;
+        direct = direct_light(
+            world, surface, &frame, up, &white, stream, options, &mut rays,
+        );
+    }
+    let Some(next) = white.sample(Vec3::Z, stream.uniform(), stream.uniform2()) else {
+        return PathSample {
+            radiance: direct,
+            rays,
+            rejected: false,
+        };
+    };
+    let wi = frame.to_world(next.wi);
+    let origin = offset_origin(surface.point, normal, &surface.corners, wi);
+    let leg = Leg {
+        ray: Ray::new(origin, wi),
+        throughput: next.weight,
+        bsdf_pdf: Some(next.pdf),
+        bounce: 1,
+    };
+    let mut sample = follow(world, leg, stream, options);
+    sample.radiance += direct;
+    sample.rays += rays;
+    if !sample.radiance.is_finite() {
+        sample.radiance = Vec3::ZERO;
+        sample.rejected = true;
+    }
+    sample
+}
+
+/// Where a path stands before its next ray.
+struct Leg {
+    ray: Ray,
+    throughput: Vec3,
+    /// Density of the last BSDF sample per solid angle; `None` on the camera ray, which no light sample competes with.
+    bsdf_pdf: Option<f32>,
+    bounce: u32,
+}
+
+impl Leg {
+    fn from_camera(ray: &Ray) -> Self {
+        Self {
+            ray: *ray,
+            throughput: Vec3::ONE,
+            bsdf_pdf: None,
+            bounce: 0,
+        }
+    }
+}
+
+/// Follows a path from a leg on to its end.
+fn follow(world: &impl World, leg: Leg, stream: &mut Stream, options: &PathOptions) -> PathSample {
     let mut sample = PathSample::default();
-    let mut ray = *camera_ray;
-    let mut throughput = Vec3::ONE;
-    // Density of the last BSDF sample per solid angle; `None` on the camera ray, which no light sample competes with.
-    let mut bsdf_pdf: Option<f32> = None;
-    let mut bounce = 0;
+    let Leg {
+        mut ray,
+        mut throughput,
+        mut bsdf_pdf,
+        mut bounce,
+    } = leg;
     let mut total = Vec3::ZERO;
 
     loop {

@@ -47,7 +47,7 @@ impl Ladder<'_, '_> {
         self.tell_lamps(&cache, Role::Dark)?;
         self.finish_stage("light field", started, format!("each object fitted to the light that the photographs measured around it; {} give light", self.lamps()))?;
         let escaping = cache.share_ending_on(self.outside.first);
-        if escaping > ESCAPING {
+        if escaping > ESCAPING && self.monitor.settings.outside_light {
             self.light_from_outside(&cache, escaping)?;
         }
         for (error, albedo) in self.errors.albedo.iter_mut().zip(&self.unknowns.albedo) {

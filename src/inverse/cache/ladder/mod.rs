@@ -1,5 +1,6 @@
 //! The transport-cache solver: a light-field start, then rounds of full paths until the errors are small enough.
 
+mod detail;
 mod lamps;
 mod light_field;
 
@@ -24,6 +25,7 @@ use crate::inverse::parameters::Unknowns;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Problem, Solution, Stage, Termination};
 use crate::inverse::survey::Survey;
+use crate::inverse::texture::Refined;
 use crate::transport::emitters::Emitters;
 use glam::Vec3;
 use std::time::{Duration, Instant};
@@ -38,6 +40,8 @@ const NEGLIGIBLE: f64 = 1.0 / 3.0;
 /// Columns and rows of the map of light from outside.
 const OUTSIDE_WIDTH: usize = 6;
 const OUTSIDE_HEIGHT: usize = 3;
+/// Stages of a solve that goes all the way.
+const STAGES: u32 = 4;
 /// Work between two reports to the observer.
 const SLICE: Duration = Duration::from_millis(25);
 
@@ -59,6 +63,8 @@ pub struct Ladder<'a, 'o> {
     unknowns: Unknowns,
     errors: StandardErrors,
     estimate: Estimate,
+    /// Spatial detail, once it was looked for.
+    detail: Option<Refined>,
     /// Stages finished.
     stages: u32,
     /// Where the last of them ended.
@@ -119,6 +125,7 @@ pub fn solve(
         path_noise: vec![1.0; surfaces],
         unknowns: start.unknowns,
         estimate: Estimate::default(),
+        detail: None,
         stages: start.stages,
     };
     ladder.describe();
@@ -141,12 +148,16 @@ impl Ladder<'_, '_> {
             self.objects()?;
             self.reached(2);
         }
+        let mut ended = Termination::Converged;
         if self.stages < 3 {
-            let ended = self.rounds()?;
+            ended = self.rounds()?;
             self.reached(3);
-            return Ok(ended);
         }
-        Ok(Termination::Converged)
+        if self.stages < STAGES && self.monitor.settings.textures {
+            self.detail()?;
+        }
+        self.reached(STAGES);
+        Ok(ended)
     }
 
     /// Second stage: full paths to the lamps found. Lights that the first stage missed or imagined are tested here,
@@ -385,6 +396,9 @@ impl Ladder<'_, '_> {
             &self.errors,
             self.outside,
         );
+        if let Some(detail) = &self.detail {
+            detail.apply(&mut self.estimate);
+        }
     }
 
     fn measure(&mut self) -> Losses {
@@ -431,7 +445,7 @@ impl Ladder<'_, '_> {
 
     fn finish(mut self, termination: Termination) -> Solution {
         // A finished stage has measured its loss already.
-        let done = self.stages >= 3 || termination == Termination::Converged;
+        let done = self.stages >= STAGES || termination == Termination::Converged;
         if !done {
             let losses = self.measure();
             self.monitor.loss(losses.train, losses.held_out);

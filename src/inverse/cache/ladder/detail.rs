@@ -1,0 +1,39 @@
+//! The last stage: albedo that varies over an object, where its pixels show more than one colour.
+
+use super::Ladder;
+use crate::inverse::cache::roles::Role;
+use crate::inverse::solver::Termination;
+use crate::inverse::texture::{Task, refine};
+
+impl Ladder<'_, '_> {
+    /// Tries a texture on every object that reflects and gives no light.
+    pub(super) fn detail(&mut self) -> Result<(), Termination> {
+        let started = self.monitor.seconds();
+        self.monitor.phase("looking for textures");
+        let objects: Vec<usize> = (0..self.problem.scene.objects.len())
+            .filter(|&k| {
+                self.roles[k] == Role::Reflector && self.estimate.objects[k].albedo_identifiable
+            })
+            .collect();
+        let settings = self.monitor.settings.clone();
+        let task = Task {
+            problem: self.problem,
+            survey: &self.survey,
+            settings: &settings,
+            paths: self.budget.round_paths,
+            max_bounces: self.max_bounces,
+        };
+        let (monitor, estimate, checkpoint) = (&mut self.monitor, &self.estimate, &self.checkpoint);
+        let refined = refine(&task, estimate, &objects, &mut |rays, rejected, share| {
+            monitor.progress.rays += rays;
+            monitor.rejected("path weight not finite", rejected);
+            monitor.progress.fraction = Some(share as f32);
+            monitor.tick(estimate, &|_| checkpoint.clone())
+        })?;
+        let why = refined.summary(|k| self.problem.scene.objects[k].name.clone());
+        let kept = refined.texels.is_some();
+        self.detail = Some(refined);
+        self.describe();
+        self.record("textures", started, kept, why)
+    }
+}

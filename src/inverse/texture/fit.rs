@@ -1,0 +1,220 @@
+//! The albedo of an object's cells from its pixels, smoothed as far as pixels left out of the fit ask for.
+
+use super::fuse::{Problem, fuse, mean};
+use super::links::Links;
+use super::look::SeenPixel;
+use super::observations::Observations;
+use crate::math::color::luminance;
+use crate::math::rng::splitmix64;
+use crate::math::stats::quantile;
+use glam::{DVec3, Vec3};
+
+/// Of the pixels in the fit, one in so many is left out in turn to choose the smoothing.
+const FOLDS: usize = 5;
+/// Key of the choice.
+const FOLD_KEY: u64 = 0x51f0_1d5e;
+/// So many pixels left out are enough to choose by.
+const ENOUGH: usize = 4_000;
+/// The strongest smoothing tried, for one pixel a cell, and the factor to the next.
+const STRONGEST: f32 = 2.0;
+const FACTOR: f32 = 0.5;
+/// The weakest, and how many worse ones in a row end the search.
+const WEAKEST: f32 = 1e-3;
+const PATIENCE: u32 = 3;
+/// Albedos are counted in the object's own luminance, but never in less than this.
+const LEAST_UNIT: f32 = 1e-4;
+/// Below this share of the object's median level, pixels weigh no more for being darker.
+const DARK: f32 = 0.5;
+/// Squared residuals count up to so many times their median.
+const CLIP: f64 = 30.0;
+
+/// The pixels of an object that are in the fit, as measurements of its albedo.
+#[derive(Debug, Clone)]
+pub struct Measurements {
+    /// Which cells each pixel sees.
+    pub observations: Observations,
+    /// Measured radiance over that of a white surface.
+    pub albedo: Vec<Vec3>,
+    /// Weight of each: squared level over its variance, on average 1.
+    pub weights: Vec<f32>,
+    /// The fold of each.
+    folds: Vec<usize>,
+    /// The weighted mean of `albedo`.
+    pub constant: Vec3,
+}
+
+/// A fitted texture.
+#[derive(Debug, Clone)]
+pub struct Texture {
+    /// Albedo of each cell.
+    pub colors: Vec<Vec3>,
+    /// Strength of the smoothing; `None` where one colour did best.
+    pub strength: Option<f32>,
+    /// The same without the pixels of a fold, for each fold that was left out in turn.
+    pub without: Vec<Vec<Vec3>>,
+    /// Standard deviation of a pixel of weight 1 that was left out, about the fit, in units of the mean albedo.
+    pub noise: Vec3,
+}
+
+impl Measurements {
+    /// Of pixels and what their cells would send if they were white.
+    pub fn new(pixels: &[&SeenPixel], observations: Observations, white: &[Vec3]) -> Self {
+        let received = observations.all_of(white);
+        let tiny = Vec3::splat(f32::MIN_POSITIVE);
+        let albedo: Vec<Vec3> = (pixels.iter().zip(&received))
+            .map(|(pixel, r)| pixel.measured / r.max(tiny))
+            .collect();
+        // Noise grows with the level, down to a floor.
+        let mut levels: Vec<f64> = pixels
+            .iter()
+            .map(|p| f64::from(luminance(p.measured)))
+            .collect();
+        let floor = DARK * quantile(&mut levels, 0.5).unwrap_or(0.0) as f32;
+        let weigh = |constant: Vec3| -> Vec<f32> {
+            let raw: Vec<f32> = (received.iter())
+                .map(|r| {
+                    let (white, level) = (luminance(*r), luminance(*r * constant));
+                    white * white / (level * level + floor * floor).max(f32::MIN_POSITIVE)
+                })
+                .collect();
+            let scale = 1.0 / mean(&raw).max(f32::MIN_POSITIVE);
+            raw.iter().map(|w| w * scale).collect()
+        };
+        let first = weighted_mean(&albedo, &vec![1.0; albedo.len()]);
+        let weights = weigh(weighted_mean(&albedo, &weigh(first)));
+        Self {
+            constant: weighted_mean(&albedo, &weights),
+            folds: pixels.iter().map(|p| fold(p)).collect(),
+            observations,
+            albedo,
+            weights,
+        }
+    }
+
+    /// Fits the cells, with the smoothing that predicts pixels left out best.
+    pub fn fit(&self, links: &Links) -> Texture {
+        let unit = self.unit();
+        let values: Vec<Vec3> = self.albedo.iter().map(|a| *a / unit).collect();
+        let flat = vec![self.constant / unit; self.observations.cells()];
+        let levels = vec![1.0; flat.len()];
+        let density = mean(&self.observations.diagonal(&self.weights));
+        let folds = (ENOUGH * FOLDS / self.albedo.len().max(1)).clamp(1, FOLDS);
+        let fitted = |weights: &[f32], strength: f32, start: &[Vec3]| {
+            let problem = Problem {
+                observations: &self.observations,
+                weights,
+                values: &values,
+                links,
+                levels: &levels,
+            };
+            fuse(&problem, strength, start)
+        };
+
+        // From strong to weak, until it is plainly past the best.
+        let mut colors: Vec<Vec<Vec3>> = vec![flat.clone(); folds];
+        let clip = self.clip(&values, &flat);
+        let mut best = (self.score(&values, &colors, clip), None, colors.clone());
+        let mut strength = STRONGEST * density;
+        let mut worse = 0;
+        while worse < PATIENCE && strength > WEAKEST * density {
+            for (fold, colors) in (0..folds).zip(&mut colors) {
+                *colors = fitted(&self.weights_without(fold), strength, colors);
+            }
+            let score = self.score(&values, &colors, clip);
+            if score < best.0 {
+                best = (score, Some(strength), colors.clone());
+                worse = 0;
+            } else {
+                worse += 1;
+            }
+            strength *= FACTOR;
+        }
+
+        let (_, strength, without) = best;
+        let noise = self.noise(&values, &without);
+        let all = match strength {
+            Some(strength) => fitted(&self.weights, strength, &without[0]),
+            None => flat,
+        };
+        let albedo = |colors: Vec<Vec3>| -> Vec<Vec3> {
+            let colors = colors
+                .iter()
+                .map(|c| (*c * unit).clamp(Vec3::ZERO, Vec3::ONE));
+            colors.collect()
+        };
+        Texture {
+            colors: albedo(all),
+            strength,
+            without: without.into_iter().map(albedo).collect(),
+            noise,
+        }
+    }
+
+    /// The luminance that albedos are counted in.
+    pub fn unit(&self) -> f32 {
+        luminance(self.constant).max(LEAST_UNIT)
+    }
+
+    /// Weights with those of one fold at zero.
+    fn weights_without(&self, fold: usize) -> Vec<f32> {
+        (self.weights.iter().zip(&self.folds))
+            .map(|(w, other)| if *other == fold { 0.0 } else { *w })
+            .collect()
+    }
+
+    /// Mean squared residual of the pixels left out, each by the colours that were fitted without it.
+    fn score(&self, values: &[Vec3], colors: &[Vec<Vec3>], clip: f64) -> f64 {
+        let (mut sum, mut count) = (0.0, 0u64);
+        for (row, value) in values.iter().enumerate() {
+            if let Some(colors) = colors.get(self.folds[row]) {
+                let residual = *value - self.observations.of(row, colors);
+                let square = f64::from(residual.length_squared() * self.weights[row]);
+                sum += square.min(clip);
+                count += 1;
+            }
+        }
+        sum / count.max(1) as f64
+    }
+
+    /// Root mean square weighted residual of the pixels left out, per channel.
+    fn noise(&self, values: &[Vec3], colors: &[Vec<Vec3>]) -> Vec3 {
+        let (mut sum, mut count) = (DVec3::ZERO, 0u64);
+        for (row, value) in values.iter().enumerate() {
+            if let Some(colors) = colors.get(self.folds[row]) {
+                let residual = (*value - self.observations.of(row, colors)).as_dvec3();
+                sum += residual * residual * f64::from(self.weights[row]);
+                count += 1;
+            }
+        }
+        (sum / count.max(1) as f64).powf(0.5).as_vec3()
+    }
+
+    fn clip(&self, values: &[Vec3], flat: &[Vec3]) -> f64 {
+        let mut squares: Vec<f64> = (0..values.len())
+            .map(|row| {
+                let residual = values[row] - self.observations.of(row, flat);
+                f64::from(residual.length_squared() * self.weights[row])
+            })
+            .collect();
+        quantile(&mut squares, 0.5).unwrap_or(0.0) * CLIP
+    }
+}
+
+/// The fold that a pixel in the fit belongs to.
+pub fn fold(pixel: &SeenPixel) -> usize {
+    let key = splitmix64(splitmix64(u64::from(pixel.frame) ^ FOLD_KEY) ^ u64::from(pixel.pixel));
+    (key % FOLDS as u64) as usize
+}
+
+fn weighted_mean(values: &[Vec3], weights: &[f32]) -> Vec3 {
+    let (mut sum, mut total) = (DVec3::ZERO, 0.0);
+    for (value, weight) in values.iter().zip(weights) {
+        sum += value.as_dvec3() * f64::from(*weight);
+        total += f64::from(*weight);
+    }
+    if total > 0.0 {
+        (sum / total).as_vec3()
+    } else {
+        Vec3::ZERO
+    }
+}

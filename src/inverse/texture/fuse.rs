@@ -1,0 +1,188 @@
+//! Colours of cells from noisy measurements: least squares with a total-variation penalty on a graph of neighbours,
+//! which pools what belongs together and keeps edges (the fused lasso on a graph).
+//!
+//! Minimises ½ Σ ω ‖y − Σ w x‖² + λ Σ b φ(‖xᵢ − xⱼ‖ / l) over pairs of neighbours with common border b and mean level l,
+//! where φ is Huber's: quadratic up to [`FLAT`], linear beyond. Colours change together, so edges lie at the same place
+//! in all channels. Solved by iteratively reweighted least squares with preconditioned conjugate gradients.
+
+use super::links::Links;
+use super::observations::Observations;
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Differences below this share of the level count as gradients rather than as edges.
+pub const FLAT: f32 = 0.02;
+/// Reweightings at most.
+const REWEIGHTINGS: u32 = 5;
+/// Steps of conjugate gradients in each.
+const STEPS: u32 = 12;
+/// The iteration stands when the root mean square change is below this.
+const STANDING: f64 = 1e-3;
+/// Weight, in mean observations, that pulls every cell to where it started, so that none is without an answer.
+const TETHER: f32 = 1e-5;
+/// Terms added up by one thread.
+const CHUNK: usize = 4096;
+
+/// What is measured, and how far neighbours may differ.
+#[derive(Clone, Copy)]
+pub struct Problem<'a> {
+    /// Which cells each measurement sees.
+    pub observations: &'a Observations,
+    /// ω of each measurement.
+    pub weights: &'a [f32],
+    /// y of each measurement.
+    pub values: &'a [Vec3],
+    /// The neighbours.
+    pub links: &'a Links,
+    /// For each cell, the level against which differences count.
+    pub levels: &'a [f32],
+}
+
+/// Finds the colours for one strength λ of the penalty, starting from `start`.
+pub fn fuse(problem: &Problem, strength: f32, start: &[Vec3]) -> Vec<Vec3> {
+    let Problem {
+        observations,
+        weights: row_weights,
+        values,
+        links,
+        levels,
+    } = *problem;
+    let data = observations.diagonal(row_weights);
+    let tether = TETHER * mean(&data).max(f32::MIN_POSITIVE);
+    let mut right = observations.gathered(row_weights, values);
+    for (r, s) in right.iter_mut().zip(start) {
+        *r += *s * tether;
+    }
+    let mut colors = start.to_vec();
+    for _ in 0..REWEIGHTINGS {
+        let system = System {
+            observations,
+            row_weights,
+            links,
+            penalties: penalties(links, levels, strength, &colors),
+            tether,
+        };
+        let before = colors.clone();
+        system.solve(&data, &right, &mut colors);
+        let change: f64 = sum(&colors, &before, |a, b| f64::from((a - b).length_squared()));
+        if change <= STANDING * STANDING * colors.len() as f64 {
+            break;
+        }
+    }
+    colors
+}
+
+/// λ b / (l max(‖xᵢ − xⱼ‖, FLAT l)) for every link.
+pub fn penalties(links: &Links, levels: &[f32], strength: f32, colors: &[Vec3]) -> Vec<f32> {
+    let rows: Vec<Vec<f32>> = (0..colors.len())
+        .into_par_iter()
+        .map(|cell| {
+            links
+                .of(cell)
+                .map(|(at, other)| {
+                    let difference = (colors[cell] - colors[other]).length();
+                    let level = 0.5 * (levels[cell] + levels[other]);
+                    strength * links.borders[at] / (level * difference.max(FLAT * level))
+                })
+                .collect()
+        })
+        .collect();
+    rows.concat()
+}
+
+/// The normal equations of one reweighting.
+pub struct System<'a> {
+    /// What is measured.
+    pub observations: &'a Observations,
+    /// ω of each row.
+    pub row_weights: &'a [f32],
+    /// The neighbours.
+    pub links: &'a Links,
+    /// The weight of each link's squared difference.
+    pub penalties: Vec<f32>,
+    /// The weight that pulls every cell to where it started.
+    pub tether: f32,
+}
+
+impl System<'_> {
+    /// Solves for the right-hand side by conjugate gradients, from `colors` on.
+    pub fn solve(&self, data: &[f32], right: &[Vec3], colors: &mut [Vec3]) {
+        let scale: Vec<f32> = (0..colors.len())
+            .into_par_iter()
+            .map(|cell| {
+                let penalty: f32 = self.penalties[self.links.row(cell)].iter().sum();
+                1.0 / (data[cell] + penalty + self.tether)
+            })
+            .collect();
+        let mut residual: Vec<Vec3> = self.apply(colors);
+        for (r, b) in residual.iter_mut().zip(right) {
+            *r = *b - *r;
+        }
+        let preconditioned = |residual: &[Vec3]| -> Vec<Vec3> {
+            residual.iter().zip(&scale).map(|(r, s)| *r * *s).collect()
+        };
+        let mut z = preconditioned(&residual);
+        let mut direction = z.clone();
+        let mut rz = dot(&residual, &z);
+        let goal = rz * 1e-4;
+        for _ in 0..STEPS {
+            if !(rz > goal && rz > 0.0) {
+                break;
+            }
+            let product = self.apply(&direction);
+            let alpha = (rz / dot(&direction, &product)) as f32;
+            if !alpha.is_finite() {
+                break;
+            }
+            for (((x, r), d), p) in (colors.iter_mut().zip(&mut residual))
+                .zip(&direction)
+                .zip(&product)
+            {
+                *x += *d * alpha;
+                *r -= *p * alpha;
+            }
+            z = preconditioned(&residual);
+            let next = dot(&residual, &z);
+            let beta = (next / rz) as f32;
+            for (d, z) in direction.iter_mut().zip(&z) {
+                *d = *z + *d * beta;
+            }
+            rz = next;
+        }
+    }
+
+    fn apply(&self, x: &[Vec3]) -> Vec<Vec3> {
+        let seen = self.observations.all_of(x);
+        (0..x.len())
+            .into_par_iter()
+            .map(|cell| {
+                let data: Vec3 = (self.observations.column(cell))
+                    .map(|(row, w)| seen[row] * (w * self.row_weights[row]))
+                    .sum();
+                let smooth: Vec3 = (self.links.of(cell))
+                    .map(|(at, other)| (x[cell] - x[other]) * self.penalties[at])
+                    .sum();
+                data + smooth + x[cell] * self.tether
+            })
+            .collect()
+    }
+}
+
+fn dot(a: &[Vec3], b: &[Vec3]) -> f64 {
+    sum(a, b, |a, b| a.as_dvec3().dot(b.as_dvec3()))
+}
+
+/// Adds up a function of pairs in an order that does not depend on threads.
+fn sum(a: &[Vec3], b: &[Vec3], f: impl Fn(Vec3, Vec3) -> f64 + Sync) -> f64 {
+    let parts: Vec<f64> = a
+        .par_chunks(CHUNK)
+        .zip(b.par_chunks(CHUNK))
+        .map(|(a, b)| a.iter().zip(b).map(|(&a, &b)| f(a, b)).sum())
+        .collect();
+    parts.iter().sum()
+}
+
+/// The mean of some numbers, added up in f64.
+pub fn mean(values: &[f32]) -> f32 {
+    (values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len().max(1) as f64) as f32
+}

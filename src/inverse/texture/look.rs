@@ -1,0 +1,106 @@
+//! Where the parts of each pixel of an object land on its triangles.
+
+use crate::inverse::solver::Problem;
+use crate::inverse::survey::SurveyedPixel;
+use crate::math::rng::Stream;
+use crate::scene::geometry::Hit;
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+/// Rays along a pixel's side.
+const SIDE: u32 = 4;
+/// Rays through a pixel.
+pub const RAYS: u32 = SIDE * SIDE;
+/// First of the sample keys of these rays, far from those of paths.
+const KEY: u64 = 3 << 60;
+/// Pixels above this share of saturation may have been brighter than they show, and are left out.
+const BELOW_SATURATION: f32 = 0.97;
+
+/// A pixel that sees one smooth surface of one object, through which rays were cast.
+#[derive(Debug, Clone)]
+pub struct SeenPixel {
+    /// Frame index.
+    pub frame: u32,
+    /// Row by row from the top left.
+    pub pixel: u32,
+    /// Whether it is kept out of every fit.
+    pub held_out: bool,
+    /// What the photograph holds.
+    pub measured: Vec3,
+    /// Where its rays land.
+    pub landings: Vec<Landing>,
+}
+
+/// Where one ray through a pixel meets the object.
+#[derive(Debug, Clone, Copy)]
+pub struct Landing {
+    /// The place on its triangle.
+    pub hit: Hit,
+    /// Whether it meets the triangle's front.
+    pub front: bool,
+    /// Width of the pixel's footprint there: the root of its area, in metres.
+    pub footprint: f32,
+}
+
+/// Looks through the given pixels, all of which see `object`; those that also see something else are left out.
+pub fn look(
+    problem: &Problem,
+    object: u32,
+    pixels: &[&SurveyedPixel],
+    seed: u64,
+) -> Vec<SeenPixel> {
+    let seen: Vec<Option<SeenPixel>> = pixels
+        .par_iter()
+        .map(|pixel| look_through(problem, object, pixel, seed))
+        .collect();
+    seen.into_iter().flatten().collect()
+}
+
+fn look_through(
+    problem: &Problem,
+    object: u32,
+    surveyed: &SurveyedPixel,
+    seed: u64,
+) -> Option<SeenPixel> {
+    let scene = &*problem.scene;
+    let photograph = &problem.photographs[surveyed.frame as usize];
+    let measured = photograph.pixels[surveyed.pixel as usize];
+    if measured.max_element() >= photograph.saturation * BELOW_SATURATION {
+        return None;
+    }
+    let camera = &scene.cameras[surveyed.frame as usize];
+    let corner = Vec2::new(
+        (surveyed.pixel % photograph.width) as f32,
+        (surveyed.pixel / photograph.width) as f32,
+    );
+    let focal2 = (camera.intrinsics.fx * camera.intrinsics.fy) as f32;
+    let mut stream = Stream::new(
+        seed,
+        u64::from(surveyed.frame),
+        u64::from(surveyed.pixel),
+        KEY,
+    );
+    let mut landings = Vec::with_capacity(RAYS as usize);
+    for i in 0..RAYS {
+        let [dx, dy] = stream.uniform2();
+        let offset = Vec2::new((i % SIDE) as f32 + dx, (i / SIDE) as f32 + dy) / SIDE as f32;
+        let hit = scene.intersect(&camera.ray(corner + offset))?;
+        if scene.object_of[hit.triangle as usize] != object {
+            return None;
+        }
+        let to_camera = camera.center - scene.point(&hit);
+        let cosine = scene.normals[hit.triangle as usize].dot(to_camera.normalize_or_zero());
+        landings.push(Landing {
+            hit,
+            front: cosine >= 0.0,
+            footprint: (to_camera.length_squared() / (focal2 * cosine.abs().max(0.05))).sqrt(),
+        });
+    }
+    Some(SeenPixel {
+        frame: surveyed.frame,
+        pixel: surveyed.pixel,
+        held_out: surveyed.held_out,
+        measured,
+        landings,
+    })
+}

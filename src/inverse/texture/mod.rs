@@ -1,0 +1,229 @@
+//! Spatial detail: the albedo of an object's cells, where pixels held out of the fit ask for it.
+//!
+//! For a diffuse point, albedo = radiance in the photograph / radiance of a white surface there. The second is traced
+//! by full paths with the lights and albedos found so far and smoothed where it varies slowly ([`received`]); the
+//! first is noisy, so neighbouring cells are pooled as far as pixels left out of the fit ask for ([`fit`]). A texture
+//! is kept where it predicts held-out pixels better than one colour does, by more than their noise ([`trial`]).
+
+mod cells;
+mod errors;
+mod fit;
+mod fuse;
+mod links;
+mod look;
+mod observations;
+mod received;
+mod surface;
+mod trial;
+mod whole;
+
+use crate::inverse::estimate::{Estimate, TexelEstimate};
+use crate::inverse::settings::Settings;
+use crate::inverse::solver::{Problem, Termination};
+use crate::inverse::survey::{Survey, SurveyedPixel};
+use crate::transport::path::PathOptions;
+use glam::Vec3;
+use std::sync::Arc;
+use surface::Surface;
+pub use trial::Trial;
+
+/// A gain on held-out pixels of so many standard errors is no accident.
+const SIGNIFICANT: f64 = 4.0;
+/// Pixels in the fit and held out that an object needs.
+const LEAST_PIXELS: usize = 60;
+const LEAST_HELD_OUT: usize = 10;
+/// Times that light and texture are found in turn.
+const SWEEPS: u32 = 2;
+
+/// What the stage works on.
+#[derive(Debug, Clone, Copy)]
+pub struct Task<'a> {
+    /// Scene and photographs.
+    pub problem: &'a Problem,
+    /// What the pixels see.
+    pub survey: &'a Survey,
+    /// Parameters.
+    pub settings: &'a Settings,
+    /// Paths to trace in each sweep.
+    pub paths: u64,
+    /// Longest path in bounces.
+    pub max_bounces: u32,
+}
+
+/// What happened to one object.
+#[derive(Debug, Clone)]
+pub struct Attempt {
+    /// Object index.
+    pub object: usize,
+    /// Cells that its surface was cut into.
+    pub cells: usize,
+    /// Pixels in the fit.
+    pub pixels: usize,
+    /// How it did on held-out pixels.
+    pub trial: Trial,
+    /// Whether its texture is kept.
+    pub kept: bool,
+}
+
+/// What was found.
+#[derive(Debug, Clone)]
+pub struct Refined {
+    /// The objects that were tried.
+    pub attempts: Vec<Attempt>,
+    /// The texels, where any object kept a texture.
+    pub texels: Option<Arc<TexelEstimate>>,
+    /// Mean albedo of each textured object over what pixels see of it.
+    pub means: Vec<(usize, Vec3)>,
+    /// Greatest change of a mean albedo in the last sweep, relative.
+    pub unrest: f64,
+}
+
+impl Refined {
+    /// Puts the textures into an estimate.
+    pub fn apply(&self, estimate: &mut Estimate) {
+        estimate.texels.clone_from(&self.texels);
+        for &(object, mean) in &self.means {
+            let object = &mut estimate.objects[object];
+            object.albedo = mean;
+            "its albedo varies over it; this is the mean of what is seen"
+                .clone_into(&mut object.note);
+        }
+    }
+
+    /// What was added where and what it bought, in a sentence.
+    pub fn summary(&self, name: impl Fn(usize) -> String) -> String {
+        let kept: Vec<String> = (self.attempts.iter().filter(|a| a.kept))
+            .map(|a| {
+                format!(
+                    "{} ({} cells, squared error of untouched pixels {:.0} % less)",
+                    name(a.object),
+                    a.cells,
+                    100.0 * (1.0 - a.trial.after / a.trial.before)
+                )
+            })
+            .collect();
+        let (tried, cells) = (self.attempts.len(), self.unknowns());
+        if kept.is_empty() {
+            return format!("none of {tried} objects tried shows more than one colour");
+        }
+        format!(
+            "{cells} unknowns: {}; {} of {tried} objects tried show one colour; mean albedo moved {:.1} % in the last sweep",
+            kept.join(", "),
+            tried - kept.len(),
+            self.unrest * 100.0
+        )
+    }
+
+    /// Cells of the objects that kept a texture.
+    pub fn unknowns(&self) -> usize {
+        self.attempts
+            .iter()
+            .filter(|a| a.kept)
+            .map(|a| a.cells)
+            .sum()
+    }
+}
+
+/// Hears of rays cast, paths dropped and the share of the work that is done; may end the stage.
+pub type Tell<'t> = dyn FnMut(u64, u64, f64) -> Result<(), Termination> + 't;
+
+/// Tries a texture on each of the given objects, keeps those that held-out pixels ask for, and sweeps over them until
+/// light and texture agree.
+///
+/// # Errors
+/// The listener ended the stage; nothing is kept.
+pub fn refine(
+    task: &Task,
+    estimate: &Estimate,
+    objects: &[usize],
+    tell: &mut Tell,
+) -> Result<Refined, Termination> {
+    let lit = estimate.lit(&task.problem.scene);
+    let options = PathOptions {
+        max_bounces: task.max_bounces,
+        ..PathOptions::default()
+    };
+    let candidates = candidates(task, objects);
+    let shares: f64 = candidates.iter().map(|c| (c.1.len() as f64).sqrt()).sum();
+    let mut attempts = Vec::new();
+    let mut kept: Vec<Surface> = Vec::new();
+    for (index, (object, pixels)) in candidates.iter().enumerate() {
+        let paths = task.paths as f64 * (pixels.len() as f64).sqrt() / shares;
+        let mut done =
+            |rays, rejected| tell(rays, rejected, index as f64 / candidates.len() as f64 * 0.6);
+        done(0, 0)?;
+        let Some(mut surface) = Surface::new(task, *object, pixels) else {
+            continue;
+        };
+        surface.find(&lit, &options, paths as u64, 0, None, &mut done)?;
+        let trial = surface.try_out(&lit, &options, &mut done)?;
+        let keep = surface.is_textured() && trial.gain > SIGNIFICANT * trial.noise;
+        attempts.push(Attempt {
+            object: *object,
+            cells: surface.cell_count(),
+            pixels: surface.pixel_count(),
+            trial,
+            kept: keep,
+        });
+        if keep {
+            kept.push(surface);
+        }
+    }
+
+    // Light as the textures send it on, and textures as that light shows them.
+    let mut texels = None;
+    let mut unrest = 0.0;
+    let shares: f64 = kept.iter().map(|s| (s.pixel_count() as f64).sqrt()).sum();
+    for sweep in 1..=SWEEPS {
+        if kept.is_empty() {
+            break;
+        }
+        let current = whole::texels(&task.problem.scene, estimate, &kept);
+        let textured = Estimate {
+            texels: Some(Arc::new(current)),
+            ..estimate.clone()
+        };
+        let lit = textured.lit(&task.problem.scene);
+        unrest = 0.0;
+        let count = kept.len();
+        for (index, surface) in kept.iter_mut().enumerate() {
+            let paths = task.paths as f64 * (surface.pixel_count() as f64).sqrt() / shares;
+            let share = (f64::from(sweep - 1) + index as f64 / count as f64) / f64::from(SWEEPS);
+            let mut done = |rays, rejected| tell(rays, rejected, 0.6 + 0.4 * share);
+            let before = surface.mean();
+            let known = &estimate.objects[surface.object];
+            let scale_error = known.albedo_stderr / known.albedo.max(Vec3::splat(1e-3));
+            let errors = (sweep == SWEEPS).then_some(scale_error);
+            surface.find(&lit, &options, paths as u64, sweep, errors, &mut done)?;
+            let change = (surface.mean() - before).abs().max_element();
+            unrest = f64::max(unrest, f64::from(change / before.max_element().max(1e-4)));
+        }
+        texels = Some(whole::texels(&task.problem.scene, estimate, &kept));
+    }
+    Ok(Refined {
+        attempts,
+        texels: texels.map(Arc::new),
+        means: kept.iter().map(|s| (s.object, s.mean())).collect(),
+        unrest,
+    })
+}
+
+/// The objects that enough pixels see, with those pixels.
+fn candidates<'a>(task: &Task<'a>, objects: &[usize]) -> Vec<(usize, Vec<&'a SurveyedPixel>)> {
+    let mut of_object = vec![None; task.problem.scene.objects.len()];
+    for (place, &object) in objects.iter().enumerate() {
+        of_object[object] = Some(place);
+    }
+    let mut pixels: Vec<(usize, Vec<&SurveyedPixel>)> =
+        objects.iter().map(|&o| (o, Vec::new())).collect();
+    for pixel in task.survey.pixels.iter().filter(|p| p.pure) {
+        if let Some(&Some(place)) = of_object.get(pixel.object as usize) {
+            pixels[place].1.push(pixel);
+        }
+    }
+    pixels.retain(|(_, pixels)| {
+        let held_out = pixels.iter().filter(|p| p.held_out).count();
+        held_out >= LEAST_HELD_OUT && pixels.len() - held_out >= LEAST_PIXELS
+    });
+    pixels
+}

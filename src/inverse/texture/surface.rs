@@ -1,0 +1,208 @@
+//! One object under refinement: its cells, the light that they receive, and their albedo.
+
+use super::Task;
+use super::cells::Cells;
+use super::errors::{standard_errors, with_light};
+use super::fit::{Measurements, Texture, fold};
+use super::links::Links;
+use super::look::{SeenPixel, look};
+use super::observations::Observations;
+use super::received::{Received, trace};
+use super::trial::{Trial, Untouched, try_out};
+use crate::inverse::solver::Termination;
+use crate::inverse::survey::SurveyedPixel;
+use crate::transport::lit::Lit;
+use crate::transport::path::PathOptions;
+use glam::{DVec3, Vec3};
+
+/// Cells traced between two reports.
+const SLICE: usize = 2048;
+/// Paths a cell at most, in each of two sets.
+const MOST_SAMPLES: u64 = 256;
+
+/// Fewer held-out pixels than this are joined by others.
+const FEW_HELD_OUT: usize = 1_000;
+
+/// The state of one object.
+pub struct Surface {
+    /// Object index.
+    pub object: usize,
+    seed: u64,
+    pixels: Vec<SeenPixel>,
+    /// Its cells.
+    pub cells: Cells,
+    /// Which of them lie side by side.
+    pub links: Links,
+    /// Pixels in the fit that see each cell.
+    pub seen: Vec<u32>,
+    /// What was found last.
+    pub texture: Texture,
+    /// One colour for all of it, by the same pixels and the same light.
+    pub constant: Vec3,
+    /// Standard error of each cell's albedo.
+    pub stderr: Vec<Vec3>,
+}
+
+/// Hears of rays cast and paths dropped.
+type Done<'d> = dyn FnMut(u64, u64) -> Result<(), Termination> + 'd;
+
+impl Surface {
+    /// Cuts the object into cells; `None` where none of the pixels sees it alone.
+    pub fn new(task: &Task, object: usize, pixels: &[&SurveyedPixel]) -> Option<Self> {
+        let scene = &*task.problem.scene;
+        let mut pixels = look(task.problem, object as u32, pixels, task.settings.seed);
+        let cells = Cells::new(scene, &pixels);
+        // One side of a triangle receives the light that its texture is measured in.
+        pixels
+            .retain(|p| (p.landings.iter()).all(|l| cells.front(l.hit.triangle) == Some(l.front)));
+        if pixels.iter().all(|p| p.held_out) {
+            return None;
+        }
+        let links = Links::new(scene, &cells);
+        let mut surface = Self {
+            object,
+            seed: task.settings.seed,
+            seen: vec![0; cells.count()],
+            texture: Texture {
+                colors: vec![Vec3::ZERO; cells.count()],
+                strength: None,
+                without: Vec::new(),
+                noise: Vec3::ZERO,
+            },
+            constant: Vec3::ZERO,
+            stderr: Vec::new(),
+            pixels,
+            cells,
+            links,
+        };
+        for row in surface.rows() {
+            for (cell, _) in row {
+                surface.seen[cell as usize] += 1;
+            }
+        }
+        Some(surface)
+    }
+
+    /// Traces the light that arrives and fits the texture to it; finds its standard errors too where the relative
+    /// error of the object's overall albedo is given.
+    pub fn find(
+        &mut self,
+        lit: &Lit,
+        options: &PathOptions,
+        paths: u64,
+        sweep: u32,
+        errors: Option<Vec3>,
+        done: &mut Done,
+    ) -> Result<(), Termination> {
+        let samples = (paths / (2 * self.cells.count() as u64)).clamp(1, MOST_SAMPLES) as u32;
+        let key = (u64::from(sweep) << 32) + self.object as u64;
+        let mut received = Received::default();
+        for start in (0..self.cells.count()).step_by(SLICE) {
+            let range = start..(start + SLICE).min(self.cells.count());
+            let part = trace(lit, &self.cells, range, samples, options, self.seed, key);
+            done(part.rays, part.rejected)?;
+            received.append(part);
+        }
+        let light = received.smoothed(&self.links);
+        done(0, 0)?;
+        let observations = Observations::new(&self.rows(), self.cells.count());
+        let fitted: Vec<&SeenPixel> = self.pixels.iter().filter(|p| !p.held_out).collect();
+        let measurements = Measurements::new(&fitted, observations, &light.radiance);
+        self.texture = measurements.fit(&self.links);
+        self.constant = measurements.constant;
+        done(0, 0)?;
+        if let Some(scale_error) = errors {
+            let errors = standard_errors(
+                &measurements,
+                &self.links,
+                &self.texture,
+                self.seed,
+                self.object,
+            );
+            let light =
+                (scale_error * scale_error + Vec3::splat(light.noise * light.noise)).powf(0.5);
+            self.stderr = with_light(&errors, &self.texture, light);
+        }
+        done(0, 0)
+    }
+
+    /// Compares texture and one colour on held-out pixels.
+    pub fn try_out(
+        &self,
+        lit: &Lit,
+        options: &PathOptions,
+        done: &mut Done,
+    ) -> Result<Trial, Termination> {
+        // Held-out pixels; where they are few, also those that were left out in turn to choose the smoothing.
+        let colors = self.texture.colors.as_slice();
+        let held_out = self.pixels.iter().filter(|p| p.held_out);
+        let mut pixels: Vec<Untouched> =
+            held_out.map(|pixel| Untouched { pixel, colors }).collect();
+        if pixels.len() < FEW_HELD_OUT {
+            let fitted = self.pixels.iter().filter(|p| !p.held_out);
+            pixels.extend(fitted.filter_map(|pixel| {
+                let colors = self.texture.without.get(fold(pixel))?;
+                Some(Untouched { pixel, colors })
+            }));
+        }
+        let trial = try_out(lit, &self.cells, &pixels, self.constant, options, self.seed);
+        done(trial.rays, 0)?;
+        Ok(trial)
+    }
+
+    /// Whether the fit found more than one colour.
+    pub fn is_textured(&self) -> bool {
+        self.texture.strength.is_some()
+    }
+
+    /// Number of cells.
+    pub fn cell_count(&self) -> usize {
+        self.cells.count()
+    }
+
+    /// Pixels in the fit.
+    pub fn pixel_count(&self) -> usize {
+        self.pixels.iter().filter(|p| !p.held_out).count()
+    }
+
+    /// Mean albedo by area over the cells that pixels see.
+    pub fn mean(&self) -> Vec3 {
+        let (mut sum, mut area) = (DVec3::ZERO, 0.0);
+        for ((cell, color), seen) in
+            (self.cells.cells.iter().zip(&self.texture.colors)).zip(&self.seen)
+        {
+            if *seen > 0 {
+                let share = f64::from(cell.size * cell.size);
+                sum += color.as_dvec3() * share;
+                area += share;
+            }
+        }
+        if area > 0.0 {
+            (sum / area).as_vec3()
+        } else {
+            self.constant
+        }
+    }
+
+    /// For each pixel in the fit, the cells that it sees and their shares of it.
+    fn rows(&self) -> Vec<Vec<(u32, f32)>> {
+        (self.pixels.iter().filter(|p| !p.held_out))
+            .map(|pixel| {
+                let share = 1.0 / pixel.landings.len() as f32;
+                let mut row: Vec<(u32, f32)> = (pixel.landings.iter())
+                    .filter_map(|l| self.cells.locate(&l.hit))
+                    .map(|cell| (cell, share))
+                    .collect();
+                row.sort_by_key(|&(cell, _)| cell);
+                row.dedup_by(|next, kept| {
+                    let same = next.0 == kept.0;
+                    if same {
+                        kept.1 += next.1;
+                    }
+                    same
+                });
+                row
+            })
+            .collect()
+    }
+}

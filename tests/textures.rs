@@ -1,0 +1,273 @@
+//! Albedo that varies over an object, found from photographs rendered in memory.
+
+mod scenes;
+
+use glam::{DVec3, Vec2, Vec3};
+use relit::capture::mesh::Mesh;
+use relit::inverse::estimate::{Estimate, ObjectEstimate};
+use relit::inverse::settings::Settings;
+use relit::inverse::solver::{Problem, Termination};
+use relit::inverse::survey::Survey;
+use relit::inverse::texture::{Refined, Task, refine};
+use relit::scene::geometry::Hit;
+use relit::transport::material::{Albedo, Material, Texture};
+use std::sync::{Arc, LazyLock};
+
+const BACK: usize = 4;
+const LAMP: usize = 6;
+const CHECKS: u32 = 6;
+
+/// A checkerboard over the back wall's two triangles, which are the ninth and the tenth.
+fn checkerboard(triangles: usize) -> Arc<Texture> {
+    let size = CHECKS * 16;
+    let color = |i: u32| {
+        let odd = (i % size / 16 + i / size / 16) % 2 == 1;
+        if odd {
+            Vec3::new(0.75, 0.60, 0.30)
+        } else {
+            Vec3::new(0.25, 0.30, 0.40)
+        }
+    };
+    let corner = |u: f32, v: f32| Vec2::new(u, v);
+    let mut corner_uvs = vec![[Vec2::ZERO; 3]; triangles];
+    corner_uvs[2 * BACK] = [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0)];
+    corner_uvs[2 * BACK + 1] = [corner(0.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)];
+    Arc::new(Texture {
+        width: size,
+        height: size,
+        pixels: (0..size * size).map(color).collect(),
+        corner_uvs: Arc::new(corner_uvs),
+    })
+}
+
+/// The room with a checkerboard on its back wall, its photographs, and what one colour an object makes of it.
+struct Room {
+    problem: Problem,
+    poster: Arc<Texture>,
+    estimate: Estimate,
+}
+
+fn room(size: [u32; 2], samples: u32) -> Room {
+    let mut mesh = scenes::closed_box(1.0, DVec3::ZERO);
+    scenes::lamp(&mut mesh, 0.4, DVec3::new(0.1, 0.9, 0.2));
+    let poster = checkerboard(mesh.triangles.len());
+    let mut materials: Vec<Material> = [0.6, 0.5, 0.4, 0.7, 0.5, 0.6, 0.0]
+        .map(|a| Material::diffuse(Vec3::splat(a), Vec3::ZERO))
+        .to_vec();
+    materials[LAMP].emission = Vec3::new(12.0, 11.0, 10.0);
+    let objects = materials.iter().map(|m| ObjectEstimate {
+        albedo: match m.albedo {
+            Albedo::Constant(color) => color,
+            _ => Vec3::ZERO,
+        },
+        albedo_stderr: Vec3::splat(1e-3),
+        emission: m.emission,
+        ..ObjectEstimate::default()
+    });
+    let estimate = Estimate {
+        objects: objects.collect(),
+        ..Estimate::default()
+    };
+    materials[BACK].albedo = Albedo::Image(poster.clone(), Vec3::ONE);
+    let views = [
+        ([0.1, 0.0, 0.9], [0.0, 0.0, -1.0]),
+        ([-0.6, 0.2, 0.5], [0.3, -0.1, -1.0]),
+        ([0.6, -0.3, 0.5], [-0.3, 0.1, -1.0]),
+        ([0.5, 0.3, -0.5], [-0.5, -0.6, 0.9]),
+    ]
+    .map(|(center, target)| (DVec3::from_array(center), DVec3::from_array(target)));
+    let capture = scenes::capture(mesh, &views, size);
+    Room {
+        problem: scenes::photographed(&capture, &materials, samples, 5),
+        poster,
+        estimate,
+    }
+}
+
+/// With some seven per cent of noise a pixel.
+static ROOM: LazyLock<Room> = LazyLock::new(|| room([64, 48], 96));
+
+fn refined(problem: &Problem, estimate: &Estimate, objects: &[usize], paths: u64) -> Refined {
+    let settings = Settings::default();
+    let survey = Survey::new(problem, &settings, usize::MAX);
+    let task = Task {
+        problem,
+        survey: &survey,
+        settings: &settings,
+        paths,
+        max_bounces: 1000,
+    };
+    refine(&task, estimate, objects, &mut |_, _, _| Ok(())).expect("nobody ends it")
+}
+
+static REFINED: LazyLock<Refined> =
+    LazyLock::new(|| refined(&ROOM.problem, &ROOM.estimate, &[0, 1, 2, 3, 4, 5], 200_000));
+
+/// For each texel of the back wall: pixels that saw it, and its error and standard error in each channel.
+fn errors() -> Vec<(u32, Vec3, Vec3)> {
+    let texels = REFINED.texels.as_ref().expect("the poster was found");
+    let layout = &texels.colors.layout;
+    let mut errors = Vec::new();
+    for triangle in [2 * BACK, 2 * BACK + 1] {
+        let first = layout.first[triangle];
+        for texel in 0..layout.first[triangle + 1] - first {
+            let truth = |[b1, b2]: [f32; 2]| {
+                ROOM.poster.at(&Hit {
+                    t: 0.0,
+                    triangle: triangle as u32,
+                    b1,
+                    b2,
+                })
+            };
+            let center = truth(layout.center(triangle, texel));
+            let inside = (layout.corners(triangle, texel).iter())
+                .all(|&corner| truth(corner).distance(center) < 1e-3);
+            if inside {
+                let at = (first + texel) as usize;
+                let error = texels.colors.colors[at] - center;
+                errors.push((texels.seen[at], error, texels.stderr[at]));
+            }
+        }
+    }
+    errors
+}
+
+#[test]
+fn the_poster_is_found_and_flat_walls_keep_one_colour() {
+    for attempt in &REFINED.attempts {
+        println!("{attempt:?}");
+        assert_eq!(attempt.kept, attempt.object == BACK, "{}", attempt.object);
+    }
+    assert_eq!(REFINED.attempts.len(), 6);
+    let texels = REFINED.texels.as_ref().expect("the poster was found");
+    for (object, textured) in texels.textured.iter().enumerate() {
+        assert_eq!(*textured, object == BACK);
+    }
+}
+
+/// The mean square of errors over standard errors is 1 for exact ones; smoothing makes neighbours depend on each other,
+/// so that it scatters, and the errors may claim too much as little as too little.
+#[test]
+fn its_albedo_is_right_within_the_reported_errors() {
+    let seen: Vec<_> = errors()
+        .into_iter()
+        .filter(|(seen, ..)| *seen > 0)
+        .collect();
+    let mean =
+        |f: &dyn Fn(&(u32, Vec3, Vec3)) -> f32| seen.iter().map(f).sum::<f32>() / seen.len() as f32;
+    let error = mean(&|(_, e, _)| e.length_squared() / 3.0).sqrt();
+    let z2 = mean(&|(_, e, s)| (*e / *s).length_squared() / 3.0);
+    let beyond = mean(&|(_, e, s)| f32::from((*e / *s).abs().max_element() > 3.0));
+    println!(
+        "{} texels: rms error {error}, mean z² {z2}, {beyond} beyond three",
+        seen.len()
+    );
+    assert!(seen.len() > 1000);
+    assert!(error < 0.03, "rms error {error}");
+    assert!((0.2..2.0).contains(&z2), "mean square of z is {z2}");
+    assert!(beyond < 0.05, "{beyond} are beyond three standard errors");
+}
+
+/// Only the right half of the wall is seen.
+#[test]
+fn what_no_pixel_sees_is_marked_and_takes_its_neighbours_colour() {
+    let mut mesh = scenes::closed_box(1.0, DVec3::ZERO);
+    scenes::lamp(&mut mesh, 0.4, DVec3::new(0.1, 0.9, 0.2));
+    let view = (DVec3::new(0.9, 0.0, 0.0), DVec3::new(0.8, 0.0, -1.0));
+    let capture = scenes::capture(mesh, &[view], [64, 48]);
+    let materials = ROOM.estimate.materials();
+    let mut painted = materials.clone();
+    painted[BACK].albedo = Albedo::Image(ROOM.poster.clone(), Vec3::ONE);
+    let problem = scenes::photographed(&capture, &painted, 96, 5);
+    let refined = refined(&problem, &ROOM.estimate, &[BACK], 50_000);
+    let texels = refined.texels.expect("half a poster is found");
+    let first = texels.colors.layout.first[2 * BACK] as usize;
+    let last = texels.colors.layout.first[2 * BACK + 2] as usize;
+    let unseen: Vec<usize> = (first..last).filter(|&t| texels.seen[t] == 0).collect();
+    assert!(unseen.len() * 4 > last - first && unseen.len() < last - first);
+    for texel in unseen {
+        let color = texels.colors.colors[texel];
+        assert!(
+            color.min_element() > 0.1 && color.max_element() < 0.9,
+            "{color}"
+        );
+        assert!(texels.stderr[texel].min_element() > 0.0);
+    }
+}
+
+/// A wall of 20,000 triangles, far smaller than the pixels that see it.
+#[test]
+fn a_dense_mesh_has_no_more_unknowns_than_its_pixels_can_tell_apart() {
+    let mut mesh = Mesh::default();
+    let side = 100;
+    let at =
+        |i: i32, j: i32| DVec3::new(f64::from(i) / 50.0 - 1.0, f64::from(j) / 50.0 - 1.0, -1.0);
+    for i in 0..side {
+        for j in 0..side {
+            let corners = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            scenes::quad(&mut mesh, "wall", corners);
+        }
+    }
+    scenes::lamp(&mut mesh, 0.5, DVec3::new(0.0, 1.5, 0.0));
+    let capture = scenes::capture(mesh, &[(DVec3::new(0.0, 0.0, 1.0), DVec3::NEG_Z)], [40, 30]);
+    let estimate = Estimate {
+        objects: vec![
+            ObjectEstimate {
+                albedo: Vec3::splat(0.5),
+                ..ObjectEstimate::default()
+            },
+            ObjectEstimate {
+                emission: Vec3::splat(10.0),
+                ..ObjectEstimate::default()
+            },
+        ],
+        ..Estimate::default()
+    };
+    let problem = scenes::photographed(&capture, &estimate.materials(), 16, 5);
+    let refined = refined(&problem, &estimate, &[0], 20_000);
+    let [attempt] = refined.attempts.as_slice() else {
+        panic!("the wall is tried");
+    };
+    assert!(attempt.cells < 4 * attempt.pixels, "{attempt:?}");
+    assert!(!attempt.kept);
+}
+
+#[test]
+fn threads_do_not_change_a_bit() {
+    let small = room([40, 30], 64);
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.expect("threads start");
+        pool.install(|| refined(&small.problem, &small.estimate, &[2, BACK], 60_000))
+    };
+    let (one, two) = (with(1), with(2));
+    let (a, b) = (one.texels.expect("found"), two.texels.expect("found"));
+    assert_eq!(a.colors.colors, b.colors.colors);
+    assert_eq!((&a.stderr, &a.seen), (&b.stderr, &b.seen));
+}
+
+#[test]
+fn who_ends_it_is_obeyed() {
+    let settings = Settings::default();
+    let survey = Survey::new(&ROOM.problem, &settings, usize::MAX);
+    let task = Task {
+        problem: &ROOM.problem,
+        survey: &survey,
+        settings: &settings,
+        paths: 10_000,
+        max_bounces: 1000,
+    };
+    let mut calls = 0;
+    let ended = refine(&task, &ROOM.estimate, &[BACK], &mut |_, _, _| {
+        calls += 1;
+        if calls > 3 {
+            Err(Termination::Cancelled)
+        } else {
+            Ok(())
+        }
+    });
+    assert_eq!(
+        ended.map(|r| r.texels.is_some()),
+        Err(Termination::Cancelled)
+    );
+}
