@@ -5,6 +5,7 @@ use crate::inverse::held_out::is_held_out;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::Problem;
 use crate::math::rng::{Stream, splitmix64};
+use crate::scene::visibility::NOTHING;
 use crate::transport::lit::Lit;
 use crate::transport::path::{PathOptions, radiance};
 use glam::{DVec3, Vec2};
@@ -35,7 +36,7 @@ pub struct Losses {
 }
 
 impl LossProbe {
-    /// Draws up to `pixels` usable pixels for each set, spread evenly over all photographs, to be rendered with
+    /// Draws up to `pixels` usable pixels that see the mesh for each set, spread evenly over all photographs, to be rendered with
     /// `samples` paths each of at most `max_bounces` bounces.
     pub fn new(
         problem: &Problem,
@@ -48,13 +49,15 @@ impl LossProbe {
         let total: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
         // Look at some forty times as many pixels as are wanted: enough to find the held-out ones.
         let stride = (total / (pixels * 40).max(1)).max(1);
+        let sees_mesh = &problem.scene.ids().triangles;
         let mut next = 0;
         let mut before = 0;
         for (frame, photograph) in problem.photographs.iter().enumerate() {
             let end = before + photograph.pixels.len();
             while next < end {
                 let pixel = next - before;
-                if photograph.usable.is_empty() || photograph.usable[pixel] {
+                let usable = photograph.usable.is_empty() || photograph.usable[pixel];
+                if usable && sees_mesh[frame].get(pixel) != Some(&NOTHING) {
                     let held = is_held_out(settings, frame as u32, pixel as u32);
                     sets[usize::from(held)].push((frame as u32, pixel as u32));
                 }

@@ -6,6 +6,7 @@ pub mod held_out;
 pub mod loss;
 pub mod measured;
 pub mod monitor;
+pub mod outside;
 pub mod paper;
 pub mod parameters;
 pub mod settings;

@@ -67,6 +67,7 @@ mod tests {
     use super::*;
     use crate::inverse::cache::clusters::Cluster;
     use crate::inverse::cache::evaluate::NormalEquations;
+    use crate::inverse::cache::prior::Prior;
     use crate::inverse::cache::trust::Trust;
     use crate::inverse::cache::{CachedCluster, NO_LAMP, PathCache, Vertex};
     use crate::inverse::parameters::Unknowns;
@@ -145,9 +146,10 @@ mod tests {
         }
         assert_eq!(sums.rounds(), ROUNDS as u32);
         let even = Trust::even(SURFACES);
-        let found = NormalEquations::new(&sums.mean(), free.len(), &even);
+        let prior = Prior::new(SURFACES, SURFACES, Vec3::ONE);
+        let found = NormalEquations::new(&sums.mean(), free.len(), &even, &prior);
         let together = cache(|pixel, set| (0..ROUNDS).flat_map(|r| round(r, pixel, set)).collect());
-        let wanted = together.normal_equations(&unknowns, &free, &even);
+        let wanted = together.normal_equations(&unknowns, &free, &even, &prior);
 
         assert_eq!(found.clusters, wanted.clusters);
         assert!((found.objective - wanted.objective).length() < 1e-5);

@@ -108,3 +108,21 @@ fn typical_level(problem: &Problem, survey: &Survey) -> Vec3 {
     };
     Vec3::new(channel(0), channel(1), channel(2))
 }
+
+/// Mean radiance of the clusters.
+pub fn mean_radiance(clusters: &[Cluster]) -> Vec3 {
+    let sum: DVec3 = clusters.iter().map(|c| c.measured.as_dvec3()).sum();
+    (sum / clusters.len().max(1) as f64).as_vec3()
+}
+
+/// Mean of each surface's brightest channel over its clusters.
+pub fn brightness(clusters: &[Cluster], surfaces: usize) -> Vec<f32> {
+    let mut sums = vec![(0.0, 0.0); surfaces];
+    for cluster in clusters {
+        let (sum, pixels) = &mut sums[cluster.object as usize];
+        *sum += f64::from(cluster.measured.max_element()) * cluster.pixels.len() as f64;
+        *pixels += cluster.pixels.len() as f64;
+    }
+    let mean = |(sum, pixels): (f64, f64)| (sum / pixels.max(1.0)) as f32;
+    sums.into_iter().map(mean).collect()
+}

@@ -1,10 +1,11 @@
 //! From fitted unknowns to the estimate that people see, saying what could not be known.
 
 use super::errors::StandardErrors;
-use super::fit::PRIOR_DEVIATION;
+use super::prior::ALBEDO_DEVIATION;
 use super::roles::Role;
 use super::trace::OutsideGrid;
 use crate::inverse::estimate::{Estimate, ObjectEstimate, Outside};
+use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::survey::Survey;
 use crate::math::color::luminance;
@@ -12,7 +13,7 @@ use crate::scene::Scene;
 use glam::{DVec3, Vec3};
 
 /// An albedo with a larger standard error than this is as good as unknown.
-const UNKNOWN_ALBEDO: f32 = 0.2 * PRIOR_DEVIATION as f32;
+const UNKNOWN_ALBEDO: f32 = 0.2 * ALBEDO_DEVIATION as f32;
 /// An emitting object that fewer pixels see is known only through its light.
 const FEW_PIXELS: u64 = 19;
 
@@ -24,6 +25,7 @@ pub fn estimate(
     unknowns: &Unknowns,
     errors: &StandardErrors,
     outside: OutsideGrid,
+    sky: Option<&MeasuredOutside>,
 ) -> Estimate {
     let typical = typical_albedo(scene, roles, unknowns, errors);
     let objects = (0..scene.objects.len())
@@ -48,7 +50,7 @@ pub fn estimate(
                 }
                 Role::Emitter => {
                     object.albedo = Vec3::ZERO;
-                    object.albedo_stderr = Vec3::splat(PRIOR_DEVIATION as f32);
+                    object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION as f32);
                     object.albedo_identifiable = false;
                     object.note =
                         "its own light hides what it reflects; emission is all that leaves it"
@@ -67,7 +69,7 @@ pub fn estimate(
                 }
                 Role::Dark => {
                     object.albedo = typical;
-                    object.albedo_stderr = Vec3::splat(PRIOR_DEVIATION as f32);
+                    object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION as f32);
                     object.identifiable = false;
                     object.albedo_identifiable = false;
                     object.note = "no photograph sees it; its albedo is the room's mean".into();
@@ -76,10 +78,19 @@ pub fn estimate(
             object
         })
         .collect();
-    let pixels = unknowns.emission[scene.objects.len()..].to_vec();
+    let (size, pixels) = match sky {
+        Some(sky) => {
+            let elsewhere = |direction| unknowns.emission[outside.surface(direction) as usize];
+            (sky.size(), sky.filled(elsewhere))
+        }
+        None => (
+            [outside.width, outside.height],
+            unknowns.emission[scene.objects.len()..].to_vec(),
+        ),
+    };
     let outside = pixels.iter().any(|&p| p != Vec3::ZERO).then_some(Outside {
-        width: outside.width as u32,
-        height: outside.height as u32,
+        width: size[0] as u32,
+        height: size[1] as u32,
         pixels,
     });
     Estimate {

@@ -1,8 +1,8 @@
 //! How sure a fit is: standard errors of what was fitted, and tests of what was left out.
 
 use super::evaluate::NormalEquations;
-use super::fit::{PRIOR_DEVIATION, noise, prior_precision};
-use crate::inverse::parameters::Unknowns;
+use super::fit::noise;
+use super::prior::ALBEDO_DEVIATION;
 use glam::Vec3;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -75,14 +75,14 @@ pub fn standard_errors(
     objects: usize,
 ) -> StandardErrors {
     let mut errors = StandardErrors {
-        albedo: vec![Vec3::splat(PRIOR_DEVIATION as f32); objects],
+        albedo: vec![Vec3::splat(ALBEDO_DEVIATION as f32); objects],
         emission: vec![Vec3::INFINITY; objects],
     };
     for channel in 0..3 {
         let variance = noise(equations, channel);
         let prior: Vec<f64> = rows
             .iter()
-            .map(|&r| prior_precision(free[r], objects, variance))
+            .map(|&r| equations.prior.of(free[r], channel, variance).1)
             .collect();
         let Some(bread) = inverse(equations, rows, &prior, channel) else {
             continue;
@@ -109,13 +109,7 @@ pub fn standard_errors(
 
 /// For each row of `free` that is not in `active`: the step it would take if it alone were set free besides the
 /// active ones, with its standard error (a score test, Rao 1948).
-pub fn release(
-    equations: &NormalEquations,
-    free: &[usize],
-    active: &[usize],
-    unknowns: &Unknowns,
-) -> Vec<Released> {
-    let objects = unknowns.surfaces();
+pub fn release(equations: &NormalEquations, free: &[usize], active: &[usize]) -> Vec<Released> {
     let held: Vec<usize> = (0..free.len()).filter(|r| !active.contains(r)).collect();
     let mut released: Vec<Released> = held
         .iter()
@@ -129,7 +123,7 @@ pub fn release(
         let variance = noise(equations, channel);
         let prior: Vec<f64> = active
             .iter()
-            .map(|&r| prior_precision(free[r], objects, variance))
+            .map(|&r| equations.prior.of(free[r], channel, variance).1)
             .collect();
         let Some(inverse) = inverse(equations, active, &prior, channel) else {
             continue;

@@ -4,6 +4,7 @@
 //! biased towards darkness. Products are therefore taken across the two independent sets A and B.
 
 use super::derivative::{Gradient, differentiate};
+use super::prior::Prior;
 use super::trust::Trust;
 use super::{CachedCluster, PathCache};
 use crate::inverse::parameters::Unknowns;
@@ -41,6 +42,8 @@ pub struct NormalEquations {
     pub objective: DVec3,
     /// Clusters in the sums.
     pub clusters: usize,
+    /// What is believed besides.
+    pub prior: Prior,
 }
 
 impl PathCache {
@@ -50,19 +53,20 @@ impl PathCache {
         unknowns: &Unknowns,
         free: &[usize],
         trust: &Trust,
+        prior: &Prior,
     ) -> NormalEquations {
         let parameters = 2 * unknowns.surfaces();
         let mut place = vec![usize::MAX; parameters];
         for (i, &index) in free.iter().enumerate() {
             place[index] = i;
         }
-        NormalEquations::new(&self.linearise(unknowns, &place), free.len(), trust)
+        NormalEquations::new(&self.linearise(unknowns, &place), free.len(), trust, prior)
     }
 }
 
 impl NormalEquations {
     /// Sums over linearised clusters with `n` rows.
-    pub fn new(linearised: &[Linearised], n: usize, trust: &Trust) -> Self {
+    pub fn new(linearised: &[Linearised], n: usize, trust: &Trust, prior: &Prior) -> Self {
         let mut sums = Self {
             hessian: std::array::from_fn(|_| DMatrix::zeros(n, n)),
             descent: std::array::from_fn(|_| DVector::zeros(n)),
@@ -70,6 +74,7 @@ impl NormalEquations {
             scatter: std::array::from_fn(|_| DMatrix::zeros(n, n)),
             objective: DVec3::ZERO,
             clusters: linearised.len(),
+            prior: *prior,
         };
         for cluster in linearised {
             sums.add(cluster, trust.of(cluster.object));

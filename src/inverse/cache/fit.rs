@@ -2,16 +2,13 @@
 
 use super::PathCache;
 use super::evaluate::NormalEquations;
+use super::prior::Prior;
 use super::step::Step;
 use super::trust::Trust;
 use crate::inverse::parameters::Unknowns;
 use glam::DVec3;
 use nalgebra::DVector;
 
-/// Standard deviation of an albedo of which nothing is known, about [`PRIOR_MEAN`].
-pub const PRIOR_DEVIATION: f64 = 0.5;
-/// Where an albedo stays of which nothing is known.
-const PRIOR_MEAN: f64 = 0.5;
 /// Damping relative to the diagonal; only keeps the factorisation safe from rounding.
 const LEAST_DAMPING: f64 = 1e-10;
 /// A step below this many standard errors in every parameter ends the fit.
@@ -56,16 +53,6 @@ pub fn scatter(unknowns: &mut Unknowns, free: &[usize], channel: usize, values: 
     }
 }
 
-/// Precision that the prior lends to a parameter, in the units of the normal equations: the noise variance of one
-/// cluster over the prior's variance for albedos, none for emissions.
-pub fn prior_precision(index: usize, objects: usize, noise: f64) -> f64 {
-    if index < objects {
-        noise / (PRIOR_DEVIATION * PRIOR_DEVIATION)
-    } else {
-        0.0
-    }
-}
-
 /// Weighted variance of one cluster's residual, without the noise of the paths.
 pub fn noise(equations: &NormalEquations, channel: usize) -> f64 {
     (equations.objective[channel] / equations.clusters.max(1) as f64).max(1e-12)
@@ -77,16 +64,17 @@ pub fn fit<E>(
     start: &Unknowns,
     free: &[usize],
     trust: &Trust,
+    prior: &Prior,
     most_steps: u64,
     mut between: impl FnMut(&Unknowns) -> Result<(), E>,
 ) -> Result<Fit, E> {
     let mut unknowns = start.clone();
-    let mut equations = cache.normal_equations(&unknowns, free, trust);
+    let mut equations = cache.normal_equations(&unknowns, free, trust, prior);
     let mut iterations = 0;
     let mut damping = LEAST_DAMPING;
     while iterations < most_steps {
         let (proposal, largest) = propose(&equations, free, &unknowns, damping);
-        let after = cache.normal_equations(&proposal, free, trust);
+        let after = cache.normal_equations(&proposal, free, trust, prior);
         iterations += 1;
         between(&proposal)?;
         // A step from afar may overshoot: the squared error then tells.
@@ -150,12 +138,11 @@ fn propose_channel(
 ) -> Option<Vec<f64>> {
     let variance = noise(equations, channel);
     let hessian = &equations.hessian[channel];
-    let prior: Vec<f64> = free
-        .iter()
-        .map(|&i| prior_precision(i, objects, variance))
-        .collect();
+    let (mean, prior): (Vec<f64>, Vec<f64>) = (free.iter())
+        .map(|&i| equations.prior.of(i, channel, variance))
+        .unzip();
     let descent = DVector::from_fn(x.len(), |i, _| {
-        equations.descent[channel][i] + prior[i] * (PRIOR_MEAN - x[i])
+        equations.descent[channel][i] + prior[i] * (mean[i] - x[i])
     });
     let lower = vec![0.0; x.len()];
     let upper: Vec<f64> = free

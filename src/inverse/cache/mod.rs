@@ -14,6 +14,7 @@ pub mod fit;
 pub mod judge;
 pub mod ladder;
 pub mod path_noise;
+pub mod prior;
 mod reached;
 pub mod roles;
 pub mod step;

@@ -11,6 +11,8 @@ use serde::{Deserialize, Serialize};
 pub struct Reached {
     /// Stages finished.
     pub stages: u32,
+    /// Whether light comes from outside.
+    pub open: bool,
     /// What each object is taken for.
     pub roles: Vec<Role>,
     /// Values of all unknowns.
@@ -21,13 +23,20 @@ pub struct Reached {
 
 impl Reached {
     /// Writes down what was found; an infinite error becomes `null`.
-    pub fn new(stages: u32, roles: &[Role], unknowns: &Unknowns, errors: &StandardErrors) -> Self {
+    pub fn new(
+        stages: u32,
+        open: bool,
+        roles: &[Role],
+        unknowns: &Unknowns,
+        errors: &StandardErrors,
+    ) -> Self {
         let finite = |errors: &[Vec3]| {
             let finite = |e: f32| e.is_finite().then_some(e);
             errors.iter().map(|e| e.to_array().map(finite)).collect()
         };
         Self {
             stages,
+            open,
             roles: roles.to_vec(),
             unknowns: unknowns.clone(),
             albedo_errors: finite(&errors.albedo),

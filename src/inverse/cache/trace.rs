@@ -3,6 +3,7 @@
 use super::clusters::Cluster;
 use super::{CachedCluster, NO_LAMP, PathCache, Vertex};
 use crate::inverse::measured::MeasuredRadiance;
+use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::settings::LightSampling;
 use crate::inverse::survey::SurveyPoint;
 use crate::math::frame::Frame;
@@ -35,7 +36,9 @@ pub struct Tracer<'a> {
     pub surface_of: &'a [u32],
     /// For each surface, the largest channel of its albedo as believed now; only steers where paths end.
     pub believed_albedo: &'a [f32],
-    /// Surfaces that stand for light from outside, by direction; `None` lets escaping rays find nothing.
+    /// Light from outside where photographs measured it; draws light samples too.
+    pub sky: Option<&'a MeasuredOutside>,
+    /// Surfaces that stand for light from elsewhere outside, by direction; `None` lets escaping rays find nothing.
     pub outside: Option<OutsideGrid>,
     /// How light is found at a vertex.
     pub sampling: LightSampling,
@@ -61,10 +64,15 @@ pub struct OutsideGrid {
 }
 
 impl OutsideGrid {
+    /// The surface of a unit direction.
+    pub fn surface(&self, direction: Vec3) -> u32 {
+        self.first + pixel_of(self.width, self.height, direction) as u32
+    }
+
     /// The vertex at which a path ends that leaves in a unit direction.
     fn vertex(&self, direction: Vec3, weight: f32) -> Vertex {
         Vertex {
-            surface: self.first + pixel_of(self.width, self.height, direction) as u32,
+            surface: self.surface(direction),
             lamp: NO_LAMP,
             lamp_weight: 0.0,
             emission_weight: weight,
@@ -182,10 +190,14 @@ impl Tracer<'_> {
             }
 
             // Sample light directly.
-            let [choice, u, v, _] = numbers.four();
+            let [choice, u, v, pick] = numbers.four();
             if self.sampling != LightSampling::Bsdf {
                 let choice = numbers.refine(choice);
-                rays += self.light_sample(&surface, scale, choice, [u, v], &mut vertex);
+                rays += if pick < self.sky_share() {
+                    self.sky_sample(&surface, scale, choice, [u, v], &mut vertex)
+                } else {
+                    self.light_sample(&surface, scale, choice, [u, v], &mut vertex)
+                };
             }
 
             // Decide whether to go on, by what is believed of the albedo and never by the unknowns themselves.
@@ -213,9 +225,16 @@ impl Tracer<'_> {
             rays += 1;
             let next = self.scene.intersect(&Ray::new(origin, wi));
             let Some(next) = next else {
-                vertices.push(vertex);
-                // Light from outside is met by BSDF sampling alone, so it has the whole weight.
-                vertices.extend(self.outside.map(|grid| grid.vertex(wi, scale)));
+                if let Some((sky, radiance)) = self.sky.and_then(|s| Some((s, s.at(wi)?))) {
+                    let sky_pdf = sky.map().pdf(wi) * self.sky_share();
+                    let weight = self.met_weight(warp::cosine_hemisphere_pdf(local.z), sky_pdf);
+                    vertex.known += radiance * (weight * scale);
+                    vertices.push(vertex);
+                } else {
+                    vertices.push(vertex);
+                    // Where nothing is known no light samples go, so what is met has the whole weight.
+                    vertices.extend(self.outside.map(|grid| grid.vertex(wi, scale)));
+                }
                 return rays;
             };
 
@@ -224,16 +243,11 @@ impl Tracer<'_> {
             let bsdf_pdf = warp::cosine_hemisphere_pdf(local.z);
             let light_pdf = if met.front {
                 let cosine = met.seen.normal.dot(-wi);
-                self.lights.pdf(met.seen.object) * next.t * next.t / cosine.max(f32::MIN_POSITIVE)
+                self.light_pdf(met.seen.object) * next.t * next.t / cosine.max(f32::MIN_POSITIVE)
             } else {
                 0.0
             };
-            emission_weight = match self.sampling {
-                LightSampling::Mis => power_heuristic(bsdf_pdf, light_pdf),
-                LightSampling::Bsdf => 1.0,
-                // What light sampling cannot draw is left to BSDF sampling.
-                LightSampling::Emitter => f32::from(light_pdf <= 0.0),
-            };
+            emission_weight = self.met_weight(bsdf_pdf, light_pdf);
 
             // End at a surface whose radiance a photograph measured.
             if let Some(radiance) = self.measured.and_then(|m| m.at(&met.seen)) {
@@ -283,7 +297,7 @@ impl Tracer<'_> {
         if self.scene.occluded(&Ray::between(from, to)) {
             return 1;
         }
-        let light_pdf = self.lights.pdf(object) * distance2 / cos_light;
+        let light_pdf = self.light_pdf(object) * distance2 / cos_light;
         let bsdf_pdf = cos_surface * FRAC_1_PI;
         let share = match self.sampling {
             LightSampling::Mis => power_heuristic(light_pdf, bsdf_pdf),
@@ -303,6 +317,65 @@ impl Tracer<'_> {
             }
         }
         1
+    }
+
+    /// Adds a light sample of the measured light from outside to a vertex; returns the number of rays.
+    fn sky_sample(
+        &self,
+        surface: &Surface,
+        scale: f32,
+        choice: f64,
+        u: [f32; 2],
+        vertex: &mut Vertex,
+    ) -> u64 {
+        let Some((sky, (wi, pdf))) = self.sky.and_then(|s| Some((s, s.map().sample(choice, u)?)))
+        else {
+            return 0;
+        };
+        let cosine = surface.seen.normal.dot(wi);
+        if cosine <= 0.0 {
+            return 0;
+        }
+        let from = offset_origin(
+            surface.seen.point,
+            surface.seen.normal,
+            &surface.corners,
+            wi,
+        );
+        if self.scene.occluded(&Ray::new(from, wi)) {
+            return 1;
+        }
+        let (light_pdf, bsdf_pdf) = (pdf * self.sky_share(), cosine * FRAC_1_PI);
+        let share = match self.sampling {
+            LightSampling::Mis => power_heuristic(light_pdf, bsdf_pdf),
+            LightSampling::Emitter | LightSampling::Bsdf => 1.0,
+        };
+        vertex.known += sky.map().radiance(wi) * (bsdf_pdf / light_pdf * share * scale);
+        1
+    }
+
+    /// Share of the light samples that go outside.
+    fn sky_share(&self) -> f32 {
+        match (self.sky.is_some(), self.lights.is_dark()) {
+            (false, _) => 0.0,
+            (true, true) => 1.0,
+            (true, false) => 0.5,
+        }
+    }
+
+    /// Density per square metre with which light samples land on an object of the mesh.
+    fn light_pdf(&self, object: u32) -> f32 {
+        self.lights.pdf(object) * (1.0 - self.sky_share())
+    }
+
+    /// Weight of light met by BSDF sampling against light sampling, given both densities per solid angle.
+    fn met_weight(&self, bsdf_pdf: f32, light_pdf: f32) -> f32 {
+        match self.sampling {
+            LightSampling::Mis => power_heuristic(bsdf_pdf, light_pdf),
+            LightSampling::Bsdf => 1.0,
+            // What light sampling cannot draw is left to BSDF sampling.
+            LightSampling::Emitter => f32::from(light_pdf <= 0.0),
+        }
     }
 
     fn surface(&self, hit: &Hit, wo: Vec3) -> Surface {

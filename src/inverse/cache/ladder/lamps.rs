@@ -14,6 +14,8 @@ use glam::Vec3;
 const SIGNIFICANT: f64 = 25.0;
 /// Rounds of changing roles at most.
 const MOST_CHANGES: usize = 8;
+/// A glow below this share of an object's photographed radiance is no light but a shortcoming of the model.
+const FAINT: f32 = 0.1;
 /// Share of the area-weighted light samples that go to objects with no light found yet but none excluded either.
 const EXPLORATION: f64 = 0.05;
 
@@ -28,8 +30,8 @@ impl Ladder<'_, '_> {
                 .filter(|&k| !self.roles[k].emits())
                 .map(|k| objects + k),
         );
-        let equations = cache.normal_equations(&self.unknowns, &free, &self.trust);
-        let released = release(&equations, &free, &active, &self.unknowns);
+        let equations = cache.normal_equations(&self.unknowns, &free, &self.trust, &self.prior);
+        let released = release(&equations, &free, &active);
         for test in &released {
             self.errors.emission[test.index - objects] =
                 Vec3::from_array(test.stderr.map(|e| e as f32));
@@ -119,7 +121,8 @@ impl Ladder<'_, '_> {
             self.take(fitted);
             let z = self.unknowns.emission[k]
                 / self.errors.emission[k].max(Vec3::splat(f32::MIN_POSITIVE));
-            if f64::from(z.length_squared()) < SIGNIFICANT {
+            let faint = self.unknowns.emission[k].max_element() < FAINT * self.brightness[k];
+            if f64::from(z.length_squared()) < SIGNIFICANT || faint {
                 (self.unknowns, self.errors, self.roles) = before;
                 break;
             }

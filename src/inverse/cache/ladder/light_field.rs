@@ -6,6 +6,7 @@ use crate::inverse::cache::path_noise::share_paths;
 use crate::inverse::cache::roles::Role;
 use crate::inverse::cache::trust::Trust;
 use crate::inverse::measured::MeasuredRadiance;
+use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::solver::Termination;
 use crate::math::color::luminance;
@@ -45,20 +46,20 @@ impl Ladder<'_, '_> {
         // First as if no light came from outside, then, where rays leave the mesh, as if some did.
         self.monitor.phase("telling lamps from walls");
         self.tell_lamps(&cache, Role::Dark)?;
+        self.monitor
+            .progress
+            .seconds_to_first_estimate
+            .get_or_insert(self.monitor.seconds());
         self.finish_stage("light field", started, format!("each object fitted to the light that the photographs measured around it; {} give light", self.lamps()))?;
         let escaping = cache.share_ending_on(self.outside.first);
         if escaping > ESCAPING && self.monitor.settings.outside_light {
-            self.light_from_outside(&cache, escaping)?;
+            self.light_from_outside(&cache, &lights, &measured, escaping)?;
         }
         for (error, albedo) in self.errors.albedo.iter_mut().zip(&self.unknowns.albedo) {
             *error = (*error * *error + *albedo * *albedo * (LIGHT_FIELD_BIAS * LIGHT_FIELD_BIAS))
                 .powf(0.5);
         }
         self.describe();
-        self.monitor
-            .progress
-            .seconds_to_first_estimate
-            .get_or_insert(self.monitor.seconds());
         self.monitor
             .report(&self.estimate, &|_| self.checkpoint.clone())
     }
@@ -84,16 +85,34 @@ impl Ladder<'_, '_> {
     }
 
     /// Tries light from outside the mesh, and keeps it only if pixels held out of the fit get better.
-    fn light_from_outside(&mut self, cache: &PathCache, escaping: f64) -> Result<(), Termination> {
+    fn light_from_outside(
+        &mut self,
+        cache: &PathCache,
+        lights: &Emitters,
+        measured: &MeasuredRadiance,
+        escaping: f64,
+    ) -> Result<(), Termination> {
         let started = self.monitor.seconds();
         self.monitor.phase("trying light from outside");
         let before = (
             self.roles.clone(),
             self.unknowns.clone(),
             self.errors.clone(),
+            self.trust.clone(),
         );
         let closed = self.measure();
-        self.tell_lamps(cache, Role::Unseen)?;
+        self.open = true;
+        self.sky = MeasuredOutside::new(self.problem, &self.survey);
+        self.prior = self
+            .prior
+            .with_sky(self.sky.as_ref().map(MeasuredOutside::mean));
+        match self.sky {
+            Some(_) => {
+                let cache = self.trace(lights, Some(measured), 0, 0)?;
+                self.tell_lamps(&cache, Role::Unseen)?;
+            }
+            None => self.tell_lamps(cache, Role::Unseen)?,
+        }
         let open = self.measure();
         // Held-out pixels decide; where there are none, those of the fit must do.
         let gain = match (
@@ -105,7 +124,8 @@ impl Ladder<'_, '_> {
         };
         let kept = gain > OUTSIDE_GAIN;
         if !kept {
-            (self.roles, self.unknowns, self.errors) = before;
+            (self.roles, self.unknowns, self.errors, self.trust) = before;
+            (self.open, self.sky) = (false, None);
             self.describe();
         }
         let why = format!(

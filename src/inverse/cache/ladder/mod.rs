@@ -3,14 +3,14 @@
 mod detail;
 mod lamps;
 mod light_field;
+mod rounds;
 
-use super::accumulate::Accumulated;
 use super::budget::Budget;
-use super::clusters::{Cluster, cluster};
+use super::clusters::{Cluster, brightness, cluster, mean_radiance};
 use super::errors::{StandardErrors, standard_errors};
-use super::evaluate::NormalEquations;
-use super::fit::{Fit, fit, propose};
-use super::path_noise::{self, share_paths};
+use super::fit::{Fit, fit};
+use super::path_noise::share_paths;
+use super::prior::Prior;
 use super::reached::Reached;
 use super::roles::{self, Role};
 use super::trace::{OutsideGrid, Tracer};
@@ -21,6 +21,7 @@ use crate::inverse::estimate::Estimate;
 use crate::inverse::loss::{LossProbe, Losses};
 use crate::inverse::measured::MeasuredRadiance;
 use crate::inverse::monitor::Monitor;
+use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Problem, Solution, Stage, Termination};
@@ -32,14 +33,9 @@ use std::time::{Duration, Instant};
 
 /// Gauss–Newton steps at most in one fit.
 const MOST_STEPS: u64 = 30;
-/// A step (in albedo, or relative in emission) asks for linearising anew when it is larger than so many times the
-/// median error aimed at.
-const NONLINEAR: f64 = 10.0;
-/// What the paths add to an error is negligible below this share of the error aimed at.
-const NEGLIGIBLE: f64 = 1.0 / 3.0;
 /// Columns and rows of the map of light from outside.
-const OUTSIDE_WIDTH: usize = 6;
-const OUTSIDE_HEIGHT: usize = 3;
+const OUTSIDE_WIDTH: usize = 12;
+const OUTSIDE_HEIGHT: usize = 6;
 /// Stages of a solve that goes all the way.
 const STAGES: u32 = 4;
 /// Work between two reports to the observer.
@@ -56,8 +52,13 @@ pub struct Ladder<'a, 'o> {
     losses: LossProbe,
     max_bounces: u32,
     outside: OutsideGrid,
+    /// Whether light comes from outside.
+    open: bool,
+    /// What is known of it from pixels that see it, if light comes from there.
+    sky: Option<MeasuredOutside>,
     roles: Vec<Role>,
     trust: Trust,
+    prior: Prior,
     /// For each surface, the share of the paths' noise in its residuals.
     path_noise: Vec<f64>,
     unknowns: Unknowns,
@@ -65,6 +66,8 @@ pub struct Ladder<'a, 'o> {
     estimate: Estimate,
     /// Spatial detail, once it was looked for.
     detail: Option<Refined>,
+    /// Mean of each surface's brightest channel in the photographs; zero where none sees it.
+    brightness: Vec<f32>,
     /// Stages finished.
     stages: u32,
     /// Where the last of them ended.
@@ -96,6 +99,7 @@ pub fn solve(
         Some(checkpoint) => checkpoint.state(|reached: &Reached| reached.fits(surfaces))?,
         None => Reached::new(
             0,
+            false,
             &vec![Role::Reflector; surfaces],
             &Unknowns::new(surfaces),
             &StandardErrors {
@@ -104,13 +108,22 @@ pub fn solve(
             },
         ),
     };
+    let clusters = cluster(problem, &survey, budget.pixels);
+    let sky = (start.open)
+        .then(|| MeasuredOutside::new(problem, &survey))
+        .flatten();
+    let prior = Prior::new(surfaces, objects, mean_radiance(&clusters))
+        .with_sky(sky.as_ref().map(MeasuredOutside::mean));
     let mut ladder = Ladder {
         problem,
         budget,
         losses: LossProbe::new(problem, settings, 400, 16, max_bounces),
         checkpoint: Checkpoint::new(&monitor.progress, &start),
         monitor,
-        clusters: cluster(problem, &survey, budget.pixels),
+        sky,
+        open: start.open,
+        brightness: brightness(&clusters, surfaces),
+        clusters,
         survey,
         widths: problem.photographs.iter().map(|p| p.width).collect(),
         max_bounces,
@@ -122,6 +135,7 @@ pub fn solve(
         errors: start.errors(),
         roles: start.roles,
         trust: Trust::even(surfaces),
+        prior,
         path_noise: vec![1.0; surfaces],
         unknowns: start.unknowns,
         estimate: Estimate::default(),
@@ -190,78 +204,6 @@ impl Ladder<'_, '_> {
         self.finish_stage("objects", started, why)
     }
 
-    /// Last stage: rounds of independent paths, added up until the reported errors are small enough.
-    fn rounds(&mut self) -> Result<Termination, Termination> {
-        let started = self.monitor.seconds();
-        self.monitor.phase("refining");
-        share_paths(
-            &mut self.clusters,
-            self.roles.len(),
-            self.budget.round_paths,
-        );
-        let lights = self.lights();
-        let free = roles::free(&self.roles);
-        let all: Vec<usize> = (0..free.len()).collect();
-        let place = self.places(&free);
-        let mut about = self.unknowns.clone();
-        let mut sums = Accumulated::default();
-        let mut outcome = Termination::Steps;
-        for round in 0..self.budget.rounds {
-            // Path lengths are steered by what is believed at the start, the same in every round.
-            let cache = self.trace(&lights, None, 2, round)?;
-            sums.add(cache.linearise(&about, &place));
-            let mean = sums.mean();
-            self.trust = Trust::from_residuals(&mean, self.roles.len());
-            self.path_noise = path_noise::shares(&mean, self.roles.len());
-            let equations = NormalEquations::new(&mean, free.len(), &self.trust);
-            let (proposal, _) = propose(&equations, &free, &about, 1e-10);
-            let errors = standard_errors(&equations, &free, &all, self.roles.len());
-            let step = largest_step(&about, &proposal);
-            self.monitor.progress.iterations += 1;
-            self.unknowns = proposal;
-            self.merge_errors(errors);
-            self.describe();
-            self.monitor
-                .report(&self.estimate, &|_| self.checkpoint.clone())?;
-            if f64::from(step) > NONLINEAR * self.budget.median_error
-                && round < self.budget.rounds / 4
-            {
-                about = self.unknowns.clone();
-                sums = Accumulated::default();
-                continue;
-            }
-            let [median, tail] = self.relative_errors(|k| self.relative_error(k));
-            let paths = |k: usize| self.relative_error(k) * self.path_noise[k].sqrt();
-            let [median_of_paths, tail_of_paths] = self.relative_errors(paths);
-            self.monitor.progress.fraction =
-                Some((self.budget.median_error / median).powi(2).min(1.0) as f32);
-            // Paths are enough when the error is small, or when next to none of it is theirs.
-            let enough = |error: f64, of_paths: f64, target: f64| {
-                error < target || of_paths < target * NEGLIGIBLE
-            };
-            if enough(median, median_of_paths, self.budget.median_error)
-                && enough(tail, tail_of_paths, self.budget.tail_error)
-            {
-                outcome = Termination::Converged;
-                break;
-            }
-        }
-        let [median, tail] = self.relative_errors(|k| self.relative_error(k));
-        let paths = |k: usize| self.relative_error(k) * self.path_noise[k].sqrt();
-        let [median_of_paths, tail_of_paths] = self.relative_errors(paths);
-        let why = format!(
-            "{} rounds of independent paths: relative standard error of albedo {:.2} % (median), {:.2} % (95 of 100 objects); \
-             of that from the paths {:.2} % and {:.2} %, the rest from the photographs and the model",
-            sums.rounds(),
-            median * 100.0,
-            tail * 100.0,
-            median_of_paths * 100.0,
-            tail_of_paths * 100.0,
-        );
-        self.finish_stage("refine", started, why)?;
-        Ok(outcome)
-    }
-
     /// Traces the clusters' paths in slices, reporting between them.
     fn trace(
         &mut self,
@@ -282,6 +224,7 @@ impl Ladder<'_, '_> {
             measured,
             surface_of: &self.problem.scene.object_of,
             believed_albedo: &believed,
+            sky: self.sky.as_ref(),
             outside: Some(self.outside),
             sampling: self.monitor.settings.light_sampling,
             max_bounces: self.max_bounces,
@@ -321,6 +264,7 @@ impl Ladder<'_, '_> {
             &self.unknowns,
             &free,
             &self.trust,
+            &self.prior,
             MOST_STEPS,
             |_| {
                 monitor.progress.iterations += 1;
@@ -361,32 +305,6 @@ impl Ladder<'_, '_> {
         }
     }
 
-    /// Where each parameter stands among the free ones.
-    fn places(&self, free: &[usize]) -> Vec<usize> {
-        let mut place = vec![usize::MAX; 2 * self.roles.len()];
-        for (row, &index) in free.iter().enumerate() {
-            place[index] = row;
-        }
-        place
-    }
-
-    /// Relative standard error of an albedo.
-    fn relative_error(&self, k: usize) -> f64 {
-        f64::from(self.errors.albedo[k].length() / self.unknowns.albedo[k].length().max(1e-3))
-    }
-
-    /// Median and 95th percentile of an error over the reflectors that enough pixels see.
-    fn relative_errors(&self, error: impl Fn(usize) -> f64) -> [f64; 2] {
-        let mut errors: Vec<f64> = (0..self.roles.len())
-            .filter(|&k| {
-                matches!(self.roles[k], Role::Reflector | Role::Glowing)
-                    && self.survey.seen.get(k).copied().unwrap_or(0) >= 50
-            })
-            .map(error)
-            .collect();
-        [0.5, 0.95].map(|q| crate::math::stats::quantile(&mut errors, q).unwrap_or(0.0))
-    }
-
     fn describe(&mut self) {
         self.estimate = describe::estimate(
             &self.problem.scene,
@@ -395,6 +313,7 @@ impl Ladder<'_, '_> {
             &self.unknowns,
             &self.errors,
             self.outside,
+            self.sky.as_ref(),
         );
         if let Some(detail) = &self.detail {
             detail.apply(&mut self.estimate);
@@ -439,7 +358,7 @@ impl Ladder<'_, '_> {
     fn reached(&mut self, stages: u32) {
         self.stages = stages;
         self.monitor.progress.seconds = self.monitor.seconds();
-        let reached = Reached::new(stages, &self.roles, &self.unknowns, &self.errors);
+        let reached = Reached::new(stages, self.open, &self.roles, &self.unknowns, &self.errors);
         self.checkpoint = Checkpoint::new(&self.monitor.progress, &reached);
     }
 
@@ -459,22 +378,4 @@ impl Ladder<'_, '_> {
             checkpoint: (!done).then_some(self.checkpoint),
         }
     }
-}
-
-/// Largest change of an albedo, or relative change of an emission.
-fn largest_step(from: &Unknowns, to: &Unknowns) -> f32 {
-    let albedo = from
-        .albedo
-        .iter()
-        .zip(&to.albedo)
-        .map(|(a, b)| (*a - *b).abs().max_element());
-    let emission = from.emission.iter().zip(&to.emission).map(|(a, b)| {
-        let size = a.max_element();
-        if size > 0.0 {
-            (*a - *b).abs().max_element() / size
-        } else {
-            0.0
-        }
-    });
-    albedo.chain(emission).fold(0.0, f32::max)
 }

@@ -1,0 +1,81 @@
+//! What is believed of an unknown before any photograph speaks: little, but enough to keep what no photograph
+//! determines within reason.
+
+use glam::Vec3;
+
+/// Standard deviation of an albedo of which nothing is known, about [`ALBEDO_MEAN`].
+pub const ALBEDO_DEVIATION: f64 = 0.5;
+/// Where an albedo stays of which nothing is known.
+const ALBEDO_MEAN: f64 = 0.5;
+/// Standard deviation of light from a direction outside that no photograph looks in, in mean radiances of what the
+/// photographs show.
+const OUTSIDE_DEVIATION: f32 = 4.0;
+
+/// Normal distributions of the unknowns; nothing is believed of a lamp.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prior {
+    surfaces: usize,
+    /// First of the surfaces that stand for directions outside.
+    outside: usize,
+    mean: Vec3,
+    deviation: Vec3,
+}
+
+impl Prior {
+    /// For `surfaces` surfaces of which those from `outside` on stand for directions outside; `photographed` is the mean
+    /// radiance of all photographs.
+    pub fn new(surfaces: usize, outside: usize, photographed: Vec3) -> Self {
+        Self {
+            surfaces,
+            outside,
+            mean: Vec3::ZERO,
+            deviation: photographed * OUTSIDE_DEVIATION,
+        }
+    }
+
+    /// The same where the mean radiance of what was seen of the outside is known.
+    pub fn with_sky(self, sky: Option<Vec3>) -> Self {
+        let mean = sky.unwrap_or(Vec3::ZERO);
+        Self {
+            mean,
+            deviation: self.deviation.max(mean),
+            ..self
+        }
+    }
+
+    /// Mean of a parameter (albedos first, then emissions) in one channel, and its precision in the units of the normal
+    /// equations: the noise variance of one cluster over the prior's variance. Zero where nothing is believed.
+    pub fn of(&self, parameter: usize, channel: usize, noise: f64) -> (f64, f64) {
+        match parameter.checked_sub(self.surfaces) {
+            None => (ALBEDO_MEAN, noise / (ALBEDO_DEVIATION * ALBEDO_DEVIATION)),
+            Some(emitter) if emitter >= self.outside && self.deviation[channel] > 0.0 => {
+                let deviation = f64::from(self.deviation[channel]);
+                (
+                    f64::from(self.mean[channel]),
+                    noise / (deviation * deviation),
+                )
+            }
+            Some(_) => (0.0, 0.0),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lamps_are_free_and_the_outside_is_held_near_what_was_seen_in_any_unit() {
+        for unit in [1e-12f32, 1.0, 1e12] {
+            let prior =
+                Prior::new(5, 3, Vec3::splat(2.0 * unit)).with_sky(Some(Vec3::splat(3.0 * unit)));
+            assert_eq!(prior.of(0, 0, 0.1), (0.5, 0.1 / 0.25));
+            assert_eq!(prior.of(5 + 2, 0, 0.1), (0.0, 0.0));
+            let (mean, precision) = prior.of(5 + 3, 1, 0.1);
+            assert!((mean / f64::from(unit) - 3.0).abs() < 1e-5);
+            assert!((precision * f64::from(unit).powi(2) - 0.1 / 64.0).abs() < 1e-8);
+        }
+        // All photographs black: nothing to hold on to.
+        assert_eq!(Prior::new(2, 1, Vec3::ZERO).of(3, 0, 0.1), (0.0, 0.0));
+    }
+}

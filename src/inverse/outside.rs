@@ -1,0 +1,180 @@
+//! Light from outside the mesh, as the photographs measured it: pixels that look past the mesh, by direction.
+//!
+//! What lies there is taken to be far away, so that it looks the same from everywhere in the room: a sky, or for scans
+//! with holes the nearest stand-in for what is missing.
+
+use crate::inverse::solver::Problem;
+use crate::inverse::survey::Survey;
+use crate::transport::environment::{Environment, pixel_of};
+use glam::{DVec3, Vec2, Vec3};
+use std::f64::consts::PI;
+
+/// Width of a cell of the map in widths of a pixel.
+const CELL_PIXELS: f64 = 2.0;
+/// Columns of the map at least and at most.
+const COLUMNS: [usize; 2] = [32, 512];
+/// A direction that no pixel looks in takes the mean of a block of cells up to 2^(LEVELS − 1) cells wide around it.
+const LEVELS: usize = 3;
+
+/// Mean measured radiance by direction; black where no photograph looks.
+#[derive(Debug, Clone)]
+pub struct MeasuredOutside {
+    width: usize,
+    height: usize,
+    known: Vec<bool>,
+    map: Environment,
+}
+
+impl MeasuredOutside {
+    /// Gathers the pixels in the fit that see nothing of the mesh; `None` where there are none.
+    pub fn new(problem: &Problem, survey: &Survey) -> Option<Self> {
+        // Cells a little wider than the pixels.
+        let scene = &problem.scene;
+        let camera = scene.cameras.first()?;
+        let columns = 2.0 * PI * camera.intrinsics.fx / CELL_PIXELS;
+        let height = (columns.clamp(COLUMNS[0] as f64, COLUMNS[1] as f64) as usize) / 2;
+        let height = height.next_multiple_of(1 << (LEVELS - 1));
+        let width = 2 * height;
+
+        // Add up what the pixels show, in the finest cells.
+        let mut sums = vec![(DVec3::ZERO, 0u32); width * height];
+        let past_the_mesh = (survey.pixels.iter()).filter(|p| {
+            !p.held_out && p.object == u32::MAX && p.points.iter().all(Option::is_none)
+        });
+        for pixel in past_the_mesh {
+            let photograph = &problem.photographs[pixel.frame as usize];
+            let place = [
+                pixel.pixel % photograph.width,
+                pixel.pixel / photograph.width,
+            ];
+            let at = Vec2::from(place.map(|x| x as f32 + 0.5));
+            let direction = scene.cameras[pixel.frame as usize].ray(at).direction;
+            let sum = &mut sums[pixel_of(width, height, direction.normalize_or_zero())];
+            sum.0 += photograph.pixels[pixel.pixel as usize].as_dvec3();
+            sum.1 += 1;
+        }
+        if sums.iter().all(|s| s.1 == 0) {
+            return None;
+        }
+
+        // Fill gaps from coarser blocks.
+        let mut known = vec![false; width * height];
+        let mut pixels = vec![Vec3::ZERO; width * height];
+        for level in 0..LEVELS {
+            let block = 1 << level;
+            for (row, column) in blocks(width, height, block) {
+                let cells = || cells(width, row, column, block);
+                let (sum, count) = cells().fold((DVec3::ZERO, 0), |all, cell| {
+                    (all.0 + sums[cell].0, all.1 + sums[cell].1)
+                });
+                if count == 0 {
+                    continue;
+                }
+                let mean = (sum / f64::from(count)).as_vec3();
+                for cell in cells().filter(|&cell| !known[cell]).collect::<Vec<_>>() {
+                    known[cell] = true;
+                    pixels[cell] = mean;
+                }
+            }
+        }
+        let map = Environment::new(width, height, pixels)?;
+        Some(Self {
+            width,
+            height,
+            known,
+            map,
+        })
+    }
+
+    /// Radiance that arrives from a unit direction; `None` where no photograph tells.
+    #[inline]
+    pub fn at(&self, direction: Vec3) -> Option<Vec3> {
+        self.known[pixel_of(self.width, self.height, direction)]
+            .then(|| self.map.radiance(direction))
+    }
+
+    /// The map, for drawing directions from.
+    pub fn map(&self) -> &Environment {
+        &self.map
+    }
+
+    /// Mean radiance over the directions that photographs look in, by solid angle.
+    pub fn mean(&self) -> Vec3 {
+        let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
+        for cell in (0..self.known.len()).filter(|&cell| self.known[cell]) {
+            let theta = PI * ((cell / self.width) as f64 + 0.5) / self.height as f64;
+            let radiance = self.map.radiance(self.direction(cell)).as_dvec3();
+            sum += radiance * theta.sin();
+            weight += theta.sin();
+        }
+        (sum / f64::max(weight, f64::MIN_POSITIVE)).as_vec3()
+    }
+
+    /// Columns and rows.
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+
+    /// The whole map: what was measured, and `elsewhere` by direction where nothing was.
+    pub fn filled(&self, elsewhere: impl Fn(Vec3) -> Vec3) -> Vec<Vec3> {
+        (0..self.width * self.height)
+            .map(|cell| {
+                let direction = self.direction(cell);
+                self.at(direction).unwrap_or_else(|| elsewhere(direction))
+            })
+            .collect()
+    }
+
+    /// Direction of a cell's middle.
+    fn direction(&self, cell: usize) -> Vec3 {
+        let (row, column) = (cell / self.width, cell % self.width);
+        let theta = PI * (row as f64 + 0.5) / self.height as f64;
+        let phi = 2.0 * PI * (column as f64 + 0.5) / self.width as f64;
+        DVec3::new(
+            theta.sin() * phi.cos(),
+            theta.cos(),
+            theta.sin() * phi.sin(),
+        )
+        .as_vec3()
+    }
+}
+
+/// Upper left cells of the blocks that tile a map.
+fn blocks(width: usize, height: usize, block: usize) -> impl Iterator<Item = (usize, usize)> {
+    let rows = (0..height).step_by(block);
+    rows.flat_map(move |row| (0..width).step_by(block).map(move |column| (row, column)))
+}
+
+/// Cells of one block.
+fn cells(width: usize, row: usize, column: usize, block: usize) -> impl Iterator<Item = usize> {
+    (row..row + block).flat_map(move |r| (column..column + block).map(move |c| r * width + c))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_middle_of_each_cell_falls_into_it() {
+        let [width, height] = [16, 8];
+        let map = Environment::new(width, height, vec![Vec3::ONE; 128]).expect("sizes fit");
+        let measured = MeasuredOutside {
+            width,
+            height,
+            known: vec![true; 128],
+            map,
+        };
+        for cell in 0..128 {
+            assert_eq!(pixel_of(width, height, measured.direction(cell)), cell);
+        }
+    }
+
+    #[test]
+    fn blocks_and_their_cells_tile_the_map_once() {
+        let mut hits = vec![0; 16 * 8];
+        for (row, column) in blocks(16, 8, 4) {
+            cells(16, row, column, 4).for_each(|cell| hits[cell] += 1);
+        }
+        assert!(hits.iter().all(|&h| h == 1));
+    }
+}
