@@ -5,7 +5,7 @@
 
 use crate::inverse::solver::Problem;
 use crate::inverse::survey::Survey;
-use crate::transport::environment::{Environment, pixel_of};
+use crate::transport::environment::{Environment, direction_of, pixel_of};
 use glam::{DVec3, Vec2, Vec3};
 use std::f64::consts::PI;
 
@@ -98,15 +98,22 @@ impl MeasuredOutside {
         &self.map
     }
 
-    /// Mean radiance over the directions that photographs look in, by solid angle.
-    pub fn mean(&self) -> Vec3 {
-        let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
+    /// What to expect from a direction that no photograph looks in: the mean of what was seen at its height above the
+    /// horizon, within a band as high as `band` radians, or of all that was seen.
+    pub fn expected(&self, direction: Vec3, band: f64) -> Vec3 {
+        let height_of = |d: Vec3| f64::from(d.y.clamp(-1.0, 1.0)).asin();
+        let height = height_of(direction);
+        let (mut near, mut all) = ((DVec3::ZERO, 0.0), (DVec3::ZERO, 0.0));
         for cell in (0..self.known.len()).filter(|&cell| self.known[cell]) {
-            let theta = PI * ((cell / self.width) as f64 + 0.5) / self.height as f64;
-            let radiance = self.map.radiance(self.direction(cell)).as_dvec3();
-            sum += radiance * theta.sin();
-            weight += theta.sin();
+            let seen = direction_of(self.width, self.height, cell);
+            let solid_angle = f64::from(1.0 - seen.y * seen.y).max(0.0).sqrt();
+            let radiance = self.map.radiance(seen).as_dvec3() * solid_angle;
+            all = (all.0 + radiance, all.1 + solid_angle);
+            if (height_of(seen) - height).abs() < 0.5 * band {
+                near = (near.0 + radiance, near.1 + solid_angle);
+            }
         }
+        let (sum, weight) = if near.1 > 0.0 { near } else { all };
         (sum / f64::max(weight, f64::MIN_POSITIVE)).as_vec3()
     }
 
@@ -119,23 +126,10 @@ impl MeasuredOutside {
     pub fn filled(&self, elsewhere: impl Fn(Vec3) -> Vec3) -> Vec<Vec3> {
         (0..self.width * self.height)
             .map(|cell| {
-                let direction = self.direction(cell);
+                let direction = direction_of(self.width, self.height, cell);
                 self.at(direction).unwrap_or_else(|| elsewhere(direction))
             })
             .collect()
-    }
-
-    /// Direction of a cell's middle.
-    fn direction(&self, cell: usize) -> Vec3 {
-        let (row, column) = (cell / self.width, cell % self.width);
-        let theta = PI * (row as f64 + 0.5) / self.height as f64;
-        let phi = 2.0 * PI * (column as f64 + 0.5) / self.width as f64;
-        DVec3::new(
-            theta.sin() * phi.cos(),
-            theta.cos(),
-            theta.sin() * phi.sin(),
-        )
-        .as_vec3()
     }
 }
 
@@ -155,18 +149,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_middle_of_each_cell_falls_into_it() {
+    fn unseen_directions_are_expected_to_look_like_what_was_seen_at_their_height() {
         let [width, height] = [16, 8];
-        let map = Environment::new(width, height, vec![Vec3::ONE; 128]).expect("sizes fit");
+        // One seen cell above the horizon, one below.
+        let (above, below) = (16 * 2 + 3, 16 * 5 + 9);
+        let mut pixels = vec![Vec3::ZERO; 128];
+        (pixels[above], pixels[below]) = (Vec3::splat(4.0), Vec3::splat(1.0));
         let measured = MeasuredOutside {
             width,
             height,
-            known: vec![true; 128],
-            map,
+            known: (0..128).map(|c| c == above || c == below).collect(),
+            map: Environment::new(width, height, pixels).expect("sizes fit"),
         };
-        for cell in 0..128 {
-            assert_eq!(pixel_of(width, height, measured.direction(cell)), cell);
-        }
+        let at = |row: usize| {
+            let direction = direction_of(width, height, row * 16 + 12);
+            measured.expected(direction, PI / 8.0)
+        };
+        assert!((at(2) - Vec3::splat(4.0)).length() < 1e-5);
+        assert!((at(5) - Vec3::ONE).length() < 1e-5);
+        // Both cells span the same solid angle.
+        assert!((at(0) - Vec3::splat(2.5)).length() < 1e-4);
     }
 
     #[test]

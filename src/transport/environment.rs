@@ -109,6 +109,17 @@ pub fn pixel_of(width: usize, height: usize, direction: Vec3) -> usize {
     row * width + column
 }
 
+/// The unit direction in the middle of a pixel of a `width` × `height` map.
+pub fn direction_of(width: usize, height: usize, pixel: usize) -> Vec3 {
+    let theta = PI * ((pixel / width) as f32 + 0.5) / height as f32;
+    let phi = 2.0 * PI * ((pixel % width) as f32 + 0.5) / width as f32;
+    Vec3::new(
+        theta.sin() * phi.cos(),
+        theta.cos(),
+        theta.sin() * phi.sin(),
+    )
+}
+
 /// Cosines of the upper and lower edge of a row.
 fn row_cosines(row: usize, height: usize) -> (f64, f64) {
     let angle = |r: usize| (std::f64::consts::PI * r as f64 / height as f64).cos();
@@ -125,6 +136,13 @@ fn row_solid_angle(row: usize, width: usize, height: usize) -> f64 {
 mod tests {
     use super::*;
     use crate::math::rng::Stream;
+
+    #[test]
+    fn the_middle_of_each_pixel_falls_into_it() {
+        for pixel in 0..128 {
+            assert_eq!(pixel_of(16, 8, direction_of(16, 8, pixel)), pixel);
+        }
+    }
 
     #[test]
     fn sampling_matches_its_density_and_a_constant_map_integrates_to_four_pi() {

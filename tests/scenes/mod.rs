@@ -8,6 +8,7 @@ use relit::capture::photograph::{Encoding, Photograph, PhotographSource};
 use relit::capture::{Capture, Frame};
 use relit::inverse::solver::Problem;
 use relit::scene::Scene;
+use relit::transport::environment::Environment;
 use relit::transport::film::Film;
 use relit::transport::lit::Lit;
 use relit::transport::material::Material;
@@ -162,8 +163,19 @@ pub fn scene_of(mesh: Mesh) -> Arc<Scene> {
 
 /// The photographs of a capture's cameras under given materials, `samples` paths a pixel, all bounces.
 pub fn photographed(capture: &Capture, materials: &[Material], samples: u32, seed: u64) -> Problem {
+    photographed_under(None, capture, materials, samples, seed)
+}
+
+/// The same with light from outside.
+pub fn photographed_under(
+    outside: Option<Arc<Environment>>,
+    capture: &Capture,
+    materials: &[Material],
+    samples: u32,
+    seed: u64,
+) -> Problem {
     let scene = Arc::new(Scene::new(capture).expect("the test scene is sound"));
-    let lit = Lit::new(scene.clone(), materials.to_vec(), None);
+    let lit = Lit::new(scene.clone(), materials.to_vec(), outside);
     let photographs = (0u64..)
         .zip(&scene.cameras)
         .map(|(frame, camera)| {

@@ -74,7 +74,7 @@ impl NormalEquations {
             scatter: std::array::from_fn(|_| DMatrix::zeros(n, n)),
             objective: DVec3::ZERO,
             clusters: linearised.len(),
-            prior: *prior,
+            prior: prior.clone(),
         };
         for cluster in linearised {
             sums.add(cluster, trust.of(cluster.object));

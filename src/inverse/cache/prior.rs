@@ -12,12 +12,13 @@ const ALBEDO_MEAN: f64 = 0.5;
 const OUTSIDE_DEVIATION: f32 = 4.0;
 
 /// Normal distributions of the unknowns; nothing is believed of a lamp.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
     surfaces: usize,
     /// First of the surfaces that stand for directions outside.
     outside: usize,
-    mean: Vec3,
+    /// One for each of those.
+    means: Vec<Vec3>,
     deviation: Vec3,
 }
 
@@ -28,19 +29,18 @@ impl Prior {
         Self {
             surfaces,
             outside,
-            mean: Vec3::ZERO,
+            means: vec![Vec3::ZERO; surfaces - outside],
             deviation: photographed * OUTSIDE_DEVIATION,
         }
     }
 
-    /// The same where the mean radiance of what was seen of the outside is known.
-    pub fn with_sky(self, sky: Option<Vec3>) -> Self {
-        let mean = sky.unwrap_or(Vec3::ZERO);
-        Self {
-            mean,
-            deviation: self.deviation.max(mean),
-            ..self
+    /// The same with what to expect of each direction outside, from what was seen of others.
+    pub fn with_sky(mut self, expected: impl Fn(u32) -> Vec3) -> Self {
+        for (surface, mean) in (self.outside as u32..).zip(&mut self.means) {
+            *mean = expected(surface);
+            self.deviation = self.deviation.max(*mean);
         }
+        self
     }
 
     /// Mean of a parameter (albedos first, then emissions) in one channel, and its precision in the units of the normal
@@ -51,7 +51,7 @@ impl Prior {
             Some(emitter) if emitter >= self.outside && self.deviation[channel] > 0.0 => {
                 let deviation = f64::from(self.deviation[channel]);
                 (
-                    f64::from(self.mean[channel]),
+                    f64::from(self.means[emitter - self.outside][channel]),
                     noise / (deviation * deviation),
                 )
             }
@@ -68,7 +68,7 @@ mod tests {
     fn lamps_are_free_and_the_outside_is_held_near_what_was_seen_in_any_unit() {
         for unit in [1e-12f32, 1.0, 1e12] {
             let prior =
-                Prior::new(5, 3, Vec3::splat(2.0 * unit)).with_sky(Some(Vec3::splat(3.0 * unit)));
+                Prior::new(5, 3, Vec3::splat(2.0 * unit)).with_sky(|_| Vec3::splat(3.0 * unit));
             assert_eq!(prior.of(0, 0, 0.1), (0.5, 0.1 / 0.25));
             assert_eq!(prior.of(5 + 2, 0, 0.1), (0.0, 0.0));
             let (mean, precision) = prior.of(5 + 3, 1, 0.1);

@@ -13,7 +13,7 @@ use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::geometry::{Hit, Ray, offset_origin};
 use crate::transport::emitters::Emitters;
-use crate::transport::environment::pixel_of;
+use crate::transport::environment::{direction_of, pixel_of};
 use crate::transport::path::power_heuristic;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -64,6 +64,11 @@ pub struct OutsideGrid {
 }
 
 impl OutsideGrid {
+    /// The unit direction in the middle of a surface.
+    pub fn direction(&self, surface: u32) -> Vec3 {
+        direction_of(self.width, self.height, (surface - self.first) as usize)
+    }
+
     /// The surface of a unit direction.
     pub fn surface(&self, direction: Vec3) -> u32 {
         self.first + pixel_of(self.width, self.height, direction) as u32

@@ -50,6 +50,7 @@ impl Ladder<'_, '_> {
             };
             let doubtful: Vec<usize> = (0..self.roles.len())
                 .filter(|&k| self.roles[k] == Role::Unseen && significance(k) < SIGNIFICANT)
+                .filter(|&k| k < self.problem.scene.objects.len())
                 .collect();
             if doubtful.is_empty() {
                 return Ok(());
@@ -99,9 +100,12 @@ impl Ladder<'_, '_> {
     /// free, refitted, and kept if it stays significant. Returns their names.
     pub(super) fn test_glow(&mut self, cache: &PathCache) -> Result<Vec<String>, Termination> {
         let objects = self.roles.len();
+        let in_mesh = self.problem.scene.objects.len();
         let mut added = Vec::new();
         while added.len() < 8 {
+            let of_the_mesh = |test: &Released| test.index - objects < in_mesh;
             let strongest = (self.test_dark(cache).into_iter())
+                .filter(of_the_mesh)
                 .max_by(|a, b| a.significance().total_cmp(&b.significance()));
             let Some(candidate) = strongest.filter(|c| c.significance() > SIGNIFICANT) else {
                 break;
@@ -126,13 +130,7 @@ impl Ladder<'_, '_> {
                 (self.unknowns, self.errors, self.roles) = before;
                 break;
             }
-            let name = self
-                .problem
-                .scene
-                .objects
-                .get(k)
-                .map_or("outside", |o| &o.name);
-            added.push(name.to_owned());
+            added.push(self.problem.scene.objects[k].name.clone());
         }
         Ok(added)
     }

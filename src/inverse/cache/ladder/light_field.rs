@@ -103,9 +103,7 @@ impl Ladder<'_, '_> {
         let closed = self.measure();
         self.open = true;
         self.sky = MeasuredOutside::new(self.problem, &self.survey);
-        self.prior = self
-            .prior
-            .with_sky(self.sky.as_ref().map(MeasuredOutside::mean));
+        self.expect_of_outside();
         match self.sky {
             Some(_) => {
                 let cache = self.trace(lights, Some(measured), 0, 0)?;

@@ -112,8 +112,7 @@ pub fn solve(
     let sky = (start.open)
         .then(|| MeasuredOutside::new(problem, &survey))
         .flatten();
-    let prior = Prior::new(surfaces, objects, mean_radiance(&clusters))
-        .with_sky(sky.as_ref().map(MeasuredOutside::mean));
+    let prior = Prior::new(surfaces, objects, mean_radiance(&clusters));
     let mut ladder = Ladder {
         problem,
         budget,
@@ -142,6 +141,7 @@ pub fn solve(
         detail: None,
         stages: start.stages,
     };
+    ladder.expect_of_outside();
     ladder.describe();
     let termination = match ladder.run() {
         Ok(termination) | Err(termination) => termination,
@@ -172,6 +172,16 @@ impl Ladder<'_, '_> {
         }
         self.reached(STAGES);
         Ok(ended)
+    }
+
+    /// Takes what was seen of the outside for what to expect of the rest of it.
+    fn expect_of_outside(&mut self) {
+        if let Some(sky) = &self.sky {
+            let grid = self.outside;
+            let band = std::f64::consts::PI / grid.height as f64;
+            let expected = |surface| sky.expected(grid.direction(surface), band);
+            self.prior = self.prior.clone().with_sky(expected);
+        }
     }
 
     /// Second stage: full paths to the lamps found. Lights that the first stage missed or imagined are tested here,

@@ -1,0 +1,138 @@
+//! Light from outside: found in a room that a sky lights through a window, not looked for in a room with lamps.
+
+mod scenes;
+
+use glam::{DVec3, Vec3};
+use relit::capture::mesh::Mesh;
+use relit::inverse::estimate::Estimate;
+use relit::inverse::settings::{Preset, Settings};
+use relit::inverse::solver::{Control, Observer, Problem, Progress, Solution, solve};
+use relit::transport::environment::Environment;
+use relit::transport::material::{Albedo, Material};
+use scenes::View;
+use std::sync::Arc;
+
+const SIZE: [u32; 2] = [64, 48];
+
+struct Silent;
+
+impl Observer for Silent {
+    fn observe(&mut self, _: &Progress, _: &Estimate) -> Control {
+        Control::Continue
+    }
+}
+
+fn run(problem: &Problem) -> Solution {
+    let settings = Settings {
+        preset: Preset::Preview,
+        ..Settings::default()
+    };
+    solve(problem, &settings, None, &mut Silent).expect("nothing to resume")
+}
+
+/// The walls of [`scenes::lamp_room`] with a square hole in the front one, and no lamp.
+fn room_with_a_window() -> (Mesh, Vec<Material>) {
+    let (whole, materials) = scenes::lamp_room();
+    let mut mesh = Mesh::default();
+    let mut kept = Vec::new();
+    for (triangle, &object) in whole.triangles.iter().zip(&whole.object_of) {
+        let name = &whole.objects[object as usize];
+        if name == "lamp" || name == "front" {
+            continue;
+        }
+        if !mesh.objects.contains(name) {
+            mesh.objects.push(name.clone());
+            kept.push(materials[object as usize].clone());
+        }
+        let first = mesh.positions.len() as u32;
+        mesh.positions
+            .extend(triangle.map(|corner| whole.positions[corner as usize]));
+        mesh.triangles.push([first, first + 1, first + 2]);
+        mesh.object_of
+            .push(mesh.objects.iter().position(|o| o == name).unwrap_or(0) as u32);
+    }
+    // Four strips around the window, looking inwards (to −z).
+    for [left, right, bottom, top] in [
+        [-1.0, -0.6, -1.0, 1.0],
+        [0.6, 1.0, -1.0, 1.0],
+        [-0.6, 0.6, -1.0, -0.4],
+        [-0.6, 0.6, 0.6, 1.0],
+    ] {
+        let corner = |x: f64, y: f64| DVec3::new(x, y, 1.0);
+        let corners = [
+            corner(left, bottom),
+            corner(left, top),
+            corner(right, top),
+            corner(right, bottom),
+        ];
+        scenes::quad(&mut mesh, "front", corners);
+    }
+    kept.push(materials[5].clone());
+    (mesh, kept)
+}
+
+/// Blue above the horizon, brighter to one side, brown below.
+fn sky() -> Arc<Environment> {
+    let (width, height) = (64, 32);
+    let pixels = (0..width * height).map(|i| {
+        let (row, column) = (i / width, i % width);
+        let side = 1.0 + 0.4 * (column as f32 / width as f32 * std::f32::consts::TAU).sin();
+        let above = Vec3::new(2.0, 2.6, 4.0) * side;
+        if row < height / 2 {
+            above
+        } else {
+            Vec3::new(0.5, 0.4, 0.3)
+        }
+    });
+    let map = Environment::new(width, height, pixels.collect());
+    Arc::new(map.expect("the sizes fit"))
+}
+
+/// Views from the walls, two of which see the window.
+fn views() -> Vec<View> {
+    let mut views = scenes::room_views().to_vec();
+    views.push((DVec3::new(0.0, 0.2, -0.8), DVec3::new(0.0, 0.2, 1.0)));
+    views.push((DVec3::new(0.6, -0.6, -0.7), DVec3::new(-0.2, 0.6, 1.0)));
+    views
+}
+
+#[test]
+fn a_room_lit_through_its_window_keeps_its_walls_dark() {
+    let (mesh, materials) = room_with_a_window();
+    let capture = scenes::capture(mesh, &views(), SIZE);
+    let problem = scenes::photographed_under(Some(sky()), &capture, &materials, 512, 71);
+    let estimate = run(&problem).estimate;
+    let outside = estimate.outside.as_ref().expect("the sky is seen");
+    assert!(outside.pixels.iter().all(|p| p.is_finite()));
+    let mut errors: Vec<f32> = (estimate.objects.iter().zip(&materials))
+        .map(|(object, material)| {
+            assert_eq!(object.emission, Vec3::ZERO);
+            let Albedo::Constant(truth) = &material.albedo else {
+                panic!("the walls have one colour each");
+            };
+            (object.albedo - *truth).length() / truth.length()
+        })
+        .collect();
+    errors.sort_by(f32::total_cmp);
+    assert!(errors[errors.len() / 2] < 0.05, "{errors:?}");
+}
+
+#[test]
+fn a_room_with_its_lamp_and_a_black_window_has_no_light_from_outside() {
+    let (mut mesh, mut materials) = room_with_a_window();
+    scenes::lamp(&mut mesh, 0.35, DVec3::new(0.1, 0.9, -0.1));
+    materials.push(Material::diffuse(Vec3::ZERO, Vec3::new(14.0, 12.0, 9.0)));
+    let capture = scenes::capture(mesh, &views(), SIZE);
+    let problem = scenes::photographed(&capture, &materials, 256, 72);
+    let solution = run(&problem);
+    assert!(solution.estimate.outside.is_none());
+    let rung = (solution.progress.stages.iter()).find(|s| s.name == "outside light");
+    assert!(rung.is_some_and(|s| !s.kept), "it was not even tried");
+    assert!(
+        solution
+            .estimate
+            .objects
+            .last()
+            .is_some_and(|lamp| lamp.emission.x > 13.0)
+    );
+}
