@@ -94,16 +94,18 @@ pub struct Outside {
     pub pixels: Vec<Vec3>,
 }
 
+/// Size over RGB of an error of an albedo, relative to that albedo.
+pub fn relative_to_albedo(error: Vec3, albedo: Vec3) -> f64 {
+    f64::from(error.length() / albedo.length().max(SMALLEST_ALBEDO))
+}
+
 impl Estimate {
     /// The error that the estimate claims of itself: median over objects of the relative standard error of albedo over
     /// RGB, of those whose albedo is determined and that [`ENOUGH_PIXELS`] see; `None` where there are none.
     pub fn relative_error(&self) -> Option<f64> {
         let mut relative: Vec<f64> = (self.objects.iter())
             .filter(|object| object.albedo_identifiable && object.seen_pixels >= ENOUGH_PIXELS)
-            .map(|object| {
-                let size = object.albedo.length().max(SMALLEST_ALBEDO);
-                f64::from(object.albedo_stderr.length() / size)
-            })
+            .map(|object| relative_to_albedo(object.albedo_stderr, object.albedo))
             .collect();
         quantile(&mut relative, 0.5)
     }

@@ -25,4 +25,20 @@ impl Unknowns {
     pub fn surfaces(&self) -> usize {
         self.albedo.len()
     }
+
+    /// The value of a parameter: albedos come first, then emissions.
+    pub fn value(&self, parameter: usize) -> Vec3 {
+        match parameter.checked_sub(self.surfaces()) {
+            None => self.albedo[parameter],
+            Some(surface) => self.emission[surface],
+        }
+    }
+
+    /// The same, to be changed.
+    pub fn value_mut(&mut self, parameter: usize) -> &mut Vec3 {
+        match parameter.checked_sub(self.surfaces()) {
+            None => &mut self.albedo[parameter],
+            Some(surface) => &mut self.emission[surface],
+        }
+    }
 }

@@ -5,6 +5,7 @@
 
 use super::derivative::{Gradient, differentiate};
 use super::prior::Prior;
+use super::roles::places;
 use super::trust::Trust;
 use super::{CachedCluster, PathCache};
 use crate::inverse::parameters::Unknowns;
@@ -55,12 +56,8 @@ impl PathCache {
         trust: &Trust,
         prior: &Prior,
     ) -> NormalEquations {
-        let parameters = 2 * unknowns.surfaces();
-        let mut place = vec![usize::MAX; parameters];
-        for (i, &index) in free.iter().enumerate() {
-            place[index] = i;
-        }
-        NormalEquations::new(&self.linearise(unknowns, &place), free.len(), trust, prior)
+        let places = places(free, unknowns.surfaces());
+        NormalEquations::new(&self.linearise(unknowns, &places), free.len(), trust, prior)
     }
 }
 
@@ -191,15 +188,6 @@ impl NormalEquations {
                 }
             }
         }
-    }
-
-    /// Replaces one channel's sums by another's.
-    pub fn take_channel(&mut self, other: &Self, channel: usize) {
-        self.hessian[channel].copy_from(&other.hessian[channel]);
-        self.descent[channel].copy_from(&other.descent[channel]);
-        self.information[channel].copy_from(&other.information[channel]);
-        self.scatter[channel].copy_from(&other.scatter[channel]);
-        self.objective[channel] = other.objective[channel];
     }
 }
 

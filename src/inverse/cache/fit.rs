@@ -10,7 +10,7 @@ use glam::DVec3;
 use nalgebra::DVector;
 
 /// Damping relative to the diagonal; only keeps the factorisation safe from rounding.
-const LEAST_DAMPING: f64 = 1e-10;
+pub const LEAST_DAMPING: f64 = 1e-10;
 /// A step below this many standard errors in every parameter ends the fit.
 const STEP_TOLERANCE: f64 = 0.02;
 
@@ -27,29 +27,15 @@ pub struct Fit {
 
 /// Reads the free parameters of one channel.
 pub fn gather(unknowns: &Unknowns, free: &[usize], channel: usize) -> Vec<f64> {
-    let objects = unknowns.surfaces();
     free.iter()
-        .map(|&i| {
-            let value = if i < objects {
-                unknowns.albedo[i]
-            } else {
-                unknowns.emission[i - objects]
-            };
-            f64::from(value[channel])
-        })
+        .map(|&i| f64::from(unknowns.value(i)[channel]))
         .collect()
 }
 
 /// Writes the free parameters of one channel.
 pub fn scatter(unknowns: &mut Unknowns, free: &[usize], channel: usize, values: &[f64]) {
-    let objects = unknowns.surfaces();
     for (&i, &value) in free.iter().zip(values) {
-        let target = if i < objects {
-            &mut unknowns.albedo[i]
-        } else {
-            &mut unknowns.emission[i - objects]
-        };
-        target[channel] = value as f32;
+        unknowns.value_mut(i)[channel] = value as f32;
     }
 }
 

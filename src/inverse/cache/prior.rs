@@ -2,19 +2,30 @@
 //! determines within reason.
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// Standard deviation of an albedo of which nothing is known, about [`ALBEDO_MEAN`].
 pub const ALBEDO_DEVIATION: f64 = 0.5;
 /// Where an albedo stays of which nothing is known.
-const ALBEDO_MEAN: f64 = 0.5;
+pub const ALBEDO_MEAN: f64 = 0.5;
 /// Standard deviation of light from a direction outside that no photograph looks in, in mean radiances of what the
 /// photographs show.
 const OUTSIDE_DEVIATION: f32 = 4.0;
+
+/// Normal distributions of albedos.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ExpectedAlbedo {
+    /// One for each surface.
+    pub mean: Vec<Vec3>,
+    /// Standard deviations.
+    pub deviation: Vec<Vec3>,
+}
 
 /// Normal distributions of the unknowns; nothing is believed of a lamp.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
     surfaces: usize,
+    albedo: Option<ExpectedAlbedo>,
     /// First of the surfaces that stand for directions outside.
     outside: usize,
     /// One for each of those.
@@ -28,10 +39,22 @@ impl Prior {
     pub fn new(surfaces: usize, outside: usize, photographed: Vec3) -> Self {
         Self {
             surfaces,
+            albedo: None,
             outside,
             means: vec![Vec3::ZERO; surfaces - outside],
             deviation: photographed * OUTSIDE_DEVIATION,
         }
+    }
+
+    /// The same with what to expect of each surface's albedo.
+    pub fn with_albedo(mut self, albedo: Option<ExpectedAlbedo>) -> Self {
+        self.albedo = albedo;
+        self
+    }
+
+    /// What is expected of the albedos, if anything was found.
+    pub fn albedo(&self) -> Option<&ExpectedAlbedo> {
+        self.albedo.as_ref()
     }
 
     /// The same with what to expect of each direction outside, from what was seen of others.
@@ -47,7 +70,16 @@ impl Prior {
     /// equations: the noise variance of one cluster over the prior's variance. Zero where nothing is believed.
     pub fn of(&self, parameter: usize, channel: usize, noise: f64) -> (f64, f64) {
         match parameter.checked_sub(self.surfaces) {
-            None => (ALBEDO_MEAN, noise / (ALBEDO_DEVIATION * ALBEDO_DEVIATION)),
+            None => {
+                let (mean, deviation) = match &self.albedo {
+                    Some(expected) => (
+                        f64::from(expected.mean[parameter][channel]),
+                        f64::from(expected.deviation[parameter][channel]),
+                    ),
+                    None => (ALBEDO_MEAN, ALBEDO_DEVIATION),
+                };
+                (mean, noise / (deviation * deviation))
+            }
             Some(emitter) if emitter >= self.outside && self.deviation[channel] > 0.0 => {
                 let deviation = f64::from(self.deviation[channel]);
                 (
@@ -63,6 +95,24 @@ impl Prior {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_expected_albedo_weighs_by_its_own_deviation() {
+        let expected = ExpectedAlbedo {
+            mean: vec![Vec3::new(0.2, 0.3, 0.4)],
+            deviation: vec![Vec3::new(0.1, 0.01, 0.5)],
+        };
+        let prior = Prior::new(1, 1, Vec3::ONE).with_albedo(Some(expected));
+        for (channel, (mean, precision)) in [(0.2, 100.0), (0.3, 1e4), (0.4, 4.0)]
+            .into_iter()
+            .enumerate()
+        {
+            let of = prior.of(0, channel, 1.0);
+            assert!((of.0 - mean).abs() < 1e-6, "{of:?}");
+            assert!((of.1 / precision - 1.0).abs() < 1e-5, "{of:?}");
+        }
+        assert_eq!(prior.with_albedo(None).of(0, 0, 1.0), (0.5, 4.0));
+    }
 
     #[test]
     fn lamps_are_free_and_the_outside_is_held_near_what_was_seen_in_any_unit() {

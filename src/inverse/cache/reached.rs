@@ -1,6 +1,7 @@
 //! What the stages so far have found: all that the next stage starts from, and what a checkpoint holds.
 
 use super::errors::StandardErrors;
+use super::prior::ExpectedAlbedo;
 use super::roles::Role;
 use crate::inverse::parameters::Unknowns;
 use glam::Vec3;
@@ -13,6 +14,9 @@ pub struct Reached {
     pub stages: u32,
     /// Whether light comes from outside.
     pub open: bool,
+    /// What the light field said of the albedos, where that still counts.
+    #[serde(default)]
+    pub expected: Option<ExpectedAlbedo>,
     /// What each object is taken for.
     pub roles: Vec<Role>,
     /// Values of all unknowns.
@@ -26,6 +30,7 @@ impl Reached {
     pub fn new(
         stages: u32,
         open: bool,
+        expected: Option<&ExpectedAlbedo>,
         roles: &[Role],
         unknowns: &Unknowns,
         errors: &StandardErrors,
@@ -37,6 +42,7 @@ impl Reached {
         Self {
             stages,
             open,
+            expected: expected.cloned(),
             roles: roles.to_vec(),
             unknowns: unknowns.clone(),
             albedo_errors: finite(&errors.albedo),
@@ -47,6 +53,8 @@ impl Reached {
     /// Whether it speaks of as many objects as there are.
     pub fn fits(&self, objects: usize) -> bool {
         self.roles.len() == objects
+            && (self.expected.iter())
+                .all(|e| e.mean.len() == objects && e.deviation.len() == objects)
             && self.unknowns.albedo.len() == objects
             && self.unknowns.emission.len() == objects
             && self.albedo_errors.len() == objects

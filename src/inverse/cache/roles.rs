@@ -29,6 +29,15 @@ impl Role {
     }
 }
 
+/// Where each of the parameters of so many surfaces stands among the free ones; `usize::MAX` for those that are held.
+pub fn places(free: &[usize], surfaces: usize) -> Vec<usize> {
+    let mut places = vec![usize::MAX; 2 * surfaces];
+    for (row, &parameter) in free.iter().enumerate() {
+        places[parameter] = row;
+    }
+    places
+}
+
 /// The parameters that are fitted under some roles: indices into albedos, then emissions.
 pub fn free(roles: &[Role]) -> Vec<usize> {
     let albedo = (0..roles.len()).filter(|&k| roles[k].reflects());

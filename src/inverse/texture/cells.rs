@@ -72,9 +72,14 @@ enum Node {
 type Spot = ([f32; 2], f32);
 
 impl Cells {
-    /// Cuts the triangles on which the pixels land.
-    pub fn new(scene: &Scene, pixels: &[SeenPixel]) -> Self {
-        let mut landings: Vec<&Landing> = pixels.iter().flat_map(|p| &p.landings).collect();
+    /// Cuts the triangles on which the pixels land, into cells `width` times as wide as what the pixels resolve.
+    pub fn new(scene: &Scene, pixels: &[SeenPixel], width: f32) -> Self {
+        let mut landings: Vec<Landing> = (pixels.iter().flat_map(|p| &p.landings))
+            .map(|&landing| Landing {
+                footprint: landing.footprint * width,
+                ..landing
+            })
+            .collect();
         landings.sort_by_key(|l| l.hit.triangle);
         let mut cells = Self::default();
         let mut shared = HashMap::new();
@@ -87,7 +92,7 @@ impl Cells {
         cells
     }
 
-    fn triangle(&mut self, scene: &Scene, group: &[&Landing], shared: &mut HashMap<[i64; 5], u32>) {
+    fn triangle(&mut self, scene: &Scene, group: &[Landing], shared: &mut HashMap<[i64; 5], u32>) {
         let triangle = group[0].hit.triangle;
         let fronts = group.iter().filter(|l| l.front).count();
         let front = 2 * fronts >= group.len();

@@ -8,6 +8,7 @@ use crate::math::color::luminance;
 use crate::math::rng::splitmix64;
 use crate::math::stats::quantile;
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 /// Of the pixels in the fit, one in so many is left out in turn to choose the smoothing.
 const FOLDS: usize = 5;
@@ -117,9 +118,12 @@ impl Measurements {
         let mut strength = STRONGEST * density;
         let mut worse = 0;
         while worse < PATIENCE && strength > WEAKEST * density {
-            for (fold, colors) in (0..folds).zip(&mut colors) {
-                *colors = fitted(&self.weights_without(fold), strength, colors);
-            }
+            colors
+                .par_iter_mut()
+                .enumerate()
+                .for_each(|(fold, colors)| {
+                    *colors = fitted(&self.weights_without(fold), strength, colors);
+                });
             let score = self.score(&values, &colors, clip);
             if score < best.0 {
                 best = (score, Some(strength), colors.clone());

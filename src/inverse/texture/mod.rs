@@ -32,6 +32,9 @@ const SIGNIFICANT: f64 = 4.0;
 /// Pixels in the fit and held out that an object needs.
 const LEAST_PIXELS: usize = 60;
 const LEAST_HELD_OUT: usize = 10;
+/// Share of the paths, and width of cells in the finest ones', that are enough to see whether an object has a texture.
+const FIRST_LOOK: f64 = 0.4;
+const COARSE: f32 = 2.0;
 /// Times that light and texture are found in turn.
 const SWEEPS: u32 = 2;
 
@@ -59,8 +62,8 @@ pub struct Attempt {
     pub cells: usize,
     /// Pixels in the fit.
     pub pixels: usize,
-    /// How it did on held-out pixels.
-    pub trial: Trial,
+    /// How it did on held-out pixels; unset where the fit itself found one colour.
+    pub trial: Option<Trial>,
     /// Whether its texture is kept.
     pub kept: bool,
 }
@@ -93,13 +96,14 @@ impl Refined {
     /// What was added where and what it bought, in a sentence.
     pub fn summary(&self, name: impl Fn(usize) -> String) -> String {
         let kept: Vec<String> = (self.attempts.iter().filter(|a| a.kept))
-            .map(|a| {
-                format!(
+            .filter_map(|a| {
+                let trial = a.trial?;
+                Some(format!(
                     "{} ({} cells, squared error of untouched pixels {:.0} % less)",
                     name(a.object),
                     a.cells,
-                    100.0 * (1.0 - a.trial.after / a.trial.before)
-                )
+                    100.0 * (1.0 - trial.after / trial.before)
+                ))
             })
             .collect();
         let (tried, cells) = (self.attempts.len(), self.unknowns());
@@ -148,25 +152,33 @@ pub fn refine(
     let mut attempts = Vec::new();
     let mut kept: Vec<Surface> = Vec::new();
     for (index, (object, pixels)) in candidates.iter().enumerate() {
-        let paths = task.paths as f64 * (pixels.len() as f64).sqrt() / shares;
+        let paths = task.paths as f64 * FIRST_LOOK * (pixels.len() as f64).sqrt() / shares;
         let mut done =
             |rays, rejected| tell(rays, rejected, index as f64 / candidates.len() as f64 * 0.6);
         done(0, 0)?;
-        let Some(mut surface) = Surface::new(task, *object, pixels) else {
+        let Some(mut coarse) = Surface::new(task, *object, pixels, COARSE) else {
             continue;
         };
-        surface.find(&lit, &options, paths as u64, 0, None, &mut done)?;
-        let trial = surface.try_out(&lit, &options, &mut done)?;
-        let keep = surface.is_textured() && trial.gain > SIGNIFICANT * trial.noise;
+        coarse.find(&lit, &options, paths as u64, 0, None, &mut done)?;
+        let trial = if coarse.is_textured() {
+            Some(coarse.try_out(&lit, &options, &mut done)?)
+        } else {
+            None
+        };
+        let keep = trial.is_some_and(|trial| trial.gain > SIGNIFICANT * trial.noise);
         attempts.push(Attempt {
             object: *object,
-            cells: surface.cell_count(),
-            pixels: surface.pixel_count(),
+            cells: coarse.cell_count(),
+            pixels: coarse.pixel_count(),
             trial,
             kept: keep,
         });
-        if keep {
-            kept.push(surface);
+        if keep && let Some(mut fine) = coarse.recut(&task.problem.scene, 1.0) {
+            fine.find(&lit, &options, paths as u64, 0, None, &mut done)?;
+            if let Some(attempt) = attempts.last_mut() {
+                attempt.cells = fine.cell_count();
+            }
+            kept.push(fine);
         }
     }
 

@@ -11,6 +11,7 @@ use super::received::{Received, trace};
 use super::trial::{Trial, Untouched, try_out};
 use crate::inverse::solver::Termination;
 use crate::inverse::survey::SurveyedPixel;
+use crate::scene::Scene;
 use crate::transport::lit::Lit;
 use crate::transport::path::PathOptions;
 use glam::{DVec3, Vec3};
@@ -47,11 +48,32 @@ pub struct Surface {
 type Done<'d> = dyn FnMut(u64, u64) -> Result<(), Termination> + 'd;
 
 impl Surface {
-    /// Cuts the object into cells; `None` where none of the pixels sees it alone.
-    pub fn new(task: &Task, object: usize, pixels: &[&SurveyedPixel]) -> Option<Self> {
-        let scene = &*task.problem.scene;
-        let mut pixels = look(task.problem, object as u32, pixels, task.settings.seed);
-        let cells = Cells::new(scene, &pixels);
+    /// Cuts the object into cells, `width` times as wide as the finest that its pixels resolve; `None` where none of the
+    /// pixels sees it alone.
+    pub fn new(task: &Task, object: usize, pixels: &[&SurveyedPixel], width: f32) -> Option<Self> {
+        let pixels = look(task.problem, object as u32, pixels, task.settings.seed);
+        Self::cut(
+            &task.problem.scene,
+            object,
+            pixels,
+            task.settings.seed,
+            width,
+        )
+    }
+
+    /// The same object in cells of another width.
+    pub fn recut(self, scene: &Scene, width: f32) -> Option<Self> {
+        Self::cut(scene, self.object, self.pixels, self.seed, width)
+    }
+
+    fn cut(
+        scene: &Scene,
+        object: usize,
+        mut pixels: Vec<SeenPixel>,
+        seed: u64,
+        width: f32,
+    ) -> Option<Self> {
+        let cells = Cells::new(scene, &pixels, width);
         // One side of a triangle receives the light that its texture is measured in.
         pixels
             .retain(|p| (p.landings.iter()).all(|l| cells.front(l.hit.triangle) == Some(l.front)));
@@ -61,7 +83,7 @@ impl Surface {
         let links = Links::new(scene, &cells);
         let mut surface = Self {
             object,
-            seed: task.settings.seed,
+            seed,
             seen: vec![0; cells.count()],
             texture: Texture {
                 colors: vec![Vec3::ZERO; cells.count()],

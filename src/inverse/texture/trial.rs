@@ -1,5 +1,6 @@
 //! Whether a texture explains pixels that no fit has seen better than one colour does.
 
+use super::SIGNIFICANT;
 use super::cells::Cells;
 use super::look::SeenPixel;
 use crate::math::color::luminance;
@@ -16,8 +17,9 @@ const KEY: u64 = 7 << 59;
 const PATHS: usize = 64_000;
 /// Paths a pixel at least and at most, in each set.
 const PATHS_A_PIXEL: (usize, usize) = (32, 512);
-/// Pixels used at most.
+/// Pixels used at most, and how many of them decide whether to go on with the rest.
 const MOST_PIXELS: usize = 2_000;
+const FIRST_PIXELS: usize = 250;
 /// One pixel's gain counts up to so many times what two of three stay below.
 const CLIP: f64 = 5.0;
 
@@ -51,7 +53,8 @@ pub struct Untouched<'a> {
 /// Compares one colour and a texture on pixels that the texture was fitted without.
 ///
 /// Both see the same light: full paths from the pixel's own points, in two independent sets whose errors are
-/// multiplied, so that the noise of the paths favours neither.
+/// multiplied, so that the noise of the paths favours neither. Where a first part of the pixels leaves no hope that all
+/// of them together would speak for the texture, the rest are not traced.
 pub fn try_out(
     lit: &Lit,
     cells: &Cells,
@@ -64,68 +67,149 @@ pub fn try_out(
     let chosen: Vec<Untouched> = (0..count)
         .map(|i| pixels[i * pixels.len() / count])
         .collect();
-    let paths = (PATHS / count.max(1)).clamp(PATHS_A_PIXEL.0, PATHS_A_PIXEL.1);
-    let traced: Vec<([Vec3; 2], [Vec3; 2], u64)> = chosen
-        .par_iter()
-        .map(|&Untouched { pixel, colors }| {
-            let texture = |hit| cells.locate(hit).map_or(constant, |c| colors[c as usize]);
-            let mut rays = 0;
-            let [a, b] = [0u64, 1].map(|set| {
-                let (mut flat, mut textured) = (Vec3::ZERO, Vec3::ZERO);
-                for path in 0..paths {
-                    let landing = &pixel.landings[path % pixel.landings.len()];
-                    let sample = KEY + 2 * path as u64 + set;
-                    let key = (u64::from(pixel.frame), u64::from(pixel.pixel));
-                    let mut stream = Stream::new(seed, key.0, key.1, sample);
-                    let surface = lit.surface(&landing.hit);
-                    let normal = if landing.front {
-                        surface.normal
-                    } else {
-                        -surface.normal
-                    };
-                    let path = white_radiance(lit, &surface, normal, &mut stream, options);
-                    rays += u64::from(path.rays);
-                    flat += path.radiance * constant;
-                    textured += path.radiance * texture(&landing.hit);
-                }
-                [flat / paths as f32, textured / paths as f32]
-            });
-            ([a[0], b[0]], [a[1], b[1]], rays)
-        })
-        .collect();
-
-    let mut levels: Vec<f64> = chosen
-        .iter()
+    let mut levels: Vec<f64> = (chosen.iter())
         .map(|p| f64::from(luminance(p.pixel.measured)))
         .collect();
-    let floor = 0.5 * quantile(&mut levels, 0.5).unwrap_or(0.0) as f32;
-    let error = |measured: Vec3, [a, b]: [Vec3; 2], level: f32| {
-        let product = (measured - a) * (measured - b);
-        f64::from(
-            product.element_sum() / (3.0 * (level * level + floor * floor).max(f32::MIN_POSITIVE)),
-        )
+    let comparison = Comparison {
+        lit,
+        cells,
+        constant,
+        options,
+        seed,
+        paths: (PATHS / count.max(1)).clamp(PATHS_A_PIXEL.0, PATHS_A_PIXEL.1),
+        floor: 0.5 * quantile(&mut levels, 0.5).unwrap_or(0.0) as f32,
     };
-    let (mut before, mut after) = (Moments::default(), Moments::default());
-    let mut gains = Vec::with_capacity(count);
-    let mut rays = 0;
-    for (Untouched { pixel, .. }, (flat, textured, cast)) in chosen.iter().zip(traced) {
-        let level = luminance((flat[0] + flat[1]) * 0.5);
-        let errors = [flat, textured].map(|sets| error(pixel.measured, sets, level));
-        before.push(errors[0]);
-        after.push(errors[1]);
-        gains.push(errors[0] - errors[1]);
-        rays += cast;
+    let every = count.div_ceil(FIRST_PIXELS).max(1);
+    let part = |first: bool| {
+        let indices = (0..count).filter(|i| (i % every == 0) == first);
+        let pixels: Vec<Untouched> = indices.map(|i| chosen[i]).collect();
+        comparison.compare(&pixels)
+    };
+    let mut compared = part(true);
+    if !is_hopeless(&Trial::of(&compared), count) {
+        compared.extend(part(false));
     }
-    let mut sizes: Vec<f64> = gains.iter().map(|g| g.abs()).collect();
-    let clip = CLIP * quantile(&mut sizes, 0.68).unwrap_or(0.0);
-    let mut gain = Moments::default();
-    gains.iter().for_each(|g| gain.push(g.clamp(-clip, clip)));
-    Trial {
-        before: before.mean,
-        after: after.mean,
-        gain: gain.mean,
-        noise: gain.standard_error(),
-        pixels: count,
-        rays,
+    Trial::of(&compared)
+}
+
+/// Whether `count` pixels would hardly reach a significant gain, after what some of them showed.
+fn is_hopeless(first: &Trial, count: usize) -> bool {
+    let growth = (count as f64 / first.pixels.max(1) as f64).sqrt();
+    (first.gain / first.noise.max(f64::MIN_POSITIVE) + 1.0) * growth < SIGNIFICANT
+}
+
+/// What both predictions of a pixel are made and weighed by.
+struct Comparison<'a> {
+    lit: &'a Lit,
+    cells: &'a Cells,
+    constant: Vec3,
+    options: &'a PathOptions,
+    seed: u64,
+    /// Paths a pixel in each set.
+    paths: usize,
+    /// Level below which errors weigh no more.
+    floor: f32,
+}
+
+/// Squared relative errors of one pixel, and the rays that it took.
+struct Compared {
+    flat: f64,
+    textured: f64,
+    rays: u64,
+}
+
+impl Comparison<'_> {
+    fn compare(&self, pixels: &[Untouched]) -> Vec<Compared> {
+        pixels.par_iter().map(|pixel| self.pixel(pixel)).collect()
+    }
+
+    fn pixel(&self, &Untouched { pixel, colors }: &Untouched) -> Compared {
+        let texture = |hit| {
+            let cell = self.cells.locate(hit);
+            cell.map_or(self.constant, |c| colors[c as usize])
+        };
+        let mut rays = 0;
+        let sets = [0u64, 1].map(|set| {
+            let (mut flat, mut textured) = (Vec3::ZERO, Vec3::ZERO);
+            for path in 0..self.paths {
+                let landing = &pixel.landings[path % pixel.landings.len()];
+                let sample = KEY + 2 * path as u64 + set;
+                let key = (u64::from(pixel.frame), u64::from(pixel.pixel));
+                let mut stream = Stream::new(self.seed, key.0, key.1, sample);
+                let surface = self.lit.surface(&landing.hit);
+                let normal = if landing.front {
+                    surface.normal
+                } else {
+                    -surface.normal
+                };
+                let path = white_radiance(self.lit, &surface, normal, &mut stream, self.options);
+                rays += u64::from(path.rays);
+                flat += path.radiance * self.constant;
+                textured += path.radiance * texture(&landing.hit);
+            }
+            [flat, textured].map(|sum| sum / self.paths as f32)
+        });
+        let flat = sets.map(|set| set[0]);
+        let level = luminance((flat[0] + flat[1]) * 0.5);
+        let weight = 1.0 / (level * level + self.floor * self.floor).max(f32::MIN_POSITIVE);
+        let error = |[a, b]: [Vec3; 2]| {
+            let product = (pixel.measured - a) * (pixel.measured - b);
+            f64::from(product.element_sum() / 3.0 * weight)
+        };
+        Compared {
+            flat: error(flat),
+            textured: error(sets.map(|set| set[1])),
+            rays,
+        }
+    }
+}
+
+impl Trial {
+    fn of(pixels: &[Compared]) -> Self {
+        let mut sizes: Vec<f64> = (pixels.iter())
+            .map(|p| (p.flat - p.textured).abs())
+            .collect();
+        let clip = CLIP * quantile(&mut sizes, 0.68).unwrap_or(0.0);
+        let (mut before, mut after) = (Moments::default(), Moments::default());
+        let mut gain = Moments::default();
+        for pixel in pixels {
+            before.push(pixel.flat);
+            after.push(pixel.textured);
+            gain.push((pixel.flat - pixel.textured).clamp(-clip, clip));
+        }
+        Self {
+            before: before.mean,
+            after: after.mean,
+            gain: gain.mean,
+            noise: gain.standard_error(),
+            pixels: pixels.len(),
+            rays: pixels.iter().map(|p| p.rays).sum(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_loss_ends_a_trial_early_and_a_promising_gain_does_not() {
+        let first = |gain: f64| Trial {
+            gain,
+            noise: 1.0,
+            pixels: 250,
+            ..Trial::default()
+        };
+        // Eight times the pixels make 2.8 times the significance; one standard error is granted for luck.
+        assert!(is_hopeless(&first(-1.0), 2000));
+        assert!(is_hopeless(&first(0.3), 2000));
+        assert!(!is_hopeless(&first(0.5), 2000));
+        // No noise at all: whatever is gained is significant.
+        let silent = |gain: f64| Trial {
+            noise: 0.0,
+            ..first(gain)
+        };
+        assert!(!is_hopeless(&silent(1e-9), 2000));
+        assert!(is_hopeless(&silent(-1e-9), 2000));
     }
 }

@@ -34,6 +34,7 @@ impl Ladder<'_, '_> {
         let kept = refined.texels.is_some();
         self.detail = Some(refined);
         self.describe();
-        self.record("textures", started, kept, why)
+        self.record("textures", started, kept, why)?;
+        Ok(())
     }
 }

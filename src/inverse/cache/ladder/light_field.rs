@@ -2,15 +2,20 @@
 
 use super::Ladder;
 use crate::inverse::cache::PathCache;
+use crate::inverse::cache::evaluate::NormalEquations;
+use crate::inverse::cache::fit::{LEAST_DAMPING, propose};
 use crate::inverse::cache::path_noise::share_paths;
-use crate::inverse::cache::roles::Role;
+use crate::inverse::cache::prior::{ALBEDO_DEVIATION, ALBEDO_MEAN, ExpectedAlbedo};
+use crate::inverse::cache::roles::{self, Role};
 use crate::inverse::cache::trust::Trust;
+use crate::inverse::loss::Losses;
 use crate::inverse::measured::MeasuredRadiance;
 use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::solver::Termination;
 use crate::math::color::luminance;
 use crate::transport::emitters::Emitters;
+use glam::{DVec3, Vec3};
 
 /// Share of paths that must leave the mesh before light from outside is tried.
 const ESCAPING: f64 = 1e-3;
@@ -19,6 +24,8 @@ const OUTSIDE_GAIN: f64 = 0.03;
 /// Relative error of albedo that the light field's resolution is trusted to stay below, where edges blur: a
 /// cautious assumption until full paths have replaced it.
 const LIGHT_FIELD_BIAS: f32 = 0.01;
+/// No albedo is held closer than this.
+const LEAST_DEVIATION: f32 = 1e-3;
 
 impl Ladder<'_, '_> {
     /// First stage: paths end where a photograph measured the radiance, so each object is nearly a linear fit of its
@@ -50,18 +57,46 @@ impl Ladder<'_, '_> {
             .progress
             .seconds_to_first_estimate
             .get_or_insert(self.monitor.seconds());
-        self.finish_stage("light field", started, format!("each object fitted to the light that the photographs measured around it; {} give light", self.lamps()))?;
+        let why = format!(
+            "each object fitted to the light that the photographs measured around it; {} give light",
+            self.lamps()
+        );
+        let closed = self.record("light field", started, true, why)?;
         let escaping = cache.share_ending_on(self.outside.first);
         if escaping > ESCAPING && self.monitor.settings.outside_light {
-            self.light_from_outside(&cache, &lights, &measured, escaping)?;
+            self.light_from_outside(&cache, &lights, &measured, escaping, closed)?;
         }
         for (error, albedo) in self.errors.albedo.iter_mut().zip(&self.unknowns.albedo) {
             *error = (*error * *error + *albedo * *albedo * (LIGHT_FIELD_BIAS * LIGHT_FIELD_BIAS))
                 .powf(0.5);
         }
         self.describe();
+        self.expect_of_albedo();
         self.monitor
             .report(&self.estimate, &|_| self.checkpoint.clone())
+    }
+
+    /// Where light comes from outside, full paths know it only by a coarse map, and albedos would drift to make up for
+    /// what that lacks. What the light field said of them, which measures all light that arrives, holds them.
+    fn expect_of_albedo(&mut self) {
+        if !self.open {
+            return;
+        }
+        let surfaces = self.roles.len();
+        let nothing = (
+            Vec3::splat(ALBEDO_MEAN as f32),
+            Vec3::splat(ALBEDO_DEVIATION as f32),
+        );
+        let (mean, deviation) = (0..surfaces)
+            .map(|k| match self.roles[k] {
+                Role::Reflector => (
+                    self.unknowns.albedo[k],
+                    self.errors.albedo[k].clamp(Vec3::splat(LEAST_DEVIATION), nothing.1),
+                ),
+                _ => nothing,
+            })
+            .unzip();
+        self.prior = (self.prior.clone()).with_albedo(Some(ExpectedAlbedo { mean, deviation }));
     }
 
     /// Fits all seen objects as reflectors, then those that plainly give light as emitters; light from outside is
@@ -91,16 +126,28 @@ impl Ladder<'_, '_> {
         lights: &Emitters,
         measured: &MeasuredRadiance,
         escaping: f64,
+        closed: Losses,
     ) -> Result<(), Termination> {
         let started = self.monitor.seconds();
         self.monitor.phase("trying light from outside");
+        // A linear step tells about what could be gained, at a small part of the cost of a trial.
+        let gain = self.outside_gain(cache);
+        if gain < OUTSIDE_GAIN {
+            let why = format!(
+                "{:.1} % of the paths leave the mesh; light from there would change the squared error by {:.1} %, so it is \
+                 not called for",
+                escaping * 100.0,
+                -gain * 100.0,
+            );
+            self.record("outside light", started, false, why)?;
+            return Ok(());
+        }
         let before = (
             self.roles.clone(),
             self.unknowns.clone(),
             self.errors.clone(),
             self.trust.clone(),
         );
-        let closed = self.measure();
         self.open = true;
         self.sky = MeasuredOutside::new(self.problem, &self.survey);
         self.expect_of_outside();
@@ -136,7 +183,36 @@ impl Ladder<'_, '_> {
                 ", so it is not called for"
             }
         );
-        self.record("outside light", started, kept, why)
+        self.record("outside light", started, kept, why)?;
+        Ok(())
+    }
+
+    /// The share of the clusters' squared residuals that one linear step takes away once light from every direction
+    /// outside is free. The fall is measured across the two sets of paths, so that fitting their noise gains nothing.
+    fn outside_gain(&self, cache: &PathCache) -> f64 {
+        let surfaces = self.roles.len();
+        let mut free = roles::free(&self.roles);
+        free.extend(surfaces + self.outside.first as usize..2 * surfaces);
+        let linearised = cache.linearise(&self.unknowns, &roles::places(&free, surfaces));
+        let even = Trust::even(surfaces);
+        let equations = NormalEquations::new(&linearised, free.len(), &even, &self.prior);
+        let (after, _) = propose(&equations, &free, &self.unknowns, LEAST_DAMPING);
+        let steps: Vec<DVec3> = (free.iter())
+            .map(|&i| (after.value(i) - self.unknowns.value(i)).as_dvec3())
+            .collect();
+        let (mut fall, mut all) = (0.0, 0.0);
+        for cluster in &linearised {
+            let [mut a, mut b] = cluster.residuals;
+            let weigh = |r: DVec3, s: DVec3| (cluster.weight * r * s).element_sum();
+            all += weigh((a + b) * 0.5, (a + b) * 0.5);
+            fall += weigh(a, b);
+            for &(row, of_a, of_b) in &cluster.rows {
+                a -= of_a * steps[row];
+                b -= of_b * steps[row];
+            }
+            fall -= weigh(a, b);
+        }
+        if all > 0.0 { fall / all } else { 0.0 }
     }
 
     /// Objects that give light.

@@ -100,6 +100,7 @@ pub fn solve(
         None => Reached::new(
             0,
             false,
+            None,
             &vec![Role::Reflector; surfaces],
             &Unknowns::new(surfaces),
             &StandardErrors {
@@ -112,7 +113,8 @@ pub fn solve(
     let sky = (start.open)
         .then(|| MeasuredOutside::new(problem, &survey))
         .flatten();
-    let prior = Prior::new(surfaces, objects, mean_radiance(&clusters));
+    let prior =
+        Prior::new(surfaces, objects, mean_radiance(&clusters)).with_albedo(start.expected.clone());
     let mut ladder = Ladder {
         problem,
         budget,
@@ -211,7 +213,8 @@ impl Ladder<'_, '_> {
                 names.join(", ")
             ),
         };
-        self.finish_stage("objects", started, why)
+        self.record("objects", started, true, why)?;
+        Ok(())
     }
 
     /// Traces the clusters' paths in slices, reporting between them.
@@ -336,18 +339,14 @@ impl Ladder<'_, '_> {
         losses
     }
 
-    fn finish_stage(&mut self, name: &str, started: f64, why: String) -> Result<(), Termination> {
-        self.record(name, started, true, why)
-    }
-
-    /// Records a stage, with its losses as a point of the loss curve.
+    /// Records a stage with its losses, which become a point of the loss curve.
     fn record(
         &mut self,
         name: &str,
         started: f64,
         kept: bool,
         why: String,
-    ) -> Result<(), Termination> {
+    ) -> Result<Losses, Termination> {
         let losses = self.measure();
         self.monitor.loss(losses.train, losses.held_out);
         let stage = Stage {
@@ -361,14 +360,22 @@ impl Ladder<'_, '_> {
         };
         self.monitor.stage(stage);
         self.monitor
-            .report(&self.estimate, &|_| self.checkpoint.clone())
+            .report(&self.estimate, &|_| self.checkpoint.clone())?;
+        Ok(losses)
     }
 
     /// Marks the end of a stage, from where a solve can be taken up again.
     fn reached(&mut self, stages: u32) {
         self.stages = stages;
         self.monitor.progress.seconds = self.monitor.seconds();
-        let reached = Reached::new(stages, self.open, &self.roles, &self.unknowns, &self.errors);
+        let reached = Reached::new(
+            stages,
+            self.open,
+            self.prior.albedo(),
+            &self.roles,
+            &self.unknowns,
+            &self.errors,
+        );
         self.checkpoint = Checkpoint::new(&self.monitor.progress, &reached);
     }
 

@@ -4,12 +4,14 @@ use super::Ladder;
 use crate::inverse::cache::accumulate::Accumulated;
 use crate::inverse::cache::errors::standard_errors;
 use crate::inverse::cache::evaluate::NormalEquations;
-use crate::inverse::cache::fit::propose;
+use crate::inverse::cache::fit::{LEAST_DAMPING, propose};
 use crate::inverse::cache::path_noise::{self, share_paths};
-use crate::inverse::cache::roles::{self, Role};
+use crate::inverse::cache::roles;
 use crate::inverse::cache::trust::Trust;
+use crate::inverse::estimate::{ENOUGH_PIXELS, relative_to_albedo};
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::solver::Termination;
+use crate::math::stats::quantile;
 
 /// A step (in albedo, or relative in emission) asks for linearising anew when it is larger than so many times the
 /// median error aimed at.
@@ -30,19 +32,19 @@ impl Ladder<'_, '_> {
         let lights = self.lights();
         let free = roles::free(&self.roles);
         let all: Vec<usize> = (0..free.len()).collect();
-        let place = self.places(&free);
+        let places = roles::places(&free, self.roles.len());
         let mut about = self.unknowns.clone();
         let mut sums = Accumulated::default();
         let mut outcome = Termination::Steps;
         for round in 0..self.budget.rounds {
             // Path lengths are steered by what is believed at the start, the same in every round.
             let cache = self.trace(&lights, None, 2, round)?;
-            sums.add(cache.linearise(&about, &place));
+            sums.add(cache.linearise(&about, &places));
             let mean = sums.mean();
             self.trust = Trust::from_residuals(&mean, self.roles.len());
             self.path_noise = path_noise::shares(&mean, self.roles.len());
             let equations = NormalEquations::new(&mean, free.len(), &self.trust, &self.prior);
-            let (proposal, _) = propose(&equations, &free, &about, 1e-10);
+            let (proposal, _) = propose(&equations, &free, &about, LEAST_DAMPING);
             let errors = standard_errors(&equations, &free, &all, self.roles.len());
             let step = largest_step(&about, &proposal);
             self.monitor.progress.iterations += 1;
@@ -58,62 +60,57 @@ impl Ladder<'_, '_> {
                 sums = Accumulated::default();
                 continue;
             }
-            let [median, tail] = self.relative_errors(|k| self.relative_error(k));
-            let paths = |k: usize| self.relative_error(k) * self.path_noise[k].sqrt();
-            let [median_of_paths, tail_of_paths] = self.relative_errors(paths);
-            self.monitor.progress.fraction =
-                Some((self.budget.median_error / median).powi(2).min(1.0) as f32);
-            // Paths are enough when the error is small, or when next to none of it is theirs.
-            let enough = |error: f64, of_paths: f64, target: f64| {
-                error < target || of_paths < error * NEGLIGIBLE
-            };
-            if enough(median, median_of_paths, self.budget.median_error)
-                && enough(tail, tail_of_paths, self.budget.tail_error)
-            {
+            let reported = self.reported();
+            let share = (self.budget.median_error / reported.all[0]).powi(2);
+            self.monitor.progress.fraction = Some(share.min(1.0) as f32);
+            if reported.is_enough([self.budget.median_error, self.budget.tail_error]) {
                 outcome = Termination::Converged;
                 break;
             }
         }
-        let [median, tail] = self.relative_errors(|k| self.relative_error(k));
-        let paths = |k: usize| self.relative_error(k) * self.path_noise[k].sqrt();
-        let [median_of_paths, tail_of_paths] = self.relative_errors(paths);
+        let reported = self.reported();
+        let [median, tail] = reported.all.map(|e| e * 100.0);
+        let [median_of_paths, tail_of_paths] = reported.of_paths.map(|e| e * 100.0);
         let why = format!(
-            "{} rounds of independent paths: relative standard error of albedo {:.2} % (median), {:.2} % (95 of 100 objects); \
-             of that from the paths {:.2} % and {:.2} %, the rest from the photographs and the model",
+            "{} rounds of independent paths: relative standard error of albedo {median:.2} % (median), {tail:.2} % (95 of 100 \
+             objects); of that from the paths {median_of_paths:.2} % and {tail_of_paths:.2} %, the rest from the photographs \
+             and the model",
             sums.rounds(),
-            median * 100.0,
-            tail * 100.0,
-            median_of_paths * 100.0,
-            tail_of_paths * 100.0,
         );
-        self.finish_stage("refine", started, why)?;
+        self.record("refine", started, true, why)?;
         Ok(outcome)
     }
 
-    /// Where each parameter stands among the free ones.
-    fn places(&self, free: &[usize]) -> Vec<usize> {
-        let mut place = vec![usize::MAX; 2 * self.roles.len()];
-        for (row, &index) in free.iter().enumerate() {
-            place[index] = row;
-        }
-        place
-    }
-
-    /// Relative standard error of an albedo.
-    fn relative_error(&self, k: usize) -> f64 {
-        f64::from(self.errors.albedo[k].length() / self.unknowns.albedo[k].length().max(1e-3))
-    }
-
-    /// Median and 95th percentile of an error over the reflectors that enough pixels see.
-    fn relative_errors(&self, error: impl Fn(usize) -> f64) -> [f64; 2] {
-        let mut errors: Vec<f64> = (0..self.roles.len())
-            .filter(|&k| {
-                matches!(self.roles[k], Role::Reflector | Role::Glowing)
-                    && self.survey.seen.get(k).copied().unwrap_or(0) >= 50
-            })
-            .map(error)
+    /// How large the relative standard errors of albedo are over the reflectors that enough pixels see.
+    fn reported(&self) -> Reported {
+        let counted: Vec<usize> = (0..self.roles.len())
+            .filter(|&k| self.roles[k].reflects())
+            .filter(|&k| self.survey.seen.get(k).is_some_and(|&n| n >= ENOUGH_PIXELS))
             .collect();
-        [0.5, 0.95].map(|q| crate::math::stats::quantile(&mut errors, q).unwrap_or(0.0))
+        let quantiles = |error: &dyn Fn(usize) -> f64| {
+            let mut errors: Vec<f64> = counted.iter().map(|&k| error(k)).collect();
+            [0.5, 0.95].map(|q| quantile(&mut errors, q).unwrap_or(0.0))
+        };
+        let relative =
+            |k: usize| relative_to_albedo(self.errors.albedo[k], self.unknowns.albedo[k]);
+        Reported {
+            all: quantiles(&relative),
+            of_paths: quantiles(&|k| relative(k) * self.path_noise[k].sqrt()),
+        }
+    }
+}
+
+/// Relative standard errors of albedo: the median over objects, and what 95 of 100 stay below.
+struct Reported {
+    all: [f64; 2],
+    /// The part of them that the noise of the paths makes.
+    of_paths: [f64; 2],
+}
+
+impl Reported {
+    /// Whether more paths would gain little: the error is small, or next to none of it is theirs.
+    fn is_enough(&self, targets: [f64; 2]) -> bool {
+        (0..2).all(|i| self.all[i] < targets[i] || self.of_paths[i] < self.all[i] * NEGLIGIBLE)
     }
 }
 
