@@ -25,6 +25,7 @@ impl Accumulated {
             for set in 0..2 {
                 sum.residuals[set] += new.residuals[set];
             }
+            sum.own += new.own;
             for (place, a, b) in new.rows {
                 match sum.rows.binary_search_by_key(&place, |r| r.0) {
                     Ok(at) => {
@@ -52,6 +53,7 @@ impl Accumulated {
                 weight: c.weight,
                 floor: c.floor,
                 residuals: c.residuals.map(|r: DVec3| r * scale),
+                own: c.own * scale,
                 rows: c
                     .rows
                     .iter()

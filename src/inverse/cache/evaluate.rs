@@ -24,6 +24,9 @@ pub struct Linearised {
     pub floor: DVec3,
     /// Photograph minus model, from set A and from set B.
     pub residuals: [DVec3; 2],
+    /// Derivative with respect to the object's own emission if that is all its light, else to its own albedo; mean of
+    /// both sets.
+    pub own: DVec3,
     /// Place among the free parameters, derivative of A, derivative of B.
     pub rows: Vec<(usize, DVec3, DVec3)>,
 }
@@ -143,7 +146,17 @@ fn linearise(
             rows.push((place, scaled(a), scaled(b)));
         }
     }
+    let object = cached.cluster.object as usize;
+    let gives_light_alone =
+        unknowns.albedo[object] == Vec3::ZERO && unknowns.emission[object] != Vec3::ZERO;
+    let own = object
+        + if gives_light_alone {
+            unknowns.surfaces()
+        } else {
+            0
+        };
     Linearised {
+        own: ((a.values[own] + b.values[own]) * (0.5 * scale)).as_dvec3(),
         object: cached.cluster.object,
         weight: cached.cluster.weight.as_dvec3(),
         floor: (cached.cluster.weight * cached.cluster.measured * cached.cluster.measured)

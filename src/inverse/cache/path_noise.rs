@@ -93,6 +93,7 @@ mod tests {
             weight: DVec3::ONE,
             floor: DVec3::ONE,
             residuals: [DVec3::splat(a), DVec3::splat(b)],
+            own: DVec3::ZERO,
             rows: Vec::new(),
         }
     }

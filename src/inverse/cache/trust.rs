@@ -2,7 +2,9 @@
 //!
 //! Least squares are best where every term weighs by the inverse of its variance. That variance differs from object to
 //! object: a lamp is seen with no noise from paths at all, a textured surface is badly described by one albedo. It is
-//! read off the residuals and the fit repeated (feasible generalised least squares, Aitken 1935, Zellner 1962).
+//! read off the residuals and the fit repeated (feasible generalised least squares, Aitken 1935, Zellner 1962). What a
+//! change of the object's own albedo or emission would take away is left out of them: else an object whose albedo is
+//! wrong would be distrusted for it, and the distrust would keep it wrong.
 
 use super::evaluate::Linearised;
 use glam::DVec3;
@@ -27,7 +29,7 @@ impl Trust {
     /// From the residuals that a fit has left.
     pub fn from_residuals(clusters: &[Linearised], objects: usize) -> Self {
         // The typical variance is a median, which no badly described object can raise.
-        let squares: Vec<DVec3> = clusters.iter().map(square).collect();
+        let squares = squares(clusters, objects);
         let typical = DVec3::from_array(std::array::from_fn(|channel| {
             let mut values: Vec<f64> = squares.iter().map(|s| s[channel]).collect();
             crate::math::stats::quantile(&mut values, 0.5).unwrap_or(0.0) / MEDIAN_CHI2
@@ -63,10 +65,24 @@ impl Trust {
     }
 }
 
-/// Weighted square of a cluster's residual, from both sets together.
-fn square(cluster: &Linearised) -> DVec3 {
-    let mean = (cluster.residuals[0] + cluster.residuals[1]) * 0.5;
-    cluster.weight * mean * mean
+/// Weighted squares of the clusters' residuals, from both sets together, about the best own parameter of each object.
+fn squares(clusters: &[Linearised], objects: usize) -> Vec<DVec3> {
+    let residual = |c: &Linearised| (c.residuals[0] + c.residuals[1]) * 0.5;
+    let mut sums = vec![(DVec3::ZERO, DVec3::ZERO); objects];
+    for cluster in clusters {
+        let (top, bottom) = &mut sums[cluster.object as usize];
+        *top += cluster.weight * cluster.own * residual(cluster);
+        *bottom += cluster.weight * cluster.own * cluster.own;
+    }
+    let steps: Vec<DVec3> = (sums.into_iter())
+        .map(|(top, bottom)| DVec3::select(bottom.cmpgt(DVec3::ZERO), top / bottom, DVec3::ZERO))
+        .collect();
+    (clusters.iter())
+        .map(|cluster| {
+            let left = residual(cluster) - cluster.own * steps[cluster.object as usize];
+            cluster.weight * left * left
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -82,6 +98,7 @@ mod tests {
             weight: DVec3::ONE,
             floor: DVec3::ONE,
             residuals: [DVec3::splat(r); 2],
+            own: DVec3::ZERO,
             rows: Vec::new(),
         })
     }
@@ -110,6 +127,25 @@ mod tests {
             "{ratio}"
         );
         assert_eq!(trust.of(3), trust.of(3).min(DVec3::ONE).max(DVec3::ONE));
+    }
+
+    #[test]
+    fn a_wrong_albedo_costs_no_trust() {
+        let right: Vec<Linearised> = clusters(0, noise(100, 0.1))
+            .chain(clusters(1, noise(100, 0.1)))
+            .collect();
+        let mut wrong = right.clone();
+        for (index, cluster) in wrong.iter_mut().enumerate().skip(100) {
+            cluster.own = DVec3::splat(1.0 + (index / 4 % 3) as f64);
+            for residual in &mut cluster.residuals {
+                *residual += cluster.own * 0.8;
+            }
+        }
+        let [right, wrong] = [right, wrong].map(|c| Trust::from_residuals(&c, 2).of(1));
+        assert!(
+            (right / wrong - DVec3::ONE).abs().max_element() < 0.02,
+            "{wrong}"
+        );
     }
 
     #[test]
