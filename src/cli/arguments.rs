@@ -3,6 +3,7 @@
 use crate::cli::edit::EditArguments;
 use crate::cli::evaluate::EvaluateArguments;
 use crate::cli::export::{DemoArguments, ExportArguments};
+use crate::cli::import::ImportArguments;
 use crate::cli::insert::InsertArguments;
 use crate::cli::parameters::Parameters;
 use crate::cli::render::RenderArguments;
@@ -45,6 +46,8 @@ pub enum Action {
     Edit(EditArguments),
     /// Write the scene or its light for another program
     Export(ExportArguments),
+    /// Turn a scan of another program into a capture
+    Import(ImportArguments),
     /// Write the built-in room as a capture, with its truth
     Demo(DemoArguments),
     /// Measure what exactness costs in seconds, over presets and settings

@@ -4,6 +4,7 @@ mod arguments;
 mod edit;
 mod evaluate;
 mod export;
+mod import;
 mod insert;
 mod interrupt;
 mod parameters;
@@ -55,6 +56,7 @@ fn act(arguments: Arguments, window: Option<Window>) -> Result<()> {
         Some(Action::Render(render)) => render::render(&render),
         Some(Action::Insert(insert)) => insert::insert(&insert),
         Some(Action::Export(files)) => export::export(&files),
+        Some(Action::Import(scan)) => import::import(&scan),
         Some(Action::Demo(demo)) => export::demo(&demo),
         Some(Action::Edit(edit)) => edit::edit(&edit),
         Some(Action::Trade(measured)) => trade::trade(&measured),

@@ -1,12 +1,13 @@
 //! A capture as a folder that every reader of the format opens: transforms.json, mesh.obj, images/NNN.exr, truth.json.
 
 use crate::capture::Capture;
-use crate::capture::camera::Intrinsics;
+use crate::capture::camera::{Intrinsics, Pose};
 use crate::capture::mesh::Mesh;
 use crate::error::Result;
 use crate::export::atomic::{WriteError, write_atomically, write_bytes};
 use crate::export::exr::{Precision, write_rgb};
 use crate::math::picture::Picture;
+use glam::DVec3;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 use std::io::Write;
@@ -30,7 +31,17 @@ pub fn write(folder: &Path, capture: &Capture, precision: Precision) -> Result<(
         };
         write_rgb(&folder.join(image_name(index)), &picture, precision)?;
     }
-    let text = format!("{:#}\n", transforms(capture));
+    let entries: Vec<Entry> = (capture.frames.iter().enumerate())
+        .map(|(index, frame)| Entry {
+            file_path: image_name(index),
+            intrinsics: frame.intrinsics,
+            pose: frame.pose,
+            exposure: None,
+            depth: None,
+        })
+        .collect();
+    let file = transforms(&entries, "mesh.obj", Some(capture.up));
+    let text = format!("{file:#}\n");
     write_bytes(&folder.join("transforms.json"), text.as_bytes())
 }
 
@@ -53,25 +64,47 @@ fn image_name(index: usize) -> String {
     format!("images/{index:03}.exr")
 }
 
-/// Intrinsics, poses and up; numbers are written so that they read back to the bit.
-fn transforms(capture: &Capture) -> Value {
-    let shared = capture.frames.first().map(|frame| frame.intrinsics);
+/// A frame of transforms.json.
+#[derive(Debug, Clone)]
+pub struct Entry {
+    /// The photograph, relative to the folder.
+    pub file_path: String,
+    /// Its camera.
+    pub intrinsics: Intrinsics,
+    /// Camera to world.
+    pub pose: Pose,
+    /// Linear multiplier, if it is to be written.
+    pub exposure: Option<f64>,
+    /// Depth image relative to the folder, and metres per unit.
+    pub depth: Option<(String, f64)>,
+}
+
+/// transforms.json: intrinsics, poses and up; numbers are written so that they read back to the bit.
+pub fn transforms(entries: &[Entry], mesh_path: &str, up: Option<DVec3>) -> Value {
+    let shared = entries.first().map(|entry| entry.intrinsics);
     let mut file = Map::new();
     file.insert("camera_model".into(), json!("OPENCV"));
     if let Some(shared) = shared {
         file.extend(lens(&shared));
     }
-    file.insert("mesh_path".into(), json!("mesh.obj"));
-    file.insert("up".into(), json!(capture.up.to_array()));
-    let frames: Vec<Value> = capture
-        .frames
+    file.insert("mesh_path".into(), json!(mesh_path));
+    if let Some(up) = up {
+        file.insert("up".into(), json!(up.to_array()));
+    }
+    let frames: Vec<Value> = entries
         .iter()
-        .enumerate()
-        .map(|(index, frame)| {
+        .map(|frame| {
             let mut entry = Map::new();
-            entry.insert("file_path".into(), json!(image_name(index)));
+            entry.insert("file_path".into(), json!(frame.file_path));
             if Some(frame.intrinsics) != shared {
                 entry.extend(lens(&frame.intrinsics));
+            }
+            if let Some(exposure) = frame.exposure {
+                entry.insert("exposure".into(), json!(exposure));
+            }
+            if let Some((path, unit)) = &frame.depth {
+                entry.insert("depth_file_path".into(), json!(path));
+                entry.insert("depth_unit_scale_factor".into(), json!(unit));
             }
             let r = frame.pose.rotation;
             let c = frame.pose.center;

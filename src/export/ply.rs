@@ -1,5 +1,6 @@
 //! Binary PLY with vertex colours.
 
+use crate::capture::mesh::Mesh;
 use crate::error::Result;
 use crate::export::atomic::write_atomically;
 use crate::export::scene::Part;
@@ -87,6 +88,62 @@ pub fn write_part(path: &Path, part: &Part) -> Result<()> {
         }
         for &triangle in &part.triangles {
             write_face(out, triangle)?;
+        }
+        Ok(())
+    })
+}
+
+/// Writes a mesh as it is: positions in double precision, linear vertex colours as floats, texture coordinates a corner, and
+/// each face's `object_id` with the names in comments if `with_objects`. [`crate::capture::read`] reads it back.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_mesh(path: &Path, mesh: &Mesh, with_objects: bool) -> Result<()> {
+    let colored = mesh.vertex_colors.len() == mesh.positions.len();
+    let textured = mesh.corner_uvs.len() == mesh.triangles.len();
+    write_atomically(path, |out| {
+        writeln!(out, "ply\nformat binary_little_endian 1.0")?;
+        if with_objects {
+            for (index, name) in mesh.objects.iter().enumerate() {
+                let name = name.replace(char::is_control, " ");
+                writeln!(out, "comment object_id {index} {name}")?;
+            }
+        }
+        writeln!(out, "element vertex {}", mesh.positions.len())?;
+        for axis in ["x", "y", "z"] {
+            writeln!(out, "property double {axis}")?;
+        }
+        for color in ["red", "green", "blue"].iter().filter(|_| colored) {
+            writeln!(out, "property float {color}")?;
+        }
+        writeln!(out, "element face {}", mesh.triangles.len())?;
+        writeln!(out, "property list uchar int vertex_indices")?;
+        if textured {
+            writeln!(out, "property list uchar float texcoord")?;
+        }
+        if with_objects {
+            writeln!(out, "property int object_id")?;
+        }
+        writeln!(out, "end_header")?;
+        for (index, position) in mesh.positions.iter().enumerate() {
+            for v in position.to_array() {
+                out.write_all(&v.to_le_bytes())?;
+            }
+            if colored {
+                write_color(out, mesh.vertex_colors[index])?;
+            }
+        }
+        for (index, &triangle) in mesh.triangles.iter().enumerate() {
+            write_face(out, triangle)?;
+            if textured {
+                out.write_all(&[6])?;
+                for v in mesh.corner_uvs[index].iter().flat_map(|uv| uv.to_array()) {
+                    out.write_all(&v.to_le_bytes())?;
+                }
+            }
+            if with_objects {
+                out.write_all(&mesh.object_of[index].to_le_bytes())?;
+            }
         }
         Ok(())
     })

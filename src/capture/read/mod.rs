@@ -14,16 +14,16 @@
 mod accessor;
 pub mod confine;
 mod exposure;
-mod fields;
+pub(in crate::capture) mod fields;
 mod gltf;
 pub mod gltf_file;
 pub mod image;
-mod lens;
-mod mesh;
+pub(in crate::capture) mod lens;
+pub(in crate::capture) mod mesh;
 mod obj;
 mod ply;
 mod ply_elements;
-mod pose;
+pub(in crate::capture) mod pose;
 mod transforms;
 
 use crate::capture::Capture;

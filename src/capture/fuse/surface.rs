@@ -1,0 +1,131 @@
+//! The zero surface of the distance field, block by block, by the crate fast-surface-nets.
+
+use crate::capture::fuse::block::{Block, SIDE, Voxel};
+use crate::capture::fuse::integrate::Field;
+use crate::capture::mesh::Mesh;
+use fast_surface_nets::ndshape::{ConstShape, ConstShape3u32};
+use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
+use glam::{DVec3, IVec3, Vec3};
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// A block with one voxel more on each side.
+type Samples = ConstShape3u32<10, 10, 10>;
+/// Blocks whose surface is found at a time.
+const BATCH: usize = 1024;
+
+/// The surface in one block: vertices by their cell of the grid, and triangles of them.
+#[derive(Debug, Default)]
+struct Piece {
+    cells: Vec<IVec3>,
+    positions: Vec<DVec3>,
+    colors: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+}
+
+/// All triangles between voxels that were all measured; their front is where the distance is positive.
+pub fn extract(field: &Field) -> Mesh {
+    let mut order: Vec<&Block> = field.blocks.iter().collect();
+    order.sort_unstable_by_key(|block| block.at.to_array());
+    let mut mesh = Mesh {
+        objects: vec!["mesh".into()],
+        ..Mesh::default()
+    };
+    // A cell has one vertex, whichever block found it.
+    let mut vertices: HashMap<IVec3, u32> = HashMap::new();
+    for blocks in order.chunks(BATCH) {
+        let pieces: Vec<Piece> = blocks.par_iter().map(|b| piece(field, b)).collect();
+        for piece in pieces {
+            let mut index = Vec::with_capacity(piece.cells.len());
+            for (i, &cell) in piece.cells.iter().enumerate() {
+                let next = mesh.positions.len() as u32;
+                let vertex = *vertices.entry(cell).or_insert(next);
+                if vertex == next {
+                    mesh.positions.push(piece.positions[i]);
+                    mesh.vertex_colors.push(piece.colors[i]);
+                }
+                index.push(vertex);
+            }
+            for triangle in piece.triangles {
+                mesh.triangles.push(triangle.map(|i| index[i as usize]));
+                mesh.object_of.push(0);
+            }
+        }
+    }
+    mesh
+}
+
+/// The surface in a block and the cells before it.
+fn piece(field: &Field, block: &Block) -> Piece {
+    // The block's voxels with one layer of its neighbours' around.
+    let low = block.at * SIDE - IVec3::ONE;
+    let neighbours: [Option<&Block>; 27] = std::array::from_fn(|i| {
+        let i = i as i32;
+        let offset = IVec3::new(i % 3, i / 3 % 3, i / 9) - IVec3::ONE;
+        let place = field.places.get(&(block.at + offset))?;
+        field.blocks.get(*place)
+    });
+    let sample = |p: [u32; 3]| -> Option<&Voxel> {
+        let inside = IVec3::from_array(p.map(|c| c as i32)) - IVec3::ONE;
+        let which = inside.div_euclid(IVec3::splat(SIDE)) + IVec3::ONE;
+        let neighbour = neighbours[(which.x + 3 * (which.y + 3 * which.z)) as usize]?;
+        let voxel = &neighbour.voxels[Block::index(inside.rem_euclid(IVec3::splat(SIDE)))];
+        (voxel.weight > 0.0).then_some(voxel)
+    };
+    let voxels: Vec<Option<&Voxel>> = (0..Samples::SIZE)
+        .map(|i| sample(Samples::delinearize(i)))
+        .collect();
+    let distances: Vec<f32> = voxels
+        .iter()
+        .map(|voxel| voxel.map_or(1.0, |voxel| voxel.distance))
+        .collect();
+    let mut net = SurfaceNetsBuffer::default();
+    surface_nets(&distances, &Samples {}, [0; 3], [9; 3], &mut net);
+
+    // Cells with a corner that nothing measured hold no surface.
+    let mut piece = Piece::default();
+    let mut kept = vec![None; net.positions.len()];
+    for (vertex, &cell) in net.surface_points.iter().enumerate() {
+        let corners: Option<Vec<&Voxel>> = (0..8)
+            .map(|i| {
+                let corner = [
+                    cell[0] + (i & 1),
+                    cell[1] + (i >> 1 & 1),
+                    cell[2] + (i >> 2),
+                ];
+                voxels[Samples::linearize(corner) as usize]
+            })
+            .collect();
+        let Some(corners) = corners else { continue };
+        kept[vertex] = Some(piece.cells.len() as u32);
+        let local = Vec3::from_array(net.positions[vertex]).as_dvec3();
+        piece.positions.push((low.as_dvec3() + local) * field.edge);
+        piece.colors.push(mean_color(&corners));
+        piece
+            .cells
+            .push(low + IVec3::from_array(cell.map(|c| c as i32)));
+    }
+    for triangle in net.indices.chunks_exact(3) {
+        let corners = [triangle[0], triangle[1], triangle[2]].map(|i| kept[i as usize]);
+        if let [Some(a), Some(b), Some(c)] = corners {
+            piece.triangles.push([a, b, c]);
+        }
+    }
+    piece
+}
+
+/// The mean colour of a cell's corners, nearer ones to the surface counting more; grey where no photograph saw any.
+fn mean_color(corners: &[&Voxel]) -> Vec3 {
+    let mut sum = Vec3::ZERO;
+    let mut weights = 0.0;
+    for voxel in corners.iter().filter(|voxel| voxel.color_weight > 0.0) {
+        let weight = 1.01 - voxel.distance.abs();
+        sum += voxel.color * weight;
+        weights += weight;
+    }
+    if weights > 0.0 {
+        sum / weights
+    } else {
+        Vec3::splat(0.5)
+    }
+}

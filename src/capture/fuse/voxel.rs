@@ -1,0 +1,103 @@
+//! How large voxels should be.
+
+use crate::capture::import::{DepthImage, ImportedFrame};
+use crate::error::{Error, Result};
+use crate::math::stats::quantile;
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+/// Voxels along the scan's longest side, by default.
+const ACROSS: f64 = 256.0;
+/// Depth images that are looked at for the scan's extent.
+const FRAMES: usize = 64;
+/// Points of each depth image along its longer side.
+const POINTS: u32 = 64;
+
+/// An edge, and why it was chosen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VoxelChoice {
+    /// Edge in metres.
+    pub edge: f64,
+    /// The reason in words; empty if the person chose.
+    pub reason: String,
+}
+
+/// The edge that the person asks for, or 1/256 of the longest side of what the depth images show (1 % at either end left out),
+/// no finer than depth pixels are. A room that fills its bounding box with surfaces would then need 400 MB.
+///
+/// # Errors
+/// The edge asked for is impossible, a depth image is broken, or no depth was measured.
+pub fn voxel_size(frames: &[ImportedFrame], asked: Option<f64>) -> Result<VoxelChoice> {
+    if let Some(edge) = asked {
+        if !(edge.is_finite() && edge > 0.0) {
+            return Err(Error::usage(
+                "--voxel",
+                "the edge of a voxel must be positive",
+                "give it in metres, e.g. 0.02",
+            ));
+        }
+        return Ok(VoxelChoice {
+            edge,
+            reason: String::new(),
+        });
+    }
+    let with_depth: Vec<(&ImportedFrame, &DepthImage)> = frames
+        .iter()
+        .filter_map(|frame| Some((frame, frame.depth.as_ref()?)))
+        .collect();
+    let step = with_depth.len().div_ceil(FRAMES).max(1);
+    let samples: Result<Vec<Vec<(DVec3, f64)>>> = with_depth
+        .par_iter()
+        .step_by(step)
+        .map(|(frame, depth)| points(frame, depth))
+        .collect();
+    let samples: Vec<(DVec3, f64)> = samples?.into_iter().flatten().collect();
+    let ends = |value: fn(&DVec3) -> f64| -> Option<(f64, f64)> {
+        let mut values: Vec<f64> = samples.iter().map(|(p, _)| value(p)).collect();
+        Some((quantile(&mut values, 0.01)?, quantile(&mut values, 0.99)?))
+    };
+    let sides = [ends(|p| p.x), ends(|p| p.y), ends(|p| p.z)];
+    let longest = sides
+        .iter()
+        .flatten()
+        .fold(0.0, |longest: f64, (low, high)| longest.max(high - low));
+    let mut pixels: Vec<f64> = samples.iter().map(|(_, pixel)| *pixel).collect();
+    let Some(pixel) = quantile(&mut pixels, 0.5).filter(|_| longest > 0.0) else {
+        return Err(Error::new(
+            "depth images",
+            "they hold no measured depth",
+            "check the depth images, or name a mesh with --mesh",
+        ));
+    };
+
+    let (mut edge, mut reason) = (
+        longest / ACROSS,
+        format!("1/{ACROSS} of the depth's extent of {longest:.2} m"),
+    );
+    if pixel > edge {
+        edge = pixel;
+        reason = "the size of a depth pixel".into();
+    }
+    Ok(VoxelChoice { edge, reason })
+}
+
+/// Measured points of a depth image in the world, and the size of a pixel there.
+fn points(frame: &ImportedFrame, depth: &DepthImage) -> Result<Vec<(DVec3, f64)>> {
+    let metres = depth.metres()?;
+    let k = &depth.lens.pinhole;
+    let stride = k.width.max(k.height).div_ceil(POINTS).max(1) as usize;
+    let mut points = Vec::new();
+    for y in (0..k.height).step_by(stride) {
+        for x in (0..k.width).step_by(stride) {
+            let z = f64::from(metres[(y * k.width + x) as usize]);
+            let pixel = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+            if z > 0.0
+                && let Some(ray) = depth.lens.ray(pixel)
+            {
+                let p = DVec3::new(ray.x, -ray.y, -1.0) * z;
+                points.push((frame.pose.rotation * p + frame.pose.center, z / k.fx));
+            }
+        }
+    }
+    Ok(points)
+}

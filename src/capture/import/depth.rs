@@ -1,0 +1,107 @@
+//! 16-bit depth images.
+
+use crate::capture::import::lens::Lens;
+use crate::error::{Error, Result};
+use image::{DynamicImage, ImageReader, Limits};
+use std::path::{Path, PathBuf};
+
+/// A depth image and what its numbers mean.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DepthImage {
+    /// 16-bit grey PNG (or PGM).
+    pub path: PathBuf,
+    /// The camera that it was taken with; it sits where the photograph's does.
+    pub lens: Lens,
+    /// Metres per unit, along the viewing direction (not along the ray).
+    pub metres_per_unit: f64,
+    /// A value that, like 0, means that nothing was measured.
+    pub invalid: Option<u16>,
+}
+
+impl DepthImage {
+    /// The raw values, row by row; 0 where nothing was measured.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no 16-bit grey image, or has another size than its camera.
+    pub fn raw(&self) -> Result<Vec<u16>> {
+        let broken = |e: &image::ImageError| {
+            Error::file(
+                &self.path,
+                format!("cannot be decoded: {e}"),
+                "export it again",
+            )
+        };
+        let mut reader = reader(&self.path)?;
+        let mut limits = Limits::default();
+        limits.max_alloc = Some(1 << 30);
+        reader.limits(limits);
+        let image = reader.decode().map_err(|e| broken(&e))?;
+        let (width, height) = (image.width(), image.height());
+        let k = &self.lens.pinhole;
+        if (width, height) != (k.width, k.height) {
+            return Err(Error::file(
+                &self.path,
+                format!(
+                    "is {width}×{height} pixels, but the other depth images {}×{}",
+                    k.width, k.height
+                ),
+                "use depth images of one size",
+            ));
+        }
+        let DynamicImage::ImageLuma16(image) = image else {
+            return Err(Error::file(
+                &self.path,
+                format!("is no 16-bit grey image but {:?}", image.color()),
+                "export depth as 16-bit grey PNG",
+            ));
+        };
+        let mut values = image.into_raw();
+        if let Some(invalid) = self.invalid {
+            for value in &mut values {
+                if *value == invalid {
+                    *value = 0;
+                }
+            }
+        }
+        Ok(values)
+    }
+
+    /// Metres along the viewing direction; 0 where nothing was measured.
+    ///
+    /// # Errors
+    /// As [`DepthImage::raw`].
+    pub fn metres(&self) -> Result<Vec<f32>> {
+        let unit = self.metres_per_unit;
+        let raw = self.raw()?;
+        Ok(raw.iter().map(|&v| (f64::from(v) * unit) as f32).collect())
+    }
+
+    /// Whether the depth image shows what the photograph's lens shows, up to the number of pixels.
+    pub fn is_registered_to(&self, photograph: &Lens) -> bool {
+        let k = &self.lens.pinhole;
+        let scaled = photograph.resized([k.width, k.height]);
+        let near = |a: f64, b: f64| (a - b).abs() <= 0.005 * f64::from(k.width);
+        let p = &scaled.pinhole;
+        let same = near(k.fx, p.fx) && near(k.fy, p.fy) && near(k.cx, p.cx) && near(k.cy, p.cy);
+        same && self.lens.model == photograph.model
+    }
+}
+
+/// Width and height of a depth image.
+///
+/// # Errors
+/// The file cannot be read or is no image.
+pub fn size(path: &Path) -> Result<[u32; 2]> {
+    let (width, height) = reader(path)?
+        .into_dimensions()
+        .map_err(|e| Error::file(path, format!("cannot be decoded: {e}"), "export it again"))?;
+    Ok([width, height])
+}
+
+fn reader(path: &Path) -> Result<ImageReader<std::io::BufReader<std::fs::File>>> {
+    let io = |e: std::io::Error| Error::io(path, &e);
+    ImageReader::open(path)
+        .map_err(io)?
+        .with_guessed_format()
+        .map_err(io)
+}

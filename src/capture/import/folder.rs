@@ -1,0 +1,178 @@
+//! The folder that is imported: listings and texts of bounded size, and no way out of it.
+
+use crate::capture::read::confine::Confine;
+use crate::error::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// Longest text file that is read.
+const MAX_TEXT: u64 = 1 << 28;
+/// Most entries that a folder may have.
+const MAX_ENTRIES: usize = 1 << 20;
+
+/// A folder that paths may not leave.
+#[derive(Debug, Clone)]
+pub struct Folder {
+    confine: Confine,
+}
+
+impl Folder {
+    /// The folder to import.
+    ///
+    /// # Errors
+    /// It is no folder.
+    pub fn new(path: &Path) -> Result<Self> {
+        if !path.is_dir() {
+            return Err(Error::file(
+                path,
+                "is not a folder",
+                "name the folder that holds the scan",
+            ));
+        }
+        Ok(Self {
+            confine: Confine::new(path, false)?,
+        })
+    }
+
+    /// The way that keeps paths inside.
+    pub fn confine(&self) -> &Confine {
+        &self.confine
+    }
+
+    /// Full path of something inside, unchecked.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.confine.folder().join(name)
+    }
+
+    /// Whether something of this name is there.
+    pub fn has(&self, name: &str) -> bool {
+        self.confine.holds(name)
+    }
+
+    /// Whether a folder of this name is there.
+    pub fn has_folder(&self, name: &str) -> bool {
+        self.path(name).is_dir()
+    }
+
+    /// The first of the names that is there.
+    pub fn first<'a>(&self, names: &[&'a str]) -> Option<&'a str> {
+        names.iter().copied().find(|name| self.has(name))
+    }
+
+    /// The existing file of this name; `place` says who asks for it.
+    ///
+    /// # Errors
+    /// It leads out of the folder, or is no regular file.
+    pub fn file(&self, place: &str, name: &str) -> Result<PathBuf> {
+        self.confine.file(place, name)
+    }
+
+    /// A text file's content; bytes that are no UTF-8 are replaced.
+    ///
+    /// # Errors
+    /// As [`Folder::file`], or the file is too long.
+    pub fn text(&self, name: &str) -> Result<String> {
+        let bytes = self.bytes(name, MAX_TEXT)?;
+        Ok(String::from_utf8_lossy(&bytes).into_owned())
+    }
+
+    /// A file's content of at most `most` bytes.
+    ///
+    /// # Errors
+    /// As [`Folder::file`], or the file is too long.
+    pub fn bytes(&self, name: &str, most: u64) -> Result<Vec<u8>> {
+        let path = self.path(name);
+        let file = self.file(&path.display().to_string(), name)?;
+        let length = file.metadata().map_err(|e| Error::io(&file, &e))?.len();
+        if length > most {
+            return Err(Error::file(
+                &file,
+                format!("{length} bytes are more than the {most} that are read"),
+                "split the scan",
+            ));
+        }
+        std::fs::read(&file).map_err(|e| Error::io(&file, &e))
+    }
+
+    /// Names of what lies in a folder inside (`""` for the folder itself), numbers in them ordered by value.
+    ///
+    /// # Errors
+    /// The folder leads out, cannot be read or has too many entries.
+    pub fn names(&self, inside: &str) -> Result<Vec<String>> {
+        let path = self.path(inside);
+        let whole = self.confine.folder().canonicalize();
+        let resolved = path.canonicalize().map_err(|e| Error::io(&path, &e))?;
+        if !whole.is_ok_and(|whole| resolved.starts_with(whole)) {
+            return Err(Error::file(
+                &path,
+                "leads out of the imported folder",
+                "copy it into the folder",
+            ));
+        }
+        let entries = std::fs::read_dir(&path).map_err(|e| Error::io(&path, &e))?;
+        let mut names = Vec::new();
+        for entry in entries {
+            let entry = entry.map_err(|e| Error::io(&path, &e))?;
+            if let Ok(name) = entry.file_name().into_string() {
+                names.push(name);
+            }
+            if names.len() > MAX_ENTRIES {
+                return Err(Error::file(
+                    &path,
+                    format!("has more than {MAX_ENTRIES} entries"),
+                    "split the scan",
+                ));
+            }
+        }
+        names.sort_by_cached_key(|name| natural_key(name));
+        Ok(names)
+    }
+}
+
+/// Digits as numbers, all else as letters: `10` comes after `9`.
+fn natural_key(name: &str) -> Vec<(String, u64, String)> {
+    let mut parts: Vec<(String, u64, String)> = Vec::new();
+    let mut rest = name;
+    while !rest.is_empty() {
+        let split = rest
+            .find(|c: char| c.is_ascii_digit())
+            .unwrap_or(rest.len());
+        let (letters, after) = rest.split_at(split);
+        let end = after
+            .find(|c: char| !c.is_ascii_digit())
+            .unwrap_or(after.len());
+        let (digits, after) = after.split_at(end);
+        let number = digits.parse().unwrap_or(u64::MAX);
+        parts.push((letters.to_owned(), number, digits.to_owned()));
+        rest = after;
+    }
+    parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_in_names_order_by_value() {
+        let mut names = [
+            "frame-10.png",
+            "frame-9.png",
+            "a",
+            "frame-010.png",
+            "2",
+            "11",
+        ];
+        names.sort_by_cached_key(|name| natural_key(name));
+        assert_eq!(
+            names,
+            [
+                "2",
+                "11",
+                "a",
+                "frame-9.png",
+                "frame-010.png",
+                "frame-10.png"
+            ]
+        );
+    }
+}

@@ -1,0 +1,241 @@
+//! Lens models of other programs, and which of them a capture can hold as they are.
+
+use crate::capture::camera::Intrinsics;
+use glam::{DVec2, DVec3};
+
+/// A camera before it is a capture's: any of the lens models that are understood.
+///
+/// Pixel (i, j) covers [i, i+1] × [j, j+1], y down, as in [`Intrinsics`]. Camera axes are OpenCV's: x right, y down,
+/// looking along +z.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lens {
+    /// Focal lengths, principal point and size; its own distortion is zero and plays no part.
+    pub pinhole: Intrinsics,
+    /// How the lens bends.
+    pub model: Model,
+}
+
+/// Distortion of normalised image coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Model {
+    /// k1, k2, p1, p2 of OpenCV: what a capture itself holds.
+    Brown([f64; 4]),
+    /// OpenCV's rational model: radial (1 + k1 r² + k2 r⁴ + k3 r⁶) / (1 + k4 r² + k5 r⁴ + k6 r⁶), tangential p1, p2.
+    Rational {
+        /// k1 to k6.
+        k: [f64; 6],
+        /// p1, p2.
+        p: [f64; 2],
+    },
+    /// OpenCV's fisheye: θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸) for the angle θ from the axis (Kannala and Brandt).
+    Fisheye([f64; 4]),
+}
+
+impl Lens {
+    /// A lens without distortion.
+    pub fn plain(size: [u32; 2], focal: [f64; 2], center: [f64; 2]) -> Self {
+        Self {
+            pinhole: Intrinsics {
+                width: size[0],
+                height: size[1],
+                fx: focal[0],
+                fy: focal[1],
+                cx: center[0],
+                cy: center[1],
+                distortion: [0.0; 4],
+            },
+            model: Model::Brown([0.0; 4]),
+        }
+    }
+
+    /// The same lens with a distortion; a rational model or a fisheye that says no more than k1 k2 p1 p2 becomes that.
+    pub fn with(self, model: Model) -> Self {
+        let model = match model {
+            Model::Rational { k, p } if k[2..].iter().all(|&k| k == 0.0) => {
+                Model::Brown([k[0], k[1], p[0], p[1]])
+            }
+            model => model,
+        };
+        Self { model, ..self }
+    }
+
+    /// Whether every number is finite and the focal lengths are positive.
+    pub fn is_possible(&self) -> bool {
+        let k = &self.pinhole;
+        let coefficients: &[f64] = match &self.model {
+            Model::Brown(k) | Model::Fisheye(k) => k,
+            Model::Rational { k, p } if p.iter().all(|p| p.is_finite()) => k,
+            Model::Rational { .. } => return false,
+        };
+        let finite = |x: &f64| x.is_finite();
+        k.fx > 0.0
+            && k.fy > 0.0
+            && [k.fx, k.fy, k.cx, k.cy].iter().all(finite)
+            && coefficients.iter().all(finite)
+    }
+
+    /// Whether a capture holds this lens as it is; otherwise the photograph has to be resampled.
+    pub fn fits_a_capture(&self) -> bool {
+        matches!(self.model, Model::Brown(_))
+    }
+
+    /// What the capture's photograph has: this lens, or the pinhole of the same focal length that it is resampled to.
+    pub fn intrinsics(&self) -> Intrinsics {
+        match self.model {
+            Model::Brown(distortion) => Intrinsics {
+                distortion,
+                ..self.pinhole
+            },
+            _ => self.pinhole,
+        }
+    }
+
+    /// The same lens on an image scaled to another size.
+    pub fn resized(&self, size: [u32; 2]) -> Self {
+        let k = self.pinhole;
+        let x = f64::from(size[0]) / f64::from(k.width);
+        let y = f64::from(size[1]) / f64::from(k.height);
+        Self {
+            pinhole: Intrinsics {
+                width: size[0],
+                height: size[1],
+                fx: k.fx * x,
+                fy: k.fy * y,
+                cx: k.cx * x,
+                cy: k.cy * y,
+                distortion: k.distortion,
+            },
+            model: self.model,
+        }
+    }
+
+    /// The pixel position of a point in camera axes; `None` behind the camera or where the lens model says nothing.
+    pub fn project(&self, point: DVec3) -> Option<DVec2> {
+        if point.z <= 0.0 {
+            return None;
+        }
+        self.distort(point.truncate() / point.z)
+            .map(|p| self.pixel(p))
+    }
+
+    /// The pixel position of distorted normalised coordinates.
+    fn pixel(&self, p: DVec2) -> DVec2 {
+        let k = &self.pinhole;
+        DVec2::new(p.x * k.fx + k.cx, p.y * k.fy + k.cy)
+    }
+
+    /// Distorted normalised coordinates of undistorted ones; `None` where the radial function turns back.
+    pub fn distort(&self, p: DVec2) -> Option<DVec2> {
+        let r2 = p.length_squared();
+        match self.model {
+            Model::Brown(distortion) => Intrinsics {
+                distortion,
+                ..self.pinhole
+            }
+            .distort(p),
+            Model::Rational { k, p: [p1, p2] } => {
+                let over = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[2]));
+                let under = 1.0 + r2 * (k[3] + r2 * (k[4] + r2 * k[5]));
+                let over_slope = k[0] + r2 * (2.0 * k[1] + r2 * 3.0 * k[2]);
+                let under_slope = k[3] + r2 * (2.0 * k[4] + r2 * 3.0 * k[5]);
+                // d(r · over / under)/dr, times under².
+                let slope = over * under + 2.0 * r2 * (over_slope * under - over * under_slope);
+                if slope <= 0.0 || under <= 0.0 {
+                    return None;
+                }
+                let radial = over / under;
+                Some(DVec2::new(
+                    p.x * radial + 2.0 * p1 * p.x * p.y + p2 * (r2 + 2.0 * p.x * p.x),
+                    p.y * radial + p1 * (r2 + 2.0 * p.y * p.y) + 2.0 * p2 * p.x * p.y,
+                ))
+            }
+            Model::Fisheye(k) => {
+                let r = r2.sqrt();
+                let angle = r.atan();
+                let a2 = angle * angle;
+                let bent = 1.0 + a2 * (k[0] + a2 * (k[1] + a2 * (k[2] + a2 * k[3])));
+                let slope = 1.0
+                    + a2 * (3.0 * k[0] + a2 * (5.0 * k[1] + a2 * (7.0 * k[2] + a2 * 9.0 * k[3])));
+                if slope <= 0.0 {
+                    return None;
+                }
+                let scale = if r > 1e-12 { angle * bent / r } else { 1.0 };
+                Some(p * scale)
+            }
+        }
+    }
+
+    /// Undistorted normalised coordinates of a pixel position, by fixed-point iteration; `None` where that finds none.
+    pub fn ray(&self, pixel: DVec2) -> Option<DVec2> {
+        let k = &self.pinhole;
+        let distorted = DVec2::new((pixel.x - k.cx) / k.fx, (pixel.y - k.cy) / k.fy);
+        if self.model == Model::Brown([0.0; 4]) {
+            return Some(distorted);
+        }
+        let mut p = distorted;
+        for _ in 0..50 {
+            let error = distorted - self.distort(p)?;
+            p += error;
+            if error.length_squared() < 1e-20 {
+                return Some(p);
+            }
+        }
+        let error = distorted - self.distort(p)?;
+        (error.length_squared() < 1e-10).then_some(p)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lens(model: Model) -> Lens {
+        Lens::plain([640, 480], [500.0, 510.0], [318.0, 241.0]).with(model)
+    }
+
+    #[test]
+    fn rays_undo_projections_for_every_model() {
+        for model in [
+            Model::Brown([0.1, -0.05, 1e-3, -2e-3]),
+            Model::Rational {
+                k: [0.2624, -0.9531, 1.1633, 0.0, 0.0, 0.0],
+                p: [-0.0054, 0.0026],
+            },
+            Model::Fisheye([0.02, -0.01, 0.003, 0.0]),
+        ] {
+            let lens = lens(model);
+            for point in [
+                DVec3::new(0.3, -0.2, 1.0),
+                DVec3::new(0.0, 0.0, 2.0),
+                DVec3::new(-1.0, 0.7, 2.5),
+            ] {
+                let pixel = lens.project(point).unwrap();
+                let ray = lens.ray(pixel).unwrap();
+                assert!(
+                    (ray - point.truncate() / point.z).length() < 1e-6,
+                    "{model:?} {point}"
+                );
+            }
+            assert!(lens.project(DVec3::new(0.0, 0.0, -1.0)).is_none());
+        }
+    }
+
+    #[test]
+    fn an_equidistant_fisheye_maps_angles_to_radii() {
+        let lens = lens(Model::Fisheye([0.0; 4]));
+        let angle = 0.9_f64;
+        let pixel = lens
+            .project(DVec3::new(angle.sin(), 0.0, angle.cos()))
+            .unwrap();
+        assert!((pixel.x - (318.0 + 500.0 * angle)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_rational_model_without_higher_terms_is_one_that_captures_hold() {
+        let k = [0.1, 0.2, 0.0, 0.0, 0.0, 0.0];
+        let plain = lens(Model::Rational { k, p: [0.3, 0.4] });
+        assert_eq!(plain.intrinsics().distortion, [0.1, 0.2, 0.3, 0.4]);
+        assert!(plain.fits_a_capture());
+        assert!(!lens(Model::Fisheye([0.0; 4])).fits_a_capture());
+    }
+}

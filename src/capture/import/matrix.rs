@@ -1,0 +1,126 @@
+//! Matrices and poses in text files.
+
+use crate::capture::camera::Pose;
+use crate::capture::read::pose::from_rows;
+use crate::error::{Error, Result};
+use glam::{DMat3, DQuat, DVec3};
+use std::path::Path;
+
+/// A number as C, Python and MATLAB write it, `nan`, `-nan` and `-inf` included.
+pub fn number(word: &str) -> Option<f64> {
+    let lower = word.to_ascii_lowercase();
+    match lower.as_str() {
+        "-nan" | "+nan" | "-nan(ind)" | "1.#qnan" | "-1.#ind" => Some(f64::NAN),
+        "1.#inf" => Some(f64::INFINITY),
+        "-1.#inf" => Some(f64::NEG_INFINITY),
+        _ => lower.parse().ok(),
+    }
+}
+
+/// All numbers of a text, separated by white space, commas or semicolons; `None` if a word is no number.
+pub fn numbers(text: &str) -> Option<Vec<f64>> {
+    text.split(|c: char| c.is_whitespace() || c == ',' || c == ';')
+        .filter(|word| !word.is_empty())
+        .map(number)
+        .collect()
+}
+
+/// The 3×3, 3×4 or 4×4 matrix of a text file, in rows.
+///
+/// # Errors
+/// The text is something else.
+pub fn rows(path: &Path, text: &str) -> Result<Vec<Vec<f64>>> {
+    let numbers = numbers(text);
+    let width = match numbers.as_ref().map(Vec::len) {
+        Some(9) => 3,
+        Some(12 | 16) => 4,
+        _ => {
+            return Err(Error::file(
+                path,
+                "is no 3×3, 3×4 or 4×4 matrix of numbers",
+                "export it again",
+            ));
+        }
+    };
+    Ok(numbers
+        .unwrap_or_default()
+        .chunks(width)
+        .map(<[f64]>::to_vec)
+        .collect())
+}
+
+/// The pose of a camera-to-world matrix with OpenCV's camera axes; `None` if it holds a number that is not finite.
+///
+/// # Errors
+/// The matrix is no rigid motion.
+pub fn pose_of_rows(place: &str, rows: &[Vec<f64>]) -> Result<Option<Pose>> {
+    if rows.iter().flatten().any(|x| !x.is_finite()) {
+        return Ok(None);
+    }
+    let (pose, _) = from_rows(rows).map_err(|problem| {
+        Error::new(
+            place,
+            format!("the camera-to-world matrix {problem}"),
+            "correct the pose or leave the frame out",
+        )
+    })?;
+    Ok(Some(from_opencv(pose.rotation, pose.center)))
+}
+
+/// The pose of a rotation (camera to world, OpenCV's axes: x right, y down, looking along +z) and a position.
+pub fn from_opencv(rotation: DMat3, center: DVec3) -> Pose {
+    Pose {
+        rotation: DMat3::from_cols(rotation.x_axis, -rotation.y_axis, -rotation.z_axis),
+        center,
+    }
+}
+
+/// The rotation of a quaternion of any length; `None` if it has none or a number is not finite.
+pub fn rotation(x: f64, y: f64, z: f64, w: f64) -> Option<DMat3> {
+    let q = DQuat::from_xyzw(x, y, z, w);
+    let length = q.length();
+    (length.is_finite() && length > 1e-9).then(|| DMat3::from_quat(q / length))
+}
+
+/// Refuses a rotation quaternion that is not one.
+///
+/// # Errors
+/// Always.
+pub fn no_quaternion<T>(place: &str) -> Result<T> {
+    Err(Error::new(
+        place,
+        "the quaternion has no length",
+        "correct the pose or leave the line out",
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_come_as_programs_write_them() {
+        assert_eq!(numbers("1 -2e3;0.5,\n7"), Some(vec![1.0, -2e3, 0.5, 7.0]));
+        assert_eq!(number("-inf"), Some(f64::NEG_INFINITY));
+        assert!(number("-nan").is_some_and(f64::is_nan));
+        assert_eq!(numbers("1 two"), None);
+        assert!(rows(Path::new("p"), "1 2 3").is_err());
+    }
+
+    #[test]
+    fn poses_that_are_not_finite_are_none_and_shears_are_errors() {
+        let identity = rows(Path::new("p"), "1 0 0 5 0 1 0 6 0 0 1 7 0 0 0 1").unwrap();
+        let pose = pose_of_rows("p", &identity).unwrap().unwrap();
+        assert_eq!(pose.center, DVec3::new(5.0, 6.0, 7.0));
+        // OpenCV looks along +z, OpenGL along −z.
+        assert_eq!(pose.rotation.z_axis, -DVec3::Z);
+        assert_eq!(pose.rotation.y_axis, -DVec3::Y);
+        let mut lost = identity.clone();
+        lost[0][3] = f64::NEG_INFINITY;
+        assert!(pose_of_rows("p", &lost).unwrap().is_none());
+        let mut sheared = identity;
+        sheared[0][1] = 0.5;
+        assert!(pose_of_rows("p", &sheared).is_err());
+        assert!(rotation(0.0, 0.0, 0.0, 0.0).is_none());
+    }
+}

@@ -1,0 +1,131 @@
+//! ScanNet (Dai et al. 2017) as its exporter writes a `.sens` file: `color/N.jpg`, `depth/N.png`, `pose/N.txt`, `intrinsic/`.
+//!
+//! Poses are 4×4 camera-to-world matrices with OpenCV's axes, all −inf where tracking was lost; depth is in millimetres.
+//! `*_vh_clean_2.ply` (or `_vh_clean.ply`) is the reconstructed mesh.
+
+use crate::capture::import::depth::DepthImage;
+use crate::capture::import::folder::Folder;
+use crate::capture::import::lens::Lens;
+use crate::capture::import::matrix::{pose_of_rows, rows};
+use crate::capture::import::rgbd::{depth_size, lost, opencv_lens, photograph_size, possible};
+use crate::capture::import::{ImportedFrame, Scan};
+use crate::error::Result;
+use glam::DMat3;
+
+/// Whether a folder has this layout.
+pub fn is_here(folder: &Folder) -> bool {
+    ["color", "depth", "pose", "intrinsic"]
+        .iter()
+        .all(|name| folder.has_folder(name))
+}
+
+/// Reads the frames and finds the mesh.
+///
+/// # Errors
+/// A frame lacks its photograph or depth image, or a file is broken.
+pub fn read(folder: &Folder) -> Result<Scan> {
+    let mut scan = Scan {
+        is_video: true,
+        mesh: mesh(folder)?,
+        ..Scan::default()
+    };
+    let mut cameras: Option<[Lens; 2]> = None;
+    let mut left_out = 0;
+    for name in folder.names("pose")? {
+        let Some(stem) = name.strip_suffix(".txt") else {
+            continue;
+        };
+        let pose_name = format!("pose/{name}");
+        let path = folder.path(&pose_name);
+        let place = path.display().to_string();
+        let rows = rows(&path, &folder.text(&pose_name)?)?;
+        let Some(pose) = pose_of_rows(&place, &rows)? else {
+            left_out += 1;
+            continue;
+        };
+        let either = |names: [String; 2]| {
+            let [usual, other] = names;
+            if folder.has(&other) && !folder.has(&usual) {
+                other
+            } else {
+                usual
+            }
+        };
+        let color = either([format!("color/{stem}.jpg"), format!("color/{stem}.png")]);
+        let depth = either([format!("depth/{stem}.png"), format!("depth/{stem}.pgm")]);
+        let [lens, depth_lens] = match cameras {
+            Some(known) => known,
+            None => *cameras.insert([
+                camera(folder, "color", photograph_size(folder, &color)?)?,
+                camera(folder, "depth", depth_size(folder, &depth)?)?,
+            ]),
+        };
+        scan.frames.push(ImportedFrame {
+            photograph: folder.file(&place, &color)?,
+            lens,
+            pose,
+            exposure: None,
+            mask: None,
+            depth: Some(DepthImage {
+                path: folder.file(&place, &depth)?,
+                lens: depth_lens,
+                metres_per_unit: 0.001,
+                invalid: None,
+            }),
+        });
+    }
+    lost(left_out, &mut scan.said);
+    remark_on_extrinsics(folder, &mut scan.said)?;
+    Ok(scan)
+}
+
+/// The camera of one kind of image.
+fn camera(folder: &Folder, kind: &str, size: [u32; 2]) -> Result<Lens> {
+    let name = format!("intrinsic/intrinsic_{kind}.txt");
+    let path = folder.path(&name);
+    let k = rows(&path, &folder.text(&name)?)?;
+    let lens = opencv_lens(size, [k[0][0], k[1][1], k[0][2], k[1][2]]);
+    possible(lens, &path)
+}
+
+/// Says where the depth camera stands elsewhere than the colour camera.
+fn remark_on_extrinsics(folder: &Folder, said: &mut Vec<String>) -> Result<()> {
+    for kind in ["color", "depth"] {
+        let name = format!("intrinsic/extrinsic_{kind}.txt");
+        if !folder.has(&name) {
+            continue;
+        }
+        let path = folder.path(&name);
+        let m = rows(&path, &folder.text(&name)?)?;
+        let column = |j: usize| glam::DVec3::new(m[0][j], m[1][j], m[2][j]);
+        let turn = DMat3::from_cols(column(0), column(1), column(2)) - DMat3::IDENTITY;
+        let shift = if m[0].len() == 4 {
+            column(3).length()
+        } else {
+            0.0
+        };
+        let turned = turn
+            .to_cols_array()
+            .iter()
+            .fold(0.0, |a: f64, x| a.max(x.abs()));
+        if turned > 1e-3 || shift > 1e-3 {
+            said.push(format!(
+                "{name} is not the identity ({shift:.3} m); depth is taken to be seen from where the colour camera is"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The reconstruction, the simplified one first.
+fn mesh(folder: &Folder) -> Result<Option<std::path::PathBuf>> {
+    let names = folder.names("")?;
+    for end in ["_vh_clean_2.ply", "_vh_clean.ply"] {
+        if let Some(name) = names.iter().find(|name| name.ends_with(end)) {
+            return folder
+                .file(&folder.path(name).display().to_string(), name)
+                .map(Some);
+        }
+    }
+    Ok(None)
+}

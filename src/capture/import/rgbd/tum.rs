@@ -1,0 +1,302 @@
+//! TUM RGB-D (Sturm et al. 2012) and ICL-NUIM (Handa et al. 2014) in TUM's layout.
+//!
+//! `rgb.txt` and `depth.txt` list `timestamp file`, the trajectory `timestamp tx ty tz qx qy qz qw` (camera to world,
+//! OpenCV's axes); depth is in 1/5000 m. Photographs, depth and poses belong together by their timestamps.
+//!
+//! ICL-NUIM lists both images in `associations.txt`, its timestamps count frames, and its camera has fy = −480: its axes are
+//! x right, y *up*, z forwards, left-handed like its world. Mirroring the camera in y and the world in z gives a
+//! right-handed scene that keeps y up.
+
+use crate::capture::camera::Pose;
+use crate::capture::import::depth::DepthImage;
+use crate::capture::import::folder::Folder;
+use crate::capture::import::lens::{Lens, Model};
+use crate::capture::import::matrix::{from_opencv, no_quaternion, number, rotation};
+use crate::capture::import::rgbd::{depth_size, lost, opencv_lens, photograph_size};
+use crate::capture::import::{ImportOptions, ImportedFrame, Scan};
+use crate::error::{Error, Result};
+use glam::{DMat3, DVec3};
+
+/// Seconds between the stamps of things that belong together, at most.
+const MAX_DIFFERENCE: f64 = 0.02;
+/// Metres of one unit of depth.
+const UNIT: f64 = 1.0 / 5000.0;
+/// The trajectory's names in TUM's layout.
+const TRAJECTORIES: [&str; 4] = [
+    "groundtruth.txt",
+    "trajectory.txt",
+    "CameraTrajectory.txt",
+    "poses.txt",
+];
+/// Lists of both images in one.
+const ASSOCIATIONS: [&str; 2] = ["associations.txt", "associated.txt"];
+
+/// A line of a list: its stamp, and the words behind.
+#[derive(Debug, Clone)]
+struct Entry {
+    stamp: f64,
+    words: Vec<String>,
+}
+
+/// Whether a folder has TUM's layout.
+pub fn is_here(folder: &Folder) -> bool {
+    let images =
+        (folder.has("rgb.txt") && folder.has("depth.txt")) || folder.first(&ASSOCIATIONS).is_some();
+    images && folder.first(&TRAJECTORIES).is_some()
+}
+
+/// Whether a folder is ICL-NUIM's: a trajectory called `*.gt.freiburg` beside the images.
+///
+/// # Errors
+/// The folder cannot be read.
+pub fn is_icl_nuim(folder: &Folder) -> Result<bool> {
+    Ok(folder.has_folder("depth") && folder.has_folder("rgb") && freiburg(folder)?.is_some())
+}
+
+fn freiburg(folder: &Folder) -> Result<Option<String>> {
+    let names = folder.names("")?;
+    let mut found = names.into_iter().filter(|name| name.ends_with(".freiburg"));
+    Ok(found.next())
+}
+
+/// Reads the frames; `left_handed` for ICL-NUIM's cameras.
+///
+/// # Errors
+/// A list is missing or broken, or names a file that is not there.
+pub fn read(folder: &Folder, options: &ImportOptions, left_handed: bool) -> Result<Scan> {
+    let mut scan = Scan {
+        is_video: true,
+        mirrored: left_handed,
+        ..Scan::default()
+    };
+    let (colors, depths) = images(folder, left_handed)?;
+    let trajectory_name = match (freiburg(folder)?, folder.first(&TRAJECTORIES)) {
+        (Some(name), _) => name,
+        (None, Some(name)) => name.to_owned(),
+        (None, None) => {
+            return Err(Error::file(
+                &folder.path(TRAJECTORIES[0]),
+                "there is no trajectory",
+                "add the poses as lines of: timestamp tx ty tz qx qy qz qw",
+            ));
+        }
+    };
+    let poses = entries(folder, &trajectory_name, 7)?;
+    // ICL-NUIM counts frames where TUM has seconds.
+    let reach = if left_handed { 0.5 } else { MAX_DIFFERENCE };
+
+    let mut lenses: Option<[Lens; 2]> = None;
+    let (mut without_depth, mut without_pose, mut left_out) = (0, 0, 0);
+    for color in &colors {
+        let Some(depth) = nearest(&depths, color.stamp, reach) else {
+            without_depth += 1;
+            continue;
+        };
+        let Some(line) = nearest(&poses, color.stamp, reach) else {
+            without_pose += 1;
+            continue;
+        };
+        let place = folder.path(&trajectory_name).display().to_string();
+        let Some(pose) = pose(&place, line, left_handed)? else {
+            left_out += 1;
+            continue;
+        };
+        let (color, depth) = (&color.words[0], &depth.words[0]);
+        let [lens, depth_lens] = match lenses {
+            Some(known) => known,
+            None => *lenses.insert(cameras(
+                folder,
+                [color, depth],
+                options,
+                left_handed,
+                &mut scan.said,
+            )?),
+        };
+        scan.frames.push(ImportedFrame {
+            photograph: folder.file(&folder.path(color).display().to_string(), color)?,
+            lens,
+            pose,
+            exposure: None,
+            mask: None,
+            depth: Some(DepthImage {
+                path: folder.file(&folder.path(depth).display().to_string(), depth)?,
+                lens: depth_lens,
+                metres_per_unit: UNIT,
+                invalid: None,
+            }),
+        });
+    }
+    for (count, lacking) in [(without_depth, "depth image"), (without_pose, "pose")] {
+        if count > 0 {
+            scan.said.push(format!(
+                "{count} photographs left out: no {lacking} within {reach} of their timestamp"
+            ));
+        }
+    }
+    lost(left_out, &mut scan.said);
+    if left_handed {
+        scan.said.push(
+            "the left-handed cameras (negative fy) and their world are mirrored: z changes its sign"
+                .into(),
+        );
+    }
+    Ok(scan)
+}
+
+/// The lists of photographs and depth images, ordered by stamp.
+fn images(folder: &Folder, numbered: bool) -> Result<(Vec<Entry>, Vec<Entry>)> {
+    if folder.has("rgb.txt") && folder.has("depth.txt") {
+        return Ok((
+            entries(folder, "rgb.txt", 1)?,
+            entries(folder, "depth.txt", 1)?,
+        ));
+    }
+    if let Some(name) = folder.first(&ASSOCIATIONS) {
+        // stamp file stamp file; which of the two is depth is told by its folder.
+        let mut lists = (Vec::new(), Vec::new());
+        for entry in entries(folder, name, 3)? {
+            let second = Entry {
+                stamp: entry.stamp,
+                words: entry.words[2..].to_vec(),
+            };
+            if entry.words[0].contains("depth") {
+                lists.0.push(second);
+                lists.1.push(entry);
+            } else {
+                lists.0.push(entry);
+                lists.1.push(second);
+            }
+        }
+        return Ok(lists);
+    }
+    if numbered {
+        let list = |inside: &str| -> Result<Vec<Entry>> {
+            let names = folder.names(inside)?;
+            let stamped = names.into_iter().filter_map(|name| {
+                let stamp = name.split('.').next()?.parse().ok()?;
+                let words = vec![format!("{inside}/{name}")];
+                Some(Entry { stamp, words })
+            });
+            Ok(stamped.collect())
+        };
+        return Ok((list("rgb")?, list("depth")?));
+    }
+    Err(Error::file(
+        &folder.path("rgb.txt"),
+        "there is neither rgb.txt with depth.txt nor associations.txt",
+        "add the lists of images",
+    ))
+}
+
+/// The lines of a list with at least `least` words behind the stamp, ordered by stamp; `#` begins a comment.
+fn entries(folder: &Folder, name: &str, least: usize) -> Result<Vec<Entry>> {
+    let text = folder.text(name)?;
+    let path = folder.path(name);
+    let mut entries = Vec::new();
+    for (index, line) in text.lines().enumerate() {
+        let line = line.split('#').next().unwrap_or_default();
+        let mut words = line
+            .split(|c: char| c.is_whitespace() || c == ',')
+            .filter(|word| !word.is_empty());
+        let Some(first) = words.next() else { continue };
+        let words: Vec<String> = words.map(str::to_owned).collect();
+        let stamp = number(first).filter(|stamp| stamp.is_finite());
+        let (Some(stamp), true) = (stamp, words.len() >= least) else {
+            return Err(Error::new(
+                format!("{} line {}", path.display(), index + 1),
+                format!("is no timestamp with {least} words behind it"),
+                "correct the line",
+            ));
+        };
+        entries.push(Entry { stamp, words });
+    }
+    entries.sort_by(|a, b| a.stamp.total_cmp(&b.stamp));
+    Ok(entries)
+}
+
+/// The entry whose stamp is nearest, within `reach`.
+fn nearest(entries: &[Entry], stamp: f64, reach: f64) -> Option<&Entry> {
+    let after = entries.partition_point(|entry| entry.stamp < stamp);
+    let before = after.checked_sub(1).and_then(|i| entries.get(i));
+    let difference = |entry: &&Entry| (entry.stamp - stamp).abs();
+    [before, entries.get(after)]
+        .into_iter()
+        .flatten()
+        .filter(|entry| difference(entry) <= reach)
+        .min_by(|a, b| difference(a).total_cmp(&difference(b)))
+}
+
+/// The pose of a line of a trajectory; `None` if a number is not finite.
+fn pose(place: &str, line: &Entry, left_handed: bool) -> Result<Option<Pose>> {
+    let numbers: Option<Vec<f64>> = line.words[..7].iter().map(|word| number(word)).collect();
+    let Some(&[x, y, z, qx, qy, qz, qw]) = numbers.as_deref() else {
+        return Err(Error::new(
+            place,
+            format!(
+                "the line of timestamp {} holds a word that is no number",
+                line.stamp
+            ),
+            "correct the line",
+        ));
+    };
+    let center = DVec3::new(x, y, z);
+    if !center.is_finite() || ![qx, qy, qz, qw].iter().all(|q| q.is_finite()) {
+        return Ok(None);
+    }
+    let Some(turn) = rotation(qx, qy, qz, qw) else {
+        return no_quaternion(&format!("{place} timestamp {}", line.stamp));
+    };
+    Ok(Some(if left_handed {
+        let world = DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0));
+        let camera = DMat3::from_diagonal(DVec3::new(1.0, -1.0, 1.0));
+        from_opencv(world * turn * camera, world * center)
+    } else {
+        from_opencv(turn, center)
+    }))
+}
+
+/// The colour camera and the depth camera, whose images TUM registered to each other pixel by pixel.
+fn cameras(
+    folder: &Folder,
+    [color, depth]: [&str; 2],
+    options: &ImportOptions,
+    left_handed: bool,
+    said: &mut Vec<String>,
+) -> Result<[Lens; 2]> {
+    let size = photograph_size(folder, color)?;
+    let depth_size = depth_size(folder, depth)?;
+    if let Some(given) = options.intrinsics {
+        let [fx, fy, cx, cy] = given;
+        let lens = opencv_lens(size, [fx, fy.abs(), cx, cy]);
+        return Ok([lens, lens.resized(depth_size)]);
+    }
+    let own = folder.confine().folder().canonicalize();
+    let name = own
+        .ok()
+        .and_then(|path| Some(path.file_name()?.to_string_lossy().to_ascii_lowercase()))
+        .unwrap_or_default();
+    // Calibrations as the data sets' own pages state them, for 640 × 480 pixels.
+    let rational = |k1, k2, p1, p2, k3| Model::Rational {
+        k: [k1, k2, k3, 0.0, 0.0, 0.0],
+        p: [p1, p2],
+    };
+    let none = Model::Brown([0.0; 4]);
+    let (whose, numbers, model) = if left_handed {
+        ("ICL-NUIM", [481.2, 480.0, 319.5, 239.5], none)
+    } else if name.contains("freiburg1") {
+        let model = rational(0.2624, -0.9531, -0.0054, 0.0026, 1.1633);
+        ("freiburg1", [517.3, 516.5, 318.6, 255.3], model)
+    } else if name.contains("freiburg2") {
+        let model = rational(0.2312, -0.7849, -0.0033, -0.0001, 0.9172);
+        ("freiburg2", [520.9, 521.0, 325.1, 249.7], model)
+    } else if name.contains("freiburg3") {
+        ("freiburg3", [535.4, 539.2, 320.1, 247.6], none)
+    } else {
+        ("the ROS default", [525.0, 525.0, 319.5, 239.5], none)
+    };
+    said.push(format!(
+        "intrinsics: those of {whose} by the folder's layout and name; --intrinsics overrules"
+    ));
+    let lens = opencv_lens([640, 480], numbers).with(model);
+    Ok([lens.resized(size), lens.resized(depth_size)])
+}

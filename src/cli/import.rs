@@ -1,0 +1,95 @@
+//! `relit import`: scans of other programs as captures.
+
+use crate::capture::import::{self, Format, ImportOptions};
+use crate::cli::arguments::triple;
+use crate::error::Result;
+use crate::export;
+use clap::Args;
+use clap::builder::PossibleValuesParser;
+use glam::DVec3;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+use std::path::PathBuf;
+
+/// `relit import`.
+#[derive(Debug, Args)]
+pub struct ImportArguments {
+    /// Folder of the scan
+    source: PathBuf,
+    /// Folder to write the capture into: new, or empty
+    #[arg(long, value_name = "CAPTURE")]
+    out: PathBuf,
+    /// Layout of the folder [default: found by its content]
+    #[arg(long, value_name = "F", value_parser = PossibleValuesParser::new(Format::ALL.iter().map(|(word, _)| *word)))]
+    format: Option<String>,
+    /// Mesh in the poses' coordinates: OBJ, PLY, GLB [default: the scan's own, or one fused from depth]
+    #[arg(long, value_name = "FILE")]
+    mesh: Option<PathBuf>,
+    /// Edge of the voxels of a fused mesh [default: 1/256 of the depth's extent]
+    #[arg(long, value_name = "METRES")]
+    voxel: Option<f64>,
+    /// Take every N-th frame as a photograph; depth is fused from all
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    every: Option<u32>,
+    /// Take at most N photographs, evenly spaced [default: 200 of a video, else all]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    most_frames: Option<u32>,
+    /// Up axis of the capture [default: the cameras' mean up]
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
+    up: Option<DVec3>,
+    /// Colour camera of a scan that does not say, in pixels with centres at whole numbers
+    #[arg(long, value_name = "FX,FY,CX,CY", value_parser = intrinsics, allow_hyphen_values = true)]
+    intrinsics: Option<Intrinsics>,
+}
+
+/// fx, fy, cx, cy.
+#[derive(Debug, Clone, Copy)]
+struct Intrinsics([f64; 4]);
+
+fn intrinsics(text: &str) -> std::result::Result<Intrinsics, String> {
+    let numbers: Option<Vec<f64>> = text
+        .split(',')
+        .map(|part| part.trim().parse().ok().filter(|v: &f64| v.is_finite()))
+        .collect();
+    match numbers.as_deref() {
+        Some(&[fx, fy, cx, cy]) if fx > 0.0 && fy != 0.0 => Ok(Intrinsics([fx, fy, cx, cy])),
+        _ => Err("four numbers are wanted, e.g. 525,525,319.5,239.5".to_owned()),
+    }
+}
+
+/// Turns a scan into a capture and says what was found and guessed.
+///
+/// # Errors
+/// The scan cannot be read, or the capture cannot be written.
+pub fn import(arguments: &ImportArguments) -> Result<()> {
+    let named = |word: &String| Format::ALL.iter().find(|(name, _)| name == word);
+    let options = ImportOptions {
+        format: arguments.format.as_ref().and_then(named).map(|f| f.1),
+        mesh: arguments.mesh.clone(),
+        voxel: arguments.voxel,
+        every: arguments.every.unwrap_or(0) as usize,
+        most_frames: arguments.most_frames.map(|n| n as usize),
+        up: arguments.up,
+        intrinsics: arguments.intrinsics.map(|k| k.0),
+    };
+    let bar = std::io::stderr().is_terminal().then(|| {
+        let style = ProgressStyle::with_template("{bar:24} {pos} of {len} depth images fused");
+        ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr())
+            .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+    });
+    let scan = import::read(&arguments.source, &options, &mut |done, all| {
+        if let Some(bar) = &bar {
+            bar.set_length(all as u64);
+            bar.set_position(done as u64);
+        }
+    })?;
+    if let Some(bar) = &bar {
+        bar.finish_and_clear();
+    }
+    for line in &scan.said {
+        println!("{line}");
+    }
+    export::import::write(&arguments.out, &scan)?;
+    println!("{}", arguments.out.display());
+    Ok(())
+}

@@ -1,0 +1,187 @@
+//! An imported scan as a capture: images, mesh.ply, transforms.json.
+
+use crate::capture::import::{DepthImage, Import, ImportedFrame, Lens};
+use crate::capture::photograph::Photograph;
+use crate::capture::read::image;
+use crate::error::{Error, Result};
+use crate::export::atomic::write_bytes;
+use crate::export::capture::{Entry, transforms};
+use crate::export::{ply, resample};
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+
+/// Writes a capture into a folder that is new or empty, whole or not at all.
+///
+/// Photographs are copied as they are where the capture's format holds their lens, and resampled to a pinhole otherwise; a
+/// mask becomes the alpha of a PNG or EXR. Depth goes along where it shows what the photograph shows.
+///
+/// # Errors
+/// The folder holds something, an image is broken, or a file cannot be written.
+pub fn write(folder: &Path, import: &Import) -> Result<()> {
+    let staging = Staging::new(folder)?;
+    let entries: Result<Vec<Entry>> = import
+        .frames
+        .par_iter()
+        .enumerate()
+        .map(|(index, frame)| write_frame(staging.path(), index, frame))
+        .collect();
+    ply::write_mesh(
+        &staging.path().join("mesh.ply"),
+        &import.mesh,
+        import.has_objects,
+    )?;
+    let file = transforms(&entries?, "mesh.ply", import.up);
+    write_bytes(
+        &staging.path().join("transforms.json"),
+        format!("{file:#}\n").as_bytes(),
+    )?;
+    staging.take_its_place()
+}
+
+/// Writes a frame's images; what transforms.json says of it.
+fn write_frame(folder: &Path, index: usize, frame: &ImportedFrame) -> Result<Entry> {
+    let name = format!("images/{index:05}");
+    let ending = if frame.lens.fits_a_capture() && frame.mask.is_none() {
+        let header = image::header(&frame.photograph)?;
+        let k = &frame.lens.pinhole;
+        if (header.width, header.height) != (k.width, k.height) {
+            return Err(Error::file(
+                &frame.photograph,
+                format!(
+                    "is {}×{} pixels, but its camera {}×{}",
+                    header.width, header.height, k.width, k.height
+                ),
+                "use photographs of the camera's size",
+            ));
+        }
+        let ending = frame
+            .photograph
+            .extension()
+            .map(|e| e.to_string_lossy().to_ascii_lowercase())
+            .filter(|e| e.chars().all(|c| c.is_ascii_alphanumeric()))
+            .unwrap_or_else(|| "png".into());
+        copy(&frame.photograph, &folder.join(format!("{name}.{ending}")))?;
+        ending
+    } else {
+        let (mut photograph, _) = image::read(&frame.photograph, &frame.lens.pinhole, None)?;
+        if let Some(mask) = &frame.mask {
+            apply_mask(&mut photograph, mask, &frame.lens)?;
+        }
+        if !frame.lens.fits_a_capture() {
+            photograph = resample::photograph(&photograph, &frame.lens);
+        }
+        resample::write_photograph(&folder.join(&name), &photograph)?.to_owned()
+    };
+    let depth = frame
+        .depth
+        .as_ref()
+        .filter(|depth| depth.is_registered_to(&frame.lens));
+    let depth = match depth {
+        Some(depth) => {
+            let name = format!("depth/{index:05}.png");
+            write_depth(&folder.join(&name), depth)?;
+            Some((name, depth.metres_per_unit))
+        }
+        None => None,
+    };
+    Ok(Entry {
+        file_path: format!("{name}.{ending}"),
+        intrinsics: frame.lens.intrinsics(),
+        pose: frame.pose,
+        exposure: frame.exposure,
+        depth,
+    })
+}
+
+/// Copies a depth image, or writes it anew where its values or lens have to change.
+fn write_depth(path: &Path, depth: &DepthImage) -> Result<()> {
+    let is_png = depth.path.extension().is_some_and(|e| e == "png");
+    if is_png && depth.invalid.is_none() && depth.lens.fits_a_capture() {
+        return copy(&depth.path, path);
+    }
+    let mut values = depth.raw()?;
+    if !depth.lens.fits_a_capture() {
+        values = resample::depth(&values, &depth.lens);
+    }
+    let k = &depth.lens.pinhole;
+    resample::write_depth(path, [k.width, k.height], values)
+}
+
+/// Makes pixels unusable where the mask is dark (below one half).
+fn apply_mask(photograph: &mut Photograph, path: &Path, lens: &Lens) -> Result<()> {
+    let (mask, _) = image::read(path, &lens.pinhole, None)?;
+    let count = photograph.pixels.len();
+    photograph.usable.resize(count, true);
+    for (usable, value) in photograph.usable.iter_mut().zip(&mask.pixels) {
+        *usable &= value.max_element() > 0.2;
+    }
+    Ok(())
+}
+
+fn copy(from: &Path, to: &Path) -> Result<()> {
+    if let Some(folder) = to.parent() {
+        std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;
+    }
+    let mut source = std::fs::File::open(from).map_err(|e| Error::io(from, &e))?;
+    let mut target = std::fs::File::create(to).map_err(|e| Error::io(to, &e))?;
+    std::io::copy(&mut source, &mut target).map_err(|e| Error::io(to, &e))?;
+    Ok(())
+}
+
+/// A folder beside the one wanted, which takes its place when it is complete and vanishes otherwise.
+#[derive(Debug)]
+struct Staging {
+    folder: tempfile::TempDir,
+    place: PathBuf,
+}
+
+impl Staging {
+    fn new(place: &Path) -> Result<Self> {
+        let is_empty = match std::fs::read_dir(place) {
+            Ok(mut entries) => entries.next().is_none(),
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => true,
+            Err(e) => return Err(Error::io(place, &e)),
+        };
+        if !is_empty {
+            return Err(Error::file(
+                place,
+                "is not empty",
+                "name a new folder, or take away what is in it",
+            ));
+        }
+        let parent = match place.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        std::fs::create_dir_all(parent).map_err(|e| Error::io(parent, &e))?;
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".relit-").suffix(".partial");
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(std::fs::Permissions::from_mode(0o777));
+        }
+        let folder = builder
+            .tempdir_in(parent)
+            .map_err(|e| Error::io(parent, &e))?;
+        Ok(Self {
+            folder,
+            place: place.to_path_buf(),
+        })
+    }
+
+    fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    fn take_its_place(self) -> Result<()> {
+        let place = self.place;
+        if place.is_dir() {
+            std::fs::remove_dir(&place).map_err(|e| Error::io(&place, &e))?;
+        }
+        std::fs::rename(self.folder.path(), &place).map_err(|e| Error::io(&place, &e))?;
+        // Nothing is left to take away.
+        let _ = self.folder.keep();
+        Ok(())
+    }
+}

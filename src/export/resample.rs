@@ -1,0 +1,141 @@
+//! Photographs and depth images of lenses that a capture does not have, resampled to a pinhole of the same focal length.
+
+use crate::capture::import::Lens;
+use crate::capture::photograph::{Encoding, Photograph};
+use crate::error::{Error, Result};
+use crate::export::atomic::write_atomically;
+use crate::export::exr::{Channel, Layer, Samples, write_layers};
+use crate::math::color::linear_to_srgb;
+use glam::{DVec2, Vec3};
+use image::{ImageBuffer, ImageFormat, Luma, Rgba};
+use rayon::prelude::*;
+use std::io::Cursor;
+use std::path::Path;
+
+/// Where the pixel centre (i, j) of the pinhole lies in the lens's own image; `None` where the lens says nothing.
+fn source_of(lens: &Lens, i: u32, j: u32) -> Option<DVec2> {
+    let k = lens.intrinsics();
+    let p = DVec2::new(
+        (f64::from(i) + 0.5 - k.cx) / k.fx,
+        (f64::from(j) + 0.5 - k.cy) / k.fy,
+    );
+    lens.project(p.extend(1.0))
+}
+
+/// The photograph as the pinhole of [`Lens::intrinsics`] would have taken it, interpolated bilinearly in linear light; pixels
+/// that the lens did not see, and mixtures with unusable ones, are unusable.
+pub fn photograph(source: &Photograph, lens: &Lens) -> Photograph {
+    let (width, height) = (source.width, source.height);
+    let usable = |i: usize| source.usable.get(i).copied().unwrap_or(true);
+    let sampled: Vec<Option<Vec3>> = (0..width * height)
+        .into_par_iter()
+        .map(|index| {
+            let at = source_of(lens, index % width, index / width)?;
+            let inside =
+                at.x >= 0.0 && at.y >= 0.0 && at.x <= f64::from(width) && at.y <= f64::from(height);
+            if !inside {
+                return None;
+            }
+            let corner = at - DVec2::splat(0.5);
+            let floor = corner.floor();
+            let (u, v) = ((corner.x - floor.x) as f32, (corner.y - floor.y) as f32);
+            let pixel = |dx: i64, dy: i64| -> Option<Vec3> {
+                let x = (floor.x as i64 + dx).clamp(0, i64::from(width) - 1);
+                let y = (floor.y as i64 + dy).clamp(0, i64::from(height) - 1);
+                let i = y as usize * width as usize + x as usize;
+                usable(i).then(|| source.pixels[i])
+            };
+            let top = pixel(0, 0)?.lerp(pixel(1, 0)?, u);
+            let bottom = pixel(0, 1)?.lerp(pixel(1, 1)?, u);
+            Some(top.lerp(bottom, v))
+        })
+        .collect();
+    Photograph {
+        width,
+        height,
+        pixels: sampled.iter().map(|c| c.unwrap_or(Vec3::ZERO)).collect(),
+        usable: sampled.iter().map(Option::is_some).collect(),
+        encoding: source.encoding,
+        saturation: source.saturation,
+    }
+}
+
+/// Depth values as the pinhole would have seen them: the nearest pixel's, 0 where the lens saw nothing.
+pub fn depth(values: &[u16], lens: &Lens) -> Vec<u16> {
+    let k = lens.intrinsics();
+    let (width, height) = (k.width, k.height);
+    (0..width * height)
+        .into_par_iter()
+        .map(|index| {
+            let Some(at) = source_of(lens, index % width, index / width) else {
+                return 0;
+            };
+            let inside =
+                at.x >= 0.0 && at.y >= 0.0 && at.x < f64::from(width) && at.y < f64::from(height);
+            match inside {
+                true => values[at.y as usize * width as usize + at.x as usize],
+                false => 0,
+            }
+        })
+        .collect()
+}
+
+/// Writes a photograph with its unusable pixels transparent: `NAME.exr` for linear values, else `NAME.png` with 16 bits a
+/// channel. Returns the name's ending.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_photograph(stem: &Path, photograph: &Photograph) -> Result<&'static str> {
+    let (width, height) = (photograph.width, photograph.height);
+    let usable = |i: usize| photograph.usable.get(i).copied().unwrap_or(true);
+    if photograph.encoding == Encoding::Linear {
+        let path = stem.with_extension("exr");
+        let channel = |name: &str, value: &dyn Fn(usize) -> f32| Channel {
+            name: name.to_owned(),
+            samples: Samples::Float((0..photograph.pixels.len()).map(value).collect()),
+        };
+        let layer = Layer {
+            name: String::new(),
+            channels: vec![
+                channel("R", &|i| photograph.pixels[i].x),
+                channel("G", &|i| photograph.pixels[i].y),
+                channel("B", &|i| photograph.pixels[i].z),
+                channel("A", &|i| f32::from(u8::from(usable(i)))),
+            ],
+        };
+        write_layers(&path, width, height, &[layer])?;
+        return Ok("exr");
+    }
+    let path = stem.with_extension("png");
+    let code = |v: f32| (linear_to_srgb(v) * 65535.0).round() as u16;
+    let image: ImageBuffer<Rgba<u16>, Vec<u16>> = ImageBuffer::from_fn(width, height, |x, y| {
+        let i = y as usize * width as usize + x as usize;
+        let [r, g, b] = photograph.pixels[i].to_array().map(code);
+        Rgba([r, g, b, if usable(i) { u16::MAX } else { 0 }])
+    });
+    write_png(&path, |bytes| image.write_to(bytes, ImageFormat::Png))?;
+    Ok("png")
+}
+
+/// Writes 16-bit values as a grey PNG.
+///
+/// # Errors
+/// The file cannot be written, or there is not one value a pixel.
+pub fn write_depth(path: &Path, size: [u32; 2], values: Vec<u16>) -> Result<()> {
+    let image: ImageBuffer<Luma<u16>, Vec<u16>> =
+        ImageBuffer::from_raw(size[0], size[1], values)
+            .ok_or_else(|| Error::file(path, "has not one depth a pixel", ""))?;
+    write_png(path, |bytes| image.write_to(bytes, ImageFormat::Png))
+}
+
+fn write_png(
+    path: &Path,
+    encode: impl FnOnce(&mut Cursor<Vec<u8>>) -> image::ImageResult<()>,
+) -> Result<()> {
+    let mut bytes = Cursor::new(Vec::new());
+    encode(&mut bytes).map_err(|e| Error::file(path, e, "nothing was written there"))?;
+    write_atomically(path, |out| {
+        std::io::Write::write_all(out, bytes.get_ref())?;
+        Ok(())
+    })
+}

@@ -1,0 +1,101 @@
+//! 7-Scenes and 3DMatch.
+
+use crate::{
+    Camera, cameras, check_cameras, check_room, import, import_with, says, write, write_images,
+};
+use glam::DVec3;
+use relit::capture::import::ImportOptions;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// The sample in a folder, in sequences of 12 frames.
+pub fn sample(folder: &Path, cameras: &[Camera]) {
+    for (index, camera) in cameras.iter().enumerate() {
+        let stem = format!("seq-{:02}/frame-{:06}", index / 12 + 1, index % 12);
+        let names = [format!("{stem}.color.png"), format!("{stem}.depth.png")];
+        write_images(folder, camera, &names[0], &names[1], 1000.0);
+        write(folder, &format!("{stem}.pose.txt"), camera.matrix_text());
+    }
+}
+
+/// Intrinsics of the sample as 3DMatch writes them.
+pub fn intrinsics(camera: &Camera) -> String {
+    format!(
+        "{} 0 {}\n0 {} {}\n0 0 1\n",
+        camera.fx, camera.cx, camera.fy, camera.cy
+    )
+}
+
+#[test]
+fn the_room_comes_back() {
+    let folder = TempDir::new().unwrap();
+    let cameras = cameras();
+    sample(folder.path(), &cameras);
+    write(
+        folder.path(),
+        "camera-intrinsics.txt",
+        intrinsics(&cameras[0]),
+    );
+    let scan = import(folder.path()).unwrap();
+    assert!(says(&scan, "taken for 7-Scenes") && says(&scan, "camera-intrinsics.txt"));
+    check_cameras(&scan, &cameras, |p| p);
+    check_room(&scan.mesh, 0.05, |p| p);
+}
+
+#[test]
+fn the_data_sets_own_focal_length_is_taken_and_said() {
+    let folder = TempDir::new().unwrap();
+    let lens = [585.0 / 8.0, 585.0 / 8.0, 39.5, 29.5];
+    let cameras: Vec<Camera> = cameras()
+        .into_iter()
+        .map(|camera| camera.with_lens([80, 60], lens))
+        .collect();
+    sample(folder.path(), &cameras);
+    let scan = import(folder.path()).unwrap();
+    assert!(says(&scan, "as 7-Scenes states"));
+    check_cameras(&scan, &cameras, |p| p);
+}
+
+#[test]
+fn depth_that_is_marked_invalid_and_frames_that_are_lost_play_no_part() {
+    let folder = TempDir::new().unwrap();
+    let cameras = cameras();
+    sample(folder.path(), &cameras);
+    write(folder.path(), "intrinsics.txt", intrinsics(&cameras[0]));
+    let path = folder.path().join("seq-01/frame-000000.depth.png");
+    let mut depth = image::open(&path).unwrap().into_luma16();
+    for x in 0..40 {
+        depth.put_pixel(x, 30, image::Luma([65535]));
+    }
+    depth.save(&path).unwrap();
+    let lost = "nan nan nan nan\n".repeat(3) + "0 0 0 1\n";
+    write(folder.path(), "seq-01/frame-000001.pose.txt", lost);
+    let scan = import(folder.path()).unwrap();
+    assert_eq!(scan.frames.len(), cameras.len() - 1);
+    assert!(says(&scan, "1 frames left out"));
+    check_room(&scan.mesh, 0.05, |p| p);
+}
+
+#[test]
+fn frames_are_chosen_evenly_and_voxels_by_the_rooms_extent() {
+    let folder = TempDir::new().unwrap();
+    let cameras = cameras();
+    sample(folder.path(), &cameras);
+    write(folder.path(), "intrinsics.txt", intrinsics(&cameras[0]));
+    let options = ImportOptions {
+        most_frames: Some(5),
+        every: 2,
+        up: Some(DVec3::Y),
+        ..ImportOptions::default()
+    };
+    let scan = import_with(folder.path(), &options).unwrap();
+    assert_eq!(scan.frames.len(), 5);
+    // Every other one of 24 is 12; five equal parts of these begin at 0, 3, 5, 8, 10.
+    for (frame, index) in scan.frames.iter().zip([0, 6, 10, 16, 20]) {
+        assert_eq!(frame.pose.center, cameras[index].center);
+    }
+    assert!(says(&scan, "photographs: 5 of 24"));
+    // A pixel of these small images is larger than 1/256 of the room.
+    assert!(says(&scan, "size of a depth pixel"), "{:?}", scan.said);
+    assert_eq!(scan.up, Some(DVec3::Y));
+}
