@@ -5,6 +5,7 @@ use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
 use crate::export::scene::{self, Format};
 use crate::room;
+use crate::room::photographs::{KEPT, Rendering};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use std::path::PathBuf;
@@ -48,6 +49,13 @@ pub struct DemoArguments {
     /// Folder to write the capture into
     #[arg(long, value_name = "CAPTURE")]
     out: PathBuf,
+    /// Renders the photographs anew with this key of all random numbers, instead of those kept in the program
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Paths a pixel of photographs that are rendered anew
+    #[arg(long, value_name = "N", default_value_t = KEPT.samples, requires = "seed",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    samples: u32,
 }
 
 /// Writes one file for another program.
@@ -83,7 +91,12 @@ pub fn export(arguments: &ExportArguments) -> Result<()> {
 /// # Errors
 /// The folder cannot be written.
 pub fn demo(arguments: &DemoArguments) -> Result<()> {
-    room::write(&arguments.out, None)?;
+    let anew = arguments.seed.map(|seed| Rendering {
+        seed,
+        samples: arguments.samples,
+        ..KEPT
+    });
+    room::write(&arguments.out, anew.as_ref())?;
     println!("{}", arguments.out.display());
     Ok(())
 }

@@ -1,10 +1,25 @@
 //! How sure a fit is: standard errors of what was fitted, and tests of what was left out.
 
-use super::evaluate::NormalEquations;
+use super::equations::{Coupling, Matrices, NormalEquations};
 use super::fit::noise;
 use super::prior::ALBEDO_DEVIATION;
-use glam::Vec3;
+use super::rows::Rows;
+use crate::math::rng::Stream;
+use glam::{DVec3, Vec3};
 use nalgebra::{Cholesky, DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Draws that standard errors are taken from where matrices would be too large: they are then within some 10 % of what
+/// matrices would give.
+const DRAWS: u64 = 48;
+/// Relative residual of a draw's solution.
+const DRAW_TOLERANCE: f64 = 1e-2;
+/// Key of the draws.
+const KEY: u64 = 0x6d75_6c74;
+/// Parameters that are tested exactly where matrices would be too large.
+const MOST_EXACT: usize = 24;
+/// Share of its curvature that a parameter must keep when the others follow it, to be told apart from them.
+const LEAST_OWN: f64 = 1e-9;
 
 /// Standard errors of all parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,26 +51,73 @@ impl Released {
     }
 }
 
-/// Inverse of the free block of one channel's Hessian with the prior, damped where it must be.
-fn inverse(
+/// Standard errors of the parameters in `free`: the sandwich (H + P)⁻¹ (S + vP) (H + P)⁻¹ with S the scatter of the
+/// clusters' scores, so that noise of photographs and of paths both count, whatever their distribution (Huber 1967).
+pub fn standard_errors(
     equations: &NormalEquations,
-    rows: &[usize],
-    prior: &[f64],
-    channel: usize,
-) -> Option<DMatrix<f64>> {
-    let hessian = &equations.hessian[channel];
-    let n = rows.len();
+    free: &[usize],
+    objects: usize,
+) -> StandardErrors {
+    let beliefs = Beliefs::new(equations, free);
+    let variances = match &equations.coupling {
+        Coupling::Dense(matrices) => sandwich(matrices, &beliefs),
+        Coupling::Sparse(rows) => multipliers(rows, &beliefs),
+    };
+    let mut errors = StandardErrors {
+        albedo: vec![Vec3::splat(ALBEDO_DEVIATION); objects],
+        emission: vec![Vec3::INFINITY; objects],
+    };
+    for ((&index, variance), diagonal) in free.iter().zip(variances).zip(&equations.diagonal) {
+        let error = variance.max(DVec3::ZERO).powf(0.5).as_vec3();
+        let target = match index.checked_sub(objects) {
+            None => &mut errors.albedo[index],
+            Some(emitter) => &mut errors.emission[emitter],
+        };
+        let known = diagonal.cmpgt(DVec3::ZERO) & variance.cmpge(DVec3::ZERO);
+        *target = Vec3::select(known, error, *target);
+    }
+    errors
+}
+
+/// What is believed of the free parameters, in the units of the normal equations.
+struct Beliefs {
+    /// Precision of each.
+    precision: Vec<DVec3>,
+    /// What keeps the diagonal positive where no path touches.
+    added: Vec<DVec3>,
+    /// Variance of one cluster.
+    variance: DVec3,
+}
+
+impl Beliefs {
+    fn new(equations: &NormalEquations, free: &[usize]) -> Self {
+        let variance = noise(equations);
+        let precision: Vec<DVec3> = (free.iter())
+            .map(|&i| equations.prior.of(i, variance).1)
+            .collect();
+        let added = (precision.iter().zip(&equations.diagonal))
+            .map(|(p, d)| *p + DVec3::select(d.cmpgt(DVec3::ZERO), DVec3::ZERO, DVec3::ONE))
+            .collect();
+        Self {
+            precision,
+            added,
+            variance,
+        }
+    }
+}
+
+/// Inverse of one channel's Hessian over the first parameters with `added` on its diagonal, damped where it must be.
+fn inverse(hessian: &DMatrix<f64>, added: &[DVec3], channel: usize) -> Option<DMatrix<f64>> {
+    let n = added.len();
     let mut damping = 0.0;
     while damping < 1e6 {
         let matrix = DMatrix::from_fn(n, n, |a, b| {
-            let (i, j) = (rows[a].max(rows[b]), rows[a].min(rows[b]));
-            let diagonal = hessian[(i, i)];
-            let added = if diagonal > 0.0 {
-                damping * diagonal
+            let h = hessian[(a.max(b), a.min(b))];
+            h + if a == b {
+                added[a][channel] + damping * h
             } else {
-                1.0
-            };
-            hessian[(i, j)] + if a == b { prior[a] + added } else { 0.0 }
+                0.0
+            }
         });
         if let Some(cholesky) = Cholesky::new(matrix) {
             return Some(cholesky.inverse());
@@ -65,91 +127,176 @@ fn inverse(
     None
 }
 
-/// Standard errors of the parameters at `rows` of `free`, the others held: the sandwich (H + P)⁻¹ (S + vP) (H + P)⁻¹
-/// with S the scatter of the clusters' scores, so that noise of photographs and of paths both count, whatever their
-/// distribution (Huber 1967).
-pub fn standard_errors(
-    equations: &NormalEquations,
-    free: &[usize],
-    rows: &[usize],
-    objects: usize,
-) -> StandardErrors {
-    let mut errors = StandardErrors {
-        albedo: vec![Vec3::splat(ALBEDO_DEVIATION as f32); objects],
-        emission: vec![Vec3::INFINITY; objects],
-    };
+/// Variances by matrices; negative where a channel has no inverse.
+fn sandwich(matrices: &Matrices, beliefs: &Beliefs) -> Vec<DVec3> {
+    let n = beliefs.added.len();
+    let mut variances = vec![DVec3::NEG_ONE; n];
     for channel in 0..3 {
-        let variance = noise(equations, channel);
-        let prior: Vec<f64> = rows
-            .iter()
-            .map(|&r| equations.prior.of(free[r], channel, variance).1)
-            .collect();
-        let Some(bread) = inverse(equations, rows, &prior, channel) else {
+        let Some(bread) = inverse(&matrices.hessian[channel], &beliefs.added, channel) else {
             continue;
         };
-        let scatter = &equations.scatter[channel];
-        let meat = DMatrix::from_fn(rows.len(), rows.len(), |a, b| {
-            let (i, j) = (rows[a].max(rows[b]), rows[a].min(rows[b]));
-            scatter[(i, j)] + if a == b { variance * prior[a] } else { 0.0 }
+        let scatter = &matrices.scatter[channel];
+        let meat = DMatrix::from_fn(n, n, |a, b| {
+            let own = beliefs.variance[channel] * beliefs.precision[a][channel];
+            scatter[(a.max(b), a.min(b))] + if a == b { own } else { 0.0 }
         });
         let covariance = &bread * meat * &bread;
-        for (a, &row) in rows.iter().enumerate() {
-            let index = free[row];
-            let error = covariance[(a, a)].max(0.0).sqrt() as f32;
-            let known = equations.hessian[channel][(row, row)] > 0.0;
-            match (known, index.checked_sub(objects)) {
-                (true, None) => errors.albedo[index][channel] = error,
-                (true, Some(emitter)) => errors.emission[emitter][channel] = error,
-                (false, _) => {}
-            }
+        for (a, variance) in variances.iter_mut().enumerate() {
+            variance[channel] = covariance[(a, a)];
         }
     }
-    errors
+    variances
 }
 
-/// For each row of `free` that is not in `active`: the step it would take if it alone were set free besides the
-/// active ones, with its standard error (a score test, Rao 1948).
-pub fn release(equations: &NormalEquations, free: &[usize], active: &[usize]) -> Vec<Released> {
-    let held: Vec<usize> = (0..free.len()).filter(|r| !active.contains(r)).collect();
-    let mut released: Vec<Released> = held
-        .iter()
-        .map(|&r| Released {
-            index: free[r],
+/// The same variances from random draws: with signs ε of the clusters, (H + P)⁻¹ Σ ε g scatters as the estimate does
+/// (the multiplier bootstrap, Wu 1986).
+fn multipliers(rows: &Rows, beliefs: &Beliefs) -> Vec<DVec3> {
+    let n = beliefs.added.len();
+    let (free, none) = (vec![DVec3::ONE; n], vec![DVec3::ZERO; n]);
+    let draws: Vec<Vec<DVec3>> = (0..DRAWS)
+        .into_par_iter()
+        .map(|draw| {
+            let sign = |kind: u64, index: usize| {
+                let bit = Stream::new(draw, kind, index as u64, KEY).below(2);
+                DVec3::splat([-1.0, 1.0][bit])
+            };
+            let mut right = rows.scores_times(|cluster| sign(0, cluster));
+            for (i, b) in right.iter_mut().enumerate() {
+                *b += (beliefs.variance * beliefs.precision[i]).powf(0.5) * sign(1, i);
+            }
+            rows.solve(&beliefs.added, &free, &right, &none, DRAW_TOLERANCE)
+        })
+        .collect();
+    (0..n)
+        .map(|i| draws.iter().map(|z| z[i] * z[i]).sum::<DVec3>() / DRAWS as f64)
+        .collect()
+}
+
+/// For each parameter of `free` after the first `active` ones: the step it would take if it alone were set free besides
+/// the active ones, with its standard error (a score test, Rao 1948).
+pub fn release(equations: &NormalEquations, free: &[usize], active: usize) -> Vec<Released> {
+    let beliefs = Beliefs::new(equations, &free[..active]);
+    let mut released: Vec<Released> = (free[active..].iter())
+        .map(|&index| Released {
+            index,
             step: [0.0; 3],
             stderr: [f64::INFINITY; 3],
         })
         .collect();
-    for channel in 0..3 {
-        let variance = noise(equations, channel);
-        let prior: Vec<f64> = active
-            .iter()
-            .map(|&r| equations.prior.of(free[r], channel, variance).1)
-            .collect();
-        let Some(inverse) = inverse(equations, active, &prior, channel) else {
-            continue;
-        };
-        let (hessian, scatter) = (&equations.hessian[channel], &equations.scatter[channel]);
-        let block = |m: &DMatrix<f64>, row: usize| {
-            DVector::from_fn(active.len(), |a, _| {
-                m[(row.max(active[a]), row.min(active[a]))]
-            })
-        };
-        let active_scatter = DMatrix::from_fn(active.len(), active.len(), |a, b| {
-            scatter[(active[a].max(active[b]), active[a].min(active[b]))]
-        });
-        for (&row, result) in held.iter().zip(&mut released) {
-            let coupling = block(hessian, row);
-            let u = &inverse * &coupling;
-            let curvature = hessian[(row, row)] - coupling.dot(&u);
-            if curvature <= 1e-9 * hessian[(row, row)] || hessian[(row, row)] <= 0.0 {
-                continue;
+    let tests = match &equations.coupling {
+        Coupling::Dense(matrices) => by_matrices(equations, matrices, &beliefs, active),
+        Coupling::Sparse(rows) => by_rows(equations, rows, &beliefs, active),
+    };
+    for ((result, tested), row) in released.iter_mut().zip(tests).zip(active..) {
+        let (diagonal, score) = (equations.diagonal[row], equations.descent[row]);
+        for channel in 0..3 {
+            let curvature = tested.curvature[channel];
+            if curvature > LEAST_OWN * diagonal[channel] && curvature > 0.0 {
+                result.step[channel] = score[channel] / curvature;
+                result.stderr[channel] = tested.variance[channel].max(0.0).sqrt() / curvature;
             }
-            let own = scatter[(row, row)];
-            let score_variance =
-                own - 2.0 * u.dot(&block(scatter, row)) + u.dot(&(&active_scatter * &u));
-            result.step[channel] = equations.descent[channel][row] / curvature;
-            result.stderr[channel] = score_variance.max(0.0).sqrt() / curvature;
         }
     }
     released
+}
+
+/// What is left of a parameter when the active ones follow it.
+struct Tested {
+    /// Its curvature.
+    curvature: DVec3,
+    /// The variance of its score.
+    variance: DVec3,
+}
+
+fn by_matrices(
+    equations: &NormalEquations,
+    matrices: &Matrices,
+    beliefs: &Beliefs,
+    active: usize,
+) -> Vec<Tested> {
+    let n = equations.diagonal.len();
+    let mut tests: Vec<Tested> = (active..n).map(|_| Tested::none()).collect();
+    for channel in 0..3 {
+        let (hessian, scatter) = (&matrices.hessian[channel], &matrices.scatter[channel]);
+        let Some(inverse) = inverse(hessian, &beliefs.added, channel) else {
+            continue;
+        };
+        let active_scatter = DMatrix::from_fn(active, active, |a, b| scatter[(a.max(b), a.min(b))]);
+        for (row, test) in (active..n).zip(&mut tests) {
+            let coupling = DVector::from_fn(active, |a, _| hessian[(row, a)]);
+            let u = &inverse * &coupling;
+            let shared = DVector::from_fn(active, |a, _| scatter[(row, a)]);
+            test.curvature[channel] = hessian[(row, row)] - coupling.dot(&u);
+            test.variance[channel] =
+                scatter[(row, row)] - 2.0 * u.dot(&shared) + u.dot(&(&active_scatter * &u));
+        }
+    }
+    tests
+}
+
+/// As [`by_matrices`], exactly for the parameters whose scores stand out most; the others as if nothing followed them.
+fn by_rows(
+    equations: &NormalEquations,
+    rows: &Rows,
+    beliefs: &Beliefs,
+    active: usize,
+) -> Vec<Tested> {
+    let n = equations.diagonal.len();
+    let mut tests: Vec<Tested> = (active..n)
+        .map(|row| Tested {
+            curvature: equations.diagonal[row],
+            variance: equations.scatter[row],
+        })
+        .collect();
+    let significance = |row: usize| {
+        let (score, scatter) = (
+            equations.descent[row].max(DVec3::ZERO),
+            equations.scatter[row],
+        );
+        let known = scatter.cmpgt(DVec3::ZERO);
+        DVec3::select(known, score * score / scatter, DVec3::ZERO).element_sum()
+    };
+    let mut standing_out: Vec<(f64, usize)> = (active..n).map(|r| (significance(r), r)).collect();
+    standing_out.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+
+    let is_active = |row: usize| {
+        if row < active {
+            DVec3::ONE
+        } else {
+            DVec3::ZERO
+        }
+    };
+    let free: Vec<DVec3> = (0..n).map(is_active).collect();
+    let none = vec![DVec3::ZERO; n];
+    let mut added = beliefs.added.clone();
+    added.resize(n, DVec3::ONE);
+    let exact: Vec<(usize, Tested)> = (standing_out.par_iter().take(MOST_EXACT))
+        .map(|&(_, row)| {
+            let mut unit = vec![DVec3::ZERO; n];
+            unit[row] = DVec3::ONE;
+            let coupling = rows.hessian_times(&unit);
+            let mut follow = rows.solve(&added, &free, &coupling, &none, DRAW_TOLERANCE);
+            let followed = (0..active).map(|a| coupling[a] * follow[a]).sum::<DVec3>();
+            follow.iter_mut().for_each(|u| *u = -*u);
+            follow[row] = DVec3::ONE;
+            let test = Tested {
+                curvature: equations.diagonal[row] - followed,
+                variance: rows.scatter_along(&follow),
+            };
+            (row - active, test)
+        })
+        .collect();
+    for (index, test) in exact {
+        tests[index] = test;
+    }
+    tests
+}
+
+impl Tested {
+    fn none() -> Self {
+        Self {
+            curvature: DVec3::ZERO,
+            variance: DVec3::ZERO,
+        }
+    }
 }

@@ -1,16 +1,9 @@
-//! Radiance and derivatives of cached paths for given unknowns, and the normal equations of the fit.
-//!
-//! With one set of paths for both, noise in the derivative correlates with noise in the residual and an ℓ2 fit is
-//! biased towards darkness. Products are therefore taken across the two independent sets A and B.
+//! Radiance and derivatives of cached paths for given unknowns.
 
 use super::derivative::{Gradient, differentiate};
-use super::prior::Prior;
-use super::roles::places;
-use super::trust::Trust;
 use super::{CachedCluster, PathCache};
 use crate::inverse::parameters::Unknowns;
 use glam::{DVec3, Vec3};
-use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// One cluster's residual and derivative from both sets.
@@ -31,68 +24,15 @@ pub struct Linearised {
     pub rows: Vec<(usize, DVec3, DVec3)>,
 }
 
-/// Sums over the clusters of the fit for one set of unknowns.
-#[derive(Debug, Clone)]
-pub struct NormalEquations {
-    /// Per channel: Σ w J̄ J̄ᵀ over the free parameters with J̄ = (J_A + J_B)/2; never indefinite. Lower triangle.
-    pub hessian: [DMatrix<f64>; 3],
-    /// Per channel: ½ Σ w (J_A r_B + J_B r_A), the unbiased direction of descent.
-    pub descent: [DVector<f64>; 3],
-    /// Per channel: Σ w J_A J_B, what is known of each parameter apart from noise.
-    pub information: [DVector<f64>; 3],
-    /// Per channel: Σ g gᵀ of the clusters' contributions g to `descent`, for standard errors. Lower triangle.
-    pub scatter: [DMatrix<f64>; 3],
-    /// Per channel: Σ w r_A r_B, an unbiased measure of the squared error.
-    pub objective: DVec3,
-    /// Clusters in the sums.
-    pub clusters: usize,
-    /// What is believed besides.
-    pub prior: Prior,
-}
-
-impl PathCache {
-    /// The normal equations for the parameters in `free` (indices into albedos, then emissions).
-    pub fn normal_equations(
-        &self,
-        unknowns: &Unknowns,
-        free: &[usize],
-        trust: &Trust,
-        prior: &Prior,
-    ) -> NormalEquations {
-        let places = places(free, unknowns.surfaces());
-        NormalEquations::new(&self.linearise(unknowns, &places), free.len(), trust, prior)
-    }
-}
-
-impl NormalEquations {
-    /// Sums over linearised clusters with `n` rows.
-    pub fn new(linearised: &[Linearised], n: usize, trust: &Trust, prior: &Prior) -> Self {
-        let mut sums = Self {
-            hessian: std::array::from_fn(|_| DMatrix::zeros(n, n)),
-            descent: std::array::from_fn(|_| DVector::zeros(n)),
-            information: std::array::from_fn(|_| DVector::zeros(n)),
-            scatter: std::array::from_fn(|_| DMatrix::zeros(n, n)),
-            objective: DVec3::ZERO,
-            clusters: linearised.len(),
-            prior: prior.clone(),
-        };
-        for cluster in linearised {
-            sums.add(cluster, trust.of(cluster.object));
-        }
-        sums
+impl Linearised {
+    /// What each row adds to the direction of descent, for a weight per channel: ½ w (J_A r_B + J_B r_A).
+    pub fn scores(&self, weight: DVec3) -> impl Iterator<Item = DVec3> + '_ {
+        let [ra, rb] = self.residuals;
+        (self.rows.iter()).map(move |&(_, ja, jb)| weight * (ja * rb + jb * ra) * 0.5)
     }
 }
 
 impl PathCache {
-    /// Photograph minus model for each cluster, from set A and from set B.
-    pub fn residuals(&self, unknowns: &Unknowns) -> Vec<[DVec3; 2]> {
-        let place = vec![usize::MAX; 2 * unknowns.surfaces()];
-        self.linearise(unknowns, &place)
-            .into_iter()
-            .map(|l| l.residuals)
-            .collect()
-    }
-
     /// Linearises every cluster about some unknowns; `place` maps parameters to rows.
     pub fn linearise(&self, unknowns: &Unknowns, place: &[usize]) -> Vec<Linearised> {
         let parameters = 2 * unknowns.surfaces();
@@ -163,44 +103,6 @@ fn linearise(
             .as_dvec3(),
         residuals,
         rows,
-    }
-}
-
-impl NormalEquations {
-    fn add(&mut self, cluster: &Linearised, trust: DVec3) {
-        let Linearised {
-            weight,
-            residuals,
-            rows,
-            ..
-        } = cluster;
-        let weight = *weight * trust;
-        self.objective += weight * residuals[0] * residuals[1];
-        let scores: Vec<DVec3> = rows
-            .iter()
-            .map(|&(_, ja, jb)| weight * (ja * residuals[1] + jb * residuals[0]) * 0.5)
-            .collect();
-        for (&(i, ja, jb), score) in rows.iter().zip(&scores) {
-            let information = weight * ja * jb;
-            for c in 0..3 {
-                self.descent[c][i] += score[c];
-                self.information[c][i] += information[c];
-            }
-        }
-        for (&(i, ia, ib), &si) in rows.iter().zip(&scores) {
-            let row = weight * (ia + ib) * 0.25;
-            for (&(j, ja, jb), &sj) in rows.iter().zip(&scores) {
-                if j > i {
-                    continue;
-                }
-                let h = row * (ja + jb);
-                let s = si * sj;
-                for c in 0..3 {
-                    self.hessian[c][(i, j)] += h[c];
-                    self.scatter[c][(i, j)] += s[c];
-                }
-            }
-        }
     }
 }
 

@@ -1,8 +1,9 @@
 //! Finds the zero of the unbiased descent direction within bounds, by Gauss–Newton steps.
 
 use super::PathCache;
-use super::evaluate::NormalEquations;
+use super::equations::{Coupling, Matrices, NormalEquations};
 use super::prior::Prior;
+use super::rows::Bounded;
 use super::step::Step;
 use super::trust::Trust;
 use crate::inverse::parameters::Unknowns;
@@ -25,23 +26,9 @@ pub struct Fit {
     pub iterations: u64,
 }
 
-/// Reads the free parameters of one channel.
-pub fn gather(unknowns: &Unknowns, free: &[usize], channel: usize) -> Vec<f64> {
-    free.iter()
-        .map(|&i| f64::from(unknowns.value(i)[channel]))
-        .collect()
-}
-
-/// Writes the free parameters of one channel.
-pub fn scatter(unknowns: &mut Unknowns, free: &[usize], channel: usize, values: &[f64]) {
-    for (&i, &value) in free.iter().zip(values) {
-        unknowns.value_mut(i)[channel] = value as f32;
-    }
-}
-
 /// Weighted variance of one cluster's residual, without the noise of the paths.
-pub fn noise(equations: &NormalEquations, channel: usize) -> f64 {
-    (equations.objective[channel] / equations.clusters.max(1) as f64).max(1e-12)
+pub fn noise(equations: &NormalEquations) -> DVec3 {
+    (equations.objective / equations.clusters.max(1) as f64).max(DVec3::splat(1e-12))
 }
 
 /// Fits the free parameters (indices into albedos, then emissions). `between` runs after every step and may end it.
@@ -95,64 +82,76 @@ pub fn propose(
     from: &Unknowns,
     damping: f64,
 ) -> (Unknowns, f64) {
+    // What is believed besides pulls like measurements; what no path touches stays where it is.
+    let x: Vec<DVec3> = free.iter().map(|&i| from.value(i).as_dvec3()).collect();
+    let variance = noise(equations);
+    let mut descent = equations.descent.clone();
+    let added = |damping: f64| -> Vec<DVec3> {
+        let diagonals = free.iter().zip(&equations.diagonal);
+        (diagonals.map(|(&i, diagonal)| {
+            let untouched = DVec3::select(diagonal.cmpgt(DVec3::ZERO), DVec3::ZERO, DVec3::ONE);
+            *diagonal * damping + equations.prior.of(i, variance).1 + untouched
+        }))
+        .collect()
+    };
+    for ((g, &i), x) in descent.iter_mut().zip(free).zip(&x) {
+        let (mean, precision) = equations.prior.of(i, variance);
+        *g += precision * (mean - *x);
+    }
+    let surfaces = from.surfaces();
+    let upper: Vec<f64> = (free.iter())
+        .map(|&i| if i < surfaces { 1.0 } else { f64::INFINITY })
+        .collect();
+    let step = match &equations.coupling {
+        Coupling::Dense(matrices) => dense_step(matrices, &x, &descent, &upper, damping, &added),
+        Coupling::Sparse(rows) => rows.bounded_step(&Bounded {
+            x: &x,
+            descent: &descent,
+            added: &added(damping),
+            upper: &upper,
+        }),
+    };
+
     let mut proposal = from.clone();
     let mut largest = 0.0f64;
-    for channel in 0..3 {
-        let x = gather(from, free, channel);
-        let Some(y) = propose_channel(equations, free, from.surfaces(), channel, &x, damping)
-        else {
-            continue;
-        };
-        let variance = noise(equations, channel);
-        for (i, (x, y)) in x.iter().zip(&y).enumerate() {
-            let information = equations.hessian[channel][(i, i)] / variance;
-            largest = largest.max((x - y).abs() * information.sqrt());
-        }
-        scatter(&mut proposal, free, channel, &y);
+    for (row, &i) in free.iter().enumerate() {
+        let y = (x[row] + step[row]).clamp(DVec3::ZERO, DVec3::splat(upper[row]));
+        let information = equations.diagonal[row] / variance;
+        largest = largest.max(((x[row] - y).abs() * information.powf(0.5)).max_element());
+        *proposal.value_mut(i) = y.as_vec3();
     }
     (proposal, largest)
 }
 
-/// New values of one channel's free parameters; `None` if no damping makes the equations definite.
-fn propose_channel(
-    equations: &NormalEquations,
-    free: &[usize],
-    objects: usize,
-    channel: usize,
-    x: &[f64],
-    mut damping: f64,
-) -> Option<Vec<f64>> {
-    let variance = noise(equations, channel);
-    let hessian = &equations.hessian[channel];
-    let (mean, prior): (Vec<f64>, Vec<f64>) = (free.iter())
-        .map(|&i| equations.prior.of(i, channel, variance))
-        .unzip();
-    let descent = DVector::from_fn(x.len(), |i, _| {
-        equations.descent[channel][i] + prior[i] * (mean[i] - x[i])
-    });
+/// The step of each channel by itself, damped as far as its equations must be; none where no damping helps.
+fn dense_step(
+    matrices: &Matrices,
+    x: &[DVec3],
+    descent: &[DVec3],
+    upper: &[f64],
+    damping: f64,
+    added: &dyn Fn(f64) -> Vec<DVec3>,
+) -> Vec<DVec3> {
+    let mut steps = vec![DVec3::ZERO; x.len()];
     let lower = vec![0.0; x.len()];
-    let upper: Vec<f64> = free
-        .iter()
-        .map(|&i| if i < objects { 1.0 } else { f64::INFINITY })
-        .collect();
-    while damping < 1e9 {
-        // What no path touches stays where it is.
-        let added = DVector::from_fn(x.len(), |i, _| {
-            let diagonal = hessian[(i, i)];
-            damping * diagonal + prior[i] + if diagonal > 0.0 { 0.0 } else { 1.0 }
-        });
-        let step = Step {
-            hessian,
-            descent: &descent,
-            damping: added,
-            lower: &lower,
-            upper: &upper,
-        };
-        if let Some(d) = step.solve(x) {
-            let bounded = |i: usize| (x[i] + d[i]).clamp(lower[i], upper[i]);
-            return Some((0..x.len()).map(bounded).collect());
+    for channel in 0..3 {
+        let of = |all: &[DVec3]| -> Vec<f64> { all.iter().map(|v| v[channel]).collect() };
+        let descent = DVector::from_vec(of(descent));
+        let mut damping = damping;
+        while damping < 1e9 {
+            let step = Step {
+                hessian: &matrices.hessian[channel],
+                descent: &descent,
+                damping: DVector::from_vec(of(&added(damping))),
+                lower: &lower,
+                upper,
+            };
+            if let Some(found) = step.solve(&of(x)) {
+                (steps.iter_mut().zip(found.iter())).for_each(|(s, d)| s[channel] = *d);
+                break;
+            }
+            damping *= 10.0;
         }
-        damping *= 10.0;
     }
-    None
+    steps
 }

@@ -1,13 +1,13 @@
 //! What is believed of an unknown before any photograph speaks: little, but enough to keep what no photograph
 //! determines within reason.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// Standard deviation of an albedo of which nothing is known, about [`ALBEDO_MEAN`].
-pub const ALBEDO_DEVIATION: f64 = 0.5;
+pub const ALBEDO_DEVIATION: f32 = 0.5;
 /// Where an albedo stays of which nothing is known.
-pub const ALBEDO_MEAN: f64 = 0.5;
+pub const ALBEDO_MEAN: f32 = 0.5;
 /// Standard deviation of light from a direction outside that no photograph looks in, in mean radiances of what the
 /// photographs show.
 const OUTSIDE_DEVIATION: f32 = 4.0;
@@ -66,29 +66,23 @@ impl Prior {
         self
     }
 
-    /// Mean of a parameter (albedos first, then emissions) in one channel, and its precision in the units of the normal
-    /// equations: the noise variance of one cluster over the prior's variance. Zero where nothing is believed.
-    pub fn of(&self, parameter: usize, channel: usize, noise: f64) -> (f64, f64) {
-        match parameter.checked_sub(self.surfaces) {
-            None => {
-                let (mean, deviation) = match &self.albedo {
-                    Some(expected) => (
-                        f64::from(expected.mean[parameter][channel]),
-                        f64::from(expected.deviation[parameter][channel]),
-                    ),
-                    None => (ALBEDO_MEAN, ALBEDO_DEVIATION),
-                };
-                (mean, noise / (deviation * deviation))
+    /// Mean of a parameter (albedos first, then emissions), and its precision in the units of the normal equations: the
+    /// noise variance of one cluster over the prior's variance. Zero where nothing is believed.
+    pub fn of(&self, parameter: usize, noise: DVec3) -> (DVec3, DVec3) {
+        let (mean, deviation) = match parameter.checked_sub(self.surfaces) {
+            None => match &self.albedo {
+                Some(expected) => (expected.mean[parameter], expected.deviation[parameter]),
+                None => (Vec3::splat(ALBEDO_MEAN), Vec3::splat(ALBEDO_DEVIATION)),
+            },
+            Some(emitter) if emitter >= self.outside => {
+                (self.means[emitter - self.outside], self.deviation)
             }
-            Some(emitter) if emitter >= self.outside && self.deviation[channel] > 0.0 => {
-                let deviation = f64::from(self.deviation[channel]);
-                (
-                    f64::from(self.means[emitter - self.outside][channel]),
-                    noise / (deviation * deviation),
-                )
-            }
-            Some(_) => (0.0, 0.0),
-        }
+            Some(_) => return (DVec3::ZERO, DVec3::ZERO),
+        };
+        let (mean, deviation) = (mean.as_dvec3(), deviation.as_dvec3());
+        let known = deviation.cmpgt(DVec3::ZERO);
+        let or_zero = |v| DVec3::select(known, v, DVec3::ZERO);
+        (or_zero(mean), or_zero(noise / (deviation * deviation)))
     }
 }
 
@@ -103,15 +97,15 @@ mod tests {
             deviation: vec![Vec3::new(0.1, 0.01, 0.5)],
         };
         let prior = Prior::new(1, 1, Vec3::ONE).with_albedo(Some(expected));
-        for (channel, (mean, precision)) in [(0.2, 100.0), (0.3, 1e4), (0.4, 4.0)]
-            .into_iter()
-            .enumerate()
-        {
-            let of = prior.of(0, channel, 1.0);
-            assert!((of.0 - mean).abs() < 1e-6, "{of:?}");
-            assert!((of.1 / precision - 1.0).abs() < 1e-5, "{of:?}");
-        }
-        assert_eq!(prior.with_albedo(None).of(0, 0, 1.0), (0.5, 4.0));
+        let (mean, precision) = prior.of(0, DVec3::ONE);
+        assert!((mean - DVec3::new(0.2, 0.3, 0.4)).length() < 1e-6, "{mean}");
+        let wanted = DVec3::new(100.0, 1e4, 4.0);
+        assert!(
+            (precision / wanted - DVec3::ONE).length() < 1e-5,
+            "{precision}"
+        );
+        let nothing = prior.with_albedo(None).of(0, DVec3::ONE);
+        assert_eq!(nothing, (DVec3::splat(0.5), DVec3::splat(4.0)));
     }
 
     #[test]
@@ -119,13 +113,16 @@ mod tests {
         for unit in [1e-12f32, 1.0, 1e12] {
             let prior =
                 Prior::new(5, 3, Vec3::splat(2.0 * unit)).with_sky(|_| Vec3::splat(3.0 * unit));
-            assert_eq!(prior.of(0, 0, 0.1), (0.5, 0.1 / 0.25));
-            assert_eq!(prior.of(5 + 2, 0, 0.1), (0.0, 0.0));
-            let (mean, precision) = prior.of(5 + 3, 1, 0.1);
-            assert!((mean / f64::from(unit) - 3.0).abs() < 1e-5);
-            assert!((precision * f64::from(unit).powi(2) - 0.1 / 64.0).abs() < 1e-8);
+            let noise = DVec3::splat(0.1);
+            assert_eq!(prior.of(0, noise), (DVec3::splat(0.5), noise / 0.25));
+            assert_eq!(prior.of(5 + 2, noise), (DVec3::ZERO, DVec3::ZERO));
+            let (mean, precision) = prior.of(5 + 3, noise);
+            let unit = f64::from(unit);
+            assert!((mean / unit - DVec3::splat(3.0)).length() < 1e-5);
+            assert!((precision * unit.powi(2) - noise / 64.0).length() < 1e-8);
         }
         // All photographs black: nothing to hold on to.
-        assert_eq!(Prior::new(2, 1, Vec3::ZERO).of(3, 0, 0.1), (0.0, 0.0));
+        let black = Prior::new(2, 1, Vec3::ZERO).of(3, DVec3::splat(0.1));
+        assert_eq!(black, (DVec3::ZERO, DVec3::ZERO));
     }
 }

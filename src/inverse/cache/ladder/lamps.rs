@@ -24,14 +24,14 @@ impl Ladder<'_, '_> {
     pub(super) fn test_dark(&mut self, cache: &PathCache) -> Vec<Released> {
         let objects = self.roles.len();
         let mut free = roles::free(&self.roles);
-        let active: Vec<usize> = (0..free.len()).collect();
+        let active = free.len();
         free.extend(
             (0..objects)
                 .filter(|&k| !self.roles[k].emits())
                 .map(|k| objects + k),
         );
         let equations = cache.normal_equations(&self.unknowns, &free, &self.trust, &self.prior);
-        let released = release(&equations, &free, &active);
+        let released = release(&equations, &free, active);
         for test in &released {
             self.errors.emission[test.index - objects] =
                 Vec3::from_array(test.stderr.map(|e| e as f32));

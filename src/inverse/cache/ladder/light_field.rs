@@ -2,7 +2,7 @@
 
 use super::Ladder;
 use crate::inverse::cache::PathCache;
-use crate::inverse::cache::evaluate::NormalEquations;
+use crate::inverse::cache::equations::NormalEquations;
 use crate::inverse::cache::fit::{LEAST_DAMPING, propose};
 use crate::inverse::cache::path_noise::share_paths;
 use crate::inverse::cache::prior::{ALBEDO_DEVIATION, ALBEDO_MEAN, ExpectedAlbedo};
@@ -83,10 +83,7 @@ impl Ladder<'_, '_> {
             return;
         }
         let surfaces = self.roles.len();
-        let nothing = (
-            Vec3::splat(ALBEDO_MEAN as f32),
-            Vec3::splat(ALBEDO_DEVIATION as f32),
-        );
+        let nothing = (Vec3::splat(ALBEDO_MEAN), Vec3::splat(ALBEDO_DEVIATION));
         let (mean, deviation) = (0..surfaces)
             .map(|k| match self.roles[k] {
                 Role::Reflector => (

@@ -299,8 +299,7 @@ impl Ladder<'_, '_> {
     /// Takes over a fit under the present roles, with its errors.
     fn take(&mut self, fitted: Fit) {
         let free = roles::free(&self.roles);
-        let rows: Vec<usize> = (0..free.len()).collect();
-        let errors = standard_errors(&fitted.equations, &free, &rows, self.roles.len());
+        let errors = standard_errors(&fitted.equations, &free, self.roles.len());
         self.unknowns = fitted.unknowns;
         self.merge_errors(errors);
         self.describe();

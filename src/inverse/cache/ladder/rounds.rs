@@ -2,8 +2,8 @@
 
 use super::Ladder;
 use crate::inverse::cache::accumulate::Accumulated;
+use crate::inverse::cache::equations::NormalEquations;
 use crate::inverse::cache::errors::standard_errors;
-use crate::inverse::cache::evaluate::NormalEquations;
 use crate::inverse::cache::fit::{LEAST_DAMPING, propose};
 use crate::inverse::cache::path_noise::{self, share_paths};
 use crate::inverse::cache::roles;
@@ -31,7 +31,6 @@ impl Ladder<'_, '_> {
         );
         let lights = self.lights();
         let free = roles::free(&self.roles);
-        let all: Vec<usize> = (0..free.len()).collect();
         let places = roles::places(&free, self.roles.len());
         let mut about = self.unknowns.clone();
         let mut sums = Accumulated::default();
@@ -45,7 +44,7 @@ impl Ladder<'_, '_> {
             self.path_noise = path_noise::shares(&mean, self.roles.len());
             let equations = NormalEquations::new(&mean, free.len(), &self.trust, &self.prior);
             let (proposal, _) = propose(&equations, &free, &about, LEAST_DAMPING);
-            let errors = standard_errors(&equations, &free, &all, self.roles.len());
+            let errors = standard_errors(&equations, &free, self.roles.len());
             let step = largest_step(&about, &proposal);
             self.monitor.progress.iterations += 1;
             self.unknowns = proposal;

@@ -1,0 +1,136 @@
+//! The normal equations of the fit.
+//!
+//! With one set of paths for both, noise in the derivative correlates with noise in the residual and an ℓ2 fit is
+//! biased towards darkness. Products are therefore taken across the two independent sets A and B.
+
+use super::PathCache;
+use super::evaluate::Linearised;
+use super::prior::Prior;
+use super::roles::places;
+use super::rows::Rows;
+use super::trust::Trust;
+use crate::inverse::parameters::Unknowns;
+use glam::DVec3;
+use nalgebra::DMatrix;
+
+/// Up to so many parameters, matrices over pairs of them are kept.
+const MOST_DENSE: usize = 256;
+
+/// Sums over the clusters of the fit for one set of unknowns.
+#[derive(Debug, Clone)]
+pub struct NormalEquations {
+    /// ½ Σ w (J_A r_B + J_B r_A) of each free parameter, the unbiased direction of descent.
+    pub descent: Vec<DVec3>,
+    /// Diagonal of the Hessian Σ w J̄ J̄ᵀ with J̄ = (J_A + J_B)/2.
+    pub diagonal: Vec<DVec3>,
+    /// Diagonal of the scatter Σ g gᵀ of the clusters' contributions g to `descent`.
+    pub scatter: Vec<DVec3>,
+    /// Σ w r_A r_B, an unbiased measure of the squared error.
+    pub objective: DVec3,
+    /// Clusters in the sums.
+    pub clusters: usize,
+    /// What is believed besides.
+    pub prior: Prior,
+    /// How parameters depend on each other.
+    pub coupling: Coupling,
+}
+
+/// Hessian and scatter.
+#[derive(Debug, Clone)]
+pub enum Coupling {
+    /// As matrices.
+    Dense(Matrices),
+    /// As the clusters' rows.
+    Sparse(Rows),
+}
+
+/// Hessian and scatter as matrices, lower triangles.
+#[derive(Debug, Clone)]
+pub struct Matrices {
+    /// Per channel: Σ w J̄ J̄ᵀ; never indefinite.
+    pub hessian: [DMatrix<f64>; 3],
+    /// Per channel: Σ g gᵀ, for standard errors.
+    pub scatter: [DMatrix<f64>; 3],
+}
+
+impl PathCache {
+    /// The normal equations for the parameters in `free` (indices into albedos, then emissions).
+    pub fn normal_equations(
+        &self,
+        unknowns: &Unknowns,
+        free: &[usize],
+        trust: &Trust,
+        prior: &Prior,
+    ) -> NormalEquations {
+        let places = places(free, unknowns.surfaces());
+        NormalEquations::new(&self.linearise(unknowns, &places), free.len(), trust, prior)
+    }
+}
+
+impl NormalEquations {
+    /// Sums over linearised clusters with `n` free parameters.
+    pub fn new(linearised: &[Linearised], n: usize, trust: &Trust, prior: &Prior) -> Self {
+        let coupling = if n <= MOST_DENSE {
+            Coupling::Dense(Matrices::new(linearised, n, trust))
+        } else {
+            Coupling::Sparse(Rows::new(linearised, n, trust))
+        };
+        Self::with_coupling(linearised, n, trust, prior, coupling)
+    }
+
+    /// The same with the couplings given.
+    pub fn with_coupling(
+        linearised: &[Linearised],
+        n: usize,
+        trust: &Trust,
+        prior: &Prior,
+        coupling: Coupling,
+    ) -> Self {
+        let mut sums = Self {
+            descent: vec![DVec3::ZERO; n],
+            diagonal: vec![DVec3::ZERO; n],
+            scatter: vec![DVec3::ZERO; n],
+            objective: DVec3::ZERO,
+            clusters: linearised.len(),
+            prior: prior.clone(),
+            coupling,
+        };
+        for cluster in linearised {
+            let weight = cluster.weight * trust.of(cluster.object);
+            sums.objective += weight * cluster.residuals[0] * cluster.residuals[1];
+            for (&(i, a, b), score) in cluster.rows.iter().zip(cluster.scores(weight)) {
+                let mean = (a + b) * 0.5;
+                sums.descent[i] += score;
+                sums.diagonal[i] += weight * mean * mean;
+                sums.scatter[i] += score * score;
+            }
+        }
+        sums
+    }
+}
+
+impl Matrices {
+    /// Of linearised clusters with `n` free parameters.
+    pub fn new(linearised: &[Linearised], n: usize, trust: &Trust) -> Self {
+        let zeros = || std::array::from_fn(|_| DMatrix::zeros(n, n));
+        let (mut hessian, mut scatter): ([DMatrix<f64>; 3], [DMatrix<f64>; 3]) = (zeros(), zeros());
+        for cluster in linearised {
+            let weight = cluster.weight * trust.of(cluster.object);
+            let scores: Vec<DVec3> = cluster.scores(weight).collect();
+            for (&(i, ia, ib), &si) in cluster.rows.iter().zip(&scores) {
+                let row = weight * (ia + ib) * 0.25;
+                for (&(j, ja, jb), &sj) in cluster.rows.iter().zip(&scores) {
+                    if j > i {
+                        continue;
+                    }
+                    let (h, s) = (row * (ja + jb), si * sj);
+                    for c in 0..3 {
+                        hessian[c][(i, j)] += h[c];
+                        scatter[c][(i, j)] += s[c];
+                    }
+                }
+            }
+        }
+        Self { hessian, scatter }
+    }
+}
