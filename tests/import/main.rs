@@ -1,5 +1,6 @@
 //! Every importer on a small sample of its format: a box-shaped room whose depth and colours are known in closed form.
 
+mod colmap;
 mod command;
 mod hostile;
 mod icl_nuim;

@@ -1,7 +1,7 @@
 //! The layouts that are understood, and how a folder's content tells which it has.
 
 use crate::capture::import::folder::Folder;
-use crate::capture::import::rgbd;
+use crate::capture::import::{colmap, rgbd};
 use crate::error::{Error, Result};
 
 /// A layout of files.
@@ -17,6 +17,8 @@ pub enum Format {
     IclNuim,
     /// Open3D's reconstruction system and Redwood: colour and depth folders, a trajectory, camera_intrinsic.json.
     Open3d,
+    /// A COLMAP model, text or binary, with its photographs and a mesh.
+    Colmap,
 }
 
 impl Format {
@@ -27,6 +29,7 @@ impl Format {
         ("tum", Self::Tum),
         ("icl-nuim", Self::IclNuim),
         ("open3d", Self::Open3d),
+        ("colmap", Self::Colmap),
     ];
 
     /// The layout in words.
@@ -37,6 +40,7 @@ impl Format {
             Self::Tum => "TUM RGB-D (rgb.txt, depth.txt, groundtruth.txt)",
             Self::IclNuim => "ICL-NUIM (TUM's layout, left-handed camera)",
             Self::Open3d => "Open3D's reconstruction system (colour, depth, trajectory)",
+            Self::Colmap => "a COLMAP model (cameras, images)",
         }
     }
 }
@@ -46,6 +50,9 @@ impl Format {
 /// # Errors
 /// No layout is recognised.
 pub fn detect(folder: &Folder) -> Result<Format> {
+    if colmap::is_here(folder) {
+        return Ok(Format::Colmap);
+    }
     if rgbd::seven_scenes::is_here(folder)? {
         return Ok(Format::SevenScenes);
     }

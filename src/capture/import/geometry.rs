@@ -7,7 +7,7 @@ use crate::capture::mesh::Mesh;
 use crate::capture::read::confine::Confine;
 use crate::capture::read::mesh;
 use crate::error::{Error, Result};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Reads a mesh, mirrored in z with its winding turned if the scan's world is left-handed; also whether it has objects.
 ///
@@ -49,6 +49,58 @@ pub fn read(
         said.push("the mesh is mirrored in z like the cameras".into());
     }
     Ok((mesh, raw.has_objects))
+}
+
+/// Meshes by name, the best first.
+const NAMES: [&str; 9] = [
+    "mesh.glb",
+    "mesh.ply",
+    "mesh.obj",
+    "textured.obj",
+    "textured_mesh.obj",
+    "poly.glb",
+    "raw.glb",
+    "meshed-poisson.ply",
+    "meshed-delaunay.ply",
+];
+/// Words in the names of PLY files that hold points without faces.
+const POINTS: [&str; 5] = ["fused", "point", "cloud", "sparse", "input"];
+
+/// The mesh in some of a folder's folders: one of the usual names, or the only file that may be one.
+///
+/// # Errors
+/// A folder cannot be read.
+pub fn find(folder: &Folder, places: &[&str], said: &mut Vec<String>) -> Result<Option<PathBuf>> {
+    let full = |place: &str, name: &str| match place {
+        "" => name.to_owned(),
+        _ => format!("{place}/{name}"),
+    };
+    let file = |name: &str| folder.file(&folder.path(name).display().to_string(), name);
+    for place in places {
+        if let Some(name) = NAMES.iter().find(|name| folder.has(&full(place, name))) {
+            return file(&full(place, name)).map(Some);
+        }
+    }
+    for place in places.iter().filter(|place| folder.has_folder(place)) {
+        let names = folder.names(place)?;
+        let is_mesh = |name: &&String| {
+            let lower = name.to_ascii_lowercase();
+            let end = lower.rsplit_once('.').map_or("", |(_, end)| end);
+            let holds_points = POINTS.iter().any(|word| lower.contains(word));
+            matches!(end, "glb" | "obj") || (end == "ply" && !holds_points)
+        };
+        let found: Vec<&String> = names.iter().filter(is_mesh).collect();
+        if found.len() > 1 {
+            said.push(format!(
+                "mesh: the first of {} files that may be one; --mesh chooses another",
+                found.len()
+            ));
+        }
+        if let Some(name) = found.first() {
+            return file(&full(place, name)).map(Some);
+        }
+    }
+    Ok(None)
 }
 
 /// Fuses the depth of all frames that have one.

@@ -4,6 +4,7 @@
 //! share is done here: frames are chosen, the mesh is read, or fused from the depth images ([`crate::capture::fuse`]).
 //! Nothing outside the scan's folder is opened, but for a mesh that the person names.
 
+mod colmap;
 mod depth;
 mod folder;
 mod format;
@@ -133,6 +134,7 @@ pub fn read(
         Format::ScanNet => rgbd::scannet::read(&folder)?,
         Format::Tum => rgbd::tum::read(&folder, options, false)?,
         Format::IclNuim => rgbd::tum::read(&folder, options, true)?,
+        Format::Colmap => colmap::read(&folder)?,
         Format::Open3d => rgbd::open3d::read(&folder, options)?,
     };
     said.append(&mut scan.said);
