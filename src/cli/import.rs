@@ -1,11 +1,11 @@
 //! `relit import`: scans of other programs as captures.
 
-use crate::capture::import::{self, Format, ImportOptions};
+use crate::capture::import::{self, AppliedTransform, Format, ImportOptions};
 use crate::cli::arguments::triple;
 use crate::error::Result;
 use crate::export;
-use clap::Args;
 use clap::builder::PossibleValuesParser;
+use clap::{Args, ValueEnum};
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
@@ -40,6 +40,18 @@ pub struct ImportArguments {
     /// Colour camera of a scan that does not say, in pixels with centres at whole numbers
     #[arg(long, value_name = "FX,FY,CX,CY", value_parser = intrinsics, allow_hyphen_values = true)]
     intrinsics: Option<Intrinsics>,
+    /// Nerfstudio's applied_transform [default: undone for a mesh that comes from elsewhere]
+    #[arg(long, value_enum, value_name = "undo|keep")]
+    applied_transform: Option<Applied>,
+}
+
+/// What becomes of an applied_transform.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Applied {
+    /// The mesh has the coordinates from before it
+    Undo,
+    /// Mesh and poses share its coordinates
+    Keep,
 }
 
 /// fx, fy, cx, cy.
@@ -71,6 +83,11 @@ pub fn import(arguments: &ImportArguments) -> Result<()> {
         most_frames: arguments.most_frames.map(|n| n as usize),
         up: arguments.up,
         intrinsics: arguments.intrinsics.map(|k| k.0),
+        applied_transform: match arguments.applied_transform {
+            None => AppliedTransform::Guess,
+            Some(Applied::Undo) => AppliedTransform::Undo,
+            Some(Applied::Keep) => AppliedTransform::Keep,
+        },
     };
     let bar = std::io::stderr().is_terminal().then(|| {
         let style = ProgressStyle::with_template("{bar:24} {pos} of {len} depth images fused");

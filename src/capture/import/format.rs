@@ -1,7 +1,7 @@
 //! The layouts that are understood, and how a folder's content tells which it has.
 
 use crate::capture::import::folder::Folder;
-use crate::capture::import::{colmap, rgbd};
+use crate::capture::import::{colmap, nerf, rgbd};
 use crate::error::{Error, Result};
 
 /// A layout of files.
@@ -19,6 +19,8 @@ pub enum Format {
     Open3d,
     /// A COLMAP model, text or binary, with its photographs and a mesh.
     Colmap,
+    /// transforms.json of Nerfstudio, instant-ngp, Polycam, Record3D.
+    Nerfstudio,
 }
 
 impl Format {
@@ -30,6 +32,7 @@ impl Format {
         ("icl-nuim", Self::IclNuim),
         ("open3d", Self::Open3d),
         ("colmap", Self::Colmap),
+        ("nerfstudio", Self::Nerfstudio),
     ];
 
     /// The layout in words.
@@ -41,6 +44,7 @@ impl Format {
             Self::IclNuim => "ICL-NUIM (TUM's layout, left-handed camera)",
             Self::Open3d => "Open3D's reconstruction system (colour, depth, trajectory)",
             Self::Colmap => "a COLMAP model (cameras, images)",
+            Self::Nerfstudio => "Nerfstudio (transforms.json)",
         }
     }
 }
@@ -50,6 +54,9 @@ impl Format {
 /// # Errors
 /// No layout is recognised.
 pub fn detect(folder: &Folder) -> Result<Format> {
+    if nerf::is_here(folder) {
+        return Ok(Format::Nerfstudio);
+    }
     if colmap::is_here(folder) {
         return Ok(Format::Colmap);
     }

@@ -3,7 +3,7 @@
 use crate::capture::camera::Pose;
 use crate::capture::read::pose::from_rows;
 use crate::error::{Error, Result};
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DMat4, DQuat, DVec3, DVec4};
 use std::path::Path;
 
 /// A number as C, Python and MATLAB write it, `nan`, `-nan` and `-inf` included.
@@ -47,6 +47,18 @@ pub fn rows(path: &Path, text: &str) -> Result<Vec<Vec<f64>>> {
         .chunks(width)
         .map(<[f64]>::to_vec)
         .collect())
+}
+
+/// A 3×4 or 4×4 matrix of rows; `None` for another shape.
+pub fn rows_of(rows: &[Vec<f64>]) -> Option<DMat4> {
+    let fits = (3..=4).contains(&rows.len()) && rows.iter().all(|row| row.len() == 4);
+    fits.then(|| {
+        let row = |i: usize| match rows.get(i) {
+            Some(row) => DVec4::new(row[0], row[1], row[2], row[3]),
+            None => DVec4::W,
+        };
+        DMat4::from_cols(row(0), row(1), row(2), row(3)).transpose()
+    })
 }
 
 /// The pose of a camera-to-world matrix with OpenCV's camera axes; `None` if it holds a number that is not finite.

@@ -11,6 +11,7 @@ mod format;
 mod geometry;
 mod lens;
 mod matrix;
+mod nerf;
 mod rgbd;
 
 pub use depth::DepthImage;
@@ -48,6 +49,20 @@ pub struct ImportOptions {
     pub up: Option<DVec3>,
     /// fx, fy, cx, cy of the colour camera in pixels, pixel centres at whole numbers, for scans that do not say.
     pub intrinsics: Option<[f64; 4]>,
+    /// What becomes of Nerfstudio's `applied_transform`.
+    pub applied_transform: AppliedTransform,
+}
+
+/// What becomes of Nerfstudio's `applied_transform`, which moved the poses after they were found.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum AppliedTransform {
+    /// Undone for a mesh that comes from elsewhere, kept for one that the file names or that is fused.
+    #[default]
+    Guess,
+    /// Undone: the mesh has the coordinates from before it.
+    Undo,
+    /// Kept: mesh and poses share its coordinates.
+    Keep,
 }
 
 /// A photograph to be, and its depth image.
@@ -135,6 +150,7 @@ pub fn read(
         Format::Tum => rgbd::tum::read(&folder, options, false)?,
         Format::IclNuim => rgbd::tum::read(&folder, options, true)?,
         Format::Colmap => colmap::read(&folder)?,
+        Format::Nerfstudio => nerf::read(&folder, options)?,
         Format::Open3d => rgbd::open3d::read(&folder, options)?,
     };
     said.append(&mut scan.said);

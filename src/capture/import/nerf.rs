@@ -1,0 +1,317 @@
+//! transforms.json as Nerfstudio, instant-ngp, Polycam and Record3D write it.
+//!
+//! Beyond what a capture itself may say: lenses with k3 to k6 and fisheyes, intrinsics of another resolution than the
+//! photographs', file names without an ending, masks in files of their own, `applied_transform`, depth to fuse a mesh from.
+
+use crate::capture::camera::Intrinsics;
+use crate::capture::import::depth::{self, DepthImage};
+use crate::capture::import::folder::Folder;
+use crate::capture::import::lens::{Lens, Model};
+use crate::capture::import::matrix::rows_of;
+use crate::capture::import::{AppliedTransform, ImportOptions, ImportedFrame, Scan, geometry};
+use crate::capture::read::fields::Fields;
+use crate::capture::read::{image, lens, pose};
+use crate::error::{Error, Result};
+use glam::{DMat4, DVec4};
+use serde_json::{Map, Value};
+use std::path::PathBuf;
+
+/// The file's names, the best first.
+const NAMES: [&str; 2] = ["transforms.json", "transforms_train.json"];
+/// Endings tried where a photograph's name has none.
+const ENDINGS: [&str; 5] = ["", ".png", ".jpg", ".jpeg", ".exr"];
+/// Metres per unit of depth where the file does not say.
+const DEPTH_UNIT: f64 = 0.001;
+
+/// Whether a folder has such a file.
+pub fn is_here(folder: &Folder) -> bool {
+    folder.first(&NAMES).is_some()
+}
+
+/// Reads the frames and finds the mesh.
+///
+/// # Errors
+/// The file is missing or broken, or names something that is not there.
+pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
+    let name = folder.first(&NAMES).unwrap_or(NAMES[0]);
+    let path = folder.path(name);
+    let value: Value = serde_json::from_str(&folder.text(name)?)
+        .map_err(|e| Error::file(&path, format!("is not valid JSON: {e}"), "correct the file"))?;
+    let place = path.display().to_string();
+    let shared = Fields::new(format!("{place}: "), &value)?;
+    let list = shared
+        .get("frames")
+        .and_then(Value::as_array)
+        .ok_or_else(|| {
+            Error::new(
+                shared.place("frames"),
+                "is no list of frames",
+                "add the photographs",
+            )
+        })?;
+
+    let mut scan = Scan {
+        up: shared.vector("up")?,
+        ..Scan::default()
+    };
+    if name != NAMES[0] {
+        scan.said.push(format!(
+            "frames: those of {name}; other splits are left out"
+        ));
+    }
+    scan.mesh = match shared.text("mesh_path")? {
+        Some(mesh) => Some(folder.file(&shared.place("mesh_path"), mesh)?),
+        None => geometry::find(folder, &[""], &mut scan.said)?,
+    };
+    let back = undoing(&shared, options, &mut scan)?;
+    let mut lost = 0;
+    for (index, entry) in list.iter().enumerate() {
+        let fields = Fields::new(format!("{place}: frames[{index}]."), entry)?;
+        match frame(folder, [&value, entry], [&shared, &fields], &back)? {
+            Some(frame) => scan.frames.push(frame),
+            None => lost += 1,
+        }
+    }
+    if lost > 0 {
+        scan.said
+            .push(format!("{lost} frames left out: their pose is not finite"));
+    }
+    let resampled = scan.frames.iter().filter(|f| !f.lens.fits_a_capture());
+    let resampled = resampled.count();
+    if resampled > 0 {
+        scan.said.push(format!(
+            "{resampled} photographs are resampled to a pinhole of the same focal length; what lies outside it is lost"
+        ));
+    }
+    if value.get("fisheye_crop_radius").is_some() {
+        scan.said.push("fisheye_crop_radius is not read".into());
+    }
+    Ok(scan)
+}
+
+/// What takes poses back to the coordinates of the scan's mesh.
+fn undoing(shared: &Fields, options: &ImportOptions, scan: &mut Scan) -> Result<DMat4> {
+    let Some(applied) = shared.matrix("applied_transform")? else {
+        return Ok(DMat4::IDENTITY);
+    };
+    let place = shared.place("applied_transform");
+    let wrong = |problem: &str| Error::new(&place, problem, "correct the field");
+    let rows = rows_of(&applied).ok_or_else(|| wrong("is no 3×4 or 4×4 matrix"))?;
+    if rows == DMat4::IDENTITY {
+        return Ok(rows);
+    }
+    if !(rows.is_finite() && rows.determinant().abs() > 1e-9) {
+        return Err(wrong("is singular"));
+    }
+    // A mesh that the file itself names, and one that is fused, share the poses' coordinates.
+    let shares =
+        options.mesh.is_none() && (scan.mesh.is_none() || shared.get("mesh_path").is_some());
+    let undo = match options.applied_transform {
+        AppliedTransform::Undo => true,
+        AppliedTransform::Keep => false,
+        AppliedTransform::Guess => !shares,
+    };
+    scan.said.push(if undo {
+        "applied_transform is undone: the mesh is taken to have the coordinates from before it; --applied-transform keep overrules".into()
+    } else {
+        "applied_transform is kept: mesh and poses are taken to share its coordinates; --applied-transform undo overrules".into()
+    });
+    Ok(if undo {
+        rows.inverse()
+    } else {
+        DMat4::IDENTITY
+    })
+}
+
+/// One frame; `None` if its pose is not finite.
+fn frame(
+    folder: &Folder,
+    values: [&Value; 2],
+    [shared, fields]: [&Fields; 2],
+    back: &DMat4,
+) -> Result<Option<ImportedFrame>> {
+    let photograph = photograph(folder, fields)?;
+    let header = image::header(&photograph)?;
+    let lens = camera(values, [shared, fields], [header.width, header.height])?;
+
+    let place = fields.place("transform_matrix");
+    let refuse = |problem: String| {
+        Error::new(
+            &place,
+            format!("the matrix {problem}"),
+            "give the camera-to-world rotation and position",
+        )
+    };
+    let rows = fields
+        .matrix("transform_matrix")?
+        .as_deref()
+        .and_then(rows_of)
+        .ok_or_else(|| refuse("is no 3×4 or 4×4 matrix".into()))?;
+    let rows = *back * rows;
+    if !rows.is_finite() {
+        return Ok(None);
+    }
+    let row = |r: DVec4| r.to_array().to_vec();
+    let rows: Vec<Vec<f64>> = (0..3).map(|i| row(rows.row(i))).collect();
+    let (pose, _) = pose::from_rows(&rows).map_err(refuse)?;
+
+    let mask = match fields.text("mask_path")? {
+        Some(mask) => Some(folder.file(&fields.place("mask_path"), mask)?),
+        None => None,
+    };
+    let of =
+        |name: &str| -> Result<Option<f64>> { Ok(fields.number(name)?.or(shared.number(name)?)) };
+    let depth = match fields.text("depth_file_path")? {
+        Some(name) => {
+            let path = folder.file(&fields.place("depth_file_path"), name)?;
+            let size = depth::size(&path)?;
+            Some(DepthImage {
+                lens: lens.resized(size),
+                path,
+                metres_per_unit: of("depth_unit_scale_factor")?.unwrap_or(DEPTH_UNIT),
+                invalid: None,
+            })
+        }
+        None => None,
+    };
+    Ok(Some(ImportedFrame {
+        photograph,
+        lens,
+        pose,
+        exposure: of("exposure")?,
+        mask,
+        depth,
+    }))
+}
+
+/// The photograph's file, its ending added where the name has none.
+fn photograph(folder: &Folder, fields: &Fields) -> Result<PathBuf> {
+    let place = fields.place("file_path");
+    let name = fields
+        .text("file_path")?
+        .ok_or_else(|| Error::new(&place, "is absent", "name the photograph"))?
+        .replace('\\', "/");
+    let names = ENDINGS.map(|ending| format!("{name}{ending}"));
+    let found = names
+        .iter()
+        .find(|name| folder.path(name).is_file())
+        .unwrap_or(&names[0]);
+    folder.file(&place, found)
+}
+
+/// The lens of a frame: what a capture could say is read as a capture's, the distortion here.
+fn camera(values: [&Value; 2], fields: [&Fields; 2], size: [u32; 2]) -> Result<Lens> {
+    let [shared, frame] = fields;
+    let number = |name: &str| -> Result<f64> {
+        Ok(frame.number(name)?.or(shared.number(name)?).unwrap_or(0.0))
+    };
+    let model = match frame.text("camera_model")? {
+        Some(model) => Some(model),
+        None => shared.text("camera_model")?,
+    };
+    let model = model.map(str::to_ascii_uppercase);
+    let flagged = |fields: &Fields| fields.get("is_fisheye").and_then(Value::as_bool);
+    let is_fisheye = flagged(frame).or(flagged(shared)) == Some(true);
+    let k = [
+        number("k1")?,
+        number("k2")?,
+        number("k3")?,
+        number("k4")?,
+        number("k5")?,
+        number("k6")?,
+    ];
+    let p = [number("p1")?, number("p2")?];
+    let model = match model.as_deref() {
+        Some("OPENCV_FISHEYE" | "FISHEYE") => Model::Fisheye([k[0], k[1], k[2], k[3]]),
+        _ if is_fisheye => Model::Fisheye([k[0], k[1], k[2], k[3]]),
+        None | Some("PINHOLE" | "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" | "OPENCV") => {
+            // Nerfstudio's own k4 belongs to another polynomial than OpenCV's.
+            if k[3..].iter().any(|&k| k != 0.0) {
+                return Err(Error::new(
+                    frame.place("k4"),
+                    "coefficients beyond k3 are not supported with this lens model",
+                    "refit the lens with k1 k2 p1 p2, or name it FULL_OPENCV",
+                ));
+            }
+            Model::Rational { k, p }
+        }
+        Some("FULL_OPENCV") => Model::Rational { k, p },
+        Some(other) => {
+            return Err(Error::new(
+                frame.place("camera_model"),
+                format!("the lens model {other:?} is not supported"),
+                "undistort the photographs to PINHOLE or OPENCV first",
+            ));
+        }
+    };
+
+    // Focal lengths and principal point, brought to the photograph's resolution.
+    let stated =
+        |name: &str| -> Result<Option<u32>> { Ok(frame.count(name)?.or(shared.count(name)?)) };
+    let factor = match (stated("w")?, stated("h")?) {
+        (Some(w), Some(h)) if [w, h] != size => {
+            let x = f64::from(size[0]) / f64::from(w);
+            let y = f64::from(size[1]) / f64::from(h);
+            if (x / y - 1.0).abs() > 0.01 {
+                return Err(Error::new(
+                    frame.place("w"),
+                    format!(
+                        "the camera has {w}×{h} pixels, the photograph {}×{}: another shape",
+                        size[0], size[1]
+                    ),
+                    "correct the intrinsics or use photographs of the camera's shape",
+                ));
+            }
+            [x, y]
+        }
+        _ => [1.0, 1.0],
+    };
+    let plain = values.map(|value| {
+        let map = value.as_object().cloned().unwrap_or_default();
+        Value::Object(without_distortion(map, factor))
+    });
+    let places = fields.map(|fields| fields.place(""));
+    let [shared_place, frame_place] = places;
+    let (intrinsics, _) = lens::read(
+        &Fields::new(shared_place, &plain[0])?,
+        &Fields::new(frame_place, &plain[1])?,
+        size,
+    )?;
+    Ok(Lens {
+        pinhole: Intrinsics {
+            distortion: [0.0; 4],
+            ..intrinsics
+        },
+        model: Model::Brown([0.0; 4]),
+    }
+    .with(model))
+}
+
+/// A file's or frame's fields with the pinhole alone, its numbers scaled to the photograph.
+fn without_distortion(mut map: Map<String, Value>, [x, y]: [f64; 2]) -> Map<String, Value> {
+    for name in [
+        "camera_model",
+        "w",
+        "h",
+        "k1",
+        "k2",
+        "k3",
+        "k4",
+        "k5",
+        "k6",
+        "p1",
+        "p2",
+        "s1",
+        "s2",
+        "s3",
+        "s4",
+    ] {
+        map.remove(name);
+    }
+    for (name, factor) in [("fl_x", x), ("cx", x), ("fl_y", y), ("cy", y)] {
+        if let Some(number) = map.get(name).and_then(Value::as_f64) {
+            map.insert(name.into(), Value::from(number * factor));
+        }
+    }
+    map
+}
