@@ -4,6 +4,7 @@ mod colmap;
 mod command;
 mod hostile;
 mod icl_nuim;
+mod matterport;
 mod nerfstudio;
 mod open3d;
 mod scannet;

@@ -1,7 +1,7 @@
 //! The layouts that are understood, and how a folder's content tells which it has.
 
 use crate::capture::import::folder::Folder;
-use crate::capture::import::{colmap, nerf, rgbd};
+use crate::capture::import::{colmap, matterport, nerf, rgbd};
 use crate::error::{Error, Result};
 
 /// A layout of files.
@@ -21,6 +21,8 @@ pub enum Format {
     Colmap,
     /// transforms.json of Nerfstudio, instant-ngp, Polycam, Record3D.
     Nerfstudio,
+    /// A house of Matterport3D.
+    Matterport,
 }
 
 impl Format {
@@ -33,6 +35,7 @@ impl Format {
         ("open3d", Self::Open3d),
         ("colmap", Self::Colmap),
         ("nerfstudio", Self::Nerfstudio),
+        ("matterport", Self::Matterport),
     ];
 
     /// The layout in words.
@@ -45,6 +48,7 @@ impl Format {
             Self::Open3d => "Open3D's reconstruction system (colour, depth, trajectory)",
             Self::Colmap => "a COLMAP model (cameras, images)",
             Self::Nerfstudio => "Nerfstudio (transforms.json)",
+            Self::Matterport => "a house of Matterport3D",
         }
     }
 }
@@ -54,6 +58,9 @@ impl Format {
 /// # Errors
 /// No layout is recognised.
 pub fn detect(folder: &Folder) -> Result<Format> {
+    if matterport::is_here(folder) {
+        return Ok(Format::Matterport);
+    }
     if nerf::is_here(folder) {
         return Ok(Format::Nerfstudio);
     }

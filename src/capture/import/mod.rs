@@ -11,6 +11,7 @@ mod format;
 mod geometry;
 mod lens;
 mod matrix;
+mod matterport;
 mod nerf;
 mod rgbd;
 
@@ -151,6 +152,7 @@ pub fn read(
         Format::IclNuim => rgbd::tum::read(&folder, options, true)?,
         Format::Colmap => colmap::read(&folder)?,
         Format::Nerfstudio => nerf::read(&folder, options)?,
+        Format::Matterport => matterport::read(&folder)?,
         Format::Open3d => rgbd::open3d::read(&folder, options)?,
     };
     said.append(&mut scan.said);

@@ -1,6 +1,6 @@
 //! PLY, ASCII and binary of either byte order, parsed by ply-rs-bw.
 //!
-//! Vertex colours are linear. A face's `object_id` names its object; a line `comment object_id 3 wall` in the header
+//! Vertex colours are linear. A face's `object_id` (or Matterport3D's `segment_id`) names its object; a line `comment object_id 3 wall` in the header
 //! gives object 3 its name.
 
 use crate::capture::mesh::Mesh;

@@ -21,7 +21,7 @@ pub struct Face {
     pub corners: Vec<u32>,
     /// texcoord: u, v of each corner.
     pub texcoord: Vec<f32>,
-    /// object_id.
+    /// object_id, or segment_id where there is none.
     pub object_id: Option<i64>,
 }
 
@@ -73,6 +73,10 @@ impl PropertyAccess for Face {
                 Some(id) => self.object_id = Some(id),
                 None => return PropertyAccessResult::UnsupportedType,
             },
+            // Matterport3D's name of the same.
+            "segment_id" | "face_segment" if self.object_id.is_none() => {
+                self.object_id = whole(&property);
+            }
             "texcoord" => match property {
                 Property::ListFloat(list) => self.texcoord = list,
                 Property::ListDouble(list) => {
