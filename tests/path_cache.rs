@@ -61,6 +61,7 @@ fn rows() -> Vec<Cluster> {
         paths: 2,
         measured: Vec3::ZERO,
         weight: Vec3::ONE,
+        dark: Vec3::ONE,
     };
     (0..height).map(row).collect()
 }
@@ -255,6 +256,7 @@ fn paths_that_end_in_photographed_radiance_hold_one_bounce_and_that_radiance() {
         paths: 4,
         measured: Vec3::ZERO,
         weight: Vec3::ONE,
+        dark: Vec3::ONE,
     }];
     let cache = tracer.trace(&clusters, &[24; 6]);
     let unknowns = Unknowns {

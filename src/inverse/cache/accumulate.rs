@@ -112,6 +112,7 @@ mod tests {
             paths: count,
             measured: Vec3::new(0.5, 0.6, 0.7),
             weight: Vec3::new(1.0, 2.0, 3.0),
+            dark: Vec3::ONE,
         };
         PathCache {
             clusters: vec![CachedCluster {

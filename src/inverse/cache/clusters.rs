@@ -32,6 +32,18 @@ pub struct Cluster {
     pub measured: Vec3,
     /// Weight of the squared difference of the means, per channel: pixels / level².
     pub weight: Vec3,
+    /// Level below which pixels weigh no more for being darker.
+    pub dark: Vec3,
+}
+
+impl Cluster {
+    /// Weighs it by a level per channel.
+    ///
+    /// The photograph's own level gives more weight to what is dark by its noise or its texture, so that one albedo for
+    /// a textured object comes out below the mean. A prediction from independent paths does not.
+    pub fn weigh(&mut self, level: Vec3) {
+        self.weight = (level * level + self.dark * self.dark).recip() * self.pixels.len() as f32;
+    }
 }
 
 /// Gathers the pixels that are in the fit. `most_pixels` bounds how many are used; small objects keep all of theirs.
@@ -63,7 +75,7 @@ pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cl
     }
 
     // Thin out large objects, evenly over each tile.
-    let floor = typical_level(problem, survey) * DARK;
+    let dark = typical_level(problem, survey) * DARK;
     tiles
         .into_iter()
         .map(|((frame, _, _, object), all)| {
@@ -76,16 +88,17 @@ pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cl
                 .map(|&p| photograph.pixels[p as usize].as_dvec3())
                 .sum();
             let measured = (sum / pixels.len() as f64).as_vec3();
-            let level = measured * measured + floor * floor;
-            let weight = level.recip() * pixels.len() as f32;
-            Cluster {
+            let mut cluster = Cluster {
                 frame,
                 object,
                 pixels,
                 paths: 1,
                 measured,
-                weight,
-            }
+                weight: Vec3::ONE,
+                dark,
+            };
+            cluster.weigh(measured);
+            cluster
         })
         .collect()
 }
@@ -125,4 +138,38 @@ pub fn brightness(clusters: &[Cluster], surfaces: usize) -> Vec<f32> {
     }
     let mean = |(sum, pixels): (f64, f64)| (sum / pixels.max(1.0)) as f32;
     sums.into_iter().map(mean).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_predicted_level_weighs_dark_and_bright_spots_of_a_texture_alike() {
+        let cluster = |measured: f32| Cluster {
+            frame: 0,
+            object: 0,
+            pixels: vec![0; 10],
+            paths: 1,
+            measured: Vec3::splat(measured),
+            weight: Vec3::ONE,
+            dark: Vec3::splat(0.1),
+        };
+        let mut spots = [cluster(0.2), cluster(1.8)];
+        let mean = |spots: &[Cluster]| {
+            let (sum, weight) = spots.iter().fold((0.0, 0.0), |(s, w), c| {
+                (s + c.weight.x * c.measured.x, w + c.weight.x)
+            });
+            sum / weight
+        };
+        for spot in &mut spots {
+            spot.weigh(spot.measured);
+        }
+        assert!(mean(&spots) < 0.3);
+        for spot in &mut spots {
+            spot.weigh(Vec3::ONE);
+        }
+        assert!((mean(&spots) - 1.0).abs() < 1e-6);
+        assert!((spots[0].weight.x - 10.0 / 1.01).abs() < 1e-4);
+    }
 }

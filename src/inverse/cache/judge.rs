@@ -218,6 +218,7 @@ mod tests {
                 paths: 1,
                 measured: Vec3::splat(measured),
                 weight: Vec3::splat(1.0 / (measured * measured + 0.25)),
+                dark: Vec3::ONE,
             },
             vertices: vec![path(0), path(1)],
             ends: vec![1, 2],

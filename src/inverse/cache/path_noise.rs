@@ -60,6 +60,7 @@ mod tests {
             paths: 1,
             measured: Vec3::ZERO,
             weight: Vec3::ONE,
+            dark: Vec3::ONE,
         }
     }
 

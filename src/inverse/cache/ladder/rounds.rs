@@ -12,24 +12,28 @@ use crate::inverse::estimate::{ENOUGH_PIXELS, relative_to_albedo};
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::solver::Termination;
 use crate::math::stats::quantile;
+use crate::transport::emitters::Emitters;
 
 /// A step (in albedo, or relative in emission) asks for linearising anew when it is larger than so many times the
 /// median error aimed at.
 const NONLINEAR: f64 = 10.0;
 /// What the paths add to an error is negligible below this share of it: without them it would be 6 % less.
 const NEGLIGIBLE: f64 = 1.0 / 3.0;
+/// Levels that clusters are weighed by take this part of the paths of a round.
+const PREDICTING: u64 = 4;
 
 impl Ladder<'_, '_> {
     /// Third stage: rounds of independent paths, added up until the reported errors are small enough.
     pub(super) fn rounds(&mut self) -> Result<Termination, Termination> {
         let started = self.monitor.seconds();
         self.monitor.phase("refining");
+        let lights = self.lights();
+        self.weigh_by_prediction(&lights)?;
         share_paths(
             &mut self.clusters,
             self.roles.len(),
             self.budget.round_paths,
         );
-        let lights = self.lights();
         let free = roles::free(&self.roles);
         let places = roles::places(&free, self.roles.len());
         let mut about = self.unknowns.clone();
@@ -78,6 +82,20 @@ impl Ladder<'_, '_> {
         );
         self.record("refine", started, true, why)?;
         Ok(outcome)
+    }
+
+    /// Weighs the clusters by what a few paths of their own predict, of which those of the rounds are independent.
+    fn weigh_by_prediction(&mut self, lights: &Emitters) -> Result<(), Termination> {
+        let paths = self.budget.round_paths / PREDICTING;
+        share_paths(&mut self.clusters, self.roles.len(), paths);
+        let cache = self.trace(lights, None, 3, 0)?;
+        let held = vec![usize::MAX; 2 * self.roles.len()];
+        let linearised = cache.linearise(&self.unknowns, &held);
+        for (cluster, found) in self.clusters.iter_mut().zip(linearised) {
+            let residual = (found.residuals[0] + found.residuals[1]) * 0.5;
+            cluster.weigh((cluster.measured.as_dvec3() - residual).as_vec3());
+        }
+        Ok(())
     }
 
     /// How large the relative standard errors of albedo are over the reflectors that enough pixels see.
