@@ -13,7 +13,7 @@ use crate::scene::Scene;
 use glam::{DVec3, Vec3};
 
 /// An albedo with a larger standard error than this is as good as unknown.
-const UNKNOWN_ALBEDO: f32 = 0.2 * ALBEDO_DEVIATION as f32;
+const UNKNOWN_ALBEDO: f32 = 0.2 * ALBEDO_DEVIATION;
 /// An emitting object that fewer pixels see is known only through its light.
 const FEW_PIXELS: u64 = 19;
 
@@ -50,7 +50,7 @@ pub fn estimate(
                 }
                 Role::Emitter => {
                     object.albedo = Vec3::ZERO;
-                    object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION as f32);
+                    object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION);
                     object.albedo_identifiable = false;
                     object.note =
                         "its own light hides what it reflects; emission is all that leaves it"
@@ -69,7 +69,7 @@ pub fn estimate(
                 }
                 Role::Dark => {
                     object.albedo = typical;
-                    object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION as f32);
+                    object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION);
                     object.identifiable = false;
                     object.albedo_identifiable = false;
                     object.note = "no photograph sees it; its albedo is the room's mean".into();

@@ -274,7 +274,7 @@ mod tests {
                         rows.push((place, color(0.3), color(0.3)));
                     }
                 }
-                let pull = if object % 3 == 0 { -1.5 } else { 0.4 };
+                let pull = if object.is_multiple_of(3) { -1.5 } else { 0.4 };
                 let residual = rows[0].1 * pull + color(0.3);
                 Linearised {
                     object: object as u32,
