@@ -61,9 +61,12 @@ impl Measurements {
     /// Of pixels and what their cells would send if they were white.
     pub fn new(pixels: &[&SeenPixel], observations: Observations, white: &[Vec3]) -> Self {
         let received = observations.all_of(white);
-        let tiny = Vec3::splat(f32::MIN_POSITIVE);
+        // A pixel whose cells no light reached says nothing, and weighs nothing below.
         let albedo: Vec<Vec3> = (pixels.iter().zip(&received))
-            .map(|(pixel, r)| pixel.measured / r.max(tiny))
+            .map(|(pixel, r)| {
+                let lit = r.cmpge(Vec3::splat(f32::MIN_POSITIVE));
+                Vec3::select(lit, pixel.measured / *r, Vec3::ZERO)
+            })
             .collect();
         // Noise grows with the level, down to a floor.
         let mut levels: Vec<f64> = pixels
@@ -220,5 +223,35 @@ fn weighted_mean(values: &[Vec3], weights: &[f32]) -> Vec3 {
         (sum / total).as_vec3()
     } else {
         Vec3::ZERO
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_that_no_light_reaches_have_no_say_and_leave_all_finite() {
+        let pixel = |index: u32| SeenPixel {
+            frame: 0,
+            pixel: index,
+            held_out: false,
+            measured: Vec3::splat(0.3),
+            landings: Vec::new(),
+        };
+        let pixels: Vec<SeenPixel> = (0..20).map(pixel).collect();
+        let seen: Vec<&SeenPixel> = pixels.iter().collect();
+        let rows = |cell: fn(u32) -> u32| -> Vec<Vec<(u32, f32)>> {
+            (0..20).map(|i| vec![(cell(i), 1.0)]).collect()
+        };
+        let half_lit = Measurements::new(
+            &seen,
+            Observations::new(&rows(|i| i % 2), 2),
+            &[Vec3::splat(0.6), Vec3::ZERO],
+        );
+        assert!((half_lit.constant - Vec3::splat(0.5)).length() < 1e-6);
+        assert!(half_lit.albedo.iter().all(|a| a.is_finite()));
+        let dark = Measurements::new(&seen, Observations::new(&rows(|_| 0), 1), &[Vec3::ZERO]);
+        assert_eq!(dark.constant, Vec3::ZERO);
     }
 }

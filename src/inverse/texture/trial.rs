@@ -151,10 +151,15 @@ impl Comparison<'_> {
         });
         let flat = sets.map(|set| set[0]);
         let level = luminance((flat[0] + flat[1]) * 0.5);
-        let weight = 1.0 / (level * level + self.floor * self.floor).max(f32::MIN_POSITIVE);
+        let square = f64::from(level * level + self.floor * self.floor);
         let error = |[a, b]: [Vec3; 2]| {
             let product = (pixel.measured - a) * (pixel.measured - b);
-            f64::from(product.element_sum() / 3.0 * weight)
+            // Where all is black there is no level to count in.
+            if square > 0.0 {
+                f64::from(product.element_sum() / 3.0) / square
+            } else {
+                0.0
+            }
         };
         Compared {
             flat: error(flat),
