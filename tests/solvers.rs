@@ -374,3 +374,56 @@ fn the_papers_descent_lowers_the_held_out_loss_to_a_third() {
     let (first, last) = (held_out[0], held_out[held_out.len() - 1]);
     assert!(last < first / 3.0, "{first} to {last}");
 }
+
+/// An automatic camera: each photograph has its own exposure and white balance.
+#[test]
+fn exposures_that_differ_are_found_and_cost_no_accuracy() {
+    let (problem, materials) = &*ROOM;
+    let factor = |frame: usize| {
+        let f = frame as f32;
+        Vec3::new(1.0 + 0.3 * f, 1.6 - 0.2 * f, 0.7 + 0.1 * f * f)
+    };
+    let photographs = (problem.photographs.iter().enumerate()).map(|(frame, photograph)| {
+        let pixels = photograph.pixels.iter().map(|p| *p * factor(frame));
+        Arc::new(scenes::photograph(SIZE, pixels.collect()))
+    });
+    let automatic = Problem {
+        scene: problem.scene.clone(),
+        photographs: photographs.collect(),
+    };
+    let solution = run(&automatic, &preset(Preset::Preview));
+    let stage = solution.progress.stages.first().expect("stages");
+    assert_eq!(stage.name, "exposures");
+    assert!(stage.kept, "{}", stage.why);
+
+    // Known up to a common factor.
+    let found = solution.estimate.exposures.as_ref().expect("exposures");
+    for frame in 1..found.len() {
+        let relative = found[frame] / found[0] / (factor(frame) / factor(0));
+        // Pixels carry some 10 % of noise, and such small photographs share some dozens of cells.
+        assert!(
+            (relative - Vec3::ONE).abs().max_element() < 0.06,
+            "{frame}: {relative}"
+        );
+    }
+    let with = mean_absolute_error(&solution.estimate, materials);
+    let mut without = preset(Preset::Preview);
+    without.exposures = false;
+    let without = mean_absolute_error(&run(&automatic, &without).estimate, materials);
+    let fixed = mean_absolute_error(&PREVIEW.estimate, materials);
+    assert!(
+        with < fixed + 0.01 && without > 3.0 * with,
+        "{fixed} {with} {without}"
+    );
+}
+
+#[test]
+fn photographs_that_agree_keep_their_exposure() {
+    assert_eq!(PREVIEW.estimate.exposures, None);
+    let stage = PREVIEW
+        .progress
+        .stages
+        .iter()
+        .find(|s| s.name == "exposures");
+    assert!(stage.is_some_and(|s| !s.kept));
+}

@@ -89,7 +89,7 @@ impl MeasuredRadiance {
                 problem.photographs[pixel.frame as usize].pixels[pixel.pixel as usize].as_dvec3();
             for point in pixel.points.iter().flatten() {
                 for level in 0..LEVELS {
-                    let key = measured.key(level, point.object, point.point, point.normal);
+                    let key = measured.key(level, point);
                     let cell = measured.levels[level].entry(key);
                     cell.total += 1;
                     if pixel.pure {
@@ -119,7 +119,7 @@ impl MeasuredRadiance {
             return None;
         }
         for (level, table) in self.levels.iter().enumerate() {
-            let key = self.key(level, point.object, point.point, point.normal);
+            let key = self.key(level, point);
             let cell = &table.cells[table.slot(key)];
             // Cells at the edges of objects hold mostly mixed pixels, which say nothing of either.
             if cell.pure > 0 && 2 * cell.pure >= cell.total {
@@ -132,24 +132,30 @@ impl MeasuredRadiance {
         None
     }
 
-    /// Key of the cell that a point lies in: its place, object, and which way its surface looks.
+    /// Key of the cell that a point lies in.
     #[inline]
-    fn key(&self, level: usize, object: u32, point: Vec3, normal: Vec3) -> u64 {
-        let size = self.cell * (1u32 << level) as f32;
-        let place = (point / size).floor();
-        let a = normal.abs();
-        let axis = if a.x >= a.y && a.x >= a.z {
-            0
-        } else if a.y >= a.z {
-            1
-        } else {
-            2
-        };
-        let facing = 2 * axis as u64 + u64::from(normal[axis] < 0.0);
-        let mut h = splitmix64(u64::from(object) << 3 | facing);
-        for c in place.to_array() {
-            h = splitmix64(h ^ (c as i64 as u64));
-        }
-        h.max(1)
+    fn key(&self, level: usize, point: &SurveyPoint) -> u64 {
+        cell_key(self.cell * (1u32 << level) as f32, point)
     }
+}
+
+/// Key of the cell of a given width that a surface point lies in: its place, object, and which way its surface looks;
+/// never zero.
+#[inline]
+pub fn cell_key(size: f32, at: &SurveyPoint) -> u64 {
+    let place = (at.point / size).floor();
+    let a = at.normal.abs();
+    let axis = if a.x >= a.y && a.x >= a.z {
+        0
+    } else if a.y >= a.z {
+        1
+    } else {
+        2
+    };
+    let facing = 2 * axis as u64 + u64::from(at.normal[axis] < 0.0);
+    let mut h = splitmix64(u64::from(at.object) << 3 | facing);
+    for c in place.to_array() {
+        h = splitmix64(h ^ (c as i64 as u64));
+    }
+    h.max(1)
 }

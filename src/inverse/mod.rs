@@ -2,6 +2,7 @@
 
 pub mod cache;
 pub mod estimate;
+pub mod exposure;
 pub mod held_out;
 pub mod loss;
 pub mod measured;

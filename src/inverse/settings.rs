@@ -217,6 +217,8 @@ parameters! {
         "Keep every K-th frame out of the fit instead of single pixels; 0 keeps single pixels";
     outside_light: bool = true, Kind::Flag, "", false,
         "Try light from outside the mesh, where rays leave it";
+    exposures: bool = true, Kind::Flag, "", false,
+        "Estimate the exposure and white balance of each photograph, where they disagree about surfaces that they share";
     textures: bool = true, Kind::Flag, "", false,
         "Try albedo that varies over an object, where its pixels show more than one colour";
     learning_rate: f64 = 5e-3, Kind::Real { min: 1e-6, max: 10.0, logarithmic: true }, "", true,

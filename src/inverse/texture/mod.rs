@@ -132,92 +132,131 @@ impl Refined {
 pub type Tell<'t> = dyn FnMut(u64, u64, f64) -> Result<(), Termination> + 't;
 
 /// Tries a texture on each of the given objects, keeps those that held-out pixels ask for, and sweeps over them until
-/// light and texture agree.
-///
-/// # Errors
-/// The listener ended the stage; nothing is kept.
+/// light and texture agree. Where the listener ends that early, what was found by then is kept.
 pub fn refine(
     task: &Task,
     estimate: &Estimate,
     objects: &[usize],
     tell: &mut Tell,
-) -> Result<Refined, Termination> {
-    let lit = estimate.lit(&task.problem.scene);
-    let options = PathOptions {
-        max_bounces: task.max_bounces,
-        ..PathOptions::default()
+) -> (Refined, Result<(), Termination>) {
+    let mut refinement = Refinement {
+        task,
+        estimate,
+        options: PathOptions {
+            max_bounces: task.max_bounces,
+            ..PathOptions::default()
+        },
+        attempts: Vec::new(),
+        kept: Vec::new(),
+        unrest: 0.0,
     };
-    let candidates = candidates(task, objects);
-    let shares: f64 = candidates.iter().map(|c| (c.1.len() as f64).sqrt()).sum();
-    let mut attempts = Vec::new();
-    let mut kept: Vec<Surface> = Vec::new();
-    for (index, (object, pixels)) in candidates.iter().enumerate() {
-        let paths = task.paths as f64 * FIRST_LOOK * (pixels.len() as f64).sqrt() / shares;
-        let mut done =
-            |rays, rejected| tell(rays, rejected, index as f64 / candidates.len() as f64 * 0.6);
-        done(0, 0)?;
-        let Some(mut coarse) = Surface::new(task, *object, pixels, COARSE) else {
-            continue;
-        };
-        coarse.find(&lit, &options, paths as u64, 0, None, &mut done)?;
-        let trial = if coarse.is_textured() {
-            Some(coarse.try_out(&lit, &options, &mut done)?)
-        } else {
-            None
-        };
-        let keep = trial.is_some_and(|trial| trial.gain > SIGNIFICANT * trial.noise);
-        attempts.push(Attempt {
-            object: *object,
-            cells: coarse.cell_count(),
-            pixels: coarse.pixel_count(),
-            trial,
-            kept: keep,
-        });
-        if keep && let Some(mut fine) = coarse.recut(&task.problem.scene, 1.0) {
-            fine.find(&lit, &options, paths as u64, 0, None, &mut done)?;
-            if let Some(attempt) = attempts.last_mut() {
+    let ended = refinement
+        .look(&candidates(task, objects), tell)
+        .and_then(|()| (1..=SWEEPS).try_for_each(|sweep| refinement.sweep(sweep, tell)));
+    (refinement.refined(), ended)
+}
+
+/// The state of the stage.
+struct Refinement<'a> {
+    task: &'a Task<'a>,
+    estimate: &'a Estimate,
+    options: PathOptions,
+    attempts: Vec<Attempt>,
+    kept: Vec<Surface>,
+    unrest: f64,
+}
+
+impl Refinement<'_> {
+    /// Looks at each candidate in coarse cells, and at those that show more than one colour in fine ones.
+    fn look(
+        &mut self,
+        candidates: &[(usize, Vec<&SurveyedPixel>)],
+        tell: &mut Tell,
+    ) -> Result<(), Termination> {
+        let lit = self.estimate.lit(&self.task.problem.scene);
+        let shares: f64 = candidates.iter().map(|c| (c.1.len() as f64).sqrt()).sum();
+        for (index, (object, pixels)) in candidates.iter().enumerate() {
+            let paths = self.task.paths as f64 * FIRST_LOOK * (pixels.len() as f64).sqrt() / shares;
+            let share = index as f64 / candidates.len() as f64 * 0.6;
+            let mut done = |rays, rejected| tell(rays, rejected, share);
+            done(0, 0)?;
+            let Some(mut coarse) = Surface::new(self.task, *object, pixels, COARSE) else {
+                continue;
+            };
+            coarse.find(&lit, &self.options, paths as u64, 0, None, &mut done)?;
+            let trial = if coarse.is_textured() {
+                Some(coarse.try_out(&lit, &self.options, &mut done)?)
+            } else {
+                None
+            };
+            let mut attempt = Attempt {
+                object: *object,
+                cells: coarse.cell_count(),
+                pixels: coarse.pixel_count(),
+                trial,
+                kept: trial.is_some_and(|trial| trial.gain > SIGNIFICANT * trial.noise),
+            };
+            if attempt.kept
+                && let Some(mut fine) = coarse.recut(&self.task.problem.scene, 1.0)
+            {
+                fine.find(&lit, &self.options, paths as u64, 0, None, &mut done)?;
                 attempt.cells = fine.cell_count();
+                self.kept.push(fine);
             }
-            kept.push(fine);
+            self.attempts.push(attempt);
         }
+        Ok(())
     }
 
-    // Light as the textures send it on, and textures as that light shows them.
-    let mut texels = None;
-    let mut unrest = 0.0;
-    let shares: f64 = kept.iter().map(|s| (s.pixel_count() as f64).sqrt()).sum();
-    for sweep in 1..=SWEEPS {
-        if kept.is_empty() {
-            break;
-        }
-        let current = whole::texels(&task.problem.scene, estimate, &kept);
-        let textured = Estimate {
-            texels: Some(Arc::new(current)),
-            ..estimate.clone()
+    /// Finds the light as the textures send it on, and the textures as that light shows them.
+    fn sweep(&mut self, sweep: u32, tell: &mut Tell) -> Result<(), Termination> {
+        let Some(textured) = self.textured() else {
+            return Ok(());
         };
-        let lit = textured.lit(&task.problem.scene);
-        unrest = 0.0;
-        let count = kept.len();
-        for (index, surface) in kept.iter_mut().enumerate() {
-            let paths = task.paths as f64 * (surface.pixel_count() as f64).sqrt() / shares;
+        let textured = Estimate {
+            texels: Some(textured),
+            ..self.estimate.clone()
+        };
+        let lit = textured.lit(&self.task.problem.scene);
+        let count = self.kept.len();
+        let shares: f64 = (self.kept.iter())
+            .map(|s| (s.pixel_count() as f64).sqrt())
+            .sum();
+        self.unrest = 0.0;
+        for (index, surface) in self.kept.iter_mut().enumerate() {
+            let paths = self.task.paths as f64 * (surface.pixel_count() as f64).sqrt() / shares;
             let share = (f64::from(sweep - 1) + index as f64 / count as f64) / f64::from(SWEEPS);
             let mut done = |rays, rejected| tell(rays, rejected, 0.6 + 0.4 * share);
             let before = surface.mean();
-            let known = &estimate.objects[surface.object];
+            let known = &self.estimate.objects[surface.object];
             let scale_error = known.albedo_stderr / known.albedo.max(Vec3::splat(1e-3));
             let errors = (sweep == SWEEPS).then_some(scale_error);
-            surface.find(&lit, &options, paths as u64, sweep, errors, &mut done)?;
+            surface.find(&lit, &self.options, paths as u64, sweep, errors, &mut done)?;
             let change = (surface.mean() - before).abs().max_element();
-            unrest = f64::max(unrest, f64::from(change / before.max_element().max(1e-4)));
+            self.unrest = f64::max(
+                self.unrest,
+                f64::from(change / before.max_element().max(1e-4)),
+            );
         }
-        texels = Some(whole::texels(&task.problem.scene, estimate, &kept));
+        Ok(())
     }
-    Ok(Refined {
-        attempts,
-        texels: texels.map(Arc::new),
-        means: kept.iter().map(|s| (s.object, s.mean())).collect(),
-        unrest,
-    })
+
+    /// The texels as they are now, where any object kept a texture.
+    fn textured(&self) -> Option<Arc<TexelEstimate>> {
+        (!self.kept.is_empty()).then(|| {
+            let scene = &self.task.problem.scene;
+            Arc::new(whole::texels(scene, self.estimate, &self.kept))
+        })
+    }
+
+    fn refined(self) -> Refined {
+        Refined {
+            texels: self.textured(),
+            means: self.kept.iter().map(|s| (s.object, s.mean())).collect(),
+            attempts: self.attempts,
+            unrest: self.unrest,
+        }
+    }
 }
 
 /// The objects that enough pixels see, with those pixels.

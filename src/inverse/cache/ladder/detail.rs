@@ -24,17 +24,21 @@ impl Ladder<'_, '_> {
             max_bounces: self.max_bounces,
         };
         let (monitor, estimate, checkpoint) = (&mut self.monitor, &self.estimate, &self.checkpoint);
-        let refined = refine(&task, estimate, &objects, &mut |rays, rejected, share| {
+        let (refined, ended) = refine(&task, estimate, &objects, &mut |rays, rejected, share| {
             monitor.progress.rays += rays;
             monitor.rejected("path weight not finite", rejected);
             monitor.progress.fraction = Some(share as f32);
             monitor.tick(estimate, &|_| checkpoint.clone())
-        })?;
-        let why = refined.summary(|k| self.problem.scene.objects[k].name.clone());
+        });
+        let mut why = refined.summary(|k| self.problem.scene.objects[k].name.clone());
+        if ended.is_err() {
+            why.push_str("; ended before all were looked at as often as they should be");
+        }
         let kept = refined.texels.is_some();
         self.detail = Some(refined);
         self.describe();
-        self.record("textures", started, kept, why)?;
-        Ok(())
+        // Where time is up, the stage is still recorded.
+        let recorded = self.record("textures", started, kept, why);
+        ended.and(recorded.map(drop))
     }
 }

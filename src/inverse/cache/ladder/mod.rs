@@ -18,6 +18,7 @@ use super::trust::Trust;
 use super::{PathCache, describe};
 use crate::error;
 use crate::inverse::estimate::Estimate;
+use crate::inverse::exposure::Exposures;
 use crate::inverse::loss::{LossProbe, Losses};
 use crate::inverse::measured::MeasuredRadiance;
 use crate::inverse::monitor::Monitor;
@@ -63,6 +64,8 @@ pub struct Ladder<'a, 'o> {
     path_noise: Vec<f64>,
     unknowns: Unknowns,
     errors: StandardErrors,
+    /// Of each photograph, where they disagree.
+    exposures: Option<Vec<Vec3>>,
     estimate: Estimate,
     /// Spatial detail, once it was looked for.
     detail: Option<Refined>,
@@ -88,8 +91,15 @@ pub fn solve(
     let objects = problem.scene.objects.len();
     let surfaces = objects + OUTSIDE_WIDTH * OUTSIDE_HEIGHT;
     monitor.phase("looking through the pixels");
+    let started = monitor.seconds();
     let survey = Survey::new(problem, settings, budget.survey_pixels);
     monitor.progress.rays += survey.rays;
+    let exposures = (settings.exposures)
+        .then(|| Exposures::new(problem, &survey))
+        .flatten();
+    let needed = exposures.as_ref().filter(|e| e.needed);
+    let undone = needed.map(|exposures| exposures.undone(problem));
+    let problem = undone.as_ref().unwrap_or(problem);
     let max_bounces = if settings.bounces == 0 {
         1000
     } else {
@@ -139,12 +149,16 @@ pub fn solve(
         prior,
         path_noise: vec![1.0; surfaces],
         unknowns: start.unknowns,
+        exposures: needed.map(|e| e.factors.clone()),
         estimate: Estimate::default(),
         detail: None,
         stages: start.stages,
     };
     ladder.expect_of_outside();
     ladder.describe();
+    if let Some(exposures) = exposures.filter(|_| resume.is_none()) {
+        ladder.tell_exposures(&exposures, started);
+    }
     let termination = match ladder.run() {
         Ok(termination) | Err(termination) => termination,
     };
@@ -174,6 +188,31 @@ impl Ladder<'_, '_> {
         }
         self.reached(STAGES);
         Ok(ended)
+    }
+
+    /// Records what was found out about exposures.
+    fn tell_exposures(&mut self, exposures: &Exposures, started: f64) {
+        let (least, most) = exposures.range();
+        let share = exposures.gain * 100.0;
+        let stage = Stage {
+            name: "exposures".to_owned(),
+            seconds: self.monitor.seconds() - started,
+            iterations: 0,
+            train_loss: None,
+            held_out_loss: None,
+            kept: exposures.needed,
+            why: if exposures.needed {
+                format!(
+                    "exposure and white balance of each photograph, {least:.2} to {most:.2} times their mean, explain {share:.0} % of \
+                     how they disagree about surfaces that they share"
+                )
+            } else {
+                format!(
+                    "exposures would explain {share:.0} % of how the photographs disagree: they agree"
+                )
+            },
+        };
+        self.monitor.stage(stage);
     }
 
     /// Takes what was seen of the outside for what to expect of the rest of it.
@@ -327,6 +366,7 @@ impl Ladder<'_, '_> {
             self.outside,
             self.sky.as_ref(),
         );
+        self.estimate.exposures.clone_from(&self.exposures);
         if let Some(detail) = &self.detail {
             detail.apply(&mut self.estimate);
         }
