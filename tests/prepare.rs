@@ -141,3 +141,46 @@ fn a_mesh_that_no_photograph_sees_is_an_error() {
     let error = prepare(&behind, &working).unwrap_err();
     assert!(error.problem.contains("no photograph sees the mesh"));
 }
+
+/// A wall at two metres fills the left half of the view; the right half sees past the mesh.
+#[test]
+fn pixels_whose_depth_contradicts_the_mesh_are_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("depth.png");
+    // Twice the photograph's size. Left: the wall, with a chair before it in the upper quarter and nothing measured in
+    // the lowest. Right: a wall that the mesh lacks above, nothing measured below.
+    let image = image::ImageBuffer::<image::Luma<u16>, _>::from_fn(2 * SIZE, 2 * SIZE, |x, y| {
+        image::Luma([match (x < SIZE, y / (SIZE / 2)) {
+            (true, 0) => 1200,
+            (true, 3) => 0,
+            (true, _) => 1995 + (x % 3) as u16 * 5,
+            (false, 0 | 1) => 3000,
+            (false, _) => 0,
+        }])
+    });
+    image.save(&path).unwrap();
+    let mut with_depth = frame(1.0, 0.5);
+    with_depth.depth = Some((path.clone(), 1e-3));
+    let compared = prepared(&capture(&[(-2.0, 0.0, -2.0, true)], with_depth.clone()));
+    for y in 0..SIZE {
+        for x in 0..SIZE {
+            let usable = compared.photographs[0].usable[(y * SIZE + x) as usize];
+            let (left, quarter) = (x < SIZE / 2, y / (SIZE / 4));
+            let contradicts = if left { quarter == 0 } else { quarter < 2 };
+            assert_eq!(usable, !contradicts, "{x} {y}");
+        }
+    }
+    let said = |p: &Prepared, words: &str| p.warnings.iter().any(|w| w.contains(words));
+    // An eighth of all, and a quarter.
+    assert!(
+        said(&compared, "38 % of the pixels"),
+        "{:?}",
+        compared.warnings
+    );
+
+    // A depth image that cannot be read is said and costs no pixel.
+    std::fs::write(&path, b"no image").unwrap();
+    let unread = prepared(&capture(&[(-2.0, 0.0, -2.0, true)], with_depth));
+    assert!(unread.photographs[0].usable.iter().all(|&u| u));
+    assert!(said(&unread, "depth.png"), "{:?}", unread.warnings);
+}

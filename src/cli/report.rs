@@ -60,7 +60,8 @@ pub fn objects(scene: &Scene, estimate: &Estimate) -> String {
 
 fn error(stderr: Vec3, digits: usize) -> String {
     let worst = stderr.max_element();
-    if worst.is_finite() {
+    // Nothing at all is known of an error as large as numbers go.
+    if worst < f32::MAX {
         format!("{worst:.digits$}")
     } else {
         "?".to_owned()

@@ -2,6 +2,7 @@
 
 pub mod bvh;
 pub mod camera;
+pub mod depth;
 pub mod geometry;
 pub mod prepare;
 pub mod texels;

@@ -5,6 +5,7 @@ use crate::capture::photograph::Photograph;
 use crate::capture::working::Working;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
+use crate::scene::depth;
 use crate::scene::visibility::seen_area_share;
 use crate::scene::winding::turn_over;
 use std::sync::Arc;
@@ -55,9 +56,11 @@ pub fn prepare(capture: &Capture, working: &Working) -> Result<Prepared> {
         scene = scene.with_ids(ids);
     }
     warnings.extend(oddities(&scene));
+    let compared = depth::compare(&capture, &scene, &working.photographs);
+    warnings.extend(compared.warnings);
     Ok(Prepared {
         seen_area_share: seen_area_share(&scene, AREA_SAMPLES),
-        photographs: working.photographs.clone(),
+        photographs: compared.photographs,
         capture,
         scene,
         warnings,

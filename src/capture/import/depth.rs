@@ -2,7 +2,7 @@
 
 use crate::capture::import::lens::Lens;
 use crate::error::{Error, Result};
-use image::{DynamicImage, ImageReader, Limits};
+use image::{DynamicImage, ImageBuffer, ImageReader, Limits, Luma};
 use std::path::{Path, PathBuf};
 
 /// A depth image and what its numbers mean.
@@ -24,19 +24,8 @@ impl DepthImage {
     /// # Errors
     /// The file cannot be read, is no 16-bit grey image, or has another size than its camera.
     pub fn raw(&self) -> Result<Vec<u16>> {
-        let broken = |e: &image::ImageError| {
-            Error::file(
-                &self.path,
-                format!("cannot be decoded: {e}"),
-                "export it again",
-            )
-        };
-        let mut reader = reader(&self.path)?;
-        let mut limits = Limits::default();
-        limits.max_alloc = Some(1 << 30);
-        reader.limits(limits);
-        let image = reader.decode().map_err(|e| broken(&e))?;
-        let (width, height) = (image.width(), image.height());
+        let image = decode(&self.path)?;
+        let (width, height) = image.dimensions();
         let k = &self.lens.pinhole;
         if (width, height) != (k.width, k.height) {
             return Err(Error::file(
@@ -48,13 +37,6 @@ impl DepthImage {
                 "use depth images of one size",
             ));
         }
-        let DynamicImage::ImageLuma16(image) = image else {
-            return Err(Error::file(
-                &self.path,
-                format!("is no 16-bit grey image but {:?}", image.color()),
-                "export depth as 16-bit grey PNG",
-            ));
-        };
         let mut values = image.into_raw();
         if let Some(invalid) = self.invalid {
             for value in &mut values {
@@ -84,6 +66,28 @@ impl DepthImage {
         let p = &scaled.pinhole;
         let same = near(k.fx, p.fx) && near(k.fy, p.fy) && near(k.cx, p.cx) && near(k.cy, p.cy);
         same && self.lens.model == photograph.model
+    }
+}
+
+/// The raw values of a depth image.
+///
+/// # Errors
+/// The file cannot be read, is larger than 1 GiB, or is no 16-bit grey image.
+pub fn decode(path: &Path) -> Result<ImageBuffer<Luma<u16>, Vec<u16>>> {
+    let mut reader = reader(path)?;
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(1 << 30);
+    reader.limits(limits);
+    let image = reader
+        .decode()
+        .map_err(|e| Error::file(path, format!("cannot be decoded: {e}"), "export it again"))?;
+    match image {
+        DynamicImage::ImageLuma16(image) => Ok(image),
+        other => Err(Error::file(
+            path,
+            format!("is no 16-bit grey image but {:?}", other.color()),
+            "export depth as 16-bit grey PNG",
+        )),
     }
 }
 

@@ -5,7 +5,7 @@
 //! Nothing outside the scan's folder is opened, but for a mesh that the person names.
 
 mod colmap;
-mod depth;
+pub mod depth;
 mod folder;
 mod format;
 mod geometry;

@@ -1,0 +1,147 @@
+//! Pixels whose depth image contradicts the mesh: what they show is not in the mesh, or lies elsewhere in it.
+
+use crate::capture::Capture;
+use crate::capture::import::depth::decode;
+use crate::capture::photograph::Photograph;
+use crate::error::Result;
+use crate::math::stats::quantile;
+use crate::scene::Scene;
+use crate::scene::camera::Camera;
+use crate::scene::visibility::NOTHING;
+use glam::Vec2;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// A pixel contradicts the mesh beyond so many times the frame's median difference, and this share of its depth.
+const MEDIANS: f64 = 5.0;
+const SHARE: f64 = 0.02;
+/// Width over height of a depth image and its photograph may differ by this share.
+const SAME_ASPECT: f64 = 0.02;
+
+/// Photographs with the pixels that contradict the mesh marked as unusable, and remarks for the person.
+#[derive(Debug)]
+pub struct Compared {
+    /// One a camera.
+    pub photographs: Vec<Arc<Photograph>>,
+    /// Full sentences.
+    pub warnings: Vec<String>,
+}
+
+/// Compares the depth images of a capture with its mesh. Frames without one keep all their pixels, as do frames whose
+/// depth image cannot be read, which is said.
+pub fn compare(capture: &Capture, scene: &Scene, photographs: &[Arc<Photograph>]) -> Compared {
+    let frames: Vec<(Arc<Photograph>, Option<Result<u64>>)> = (0..photographs.len())
+        .into_par_iter()
+        .map(|frame| {
+            let photograph = &photographs[frame];
+            let Some((path, unit)) = &capture.frames[frame].depth else {
+                return (photograph.clone(), None);
+            };
+            let depth = match decode(path) {
+                Ok(image) => Depth {
+                    size: [image.width(), image.height()],
+                    values: image.into_raw(),
+                    unit: *unit,
+                },
+                Err(error) => return (photograph.clone(), Some(Err(error))),
+            };
+            let (masked, count) = mask(&depth, scene, frame, photograph);
+            (Arc::new(masked), Some(Ok(count)))
+        })
+        .collect();
+
+    let mut warnings = Vec::new();
+    let (mut contradicting, mut compared) = (0, 0);
+    for (photograph, outcome) in &frames {
+        match outcome {
+            Some(Ok(count)) => {
+                contradicting += count;
+                compared += photograph.pixels.len() as u64;
+            }
+            Some(Err(error)) => warnings.push(format!("{error}; its pixels are not compared")),
+            None => {}
+        }
+    }
+    if contradicting > 0 {
+        warnings.push(format!(
+            "{:.0} % of the pixels with a depth image contradict the mesh by it and are left out",
+            contradicting as f64 / compared as f64 * 100.0
+        ));
+    }
+    Compared {
+        photographs: frames.into_iter().map(|f| f.0).collect(),
+        warnings,
+    }
+}
+
+/// A depth image of the same view as a photograph.
+struct Depth {
+    size: [u32; 2],
+    values: Vec<u16>,
+    /// Metres a unit.
+    unit: f64,
+}
+
+impl Depth {
+    /// Metres along the viewing direction at a point given in shares of width and height; `None` where nothing was
+    /// measured.
+    fn at(&self, share: Vec2) -> Option<f64> {
+        let [width, height] = self.size;
+        let x = ((share.x * width as f32) as u32).min(width - 1);
+        let y = ((share.y * height as f32) as u32).min(height - 1);
+        let value = self.values[y as usize * width as usize + x as usize];
+        (value > 0).then(|| f64::from(value) * self.unit)
+    }
+}
+
+/// The photograph without the pixels that contradict the mesh, and their number.
+fn mask(depth: &Depth, scene: &Scene, frame: usize, photograph: &Photograph) -> (Photograph, u64) {
+    let aspect = |[width, height]: [u32; 2]| f64::from(width) / f64::from(height.max(1));
+    let size = [photograph.width, photograph.height];
+    let same_view = (aspect(depth.size) / aspect(size) - 1.0).abs() < SAME_ASPECT;
+    if !same_view || depth.size.contains(&0) {
+        return (photograph.clone(), 0);
+    }
+    let camera = &scene.cameras[frame];
+    let triangles = &scene.ids().triangles[frame];
+    let pixels: Vec<Option<(f64, f64)>> = (triangles.iter().enumerate())
+        .map(|(pixel, &triangle)| {
+            let place = [pixel as u32 % size[0], pixel as u32 / size[0]];
+            let at = Vec2::from(place.map(|x| x as f32 + 0.5));
+            let measured = depth.at(at / Vec2::new(size[0] as f32, size[1] as f32))?;
+            Some((measured, mesh_depth(scene, camera, at, triangle)))
+        })
+        .collect();
+    let mut differences: Vec<f64> = (pixels.iter().flatten())
+        .map(|(measured, mesh)| (measured - mesh).abs())
+        .filter(|d| d.is_finite())
+        .collect();
+    let median = quantile(&mut differences, 0.5).unwrap_or(0.0);
+
+    let mut masked = photograph.clone();
+    if masked.usable.is_empty() {
+        masked.usable = vec![true; masked.pixels.len()];
+    }
+    let mut count = 0;
+    for (usable, seen) in masked.usable.iter_mut().zip(&pixels) {
+        let contradicts = seen.is_some_and(|(measured, mesh)| {
+            (measured - mesh).abs() > MEDIANS * median + SHARE * measured
+        });
+        count += u64::from(contradicts);
+        *usable &= !contradicts;
+    }
+    (masked, count)
+}
+
+/// Metres along the viewing direction to a triangle's plane; infinite where there is none.
+fn mesh_depth(scene: &Scene, camera: &Camera, at: Vec2, triangle: u32) -> f64 {
+    if triangle == NOTHING {
+        return f64::INFINITY;
+    }
+    let ray = camera.ray(at);
+    let normal = scene.normals[triangle as usize];
+    let [corner, _, _] = scene.corners(triangle);
+    let along = normal.dot(corner - ray.origin) / normal.dot(ray.direction);
+    let forward = -camera.rotation.z_axis;
+    f64::from(along * ray.direction.dot(forward))
+}
