@@ -167,7 +167,7 @@ struct Refinement<'a> {
 }
 
 impl Refinement<'_> {
-    /// Looks at each candidate in coarse cells, and at those that show more than one colour in fine ones.
+    /// Looks at each candidate in coarse cells, and keeps those that show more than one colour.
     fn look(
         &mut self,
         candidates: &[(usize, Vec<&SurveyedPixel>)],
@@ -189,26 +189,22 @@ impl Refinement<'_> {
             } else {
                 None
             };
-            let mut attempt = Attempt {
+            let keep = trial.is_some_and(|trial| trial.gain > SIGNIFICANT * trial.noise);
+            self.attempts.push(Attempt {
                 object: *object,
                 cells: coarse.cell_count(),
                 pixels: coarse.pixel_count(),
                 trial,
-                kept: trial.is_some_and(|trial| trial.gain > SIGNIFICANT * trial.noise),
-            };
-            if attempt.kept
-                && let Some(mut fine) = coarse.recut(&self.task.problem.scene, 1.0)
-            {
-                fine.find(&lit, &self.options, paths as u64, 0, None, &mut done)?;
-                attempt.cells = fine.cell_count();
-                self.kept.push(fine);
+                kept: keep,
+            });
+            if keep {
+                self.kept.push(coarse);
             }
-            self.attempts.push(attempt);
         }
         Ok(())
     }
 
-    /// Finds the light as the textures send it on, and the textures as that light shows them.
+    /// Finds the light as the textures send it on, and the textures, from now on in fine cells, as that light shows them.
     fn sweep(&mut self, sweep: u32, tell: &mut Tell) -> Result<(), Termination> {
         let Some(textured) = self.textured() else {
             return Ok(());
@@ -231,7 +227,15 @@ impl Refinement<'_> {
             let known = &self.estimate.objects[surface.object];
             let scale_error = known.albedo_stderr / known.albedo.max(Vec3::splat(1e-3));
             let errors = (sweep == SWEEPS).then_some(scale_error);
-            surface.find(&lit, &self.options, paths as u64, sweep, errors, &mut done)?;
+            if sweep == 1 {
+                let Some(mut fine) = surface.recut(&self.task.problem.scene, 1.0) else {
+                    continue;
+                };
+                fine.find(&lit, &self.options, paths as u64, sweep, errors, &mut done)?;
+                *surface = fine;
+            } else {
+                surface.find(&lit, &self.options, paths as u64, sweep, errors, &mut done)?;
+            }
             let change = (surface.mean() - before).abs().max_element();
             self.unrest = f64::max(
                 self.unrest,
@@ -249,7 +253,11 @@ impl Refinement<'_> {
         })
     }
 
-    fn refined(self) -> Refined {
+    fn refined(mut self) -> Refined {
+        for attempt in &mut self.attempts {
+            let found = self.kept.iter().find(|s| s.object == attempt.object);
+            attempt.cells = found.map_or(attempt.cells, Surface::cell_count);
+        }
         Refined {
             texels: self.textured(),
             means: self.kept.iter().map(|s| (s.object, s.mean())).collect(),

@@ -62,8 +62,8 @@ impl Surface {
     }
 
     /// The same object in cells of another width.
-    pub fn recut(self, scene: &Scene, width: f32) -> Option<Self> {
-        Self::cut(scene, self.object, self.pixels, self.seed, width)
+    pub fn recut(&self, scene: &Scene, width: f32) -> Option<Self> {
+        Self::cut(scene, self.object, self.pixels.clone(), self.seed, width)
     }
 
     fn cut(
