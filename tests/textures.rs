@@ -97,7 +97,9 @@ fn refined(problem: &Problem, estimate: &Estimate, objects: &[usize], paths: u64
         paths,
         max_bounces: 1000,
     };
-    refine(&task, estimate, objects, &mut |_, _, _| Ok(())).expect("nobody ends it")
+    let (refined, ended) = refine(&task, estimate, objects, &mut |_, _, _| Ok(()));
+    ended.expect("nobody ends it");
+    refined
 }
 
 static REFINED: LazyLock<Refined> =
@@ -257,17 +259,23 @@ fn who_ends_it_is_obeyed() {
         paths: 10_000,
         max_bounces: 1000,
     };
-    let mut calls = 0;
-    let ended = refine(&task, &ROOM.estimate, &[BACK], &mut |_, _, _| {
-        calls += 1;
-        if calls > 3 {
-            Err(Termination::Cancelled)
-        } else {
-            Ok(())
-        }
-    });
-    assert_eq!(
-        ended.map(|r| r.texels.is_some()),
-        Err(Termination::Cancelled)
-    );
+    let ended_after = |most: u32| {
+        let mut calls = 0;
+        refine(&task, &ROOM.estimate, &[BACK], &mut |_, _, _| {
+            calls += 1;
+            if calls > most {
+                Err(Termination::Cancelled)
+            } else {
+                Ok(())
+            }
+        })
+    };
+    let (early, ended) = ended_after(3);
+    assert_eq!(ended, Err(Termination::Cancelled));
+    assert!(early.texels.is_none());
+    // What was found by then is kept.
+    let found = (4..200).map(ended_after).find(|(r, _)| r.texels.is_some());
+    let (late, ended) = found.expect("the texture is found at some time");
+    assert_eq!(ended, Err(Termination::Cancelled));
+    assert!(late.attempts[0].kept);
 }
