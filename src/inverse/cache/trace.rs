@@ -225,8 +225,7 @@ impl Tracer<'_> {
             let frame = Frame::around(surface.seen.normal);
             let local = warp::cosine_hemisphere([u, v]);
             let wi = frame.to_world(local);
-            let corners = self.scene.corners(hit.triangle);
-            let origin = offset_origin(surface.seen.point, surface.seen.normal, &corners, wi);
+            let origin = surface.leave(wi);
             rays += 1;
             let next = self.scene.intersect(&Ray::new(origin, wi));
             let Some(next) = next else {
@@ -287,12 +286,7 @@ impl Tracer<'_> {
         if cos_surface <= 0.0 || cos_light <= 0.0 {
             return 0;
         }
-        let from = offset_origin(
-            surface.seen.point,
-            surface.seen.normal,
-            &surface.corners,
-            wi,
-        );
+        let from = surface.leave(wi);
         let to = offset_origin(
             sample.point,
             light_normal,
@@ -303,12 +297,7 @@ impl Tracer<'_> {
             return 1;
         }
         let light_pdf = self.light_pdf(object) * distance2 / cos_light;
-        let bsdf_pdf = cos_surface * FRAC_1_PI;
-        let share = match self.sampling {
-            LightSampling::Mis => power_heuristic(light_pdf, bsdf_pdf),
-            LightSampling::Emitter | LightSampling::Bsdf => 1.0,
-        };
-        let weight = bsdf_pdf / light_pdf * share * scale;
+        let weight = self.drawn_weight(light_pdf, cos_surface * FRAC_1_PI) * scale;
         let seen = SurveyPoint {
             point: sample.point,
             normal: light_normal,
@@ -341,21 +330,12 @@ impl Tracer<'_> {
         if cosine <= 0.0 {
             return 0;
         }
-        let from = offset_origin(
-            surface.seen.point,
-            surface.seen.normal,
-            &surface.corners,
-            wi,
-        );
+        let from = surface.leave(wi);
         if self.scene.occluded(&Ray::new(from, wi)) {
             return 1;
         }
-        let (light_pdf, bsdf_pdf) = (pdf * self.sky_share(), cosine * FRAC_1_PI);
-        let share = match self.sampling {
-            LightSampling::Mis => power_heuristic(light_pdf, bsdf_pdf),
-            LightSampling::Emitter | LightSampling::Bsdf => 1.0,
-        };
-        vertex.known += sky.map().radiance(wi) * (bsdf_pdf / light_pdf * share * scale);
+        let weight = self.drawn_weight(pdf * self.sky_share(), cosine * FRAC_1_PI) * scale;
+        vertex.known += sky.map().radiance(wi) * weight;
         1
     }
 
@@ -371,6 +351,16 @@ impl Tracer<'_> {
     /// Density per square metre with which light samples land on an object of the mesh.
     fn light_pdf(&self, object: u32) -> f32 {
         self.lights.pdf(object) * (1.0 - self.sky_share())
+    }
+
+    /// Weight of a light sample: cosine over π (the BSDF over its albedo, times the cosine) over its density, shared with
+    /// BSDF sampling; both densities per solid angle.
+    fn drawn_weight(&self, light_pdf: f32, bsdf_pdf: f32) -> f32 {
+        let share = match self.sampling {
+            LightSampling::Mis => power_heuristic(light_pdf, bsdf_pdf),
+            LightSampling::Emitter | LightSampling::Bsdf => 1.0,
+        };
+        bsdf_pdf / light_pdf * share
     }
 
     /// Weight of light met by BSDF sampling against light sampling, given both densities per solid angle.
@@ -406,4 +396,11 @@ struct Surface {
     /// Index of its unknowns.
     id: u32,
     front: bool,
+}
+
+impl Surface {
+    /// Where a ray begins that leaves it in a direction.
+    fn leave(&self, wi: Vec3) -> Vec3 {
+        offset_origin(self.seen.point, self.seen.normal, &self.corners, wi)
+    }
 }
