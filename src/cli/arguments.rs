@@ -7,6 +7,7 @@ use crate::cli::import::ImportArguments;
 use crate::cli::insert::InsertArguments;
 use crate::cli::parameters::Parameters;
 use crate::cli::render::RenderArguments;
+use crate::cli::study::StudyArguments;
 use crate::cli::trade::TradeArguments;
 use crate::inverse::settings::Settings;
 use crate::session::command::OpenOptions;
@@ -52,6 +53,8 @@ pub enum Action {
     Demo(DemoArguments),
     /// Measure what exactness costs in seconds, over presets and settings
     Trade(TradeArguments),
+    /// Rerun experiments of the paper
+    Study(StudyArguments),
 }
 
 /// `relit solve`.

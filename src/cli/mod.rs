@@ -13,6 +13,7 @@ mod render;
 mod report;
 mod saved;
 mod solve;
+mod study;
 mod trade;
 
 use crate::error::{Error, Result};
@@ -60,6 +61,7 @@ fn act(arguments: Arguments, window: Option<Window>) -> Result<()> {
         Some(Action::Demo(demo)) => export::demo(&demo),
         Some(Action::Edit(edit)) => edit::edit(&edit),
         Some(Action::Trade(measured)) => trade::trade(&measured),
+        Some(Action::Study(studied)) => study::study(&studied),
         Some(Action::Solve(capture)) => {
             solve::solve(&Source::Folder(capture.capture.clone()), &capture.solve)
         }

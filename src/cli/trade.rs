@@ -43,7 +43,8 @@ pub struct TradeArguments {
     read: ReadOptions,
 }
 
-fn time(text: &str) -> std::result::Result<Duration, String> {
+/// A time above zero, as typed.
+pub fn time(text: &str) -> std::result::Result<Duration, String> {
     let seconds = duration(text).filter(|seconds| *seconds > 0.0);
     let time = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
     time.ok_or_else(|| "a time such as 90, 60s, 5m or 1h is wanted".to_owned())

@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
-use crate::inverse::solver::{Control, Observer, Problem, Progress, Termination, solve};
+use crate::inverse::solver::{Control, Observer, Problem, Progress, Solution, Termination, solve};
 use crate::study::trade::judge::{Bench, Judge};
 use crate::study::trade::plan::Run;
 use crate::study::trade::{Curve, Point};
@@ -41,21 +41,24 @@ pub fn measure(
         let left = end.saturating_duration_since(now);
         let share = left.mul_f64((run.weight / weights).clamp(0.0, 1.0));
         tell(Heard::Begins(run));
-        let curve = watch(problem, judge, run, now + share, stopped)?;
+        let (curve, _) = watch(problem, judge, run, now + share, stopped)?;
         tell(Heard::Ended(&curve));
         curves.push(curve);
     }
     Ok(curves)
 }
 
-/// Runs one solve until it ends or `deadline` comes.
-fn watch(
+/// Runs one solve until it ends or `deadline` comes; its course and what it found.
+///
+/// # Errors
+/// The solver cannot start.
+pub fn watch(
     problem: &Problem,
     judge: &Judge,
     run: &Run,
     deadline: Instant,
     stopped: &dyn Fn() -> bool,
-) -> Result<Curve> {
+) -> Result<(Curve, Solution)> {
     let mut watch = Watch {
         problem,
         bench: judge.bench(problem, &run.settings),
@@ -75,14 +78,15 @@ fn watch(
         Termination::Cancelled if watch.late => Termination::Time,
         other => other,
     };
-    Ok(Curve {
+    let curve = Curve {
         name: run.name.clone(),
         is_preset: run.is_preset,
         settings: run.settings.clone(),
         ended: Some(ended),
         rejected: watch.rejected,
         points: watch.points,
-    })
+    };
+    Ok((curve, solution))
 }
 
 /// Judges a running solve now and then.

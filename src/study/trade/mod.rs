@@ -15,7 +15,7 @@ pub mod rooms;
 mod words;
 
 pub use judge::Judge;
-pub use measure::{Heard, measure};
+pub use measure::{Heard, measure, watch};
 
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::Termination;

@@ -3,7 +3,9 @@
 use crate::capture::truth::Truth;
 use crate::error::Result;
 use crate::inverse::solver::Problem;
+use crate::room::Room;
 use crate::room::generated::generate;
+use crate::room::photographs::Rendering;
 use crate::scene::Scene;
 use crate::study::evaluate::Reference;
 use crate::study::trade::judge::Judge;
@@ -18,18 +20,27 @@ pub const SIZE: [u32; 2] = [96, 72];
 /// Never for rooms as they are generated; the signature is the scene's.
 pub fn problem(seed: u64, size: [u32; 2]) -> Result<(Problem, Judge)> {
     let (room, rendering) = generate(seed, size);
-    let capture = room.photographed(&rendering)?;
+    let (problem, reference) = photographed(&room, &rendering)?;
+    Ok((problem, Judge::Truth(Box::new(reference))))
+}
+
+/// Any room, photographed, with its truth.
+///
+/// # Errors
+/// The room's mesh holds nothing to see.
+pub fn photographed(room: &Room, rendering: &Rendering) -> Result<(Problem, Reference)> {
+    let capture = room.photographed(rendering)?;
     let photographs: Vec<_> = capture
         .frames
         .iter()
         .map(|frame| frame.load())
         .collect::<Result<_>>()?;
     let scene = Scene::new(&capture)?;
-    let truth: Truth = room.truth(size)?;
+    let truth: Truth = room.truth(rendering.size)?;
     let reference = Reference::new(truth, &capture, &scene, &photographs);
     let problem = Problem {
         scene: Arc::new(scene),
         photographs,
     };
-    Ok((problem, Judge::Truth(Box::new(reference))))
+    Ok((problem, reference))
 }

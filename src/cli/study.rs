@@ -1,0 +1,104 @@
+//! `relit study`: the paper's experiments.
+
+use crate::cli::arguments::ReadOptions;
+use crate::cli::solve::use_threads;
+use crate::cli::trade::time;
+use crate::error::{Error, Result};
+use crate::inverse::solver::Problem;
+use crate::session::command::Source;
+use crate::session::open::open;
+use crate::study::experiments::{Bench, STUDIES, Study, Subject};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// The word for every study.
+const ALL: &str = "all";
+/// Seeds where none are named, and in the quick form.
+const SEEDS: u64 = 5;
+const QUICK_SEEDS: u64 = 2;
+
+/// `relit study`.
+#[derive(Debug, Args)]
+pub struct StudyArguments {
+    /// The study
+    #[arg(value_name = "NAME", value_parser = names())]
+    name: String,
+    /// Folder to write NAME.csv, NAME.png and NAME.md into
+    #[arg(long, value_name = "DIR", default_value = "relit-out/studies")]
+    out: PathBuf,
+    /// Time for all solves of a study together; making scenes and measuring comes on top
+    #[arg(long, value_name = "TIME", default_value = "5m", value_parser = time)]
+    time: Duration,
+    /// Seeds that each solve is repeated with: 1, 2, … [default: 5; quick: 2]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000))]
+    seeds: Option<u64>,
+    /// Only try it, in seconds: fewer values, smaller scenes, solves cut short
+    #[arg(long)]
+    quick: bool,
+    /// A capture to run on, for studies that have no rooms of their own to vary
+    #[arg(long, value_name = "CAPTURE")]
+    capture: Option<PathBuf>,
+    /// Threads to work with [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    #[command(flatten)]
+    read: ReadOptions,
+}
+
+fn names() -> PossibleValuesParser {
+    let studies = STUDIES
+        .iter()
+        .map(|study| PossibleValue::new(study.name).help(study.question));
+    PossibleValuesParser::new(studies.chain([PossibleValue::new(ALL).help("All of them")]))
+}
+
+/// Runs the studies and writes what they found, each as soon as it is done.
+///
+/// # Errors
+/// The capture cannot be read, the study takes none, a solve cannot start, or a file cannot be written.
+pub fn study(arguments: &StudyArguments) -> Result<()> {
+    use_threads(arguments.threads)?;
+    let wanted: Vec<&Study> = STUDIES
+        .iter()
+        .filter(|study| arguments.name == ALL || study.name == arguments.name)
+        .collect();
+    if arguments.capture.is_some() && !wanted.iter().any(|study| study.takes_capture) {
+        return Err(Error::usage(
+            "--capture",
+            format!("{} varies rooms of its own", arguments.name),
+            "leave the capture out",
+        ));
+    }
+    let subject = arguments.capture.clone().map(|folder| {
+        let capture = open(&Source::Folder(folder), &arguments.read.open())?;
+        Ok(Subject {
+            name: capture.name.clone(),
+            judge: capture.judge()?,
+            problem: Problem {
+                scene: capture.scene.clone(),
+                photographs: capture.photographs.clone(),
+            },
+        })
+    });
+    let subject = subject.transpose()?;
+    let seeds = if arguments.quick { QUICK_SEEDS } else { SEEDS };
+    for study in wanted {
+        let bench = Bench {
+            quick: arguments.quick,
+            time: arguments.time,
+            seeds: arguments.seeds.unwrap_or(seeds),
+            subject: subject.as_ref().filter(|_| study.takes_capture),
+            say: &|what| eprintln!("{}: {what} …", study.name),
+        };
+        let findings = study.run(&bench)?;
+        for path in findings.write(study, &arguments.out)? {
+            println!("{}", path.display());
+        }
+        for sentence in &findings.seen {
+            println!("{sentence}");
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,127 @@
+//! A small box of a room with a block and one lamp, whose mean albedo and lamp can be chosen.
+
+use crate::error::Result;
+use crate::room::Room;
+use crate::room::photographs::Rendering;
+use crate::room::shape::Modeller;
+use crate::study::experiments::subject::Subject;
+use crate::transport::material::Material;
+use glam::{DVec3, Vec3};
+
+/// Key of the photographs' noise, far from those of solvers.
+const NOISE: u64 = 0x626f_7865_7300;
+/// Radiance times squared half side of the lamp, so that all lamps send out the same power.
+const LAMP_POWER: f64 = 0.2;
+/// Colour of the lamp.
+const LAMP_TINT: Vec3 = Vec3::new(1.0, 0.9, 0.75);
+/// Deviations of the seven reflectors from the mean albedo, in units of the largest; their sum is zero.
+const DEVIATIONS: [f64; 7] = [-1.0, 0.6, -0.3, 0.0, 0.3, -0.6, 1.0];
+/// Eyes and targets of the photographs; together they see every object.
+const VIEWS: [[[f64; 3]; 2]; 6] = [
+    [[0.7, 1.1, 0.8], [-0.4, 0.7, -0.8]],
+    [[-0.7, 1.2, 0.8], [0.5, 1.0, -0.8]],
+    [[0.8, 1.0, -0.8], [-0.3, 1.2, 0.9]],
+    [[-0.8, 0.9, 0.5], [0.9, 0.5, 0.3]],
+    [[0.6, 0.4, 0.6], [-0.1, 1.9, -0.2]],
+    [[0.85, 1.5, 0.0], [-0.9, 0.4, 0.0]],
+];
+
+/// A box of 2 m with six coloured sides, a block and a square lamp of half side `lamp` below the ceiling. The mean
+/// albedo over the seven reflectors is `albedo` in each channel; the lamp reflects nothing.
+pub fn box_room(name: &str, albedo: f64, lamp: f64) -> Room {
+    let mut modeller = Modeller::default();
+    let mut materials = Vec::new();
+    let reach = 0.6 * albedo.min(0.98 - albedo);
+    let color = |index: usize| {
+        let channel = |c: usize| albedo + reach * DEVIATIONS[(index + 2 * c) % DEVIATIONS.len()];
+        Vec3::from_array([0, 1, 2].map(|c| channel(c) as f32))
+    };
+
+    // Six sides that look inwards.
+    let (low, high) = (DVec3::new(-1.0, 0.0, -1.0), DVec3::new(1.0, 2.0, 1.0));
+    let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * 2.0);
+    let sides = [
+        ("floor", [low, z, x]),
+        ("ceiling", [high, -x, -z]),
+        ("back", [low, x, y]),
+        ("right", [high, -y, -z]),
+        ("left", [low, y, z]),
+        ("front", [high, -x, -y]),
+    ];
+    for (name, [corner, u, v]) in sides {
+        modeller.object(name);
+        modeller.grid(corner, u, v, 1, 1);
+        materials.push(Material::diffuse(color(materials.len()), Vec3::ZERO));
+    }
+
+    // The block and the lamp.
+    modeller.object("block");
+    let half = DVec3::new(0.25, 0.3, 0.2);
+    modeller.rounded_box(DVec3::new(-0.35, 0.31, -0.3), half, 0.0, 0);
+    materials.push(Material::diffuse(color(materials.len()), Vec3::ZERO));
+    modeller.object("lamp");
+    let corner = DVec3::new(0.1 - lamp, 1.9, -0.1 - lamp);
+    modeller.grid(corner, DVec3::X * 2.0 * lamp, DVec3::Z * 2.0 * lamp, 1, 1);
+    let emission = LAMP_TINT * (LAMP_POWER / (lamp * lamp)) as f32;
+    materials.push(Material::diffuse(Vec3::ZERO, emission));
+    Room {
+        name: name.to_owned(),
+        mesh: modeller.mesh,
+        materials,
+        views: VIEWS.iter().map(|view| view.map(DVec3::from)).collect(),
+    }
+}
+
+/// The room, photographed with all bounces: small and coarse where `quick`.
+///
+/// # Errors
+/// Never for a lamp that fits below the ceiling.
+pub fn photographed(name: &str, albedo: f64, lamp: f64, quick: bool) -> Result<Subject> {
+    let (size, samples) = if quick {
+        ([32, 24], 32)
+    } else {
+        ([64, 48], 128)
+    };
+    let rendering = Rendering {
+        seed: NOISE,
+        samples,
+        size,
+    };
+    Subject::of_room(&box_room(name, albedo, lamp), &rendering)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mean_albedo_is_what_was_asked_for_and_every_view_looks_at_fronts() {
+        for albedo in [0.3, 0.95] {
+            let room = box_room("room", albedo, 0.25);
+            let world = room.lit([16, 12]).expect("a scene");
+            let reflectors = &room.materials[..DEVIATIONS.len()];
+            let hit = crate::scene::geometry::Hit {
+                t: 0.0,
+                triangle: 0,
+                b1: 0.3,
+                b2: 0.3,
+            };
+            let sum: Vec3 = reflectors.iter().map(|m| m.albedo_at(&hit)).sum();
+            let mean = sum / DEVIATIONS.len() as f32;
+            assert!((mean - albedo as f32).abs().max_element() < 1e-5, "{mean}");
+            let seen = crate::room::truth::seen_pixels(&world);
+            let pixels = 16 * 12 * VIEWS.len() as u64;
+            assert_eq!(seen.iter().sum::<u64>(), pixels);
+            assert!(seen.iter().all(|&n| n > 0), "{seen:?}");
+            for camera in &world.scene.cameras {
+                for pixel in 0..16 * 12 {
+                    let at = glam::Vec2::new((pixel % 16) as f32, (pixel / 16) as f32) + 0.5;
+                    let ray = camera.ray(at);
+                    let hit = world.scene.intersect(&ray).expect("closed");
+                    let normal = world.scene.normals[hit.triangle as usize];
+                    assert!(normal.dot(ray.direction) <= 0.0);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! The courses of solves that studies compare: the paper's descent as published, watched at fixed numbers of rays, and
+//! where the transport cache ends.
+
+use crate::error::Result;
+use crate::inverse::estimate::{Estimate, ObjectEstimate};
+use crate::inverse::loss::LossProbe;
+use crate::inverse::paper::descent::{Descent, Grain};
+use crate::inverse::settings::{Preset, Settings};
+use crate::study::experiments::{Limits, Subject};
+use crate::study::trade::plan::Run;
+use crate::study::trade::watch;
+use std::time::{Duration, Instant};
+
+/// Rays at the first mark, and the factor from mark to mark.
+const FIRST: f64 = 20_000.0;
+const FACTOR: f64 = std::f64::consts::SQRT_2;
+/// Held-out pixels that are rendered for the loss, and paths for each.
+const PIXELS: usize = 400;
+const SAMPLES: u64 = 64;
+/// Longest that the transport cache is waited for.
+const PATIENCE: Duration = Duration::from_secs(600);
+
+/// Where a solve stood.
+#[derive(Debug, Clone)]
+pub struct Mark {
+    /// The number of the mark in rays that was passed last; the same for all solves. `None` before the first.
+    pub index: Option<u32>,
+    /// Rays cast by the solve.
+    pub rays: u64,
+    /// Seconds of solving, without measuring.
+    pub seconds: f64,
+    /// Steps of the optimiser.
+    pub steps: u64,
+    /// How far the estimate was off.
+    pub errors: Errors,
+}
+
+/// How far an estimate is off.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Errors {
+    /// Mean absolute difference in radiance on held-out pixels.
+    pub loss: Option<f64>,
+    /// Mean absolute error of albedo.
+    pub albedo: Option<f64>,
+    /// Median relative error of the lamps' emission.
+    pub emission: Option<f64>,
+}
+
+/// Measures estimates of one subject, always on the same pixels.
+pub struct Gauge<'a> {
+    subject: &'a Subject,
+    probe: LossProbe,
+}
+
+impl<'a> Gauge<'a> {
+    /// A gauge whose renders have at most `bounces` bounces.
+    pub fn new(subject: &'a Subject, bounces: u32) -> Self {
+        let settings = Settings::default();
+        let probe = LossProbe::new(&subject.problem, &settings, PIXELS, SAMPLES, bounces);
+        Self { subject, probe }
+    }
+
+    /// How far an estimate is off.
+    pub fn errors(&self, estimate: &Estimate) -> Errors {
+        let known =
+            (self.subject.truth()).map(|truth| truth.errors(&self.subject.problem.scene, estimate));
+        Errors {
+            loss: self.probe.held_out(&self.subject.problem, estimate),
+            albedo: known.as_ref().and_then(|known| known.albedo_mae),
+            emission: known.and_then(|known| known.emission_rel_median),
+        }
+    }
+}
+
+/// Runs the descent as published, per object and with nothing annealed, and measures it whenever its rays pass a mark.
+///
+/// Which rays are cast, and with them all errors at a mark, depends on the settings alone; how many marks are passed in
+/// limited seconds does not. Stops where the parameters leave the finite numbers.
+pub fn descend(gauge: &Gauge, settings: &Settings, limits: Limits) -> Vec<Mark> {
+    let problem = &gauge.subject.problem;
+    let mut descent = Descent::new(problem, Grain::Objects);
+    let (mut rays, mut steps, mut seconds) = (0, 0, 0.0);
+    let mut marks = Vec::new();
+    loop {
+        // Step to the next mark.
+        let goal = rays_at(mark_at(rays).map_or(0, |mark| mark + 1)).min(limits.rays);
+        let begun = Instant::now();
+        let mut over = false;
+        while rays < goal && !over {
+            let outcome = descent.step(problem, settings, settings.max_bounces());
+            rays += outcome.rays;
+            steps += 1;
+            let late = seconds + begun.elapsed().as_secs_f64() >= limits.seconds;
+            over = late || !outcome.finite || outcome.rays == 0;
+        }
+        seconds += begun.elapsed().as_secs_f64();
+
+        // Measure there.
+        marks.push(Mark {
+            index: mark_at(rays),
+            rays,
+            seconds,
+            steps,
+            errors: gauge.errors(&estimate(&descent)),
+        });
+        if over || rays >= limits.rays {
+            return marks;
+        }
+    }
+}
+
+/// Rays at a mark.
+fn rays_at(mark: u32) -> u64 {
+    (FIRST * FACTOR.powi(mark as i32)) as u64
+}
+
+/// The last mark that so many rays have passed.
+fn mark_at(rays: u64) -> Option<u32> {
+    (0..).take_while(|&mark| rays_at(mark) <= rays).last()
+}
+
+/// Where the descent stands, as an estimate.
+fn estimate(descent: &Descent) -> Estimate {
+    let values = descent.unknowns.albedo.iter().zip(&descent.lights);
+    Estimate {
+        objects: values
+            .map(|(&albedo, &emission)| ObjectEstimate {
+                albedo,
+                emission,
+                ..ObjectEstimate::default()
+            })
+            .collect(),
+        ..Estimate::default()
+    }
+}
+
+/// Where the transport cache ends, one colour an object.
+///
+/// # Errors
+/// The solver cannot start.
+pub fn cached(gauge: &Gauge, settings: &Settings) -> Result<Mark> {
+    let run = Run {
+        name: settings.preset.word().to_owned(),
+        is_preset: false,
+        settings: settings.clone(),
+        weight: 1.0,
+    };
+    let deadline = Instant::now() + PATIENCE;
+    let subject = gauge.subject;
+    let (_, solution) = watch(&subject.problem, &subject.judge, &run, deadline, &|| false)?;
+    Ok(Mark {
+        index: None,
+        rays: solution.progress.rays,
+        seconds: solution.progress.seconds,
+        steps: solution.progress.iterations,
+        errors: gauge.errors(&solution.estimate),
+    })
+}
+
+/// The transport cache's settings in studies: the default preset, or the fastest where only tried.
+pub fn cache_settings(seed: u64, quick: bool) -> Settings {
+    Settings {
+        preset: if quick {
+            Preset::Preview
+        } else {
+            Preset::Balanced
+        },
+        seed,
+        exposures: false,
+        textures: false,
+        outside_light: false,
+        ..Settings::default()
+    }
+}
+
+/// The paper's settings in studies.
+pub fn paper_settings(seed: u64) -> Settings {
+    Settings {
+        preset: Preset::Paper,
+        seed,
+        ..Settings::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_are_passed_in_order() {
+        assert_eq!(mark_at(rays_at(0) - 1), None);
+        for mark in 0..40 {
+            assert_eq!(mark_at(rays_at(mark)), Some(mark));
+            assert_eq!(mark_at(rays_at(mark + 1) - 1), Some(mark));
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! Courses of several kinds of solves over several seeds, as tables, plots and comparisons.
+
+use crate::export::plot::{Axis, Draw, Plot, Series};
+use crate::export::table::Table;
+use crate::math::stats::Moments;
+use crate::study::experiments::course::{Errors, Mark};
+use crate::study::experiments::findings::brief;
+
+/// Courses of one kind of solve, one a seed.
+#[derive(Debug, Clone)]
+pub struct Kind {
+    /// Its name.
+    pub name: String,
+    /// One course a seed, in order of seeds from 1.
+    pub courses: Vec<Vec<Mark>>,
+}
+
+/// An error over seeds.
+#[derive(Debug, Clone, Copy)]
+pub struct Spread {
+    /// Geometric mean.
+    pub mean: f64,
+    /// One standard deviation between seeds, as a factor.
+    pub factor: f64,
+    /// Seeds.
+    pub count: u64,
+}
+
+/// Which error is looked at.
+pub type Quantity = fn(&Errors) -> Option<f64>;
+
+impl Spread {
+    /// Over positive values; `None` where there are none.
+    pub fn over(values: impl Iterator<Item = f64>) -> Option<Self> {
+        let mut moments = Moments::default();
+        values
+            .filter(|value| value.is_finite() && *value > 0.0)
+            .for_each(|value| moments.push(value.ln()));
+        (moments.count > 0).then(|| Self {
+            mean: moments.mean.exp(),
+            factor: moments.variance().sqrt().exp(),
+            count: moments.count,
+        })
+    }
+
+    /// One standard deviation below and above.
+    pub fn band(&self) -> [f64; 2] {
+        [self.mean / self.factor, self.mean * self.factor]
+    }
+
+    /// Whether the mean differs from another by more than two standard errors of both.
+    pub fn differs(&self, other: &Self) -> bool {
+        let squared = |s: &Self| s.factor.ln().powi(2) / s.count as f64;
+        let error = (squared(self) + squared(other)).sqrt();
+        (self.mean / other.mean).ln().abs() > 2.0 * error
+    }
+
+    /// In words: "0.0123 (×/÷ 1.05)".
+    pub fn words(&self) -> String {
+        format!("{} (×/÷ {:.2})", brief(self.mean), self.factor)
+    }
+}
+
+/// The last mark in rays that every course has passed, or `None` where one passed none.
+pub fn common_mark(kinds: &[Kind]) -> Option<u32> {
+    let ends = kinds.iter().flat_map(|kind| &kind.courses);
+    ends.map(|course| course.last().and_then(|mark| mark.index))
+        .min()
+        .flatten()
+}
+
+impl Kind {
+    /// An error over seeds when a mark in rays was passed.
+    pub fn at_mark(&self, mark: u32, quantity: Quantity) -> Option<Spread> {
+        let values = self.courses.iter().filter_map(|course| {
+            let passed = course.iter().find(|m| m.index >= Some(mark))?;
+            quantity(&passed.errors)
+        });
+        Spread::over(values)
+    }
+
+    /// An error over seeds at the courses' ends.
+    pub fn at_end(&self, quantity: Quantity) -> Option<Spread> {
+        let ends = self.courses.iter().filter_map(|course| course.last());
+        Spread::over(ends.filter_map(|mark| quantity(&mark.errors)))
+    }
+
+    /// Mean over seeds of a count at the courses' ends.
+    pub fn mean_end(&self, count: fn(&Mark) -> f64) -> f64 {
+        let ends = self.courses.iter().filter_map(|course| course.last());
+        ends.map(count).sum::<f64>() / self.courses.len().max(1) as f64
+    }
+
+    /// Mean course over the marks in rays, with its spread: over `x`.
+    fn series(&self, x: fn(&Mark) -> f64, quantity: Quantity) -> Series {
+        let last = self.courses.iter().filter_map(|c| c.last()?.index).max();
+        let mut series = Series {
+            name: self.name.clone(),
+            ..Series::default()
+        };
+        for index in 0..=last.unwrap_or(0) {
+            let here = || {
+                let at =
+                    |course: &'_ Vec<Mark>| course.iter().find(|m| m.index == Some(index)).cloned();
+                self.courses.iter().filter_map(at)
+            };
+            if let Some(spread) = Spread::over(here().filter_map(|mark| quantity(&mark.errors))) {
+                let places = here().map(|mark| x(&mark));
+                let place = places.sum::<f64>() / here().count().max(1) as f64;
+                series.points.push([place, spread.mean]);
+                series.band.push(spread.band());
+            }
+        }
+        series
+    }
+}
+
+/// A plot of mean courses over rays or seconds, with the transport cache's ends as dots.
+pub fn plot(
+    title: &str,
+    x_label: &str,
+    y_label: &str,
+    x: fn(&Mark) -> f64,
+    quantity: Quantity,
+    kinds: &[Kind],
+    cache: &[Mark],
+) -> Plot {
+    let mut series: Vec<Series> = kinds.iter().map(|kind| kind.series(x, quantity)).collect();
+    series.retain(|series| !series.points.is_empty());
+    let ends: Vec<[f64; 2]> = (cache.iter())
+        .filter_map(|mark| Some([x(mark), quantity(&mark.errors)?]))
+        .collect();
+    // A ring without a name, which the legend gives.
+    let labels = ends.iter().map(|&end| (end, String::new())).collect();
+    series.push(Series {
+        name: "transport cache, ends".to_owned(),
+        points: ends,
+        band: Vec::new(),
+        draw: Draw::Dots,
+    });
+    Plot {
+        title: title.to_owned(),
+        x: Axis::logarithmic(x_label),
+        y: Axis::logarithmic(y_label),
+        series,
+        marks: Vec::new(),
+        labels,
+    }
+}
+
+/// All marks of all courses and the transport cache's ends, a row each.
+pub fn table(axis: &'static str, kinds: &[Kind], cache: &[Mark]) -> Table {
+    let mut table = Table::new(&[
+        axis,
+        "seed",
+        "mark",
+        "rays",
+        "seconds",
+        "steps",
+        "loss",
+        "albedo_error",
+        "emission_error",
+    ]);
+    let mut add = |name: &str, seed: usize, mark: &Mark| {
+        table.row(&[
+            name.into(),
+            (seed as u64).into(),
+            mark.index.map(u64::from).into(),
+            mark.rays.into(),
+            mark.seconds.into(),
+            mark.steps.into(),
+            mark.errors.loss.into(),
+            mark.errors.albedo.into(),
+            mark.errors.emission.into(),
+        ]);
+    };
+    for kind in kinds {
+        for (seed, course) in (1..).zip(&kind.courses) {
+            course.iter().for_each(|mark| add(&kind.name, seed, mark));
+        }
+    }
+    for (seed, mark) in (1..).zip(cache) {
+        add("transport cache", seed, mark);
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spread_is_geometric_and_differences_are_measured_against_it() {
+        let spread = |values: &[f64]| Spread::over(values.iter().copied()).expect("values");
+        let wide = spread(&[0.5, 2.0]);
+        assert!((wide.mean - 1.0).abs() < 1e-12);
+        assert!((wide.factor - (2f64.ln() * 2f64.sqrt()).exp()).abs() < 1e-12);
+        assert!(!wide.differs(&spread(&[1.5, 1.6])));
+        assert!(spread(&[1.0, 1.01]).differs(&spread(&[1.5, 1.51])));
+        assert!(Spread::over([f64::NAN, 0.0].into_iter()).is_none());
+    }
+}

@@ -1,0 +1,89 @@
+//! The paper's experiments, each rerun by one command: `relit study NAME`.
+//!
+//! A study is a row of [`STUDIES`], from which the command, its help and `all` come. It runs on scenes of known truth,
+//! photographed in memory, and hands back tables, plots and what was seen, which [`Findings::write`] puts into files.
+
+mod batch;
+mod box_room;
+mod course;
+mod courses;
+mod findings;
+mod subject;
+
+pub use findings::{Findings, Summary};
+pub use subject::Subject;
+
+use crate::error::Result;
+use std::time::Duration;
+
+/// Rays of each descent in the quick form, which is there to try the program rather than to learn from.
+const QUICK_RAYS: u64 = 150_000;
+
+/// One of the paper's experiments.
+#[derive(Debug, Clone, Copy)]
+pub struct Study {
+    /// Name on the command line and of its files.
+    pub name: &'static str,
+    /// What it asks.
+    pub question: &'static str,
+    /// Whether it can be run on a capture instead of on rooms of its own.
+    pub takes_capture: bool,
+    run: fn(&Bench) -> Result<Findings>,
+}
+
+/// All studies, in the order in which `relit study all` runs them.
+pub const STUDIES: &[Study] = &[batch::STUDY];
+
+impl Study {
+    /// Runs the study.
+    ///
+    /// # Errors
+    /// A scene or a solver cannot be set up.
+    pub fn run(&self, bench: &Bench) -> Result<Findings> {
+        (self.run)(bench)
+    }
+}
+
+/// What a study is run with.
+pub struct Bench<'a> {
+    /// Whether only to try it: fewer values, smaller scenes, work limited by rays instead of time.
+    pub quick: bool,
+    /// Time for all solves of the study together; scenes are photographed and losses measured beside it.
+    pub time: Duration,
+    /// How many seeds each solve is repeated with: 1, 2, …
+    pub seeds: u64,
+    /// The capture to run on, for studies that take one.
+    pub subject: Option<&'a Subject>,
+    /// Hears what is being done.
+    pub say: &'a dyn Fn(&str),
+}
+
+/// When a solve ends.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// Rays cast.
+    pub rays: u64,
+    /// Seconds of its own clock.
+    pub seconds: f64,
+}
+
+impl Bench<'_> {
+    /// The share of one of `runs` solves.
+    fn limits(&self, runs: usize) -> Limits {
+        if self.quick {
+            return Limits {
+                rays: QUICK_RAYS,
+                seconds: f64::INFINITY,
+            };
+        }
+        Limits {
+            rays: u64::MAX,
+            seconds: self.time.as_secs_f64() / runs.max(1) as f64,
+        }
+    }
+
+    /// The seeds.
+    fn seeds(&self) -> std::ops::RangeInclusive<u64> {
+        1..=self.seeds
+    }
+}

@@ -1,0 +1,42 @@
+//! What a study solves: a scene with photographs, and its truth where that is known.
+
+use crate::error::Result;
+use crate::inverse::solver::Problem;
+use crate::room::Room;
+use crate::room::photographs::Rendering;
+use crate::study::evaluate::Reference;
+use crate::study::trade::{Judge, rooms};
+
+/// A named problem with its truth.
+#[derive(Debug, Clone)]
+pub struct Subject {
+    /// The name shown to people.
+    pub name: String,
+    /// The scene and its photographs.
+    pub problem: Problem,
+    /// The truth, or that there is none.
+    pub judge: Judge,
+}
+
+impl Subject {
+    /// A room, photographed.
+    ///
+    /// # Errors
+    /// The room's mesh holds nothing to see.
+    pub fn of_room(room: &Room, rendering: &Rendering) -> Result<Self> {
+        let (problem, reference) = rooms::photographed(room, rendering)?;
+        Ok(Self {
+            name: room.name.clone(),
+            problem,
+            judge: Judge::Truth(Box::new(reference)),
+        })
+    }
+
+    /// The truth, where it is known.
+    pub fn truth(&self) -> Option<&Reference> {
+        match &self.judge {
+            Judge::Truth(reference) => Some(reference),
+            Judge::HeldOut => None,
+        }
+    }
+}

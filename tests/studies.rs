@@ -1,0 +1,106 @@
+//! The paper's experiments in their quick form: every file is there, complete, and says what it must.
+
+use relit::study::experiments::{Bench, Findings, STUDIES, Study};
+use std::collections::BTreeSet;
+use std::fs;
+use std::time::Duration;
+
+fn study(name: &str) -> &'static Study {
+    let found = STUDIES.iter().find(|study| study.name == name);
+    found.expect("a study of that name")
+}
+
+fn quick(name: &str) -> Findings {
+    let bench = Bench {
+        quick: true,
+        time: Duration::from_secs(1),
+        seeds: 2,
+        subject: None,
+        say: &|_| {},
+    };
+    study(name).run(&bench).expect("runs")
+}
+
+/// Rows of a table by column name, after the files were written and looked at.
+fn rows(name: &str, findings: &Findings, suffix: &str) -> Vec<Vec<String>> {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let written = findings.write(study(name), folder.path()).expect("written");
+    let expected = findings.tables.len() + findings.plots.len() + 1;
+    assert_eq!(written.len(), expected);
+    assert_eq!(written.iter().collect::<BTreeSet<_>>().len(), expected);
+    for path in &written {
+        assert!(path.metadata().expect("there").len() > 50, "{path:?}");
+    }
+    let words = fs::read_to_string(folder.path().join(format!("{name}.md"))).expect("written");
+    for part in [name, "## Seen", ".csv", ".png"] {
+        assert!(words.contains(part), "{part}: {words}");
+    }
+    assert!(
+        !findings.seen.is_empty() && !words.contains("NaN"),
+        "{words}"
+    );
+    let path = folder.path().join(format!("{name}{suffix}.csv"));
+    let text = fs::read_to_string(path).expect("written");
+    let cells = |line: &str| line.split(',').map(str::to_owned).collect();
+    text.lines().map(cells).collect()
+}
+
+/// The values of a column, as text.
+fn column(rows: &[Vec<String>], name: &str) -> Vec<String> {
+    let place = rows[0].iter().position(|c| c == name);
+    let place = place.unwrap_or_else(|| panic!("no column {name} in {:?}", rows[0]));
+    rows[1..].iter().map(|row| row[place].clone()).collect()
+}
+
+fn numbers(rows: &[Vec<String>], name: &str) -> Vec<f64> {
+    let parse = |text: &String| text.parse().unwrap_or(f64::NAN);
+    column(rows, name).iter().map(parse).collect()
+}
+
+#[test]
+fn names_differ_and_questions_are_asked() {
+    let names: BTreeSet<&str> = STUDIES.iter().map(|study| study.name).collect();
+    assert_eq!(names.len(), STUDIES.len());
+    assert!(!names.contains("all"));
+    assert!(
+        STUDIES
+            .iter()
+            .all(|study| study.question.ends_with(['.', '?']))
+    );
+}
+
+#[test]
+fn batches_fall_from_the_dark_and_large_ones_take_fewer_steps_for_as_many_rays() {
+    let findings = quick("batch");
+    let rows = rows("batch", &findings, "");
+    let (batches, seeds) = (column(&rows, "batch"), column(&rows, "seed"));
+    let (losses, steps) = (numbers(&rows, "loss"), numbers(&rows, "steps"));
+    let of = |batch: &str, seed: &str| -> Vec<usize> {
+        let all = 0..batches.len();
+        all.filter(|&i| batches[i] == batch && seeds[i] == seed)
+            .collect()
+    };
+    for seed in ["1", "2"] {
+        assert_eq!(of("transport cache", seed).len(), 1);
+        let mut taken = f64::INFINITY;
+        for batch in ["1", "8", "64"] {
+            let marks = of(batch, seed);
+            assert!(marks.len() >= 5, "{batch}: {} marks", marks.len());
+            let (first, last) = (marks[0], marks[marks.len() - 1]);
+            assert!(losses[last] <= losses[first], "{batch}: {losses:?}");
+            assert!(steps[last] < 0.5 * taken, "{batch}");
+            taken = steps[last];
+        }
+    }
+    // The same seed takes the same course; only the clock differs.
+    let again = quick("batch");
+    let without_seconds = |findings: &Findings| -> Vec<String> {
+        let table = findings.tables[0].1.as_str().to_owned();
+        let line = |line: &str| {
+            let cells: Vec<&str> = line.split(',').collect();
+            [&cells[..4], &cells[5..]].concat().join(",")
+        };
+        table.lines().map(line).collect()
+    };
+    assert_eq!(without_seconds(&findings), without_seconds(&again));
+}
