@@ -41,7 +41,22 @@ fn rows(name: &str, findings: &Findings, suffix: &str) -> Vec<Vec<String>> {
     );
     let path = folder.path().join(format!("{name}{suffix}.csv"));
     let text = fs::read_to_string(path).expect("written");
-    let cells = |line: &str| line.split(',').map(str::to_owned).collect();
+    // Commas between quotes part no cells.
+    let cells = |line: &str| -> Vec<String> {
+        let parts = line.split('"').enumerate();
+        let marked = parts.map(|(i, part)| {
+            if i % 2 == 0 {
+                part.replace(',', "\n")
+            } else {
+                part.to_owned()
+            }
+        });
+        marked
+            .collect::<String>()
+            .split('\n')
+            .map(str::to_owned)
+            .collect()
+    };
     text.lines().map(cells).collect()
 }
 
@@ -103,4 +118,30 @@ fn batches_fall_from_the_dark_and_large_ones_take_fewer_steps_for_as_many_rays()
         table.lines().map(line).collect()
     };
     assert_eq!(without_seconds(&findings), without_seconds(&again));
+}
+
+#[test]
+fn both_samplings_together_have_no_more_gradient_variance_than_the_worse_of_them() {
+    let findings = quick("mis");
+    let courses = rows("mis", &findings, "");
+    let kinds: BTreeSet<String> = column(&courses, "sampling").into_iter().collect();
+    // Two rooms by three samplings, and the transport cache.
+    assert_eq!(kinds.len(), 7, "{kinds:?}");
+    let rows = rows("mis", &findings, "-variance");
+    let (scenes, samplings) = (column(&rows, "scene"), column(&rows, "sampling"));
+    let variances = numbers(&rows, "variance");
+    let of = |scene: &str, sampling: &str| {
+        let mut all = 0..scenes.len();
+        let place = all.find(|&i| scenes[i] == scene && samplings[i] == sampling);
+        variances[place.expect("a row")]
+    };
+    for scene in ["small lamp", "large lamp"] {
+        let [both, light, bsdf] = ["mis", "emitter", "bsdf"].map(|s| of(scene, s));
+        assert!(
+            both > 0.0 && both < light.max(bsdf),
+            "{scene}: {both} {light} {bsdf}"
+        );
+    }
+    // A small lamp is hardly met by chance.
+    assert!(of("small lamp", "bsdf") > 2.0 * of("small lamp", "emitter"));
 }

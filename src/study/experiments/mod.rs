@@ -8,6 +8,8 @@ mod box_room;
 mod course;
 mod courses;
 mod findings;
+mod gradient;
+mod mis;
 mod subject;
 
 pub use findings::{Findings, Summary};
@@ -32,7 +34,7 @@ pub struct Study {
 }
 
 /// All studies, in the order in which `relit study all` runs them.
-pub const STUDIES: &[Study] = &[batch::STUDY];
+pub const STUDIES: &[Study] = &[batch::STUDY, mis::STUDY];
 
 impl Study {
     /// Runs the study.

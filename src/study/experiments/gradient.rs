@@ -1,0 +1,122 @@
+//! How noisy the derivatives of single paths are.
+
+use crate::inverse::cache::derivative::{Gradient, differentiate};
+use crate::inverse::cache::trace::Tracer;
+use crate::inverse::parameters::Unknowns;
+use crate::inverse::settings::LightSampling;
+use crate::inverse::solver::Problem;
+use crate::math::color::luminance;
+use crate::math::rng::Stream;
+use crate::math::stats::Moments;
+use crate::transport::emitters::Emitters;
+use glam::Vec2;
+use rayon::prelude::*;
+
+/// Key of the paths, far from those of solvers.
+const KEY: u64 = 0x6772_6164;
+/// Bounces, as the paper has them.
+const BOUNCES: u32 = 2;
+
+/// Noise of the derivative of a pixel's radiance from one path.
+#[derive(Debug, Clone, Copy)]
+pub struct Noise {
+    /// Variance between paths of one pixel, summed over all unknowns and channels, mean over pixels. Emissions are taken
+    /// relative to their values, so that all derivatives are radiances.
+    pub variance: f64,
+    /// Its standard error over pixels.
+    pub error: f64,
+    /// Rays a path.
+    pub rays: f64,
+}
+
+/// Measures the noise at given unknowns, one a object, on `pixels` pixels spread over all photographs with `paths` paths
+/// each.
+pub fn noise(
+    problem: &Problem,
+    unknowns: &Unknowns,
+    sampling: LightSampling,
+    pixels: usize,
+    paths: u64,
+) -> Noise {
+    let scene = &*problem.scene;
+    let weights: Vec<f64> = (scene.objects.iter().zip(&unknowns.emission))
+        .map(|(object, emission)| object.area * f64::from(luminance(*emission)))
+        .collect();
+    let lights = Emitters::new(scene, &weights);
+    let tracer = Tracer {
+        scene,
+        lights: &lights,
+        measured: None,
+        surface_of: &scene.object_of,
+        believed_albedo: &vec![1.0; unknowns.surfaces()],
+        sky: None,
+        outside: None,
+        sampling,
+        max_bounces: BOUNCES,
+        seed: KEY,
+        stage: 0,
+        round: 0,
+    };
+    let all: Vec<(usize, usize)> = (problem.photographs.iter().enumerate())
+        .flat_map(|(frame, photograph)| {
+            (0..photograph.pixels.len()).map(move |pixel| (frame, pixel))
+        })
+        .collect();
+    let count = pixels.min(all.len());
+    let found: Vec<(f64, u64)> = (0..count)
+        .into_par_iter()
+        .map(|index| {
+            let (frame, pixel) = all[index * all.len() / count];
+            of_pixel(problem, &tracer, unknowns, frame, pixel, paths)
+        })
+        .collect();
+    let mut variance = Moments::default();
+    found.iter().for_each(|(value, _)| variance.push(*value));
+    let rays: u64 = found.iter().map(|(_, rays)| rays).sum();
+    Noise {
+        variance: variance.mean,
+        error: variance.standard_error(),
+        rays: rays as f64 / (count as u64 * paths).max(1) as f64,
+    }
+}
+
+/// Summed variance of one pixel's derivatives, and the rays that it took.
+fn of_pixel(
+    problem: &Problem,
+    tracer: &Tracer,
+    unknowns: &Unknowns,
+    frame: usize,
+    pixel: usize,
+    paths: u64,
+) -> (f64, u64) {
+    let width = problem.photographs[frame].width as usize;
+    let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+    let parameters = 2 * unknowns.surfaces();
+    let mut gradient = Gradient::new(parameters);
+    let (mut vertices, mut gathered) = (Vec::new(), Vec::new());
+    let mut moments = vec![[Moments::default(); 3]; parameters];
+    let mut rays = 0;
+    for path in 0..paths {
+        let mut stream = Stream::new(KEY, frame as u64, pixel as u64, path);
+        vertices.clear();
+        let (cast, _) = tracer.pixel_path(
+            &problem.scene.cameras[frame],
+            corner,
+            &mut stream,
+            &mut vertices,
+        );
+        rays += cast;
+        gradient.clear();
+        differentiate(&vertices, unknowns, &mut gathered, &mut gradient);
+        for (parameter, moments) in moments.iter_mut().enumerate() {
+            let mut value = gradient.values[parameter];
+            if parameter >= unknowns.surfaces() {
+                value *= unknowns.value(parameter);
+            }
+            for (channel, moments) in moments.iter_mut().enumerate() {
+                moments.push(f64::from(value[channel]));
+            }
+        }
+    }
+    (moments.iter().flatten().map(Moments::variance).sum(), rays)
+}
