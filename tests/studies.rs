@@ -145,3 +145,31 @@ fn both_samplings_together_have_no_more_gradient_variance_than_the_worse_of_them
     // A small lamp is hardly met by chance.
     assert!(of("small lamp", "bsdf") > 2.0 * of("small lamp", "emitter"));
 }
+
+#[test]
+fn the_same_samples_darken_an_l2_fit_as_predicted_and_two_sets_do_not() {
+    let findings = quick("estimators");
+    let rows = rows("estimators", &findings, "");
+    let (names, samplings) = (column(&rows, "estimator"), column(&rows, "sampling"));
+    let samples = column(&rows, "samples");
+    let (scales, predicted) = (numbers(&rows, "scale"), numbers(&rows, "predicted"));
+    assert_eq!(scales.len(), 2 * 4 * 3 * 2);
+    let of = |name: &str, count: &str| -> Vec<usize> {
+        let all = 0..names.len();
+        all.filter(|&i| names[i] == name && samples[i] == count && samplings[i] == "BSDF sampling")
+            .collect()
+    };
+    let mean = |places: &[usize], values: &[f64]| {
+        places.iter().map(|&i| values[i]).sum::<f64>() / places.len() as f64
+    };
+    let same = of("l2, same samples", "1");
+    assert!(mean(&same, &scales) < 0.8, "{}", mean(&same, &scales));
+    let off = mean(&same, &scales) / mean(&same, &predicted);
+    assert!((off - 1.0).abs() < 0.15, "{off}");
+    let two = of("l2, two sets", "16");
+    assert!(
+        (mean(&two, &scales) - 1.0).abs() < 0.05,
+        "{}",
+        mean(&two, &scales)
+    );
+}

@@ -7,6 +7,7 @@ mod batch;
 mod box_room;
 mod course;
 mod courses;
+mod estimators;
 mod findings;
 mod gradient;
 mod mis;
@@ -34,7 +35,7 @@ pub struct Study {
 }
 
 /// All studies, in the order in which `relit study all` runs them.
-pub const STUDIES: &[Study] = &[batch::STUDY, mis::STUDY];
+pub const STUDIES: &[Study] = &[batch::STUDY, mis::STUDY, estimators::STUDY];
 
 impl Study {
     /// Runs the study.
