@@ -322,6 +322,62 @@ fn a_resumed_solve_ends_like_one_that_was_never_interrupted() {
     assert_eq!(iterations, ["0", "20", "40"]);
 }
 
+/// Renders a frame whole and by lamp.
+fn layers_add_up_to_the_render(place: &Place) {
+    let render = |out: &str, more: &[&str]| {
+        let mut all = vec!["render", "out", "--frame", "1", "--spp", "4", "--out", out];
+        all.extend(more);
+        place.relit(&all)
+    };
+    done(&render("whole.exr", &[]));
+    done(&render("layers.exr", &["--layers"]));
+    refused(&render("layers.png", &["--layers"]), 2, &["layers.png"]);
+    let whole = image::open(place.path("whole.exr")).expect("an image");
+    let image =
+        exr::prelude::read_all_flat_layers_from_file(place.path("layers.exr")).expect("layers");
+    let names: Vec<String> = (image.layer_data.iter())
+        .filter_map(|layer| Some(layer.attributes.layer_name.as_ref()?.to_string()))
+        .collect();
+    assert!(names.iter().any(|name| name == "lamp"), "{names:?}");
+    for (pixel, color) in whole.to_rgb32f().pixels().enumerate() {
+        for (channel, letter) in ["R", "G", "B"].into_iter().enumerate() {
+            let channels = image.layer_data.iter().flat_map(|l| &l.channel_data.list);
+            let sum: f32 = channels
+                .filter(|c| c.name.eq(letter))
+                .map(|c| c.sample_data.values_as_f32().nth(pixel).expect("a value"))
+                .sum();
+            let apart = (sum - color.0[channel]).abs();
+            assert!(
+                apart <= 1e-5 * color.0[channel].max(1.0),
+                "{pixel}: {apart}"
+            );
+        }
+    }
+}
+
+/// Switches everything off as the window writes it, and renders that.
+fn edits_beside_an_estimate_are_applied(place: &Place) {
+    let found = fs::read(place.path("out/estimate.json")).expect("the file is there");
+    let write = |name: &str| {
+        let mut file: Value = serde_json::from_slice(&found).expect("JSON");
+        let off = serde_json::json!({"off": true});
+        file["edits"] = serde_json::json!({"objects": {
+            "walls": off, "floor": off, "ceiling": off, name: off,
+        }});
+        fs::write(place.path("out/estimate.json"), file.to_string()).expect("writes");
+        place.relit(&[
+            "render", "out", "--frame", "0", "--spp", "4", "--out", "off.exr",
+        ])
+    };
+    refused(&write("moon"), 1, &["moon"]);
+    done(&write("lamp"));
+    let render = image::open(place.path("off.exr"))
+        .expect("an image")
+        .to_rgb32f();
+    assert!(render.pixels().all(|p| p.0 == [0.0; 3]), "all is off");
+    fs::write(place.path("out/estimate.json"), &found).expect("writes");
+}
+
 #[test]
 fn results_are_rendered_edited_and_moved() {
     let place = Place::new();
@@ -349,6 +405,9 @@ fn results_are_rendered_edited_and_moved() {
         2,
         &["9", "2 frames"],
     );
+
+    layers_add_up_to_the_render(&place);
+    edits_beside_an_estimate_are_applied(&place);
 
     let dark = [
         "--emission",

@@ -9,7 +9,8 @@ use relit::inverse::solver::{
 };
 use relit::session::Session;
 use relit::session::command::{Command, Source, ViewCamera, ViewRequest};
-use relit::session::snapshot::{Level, OpenCapture, Phase, Snapshot};
+use relit::session::edits::{Edits, ObjectEdit};
+use relit::session::snapshot::{Level, OpenCapture, Phase, Picture, Snapshot};
 use relit::session::worker::Backend;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, LazyLock};
@@ -101,10 +102,11 @@ impl Rig {
 
     fn look(&self, long_side: u32) {
         let camera = ViewCamera::Frame(0);
-        assert!(
-            self.session
-                .send(Command::View(ViewRequest { camera, long_side }))
-        );
+        assert!(self.session.send(Command::View(ViewRequest {
+            camera,
+            long_side,
+            layers: false
+        })));
     }
 }
 
@@ -259,4 +261,83 @@ fn what_cannot_be_opened_is_an_event_and_what_was_open_stays() {
     });
     assert!(snapshot.capture.is_some());
     rig.session.join();
+}
+
+/// The mean over a picture.
+fn mean(picture: &Picture) -> f32 {
+    let sum: glam::Vec3 = picture.pixels.iter().sum();
+    sum.element_sum() / 3.0 / picture.pixels.len() as f32
+}
+
+#[test]
+fn edits_show_at_once_are_saved_and_come_back_while_the_estimate_stays() {
+    let rig = Rig::new(None);
+    rig.until("some steps", |s| iterations(s) > 3);
+    rig.look(32);
+    let lamp = common::OBJECTS.iter().position(|o| o.0 == "lamp");
+    let lamp = lamp.expect("a lamp");
+    let light = |s: &Snapshot| Some(mean(s.view.as_ref()?.render.as_ref()?));
+    rig.until("light", |s| light(s).is_some_and(|l| l > 0.0));
+    let mut edits = Edits::default();
+    let off = ObjectEdit {
+        off: true,
+        ..ObjectEdit::default()
+    };
+    edits.set(lamp, off);
+    let asked = Instant::now();
+    assert!(rig.session.send(Command::Edit(edits.clone())));
+    let dark = rig.until("the lamp off", |s| light(s) == Some(0.0));
+    println!("first picture after {:?}", asked.elapsed());
+    assert_eq!(dark.edits, edits);
+    assert!(dark.estimate.objects[lamp].emission.max_element() > 0.0);
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    assert!(rig.session.send(Command::Save(out.clone())));
+    rig.until("the save", |s| {
+        s.events.iter().any(|e| e.message.starts_with("saved"))
+    });
+    let saved = image::open(out.join("views/000.render.exr")).expect("an image");
+    assert!(saved.to_rgb32f().pixels().all(|p| p.0 == [0.0; 3]));
+    assert!(rig.session.send(Command::Edit(Edits::default())));
+    rig.until("light again", |s| light(s).is_some_and(|l| l > 0.0));
+    assert!(rig.session.send(Command::Resume(out)));
+    let resumed = rig.until("the edits again", |s| !s.edits.is_empty());
+    assert_eq!(resumed.edits, edits);
+    assert!(resumed.estimate.objects[lamp].emission.max_element() > 0.0);
+}
+
+#[test]
+fn layers_are_shown_when_asked_for_and_add_up_to_the_render() {
+    let rig = Rig::new(None);
+    rig.until("some steps", |s| iterations(s) > 3);
+    assert!(rig.session.send(Command::View(ViewRequest {
+        camera: ViewCamera::Frame(0),
+        long_side: 32,
+        layers: true,
+    })));
+    let shown = rig.until("layers", |s| {
+        s.view
+            .as_ref()
+            .is_some_and(|v| v.layers.is_some() && v.samples > 1)
+    });
+    let view = shown.view.as_ref().expect("a view");
+    let layers = view.layers.as_ref().expect("layers");
+    let render = view.render.as_ref().expect("a render");
+    let sum = layers.mix(|_| glam::Vec3::ONE).expect("a lamp");
+    let brightest = render
+        .pixels
+        .iter()
+        .map(|p| p.max_element())
+        .fold(0.0, f32::max);
+    for (a, b) in sum.pixels.iter().zip(&render.pixels) {
+        assert!((*a - *b).abs().max_element() <= 1e-5 * brightest);
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("lights.exr");
+    assert!(rig.session.send(Command::SaveLayers(file.clone())));
+    rig.until("the file", |s| {
+        s.events.iter().any(|e| e.message.starts_with("layers at"))
+    });
+    assert!(file.exists());
 }

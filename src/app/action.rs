@@ -96,10 +96,11 @@ actions! {
     StartPage, File, "Start page", "Shows recent captures and the field for a typed path", ctrl(Key::N);
     Save, File, "Save results…", "Writes estimate, report and pictures into a folder", ctrl(Key::S);
     Export, File, "Export…", "Writes one file for another program", ctrl(Key::E);
+    SaveLayers, File, "Save light layers…", "Writes the light of each lamp as a layer of one OpenEXR file", ctrl_shift(Key::S);
     Screenshot, File, "Screenshot of the window", "Writes a picture of the whole window into the current folder", key(Key::F12);
     Quit, File, "Quit", "Closes the window", ctrl(Key::Q);
 
-    Undo, Edit, "Undo", "Takes back the last change to the inserted objects", ctrl(Key::Z);
+    Undo, Edit, "Undo", "Takes back the last change to objects or light", ctrl(Key::Z);
     Redo, Edit, "Redo", "Makes the last change that was undone again", ctrl_shift(Key::Z);
     InsertObject, Edit, "Insert object…", "Shows the panel that puts OBJ and GLB objects into the photographs", ctrl(Key::I);
     Place, Edit, "Place by click", "The next click in a view puts the chosen object there", key(Key::G);
@@ -108,6 +109,14 @@ actions! {
     NaiveBesideOurs, Edit, "Naive beside ours", "Shows the naive composite and ours side by side", None;
     WipeNaiveOurs, Edit, "Wipe naive and ours", "Shows the naive composite and ours under a wipe", ctrl(Key::W);
     BeforeAfter, Edit, "Before and after", "Shows the photograph and the composite under a wipe", ctrl(Key::B);
+    Lights, Edit, "Light mixer", "Shows a switch, a strength and a colour for the light of each lamp", key(Key::L);
+    CompareRelit, Edit, "Before and after relighting", "Shows the re-render and the mixed light under a wipe", key(Key::B);
+    ResetMix, Edit, "Reset the light mixer", "Puts all lamps back to the light that was found", None;
+    KeepMix, Edit, "Give lamps this light", "Makes the mixed light the lamps' own emission, for exports and composites", None;
+    Material, Edit, "Material", "Shows albedo and emission of the selected object, to be changed", key(Key::M);
+    SwitchLamp, Edit, "Switch lamp off / on", "Switches the selected lamp off, or on again", key(Key::K);
+    ResetMaterial, Edit, "Reset material", "Puts the selected object back to what was found", None;
+    ResetEdits, Edit, "Reset all materials", "Puts all objects and the light from outside back to what was found", None;
     Deselect, Edit, "Deselect", "Selects nothing and ends placing", key(Key::Escape);
 
     RunPause, Solve, "Run / Pause", "Starts, holds or goes on with the solve", key(Key::Space);

@@ -17,6 +17,10 @@ pub enum Pane {
     Model,
     /// The table of objects.
     Objects,
+    /// Colour and light of the selected object.
+    Material,
+    /// The light mixer.
+    Lights,
     /// Inserting objects.
     Insert,
     /// The solver's parameters.
@@ -41,6 +45,8 @@ impl Pane {
             Self::Compare,
             Self::Model,
             Self::Objects,
+            Self::Material,
+            Self::Lights,
             Self::Insert,
             Self::Settings,
             Self::Capture,
@@ -59,6 +65,8 @@ impl Pane {
             Self::Compare => "Compare",
             Self::Model => "3D view",
             Self::Objects => "Objects",
+            Self::Material => "Material",
+            Self::Lights => "Lights",
             Self::Insert => "Insert",
             Self::Settings => "Settings",
             Self::Capture => "Capture",
@@ -79,18 +87,28 @@ pub fn first_layout() -> Tree<Pane> {
     };
     let picture = Pane::Picture;
     let photograph = tabs(&[picture(Quantity::Photograph), Pane::Compare]);
-    let render = tabs(&[picture(Quantity::Render), picture(Quantity::Composite)]);
+    let render = tabs(&[
+        picture(Quantity::Render),
+        picture(Quantity::Relit),
+        picture(Quantity::Composite),
+    ]);
     let model = tabs(&[Pane::Model]);
     let albedo = tabs(&[picture(Quantity::Albedo), picture(Quantity::Emission)]);
     let error = tabs(&[picture(Quantity::Error), picture(Quantity::StandardError)]);
     let side = tabs(&[
         Pane::Objects,
+        Pane::Lights,
         Pane::Insert,
         Pane::Settings,
         Pane::Trade,
-        Pane::Capture,
     ]);
-    let course = tabs(&[Pane::Loss, Pane::Stages, Pane::Log]);
+    let course = tabs(&[
+        Pane::Loss,
+        Pane::Material,
+        Pane::Stages,
+        Pane::Capture,
+        Pane::Log,
+    ]);
     let upper = tiles.insert_horizontal_tile(vec![photograph, render]);
     let lower = tiles.insert_horizontal_tile(vec![model, albedo, error]);
     let views = tiles.insert_vertical_tile(vec![upper, lower]);
@@ -178,6 +196,8 @@ impl Behavior<Pane> for Panes<'_> {
                     ui.take_available_space();
                     match other {
                         Pane::Objects => panels::objects::pane(ui, self.app),
+                        Pane::Material => panels::material::pane(ui, self.app),
+                        Pane::Lights => panels::lights::pane(ui, self.app),
                         Pane::Insert => panels::insert::pane(ui, self.app),
                         Pane::Settings => panels::settings::pane(ui, self.app),
                         Pane::Capture => panels::capture::pane(ui, self.app),

@@ -2,8 +2,10 @@
 
 pub mod action;
 pub mod connection;
+pub mod document;
 pub mod insertion;
 pub mod layout;
+pub mod mixer;
 pub mod model;
 pub mod panels;
 mod perform;

@@ -1,7 +1,8 @@
-//! What each action does.
+//! What each action does, and when it makes sense.
 
 use crate::app::action::Action;
 use crate::app::layout::Pane;
+use crate::app::mixer::Mix;
 use crate::app::picture::compare::Mode;
 use crate::app::picture::quantity::Quantity;
 use crate::app::shell::dialogs::Ask;
@@ -9,10 +10,48 @@ use crate::app::shell::files::Sheet;
 use crate::app::shell::palette::Palette;
 use crate::app::state::{App, Shown};
 use crate::session::command::{Command, Source};
+use crate::session::edits::Edits;
 use crate::session::snapshot::{Level, Phase};
 use egui::ViewportCommand;
 
 impl App {
+    /// Whether an action makes sense now.
+    pub fn can(&self, action: Action) -> bool {
+        let open = self.capture().is_some();
+        match action {
+            Action::Undo => self.history.can_undo(),
+            Action::Redo => self.history.can_redo(),
+            Action::SwitchLamp => self.can_switch_lamp(),
+            Action::ResetMaterial => self.can_reset_material(),
+            Action::ResetEdits => !self.edits.is_empty(),
+            Action::KeepMix => {
+                let layers = self.view().is_some_and(|view| view.layers.is_some());
+                layers && !self.mixer.mix.is_neutral()
+            }
+            Action::ResetMix => !self.mixer.mix.is_neutral(),
+            Action::SaveLayers => self.view().is_some_and(|view| view.layers.is_some()),
+            Action::Place | Action::Duplicate | Action::Delete => self.insertions.chosen.is_some(),
+            Action::MeasureTrade => self.trade.doing().is_some() || self.can_measure(),
+            Action::Finish => matches!(self.snapshot.phase, Phase::Solving | Phase::Paused),
+            Action::Save
+            | Action::Export
+            | Action::InsertObject
+            | Action::Lights
+            | Action::Material
+            | Action::CompareRelit
+            | Action::RunPause
+            | Action::Step
+            | Action::Reset
+            | Action::PreviousFrame
+            | Action::NextFrame
+            | Action::FrameSelection
+            | Action::JumpToFrame
+            | Action::RenderFromHere
+            | Action::AutoExposure => open,
+            _ => true,
+        }
+    }
+
     /// Does what an action says.
     pub fn perform(&mut self, action: Action, ctx: &egui::Context) {
         if !self.can(action) {
@@ -24,11 +63,12 @@ impl App {
             Action::StartPage => self.start_page = !self.start_page,
             Action::Save => self.sheet = Sheet::save(self.capture_name()),
             Action::Export => self.sheet = Sheet::export(self.capture_name()),
+            Action::SaveLayers => self.sheet = Sheet::layers(self.capture_name()),
             Action::Screenshot => self.screenshot(ctx),
             Action::Quit => ctx.send_viewport_cmd(ViewportCommand::Close),
 
-            Action::Undo => self.insertions.undo(),
-            Action::Redo => self.insertions.redo(),
+            Action::Undo => self.undo(),
+            Action::Redo => self.redo(),
             Action::InsertObject => self.bring_forward = Some(Pane::Insert),
             Action::Place => self.insertions.placing = !self.insertions.placing,
             Action::Duplicate => self.duplicate(),
@@ -42,6 +82,16 @@ impl App {
             Action::BeforeAfter => {
                 self.compare_pictures(Mode::Wipe, Quantity::Photograph, Quantity::Composite);
             }
+            Action::Lights => self.bring_forward = Some(Pane::Lights),
+            Action::CompareRelit => {
+                self.compare_pictures(Mode::Wipe, Quantity::Render, Quantity::Relit);
+            }
+            Action::KeepMix => self.keep_mix(),
+            Action::Material => self.bring_forward = Some(Pane::Material),
+            Action::SwitchLamp => self.switch_lamp(),
+            Action::ResetMaterial => self.reset_material(),
+            Action::ResetEdits => self.edits = Edits::default(),
+            Action::ResetMix => self.mixer.mix = Mix::default(),
             Action::Deselect => {
                 self.selected = None;
                 self.insertions.placing = false;

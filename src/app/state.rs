@@ -1,9 +1,10 @@
 //! The state of the window: the newest snapshot, how it is looked at, and what is asked of the worker.
 
-use crate::app::action::Action;
 use crate::app::connection::Connection;
+use crate::app::document::Document;
 use crate::app::insertion::Insertions;
 use crate::app::layout::Pane;
+use crate::app::mixer::Mixer;
 use crate::app::model::view::ModelView;
 use crate::app::panels::objects::ObjectsTable;
 use crate::app::picture::compare::Compare;
@@ -17,9 +18,12 @@ use crate::app::shell::palette::Palette;
 use crate::app::shell::status::Memory;
 use crate::app::shell::thumbnails::Thumbnails;
 use crate::app::trade::TradeView;
+use crate::app::undo::History;
+use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::scene::camera::Camera;
 use crate::session::command::{Command, Placement, Source, ViewCamera, ViewRequest};
+use crate::session::edits::{Edited, Edits};
 use crate::session::snapshot::{Level, OpenCapture, Phase, Picture, Snapshot};
 use glam::DVec3;
 use std::collections::VecDeque;
@@ -55,6 +59,14 @@ pub struct App {
     pub selected: Option<u32>,
     /// The inserted objects.
     pub insertions: Insertions,
+    /// The light mixer.
+    pub mixer: Mixer,
+    /// Changes made by hand to what was found.
+    pub edits: Edits,
+    /// The estimate with those changes.
+    pub estimate: Arc<Estimate>,
+    /// Steps of what is edited by hand.
+    pub history: History<Document>,
     /// The 3D view.
     pub model: ModelView,
     /// The table of objects.
@@ -87,11 +99,15 @@ pub struct App {
     pub thumbnails: Thumbnails,
     /// The most pixels a pane showed along a side in this pass.
     pub pixels_needed: f32,
+    /// Whether a pane showed the light of each lamp apart in this pass.
+    pub layers_needed: bool,
     photograph: Option<(usize, Arc<Picture>)>,
     pending: VecDeque<Command>,
     opening: Option<Source>,
-    sent_view: Option<(Option<usize>, u64, u32)>,
+    sent_view: Option<(Option<usize>, u64, u32, bool)>,
     sent_insertions: Vec<Placement>,
+    pub(super) sent_edits: Edits,
+    pub(super) edited: Edited,
 }
 
 impl App {
@@ -111,6 +127,10 @@ impl App {
             shown: Shown::Frame,
             selected: None,
             insertions: Insertions::default(),
+            mixer: Mixer::default(),
+            edits: Edits::default(),
+            estimate: Arc::default(),
+            history: History::default(),
             model: ModelView::default(),
             objects: ObjectsTable::default(),
             trade: TradeView::default(),
@@ -128,10 +148,13 @@ impl App {
             thumbnails: Thumbnails::default(),
             photograph: None,
             pixels_needed: 0.0,
+            layers_needed: false,
             pending: VecDeque::new(),
             opening: None,
             sent_view: None,
             sent_insertions: Vec::new(),
+            sent_edits: Edits::default(),
+            edited: Edited::default(),
         }
     }
 
@@ -139,6 +162,11 @@ impl App {
     pub fn send(&mut self, command: Command) {
         self.pending.push_back(command);
         self.flush();
+    }
+
+    /// Asks something of the worker once; false while its channel is full.
+    pub(super) fn connect(&self, command: Command) -> bool {
+        self.connection.send(command)
     }
 
     /// Opens a capture.
@@ -212,12 +240,14 @@ impl App {
             self.answered(ask, answer);
         }
         if !ctx.input(|input| input.pointer.any_down()) {
-            self.insertions.settle();
+            self.settle();
         }
         self.convert_photograph();
+        self.mix_light();
         self.take_trade();
         self.take_models(ctx);
         self.request();
+        self.send_edits();
         self.flush();
         if !self.pending.is_empty() {
             ctx.request_repaint_after(std::time::Duration::from_millis(30));
@@ -250,6 +280,8 @@ impl App {
         self.sent_view = None;
         self.photograph = None;
         self.insertions.clear();
+        self.mixer = Mixer::default();
+        self.take_edits();
         self.sent_insertions.clear();
         self.model = ModelView::default();
         self.look.fit();
@@ -261,6 +293,11 @@ impl App {
             self.expose_automatically();
         }
         self.trade_of_capture();
+    }
+
+    fn mix_light(&mut self) {
+        let layers = self.view().and_then(|view| view.layers.clone());
+        self.mixer.update(layers.as_ref());
     }
 
     /// Puts the shown photograph's 99th percentile at 1.
@@ -303,19 +340,22 @@ impl App {
             return;
         };
         let long_side = render_size(camera, self.pixels_needed);
+        let layers = self.layers_needed;
         let (key, view) = match &self.shown {
             Shown::Frame => (
-                (Some(self.frame), 0, long_side),
+                (Some(self.frame), 0, long_side, layers),
                 ViewCamera::Frame(self.frame),
             ),
-            Shown::Free(camera, count) => {
-                ((None, *count, long_side), ViewCamera::Free(camera.clone()))
-            }
+            Shown::Free(camera, count) => (
+                (None, *count, long_side, layers),
+                ViewCamera::Free(camera.clone()),
+            ),
         };
         if self.sent_view != Some(key) {
             let request = ViewRequest {
                 camera: view,
                 long_side,
+                layers,
             };
             if self.connection.send(Command::View(request)) {
                 self.sent_view = Some(key);
@@ -413,31 +453,6 @@ impl App {
             path
         };
         self.open(Source::Folder(folder));
-    }
-
-    /// Whether an action makes sense now.
-    pub fn can(&self, action: Action) -> bool {
-        let open = self.capture().is_some();
-        match action {
-            Action::Undo => self.insertions.can_undo(),
-            Action::Redo => self.insertions.can_redo(),
-            Action::Place | Action::Duplicate | Action::Delete => self.insertions.chosen.is_some(),
-            Action::MeasureTrade => self.trade.doing().is_some() || self.can_measure(),
-            Action::Finish => matches!(self.snapshot.phase, Phase::Solving | Phase::Paused),
-            Action::Save
-            | Action::Export
-            | Action::InsertObject
-            | Action::RunPause
-            | Action::Step
-            | Action::Reset
-            | Action::PreviousFrame
-            | Action::NextFrame
-            | Action::FrameSelection
-            | Action::JumpToFrame
-            | Action::RenderFromHere
-            | Action::AutoExposure => open,
-            _ => true,
-        }
     }
 }
 

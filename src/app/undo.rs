@@ -12,6 +12,15 @@ pub struct History<T> {
 const DEPTH: usize = 200;
 
 impl<T: Clone + PartialEq> History<T> {
+    /// A history that begins with a value.
+    pub fn starting_at(value: T) -> Self {
+        Self {
+            settled: value,
+            past: Vec::new(),
+            future: Vec::new(),
+        }
+    }
+
     /// Records `value` as one step if it differs from the last. To be called whenever no drag is under way, so that
     /// a drag is one step however many frames it lasts.
     pub fn settle(&mut self, value: &T) {

@@ -90,6 +90,7 @@ impl Window {
                     return;
                 }
                 self.app.pixels_needed = 0.0;
+                self.app.layers_needed = false;
                 let mut panes = Panes { app: &mut self.app };
                 self.tree.ui(&mut panes, ui);
             });

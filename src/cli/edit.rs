@@ -3,8 +3,8 @@
 use crate::cli::arguments::triple;
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
-use crate::inverse::estimate::{Estimate, TexelEstimate};
 use crate::scene::Scene;
+use crate::session::edits::Edits;
 use crate::session::save::pictures::Frames;
 use crate::session::save::{self, Results};
 use clap::Args;
@@ -40,8 +40,9 @@ pub fn edit(arguments: &EditArguments) -> Result<()> {
     let Loaded {
         saved,
         capture,
-        mut estimate,
+        estimate,
     } = arguments.saved.load()?;
+    let mut edits = Edits::default();
     for (name, emission) in &arguments.emission {
         let object = find(&capture.scene, name)?;
         if emission.min_element() < 0.0 {
@@ -51,9 +52,9 @@ pub fn edit(arguments: &EditArguments) -> Result<()> {
                 "give values of 0 or more",
             ));
         }
-        if let Some(object) = estimate.objects.get_mut(object) {
-            object.emission = *emission;
-        }
+        let mut edit = edits.object(object);
+        edit.emission = Some(*emission);
+        edits.set(object, edit);
     }
     for (name, albedo) in &arguments.albedo {
         let object = find(&capture.scene, name)?;
@@ -64,12 +65,15 @@ pub fn edit(arguments: &EditArguments) -> Result<()> {
                 "give values from 0 to 1",
             ));
         }
-        paint(&mut estimate, object, *albedo);
+        let mut edit = edits.object(object);
+        edit.albedo = Some(*albedo);
+        edits.set(object, edit);
     }
     let results = Results {
         capture,
         settings: saved.settings,
-        estimate: Arc::new(estimate),
+        estimate: Arc::new(edits.apply(&estimate)),
+        edits: Edits::default(),
         progress: Arc::default(),
         stopped_because: Some(saved.termination),
         checkpoint: None,
@@ -80,23 +84,6 @@ pub fn edit(arguments: &EditArguments) -> Result<()> {
     save::write_estimate(&arguments.out, &results)?;
     println!("results in {}", arguments.out.display());
     Ok(())
-}
-
-/// One colour for an object, also where texels had painted it.
-fn paint(estimate: &mut Estimate, object: usize, albedo: Vec3) {
-    if let Some(entry) = estimate.objects.get_mut(object) {
-        entry.albedo = albedo;
-    }
-    if let Some(texels) = &estimate.texels {
-        let mut textured = texels.textured.clone();
-        if let Some(flag) = textured.get_mut(object) {
-            *flag = false;
-        }
-        estimate.texels = Some(Arc::new(TexelEstimate {
-            textured,
-            ..(**texels).clone()
-        }));
-    }
 }
 
 fn find(scene: &Scene, name: &str) -> Result<usize> {

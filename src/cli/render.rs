@@ -4,11 +4,13 @@ use crate::capture::camera::{Intrinsics, Pose};
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
 use crate::export::exr::{Precision, write_rgb};
+use crate::export::light_layers;
 use crate::export::picture::{percentile_exposure, write_png};
 use crate::math::picture::Picture;
 use crate::scene::camera::Camera;
 use crate::session::light::path_options;
 use crate::transport::film::Film;
+use crate::transport::layers::Split;
 use clap::Args;
 use glam::{DMat3, DMat4, DVec3};
 use serde::Deserialize;
@@ -33,6 +35,9 @@ pub struct RenderArguments {
     /// Samples a pixel
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     spp: u32,
+    /// Writes the light of each lamp apart, as named layers of one .exr that add up to the picture
+    #[arg(long)]
+    layers: bool,
     /// Picture to write, .exr (radiance) or .png
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -61,6 +66,13 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
             ));
         }
     };
+    if arguments.layers && matches!(format, Format::Png) {
+        return Err(Error::usage(
+            arguments.out.display(),
+            "a .png has no layers",
+            "choose .exr with --layers",
+        ));
+    }
     let Loaded {
         saved,
         capture,
@@ -74,15 +86,16 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
         }
     };
     let lit = estimate.lit(&capture.scene);
+    let options = path_options(&saved.settings);
+    let (seed, frame, spp) = (saved.settings.seed, frame as u64, arguments.spp);
+    if arguments.layers {
+        let split = Split::new(&lit);
+        let layers = split.render(&lit, &camera, &options, seed, frame, spp);
+        let named = split.sources().iter().copied().zip(&layers);
+        return light_layers::write(&arguments.out, &capture.scene, named);
+    }
     let mut film = Film::new(&camera);
-    film.add(
-        &lit,
-        &camera,
-        &path_options(&saved.settings),
-        saved.settings.seed,
-        frame as u64,
-        arguments.spp,
-    );
+    film.add(&lit, &camera, &options, seed, frame, spp);
     let picture = Picture {
         width: film.width,
         height: film.height,

@@ -29,7 +29,7 @@ pub struct Loaded {
     pub saved: Saved,
     /// The capture, read again.
     pub capture: Arc<OpenCapture>,
-    /// The estimate of its objects.
+    /// The estimate of its objects, with what was changed of it by hand.
     pub estimate: Estimate,
 }
 
@@ -43,7 +43,8 @@ impl SavedOptions {
         let saved = save::load(&self.dir)?;
         let moved = self.capture.clone().map(Source::Folder);
         let capture = open(moved.as_ref().unwrap_or(&saved.source), &saved.options)?;
-        let estimate = saved.estimate_for(&capture)?;
+        let found = saved.estimate_for(&capture)?;
+        let estimate = saved.edits_for(&capture)?.apply(&found);
         Ok(Loaded {
             saved,
             capture: Arc::new(capture),

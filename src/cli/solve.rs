@@ -9,6 +9,7 @@ use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{self, Checkpoint, Control, Observer, Problem, Progress};
 use crate::session::command::Source;
+use crate::session::edits::Edits;
 use crate::session::open::open;
 use crate::session::save::{self, Results};
 use std::path::Path;
@@ -44,9 +45,11 @@ pub fn solve(source: &Source, options: &SolveOptions) -> Result<()> {
     for warning in &capture.warnings {
         eprintln!("warning: {warning}");
     }
+    let mut edits = Edits::default();
     let checkpoint = match &earlier {
         Some(earlier) => {
             earlier.estimate_for(&capture)?;
+            edits = earlier.edits_for(&capture)?;
             if earlier.checkpoint.is_none() {
                 eprintln!("warning: the earlier solve left nothing to go on from; starting over");
             }
@@ -75,6 +78,7 @@ pub fn solve(source: &Source, options: &SolveOptions) -> Result<()> {
             capture: capture.clone(),
             settings: settings.clone(),
             estimate: Arc::default(),
+            edits,
             progress: Arc::default(),
             stopped_because: None,
             checkpoint: checkpoint.cloned(),

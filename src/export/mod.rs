@@ -9,6 +9,7 @@ pub mod exr;
 pub mod falsecolor;
 pub mod glb;
 pub mod import;
+pub mod light_layers;
 pub mod mitsuba;
 pub mod obj;
 pub mod objects;

@@ -4,6 +4,7 @@ pub use crate::compose::placement::Placement;
 pub use crate::export::scene::Format as ExportFormat;
 use crate::inverse::settings::Settings;
 use crate::scene::camera::Camera;
+use crate::session::edits::Edits;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -52,10 +53,14 @@ pub enum Command {
     View(ViewRequest),
     /// The inserted objects, all of them; replaces those before. Empty takes them away.
     Insert(Vec<Placement>),
+    /// The changes made by hand to what is found, all of them; replaces those before.
+    Edit(Edits),
     /// Writes what `relit solve` writes, into a folder, from the worker's own estimate.
     Save(PathBuf),
     /// Writes one file for another program.
     Export(ExportRequest),
+    /// Writes the layers of the shown view's light as one OpenEXR file, as `relit render --layers` does.
+    SaveLayers(PathBuf),
     /// Takes up the estimate of a folder that `Save` or `relit solve` wrote.
     Resume(PathBuf),
     /// Ends the worker.
@@ -69,6 +74,8 @@ pub struct ViewRequest {
     pub camera: ViewCamera,
     /// Long side of the picture in pixels, at most the photograph's.
     pub long_side: u32,
+    /// Whether the light of each lamp is kept apart.
+    pub layers: bool,
 }
 
 /// A camera to render from.

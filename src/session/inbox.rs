@@ -1,17 +1,18 @@
 //! The way in: a bounded queue of commands that the sender never waits for.
 
 use crate::session::command::{Command, Placement, ViewRequest};
+use crate::session::edits::Edits;
 use crossbeam_channel::{Receiver, Sender, TryRecvError, TrySendError, bounded};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Commands that may wait at a time. Views and insertions do not count: of each only the newest waits.
+/// Commands that may wait at a time. Views, insertions and edits do not count: of each only the newest waits.
 pub const CAPACITY: usize = 256;
 
 /// What travels through the queue.
 enum Message {
     Command(Command),
-    /// A view or an insertion lies in [`Latest`].
+    /// A view, an insertion or an edit lies in [`Latest`].
     Look,
 }
 
@@ -20,6 +21,7 @@ enum Message {
 struct Latest {
     view: Option<ViewRequest>,
     insert: Option<Vec<Placement>>,
+    edit: Option<Edits>,
 }
 
 /// The sending end.
@@ -75,6 +77,10 @@ impl Outbox {
                 }
                 Command::Insert(placements) => {
                     latest.insert = Some(placements);
+                    Message::Look
+                }
+                Command::Edit(edits) => {
+                    latest.edit = Some(edits);
                     Message::Look
                 }
                 other => Message::Command(other),
@@ -148,10 +154,9 @@ impl Inbox {
 
     fn newest(&self) -> Option<Command> {
         let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
-        match latest.view.take() {
-            Some(view) => Some(Command::View(view)),
-            None => latest.insert.take().map(Command::Insert),
-        }
+        let next = latest.edit.take().map(Command::Edit);
+        let next = next.or_else(|| latest.view.take().map(Command::View));
+        next.or_else(|| latest.insert.take().map(Command::Insert))
     }
 }
 
@@ -164,6 +169,7 @@ mod tests {
         Command::View(ViewRequest {
             camera: ViewCamera::Frame(frame),
             long_side: 64,
+            layers: false,
         })
     }
 

@@ -1,6 +1,7 @@
 //! The worker thread: commands in, snapshots out, save and resume. Knows no window; wakes it by a callback.
 
 pub mod command;
+pub mod edits;
 mod full;
 pub mod inbox;
 pub mod insertion;

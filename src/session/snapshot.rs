@@ -7,9 +7,13 @@ use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Progress, Termination};
 use crate::scene::Scene;
 use crate::session::command::{OpenOptions, Source};
+use crate::session::edits::Edits;
+use crate::transport::layers;
+use glam::Vec3;
 use std::sync::Arc;
 
 pub use crate::math::picture::Picture;
+pub use crate::transport::layers::LightSource;
 
 /// The state of a session at one moment.
 #[derive(Debug, Clone, Default)]
@@ -30,8 +34,10 @@ pub struct Snapshot {
     pub rays_per_second: f64,
     /// Seconds until the end, where that can be said.
     pub seconds_left: Option<f64>,
-    /// The estimate so far.
+    /// The estimate so far, as it was found.
     pub estimate: Arc<Estimate>,
+    /// The changes made by hand to the estimate, which all pictures and exports show.
+    pub edits: Edits,
     /// Pictures of the requested view.
     pub view: Option<Arc<View>>,
     /// Inserted objects and their composites for the requested frame.
@@ -104,6 +110,25 @@ pub struct View {
     pub stderr: Option<Arc<Picture>>,
     /// Object index of each pixel; `u32::MAX` where the ray leaves the mesh.
     pub objects: Option<Arc<Vec<u32>>>,
+    /// The re-render by lamp, where the request asked for it.
+    pub layers: Option<Arc<LightLayers>>,
+}
+
+/// A re-render with the light of each lamp apart; the layers add up to it.
+#[derive(Debug, Clone)]
+pub struct LightLayers {
+    /// What each layer holds the light of, and that light, radiance.
+    pub layers: Vec<(LightSource, Arc<Picture>)>,
+    /// Samples a pixel.
+    pub samples: u32,
+}
+
+impl LightLayers {
+    /// The picture with each layer's red, green and blue times a factor; `None` where nothing emits.
+    pub fn mix(&self, factor: impl Fn(LightSource) -> Vec3) -> Option<Picture> {
+        let layers = self.layers.iter();
+        layers::mix(layers.map(|(source, picture)| (&**picture, factor(*source))))
+    }
 }
 
 /// Composites of the inserted objects into the requested frame.

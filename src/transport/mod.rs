@@ -4,6 +4,7 @@ pub mod bsdf;
 pub mod emitters;
 pub mod environment;
 pub mod film;
+pub mod layers;
 pub mod lit;
 pub mod material;
 pub mod microfacet;

@@ -31,6 +31,15 @@ impl Default for PathOptions {
     }
 }
 
+/// Where light comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Origin {
+    /// An object of the world that emits.
+    Object(u32),
+    /// Outside the mesh.
+    Outside,
+}
+
 /// What one path found.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PathSample {
@@ -59,7 +68,36 @@ pub fn radiance(
     stream: &mut Stream,
     options: &PathOptions,
 ) -> PathSample {
-    follow(world, Leg::from_camera(camera_ray), stream, options)
+    follow(
+        world,
+        Leg::from_camera(camera_ray),
+        stream,
+        options,
+        &mut |_, _| {},
+    )
+}
+
+/// [`radiance`] with the light of each origin apart: fills `parts` with what the path's vertices added, whose sum is
+/// the sample's radiance up to rounding; with nothing where the sample was rejected.
+pub fn radiance_by_origin(
+    world: &impl World,
+    camera_ray: &Ray,
+    stream: &mut Stream,
+    options: &PathOptions,
+    parts: &mut Vec<(Origin, Vec3)>,
+) -> PathSample {
+    parts.clear();
+    let mut keep = |origin, light| {
+        if light != Vec3::ZERO {
+            parts.push((origin, light));
+        }
+    };
+    let leg = Leg::from_camera(camera_ray);
+    let sample = follow(world, leg, stream, options, &mut keep);
+    if sample.rejected {
+        parts.clear();
+    }
+    sample
 }
 
 /// Radiance that a white diffuse surface would send from a point to the side of `normal` (irradiance / π), estimated by
@@ -83,7 +121,7 @@ pub fn white_radiance(
     }
     if options.sample_emitters {
         let up = Vec3::Z;
-        direct = direct_light(
+        (_, direct) = direct_light(
             world, surface, &frame, up, &white, stream, options, &mut rays,
         );
     }
@@ -102,7 +140,7 @@ pub fn white_radiance(
         bsdf_pdf: Some(next.pdf),
         bounce: 1,
     };
-    let mut sample = follow(world, leg, stream, options);
+    let mut sample = follow(world, leg, stream, options, &mut |_, _| {});
     sample.radiance += direct;
     sample.rays += rays;
     if !sample.radiance.is_finite() {
@@ -132,8 +170,14 @@ impl Leg {
     }
 }
 
-/// Follows a path from a leg on to its end.
-fn follow(world: &impl World, leg: Leg, stream: &mut Stream, options: &PathOptions) -> PathSample {
+/// Follows a path from a leg on to its end; `found` hears what each vertex adds to the radiance, and where from.
+fn follow(
+    world: &impl World,
+    leg: Leg,
+    stream: &mut Stream,
+    options: &PathOptions,
+    found: &mut impl FnMut(Origin, Vec3),
+) -> PathSample {
     let mut sample = PathSample::default();
     let Leg {
         mut ray,
@@ -142,6 +186,10 @@ fn follow(world: &impl World, leg: Leg, stream: &mut Stream, options: &PathOptio
         mut bounce,
     } = leg;
     let mut total = Vec3::ZERO;
+    let mut add = |origin, light| {
+        total += light;
+        found(origin, light);
+    };
 
     loop {
         // Find the next vertex.
@@ -153,7 +201,8 @@ fn follow(world: &impl World, leg: Leg, stream: &mut Stream, options: &PathOptio
                     Some(pdf) => emission_weight(pdf, environment_pdf(world, direction), options),
                     None => 1.0,
                 };
-                total += throughput * environment.radiance(direction) * weight;
+                let light = throughput * environment.radiance(direction) * weight;
+                add(Origin::Outside, light);
             }
             break;
         };
@@ -172,7 +221,8 @@ fn follow(world: &impl World, leg: Leg, stream: &mut Stream, options: &PathOptio
                 }
                 None => 1.0,
             };
-            total += throughput * surface.emission * weight;
+            let light = throughput * surface.emission * weight;
+            add(Origin::Object(surface.object), light);
         }
         if bounce >= options.max_bounces {
             break;
@@ -187,17 +237,17 @@ fn follow(world: &impl World, leg: Leg, stream: &mut Stream, options: &PathOptio
             lobe: surface.lobe,
         };
         if options.sample_emitters {
-            total += throughput
-                * direct_light(
-                    world,
-                    &surface,
-                    &frame,
-                    local_wo,
-                    &bsdf,
-                    stream,
-                    options,
-                    &mut sample.rays,
-                );
+            let (origin, light) = direct_light(
+                world,
+                &surface,
+                &frame,
+                local_wo,
+                &bsdf,
+                stream,
+                options,
+                &mut sample.rays,
+            );
+            add(origin, throughput * light);
         }
 
         // Continue the path by sampling the BSDF.
@@ -231,7 +281,7 @@ fn follow(world: &impl World, leg: Leg, stream: &mut Stream, options: &PathOptio
     sample
 }
 
-/// Light that reaches a surface straight from an emitter and is scattered towards `local_wo`: one light sample.
+/// Light that reaches a surface straight from an emitter and is scattered towards `local_wo`, and its origin: one light sample.
 #[expect(clippy::too_many_arguments, reason = "the state of one path vertex")]
 fn direct_light(
     world: &impl World,
@@ -242,18 +292,18 @@ fn direct_light(
     stream: &mut Stream,
     options: &PathOptions,
     rays: &mut u32,
-) -> Vec3 {
+) -> (Origin, Vec3) {
     let (pick, choice, u) = (stream.uniform(), stream.uniform_f64(), stream.uniform2());
     let share = emitter_share(world);
     if pick >= share {
         // A direction towards the light from outside.
         let Some((wi, pdf)) = world.environment().and_then(|e| e.sample(choice, u)) else {
-            return Vec3::ZERO;
+            return (Origin::Outside, Vec3::ZERO);
         };
         let local_wi = frame.to_local(wi);
         let scattered = bsdf.eval(local_wo, local_wi);
         if scattered == Vec3::ZERO {
-            return Vec3::ZERO;
+            return (Origin::Outside, Vec3::ZERO);
         }
         *rays += 1;
         let ray = Ray::new(
@@ -261,38 +311,40 @@ fn direct_light(
             wi,
         );
         if world.occluded(&ray) {
-            return Vec3::ZERO;
+            return (Origin::Outside, Vec3::ZERO);
         }
         let pdf = pdf * (1.0 - share);
         let radiance = world.environment().map_or(Vec3::ZERO, |e| e.radiance(wi));
-        return scattered * radiance / pdf
-            * light_weight(pdf, bsdf.pdf(local_wo, local_wi), options);
+        let weight = light_weight(pdf, bsdf.pdf(local_wo, local_wi), options);
+        return (Origin::Outside, scattered * radiance / pdf * weight);
     }
 
     // A point on an emitter's front side.
     let Some(light) = world.sample_emitter(choice, u) else {
-        return Vec3::ZERO;
+        return (Origin::Outside, Vec3::ZERO);
     };
+    let origin = Origin::Object(light.object);
     let to_light = light.point - surface.point;
     let distance2 = to_light.length_squared();
     let wi = to_light.normalize_or_zero();
     let cos_emitter = -light.normal.dot(wi);
     if cos_emitter <= 0.0 || distance2 <= 0.0 {
-        return Vec3::ZERO;
+        return (origin, Vec3::ZERO);
     }
     let local_wi = frame.to_local(wi);
     let scattered = bsdf.eval(local_wo, local_wi);
     if scattered == Vec3::ZERO {
-        return Vec3::ZERO;
+        return (origin, Vec3::ZERO);
     }
     *rays += 1;
     let from = offset_origin(surface.point, surface.normal, &surface.corners, wi);
     let to = offset_origin(light.point, light.normal, &light.corners, -wi);
     if world.occluded(&Ray::between(from, to)) {
-        return Vec3::ZERO;
+        return (origin, Vec3::ZERO);
     }
     let pdf = share * light.pdf * distance2 / cos_emitter;
-    scattered * light.radiance / pdf * light_weight(pdf, bsdf.pdf(local_wo, local_wi), options)
+    let weight = light_weight(pdf, bsdf.pdf(local_wo, local_wi), options);
+    (origin, scattered * light.radiance / pdf * weight)
 }
 
 /// Probability of sampling an emitter of the mesh rather than the light from outside.

@@ -15,7 +15,7 @@ use relit::inverse::solver::{LossPoint, Progress, Stage};
 use relit::scene::Scene;
 use relit::session::command::{Command, OpenOptions, Source};
 use relit::session::snapshot::{
-    Event, Insertion, Level, OpenCapture, Phase, Picture, Snapshot, View,
+    Event, Insertion, Level, LightLayers, LightSource, OpenCapture, Phase, Picture, Snapshot, View,
 };
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -192,6 +192,10 @@ fn constant(value: Vec3) -> Option<Arc<Picture>> {
     Some(Arc::new(Picture::from_fn(64, 48, |_, _| value)))
 }
 
+fn flat(value: f32) -> Arc<Picture> {
+    Arc::new(Picture::from_fn(64, 48, |_, _| Vec3::splat(value)))
+}
+
 /// Pictures of a frame.
 pub fn view(capture: &OpenCapture, frame: usize) -> View {
     let camera = &capture.scene.cameras[frame];
@@ -213,12 +217,17 @@ pub fn view(capture: &OpenCapture, frame: usize) -> View {
         error: constant(Vec3::splat(-0.1)),
         stderr: constant(Vec3::splat(0.01)),
         objects: Some(Arc::new(objects.collect())),
+        layers: Some(Arc::new(LightLayers {
+            layers: [(LightSource::Lamp(2), 0.2), (LightSource::Outside, 0.05)]
+                .map(|(source, light)| (source, flat(light)))
+                .into(),
+            samples: 4,
+        })),
     }
 }
 
 /// Composites of a frame.
 pub fn insertion(frame: usize) -> Insertion {
-    let flat = |v| Arc::new(Picture::from_fn(64, 48, |_, _| Vec3::splat(v)));
     Insertion {
         sequence: 1,
         frame,

@@ -3,5 +3,6 @@
 
 mod connection;
 mod flows;
+mod light;
 mod rendering;
 mod trade;

@@ -1,9 +1,8 @@
-//! The inserted objects as the window edits them: placed, moved, duplicated, hidden, with undo.
+//! The inserted objects as the window edits them: placed, moved, duplicated, hidden.
 
 pub mod handles;
 pub mod models;
 
-use crate::app::undo::History;
 use crate::session::command::Placement;
 use glam::DVec3;
 use handles::Handle;
@@ -44,7 +43,6 @@ pub struct Insertions {
     pub path: String,
     /// The shapes of the objects' files.
     pub models: Models,
-    history: History<Vec<Inserted>>,
 }
 
 /// Endings that can be inserted.
@@ -110,13 +108,12 @@ impl Insertions {
         }
     }
 
-    /// Takes everything away and forgets the history, for a new capture.
+    /// Takes everything away, for a new capture.
     pub fn clear(&mut self) {
         self.objects.clear();
         self.chosen = None;
         self.placing = false;
         self.dragged = None;
-        self.history = History::default();
     }
 
     /// What the worker is to show.
@@ -128,34 +125,12 @@ impl Insertions {
             .collect()
     }
 
-    /// Records a step; to be called while no button is down.
-    pub fn settle(&mut self) {
-        self.history.settle(&self.objects);
-    }
-
-    /// Whether there is a step to take back.
-    pub fn can_undo(&self) -> bool {
-        self.history.can_undo()
-    }
-
-    /// Whether there is a step to make again.
-    pub fn can_redo(&self) -> bool {
-        self.history.can_redo()
-    }
-
-    /// Takes the last step back.
-    pub fn undo(&mut self) {
-        self.history.undo(&mut self.objects);
-        self.keep_choice();
-    }
-
-    /// Makes the last undone step again.
-    pub fn redo(&mut self) {
-        self.history.redo(&mut self.objects);
-        self.keep_choice();
-    }
-
-    fn keep_choice(&mut self) {
+    /// Replaces all objects, as undo does.
+    pub fn replace(&mut self, objects: Vec<Inserted>) {
+        if self.objects == objects {
+            return;
+        }
+        self.objects = objects;
         self.placing = false;
         self.chosen = match (self.chosen, self.objects.len()) {
             (_, 0) => None,
@@ -169,30 +144,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_visible_objects_reach_the_worker_and_undo_brings_them_back() {
+    fn only_visible_objects_reach_the_worker_and_replacing_keeps_a_choice() {
         let mut insertions = Insertions::default();
         insertions.add("chair.glb".into(), Some(DVec3::ZERO));
-        insertions.settle();
         insertions.duplicate(DVec3::X);
-        insertions.settle();
         assert_eq!(insertions.placements().len(), 2);
         assert_eq!(insertions.placements()[1].at, Some(DVec3::X));
         insertions.objects[0].visible = false;
-        insertions.settle();
         assert_eq!(insertions.placements().len(), 1);
+        let before = insertions.objects.clone();
         insertions.delete();
         insertions.delete();
-        insertions.settle();
         assert!(insertions.objects.is_empty() && insertions.chosen.is_none());
-        insertions.undo();
+        insertions.replace(before);
         assert_eq!(
             (insertions.objects.len(), insertions.placements().len()),
             (2, 1)
         );
-        insertions.undo();
-        assert_eq!(insertions.placements().len(), 2);
-        insertions.redo();
-        assert_eq!(insertions.placements().len(), 1);
+        assert_eq!(insertions.chosen, Some(1));
     }
 
     #[test]

@@ -42,7 +42,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         app.shown = Shown::Free(Box::new(app.model.orbit.camera(scene)), count + 1);
     }
 
-    let estimate = app.snapshot.estimate.clone();
+    let estimate = app.estimate.clone();
     let Some((surface, colors)) = app.model.faces(ui.ctx(), &capture, &estimate) else {
         ui.put(rect, egui::Label::new("Preparing the mesh…"));
         return;

@@ -1,9 +1,12 @@
 //! Panes of words and numbers.
 
 pub mod capture;
+pub mod color;
 pub mod insert;
+pub mod lights;
 pub mod log;
 pub mod loss;
+pub mod material;
 pub mod objects;
 pub mod settings;
 pub mod stages;

@@ -103,7 +103,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         ui.weak("No capture is open");
         return;
     };
-    let estimate = app.snapshot.estimate.clone();
+    let estimate = app.estimate.clone();
     let names: Vec<&str> = capture
         .scene
         .objects

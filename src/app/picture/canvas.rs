@@ -48,6 +48,7 @@ impl App {
                 .and_then(|view| view.photograph.clone())
                 .or_else(|| self.photograph()),
             Quantity::Render => view.and_then(|view| view.render.clone()),
+            Quantity::Relit => self.mixer.picture(),
             Quantity::Albedo => view.and_then(|view| view.albedo.clone()),
             Quantity::Emission => view.and_then(|view| view.emission.clone()),
             Quantity::Error => view.and_then(|view| view.error.clone()),
@@ -82,6 +83,7 @@ pub fn pane(ui: &mut Ui, app: &mut App, quantity: Quantity) {
     } else {
         quantity
     };
+    app.layers_needed |= shown == Quantity::Relit;
     let Some(drawn) = app.drawn(shown) else {
         missing(ui, app, shown);
         return;
@@ -118,6 +120,7 @@ pub fn missing(ui: &mut Ui, app: &App, quantity: Quantity) {
                 "Compositing…"
             }
         }
+        Quantity::Relit => "Tracing the light of each lamp…",
         _ => "Waiting for the first picture…",
     };
     ui.centered_and_justified(|ui| ui.weak(text));

@@ -71,6 +71,7 @@ impl Compare {
 
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, app: &mut App) {
+    app.layers_needed |= [app.compare.left, app.compare.right].contains(&Quantity::Relit);
     egui::Frame::NONE
         .inner_margin(egui::Margin::symmetric(6, 3))
         .show(ui, |ui| controls(ui, app));

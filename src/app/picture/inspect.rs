@@ -95,7 +95,7 @@ pub fn bar(ui: &mut Ui, app: &App) {
         .map(|&object| object as usize);
     let named = object.and_then(|index| {
         let name = &app.capture()?.scene.objects.get(index)?.name;
-        Some((name, app.snapshot.estimate.objects.get(index)?))
+        Some((name, app.estimate.objects.get(index)?))
     });
     if let Some((name, estimate)) = named {
         part("object", name);

@@ -9,6 +9,8 @@ pub enum Quantity {
     Photograph,
     /// What the estimate predicts, radiance.
     Render,
+    /// The re-render with its lamps mixed anew, radiance.
+    Relit,
     /// Diffuse reflectance.
     Albedo,
     /// Emitted radiance.
@@ -40,9 +42,10 @@ pub enum Shading {
 
 impl Quantity {
     /// All, in the order in which menus show them.
-    pub const ALL: [Quantity; 9] = [
+    pub const ALL: [Quantity; 10] = [
         Self::Photograph,
         Self::Render,
+        Self::Relit,
         Self::Albedo,
         Self::Emission,
         Self::Error,
@@ -57,6 +60,7 @@ impl Quantity {
         match self {
             Self::Photograph => "Photograph",
             Self::Render => "Re-render",
+            Self::Relit => "Relit",
             Self::Albedo => "Albedo",
             Self::Emission => "Emission",
             Self::Error => "Error",
@@ -72,6 +76,7 @@ impl Quantity {
         match self {
             Self::Photograph => "Radiance that the camera measured",
             Self::Render => "Radiance that the estimate predicts for this view",
+            Self::Relit => "The re-render with each lamp as the pane Lights sets it",
             Self::Albedo => "Estimated diffuse reflectance; 1 is white",
             Self::Emission => "Estimated emitted radiance",
             Self::Error => "Re-render minus photograph: blue is too dark, red is too bright",

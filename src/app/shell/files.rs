@@ -18,6 +18,11 @@ pub enum Sheet {
         /// The folder as typed.
         folder: String,
     },
+    /// Saving the light of each lamp.
+    Layers {
+        /// The file as typed.
+        file: String,
+    },
     /// Exporting one file.
     Export {
         /// The file as typed.
@@ -83,6 +88,13 @@ impl Sheet {
         }
     }
 
+    /// The sheet for layers of light.
+    pub fn layers(name: &str) -> Self {
+        Self::Layers {
+            file: format!("{}-lights.exr", file_name(name)),
+        }
+    }
+
     /// The sheet for exporting.
     pub fn export(name: &str) -> Self {
         Self::Export {
@@ -96,7 +108,7 @@ impl Sheet {
         let text = path.to_string_lossy().into_owned();
         match (self, ask) {
             (Self::Save { folder }, Ask::SaveFolder) => *folder = text,
-            (Self::Export { file, .. }, Ask::ExportFile) => *file = text,
+            (Self::Export { file, .. } | Self::Layers { file }, Ask::ExportFile) => *file = text,
             _ => {}
         }
     }
@@ -126,6 +138,7 @@ pub fn show(ctx: &egui::Context, app: &mut App) {
         let close = match &mut sheet {
             Sheet::Closed => true,
             Sheet::Save { folder } => save(ui, app, folder),
+            Sheet::Layers { file } => layers(ui, app, file),
             Sheet::Export { file, format } => export(ui, app, file, format),
         };
         app.sheet = if close { Sheet::Closed } else { sheet };
@@ -144,6 +157,21 @@ fn save(ui: &mut Ui, app: &mut App, folder: &mut String) -> bool {
     let go = (clicked || entered) && !folder.trim().is_empty();
     if go {
         app.send(Command::Save(PathBuf::from(folder.trim())));
+    }
+    go || cancel
+}
+
+/// Draws the sheet for layers of light; true when it is to close.
+fn layers(ui: &mut Ui, app: &mut App, file: &mut String) -> bool {
+    ui.heading("Save light layers");
+    ui.label(
+        "One OpenEXR file with the light of each lamp as found, as the shown view has it so far.",
+    );
+    let entered = path_field(ui, app, "File", file, Ask::ExportFile);
+    let (clicked, cancel) = buttons(ui, "Save", !file.trim().is_empty());
+    let go = (clicked || entered) && !file.trim().is_empty();
+    if go {
+        app.send(Command::SaveLayers(PathBuf::from(file.trim())));
     }
     go || cancel
 }

@@ -5,6 +5,7 @@ use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::Termination;
 use crate::session::command::{OpenOptions, Source};
+use crate::session::edits::{Edits, EditsRecord};
 use crate::session::save::maps::{self, Maps};
 use crate::session::save::named::Named;
 use crate::session::save::objects::{ObjectRecord, Rgb, records, rgb};
@@ -36,6 +37,9 @@ pub struct EstimateFile {
     pub maps: Option<String>,
     /// Each frame's linear exposure and white balance relative to the median frame.
     pub exposures: Option<Vec<Rgb>>,
+    /// What was changed by hand; `objects` and maps hold what was found.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub edits: Option<EditsRecord>,
 }
 
 /// Where a capture is, and how to know that it is the same.
@@ -65,6 +69,7 @@ impl EstimateFile {
         capture: &OpenCapture,
         settings: &Settings,
         estimate: &Estimate,
+        edits: &Edits,
         stopped_because: Option<Termination>,
     ) -> Result<(Self, Option<Vec<u8>>)> {
         let bytes = maps::encode(estimate)?;
@@ -85,6 +90,7 @@ impl EstimateFile {
                 .exposures
                 .as_ref()
                 .map(|exposures| exposures.iter().map(|&e| rgb(e)).collect()),
+            edits: edits.record(&capture.scene),
         };
         Ok((file, bytes))
     }

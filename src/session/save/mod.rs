@@ -17,6 +17,7 @@ pub use write::{write, write_checkpoint, write_estimate};
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Progress, Termination};
+use crate::session::edits::{Edited, Edits};
 use crate::session::snapshot::OpenCapture;
 use estimate::EstimateFile;
 use pictures::Frames;
@@ -40,6 +41,8 @@ pub struct Results {
     pub settings: Settings,
     /// What was found.
     pub estimate: Arc<Estimate>,
+    /// What was changed of it by hand; pictures and the scene show it.
+    pub edits: Edits,
     /// How it went.
     pub progress: Arc<Progress>,
     /// Why it ended; `None` while it runs.
@@ -52,6 +55,13 @@ pub struct Results {
     pub started: Instant,
     /// Seconds spent reading the capture.
     pub seconds_load: f64,
+}
+
+impl Results {
+    /// What was found, with the changes made by hand.
+    pub fn edited(&self) -> Arc<Estimate> {
+        Edited::default().of(&self.estimate, &self.edits)
+    }
 }
 
 /// `checkpoint.json`: an estimate on its way.

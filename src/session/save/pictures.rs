@@ -4,6 +4,7 @@ use crate::error::Result;
 use crate::export::exr::{Precision, write_rgb};
 use crate::export::falsecolor::{write_magnitude, write_signed};
 use crate::export::picture::{percentile_exposure, write_png};
+use crate::inverse::estimate::Estimate;
 use crate::math::picture::Picture;
 use crate::scene::camera::Camera;
 use crate::session::light::path_options;
@@ -16,6 +17,7 @@ use crate::transport::lit::Lit;
 use glam::Vec3;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Folder of the pictures within the results.
 pub const FOLDER: &str = "views";
@@ -80,22 +82,31 @@ pub fn write(staging: &mut Staging, results: &Results) -> Result<()> {
         .map(|(_, c)| u64::from(c.intrinsics.width) * u64::from(c.intrinsics.height))
         .sum();
     let samples = (PATHS / pixels.max(1)).clamp(SAMPLES.0, SAMPLES.1) as u32;
-    let lit = results.estimate.lit(&capture.scene);
+    let estimate = results.edited();
+    let lit = estimate.lit(&capture.scene);
+    let shown = Shown { estimate, lit };
     for (index, camera) in &cameras {
-        frame(staging, results, &lit, *index, camera, samples)?;
+        frame(staging, results, &shown, *index, camera, samples)?;
     }
     Ok(())
+}
+
+/// What the pictures show: the estimate as it was changed by hand.
+struct Shown {
+    estimate: Arc<Estimate>,
+    lit: Lit,
 }
 
 fn frame(
     staging: &mut Staging,
     results: &Results,
-    lit: &Lit,
+    shown: &Shown,
     index: usize,
     camera: &Camera,
     samples: u32,
 ) -> Result<()> {
-    let (capture, estimate) = (&results.capture, &results.estimate);
+    let capture = &results.capture;
+    let Shown { estimate, lit } = shown;
     let scene = &capture.scene;
     let (photograph, shown_at) = capture.sized_photograph(index, camera)?;
 

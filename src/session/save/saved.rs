@@ -5,6 +5,7 @@ use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Termination};
 use crate::session::command::{OpenOptions, Source};
+use crate::session::edits::Edits;
 use crate::session::save::estimate::EstimateFile;
 use crate::session::save::maps::Maps;
 use crate::session::save::{CHECKPOINT, CheckpointFile, ESTIMATE};
@@ -102,6 +103,18 @@ impl Saved {
             ));
         }
         self.estimate_by_name(capture)
+    }
+
+    /// What was changed of the estimate by hand.
+    ///
+    /// # Errors
+    /// The capture has no object of a name.
+    pub fn edits_for(&self, capture: &OpenCapture) -> Result<Edits> {
+        let edits = self.file.edits.as_ref();
+        edits.map_or_else(
+            || Ok(Edits::default()),
+            |edits| edits.edits(&self.path, &capture.scene),
+        )
     }
 
     /// The estimate for a capture with the same objects and mesh, wherever its photographs come from.

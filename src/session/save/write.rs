@@ -58,7 +58,7 @@ fn stage_estimate(staging: &mut Staging, folder: &Path, results: &Results) -> Re
     let scene = staging.file("scene.glb")?;
     scene::write(
         &results.capture.scene,
-        &results.estimate,
+        &results.edited(),
         Format::Glb,
         &scene,
     )?;
@@ -101,6 +101,7 @@ impl Results {
             &self.capture,
             &self.settings,
             &self.estimate,
+            &self.edits,
             self.stopped_because,
         )
     }

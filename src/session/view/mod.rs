@@ -67,6 +67,11 @@ impl Views {
         };
     }
 
+    /// Draws the requested view anew, coarsely at once, as when the light was changed by hand.
+    pub fn look_again(&mut self) {
+        self.changed = self.request.is_some();
+    }
+
     /// Starts the render over with an estimate that is final.
     pub fn refresh(&mut self, estimate: &Arc<Estimate>) {
         if let Some(target) = &mut self.target {

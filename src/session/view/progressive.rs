@@ -3,10 +3,12 @@
 use crate::math::rng::Stream;
 use crate::scene::camera::Camera;
 use crate::session::snapshot::Picture;
+use crate::transport::layers::{Parts, Split, layer_of};
 use crate::transport::lit::Lit;
 use crate::transport::path::{PathOptions, radiance};
-use glam::{DVec3, Vec2};
+use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Seconds that a slice should take.
@@ -16,10 +18,13 @@ pub const ENOUGH: u32 = 512;
 /// Samples that count of those taken with an earlier estimate.
 const MEMORY: f64 = 3.0;
 
-/// Radiance of a view, accumulated pass by pass.
+/// Radiance of a view, accumulated pass by pass; in layers by lamp where a split is given.
 #[derive(Debug)]
 pub struct Progressive {
     width: usize,
+    height: usize,
+    split: Option<Arc<Split>>,
+    /// Row by row, all layers of a pixel together.
     sums: Vec<DVec3>,
     /// Samples that `sums` stand for, in whole passes.
     weight: f64,
@@ -30,11 +35,14 @@ pub struct Progressive {
 
 impl Progressive {
     /// Nothing yet.
-    pub fn new(camera: &Camera) -> Self {
-        let k = &camera.intrinsics;
+    pub fn new(camera: &Camera, split: Option<Arc<Split>>) -> Self {
+        let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
+        let layers = split.as_ref().map_or(1, |split| split.sources().len());
         Self {
-            width: (k.width as usize).max(1),
-            sums: vec![DVec3::ZERO; k.width as usize * k.height as usize],
+            width: width as usize,
+            height: height as usize,
+            split,
+            sums: vec![DVec3::ZERO; width as usize * height as usize * layers],
             weight: 0.0,
             pass: 0,
             row: 0,
@@ -42,12 +50,22 @@ impl Progressive {
         }
     }
 
+    /// How its layers are split by lamp, if they are.
+    pub fn split(&self) -> Option<&Arc<Split>> {
+        self.split.as_ref()
+    }
+
+    /// Layers a pixel.
+    fn layers(&self) -> usize {
+        self.split.as_ref().map_or(1, |split| split.sources().len())
+    }
+
     /// Lets earlier samples count for a few at most, because the light has changed a little.
     pub fn fade(&mut self) {
         if self.weight > MEMORY {
             let factor = MEMORY / self.weight;
-            let width = self.width;
-            for (row, sums) in self.sums.chunks_mut(width).enumerate() {
+            let row_of = (self.width * self.layers()).max(1);
+            for (row, sums) in self.sums.chunks_mut(row_of).enumerate() {
                 // Rows of the pass under way hold one sample more than the rest.
                 let factor = match row < self.row {
                     true => (MEMORY + 1.0) / (self.weight + 1.0),
@@ -74,23 +92,31 @@ impl Progressive {
     /// Draws some rows; true when a pass over the picture is complete.
     pub fn add(&mut self, world: &Lit, camera: &Camera, options: &PathOptions) -> bool {
         let started = Instant::now();
-        let width = self.width;
-        let height = self.sums.len() / width;
+        let (width, height, layers) = (self.width, self.height, self.layers());
+        let row_of = width * layers;
+        let split = self.split.clone();
         let wanted = ((self.rows_a_second * SLICE) as usize).max(rayon::current_num_threads());
         let last = (self.row + wanted).min(height);
         let (row, pass) = (self.row, u64::from(self.pass));
-        self.sums[row * width..last * width]
-            .par_chunks_mut(width)
+        self.sums[row * row_of..last * row_of]
+            .par_chunks_mut(row_of.max(1))
             .enumerate()
             .for_each(|(i, sums)| {
-                for (x, sum) in sums.iter_mut().enumerate() {
+                let mut parts = Parts::new();
+                for (x, sums) in sums.chunks_mut(layers).enumerate() {
                     let y = row + i;
                     let mut stream = Stream::new(0, 0, (y * width + x) as u64, pass);
                     let [dx, dy] = stream.uniform2();
                     let ray = camera.ray(Vec2::new(x as f32 + dx, y as f32 + dy));
-                    *sum += radiance(world, &ray, &mut stream, options)
-                        .radiance
-                        .as_dvec3();
+                    match &split {
+                        Some(split) => {
+                            split.add(world, &ray, &mut stream, options, &mut parts, sums);
+                        }
+                        None => {
+                            let sample = radiance(world, &ray, &mut stream, options);
+                            sums[0] += sample.radiance.as_dvec3();
+                        }
+                    }
                 }
             });
         let seconds = started.elapsed().as_secs_f64().max(1e-6);
@@ -105,17 +131,38 @@ impl Progressive {
         true
     }
 
-    /// Mean radiance; only between passes.
+    /// Mean radiance, all layers together; only between passes.
     pub fn picture(&self, camera: &Camera) -> Picture {
-        let scale = if self.weight > 0.0 {
-            self.weight.recip()
-        } else {
-            0.0
+        let scale = self.scale();
+        let pixels = match self.layers() {
+            0 => vec![Vec3::ZERO; self.width * self.height],
+            layers => (self.sums.chunks(layers))
+                .map(|sums| (sums.iter().sum::<DVec3>() * scale).as_vec3())
+                .collect(),
         };
-        Picture {
-            width: camera.intrinsics.width,
-            height: camera.intrinsics.height,
-            pixels: self.sums.iter().map(|s| (*s * scale).as_vec3()).collect(),
+        sized(camera, pixels)
+    }
+
+    /// Mean radiance of each layer; only between passes.
+    pub fn layer_pictures(&self, camera: &Camera) -> Vec<Picture> {
+        let (count, scale) = (self.layers(), self.scale());
+        (0..count)
+            .map(|layer| sized(camera, layer_of(&self.sums, layer, count, scale)))
+            .collect()
+    }
+
+    fn scale(&self) -> f64 {
+        match self.weight > 0.0 {
+            true => self.weight.recip(),
+            false => 0.0,
         }
+    }
+}
+
+fn sized(camera: &Camera, pixels: Vec<Vec3>) -> Picture {
+    Picture {
+        width: camera.intrinsics.width,
+        height: camera.intrinsics.height,
+        pixels,
     }
 }

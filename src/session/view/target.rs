@@ -4,10 +4,11 @@ use crate::inverse::estimate::Estimate;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::session::command::{ViewCamera, ViewRequest};
-use crate::session::snapshot::{OpenCapture, Picture, View};
+use crate::session::snapshot::{LightLayers, OpenCapture, Picture, View};
 use crate::session::view::hits::Hits;
 use crate::session::view::progressive::{ENOUGH, Progressive};
 use crate::session::view::sized::{box_filter, repeat, shrink};
+use crate::transport::layers::Split;
 use crate::transport::lit::Lit;
 use crate::transport::path::PathOptions;
 use glam::Vec3;
@@ -15,6 +16,8 @@ use std::sync::Arc;
 
 /// A change of a colour by less than this share does not show.
 const VISIBLE: f32 = 0.01;
+/// Longest side in pixels of a view whose light is kept apart by lamp, for the memory that the layers take.
+const LAYERED_LONG_SIDE: u32 = 768;
 
 /// A camera's pictures on their way from coarse to sharp.
 #[derive(Debug)]
@@ -31,6 +34,8 @@ pub struct Target {
     render: Progressive,
     /// The newest complete render, and its samples a pixel.
     rendered: Option<(Arc<Picture>, u32)>,
+    /// The same render by lamp, where that was asked for.
+    layers: Option<Arc<LightLayers>>,
     /// Pictures of albedo, emission and standard error, in this order.
     maps: [Option<Arc<Picture>>; 3],
     objects: Option<Arc<Vec<u32>>>,
@@ -51,7 +56,11 @@ impl Target {
             ViewCamera::Frame(frame) => (Some(*frame), scene.cameras.get(*frame)?.clone()),
             ViewCamera::Free(camera) => (None, camera.as_ref().clone()),
         };
-        let camera = shrink(&camera, request.long_side);
+        let long_side = match request.layers {
+            true => request.long_side.min(LAYERED_LONG_SIDE),
+            false => request.long_side,
+        };
+        let camera = shrink(&camera, long_side);
         let photograph = frame.and_then(|frame| {
             let photograph = capture.photographs.get(frame)?;
             let whole = Picture {
@@ -63,10 +72,13 @@ impl Target {
             Some(Arc::new(box_filter(&whole, k.width, k.height)))
         });
         let coarse = shrink(&camera, first_long_side);
+        let world = estimate.lit(&scene);
+        let split = request.layers.then(|| Arc::new(Split::new(&world)));
         Some(Self {
-            world: estimate.lit(&scene),
-            render: Progressive::new(&camera),
+            render: Progressive::new(&camera, split),
+            world,
             rendered: None,
+            layers: None,
             maps: [const { None }; 3],
             objects: None,
             scene,
@@ -98,6 +110,13 @@ impl Target {
         self.estimate = estimate.clone();
         self.world = estimate.lit(&self.scene);
         self.stale = true;
+        // Other lamps have other layers.
+        if let Some(split) = self.render.split() {
+            let now = Split::new(&self.world);
+            if now != **split {
+                self.render = Progressive::new(&self.camera, Some(Arc::new(now)));
+            }
+        }
     }
 
     /// Whether there is nothing left to draw.
@@ -123,7 +142,9 @@ impl Target {
         {
             return None;
         } else {
-            let picture = self.exposed(self.render.picture(&self.camera));
+            let (render, camera) = (&self.render, &self.camera);
+            let picture = self.exposed(render.picture(camera));
+            self.layers = self.layers_of(render, camera);
             self.rendered = Some((Arc::new(picture), self.render.samples()));
         }
         Some(self.view(sequence))
@@ -133,10 +154,22 @@ impl Target {
     fn sketch(&mut self, coarse: &Camera, options: &PathOptions) {
         let hits = Hits::new(&self.scene, coarse);
         self.map(&hits, coarse);
-        let mut render = Progressive::new(coarse);
+        let mut render = Progressive::new(coarse, self.render.split().cloned());
         while !render.add(&self.world, coarse, options) {}
+        self.layers = self.layers_of(&render, coarse);
         let picture = self.enlarged(self.exposed(render.picture(coarse)));
         self.rendered = Some((picture, 1));
+    }
+
+    /// The layers of a render by lamp, in the size and the values of the shown pictures.
+    fn layers_of(&self, render: &Progressive, camera: &Camera) -> Option<Arc<LightLayers>> {
+        let split = render.split()?;
+        let pictures = render.layer_pictures(camera).into_iter();
+        let shown = pictures.map(|picture| self.enlarged(self.exposed(picture)));
+        Some(Arc::new(LightLayers {
+            layers: split.sources().iter().copied().zip(shown).collect(),
+            samples: render.samples(),
+        }))
     }
 
     fn map(&mut self, hits: &Hits, camera: &Camera) {
@@ -183,6 +216,7 @@ impl Target {
             error,
             stderr,
             objects: self.objects.clone(),
+            layers: self.layers.clone(),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! What each command does.
 
-use crate::export::scene;
+use crate::export::{light_layers, scene};
 use crate::session::command::{Command, ExportRequest, ViewCamera};
 use crate::session::save::pictures::Frames;
 use crate::session::save::{self, Results};
@@ -40,8 +40,16 @@ impl Worker {
                 self.views.look(request);
             }
             Command::Insert(placements) => self.inserting.place(placements),
+            Command::Edit(edits) => {
+                if self.edits != edits {
+                    self.edits = edits;
+                    self.views.look_again();
+                    self.inserting.update();
+                }
+            }
             Command::Save(folder) => self.save(&folder),
             Command::Export(request) => self.export(&request),
+            Command::SaveLayers(path) => self.save_layers(&path),
         }
         None
     }
@@ -66,6 +74,7 @@ impl Worker {
             capture: self.capture.clone()?,
             settings: self.settings.clone(),
             estimate: self.estimate.clone(),
+            edits: self.edits.clone(),
             progress: self.progress.clone(),
             stopped_because: match self.phase {
                 Phase::Finished(termination) => Some(termination),
@@ -98,8 +107,32 @@ impl Worker {
             return;
         };
         let path = &request.path;
-        match scene::write(&capture.scene, &self.estimate, request.format, path) {
+        match scene::write(&capture.scene, &self.edited(), request.format, path) {
             Ok(()) => self.say(Level::Info, format!("exported to {}", path.display())),
+            Err(error) => self.fail(&error),
+        }
+    }
+
+    fn save_layers(&mut self, path: &Path) {
+        let view = self.views.shown();
+        let layers = view.and_then(|view| view.layers.clone());
+        let Some((capture, layers)) = self.capture.clone().zip(layers) else {
+            self.say(
+                Level::Error,
+                "layers: none are there; open the pane Lights and wait for its first picture",
+            );
+            return;
+        };
+        let pictures = (layers.layers.iter()).map(|(source, picture)| (*source, &**picture));
+        match light_layers::write(path, &capture.scene, pictures) {
+            Ok(()) => self.say(
+                Level::Info,
+                format!(
+                    "layers at {} samples a pixel saved to {}",
+                    layers.samples,
+                    path.display()
+                ),
+            ),
             Err(error) => self.fail(&error),
         }
     }

@@ -92,7 +92,7 @@ impl Session {
     }
 
     /// Sends a command without ever waiting; false if the queue is full ([`inbox::CAPACITY`]) or the worker has ended.
-    /// Of views and insertions only the newest waits, so that those never fill the queue.
+    /// Of views, insertions and edits only the newest waits, so that those never fill the queue.
     pub fn send(&self, command: Command) -> bool {
         self.outbox
             .as_ref()

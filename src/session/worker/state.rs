@@ -4,6 +4,7 @@ use crate::error::Error;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Progress};
+use crate::session::edits::{Edited, Edits};
 use crate::session::inbox::Inbox;
 use crate::session::insertion::Inserting;
 use crate::session::light::path_options;
@@ -26,7 +27,10 @@ pub(super) struct Worker {
     pub backend: Backend,
     pub settings: Settings,
     pub capture: Option<Arc<OpenCapture>>,
+    /// What the solver found.
     pub estimate: Arc<Estimate>,
+    /// What was changed of it by hand.
+    pub edits: Edits,
     pub progress: Arc<Progress>,
     pub checkpoint: Option<Checkpoint>,
     pub phase: Phase,
@@ -39,6 +43,7 @@ pub(super) struct Worker {
     pub step: bool,
     pub seconds_load: f64,
     pub started: Instant,
+    edited: Edited,
     sequence: u64,
     changed: bool,
     published: Instant,
@@ -60,6 +65,7 @@ impl Worker {
             settings,
             capture: None,
             estimate: Arc::default(),
+            edits: Edits::default(),
             progress: Arc::default(),
             checkpoint: None,
             phase: Phase::Idle,
@@ -72,6 +78,7 @@ impl Worker {
             step: false,
             seconds_load: 0.0,
             started: Instant::now(),
+            edited: Edited::default(),
             sequence: 0,
             changed: true,
             published: Instant::now(),
@@ -84,6 +91,11 @@ impl Worker {
         self.progress = Arc::default();
         self.checkpoint = None;
         self.rates = Rates::default();
+    }
+
+    /// The estimate with the changes made by hand, which everything but the solver and the report shows.
+    pub fn edited(&mut self) -> Arc<Estimate> {
+        self.edited.of(&self.estimate, &self.edits)
     }
 
     /// Records an error as an event.
@@ -111,15 +123,13 @@ impl Worker {
             return false;
         };
         let options = path_options(&self.settings);
-        let (drawn, more) = self.views.draw(&capture, &self.estimate, &options, share);
+        let estimate = self.edited();
+        let (drawn, more) = self.views.draw(&capture, &estimate, &options, share);
         self.changed |= drawn;
-        if self.estimate.objects.is_empty() || !self.inserting.is_busy() {
+        if estimate.objects.is_empty() || !self.inserting.is_busy() {
             return more;
         }
-        match self
-            .inserting
-            .draw(&capture, &self.estimate, &options, share)
-        {
+        match self.inserting.draw(&capture, &estimate, &options, share) {
             Ok(drawn) => self.changed |= drawn,
             Err(error) => self.fail(&error),
         }
@@ -150,6 +160,7 @@ impl Worker {
                 .then(|| self.rates.seconds_left(&self.progress, &self.settings))
                 .flatten(),
             estimate: self.estimate.clone(),
+            edits: self.edits.clone(),
             view: self.views.shown(),
             insertion: self.inserting.shown(),
             events: self.events.clone(),

@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::inverse::solver::{Checkpoint, Problem};
 use crate::session::command::{OpenOptions, Source};
+use crate::session::edits::Edits;
 use crate::session::inbox::Mail;
 use crate::session::save;
 use crate::session::snapshot::{Level, OpenCapture, Phase};
@@ -125,6 +126,7 @@ impl Worker {
         }
         self.capture = Some(Arc::new(capture));
         self.forget();
+        self.edits = Edits::default();
         self.views.reset();
         self.inserting.reset();
     }
@@ -135,11 +137,13 @@ impl Worker {
         let loaded = save::load(folder).and_then(|saved| {
             let capture = (self.backend.open)(&saved.source, &saved.options)?;
             let estimate = saved.estimate_for(&capture)?;
-            Ok((capture, estimate, saved))
+            let edits = saved.edits_for(&capture)?;
+            Ok((capture, estimate, edits, saved))
         });
         match loaded {
-            Ok((capture, estimate, saved)) => {
+            Ok((capture, estimate, edits, saved)) => {
                 self.adopt(capture);
+                self.edits = edits;
                 self.estimate = Arc::new(estimate);
                 self.settings = saved.settings;
                 match saved.checkpoint {
@@ -202,7 +206,8 @@ impl Worker {
                 self.progress = Arc::new(solution.progress);
                 self.checkpoint = solution.checkpoint;
                 self.phase = Phase::Finished(solution.termination);
-                self.views.refresh(&self.estimate);
+                let edited = self.edited();
+                self.views.refresh(&edited);
                 self.inserting.update();
             }
             Ok(Err(error)) => {

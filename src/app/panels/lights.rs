@@ -1,0 +1,118 @@
+//! The light mixer: a switch, a strength and a colour for every lamp, on layers of light already traced.
+
+use crate::app::action::Action;
+use crate::app::mixer::Gain;
+use crate::app::panels::color;
+use crate::app::state::App;
+use crate::app::theme;
+use crate::export::light_layers;
+use crate::session::snapshot::LightSource;
+use egui::{Button, Checkbox, DragValue, Grid, Role, ScrollArea, Slider, Ui, WidgetInfo};
+
+/// The largest strength that can be set.
+const MOST: f32 = 4.0;
+
+/// Draws the pane.
+pub fn pane(ui: &mut Ui, app: &mut App) {
+    let Some(capture) = app.capture().cloned() else {
+        ui.weak("No capture is open");
+        return;
+    };
+    app.layers_needed = true;
+    let ctx = ui.ctx().clone();
+    let layers = app.view().and_then(|view| view.layers.clone());
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        let Some(layers) = layers else {
+            ui.weak("Tracing the light of each lamp…");
+            return;
+        };
+        if layers.layers.is_empty() {
+            ui.weak("Nothing emits light in this estimate.");
+            return;
+        }
+        ui.horizontal_wrapped(|ui| {
+            for (action, text) in [
+                (Action::CompareRelit, "Before and after"),
+                (Action::KeepMix, "Give lamps this light"),
+                (Action::ResetMix, "Reset mix"),
+                (Action::SaveLayers, "Save layers…"),
+                (Action::Undo, "Undo"),
+                (Action::Redo, "Redo"),
+            ] {
+                let button = ui.add_enabled(app.can(action), Button::new(text));
+                if button.on_hover_text(action.help()).clicked() {
+                    app.perform(action, &ctx);
+                }
+            }
+        });
+        ui.separator();
+        Grid::new("lights")
+            .num_columns(5)
+            .striped(true)
+            .show(ui, |ui| {
+                for (source, _) in &layers.layers {
+                    let name = light_layers::name(*source, &capture.scene);
+                    row(ui, app, *source, name);
+                    ui.end_row();
+                }
+            });
+        ui.add_space(theme::GAP);
+        ui.weak(format!(
+            "{} samples a pixel. The picture Relit shows the mix; changes cast no new rays.",
+            layers.samples
+        ));
+    });
+}
+
+/// One lamp.
+fn row(ui: &mut Ui, app: &mut App, source: LightSource, name: &str) {
+    let before = app.mixer.mix.gain(source);
+    let mut gain: Gain = before;
+    let on = ui
+        .add(Checkbox::without_text(&mut gain.on))
+        .on_hover_text("Switches this light off and on");
+    on.widget_info(|| {
+        WidgetInfo::selected(Role::CheckBox, true, gain.on, format!("{name} is lit"))
+    });
+    color::well(
+        ui,
+        &format!("Colour of {name}"),
+        "Factor on red, green and blue of this light (no unit); white leaves its colour as it is",
+        &mut gain.color,
+    );
+    let help = "Factor on this light: 0 takes it away, 1 × is what was found";
+    let slider = Slider::new(&mut gain.strength, 0.0..=MOST).show_value(false);
+    let strength = ui.add(slider).on_hover_text(help);
+    strength.widget_info(|| {
+        WidgetInfo::slider(
+            true,
+            f64::from(gain.strength),
+            format!("Strength of {name}"),
+        )
+    });
+    let number = DragValue::new(&mut gain.strength)
+        .range(0.0..=MOST)
+        .speed(0.01)
+        .max_decimals(2)
+        .suffix(" ×")
+        .update_while_editing(false);
+    let typed = ui.add(number).on_hover_text(help);
+    typed.widget_info(|| {
+        WidgetInfo::labeled(Role::SpinButton, true, format!("Strength of {name}, typed"))
+    });
+    let lamp = match source {
+        LightSource::Lamp(object) => Some(object),
+        _ => None,
+    };
+    let selected = lamp.is_some() && app.selected == lamp;
+    let label = ui
+        .selectable_label(selected, name)
+        .on_hover_text("Selects this lamp");
+    if label.clicked() && lamp.is_some() {
+        app.select(lamp);
+    }
+    if gain != before {
+        app.mixer.mix.set(source, gain);
+        ui.ctx().request_repaint();
+    }
+}

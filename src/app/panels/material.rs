@@ -1,0 +1,153 @@
+//! The selected object's colour and light, changed by hand.
+
+use crate::app::action::Action;
+use crate::app::panels::color;
+use crate::app::picture::inspect::triple;
+use crate::app::state::App;
+use crate::app::theme;
+use crate::inverse::estimate::ObjectEstimate;
+use crate::session::edits::ObjectEdit;
+use egui::{Button, DragValue, Grid, Role, ScrollArea, Ui, WidgetInfo};
+use glam::Vec3;
+
+/// Names of the channels.
+const CHANNELS: [&str; 3] = ["red", "green", "blue"];
+
+/// Draws the pane.
+pub fn pane(ui: &mut Ui, app: &mut App) {
+    let Some(capture) = app.capture().cloned() else {
+        ui.weak("No capture is open");
+        return;
+    };
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        let Some(object) = app.selected.map(|object| object as usize) else {
+            ui.weak("Select an object by a click in a picture or in the table");
+            buttons(ui, app, &[Action::ResetEdits]);
+            return;
+        };
+        let estimate = app.snapshot.estimate.clone();
+        let name = capture.scene.objects.get(object);
+        let Some((name, found)) = name.zip(estimate.objects.get(object)) else {
+            ui.weak("Nothing is known of this object yet");
+            return;
+        };
+        let before = app.edits.object(object);
+        let mut edit = before;
+        ui.horizontal(|ui| {
+            ui.strong(&name.name);
+            if before != ObjectEdit::default() {
+                ui.colored_label(theme::tokens(ui).warning, "edited");
+            }
+        });
+        Grid::new("material").num_columns(2).show(ui, |ui| {
+            albedo(ui, found, &mut edit);
+            ui.end_row();
+            emission(ui, app, found, &mut edit);
+            ui.end_row();
+        });
+        if edit != before {
+            app.edits.set(object, edit);
+            ui.ctx().request_repaint();
+        }
+        buttons(
+            ui,
+            app,
+            &[
+                Action::SwitchLamp,
+                Action::ResetMaterial,
+                Action::ResetEdits,
+            ],
+        );
+        ui.weak(format!(
+            "found: albedo {}, emission {} W/(sr·m²)",
+            triple(found.albedo),
+            triple(found.emission)
+        ));
+    });
+}
+
+/// Colour of the surface.
+fn albedo(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
+    let help = "Diffuse reflectance, 0 to 1 (no unit), linear; replaces a texture by one colour";
+    ui.label("Albedo").on_hover_text(help);
+    ui.horizontal(|ui| {
+        let mut albedo = edit.albedo(found.albedo);
+        let mut changed = color::well(ui, "Albedo colour", help, &mut albedo);
+        for (channel, value) in CHANNELS.into_iter().zip(albedo.as_mut()) {
+            let drag = DragValue::new(value)
+                .range(0.0..=1.0)
+                .speed(0.005)
+                .max_decimals(3)
+                .update_while_editing(false);
+            let response = ui.add(drag).on_hover_text(help);
+            response.widget_info(|| {
+                WidgetInfo::labeled(Role::SpinButton, true, format!("Albedo {channel}"))
+            });
+            changed |= response.changed();
+        }
+        if changed {
+            edit.albedo = Some(albedo);
+        }
+    });
+}
+
+/// Strength and colour of its light.
+fn emission(ui: &mut Ui, app: &App, found: &ObjectEstimate, edit: &mut ObjectEdit) {
+    let help = "Emitted radiance of the strongest channel, W/(sr·m²)";
+    ui.label("Emission").on_hover_text(help);
+    ui.horizontal(|ui| {
+        let mut strength = edit.emission(found.emission).max_element();
+        // A lamp that is off keeps the colour that it has when on.
+        let lit = ObjectEdit {
+            off: false,
+            ..*edit
+        }
+        .emission(found.emission);
+        let peak = lit.max_element();
+        let mut color = if peak > 0.0 { lit / peak } else { Vec3::ONE };
+        let mut changed = ui
+            .add_enabled_ui(strength > 0.0, |ui| {
+                let help = "Colour of the light at its strength (no unit), linear";
+                color::well(ui, "Emission colour", help, &mut color)
+            })
+            .inner;
+        let speed = drag_speed(app, strength);
+        let drag = DragValue::new(&mut strength)
+            .range(0.0..=1e12)
+            .speed(speed)
+            .max_decimals(4)
+            .suffix(" W/(sr·m²)")
+            .update_while_editing(false);
+        let response = ui.add(drag).on_hover_text(help);
+        response.widget_info(|| WidgetInfo::labeled(Role::SpinButton, true, "Emission strength"));
+        changed |= response.changed();
+        if changed {
+            // A colour is as strong as its strongest channel.
+            let peak = color.max_element();
+            let pure = if peak > 0.0 { color / peak } else { Vec3::ZERO };
+            edit.emission = Some(pure * strength);
+            edit.off = false;
+        }
+    });
+}
+
+/// Radiance a point of dragging: a share of the light itself, or of the brightest lamp where it is dark.
+fn drag_speed(app: &App, strength: f32) -> f64 {
+    let objects = app.snapshot.estimate.objects.iter();
+    let brightest = objects
+        .map(|o| o.emission.max_element())
+        .fold(0.0f32, f32::max);
+    f64::from((strength * 0.01).max(brightest * 1e-3).max(1e-6))
+}
+
+fn buttons(ui: &mut Ui, app: &mut App, actions: &[Action]) {
+    let ctx = ui.ctx().clone();
+    ui.horizontal_wrapped(|ui| {
+        for &action in actions.iter().chain(&[Action::Undo, Action::Redo]) {
+            let button = ui.add_enabled(app.can(action), Button::new(action.text()));
+            if button.on_hover_text(action.help()).clicked() {
+                app.perform(action, &ctx);
+            }
+        }
+    });
+}

@@ -1,0 +1,49 @@
+//! The light of each lamp as a layer of one OpenEXR file.
+
+use crate::error::{Error, Result};
+use crate::export::exr::{Layer, Precision, write_layers};
+use crate::math::picture::Picture;
+use crate::scene::Scene;
+use crate::transport::layers::LightSource;
+use std::path::Path;
+
+/// The name of a layer: its lamp's, `other lamps`, or `outside light`.
+pub fn name(source: LightSource, scene: &Scene) -> &str {
+    match source {
+        LightSource::Lamp(object) => {
+            (scene.objects.get(object as usize)).map_or("lamp", |o| &o.name)
+        }
+        LightSource::OtherLamps => "other lamps",
+        LightSource::Outside => "outside light",
+    }
+}
+
+/// Writes layers of one size under their names, in 32-bit floats. They add up to the whole picture.
+///
+/// # Errors
+/// There are none, or the file cannot be written.
+pub fn write<'a>(
+    path: &Path,
+    scene: &Scene,
+    layers: impl IntoIterator<Item = (LightSource, &'a Picture)>,
+) -> Result<()> {
+    let mut size = None;
+    let mut named: Vec<Layer> = Vec::new();
+    for (source, picture) in layers {
+        size = Some((picture.width, picture.height));
+        let mut name = name(source, scene).to_owned();
+        // An object may bear the name of another layer.
+        while named.iter().any(|layer| layer.name == name) {
+            name.push('\'');
+        }
+        named.push(Layer::rgb(&name, picture, Precision::Float));
+    }
+    let Some((width, height)) = size else {
+        return Err(Error::file(
+            path,
+            "nothing emits light in this estimate, so there are no layers",
+            "solve on, or give an object an emission",
+        ));
+    };
+    write_layers(path, width, height, &named)
+}

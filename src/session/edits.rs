@@ -1,0 +1,273 @@
+//! Changes made by hand to what a solver found: lamps off, walls recoloured.
+
+use crate::error::{Error, Result};
+use crate::inverse::estimate::{Estimate, TexelEstimate};
+use crate::scene::Scene;
+use crate::session::save::named::Named;
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+/// What is changed of one object.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ObjectEdit {
+    /// Diffuse reflectance, linear RGB in [0, 1], instead of the estimate's colour or texture.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub albedo: Option<Vec3>,
+    /// Emitted radiance, W·sr⁻¹·m⁻², instead of the estimate's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub emission: Option<Vec3>,
+    /// Whether it emits nothing, whatever its emission.
+    pub off: bool,
+}
+
+impl ObjectEdit {
+    /// The emission of an object whose estimate is `found`.
+    pub fn emission(&self, found: Vec3) -> Vec3 {
+        match self.emission {
+            _ if self.off => Vec3::ZERO,
+            Some(emission) => emission.max(Vec3::ZERO),
+            None => found,
+        }
+    }
+
+    /// The albedo of an object whose estimate is `found`.
+    pub fn albedo(&self, found: Vec3) -> Vec3 {
+        let albedo = self.albedo.map(|a| a.clamp(Vec3::ZERO, Vec3::ONE));
+        albedo.unwrap_or(found)
+    }
+}
+
+/// All changes to an estimate.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Edits {
+    objects: BTreeMap<usize, ObjectEdit>,
+    outside: Option<Vec3>,
+}
+
+impl Edits {
+    /// What is changed of an object.
+    pub fn object(&self, object: usize) -> ObjectEdit {
+        self.objects.get(&object).copied().unwrap_or_default()
+    }
+
+    /// Replaces what is changed of an object.
+    pub fn set(&mut self, object: usize, edit: ObjectEdit) {
+        if edit == ObjectEdit::default() {
+            self.objects.remove(&object);
+        } else {
+            self.objects.insert(object, edit);
+        }
+    }
+
+    /// Factors on red, green and blue of the light from outside.
+    pub fn outside(&self) -> Vec3 {
+        self.outside.unwrap_or(Vec3::ONE)
+    }
+
+    /// Replaces the factors on the light from outside.
+    pub fn set_outside(&mut self, factor: Vec3) {
+        self.outside = (factor != Vec3::ONE).then_some(factor);
+    }
+
+    /// Whether nothing is changed.
+    pub fn is_empty(&self) -> bool {
+        self.objects.is_empty() && self.outside.is_none()
+    }
+
+    /// An estimate with these changes. Standard errors stay those of what was found.
+    pub fn apply(&self, estimate: &Estimate) -> Estimate {
+        let mut edited = estimate.clone();
+        for (&object, edit) in &self.objects {
+            let Some(entry) = edited.objects.get_mut(object) else {
+                continue;
+            };
+            entry.emission = edit.emission(entry.emission);
+            if edit.albedo.is_some() {
+                entry.albedo = edit.albedo(entry.albedo);
+                unpaint(&mut edited, object);
+            }
+        }
+        if let (Some(factor), Some(outside)) = (self.outside, &mut edited.outside) {
+            let factor = factor.max(Vec3::ZERO);
+            outside.pixels.iter_mut().for_each(|p| *p *= factor);
+        }
+        edited
+    }
+
+    /// The changes as files hold them, by the names of objects; `None` where nothing is changed.
+    pub fn record(&self, scene: &Scene) -> Option<EditsRecord> {
+        let named = self.objects.iter().filter_map(|(&object, edit)| {
+            let name = scene.objects.get(object)?.name.clone();
+            Some((name, *edit))
+        });
+        (!self.is_empty()).then(|| EditsRecord {
+            objects: Named(named.collect()),
+            outside: self.outside,
+        })
+    }
+}
+
+/// Lets an object have one colour where texels had painted it.
+fn unpaint(estimate: &mut Estimate, object: usize) {
+    let Some(texels) = &estimate.texels else {
+        return;
+    };
+    let mut textured = texels.textured.clone();
+    if let Some(flag) = textured.get_mut(object) {
+        *flag = false;
+    }
+    estimate.texels = Some(Arc::new(TexelEstimate {
+        textured,
+        ..(**texels).clone()
+    }));
+}
+
+/// Changes in `estimate.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EditsRecord {
+    /// What is changed of each object, by name.
+    pub objects: Named<ObjectEdit>,
+    /// Factors on red, green and blue of the light from outside.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outside: Option<Vec3>,
+}
+
+impl EditsRecord {
+    /// The changes for a scene; `path` is the file that holds them.
+    ///
+    /// # Errors
+    /// The scene has no object of a name.
+    pub fn edits(&self, path: &Path, scene: &Scene) -> Result<Edits> {
+        let objects = self.objects.0.iter().map(|(name, edit)| {
+            let object = scene.objects.iter().position(|o| o.name == *name);
+            let object = object.ok_or_else(|| {
+                Error::new(
+                    format!("{}: edits.objects.{name}", path.display()),
+                    "the capture has no object of this name",
+                    "name the capture it was made from with --capture",
+                )
+            });
+            Ok((object?, *edit))
+        });
+        Ok(Edits {
+            objects: objects.collect::<Result<_>>()?,
+            outside: self.outside,
+        })
+    }
+}
+
+/// The estimate with its changes, made anew only where one of the two has changed.
+#[derive(Debug, Default)]
+pub struct Edited(Option<(Arc<Estimate>, Edits, Arc<Estimate>)>);
+
+impl Edited {
+    /// An estimate with changes; the estimate itself where nothing is changed.
+    pub fn of(&mut self, estimate: &Arc<Estimate>, edits: &Edits) -> Arc<Estimate> {
+        if edits.is_empty() {
+            self.0 = None;
+            return estimate.clone();
+        }
+        if let Some((found, made_by, edited)) = &self.0
+            && Arc::ptr_eq(found, estimate)
+            && made_by == edits
+        {
+            return edited.clone();
+        }
+        let edited = Arc::new(edits.apply(estimate));
+        self.0 = Some((estimate.clone(), edits.clone(), edited.clone()));
+        edited
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inverse::estimate::{ObjectEstimate, Outside};
+
+    fn estimate() -> Arc<Estimate> {
+        let object = |albedo: f32, emission: f32| ObjectEstimate {
+            albedo: Vec3::splat(albedo),
+            emission: Vec3::splat(emission),
+            ..ObjectEstimate::default()
+        };
+        Arc::new(Estimate {
+            objects: vec![object(0.5, 0.0), object(0.0, 9.0)],
+            outside: Some(Outside {
+                width: 1,
+                height: 1,
+                pixels: vec![Vec3::splat(2.0)],
+            }),
+            ..Estimate::default()
+        })
+    }
+
+    #[test]
+    fn what_is_changed_is_applied_and_the_rest_stays() {
+        let found = estimate();
+        let mut edits = Edits::default();
+        let mut edited = Edited::default();
+        assert!(Arc::ptr_eq(&edited.of(&found, &edits), &found));
+
+        let red = Vec3::new(0.9, 0.1, 0.1);
+        edits.set(
+            0,
+            ObjectEdit {
+                albedo: Some(red),
+                ..ObjectEdit::default()
+            },
+        );
+        let dim = Some(Vec3::splat(3.0));
+        edits.set(
+            1,
+            ObjectEdit {
+                emission: dim,
+                ..ObjectEdit::default()
+            },
+        );
+        edits.set_outside(Vec3::new(0.0, 0.5, 1.0));
+        let changed = edited.of(&found, &edits);
+        assert_eq!(
+            (changed.objects[0].albedo, changed.objects[0].emission),
+            (red, Vec3::ZERO)
+        );
+        assert_eq!(changed.objects[1].emission, Vec3::splat(3.0));
+        let outside = changed.outside.as_ref().expect("outside");
+        assert_eq!(outside.pixels, [Vec3::new(0.0, 1.0, 2.0)]);
+        assert!(Arc::ptr_eq(&edited.of(&found, &edits), &changed));
+
+        // Off wins over any emission, and gives it back.
+        edits.set(
+            1,
+            ObjectEdit {
+                emission: dim,
+                off: true,
+                ..ObjectEdit::default()
+            },
+        );
+        assert_eq!(edited.of(&found, &edits).objects[1].emission, Vec3::ZERO);
+        edits.set(0, ObjectEdit::default());
+        edits.set(1, ObjectEdit::default());
+        edits.set_outside(Vec3::ONE);
+        assert!(edits.is_empty());
+    }
+
+    #[test]
+    fn values_that_no_surface_has_are_brought_into_range() {
+        let mut edits = Edits::default();
+        edits.set(
+            0,
+            ObjectEdit {
+                albedo: Some(Vec3::new(-1.0, 0.5, 7.0)),
+                emission: Some(Vec3::new(-2.0, 0.0, 1.0)),
+                off: false,
+            },
+        );
+        let object = &edits.apply(&estimate()).objects[0];
+        assert_eq!(object.albedo, Vec3::new(0.0, 0.5, 1.0));
+        assert_eq!(object.emission, Vec3::new(0.0, 0.0, 1.0));
+    }
+}

@@ -1,0 +1,167 @@
+//! Light kept apart by its lamp. Light adds up: layers times any strengths are a picture again, with no new rays.
+
+use crate::math::color::luminance;
+use crate::math::picture::Picture;
+use crate::math::rng::Stream;
+use crate::scene::camera::Camera;
+use crate::scene::geometry::Ray;
+use crate::transport::lit::Lit;
+use crate::transport::path::{Origin, PathOptions, radiance_by_origin};
+use glam::{DVec3, Vec2, Vec3};
+use rayon::prelude::*;
+
+/// Lamps with a layer of their own; weaker ones share a layer.
+pub const MOST_LAMPS: usize = 16;
+
+/// What a layer holds the light of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum LightSource {
+    /// An object of the scene that emits.
+    Lamp(u32),
+    /// All lamps that have no layer of their own.
+    OtherLamps,
+    /// What lies outside the mesh.
+    Outside,
+}
+
+/// Which layer each origin of light belongs to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Split {
+    sources: Vec<LightSource>,
+    /// Layer of each object; `u32::MAX` where it does not emit.
+    of_object: Vec<u32>,
+    outside: u32,
+}
+
+/// Parts of one path, kept between paths to spare allocations.
+pub type Parts = Vec<(Origin, Vec3)>;
+
+impl Split {
+    /// One layer for each of the [`MOST_LAMPS`] lamps with the largest area × luminance, in the scene's order, one for
+    /// all others, and one for light from outside; only those that there are.
+    pub fn new(lit: &Lit) -> Self {
+        let power = |object: usize| {
+            let emission = lit.materials.get(object).map_or(Vec3::ZERO, |m| m.emission);
+            lit.scene.objects[object].area * f64::from(luminance(emission))
+        };
+        let objects = lit.scene.objects.len();
+        let mut lamps: Vec<usize> = (0..objects).filter(|&o| power(o) > 0.0).collect();
+        lamps.sort_by(|&a, &b| power(b).total_cmp(&power(a)).then(a.cmp(&b)));
+        let others = lamps.split_off(lamps.len().min(MOST_LAMPS));
+        lamps.sort_unstable();
+
+        let mut sources: Vec<LightSource> =
+            lamps.iter().map(|&o| LightSource::Lamp(o as u32)).collect();
+        let mut of_object = vec![u32::MAX; objects];
+        for (layer, &lamp) in lamps.iter().enumerate() {
+            of_object[lamp] = layer as u32;
+        }
+        for &lamp in &others {
+            of_object[lamp] = sources.len() as u32;
+        }
+        if !others.is_empty() {
+            sources.push(LightSource::OtherLamps);
+        }
+        let outside = sources.len() as u32;
+        if lit.outside.is_some() {
+            sources.push(LightSource::Outside);
+        }
+        Self {
+            sources,
+            of_object,
+            outside,
+        }
+    }
+
+    /// What each layer holds.
+    pub fn sources(&self) -> &[LightSource] {
+        &self.sources
+    }
+
+    /// The layer that an object's light goes into.
+    pub fn source_of(&self, object: u32) -> Option<LightSource> {
+        let layer = *self.of_object.get(object as usize)?;
+        self.sources.get(layer as usize).copied()
+    }
+
+    /// Adds the light that one path finds to the sums of its pixel, one a layer. Uses the stream as
+    /// [`crate::transport::path::radiance`] does, so that the layers add up to the same path's radiance.
+    pub fn add(
+        &self,
+        world: &Lit,
+        ray: &Ray,
+        stream: &mut Stream,
+        options: &PathOptions,
+        parts: &mut Parts,
+        sums: &mut [DVec3],
+    ) {
+        radiance_by_origin(world, ray, stream, options, parts);
+        for &(origin, light) in parts.iter() {
+            let layer = match origin {
+                Origin::Object(object) => self.of_object.get(object as usize).copied(),
+                Origin::Outside => Some(self.outside),
+            };
+            if let Some(sum) = layer.and_then(|layer| sums.get_mut(layer as usize)) {
+                *sum += light.as_dvec3();
+            }
+        }
+    }
+
+    /// One picture a layer from `samples` paths a pixel, keyed as [`crate::transport::film::Film::add`] keys them: the
+    /// layers add up to that film's picture.
+    pub fn render(
+        &self,
+        world: &Lit,
+        camera: &Camera,
+        options: &PathOptions,
+        seed: u64,
+        frame: u64,
+        samples: u32,
+    ) -> Vec<Picture> {
+        let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
+        let count = self.sources.len();
+        let mut sums = vec![DVec3::ZERO; width as usize * height as usize * count];
+        let row_of = width as usize * count;
+        sums.par_chunks_mut(row_of.max(1))
+            .enumerate()
+            .for_each(|(row, sums)| {
+                let mut parts = Parts::new();
+                for (column, sums) in sums.chunks_mut(count).enumerate() {
+                    let pixel = (row * width as usize + column) as u64;
+                    for index in 0..samples {
+                        let mut stream = Stream::new(seed, frame, pixel, u64::from(index));
+                        let [dx, dy] = stream.uniform2();
+                        let ray = camera.ray(Vec2::new(column as f32 + dx, row as f32 + dy));
+                        self.add(world, &ray, &mut stream, options, &mut parts, sums);
+                    }
+                }
+            });
+        let scale = 1.0 / f64::from(samples.max(1));
+        (0..count)
+            .map(|layer| Picture {
+                width,
+                height,
+                pixels: layer_of(&sums, layer, count, scale),
+            })
+            .collect()
+    }
+}
+
+/// One layer of sums that hold `count` layers a pixel, times a factor.
+pub fn layer_of(sums: &[DVec3], layer: usize, count: usize, scale: f64) -> Vec<Vec3> {
+    let of_layer = sums.iter().skip(layer).step_by(count.max(1));
+    of_layer.map(|sum| (*sum * scale).as_vec3()).collect()
+}
+
+/// The sum of pictures of one size, each times a factor on red, green and blue; `None` where there are none.
+pub fn mix<'a>(layers: impl IntoIterator<Item = (&'a Picture, Vec3)>) -> Option<Picture> {
+    let mut layers = layers.into_iter();
+    let (first, factor) = layers.next()?;
+    let mut mixed = first.clone();
+    mixed.pixels.par_iter_mut().for_each(|p| *p *= factor);
+    for (layer, factor) in layers.filter(|(_, factor)| *factor != Vec3::ZERO) {
+        let pairs = mixed.pixels.par_iter_mut().zip(&layer.pixels);
+        pairs.for_each(|(sum, light)| *sum += *light * factor);
+    }
+    Some(mixed)
+}
