@@ -44,9 +44,9 @@ pub fn box_room(name: &str, albedo: f64, lamp: f64) -> Room {
         ("floor", [low, z, x]),
         ("ceiling", [high, -x, -z]),
         ("back", [low, x, y]),
-        ("right", [high, -y, -z]),
+        ("right", [high, -z, -y]),
         ("left", [low, y, z]),
-        ("front", [high, -x, -y]),
+        ("front", [high, -y, -x]),
     ];
     for (name, [corner, u, v]) in sides {
         modeller.object(name);
