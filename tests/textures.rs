@@ -97,7 +97,7 @@ fn refined(problem: &Problem, estimate: &Estimate, objects: &[usize], paths: u64
         paths,
         max_bounces: 1000,
     };
-    let (refined, ended) = refine(&task, estimate, objects, &mut |_, _, _| Ok(()));
+    let (refined, ended) = refine(&task, estimate, objects, &|_| None, &mut |_, _, _| Ok(()));
     ended.expect("nobody ends it");
     refined
 }
@@ -261,7 +261,7 @@ fn who_ends_it_is_obeyed() {
     };
     let ended_after = |most: u32| {
         let mut calls = 0;
-        refine(&task, &ROOM.estimate, &[BACK], &mut |_, _, _| {
+        refine(&task, &ROOM.estimate, &[BACK], &|_| None, &mut |_, _, _| {
             calls += 1;
             if calls > most {
                 Err(Termination::Cancelled)
@@ -278,4 +278,34 @@ fn who_ends_it_is_obeyed() {
     let (late, ended) = found.expect("the texture is found at some time");
     assert_eq!(ended, Err(Termination::Cancelled));
     assert!(late.attempts[0].kept);
+}
+
+/// Light and texture may fail to agree: what held-out pixels say decides between the states.
+#[test]
+fn states_that_held_out_pixels_speak_against_are_not_kept() {
+    let settings = Settings::default();
+    let survey = Survey::new(&ROOM.problem, &settings, usize::MAX);
+    let task = Task {
+        problem: &ROOM.problem,
+        survey: &survey,
+        settings: &settings,
+        paths: 10_000,
+        max_bounces: 1000,
+    };
+    let judged = |judge: &dyn Fn(&Estimate) -> Option<f64>| {
+        let (refined, ended) = refine(&task, &ROOM.estimate, &[BACK], judge, &mut |_, _, _| Ok(()));
+        ended.expect("nobody ends it");
+        refined
+    };
+    let texture = |e: &Estimate| e.texels.as_ref().map(|t| t.colors.colors.len());
+    // Worse than one colour: none is kept.
+    let refused = judged(&|e| Some(if texture(e).is_some() { 2.0 } else { 1.0 }));
+    assert!(refused.texels.is_none() && refused.worse);
+    assert!(refused.attempts.iter().all(|a| !a.kept));
+    // The last state is worse than the first, which has fewer texels: the first is kept.
+    let last = judged(&|_| None);
+    let most = last.texels.as_ref().map(|t| t.colors.colors.len());
+    let first = judged(&|e| Some(if texture(e) == most { 2.0 } else { 1.0 }));
+    let cells = |r: &relit::inverse::texture::Refined| r.attempts[0].cells;
+    assert!(first.texels.is_some() && cells(&first) < cells(&last));
 }

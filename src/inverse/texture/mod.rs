@@ -35,6 +35,8 @@ const LEAST_HELD_OUT: usize = 10;
 /// Share of the paths, and width of cells in the finest ones', that are enough to see whether an object has a texture.
 const FIRST_LOOK: f64 = 0.4;
 const COARSE: f32 = 2.0;
+/// A held-out loss so many times the best one is plainly worse.
+const PLAINLY: f64 = 1.02;
 /// Times that light and texture are found in turn.
 const SWEEPS: u32 = 2;
 
@@ -69,7 +71,7 @@ pub struct Attempt {
 }
 
 /// What was found.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Refined {
     /// The objects that were tried.
     pub attempts: Vec<Attempt>,
@@ -79,6 +81,8 @@ pub struct Refined {
     pub means: Vec<(usize, Vec3)>,
     /// Greatest change of a mean albedo in the last sweep, relative.
     pub unrest: f64,
+    /// Whether textures were found but made held-out pixels worse all together, so that none is kept.
+    pub worse: bool,
 }
 
 impl Refined {
@@ -107,6 +111,11 @@ impl Refined {
             })
             .collect();
         let (tried, cells) = (self.attempts.len(), self.unknowns());
+        if self.worse {
+            return format!(
+                "textures of some of {tried} objects tried make held-out pixels worse all together, so none is kept"
+            );
+        }
         if kept.is_empty() {
             return format!("none of {tried} objects tried shows more than one colour");
         }
@@ -132,11 +141,13 @@ impl Refined {
 pub type Tell<'t> = dyn FnMut(u64, u64, f64) -> Result<(), Termination> + 't;
 
 /// Tries a texture on each of the given objects, keeps those that held-out pixels ask for, and sweeps over them until
-/// light and texture agree. Where the listener ends that early, what was found by then is kept.
+/// light and texture agree. Where the listener ends that early, what was found by then is kept; where light and texture do
+/// not come to agree and `judge`, the loss on held-out pixels, gets worse, the state before that.
 pub fn refine(
     task: &Task,
     estimate: &Estimate,
     objects: &[usize],
+    judge: &dyn Fn(&Estimate) -> Option<f64>,
     tell: &mut Tell,
 ) -> (Refined, Result<(), Termination>) {
     let mut refinement = Refinement {
@@ -150,10 +161,47 @@ pub fn refine(
         kept: Vec::new(),
         unrest: 0.0,
     };
-    let ended = refinement
-        .look(&candidates(task, objects), tell)
-        .and_then(|()| (1..=SWEEPS).try_for_each(|sweep| refinement.sweep(sweep, tell)));
-    (refinement.refined(), ended)
+    let mut ended = refinement.look(&candidates(task, objects), tell);
+    let mut states = vec![refinement.refined()];
+    for sweep in 1..=SWEEPS {
+        if ended.is_ok() && !refinement.kept.is_empty() {
+            ended = refinement.sweep(sweep, tell);
+            states.push(refinement.refined());
+        }
+    }
+    (latest_good(states, estimate, judge), ended)
+}
+
+/// The latest state whose held-out loss is not plainly above that of the best, one colour an object included.
+fn latest_good(
+    mut states: Vec<Refined>,
+    estimate: &Estimate,
+    judge: &dyn Fn(&Estimate) -> Option<f64>,
+) -> Refined {
+    if states.iter().all(|state| state.texels.is_none()) {
+        return states.pop().unwrap_or_default();
+    }
+    let loss = |state: &Refined| {
+        let mut textured = estimate.clone();
+        state.apply(&mut textured);
+        judge(&textured)
+    };
+    let losses: Vec<Option<f64>> = states.iter().map(loss).collect();
+    let flat = judge(estimate);
+    let best = (losses.iter().chain([&flat]).flatten()).fold(f64::INFINITY, |a, b| a.min(*b));
+    let good = |loss: &Option<f64>| loss.is_none_or(|loss| loss <= best * PLAINLY);
+    match losses.iter().rposition(good) {
+        Some(place) => states.swap_remove(place),
+        None => {
+            let mut refused = states.pop().unwrap_or_default();
+            refused.attempts.iter_mut().for_each(|a| a.kept = false);
+            Refined {
+                worse: true,
+                attempts: refused.attempts,
+                ..Refined::default()
+            }
+        }
+    }
 }
 
 /// The state of the stage.
@@ -253,16 +301,18 @@ impl Refinement<'_> {
         })
     }
 
-    fn refined(mut self) -> Refined {
-        for attempt in &mut self.attempts {
+    fn refined(&self) -> Refined {
+        let mut attempts = self.attempts.clone();
+        for attempt in &mut attempts {
             let found = self.kept.iter().find(|s| s.object == attempt.object);
             attempt.cells = found.map_or(attempt.cells, Surface::cell_count);
         }
         Refined {
             texels: self.textured(),
             means: self.kept.iter().map(|s| (s.object, s.mean())).collect(),
-            attempts: self.attempts,
+            attempts,
             unrest: self.unrest,
+            worse: false,
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::Ladder;
 use crate::inverse::cache::roles::Role;
+use crate::inverse::estimate::Estimate;
 use crate::inverse::solver::Termination;
 use crate::inverse::texture::{Task, refine};
 
@@ -23,13 +24,21 @@ impl Ladder<'_, '_> {
             paths: self.budget.round_paths,
             max_bounces: self.max_bounces,
         };
+        let (losses, problem) = (&self.losses, self.problem);
+        let judge = |estimate: &Estimate| losses.held_out(problem, estimate);
         let (monitor, estimate, checkpoint) = (&mut self.monitor, &self.estimate, &self.checkpoint);
-        let (refined, ended) = refine(&task, estimate, &objects, &mut |rays, rejected, share| {
-            monitor.progress.rays += rays;
-            monitor.rejected("path weight not finite", rejected);
-            monitor.progress.fraction = Some(share as f32);
-            monitor.tick(estimate, &|_| checkpoint.clone())
-        });
+        let (refined, ended) = refine(
+            &task,
+            estimate,
+            &objects,
+            &judge,
+            &mut |rays, rejected, share| {
+                monitor.progress.rays += rays;
+                monitor.rejected("path weight not finite", rejected);
+                monitor.progress.fraction = Some(share as f32);
+                monitor.tick(estimate, &|_| checkpoint.clone())
+            },
+        );
         let mut why = refined.summary(|k| self.problem.scene.objects[k].name.clone());
         if ended.is_err() {
             why.push_str("; ended before all were looked at as often as they should be");
