@@ -193,12 +193,16 @@ impl Emitters {
     }
 
     /// Draws an object and a point on it; `None` where all weights are zero.
+    ///
+    /// The 24 bits of `u[0]` are continued by the last ones of `choice`, so that a triangle is drawn by its area however
+    /// small a part of the object it is.
     pub fn sample(&self, scene: &Scene, choice: f64, u: [f32; 2]) -> Option<(u32, AreaSample)> {
         let object = self.tree.sample(choice)?;
-        // The choice's remainder below the object's share is not reused: u[0] picks the triangle and is rescaled.
+        // u[0] picks the triangle and is rescaled.
         let distribution = &self.objects[object];
         let area = *distribution.cumulative.last()?;
-        let target = f64::from(u[0]) * area;
+        let beyond = (choice * (1u64 << 29) as f64).fract() / f64::from(1 << 24);
+        let target = (f64::from(u[0]) + beyond) * area;
         let index = distribution
             .cumulative
             .partition_point(|&c| c <= target)

@@ -5,6 +5,16 @@
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
+/// A unit direction in f64. Its largest component follows from the other two, whose rounding is relative to their own
+/// size: near the horizon that of the largest would drown them.
+fn widen(direction: Vec3) -> DVec3 {
+    let mut wide = direction.as_dvec3();
+    let axis = wide.abs().max_position();
+    let others = wide.length_squared() - wide[axis] * wide[axis];
+    wide[axis] = wide[axis].signum() * (1.0 - others).max(0.0).sqrt();
+    wide
+}
+
 /// The GGX lobe between two directions above the horizon.
 #[derive(Debug, Clone, Copy)]
 pub struct Microfacet {
@@ -26,7 +36,7 @@ pub struct Microfacet {
 impl Microfacet {
     /// The lobe of roughness α between two local unit directions.
     pub fn new(alpha: f64, wo: Vec3, wi: Vec3) -> Self {
-        let (wo, wi) = (wo.as_dvec3(), wi.as_dvec3());
+        let (wo, wi) = (widen(wo), widen(wi));
         let h = (wo + wi).normalize_or_zero();
         let sin2_h = h.x * h.x + h.y * h.y;
         Self {
@@ -90,7 +100,7 @@ impl Microfacet {
 /// `wo` reflected on a normal drawn from those that it sees (Heitz 2018, in the form of Dupuy and Benyoub 2023,
 /// "Sampling Visible GGX Normals with Spherical Caps"). May point below the horizon.
 pub fn reflect_on_visible_normal(alpha: f64, wo: Vec3, u: [f32; 2]) -> Vec3 {
-    let wo = wo.as_dvec3();
+    let wo = widen(wo);
     // Stretch to the configuration of a hemisphere.
     let stretched = DVec3::new(alpha * wo.x, alpha * wo.y, wo.z).normalize_or_zero();
     // Uniform on the cap of directions that the hemisphere reflects `stretched` to.

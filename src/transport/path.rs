@@ -7,6 +7,10 @@ use crate::transport::bsdf::Bsdf;
 use crate::transport::world::{SurfacePoint, World};
 use glam::Vec3;
 
+/// Paths are never kept with a higher chance than this. Where all albedos are ρ, variance is finite only above ρ², since
+/// weights grow by ρ over the chance at each bounce.
+const MOST_SURVIVAL: f32 = 0.9999;
+
 /// How paths are traced.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathOptions {
@@ -263,7 +267,7 @@ fn follow(
 
         // End paths that carry little, without bias.
         if bounce > options.roulette_after {
-            let survival = throughput.max_element().min(0.95);
+            let survival = throughput.max_element().min(MOST_SURVIVAL);
             if survival <= 0.0 || stream.uniform() >= survival {
                 break;
             }

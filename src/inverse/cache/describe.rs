@@ -28,6 +28,8 @@ pub fn estimate(
     sky: Option<&MeasuredOutside>,
 ) -> Estimate {
     let typical = typical_albedo(scene, roles, unknowns, errors);
+    // Between surfaces that lose nothing any light lives for ever: without a source nothing tells how much they keep.
+    let sourceless = sky.is_none() && unknowns.emission.iter().all(|&e| e == Vec3::ZERO);
     let objects = (0..scene.objects.len())
         .map(|k| {
             let seen = survey.seen[k];
@@ -41,11 +43,15 @@ pub fn estimate(
             };
             match roles[k] {
                 Role::Reflector | Role::Glowing => {
-                    if errors.albedo[k].max_element() > UNKNOWN_ALBEDO {
+                    let unknown = errors.albedo[k].max_element() > UNKNOWN_ALBEDO;
+                    if unknown || sourceless {
                         object.albedo_identifiable = false;
                         object.identifiable = false;
-                        object.note =
-                            "too few paths through its pixels meet light to tell its albedo".into();
+                        object.note = if unknown {
+                            "too few paths through its pixels meet light to tell its albedo".into()
+                        } else {
+                            "no source was found of the light that it reflects".into()
+                        };
                     }
                 }
                 Role::Emitter => {

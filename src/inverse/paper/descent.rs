@@ -59,7 +59,7 @@ pub struct StepOutcome {
     pub paths: u64,
     /// Paths dropped because a weight was not finite.
     pub rejected: u64,
-    /// Whether all parameters stayed finite.
+    /// Whether the gradient was finite.
     pub finite: bool,
 }
 
@@ -129,7 +129,7 @@ impl Descent {
         }
     }
 
-    /// One step: a batch of pixels, its gradient, ADAM, and the bounds.
+    /// One step: a batch of pixels, its gradient, ADAM, and the bounds. A gradient that is not finite changes nothing.
     pub fn step(&mut self, problem: &Problem, settings: &Settings, bounces: u32) -> StepOutcome {
         let scene = &*problem.scene;
         let surfaces = self.unknowns.surfaces();
@@ -183,6 +183,16 @@ impl Descent {
             gradient[entry.0 as usize] += entry.1 / batch as f32;
         }
 
+        let outcome = StepOutcome {
+            rays: pixels.iter().map(|p| p.rays).sum(),
+            paths: 2 * batch * samples,
+            rejected: pixels.iter().map(|p| p.rejected).sum(),
+            finite: gradient.iter().all(|g| g.is_finite()),
+        };
+        if !outcome.finite {
+            return outcome;
+        }
+
         // Step every parameter; lights only while they are not fixed.
         let decay = (1.0 - settings.decay).powf(self.steps as f64 / 1000.0)
             * 0.5f64.powi(self.halvings as i32);
@@ -210,12 +220,7 @@ impl Descent {
                 }
             }
         }
-        StepOutcome {
-            rays: pixels.iter().map(|p| p.rays).sum(),
-            paths: 2 * batch * samples,
-            rejected: pixels.iter().map(|p| p.rejected).sum(),
-            finite: gradient.iter().all(|g| g.is_finite()),
-        }
+        outcome
     }
 }
 

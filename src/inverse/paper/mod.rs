@@ -38,6 +38,8 @@ struct Run<'a, 'o> {
     problem: &'a Problem,
     monitor: Monitor<'o>,
     survey: Survey,
+    /// For each object why the photographs tell nothing of it; empty where they do.
+    notes: Vec<&'static str>,
     losses: LossProbe,
     bounces: u32,
     state: State,
@@ -66,12 +68,14 @@ pub fn solve(
             state.descent.fits(&problem.scene) && state.descent.halvings <= HALVINGS
         })?,
     };
+    let notes = untold(problem, &survey);
     let mut run = Run {
-        estimate: describe(problem, &survey, &state.descent),
+        estimate: describe(problem, &survey, &notes, &state.descent),
         losses: LossProbe::new(problem, settings, 400, 16, bounces),
         problem,
         monitor,
         survey,
+        notes,
         bounces,
         state,
     };
@@ -142,12 +146,13 @@ impl Run<'_, '_> {
                 let outcome = (self.state.descent).step(self.problem, &settings, self.bounces);
                 self.state.schedule.traced(outcome.paths);
                 self.monitor.progress.rays += outcome.rays;
-                self.monitor.progress.iterations += 1;
                 self.monitor
                     .rejected("path weight not finite", outcome.rejected);
                 if !outcome.finite {
+                    self.describe();
                     return Err(Termination::Diverged);
                 }
+                self.monitor.progress.iterations += 1;
             }
             self.describe();
             self.monitor
@@ -161,7 +166,7 @@ impl Run<'_, '_> {
     }
 
     fn describe(&mut self) {
-        self.estimate = describe(self.problem, &self.survey, &self.state.descent);
+        self.estimate = describe(self.problem, &self.survey, &self.notes, &self.state.descent);
     }
 
     /// Adds a point to the loss curve; returns the loss in the fit.
@@ -191,9 +196,31 @@ impl Run<'_, '_> {
     }
 }
 
+/// For each object why the photographs tell nothing of it; empty where they do.
+fn untold(problem: &Problem, survey: &Survey) -> Vec<&'static str> {
+    let mut lit = false;
+    let mut measured = vec![false; problem.scene.objects.len()];
+    for pixel in survey.pixels.iter().filter(|p| !p.held_out) {
+        let photograph = &problem.photographs[pixel.frame as usize];
+        let brightest = photograph.pixels[pixel.pixel as usize].max_element();
+        lit |= brightest > 0.0;
+        if let Some(measured) = measured.get_mut(pixel.object as usize) {
+            *measured |= brightest < photograph.saturation;
+        }
+    }
+    (survey.seen.iter().zip(measured))
+        .map(|(&seen, measured)| match (seen, measured) {
+            (0, _) => "no photograph sees it",
+            (_, false) => "all of its pixels are saturated or held out",
+            _ if !lit => "the photographs show no light",
+            _ => "",
+        })
+        .collect()
+}
+
 /// The estimate of the present parameters. The paper's descent knows no errors: they are reported as the width of
-/// the range, and nothing is claimed to be unidentifiable but what no pixel sees.
-fn describe(problem: &Problem, survey: &Survey, descent: &Descent) -> Estimate {
+/// the range, and nothing is claimed to be unidentifiable but what `notes` say.
+fn describe(problem: &Problem, survey: &Survey, notes: &[&str], descent: &Descent) -> Estimate {
     let scene = &problem.scene;
     let unknowns = &descent.unknowns;
     let objects = (0..scene.objects.len())
@@ -209,13 +236,9 @@ fn describe(problem: &Problem, survey: &Survey, descent: &Descent) -> Estimate {
                 emission,
                 emission_stderr: emission.max(Vec3::splat(emission.max_element())),
                 seen_pixels: seen,
-                identifiable: seen > 0,
-                albedo_identifiable: seen > 0,
-                note: if seen == 0 {
-                    "no photograph sees it".into()
-                } else {
-                    String::new()
-                },
+                identifiable: notes[k].is_empty(),
+                albedo_identifiable: notes[k].is_empty(),
+                note: notes[k].to_owned(),
                 ..Default::default()
             }
         })

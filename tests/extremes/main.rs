@@ -1,0 +1,91 @@
+//! The table "At the extremes" of the README: one test or more for each of its rows.
+
+#[path = "../scenes/mod.rs"]
+mod scenes;
+
+mod descent;
+mod furnace;
+mod lamps;
+mod lobes;
+mod meshes;
+mod photographs;
+mod precision;
+mod sizes;
+mod units;
+
+use glam::Vec3;
+use relit::inverse::estimate::Estimate;
+use relit::inverse::settings::{Preset, Settings};
+use relit::inverse::solver::{Control, Observer, Problem, Progress, Solution, solve};
+use relit::math::stats::Moments;
+use relit::transport::material::Material;
+use std::sync::LazyLock;
+
+/// Photographs of [`ROOM`].
+pub const SIZE: [u32; 2] = [32, 24];
+/// The object of [`ROOM`] that emits.
+pub const LAMP: usize = 6;
+
+/// The room of `scenes`, its materials and its photographs.
+pub static ROOM: LazyLock<(Problem, Vec<Material>)> = LazyLock::new(|| {
+    let (mesh, materials) = scenes::lamp_room();
+    let capture = scenes::capture(mesh, &scenes::room_views(), SIZE);
+    let problem = scenes::photographed(&capture, &materials, 128, 51);
+    (problem, materials)
+});
+
+struct Silent;
+
+impl Observer for Silent {
+    fn observe(&mut self, _: &Progress, estimate: &Estimate) -> Control {
+        assert_sound(estimate);
+        Control::Continue
+    }
+}
+
+/// Solves without steering; every estimate on the way must be sound.
+pub fn run(problem: &Problem, settings: &Settings) -> Solution {
+    let solution = solve(problem, settings, None, &mut Silent).expect("nothing to resume");
+    assert_sound(&solution.estimate);
+    solution
+}
+
+/// A preset that is content with a median error of four per cent: its first rounds of full paths.
+pub fn preset(preset: Preset) -> Settings {
+    Settings {
+        preset,
+        target_error: if preset == Preset::Balanced { 4.0 } else { 0.0 },
+        ..Settings::default()
+    }
+}
+
+/// The same for photographs that may never give that: ended after a second.
+pub fn hurried(chosen: Preset) -> Settings {
+    Settings {
+        time: 1.0,
+        ..preset(chosen)
+    }
+}
+
+/// Finite numbers within their bounds, and what is not known is said.
+pub fn assert_sound(estimate: &Estimate) {
+    for (k, o) in estimate.objects.iter().enumerate() {
+        for v in [o.albedo, o.albedo_stderr, o.emission, o.emission_stderr] {
+            assert!(v.is_finite() && v.min_element() >= 0.0, "object {k}: {o:?}");
+        }
+        assert!(o.albedo.max_element() <= 1.0, "object {k}: {o:?}");
+        let known = o.identifiable && o.albedo_identifiable;
+        assert!(known || !o.note.is_empty(), "object {k}: {o:?}");
+        assert!(o.seen_pixels > 0 || !known, "object {k}: {o:?}");
+    }
+}
+
+/// Difference of a mean to a number in standard errors; the floor is the rounding of f32 sums.
+pub fn z(moments: &Moments, truth: f64) -> f64 {
+    (moments.mean - truth) / moments.standard_error().max(1e-6 * truth.abs())
+}
+
+/// A grey diffuse material.
+pub fn grey(albedo: f32, emission: f32) -> Material {
+    Material::diffuse(Vec3::splat(albedo), Vec3::splat(emission))
+}
