@@ -5,7 +5,7 @@ use crate::cli::evaluate::EvaluateArguments;
 use crate::cli::export::{DemoArguments, ExportArguments};
 use crate::cli::import::ImportArguments;
 use crate::cli::insert::InsertArguments;
-use crate::cli::parameters::Parameters;
+use crate::cli::parameters::{Parameters, duration};
 use crate::cli::render::RenderArguments;
 use crate::cli::study::StudyArguments;
 use crate::cli::trade::TradeArguments;
@@ -15,6 +15,7 @@ use crate::session::save::pictures::Frames;
 use clap::{Args, Parser, Subcommand};
 use glam::DVec3;
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// Recovers the lights and materials of a scanned room from photographs, and puts new objects into them.
 #[derive(Debug, Parser)]
@@ -81,6 +82,9 @@ pub struct SolveOptions {
     /// Pictures to write: all frames at full size, N frames, or none [default: 16, long side 1024]
     #[arg(long, value_name = "all|N|none", value_parser = frames)]
     pub views: Option<Frames>,
+    /// Time between two checkpoints, from which a killed solve goes on
+    #[arg(long, value_name = "TIME", default_value = "8s", value_parser = time)]
+    pub checkpoint: Duration,
     #[command(flatten)]
     pub read: ReadOptions,
     #[command(flatten)]
@@ -96,6 +100,9 @@ pub struct ReadOptions {
     /// Segments that a mesh without objects is cut into, about
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub segments: Option<u64>,
+    /// Let paths in the capture lead out of its folder; only for captures that you trust
+    #[arg(long)]
+    pub allow_outside: bool,
 }
 
 impl SolveOptions {
@@ -111,6 +118,7 @@ impl ReadOptions {
         OpenOptions {
             up: self.up,
             segments: self.segments,
+            allow_outside: self.allow_outside,
         }
     }
 }
@@ -125,6 +133,13 @@ pub fn frames(text: &str) -> std::result::Result<Frames, String> {
             .map(Frames::AtMost)
             .map_err(|_| "a number of frames, all or none is wanted".to_owned()),
     }
+}
+
+/// A time such as 90, 60s or 5m.
+pub fn time(text: &str) -> std::result::Result<Duration, String> {
+    duration(text)
+        .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok())
+        .ok_or_else(|| "a time such as 90, 60s, 5m or 1h is wanted".to_owned())
 }
 
 /// Three numbers with commas between.

@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::inverse::estimate::Estimate;
-use crate::session::command::Source;
+use crate::session::command::{OpenOptions, Source};
 use crate::session::open::open;
 use crate::session::save::{self, Saved};
 use crate::session::snapshot::OpenCapture;
@@ -21,6 +21,9 @@ pub struct SavedOptions {
     /// Threads to work with [default: one a core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
+    /// Let paths in the capture lead out of its folder; only for captures that you trust
+    #[arg(long)]
+    pub allow_outside: bool,
 }
 
 /// Results with the capture that they belong to.
@@ -42,7 +45,11 @@ impl SavedOptions {
         crate::cli::solve::use_threads(self.threads)?;
         let saved = save::load(&self.dir)?;
         let moved = self.capture.clone().map(Source::Folder);
-        let capture = open(moved.as_ref().unwrap_or(&saved.source), &saved.options)?;
+        let options = OpenOptions {
+            allow_outside: self.allow_outside,
+            ..saved.options.clone()
+        };
+        let capture = open(moved.as_ref().unwrap_or(&saved.source), &options)?;
         let found = saved.estimate_for(&capture)?;
         let estimate = saved.edits_for(&capture)?.apply(&found);
         Ok(Loaded {

@@ -11,13 +11,11 @@ use crate::inverse::solver::{self, Checkpoint, Control, Observer, Problem, Progr
 use crate::session::command::Source;
 use crate::session::edits::Edits;
 use crate::session::open::open;
+use crate::session::save::staging::Staging;
 use crate::session::save::{self, Results};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-
-/// Time between two checkpoints written while solving.
-const CHECKPOINT: Duration = Duration::from_secs(8);
 
 /// Solves a source and writes the results.
 ///
@@ -68,6 +66,9 @@ pub fn solve(source: &Source, options: &SolveOptions) -> Result<()> {
         );
     }
 
+    // Find out now, not after the work, whether there is a place for its results.
+    drop(Staging::new(&folder)?);
+
     // Solve.
     let problem = Problem {
         scene: capture.scene.clone(),
@@ -90,6 +91,7 @@ pub fn solve(source: &Source, options: &SolveOptions) -> Result<()> {
         settings: &settings,
         interrupt: &interrupt,
         meter: Meter::new(),
+        every: options.checkpoint,
         offered: None,
         written: Instant::now(),
     };
@@ -125,6 +127,8 @@ struct Watch<'a> {
     settings: &'a Settings,
     interrupt: &'a Interrupt,
     meter: Meter,
+    /// Time between two checkpoints.
+    every: Duration,
     /// A checkpoint to be written at the next report.
     offered: Option<Checkpoint>,
     written: Instant,
@@ -150,7 +154,7 @@ impl Observer for Watch<'_> {
     }
 
     fn offer(&mut self, make: &dyn Fn() -> Checkpoint) {
-        if self.written.elapsed() >= CHECKPOINT {
+        if self.written.elapsed() >= self.every {
             self.offered = Some(make());
         }
     }

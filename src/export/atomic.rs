@@ -20,6 +20,14 @@ pub fn write_atomically(
     write: impl FnOnce(&mut BufWriter<File>) -> std::result::Result<(), WriteError>,
 ) -> Result<()> {
     let io = |error: std::io::Error| Error::io(path, &error);
+    // A device or a pipe would be replaced by a file.
+    if std::fs::metadata(path).is_ok_and(|there| !there.is_file()) {
+        return Err(Error::file(
+            path,
+            "is there already and is no regular file",
+            "name another file",
+        ));
+    }
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),

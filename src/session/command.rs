@@ -104,4 +104,7 @@ pub struct OpenOptions {
     pub up: Option<DVec3>,
     /// Number of segments that a mesh without objects is cut into; `None` chooses.
     pub segments: Option<u64>,
+    /// Whether paths in the capture may lead out of its folder. Never kept in files, which may be someone else's.
+    #[serde(skip)]
+    pub allow_outside: bool,
 }

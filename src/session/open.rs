@@ -27,7 +27,7 @@ pub fn open(source: &Source, options: &OpenOptions) -> Result<OpenCapture> {
             &ReadOptions {
                 up: options.up,
                 segments: options.segments.map(|n| n as usize),
-                ..ReadOptions::default()
+                allow_outside: options.allow_outside,
             },
         ),
     }?;

@@ -1,9 +1,17 @@
 //! All files of a result appear together, or none does.
+//!
+//! Several programs may write into one folder: each fills a folder of its own, and they move their files into place one
+//! after the other. What a killed program left aside is removed by the next one. Both rest on locks on folders, which
+//! Windows and some network drives do not have; there, programs must not share a folder.
 
 use crate::error::{Error, Result};
-use std::fs;
+use crate::export::atomic::write_bytes;
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+
+/// Names of folders being filled begin with this.
+const UNFINISHED: &str = ".relit-unfinished-";
 
 /// A folder being filled aside; [`Staging::commit`] moves its files over those of an earlier run.
 #[derive(Debug)]
@@ -11,6 +19,8 @@ pub struct Staging {
     target: PathBuf,
     aside: TempDir,
     files: Vec<PathBuf>,
+    /// Says to others that the folder aside is in use, as long as it lives.
+    _in_use: Option<File>,
 }
 
 impl Staging {
@@ -20,12 +30,15 @@ impl Staging {
     /// The target cannot be written.
     pub fn new(target: &Path) -> Result<Self> {
         fs::create_dir_all(target).map_err(|error| Error::io(target, &error))?;
+        let _alone = locked(target);
+        remove_abandoned(target);
         let aside = tempfile::Builder::new()
-            .prefix(".relit-unfinished-")
+            .prefix(UNFINISHED)
             .tempdir_in(target)
             .map_err(|error| Error::io(target, &error))?;
         Ok(Self {
             target: target.to_owned(),
+            _in_use: locked(aside.path()),
             aside,
             files: Vec::new(),
         })
@@ -50,15 +63,20 @@ impl Staging {
     /// It cannot be written.
     pub fn write(&mut self, name: impl AsRef<Path>, bytes: &[u8]) -> Result<()> {
         let path = self.file(&name)?;
-        fs::write(&path, bytes).map_err(|error| Error::io(&self.target.join(name.as_ref()), &error))
+        write_bytes(&path, bytes).map_err(|error| Error {
+            place: self.target.join(name.as_ref()).display().to_string(),
+            ..error
+        })
     }
 
-    /// Moves everything into place, in the order in which it was asked for, and removes the `stale` files of an
-    /// earlier run that this one did not write.
+    /// Moves everything into place, in the order in which it was asked for, and removes those files of an earlier run
+    /// that this one did not write: what `stale` names once nobody else moves files.
     ///
     /// # Errors
     /// A file cannot be moved.
-    pub fn commit(self, stale: &[PathBuf]) -> Result<()> {
+    pub fn commit(self, stale: impl FnOnce(&Path) -> Vec<PathBuf>) -> Result<()> {
+        let _alone = locked(&self.target);
+        let stale = stale(&self.target);
         for name in &self.files {
             let target = self.target.join(name);
             if let Some(folder) = target.parent() {
@@ -76,6 +94,25 @@ impl Staging {
             }
         }
         Ok(())
+    }
+}
+
+/// Waits for a folder's lock and holds it as long as the result lives; `None` where folders have no locks.
+fn locked(folder: &Path) -> Option<File> {
+    let file = File::open(folder).ok()?;
+    file.lock().ok()?;
+    Some(file)
+}
+
+/// Removes folders aside that no living program fills.
+fn remove_abandoned(target: &Path) {
+    for entry in fs::read_dir(target).into_iter().flatten().flatten() {
+        let unfinished = entry.file_name().to_string_lossy().starts_with(UNFINISHED);
+        let abandoned = || File::open(entry.path()).is_ok_and(|folder| folder.try_lock().is_ok());
+        if unfinished && abandoned() {
+            // One that cannot be removed does no harm.
+            let _ = fs::remove_dir_all(entry.path());
+        }
     }
 }
 
@@ -98,11 +135,28 @@ mod tests {
         staging.write("views/000.txt", b"v").expect("writes");
         staging.write("a", b"new").expect("writes");
         staging
-            .commit(&["a".into(), "stale".into(), "never-there".into()])
+            .commit(|_| vec!["a".into(), "stale".into(), "never-there".into()])
             .expect("moves");
         assert_eq!(read("a").as_deref(), Some("new"));
         assert_eq!(read("views/000.txt").as_deref(), Some("v"));
         assert_eq!(read("stale"), None);
         assert_eq!(fs::read_dir(folder.path()).expect("lists").count(), 2);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_a_killed_program_left_aside_goes_and_what_a_living_one_fills_stays() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let abandoned = folder.path().join(format!("{UNFINISHED}killed"));
+        fs::create_dir(&abandoned).expect("makes it");
+        fs::write(abandoned.join("half"), "of it").expect("writes");
+        let mut living = Staging::new(folder.path()).expect("starts");
+        living.write("a", b"living").expect("writes");
+        assert!(!abandoned.exists());
+        let mut other = Staging::new(folder.path()).expect("starts");
+        other.write("a", b"other").expect("writes");
+        other.commit(|_| Vec::new()).expect("moves");
+        living.commit(|_| Vec::new()).expect("moves");
+        assert_eq!(fs::read(folder.path().join("a")).expect("reads"), b"living");
     }
 }

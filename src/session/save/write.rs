@@ -40,7 +40,7 @@ pub fn write(folder: &Path, results: &Results) -> Result<()> {
         },
     );
     staging.write(REPORT, &json(REPORT, &report)?)?;
-    staging.commit(&earlier(folder))
+    staging.commit(earlier)
 }
 
 /// Writes the estimate and its pictures alone, as after an edit.
@@ -50,7 +50,7 @@ pub fn write(folder: &Path, results: &Results) -> Result<()> {
 pub fn write_estimate(folder: &Path, results: &Results) -> Result<()> {
     let mut staging = Staging::new(folder)?;
     stage_estimate(&mut staging, folder, results)?;
-    staging.commit(&earlier(folder))
+    staging.commit(earlier)
 }
 
 fn stage_estimate(staging: &mut Staging, folder: &Path, results: &Results) -> Result<()> {
@@ -91,7 +91,7 @@ pub fn write_checkpoint(folder: &Path, results: &Results) -> Result<()> {
         checkpoint: results.checkpoint.clone(),
     };
     staging.write(CHECKPOINT, &json(CHECKPOINT, &checkpoint)?)?;
-    staging.commit(&[])
+    staging.commit(|_| Vec::new())
 }
 
 impl Results {
