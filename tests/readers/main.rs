@@ -1,5 +1,6 @@
 //! Every reader of a capture: what it understands, what it refuses and how, and that nothing makes it panic or hang.
 
+mod corpus;
 mod hostile;
 mod images;
 mod meshes;

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::inverse::estimate::Estimate;
-use crate::inverse::settings::Settings;
+use crate::inverse::settings::{PARAMETERS, Settings};
 use crate::inverse::solver::Termination;
 use crate::session::command::{OpenOptions, Source};
 use crate::session::edits::{Edits, EditsRecord};
@@ -95,19 +95,27 @@ impl EstimateFile {
         Ok((file, bytes))
     }
 
-    /// Refuses files of a later version.
+    /// Refuses files of a later version, and parameters out of their ranges.
     ///
     /// # Errors
-    /// The version is not known.
+    /// The version is not known, or a parameter is out of range.
     pub fn check(&self, path: &Path) -> Result<()> {
-        if self.version <= VERSION {
-            return Ok(());
+        if self.version > VERSION {
+            return Err(Error::new(
+                format!("{}: version", path.display()),
+                format!("{} is newer than {VERSION}, the newest known", self.version),
+                "use a newer relit",
+            ));
         }
-        Err(Error::new(
-            format!("{}: version", path.display()),
-            format!("{} is newer than {VERSION}, the newest known", self.version),
-            "use a newer relit",
-        ))
+        let mut settings = Settings::default();
+        for parameter in PARAMETERS {
+            let checked = parameter.set(&mut settings, &parameter.get(&self.settings));
+            checked.map_err(|allowed| {
+                let place = format!("{}: settings.{}", path.display(), parameter.name);
+                Error::new(place, allowed, "correct it, or solve again")
+            })?;
+        }
+        Ok(())
     }
 
     /// Reads the maps that this file names; `folder` is where it lies.
@@ -119,8 +127,14 @@ impl EstimateFile {
             return Ok(Maps::default());
         };
         let path = folder.join(name);
-        let bytes = fs::read(&path).map_err(|error| Error::io(&path, &error))?;
-        maps::decode(&path, &bytes)
+        if Path::new(name).file_name() != Some(name.as_ref()) {
+            return Err(Error::file(
+                &path,
+                "maps that do not lie beside estimate.json are not read",
+                "put the file there and name it without a folder",
+            ));
+        }
+        maps::decode(&path, &read_whole(&path)?)
     }
 
     /// The estimate of a capture's objects.
@@ -211,6 +225,19 @@ impl CaptureReference {
             (None, None) => Source::Folder(folder.to_owned()),
         }
     }
+}
+
+/// Reads a file that is one: a pipe or a device may never end.
+///
+/// # Errors
+/// It is none, or cannot be read.
+pub(super) fn read_whole(path: &Path) -> Result<Vec<u8>> {
+    let io = |error: std::io::Error| Error::io(path, &error);
+    let metadata = fs::metadata(path).map_err(io)?;
+    if !metadata.is_file() {
+        return Err(Error::file(path, "is no regular file", "restore the file"));
+    }
+    fs::read(path).map_err(io)
 }
 
 /// The path from one absolute folder to another, with forward slashes; `None` where they share no root.

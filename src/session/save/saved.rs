@@ -6,11 +6,10 @@ use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Termination};
 use crate::session::command::{OpenOptions, Source};
 use crate::session::edits::Edits;
-use crate::session::save::estimate::EstimateFile;
+use crate::session::save::estimate::{EstimateFile, read_whole};
 use crate::session::save::maps::Maps;
 use crate::session::save::{CHECKPOINT, CheckpointFile, ESTIMATE};
 use crate::session::snapshot::OpenCapture;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// A folder of results, read back.
@@ -127,14 +126,14 @@ impl Saved {
 }
 
 fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
-    let bytes = fs::read(path).map_err(|error| match error.kind() {
-        std::io::ErrorKind::NotFound => Error::file(
+    if !path.exists() {
+        return Err(Error::file(
             path,
             "there are no results here",
             "name a folder that relit solve wrote",
-        ),
-        _ => Error::io(path, &error),
-    })?;
+        ));
+    }
+    let bytes = read_whole(path)?;
     serde_json::from_slice(&bytes)
         .map_err(|error| Error::file(path, error, "restore the file, or solve again"))
 }
