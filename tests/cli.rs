@@ -3,36 +3,17 @@
 mod common;
 #[path = "common/files.rs"]
 mod files;
+#[path = "common/place.rs"]
+mod place;
 
-use files::write_capture;
+use place::Place;
 use serde_json::Value;
 use std::fs;
 use std::process::{Command, Output};
-use tempfile::TempDir;
-
-struct Place {
-    folder: TempDir,
-}
 
 impl Place {
-    fn new() -> Self {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        write_capture(&folder.path().join("room"));
-        Self { folder }
-    }
-
-    fn path(&self, name: &str) -> std::path::PathBuf {
-        self.folder.path().join(name)
-    }
-
     fn relit(&self, arguments: &[&str]) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_relit"))
-            .args(arguments)
-            .current_dir(self.folder.path())
-            .env_remove("DISPLAY")
-            .env_remove("WAYLAND_DISPLAY")
-            .output()
-            .expect("relit starts")
+        self.command(arguments).output().expect("relit starts")
     }
 
     fn json(&self, name: &str) -> Value {
@@ -635,11 +616,10 @@ fn the_built_in_room_is_written_with_its_truth() {
 #[test]
 fn an_interrupt_ends_the_solve_cleanly_with_its_results() {
     let place = Place::new();
-    let mut relit = Command::new(env!("CARGO_BIN_EXE_relit"))
-        .args([
+    let mut relit = place
+        .command(&[
             "solve", "room", "--preset", "paper", "--time", "10m", "--views", "none",
         ])
-        .current_dir(place.folder.path())
         .stdout(std::process::Stdio::null())
         .stderr(std::process::Stdio::piped())
         .spawn()

@@ -5,45 +5,28 @@
 mod common;
 #[path = "common/files.rs"]
 mod files;
+#[path = "common/place.rs"]
+mod place;
 
+use place::Place;
 use relit::math::rng::Stream;
 use relit::session::save;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
-use tempfile::TempDir;
-
-struct Place {
-    folder: TempDir,
-}
 
 impl Place {
-    fn new() -> Self {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        files::write_capture(&folder.path().join("room"));
-        Self { folder }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_relit"));
-        command
-            .args(arguments)
-            .current_dir(self.folder.path())
-            .env_remove("DISPLAY")
-            .env_remove("WAYLAND_DISPLAY")
-            .stdout(Stdio::null())
-            .stderr(Stdio::null());
+    /// The program, running unheard.
+    fn silent(&self, arguments: &[&str]) -> Command {
+        let mut command = self.command(arguments);
+        command.stdout(Stdio::null()).stderr(Stdio::null());
         command
     }
 
     /// Runs to the end; what it said.
     fn said(&self, arguments: &[&str]) -> (Option<i32>, String) {
-        let Output { status, stderr, .. } = (self.command(arguments))
+        let Output { status, stderr, .. } = (self.silent(arguments))
             .stderr(Stdio::piped())
             .output()
             .expect("relit starts");
@@ -193,7 +176,7 @@ fn a_kill_at_any_moment_leaves_only_whole_files_and_work_goes_on() {
             place.done(&first);
         }
         let before = if resuming { iterations(&out) } else { None };
-        let mut relit = place.command(arguments).spawn().expect("relit starts");
+        let mut relit = place.silent(arguments).spawn().expect("relit starts");
         std::thread::sleep(length.mul_f64(1.1 * stream.uniform_f64()));
         relit.kill().expect("kills");
         killed += u32::from(!relit.wait().expect("ends").success());
@@ -230,10 +213,10 @@ fn a_kill_at_any_moment_leaves_only_whole_files_and_work_goes_on() {
 fn two_programs_in_one_folder_leave_whole_results() {
     let place = Place::new();
     place.done(&[&ENDLESS[..12], &["--steps", "3"]].concat());
-    let mut endless = place.command(&ENDLESS).spawn().expect("relit starts");
+    let mut endless = place.silent(&ENDLESS).spawn().expect("relit starts");
     let out = place.path("out");
     for _ in 0..3 {
-        let mut pair = [&WHOLE, &WHOLE].map(|w| place.command(w).spawn().expect("relit starts"));
+        let mut pair = [&WHOLE, &WHOLE].map(|w| place.silent(w).spawn().expect("relit starts"));
         for relit in &mut pair {
             assert!(relit.wait().expect("ends").success());
         }
@@ -292,7 +275,7 @@ fn a_full_disk_is_one_line_and_leaves_what_was_there() {
         let output = Command::new("sh")
             .args(["-c", script, env!("CARGO_BIN_EXE_relit")])
             .args(arguments)
-            .current_dir(place.folder.path())
+            .current_dir(place.path(""))
             .output()
             .expect("sh starts");
         (
@@ -337,7 +320,7 @@ fn a_folder_that_vanishes_while_solving_is_made_again() {
         "--views",
         "none",
     ];
-    let mut relit = place.command(&arguments).spawn().expect("relit starts");
+    let mut relit = place.silent(&arguments).spawn().expect("relit starts");
     let out = place.path("out");
     for _ in 0..10 {
         std::thread::sleep(Duration::from_millis(150));

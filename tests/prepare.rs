@@ -178,9 +178,18 @@ fn pixels_whose_depth_contradicts_the_mesh_are_left_out() {
         compared.warnings
     );
 
-    // A depth image that cannot be read is said and costs no pixel.
+    // A depth image that cannot be read, or that shows another view, is said and costs no pixel.
     std::fs::write(&path, b"no image").unwrap();
-    let unread = prepared(&capture(&[(-2.0, 0.0, -2.0, true)], with_depth));
+    let unread = prepared(&capture(&[(-2.0, 0.0, -2.0, true)], with_depth.clone()));
     assert!(unread.photographs[0].usable.iter().all(|&u| u));
     assert!(said(&unread, "depth.png"), "{:?}", unread.warnings);
+    let wide = image::ImageBuffer::from_pixel(2 * SIZE, SIZE, image::Luma([1u16]));
+    wide.save(&path).unwrap();
+    let other = prepared(&capture(&[(-2.0, 0.0, -2.0, true)], with_depth));
+    assert!(other.photographs[0].usable.iter().all(|&u| u));
+    assert!(
+        said(&other, "another width to height"),
+        "{:?}",
+        other.warnings
+    );
 }

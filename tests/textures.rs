@@ -87,16 +87,21 @@ fn room(size: [u32; 2], samples: u32) -> Room {
 /// With some seven per cent of noise a pixel.
 static ROOM: LazyLock<Room> = LazyLock::new(|| room([64, 48], 96));
 
-fn refined(problem: &Problem, estimate: &Estimate, objects: &[usize], paths: u64) -> Refined {
-    let settings = Settings::default();
-    let survey = Survey::new(problem, &settings, usize::MAX);
-    let task = Task {
+static SETTINGS: LazyLock<Settings> = LazyLock::new(Settings::default);
+
+fn task<'a>(problem: &'a Problem, survey: &'a Survey, paths: u64) -> Task<'a> {
+    Task {
         problem,
-        survey: &survey,
-        settings: &settings,
+        survey,
+        settings: &SETTINGS,
         paths,
         max_bounces: 1000,
-    };
+    }
+}
+
+fn refined(problem: &Problem, estimate: &Estimate, objects: &[usize], paths: u64) -> Refined {
+    let survey = Survey::new(problem, &SETTINGS, usize::MAX);
+    let task = task(problem, &survey, paths);
     let (refined, ended) = refine(&task, estimate, objects, &|_| None, &mut |_, _, _| Ok(()));
     ended.expect("nobody ends it");
     refined
@@ -250,15 +255,8 @@ fn threads_do_not_change_a_bit() {
 
 #[test]
 fn who_ends_it_is_obeyed() {
-    let settings = Settings::default();
-    let survey = Survey::new(&ROOM.problem, &settings, usize::MAX);
-    let task = Task {
-        problem: &ROOM.problem,
-        survey: &survey,
-        settings: &settings,
-        paths: 10_000,
-        max_bounces: 1000,
-    };
+    let survey = Survey::new(&ROOM.problem, &SETTINGS, usize::MAX);
+    let task = task(&ROOM.problem, &survey, 10_000);
     let ended_after = |most: u32| {
         let mut calls = 0;
         refine(&task, &ROOM.estimate, &[BACK], &|_| None, &mut |_, _, _| {
@@ -283,15 +281,8 @@ fn who_ends_it_is_obeyed() {
 /// Light and texture may fail to agree: what held-out pixels say decides between the states.
 #[test]
 fn states_that_held_out_pixels_speak_against_are_not_kept() {
-    let settings = Settings::default();
-    let survey = Survey::new(&ROOM.problem, &settings, usize::MAX);
-    let task = Task {
-        problem: &ROOM.problem,
-        survey: &survey,
-        settings: &settings,
-        paths: 10_000,
-        max_bounces: 1000,
-    };
+    let survey = Survey::new(&ROOM.problem, &SETTINGS, usize::MAX);
+    let task = task(&ROOM.problem, &survey, 10_000);
     let judged = |judge: &dyn Fn(&Estimate) -> Option<f64>| {
         let (refined, ended) = refine(&task, &ROOM.estimate, &[BACK], judge, &mut |_, _, _| Ok(()));
         ended.expect("nobody ends it");

@@ -34,14 +34,7 @@ pub fn write_atomically(
     };
     std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, &error))?;
 
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".relit-").suffix(".partial");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let temporary = builder.tempfile_in(folder).map_err(io)?;
+    let temporary = temporary_names(0o666).tempfile_in(folder).map_err(io)?;
 
     let mut writer = BufWriter::new(temporary.as_file().try_clone().map_err(io)?);
     write(&mut writer).map_err(|error| match error.downcast::<std::io::Error>() {
@@ -52,6 +45,20 @@ pub fn write_atomically(
     temporary.as_file().sync_all().map_err(io)?;
     temporary.persist(path).map_err(|error| io(error.error))?;
     Ok(())
+}
+
+/// How what is not complete yet is named, and the permissions that it gets (the umask takes away from them).
+pub(super) fn temporary_names(mode: u32) -> tempfile::Builder<'static, 'static> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".relit-").suffix(".partial");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(mode));
+    }
+    #[cfg(not(unix))]
+    let _ = mode;
+    builder
 }
 
 /// Writes bytes as a whole file or not at all; see [`write_atomically`].

@@ -4,7 +4,7 @@ use crate::capture::import::{DepthImage, Import, ImportedFrame, Lens};
 use crate::capture::photograph::Photograph;
 use crate::capture::read::image;
 use crate::error::{Error, Result};
-use crate::export::atomic::write_bytes;
+use crate::export::atomic::{temporary_names, write_bytes};
 use crate::export::capture::{Entry, transforms};
 use crate::export::{ply, resample};
 use rayon::prelude::*;
@@ -154,14 +154,7 @@ impl Staging {
             _ => Path::new("."),
         };
         std::fs::create_dir_all(parent).map_err(|e| Error::io(parent, &e))?;
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".relit-").suffix(".partial");
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(std::fs::Permissions::from_mode(0o777));
-        }
-        let folder = builder
+        let folder = temporary_names(0o777)
             .tempdir_in(parent)
             .map_err(|e| Error::io(parent, &e))?;
         Ok(Self {

@@ -3,7 +3,7 @@
 use crate::capture::Capture;
 use crate::capture::import::depth::decode;
 use crate::capture::photograph::Photograph;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::math::stats::quantile;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
@@ -45,6 +45,14 @@ pub fn compare(capture: &Capture, scene: &Scene, photographs: &[Arc<Photograph>]
                 },
                 Err(error) => return (photograph.clone(), Some(Err(error))),
             };
+            if !depth.shows_the_view_of(photograph) {
+                let error = Error::file(
+                    path,
+                    "has another width to height than its photograph",
+                    "its pixels are not compared",
+                );
+                return (photograph.clone(), Some(Err(error)));
+            }
             let (masked, count) = mask(&depth, scene, frame, photograph);
             (Arc::new(masked), Some(Ok(count)))
         })
@@ -52,15 +60,23 @@ pub fn compare(capture: &Capture, scene: &Scene, photographs: &[Arc<Photograph>]
 
     let mut warnings = Vec::new();
     let (mut contradicting, mut compared) = (0, 0);
+    let mut refused = Vec::new();
     for (photograph, outcome) in &frames {
         match outcome {
             Some(Ok(count)) => {
                 contradicting += count;
                 compared += photograph.pixels.len() as u64;
             }
-            Some(Err(error)) => warnings.push(format!("{error}; its pixels are not compared")),
+            Some(Err(error)) => refused.push(error),
             None => {}
         }
+    }
+    if let Some(first) = refused.first() {
+        warnings.push(format!(
+            "{} of {} depth images are not compared with the mesh: {first}",
+            refused.len(),
+            frames.iter().filter(|f| f.1.is_some()).count()
+        ));
     }
     if contradicting > 0 {
         warnings.push(format!(
@@ -83,6 +99,13 @@ struct Depth {
 }
 
 impl Depth {
+    /// Whether it can be what the photograph shows, at another resolution.
+    fn shows_the_view_of(&self, photograph: &Photograph) -> bool {
+        let aspect = |[width, height]: [u32; 2]| f64::from(width) / f64::from(height.max(1));
+        let ratio = aspect(self.size) / aspect([photograph.width, photograph.height]);
+        !self.size.contains(&0) && (ratio - 1.0).abs() < SAME_ASPECT
+    }
+
     /// Metres along the viewing direction at a point given in shares of width and height; `None` where nothing was
     /// measured.
     fn at(&self, share: Vec2) -> Option<f64> {
@@ -96,12 +119,7 @@ impl Depth {
 
 /// The photograph without the pixels that contradict the mesh, and their number.
 fn mask(depth: &Depth, scene: &Scene, frame: usize, photograph: &Photograph) -> (Photograph, u64) {
-    let aspect = |[width, height]: [u32; 2]| f64::from(width) / f64::from(height.max(1));
     let size = [photograph.width, photograph.height];
-    let same_view = (aspect(depth.size) / aspect(size) - 1.0).abs() < SAME_ASPECT;
-    if !same_view || depth.size.contains(&0) {
-        return (photograph.clone(), 0);
-    }
     let camera = &scene.cameras[frame];
     let triangles = &scene.ids().triangles[frame];
     let pixels: Vec<Option<(f64, f64)>> = (triangles.iter().enumerate())

@@ -1,6 +1,7 @@
 //! Flows without a graphics adapter.
 
 use crate::connection::{Recorder, idle, insertion, solve, solving, view};
+use crate::input::{click, press, type_into};
 use egui::{Key, Modifiers, Role};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
@@ -12,23 +13,6 @@ use relit::session::command::{Command, ExportFormat, Source, ViewCamera};
 use relit::session::snapshot::{Event, Level, Phase};
 use std::path::PathBuf;
 use std::sync::Arc;
-
-fn click(harness: &mut Harness<'_, Window>, label: &str) {
-    harness.get_by_label(label).click();
-    harness.run_steps(3);
-}
-
-fn press(harness: &mut Harness<'_, Window>, modifiers: Modifiers, key: Key) {
-    harness.key_press_modifiers(modifiers, key);
-    harness.run_steps(3);
-}
-
-fn type_into(harness: &mut Harness<'_, Window>, label: &str, text: &str) {
-    harness.get_by_label(label).focus();
-    harness.run_steps(2);
-    harness.get_by_label(label).type_text(text);
-    harness.run_steps(2);
-}
 
 fn placements(recorder: &Recorder) -> Option<usize> {
     let sent = recorder.sent();

@@ -1,6 +1,7 @@
 //! Mixing the light of lamps, and changing lamps and materials by hand.
 
 use crate::connection::{solving, view};
+use crate::input::{click, press};
 use egui::{Key, Modifiers, Role};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
@@ -13,16 +14,6 @@ use relit::session::edits::Edits;
 use relit::session::snapshot::LightSource;
 use std::path::PathBuf;
 use std::sync::Arc;
-
-fn click(harness: &mut Harness<'_, Window>, label: &str) {
-    harness.get_by_label(label).click();
-    harness.run_steps(3);
-}
-
-fn press(harness: &mut Harness<'_, Window>, modifiers: Modifiers, key: Key) {
-    harness.key_press_modifiers(modifiers, key);
-    harness.run_steps(3);
-}
 
 /// Drags a slider from one share of its length to another, in steps.
 fn slide(harness: &mut Harness<'_, Window>, label: &str, to: f32) {

@@ -3,6 +3,7 @@
 
 mod connection;
 mod flows;
+mod input;
 mod light;
 mod rendering;
 mod trade;

@@ -1,6 +1,7 @@
 //! The pane of the trade, driven by its labels.
 
 use crate::connection::{Recorder, solving};
+use crate::input::click;
 use egui::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
@@ -72,11 +73,6 @@ fn set(recorder: &Recorder) -> Option<Settings> {
         Command::Set(settings) => Some(Settings::clone(settings)),
         _ => None,
     })
-}
-
-fn click(harness: &mut Harness<'_, Window>, label: &str) {
-    harness.get_by_label(label).click();
-    harness.run_steps(3);
 }
 
 #[test]

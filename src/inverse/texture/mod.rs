@@ -164,8 +164,9 @@ pub fn refine(
     let mut ended = refinement.look(&candidates(task, objects), tell);
     let mut states = vec![refinement.refined()];
     for sweep in 1..=SWEEPS {
-        if ended.is_ok() && !refinement.kept.is_empty() {
-            ended = refinement.sweep(sweep, tell);
+        let found = states.last().and_then(|state| state.texels.clone());
+        if let (Ok(()), Some(found)) = (&ended, found) {
+            ended = refinement.sweep(sweep, found, tell);
             states.push(refinement.refined());
         }
     }
@@ -252,13 +253,16 @@ impl Refinement<'_> {
         Ok(())
     }
 
-    /// Finds the light as the textures send it on, and the textures, from now on in fine cells, as that light shows them.
-    fn sweep(&mut self, sweep: u32, tell: &mut Tell) -> Result<(), Termination> {
-        let Some(textured) = self.textured() else {
-            return Ok(());
-        };
+    /// Finds the light as the textures `found` send it on, and the textures, from now on in fine cells, as that light
+    /// shows them.
+    fn sweep(
+        &mut self,
+        sweep: u32,
+        found: Arc<TexelEstimate>,
+        tell: &mut Tell,
+    ) -> Result<(), Termination> {
         let textured = Estimate {
-            texels: Some(textured),
+            texels: Some(found),
             ..self.estimate.clone()
         };
         let lit = textured.lit(&self.task.problem.scene);
@@ -293,22 +297,17 @@ impl Refinement<'_> {
         Ok(())
     }
 
-    /// The texels as they are now, where any object kept a texture.
-    fn textured(&self) -> Option<Arc<TexelEstimate>> {
-        (!self.kept.is_empty()).then(|| {
-            let scene = &self.task.problem.scene;
-            Arc::new(whole::texels(scene, self.estimate, &self.kept))
-        })
-    }
-
+    /// The state as it is now.
     fn refined(&self) -> Refined {
         let mut attempts = self.attempts.clone();
         for attempt in &mut attempts {
             let found = self.kept.iter().find(|s| s.object == attempt.object);
             attempt.cells = found.map_or(attempt.cells, Surface::cell_count);
         }
+        let scene = &self.task.problem.scene;
         Refined {
-            texels: self.textured(),
+            texels: (!self.kept.is_empty())
+                .then(|| Arc::new(whole::texels(scene, self.estimate, &self.kept))),
             means: self.kept.iter().map(|s| (s.object, s.mean())).collect(),
             attempts,
             unrest: self.unrest,
