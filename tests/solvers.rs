@@ -132,6 +132,32 @@ fn balanced_recovers_albedo_and_lamp_within_its_reported_errors() {
     assert!(error < 0.01, "mean absolute error {error}");
 }
 
+/// 2 MiB hold some twelve thousand of the million paths.
+#[test]
+fn with_little_memory_fewer_paths_are_stored_and_that_is_said() {
+    let (problem, materials) = &*ROOM;
+    let solution = run(
+        problem,
+        &Settings {
+            memory: 2.0 / 1024.0,
+            ..preset(Preset::Preview)
+        },
+    );
+    let said_of = |solution: &Solution| {
+        let stages = &solution.progress.stages;
+        let first = stages.iter().find(|s| s.name == "light field");
+        first.map(|s| s.why.clone()).expect("the first stage")
+    };
+    let said = said_of(&solution);
+    assert!(said.contains("memory allows"), "{said}");
+    let rays = [&solution, &PREVIEW].map(|s| s.progress.rays);
+    assert!(rays[0] < rays[1] / 2, "{rays:?}");
+    let error = mean_absolute_error(&solution.estimate, materials);
+    assert!(error < 0.05, "mean absolute error {error}");
+    let ample = said_of(&PREVIEW);
+    assert!(!ample.contains("memory"), "{ample}");
+}
+
 #[test]
 fn preview_is_a_usable_first_answer() {
     let error = mean_absolute_error(&PREVIEW.estimate, &ROOM.1);

@@ -221,6 +221,12 @@ parameters! {
         "Estimate the exposure and white balance of each photograph, where they disagree about surfaces that they share";
     textures: bool = true, Kind::Flag, "", false,
         "Try albedo that varies over an object, where its pixels show more than one colour";
+    pixels: u64 = 0, Kind::Whole { min: 0, max: 1_000_000_000 }, "", false,
+        "Pixels in the fit of the transport cache, about; 0 leaves it to the preset";
+    paths: u64 = 0, Kind::Whole { min: 0, max: 1_000_000_000_000 }, "a round", false,
+        "Paths of the transport cache in each round, its first stage in proportion; 0 leaves it to the preset";
+    memory: f64 = 0.0, Kind::Real { min: 0.0, max: 1e6, logarithmic: true }, "GiB", false,
+        "Memory that stored paths may take; 0 takes a quarter of the machine's";
     learning_rate: f64 = 5e-3, Kind::Real { min: 1e-6, max: 10.0, logarithmic: true }, "", true,
         "Paper solver: initial step size of ADAM";
     batch: u64 = 8, Kind::Whole { min: 1, max: 1_000_000 }, "pixels", true,

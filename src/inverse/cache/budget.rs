@@ -1,6 +1,6 @@
 //! How much work each preset does, and what error it stops at.
 
-use crate::inverse::settings::Preset;
+use crate::inverse::settings::{Preset, Settings};
 
 /// Work and targets of a solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,8 +22,31 @@ pub struct Budget {
 }
 
 impl Budget {
+    /// What the settings ask for, and their preset where they leave it open.
+    pub fn of(settings: &Settings) -> Self {
+        let mut budget = Self::of_preset(settings.preset);
+        if settings.pixels > 0 {
+            let share = settings.pixels as f64 / budget.pixels as f64;
+            budget.pixels = usize::try_from(settings.pixels).unwrap_or(usize::MAX);
+            budget.survey_pixels = (budget.survey_pixels as f64 * share).ceil() as usize;
+        }
+        if settings.paths > 0 {
+            let round = match budget.round_paths {
+                0 => &mut budget.light_field_paths,
+                _ => {
+                    let share = settings.paths as f64 / budget.round_paths as f64;
+                    budget.light_field_paths =
+                        (budget.light_field_paths as f64 * share).ceil() as u64;
+                    &mut budget.round_paths
+                }
+            };
+            *round = settings.paths;
+        }
+        budget
+    }
+
     /// The budget of a preset.
-    pub const fn of(preset: Preset) -> Self {
+    const fn of_preset(preset: Preset) -> Self {
         match preset {
             Preset::Preview => Self {
                 survey_pixels: 100_000,
@@ -53,5 +76,34 @@ impl Budget {
                 tail_error: 0.01,
             },
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_overrule_presets_in_proportion() {
+        let of = |preset, pixels, paths| {
+            Budget::of(&Settings {
+                preset,
+                pixels,
+                paths,
+                ..Settings::default()
+            })
+        };
+        let plain = of(Preset::Balanced, 0, 0);
+        let more = of(
+            Preset::Balanced,
+            plain.pixels as u64 * 2,
+            plain.round_paths * 3,
+        );
+        assert_eq!(more.survey_pixels, plain.survey_pixels * 2);
+        assert_eq!(more.round_paths, plain.round_paths * 3);
+        assert_eq!(more.light_field_paths, plain.light_field_paths * 3);
+        // A preset without rounds gets none.
+        let preview = of(Preset::Preview, 0, 5_000);
+        assert_eq!((preview.light_field_paths, preview.round_paths), (5_000, 0));
     }
 }

@@ -27,6 +27,10 @@ const VARIED_WEIGHT: f64 = 2.0;
 
 /// The settings that are changed, with the values tried.
 const VARIED: &[(Preset, &str, &[&str])] = &[
+    (Preset::Preview, "paths", &["100000", "1600000"]),
+    (Preset::Preview, "pixels", &["15000", "240000"]),
+    (Preset::Balanced, "paths", &["400000", "6000000"]),
+    (Preset::Balanced, "pixels", &["30000", "480000"]),
     (Preset::Balanced, "bounces", &["2", "4", "8"]),
     (Preset::Balanced, "light_sampling", &["emitter", "bsdf"]),
     (Preset::Paper, "bounces", &["8"]),

@@ -4,7 +4,6 @@ use super::Ladder;
 use crate::inverse::cache::PathCache;
 use crate::inverse::cache::equations::NormalEquations;
 use crate::inverse::cache::fit::{LEAST_DAMPING, propose};
-use crate::inverse::cache::path_noise::share_paths;
 use crate::inverse::cache::prior::{ALBEDO_DEVIATION, ALBEDO_MEAN, ExpectedAlbedo};
 use crate::inverse::cache::roles::{self, Role};
 use crate::inverse::cache::trust::Trust;
@@ -34,11 +33,6 @@ impl Ladder<'_, '_> {
         let started = self.monitor.seconds();
         self.monitor.phase("gathering light from the photographs");
         let measured = MeasuredRadiance::new(self.problem, &self.survey);
-        share_paths(
-            &mut self.clusters,
-            self.roles.len(),
-            self.budget.light_field_paths,
-        );
 
         // Light samples go where the photographs are bright: in proportion to area × radiance².
         let scene = &self.problem.scene;
@@ -48,7 +42,8 @@ impl Ladder<'_, '_> {
             })
             .collect();
         let lights = Emitters::new(scene, &self.explore(&bright));
-        let cache = self.trace(&lights, Some(&measured), 0, 0)?;
+        let paths = self.budget.light_field_paths;
+        let (cache, limit) = self.stored(&lights, Some(&measured), 0, paths)?;
 
         // First as if no light came from outside, then, where rays leave the mesh, as if some did.
         self.monitor.phase("telling lamps from walls");
@@ -58,7 +53,7 @@ impl Ladder<'_, '_> {
             .seconds_to_first_estimate
             .get_or_insert(self.monitor.seconds());
         let why = format!(
-            "each object fitted to the light that the photographs measured around it; {} give light",
+            "each object fitted to the light that the photographs measured around it; {} give light{limit}",
             self.lamps()
         );
         let closed = self.record("light field", started, true, why)?;
@@ -150,7 +145,8 @@ impl Ladder<'_, '_> {
         self.expect_of_outside();
         match self.sky {
             Some(_) => {
-                let cache = self.trace(lights, Some(measured), 0, 0)?;
+                let paths = self.budget.light_field_paths;
+                let (cache, _) = self.stored(lights, Some(measured), 0, paths)?;
                 self.tell_lamps(&cache, Role::Unseen)?;
             }
             None => self.tell_lamps(cache, Role::Unseen)?,

@@ -4,23 +4,22 @@ mod detail;
 mod lamps;
 mod light_field;
 mod rounds;
+mod trace;
 
 use super::budget::Budget;
 use super::clusters::{Cluster, brightness, cluster, mean_radiance};
 use super::errors::{StandardErrors, standard_errors};
 use super::fit::{Fit, fit};
-use super::path_noise::share_paths;
 use super::prior::Prior;
 use super::reached::Reached;
 use super::roles::{self, Role};
-use super::trace::{OutsideGrid, Tracer};
+use super::trace::OutsideGrid;
 use super::trust::Trust;
 use super::{PathCache, describe};
 use crate::error;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::exposure::Exposures;
 use crate::inverse::loss::{LossProbe, Losses};
-use crate::inverse::measured::MeasuredRadiance;
 use crate::inverse::monitor::Monitor;
 use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::parameters::Unknowns;
@@ -28,9 +27,7 @@ use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Problem, Solution, Stage, Termination};
 use crate::inverse::survey::Survey;
 use crate::inverse::texture::Refined;
-use crate::transport::emitters::Emitters;
 use glam::Vec3;
-use std::time::{Duration, Instant};
 
 /// Gauss–Newton steps at most in one fit.
 const MOST_STEPS: u64 = 30;
@@ -39,8 +36,6 @@ const OUTSIDE_WIDTH: usize = 12;
 const OUTSIDE_HEIGHT: usize = 6;
 /// Stages of a solve that goes all the way.
 const STAGES: u32 = 4;
-/// Work between two reports to the observer.
-const SLICE: Duration = Duration::from_millis(25);
 
 /// The state of a solve.
 pub struct Ladder<'a, 'o> {
@@ -87,7 +82,7 @@ pub fn solve(
     resume: Option<&Checkpoint>,
     mut monitor: Monitor,
 ) -> error::Result<Solution> {
-    let budget = Budget::of(settings.preset);
+    let budget = Budget::of(settings);
     let objects = problem.scene.objects.len();
     let surfaces = objects + OUTSIDE_WIDTH * OUTSIDE_HEIGHT;
     monitor.phase("looking through the pixels");
@@ -230,13 +225,8 @@ impl Ladder<'_, '_> {
     fn objects(&mut self) -> Result<(), Termination> {
         let started = self.monitor.seconds();
         self.monitor.phase("tracing paths to the lamps");
-        share_paths(
-            &mut self.clusters,
-            self.roles.len(),
-            self.budget.round_paths,
-        );
         let lights = self.lights();
-        let cache = self.trace(&lights, None, 1, 0)?;
+        let (cache, limit) = self.stored(&lights, None, 1, self.budget.round_paths)?;
         self.monitor.phase("fitting albedo and emission");
         // Tests of roles weigh all alike: whatever the residuals of a wrong role say is no measure of trust.
         self.trust = Trust::even(self.roles.len());
@@ -252,60 +242,8 @@ impl Ladder<'_, '_> {
                 names.join(", ")
             ),
         };
-        self.record("objects", started, true, why)?;
+        self.record("objects", started, true, why + &limit)?;
         Ok(())
-    }
-
-    /// Traces the clusters' paths in slices, reporting between them.
-    fn trace(
-        &mut self,
-        lights: &Emitters,
-        measured: Option<&MeasuredRadiance>,
-        stage: u64,
-        round: u32,
-    ) -> Result<PathCache, Termination> {
-        let believed: Vec<f32> = self
-            .unknowns
-            .albedo
-            .iter()
-            .map(|a| a.max_element())
-            .collect();
-        let tracer = Tracer {
-            scene: &self.problem.scene,
-            lights,
-            measured,
-            surface_of: &self.problem.scene.object_of,
-            believed_albedo: &believed,
-            sky: self.sky.as_ref(),
-            outside: Some(self.outside),
-            sampling: self.monitor.settings.light_sampling,
-            max_bounces: self.max_bounces,
-            seed: self.monitor.settings.seed,
-            stage,
-            round,
-        };
-        let mut cache = PathCache::default();
-        let mut next = 0;
-        let mut slice = 16;
-        while next < self.clusters.len() {
-            let end = (next + slice).min(self.clusters.len());
-            let begun = Instant::now();
-            let traced = tracer.trace(&self.clusters[next..end], &self.widths);
-            let elapsed = begun.elapsed();
-            self.monitor.progress.rays += traced.rays;
-            self.monitor
-                .rejected("path weight not finite", traced.rejected);
-            cache.append(traced);
-            self.monitor
-                .tick(&self.estimate, &|_| self.checkpoint.clone())?;
-            slice = if elapsed > SLICE {
-                (slice / 2).max(4)
-            } else {
-                slice + slice / 2
-            };
-            next = end;
-        }
-        Ok(cache)
     }
 
     fn fit(&mut self, cache: &PathCache) -> Result<Fit, Termination> {

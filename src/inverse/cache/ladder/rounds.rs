@@ -41,8 +41,7 @@ impl Ladder<'_, '_> {
         let mut outcome = Termination::Steps;
         for round in 0..self.budget.rounds {
             // Path lengths are steered by what is believed at the start, the same in every round.
-            let cache = self.trace(&lights, None, 2, round)?;
-            sums.add(cache.linearise(&about, &places));
+            sums.add(self.linearised(&lights, 2, round, &about, &places)?);
             let mean = sums.mean();
             self.trust = Trust::from_residuals(&mean, self.roles.len());
             self.path_noise = path_noise::shares(&mean, self.roles.len());
@@ -88,9 +87,8 @@ impl Ladder<'_, '_> {
     fn weigh_by_prediction(&mut self, lights: &Emitters) -> Result<(), Termination> {
         let paths = self.budget.round_paths / PREDICTING;
         share_paths(&mut self.clusters, self.roles.len(), paths);
-        let cache = self.trace(lights, None, 3, 0)?;
         let held = vec![usize::MAX; 2 * self.roles.len()];
-        let linearised = cache.linearise(&self.unknowns, &held);
+        let linearised = self.linearised(lights, 3, 0, &self.unknowns.clone(), &held)?;
         for (cluster, found) in self.clusters.iter_mut().zip(linearised) {
             let residual = (found.residuals[0] + found.residuals[1]) * 0.5;
             cluster.weigh((cluster.measured.as_dvec3() - residual).as_vec3());

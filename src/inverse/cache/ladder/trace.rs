@@ -1,0 +1,142 @@
+//! Tracing for the ladder: in slices, between which the observer hears, and within the memory that paths may take.
+
+use super::Ladder;
+use crate::inverse::cache::PathCache;
+use crate::inverse::cache::clusters::cluster;
+use crate::inverse::cache::evaluate::Linearised;
+use crate::inverse::cache::memory::{self, PILOT_CLUSTERS};
+use crate::inverse::cache::path_noise::share_paths;
+use crate::inverse::cache::trace::Tracer;
+use crate::inverse::measured::MeasuredRadiance;
+use crate::inverse::parameters::Unknowns;
+use crate::inverse::solver::Termination;
+use crate::transport::emitters::Emitters;
+use std::time::{Duration, Instant};
+
+/// Work between two reports to the observer.
+const SLICE: Duration = Duration::from_millis(25);
+
+impl Ladder<'_, '_> {
+    /// The clusters' paths, kept so that any unknowns can be tried on them: about as many as asked for, fewer where they
+    /// would take more memory than they may, and what is to be said of that.
+    pub(super) fn stored(
+        &mut self,
+        lights: &Emitters,
+        measured: Option<&MeasuredRadiance>,
+        stage: u64,
+        paths: u64,
+    ) -> Result<(PathCache, String), Termination> {
+        let allowed = memory::allowed(self.monitor.settings.memory);
+        let surfaces = self.roles.len();
+        let mut fits = paths;
+        if !memory::suffices(allowed, paths) {
+            // A few paths of the same kind tell how long they are.
+            share_paths(&mut self.clusters, surfaces, 0);
+            let step = self.clusters.len().div_ceil(PILOT_CLUSTERS).max(1);
+            let pilot: Vec<_> = self.clusters.iter().step_by(step).cloned().collect();
+            let believed = self.believed();
+            let pilot = self
+                .tracer(lights, measured, &believed, stage, 0)
+                .trace(&pilot, &self.widths);
+            self.monitor.progress.rays += pilot.rays;
+            fits = paths.min(memory::paths_that_fit(allowed, &pilot));
+        }
+        let pixels: usize = self.clusters.iter().map(|c| c.pixels.len()).sum();
+        if fits < 2 * pixels as u64 {
+            // A pixel has a path in each set; there is no room for that.
+            self.clusters = cluster(self.problem, &self.survey, (fits / 2) as usize);
+        }
+        share_paths(&mut self.clusters, surfaces, fits);
+        let mut cache = PathCache::default();
+        self.slices(lights, measured, stage, 0, |slice| cache.append(slice))?;
+        let limit = match fits < paths {
+            true => {
+                let pixels: usize = self.clusters.iter().map(|c| c.pixels.len()).sum();
+                format!("; memory allows {fits} paths of {pixels} pixels in place of {paths}")
+            }
+            false => String::new(),
+        };
+        Ok((cache, limit))
+    }
+
+    /// The clusters' paths linearised about some unknowns and forgotten; `places` maps parameters to rows.
+    pub(super) fn linearised(
+        &mut self,
+        lights: &Emitters,
+        stage: u64,
+        round: u32,
+        about: &Unknowns,
+        places: &[usize],
+    ) -> Result<Vec<Linearised>, Termination> {
+        let mut all = Vec::with_capacity(self.clusters.len());
+        self.slices(lights, None, stage, round, |slice| {
+            all.extend(slice.linearise(about, places));
+        })?;
+        Ok(all)
+    }
+
+    /// Traces the clusters' paths in slices, reporting between them.
+    fn slices(
+        &mut self,
+        lights: &Emitters,
+        measured: Option<&MeasuredRadiance>,
+        stage: u64,
+        round: u32,
+        mut take: impl FnMut(PathCache),
+    ) -> Result<(), Termination> {
+        let believed = self.believed();
+        let mut next = 0;
+        let mut slice = 16;
+        while next < self.clusters.len() {
+            let end = (next + slice).min(self.clusters.len());
+            let begun = Instant::now();
+            let traced = self
+                .tracer(lights, measured, &believed, stage, round)
+                .trace(&self.clusters[next..end], &self.widths);
+            self.monitor.progress.rays += traced.rays;
+            self.monitor
+                .rejected("path weight not finite", traced.rejected);
+            take(traced);
+            let elapsed = begun.elapsed();
+            self.monitor
+                .tick(&self.estimate, &|_| self.checkpoint.clone())?;
+            slice = if elapsed > SLICE {
+                (slice / 2).max(4)
+            } else {
+                slice + slice / 2
+            };
+            next = end;
+        }
+        Ok(())
+    }
+
+    /// For each surface, the largest channel of its albedo as believed now.
+    fn believed(&self) -> Vec<f32> {
+        let albedo = &self.unknowns.albedo;
+        albedo.iter().map(|a| a.max_element()).collect()
+    }
+
+    fn tracer<'t>(
+        &'t self,
+        lights: &'t Emitters,
+        measured: Option<&'t MeasuredRadiance>,
+        believed: &'t [f32],
+        stage: u64,
+        round: u32,
+    ) -> Tracer<'t> {
+        Tracer {
+            scene: &self.problem.scene,
+            lights,
+            measured,
+            surface_of: &self.problem.scene.object_of,
+            believed_albedo: believed,
+            sky: self.sky.as_ref(),
+            outside: Some(self.outside),
+            sampling: self.monitor.settings.light_sampling,
+            max_bounces: self.max_bounces,
+            seed: self.monitor.settings.seed,
+            stage,
+            round,
+        }
+    }
+}

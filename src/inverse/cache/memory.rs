@@ -1,0 +1,86 @@
+//! How many paths may be stored.
+
+use super::{PathCache, Vertex};
+use sysinfo::{MemoryRefreshKind, System};
+
+/// Clusters whose paths tell how long paths are.
+pub const PILOT_CLUSTERS: usize = 64;
+/// Share of the machine's memory that stored paths may take.
+const SHARE: u64 = 4;
+/// Memory where the machine's is not known, in bytes.
+const UNKNOWN: u64 = 8 << 30;
+/// No path is expected to be longer; more vertices than this are measured before they are believed.
+const LONG: u64 = 64;
+
+/// Bytes that stored paths may take: so many GiB, or a quarter of the machine's memory for zero.
+pub fn allowed(gibibytes: f64) -> u64 {
+    if gibibytes > 0.0 {
+        return (gibibytes * (1u64 << 30) as f64) as u64;
+    }
+    let known = System::new().ok().map(|mut system| {
+        system.refresh_memory_specifics(MemoryRefreshKind::nothing().with_ram());
+        // A container may hold less than the machine.
+        let limit = system.cgroup_limits().map(|limits| limits.total_memory);
+        limit.unwrap_or(u64::MAX).min(system.total_memory())
+    });
+    known.filter(|&bytes| bytes > 0).unwrap_or(UNKNOWN) / SHARE
+}
+
+/// Whether so many paths fit however long they are.
+pub fn suffices(allowed: u64, paths: u64) -> bool {
+    paths.saturating_mul(LONG * size_of::<Vertex>() as u64) <= allowed
+}
+
+/// How many paths fit, if they are like those of a pilot.
+pub fn paths_that_fit(allowed: u64, pilot: &PathCache) -> u64 {
+    let paths: usize = pilot.clusters.iter().map(|c| c.ends.len()).sum();
+    let bytes = pilot.bytes().max(1);
+    (u128::from(allowed) * paths as u128 / bytes as u128) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inverse::cache::{CachedCluster, NO_LAMP, clusters::Cluster};
+    use glam::Vec3;
+
+    #[test]
+    fn as_many_paths_fit_as_are_as_long_as_those_of_the_pilot() {
+        let vertex = Vertex {
+            surface: 0,
+            lamp: NO_LAMP,
+            lamp_weight: 0.0,
+            emission_weight: 0.0,
+            known: Vec3::ZERO,
+        };
+        let cluster = Cluster {
+            frame: 0,
+            object: 0,
+            pixels: vec![0, 1],
+            paths: 1,
+            measured: Vec3::ONE,
+            weight: Vec3::ONE,
+            dark: Vec3::ONE,
+        };
+        // Four paths of three vertices.
+        let pilot = PathCache {
+            clusters: vec![CachedCluster {
+                cluster,
+                vertices: vec![vertex; 12],
+                ends: vec![3, 6, 9, 12],
+            }],
+            ..PathCache::default()
+        };
+        let a_path = 3 * size_of::<Vertex>() as u64 + 4;
+        assert_eq!(paths_that_fit(1000 * a_path + 5, &pilot), 1000);
+        assert_eq!(paths_that_fit(1000, &PathCache::default()), 0);
+    }
+
+    #[test]
+    fn a_part_of_the_machine_is_taken_where_nothing_is_said() {
+        assert_eq!(allowed(2.0), 2 << 30);
+        let part = allowed(0.0);
+        assert!((1 << 20..1 << 46).contains(&part), "{part}");
+        assert!(suffices(part, 1000) && !suffices(part, u64::MAX));
+    }
+}
