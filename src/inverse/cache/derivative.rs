@@ -44,6 +44,27 @@ impl Gradient {
     }
 }
 
+/// Radiance of one path.
+#[inline]
+pub fn radiance(vertices: &[Vertex], unknowns: &Unknowns) -> Vec3 {
+    let leaving = |beyond: Vec3, vertex: &Vertex| {
+        let surface = vertex.surface as usize;
+        unknowns.emission[surface] * vertex.emission_weight
+            + unknowns.albedo[surface] * gathered_at(vertex, beyond, unknowns)
+    };
+    vertices.iter().rev().fold(Vec3::ZERO, leaving)
+}
+
+/// Radiance gathered at a vertex, where `beyond` leaves the next one towards it.
+#[inline]
+fn gathered_at(vertex: &Vertex, beyond: Vec3, unknowns: &Unknowns) -> Vec3 {
+    let mut gathered = beyond + vertex.known;
+    if vertex.lamp != NO_LAMP {
+        gathered += unknowns.emission[vertex.lamp as usize] * vertex.lamp_weight;
+    }
+    gathered
+}
+
 /// Radiance of one path, its derivative added to `gradient`.
 ///
 /// With G_i the radiance gathered at vertex i, L_i = w_i E_i + ρ_i G_i is what leaves it towards the camera; the
@@ -59,10 +80,7 @@ pub fn differentiate(
     gathered.clear();
     let mut beyond = Vec3::ZERO;
     for vertex in vertices.iter().rev() {
-        let mut g = beyond + vertex.known;
-        if vertex.lamp != NO_LAMP {
-            g += unknowns.emission[vertex.lamp as usize] * vertex.lamp_weight;
-        }
+        let g = gathered_at(vertex, beyond, unknowns);
         gathered.push(g);
         let surface = vertex.surface as usize;
         beyond = unknowns.emission[surface] * vertex.emission_weight + unknowns.albedo[surface] * g;

@@ -23,6 +23,8 @@ pub struct NormalEquations {
     pub descent: Vec<DVec3>,
     /// Diagonal of the Hessian Σ w J̄ J̄ᵀ with J̄ = (J_A + J_B)/2.
     pub diagonal: Vec<DVec3>,
+    /// Diagonal of the derivative of minus `descent`, Σ w J_A J_B: without the square of the paths' noise in J̄.
+    pub across: Vec<DVec3>,
     /// Diagonal of the scatter Σ g gᵀ of the clusters' contributions g to `descent`.
     pub scatter: Vec<DVec3>,
     /// Σ w r_A r_B, an unbiased measure of the squared error.
@@ -89,6 +91,7 @@ impl NormalEquations {
         let mut sums = Self {
             descent: vec![DVec3::ZERO; n],
             diagonal: vec![DVec3::ZERO; n],
+            across: vec![DVec3::ZERO; n],
             scatter: vec![DVec3::ZERO; n],
             objective: DVec3::ZERO,
             clusters: linearised.len(),
@@ -96,12 +99,13 @@ impl NormalEquations {
             coupling,
         };
         for cluster in linearised {
-            let weight = cluster.weight * trust.of(cluster.object);
+            let weight = trust.weight(cluster);
             sums.objective += weight * cluster.residuals[0] * cluster.residuals[1];
             for (&(i, a, b), score) in cluster.rows.iter().zip(cluster.scores(weight)) {
                 let mean = (a + b) * 0.5;
                 sums.descent[i] += score;
                 sums.diagonal[i] += weight * mean * mean;
+                sums.across[i] += weight * a * b;
                 sums.scatter[i] += score * score;
             }
         }
@@ -115,7 +119,7 @@ impl Matrices {
         let zeros = || std::array::from_fn(|_| DMatrix::zeros(n, n));
         let (mut hessian, mut scatter): ([DMatrix<f64>; 3], [DMatrix<f64>; 3]) = (zeros(), zeros());
         for cluster in linearised {
-            let weight = cluster.weight * trust.of(cluster.object);
+            let weight = trust.weight(cluster);
             let scores: Vec<DVec3> = cluster.scores(weight).collect();
             for (&(i, ia, ib), &si) in cluster.rows.iter().zip(&scores) {
                 let row = weight * (ia + ib) * 0.25;

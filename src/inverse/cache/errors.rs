@@ -18,6 +18,8 @@ const DRAW_TOLERANCE: f64 = 1e-2;
 const KEY: u64 = 0x6d75_6c74;
 /// Parameters that are tested exactly where matrices would be too large.
 const MOST_EXACT: usize = 24;
+/// Share of a curvature that is taken not to be noise at least.
+const LEAST_SIGNAL: f64 = 0.05;
 /// Share of its curvature that a parameter must keep when the others follow it, to be told apart from them.
 const LEAST_OWN: f64 = 1e-9;
 
@@ -53,6 +55,9 @@ impl Released {
 
 /// Standard errors of the parameters in `free`: the sandwich (H + P)⁻¹ (S + vP) (H + P)⁻¹ with S the scatter of the
 /// clusters' scores, so that noise of photographs and of paths both count, whatever their distribution (Huber 1967).
+///
+/// H holds the square of the derivatives' own noise, which the descent does not: what few paths meet would seem better known
+/// than it is. Errors grow by the share of that noise in the parameter's curvature.
 pub fn standard_errors(
     equations: &NormalEquations,
     free: &[usize],
@@ -67,8 +72,10 @@ pub fn standard_errors(
         albedo: vec![Vec3::splat(ALBEDO_DEVIATION); objects],
         emission: vec![Vec3::INFINITY; objects],
     };
-    for ((&index, variance), diagonal) in free.iter().zip(variances).zip(&equations.diagonal) {
-        let error = variance.max(DVec3::ZERO).powf(0.5).as_vec3();
+    let curvatures = equations.diagonal.iter().zip(&equations.across);
+    for ((&index, variance), (diagonal, across)) in free.iter().zip(variances).zip(curvatures) {
+        let noisy = (*diagonal / across.max(*diagonal * LEAST_SIGNAL)).max(DVec3::ONE);
+        let error = (variance.max(DVec3::ZERO).powf(0.5) * noisy).as_vec3();
         let target = match index.checked_sub(objects) {
             None => &mut errors.albedo[index],
             Some(emitter) => &mut errors.emission[emitter],

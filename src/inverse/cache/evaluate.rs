@@ -1,6 +1,6 @@
 //! Radiance and derivatives of cached paths for given unknowns.
 
-use super::derivative::{Gradient, differentiate};
+use super::derivative::{Gradient, differentiate, radiance};
 use super::{CachedCluster, PathCache};
 use crate::inverse::parameters::Unknowns;
 use glam::{DVec3, Vec3};
@@ -25,6 +25,15 @@ pub struct Linearised {
 }
 
 impl Linearised {
+    /// Takes a step along the derivatives, a component a row: the residuals become those after it.
+    pub fn step(&mut self, steps: &[DVec3]) {
+        let [a, b] = &mut self.residuals;
+        for &(row, of_a, of_b) in &self.rows {
+            *a -= of_a * steps[row];
+            *b -= of_b * steps[row];
+        }
+    }
+
     /// What each row adds to the direction of descent, for a weight per channel: ½ w (J_A r_B + J_B r_A).
     pub fn scores(&self, weight: DVec3) -> impl Iterator<Item = DVec3> + '_ {
         let [ra, rb] = self.residuals;
@@ -44,6 +53,36 @@ impl PathCache {
             )
             .collect()
     }
+
+    /// The level of each cluster that its weight goes by, as its paths predict it.
+    pub fn levels(&self, unknowns: &Unknowns) -> Vec<Vec3> {
+        let clusters = self.clusters.par_iter();
+        clusters.map(|cached| level(cached, unknowns)).collect()
+    }
+}
+
+/// Root of the mean square of what the pixels of a cluster see by these paths, where light that is seen itself differs from
+/// path to path and what is reflected by its mean.
+///
+/// A pixel on the edge of a lamp has a moderate mean, but is as uncertain as its contrast: a sliver of the lamp more or
+/// less, by noise or by the camera's position, changes it by many times the dark side's radiance.
+fn level(cached: &CachedCluster, unknowns: &Unknowns) -> Vec3 {
+    let (mut seen_squared, mut reflected) = (DVec3::ZERO, DVec3::ZERO);
+    let mut start = 0;
+    for &end in &cached.ends {
+        let vertices = &cached.vertices[start..end as usize];
+        let seen = vertices.first().map_or(Vec3::ZERO, |vertex| {
+            unknowns.emission[vertex.surface as usize] * vertex.emission_weight
+        });
+        seen_squared += (seen * seen).as_dvec3();
+        reflected += (radiance(vertices, unknowns) - seen).as_dvec3();
+        start = end as usize;
+    }
+    let paths = cached.ends.len().max(1) as f64;
+    let reflected = reflected / paths;
+    (seen_squared / paths + reflected * reflected)
+        .powf(0.5)
+        .as_vec3()
 }
 
 /// Evaluates all paths of a cluster.

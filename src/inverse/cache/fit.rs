@@ -13,7 +13,7 @@ use nalgebra::DVector;
 /// Damping relative to the diagonal; only keeps the factorisation safe from rounding.
 pub const LEAST_DAMPING: f64 = 1e-10;
 /// A step below this many standard errors in every parameter ends the fit.
-const STEP_TOLERANCE: f64 = 0.1;
+pub const STEP_TOLERANCE: f64 = 0.1;
 
 /// Where a fit ended.
 #[derive(Debug, Clone)]

@@ -14,6 +14,7 @@ pub mod evaluate;
 pub mod fit;
 pub mod judge;
 pub mod ladder;
+pub mod linear;
 pub mod memory;
 pub mod path_noise;
 pub mod prior;

@@ -57,7 +57,7 @@ impl Rows {
             diagonal: vec![DVec3::ZERO; n],
         };
         for cluster in linearised {
-            let weight = cluster.weight * trust.of(cluster.object);
+            let weight = trust.weight(cluster);
             let root = weight.powf(0.5);
             for (&(place, a, b), score) in cluster.rows.iter().zip(cluster.scores(weight)) {
                 let slope = root * (a + b) * 0.5;

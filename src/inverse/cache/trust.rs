@@ -5,6 +5,9 @@
 //! read off the residuals and the fit repeated (feasible generalised least squares, Aitken 1935, Zellner 1962). What a
 //! change of the object's own albedo or emission would take away is left out of them: else an object whose albedo is
 //! wrong would be distrusted for it, and the distrust would keep it wrong.
+//!
+//! Single clusters that lie far out, at the edge of a lamp or where somebody walked by, are bounded in what they do to
+//! the fit (Huber 1964), and in what they say of the others.
 
 use super::evaluate::Linearised;
 use glam::DVec3;
@@ -15,73 +18,117 @@ const PRIOR_CLUSTERS: f64 = 4.0;
 const FLOOR: f64 = 1e-3;
 /// Median of χ² with one degree of freedom.
 const MEDIAN_CHI2: f64 = 0.454_936;
+/// Deviations beyond which a cluster's pull no longer grows: one in 16,000 of normal ones.
+const FAR_OUT: f64 = 4.0;
 
-/// Factors on the weights of the clusters of each object, per channel.
+/// Factors on the weights of the clusters, per channel.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Trust(Vec<DVec3>);
+pub struct Trust(Vec<ObjectTrust>);
+
+/// What the residuals of an object's clusters say.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct ObjectTrust {
+    /// Typical variance over the object's.
+    factor: DVec3,
+    /// The object's variance, weighted; infinite where nothing is known.
+    variance: DVec3,
+    /// What the object's own parameter would have to change by to describe its clusters best.
+    step: DVec3,
+}
 
 impl Trust {
     /// The same for all.
     pub fn even(objects: usize) -> Self {
-        Self(vec![DVec3::ONE; objects])
+        Self(vec![
+            ObjectTrust {
+                factor: DVec3::ONE,
+                variance: DVec3::INFINITY,
+                step: DVec3::ZERO,
+            };
+            objects
+        ])
     }
 
     /// From the residuals that a fit has left.
     pub fn from_residuals(clusters: &[Linearised], objects: usize) -> Self {
+        let steps = own_steps(clusters, objects);
+        let squares: Vec<DVec3> = (clusters.iter())
+            .map(|cluster| square(cluster, steps[cluster.object as usize]))
+            .collect();
         // The typical variance is a median, which no badly described object can raise.
-        let squares = squares(clusters, objects);
-        let typical = DVec3::from_array(std::array::from_fn(|channel| {
-            let mut values: Vec<f64> = squares.iter().map(|s| s[channel]).collect();
-            crate::math::stats::quantile(&mut values, 0.5).unwrap_or(0.0) / MEDIAN_CHI2
-        }));
-
-        let mut sums = vec![(DVec3::ZERO, 0.0, DVec3::ZERO); objects];
+        let typical = typical_variance(squares.iter().copied());
+        let mut of_object: Vec<Vec<DVec3>> = vec![Vec::new(); objects];
+        let mut floors = vec![DVec3::ZERO; objects];
         for (cluster, square) in clusters.iter().zip(&squares) {
-            let sum = &mut sums[cluster.object as usize];
-            sum.0 += *square;
-            sum.1 += 1.0;
-            sum.2 += cluster.floor * (FLOOR * FLOOR);
+            of_object[cluster.object as usize].push(*square);
+            floors[cluster.object as usize] += cluster.floor * (FLOOR * FLOOR);
         }
-        let factor = |(sum, count, floor): (DVec3, f64, DVec3)| {
-            let own = (sum + typical * PRIOR_CLUSTERS) / (count + PRIOR_CLUSTERS);
-            let least = if count > 0.0 {
-                floor / count
-            } else {
-                DVec3::ZERO
-            };
+        let trust = |((squares, floor), step): ((Vec<DVec3>, DVec3), DVec3)| {
+            let count = squares.len() as f64;
+            // What lies far out counts no more than the farthest of the others.
+            let prior = typical * PRIOR_CLUSTERS;
+            let usual = (typical_variance(squares.iter().copied()) * count + prior)
+                / (count + PRIOR_CLUSTERS);
+            let most = usual * (FAR_OUT * FAR_OUT);
+            let sum: DVec3 = squares.iter().map(|s| s.min(most)).sum();
+            let least = floor / f64::max(count, 1.0);
+            let variance = ((sum + prior) / (count + PRIOR_CLUSTERS)).max(least);
             // With no residuals at all there is nothing to tell objects apart by.
-            DVec3::select(
-                typical.cmpgt(DVec3::ZERO),
-                typical / own.max(least),
-                DVec3::ONE,
-            )
+            let known = typical.cmpgt(DVec3::ZERO);
+            ObjectTrust {
+                factor: DVec3::select(known, typical / variance, DVec3::ONE),
+                variance: DVec3::select(known, variance, DVec3::INFINITY),
+                step,
+            }
         };
-        Self(sums.into_iter().map(factor).collect())
+        let all = of_object.into_iter().zip(floors).zip(steps);
+        Self(all.map(trust).collect())
+    }
+
+    /// The weight of a cluster in the fit.
+    pub fn weight(&self, cluster: &Linearised) -> DVec3 {
+        let trust = &self.0[cluster.object as usize];
+        let most = trust.variance * (FAR_OUT * FAR_OUT);
+        let square = square(cluster, trust.step);
+        let bounded = DVec3::select(square.cmpgt(most), (most / square).powf(0.5), DVec3::ONE);
+        cluster.weight * trust.factor * bounded
     }
 
     /// The factor of one object.
     pub fn of(&self, object: u32) -> DVec3 {
-        self.0[object as usize]
+        self.0[object as usize].factor
     }
 }
 
-/// Weighted squares of the clusters' residuals, from both sets together, about the best own parameter of each object.
-fn squares(clusters: &[Linearised], objects: usize) -> Vec<DVec3> {
-    let residual = |c: &Linearised| (c.residuals[0] + c.residuals[1]) * 0.5;
+/// The variance whose median of squares is that of the given ones; zero for none.
+fn typical_variance(squares: impl Iterator<Item = DVec3> + Clone) -> DVec3 {
+    DVec3::from_array(std::array::from_fn(|channel| {
+        let mut values: Vec<f64> = squares.clone().map(|s| s[channel]).collect();
+        crate::math::stats::quantile(&mut values, 0.5).unwrap_or(0.0) / MEDIAN_CHI2
+    }))
+}
+
+/// Mean residual of both sets.
+fn residual(cluster: &Linearised) -> DVec3 {
+    (cluster.residuals[0] + cluster.residuals[1]) * 0.5
+}
+
+/// Weighted square of a cluster's residual after a step of its object's own parameter.
+fn square(cluster: &Linearised, step: DVec3) -> DVec3 {
+    let left = residual(cluster) - cluster.own * step;
+    cluster.weight * left * left
+}
+
+/// For each object, the step of its own parameter after which its clusters' residuals are least.
+fn own_steps(clusters: &[Linearised], objects: usize) -> Vec<DVec3> {
     let mut sums = vec![(DVec3::ZERO, DVec3::ZERO); objects];
     for cluster in clusters {
         let (top, bottom) = &mut sums[cluster.object as usize];
         *top += cluster.weight * cluster.own * residual(cluster);
         *bottom += cluster.weight * cluster.own * cluster.own;
     }
-    let steps: Vec<DVec3> = (sums.into_iter())
+    (sums.into_iter())
         .map(|(top, bottom)| DVec3::select(bottom.cmpgt(DVec3::ZERO), top / bottom, DVec3::ZERO))
-        .collect();
-    (clusters.iter())
-        .map(|cluster| {
-            let left = residual(cluster) - cluster.own * steps[cluster.object as usize];
-            cluster.weight * left * left
-        })
         .collect()
 }
 
@@ -127,6 +174,25 @@ mod tests {
             "{ratio}"
         );
         assert_eq!(trust.of(3), trust.of(3).min(DVec3::ONE).max(DVec3::ONE));
+    }
+
+    #[test]
+    fn clusters_far_out_pull_no_more_than_others_and_cost_no_trust() {
+        let quiet: Vec<Linearised> = clusters(0, noise(400, 0.1))
+            .chain(clusters(1, noise(40, 0.1)))
+            .collect();
+        let mut edges = quiet.clone();
+        for cluster in &mut edges[400..403] {
+            cluster.residuals = [DVec3::splat(50.0); 2];
+        }
+        let [quiet, disturbed] = [&quiet, &edges].map(|c| Trust::from_residuals(c, 2));
+        assert!((disturbed.of(1) / quiet.of(1)).min_element() > 0.3);
+        let pull = |cluster: &Linearised| disturbed.weight(cluster) * cluster.residuals[0];
+        let usual = disturbed.of(1) * 0.1;
+        let ratio = (pull(&edges[400]) / usual).x;
+        assert!((2.0..10.0).contains(&ratio), "{ratio}");
+        // Where nothing is known all weigh what they weigh.
+        assert_eq!(Trust::even(2).weight(&edges[400]), DVec3::ONE);
     }
 
     #[test]

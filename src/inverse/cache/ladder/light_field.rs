@@ -194,16 +194,13 @@ impl Ladder<'_, '_> {
             .map(|&i| (after.value(i) - self.unknowns.value(i)).as_dvec3())
             .collect();
         let (mut fall, mut all) = (0.0, 0.0);
-        for cluster in &linearised {
-            let [mut a, mut b] = cluster.residuals;
-            let weigh = |r: DVec3, s: DVec3| (cluster.weight * r * s).element_sum();
+        for mut cluster in linearised {
+            let weight = cluster.weight;
+            let weigh = |r: DVec3, s: DVec3| (weight * r * s).element_sum();
+            let [a, b] = cluster.residuals;
             all += weigh((a + b) * 0.5, (a + b) * 0.5);
-            fall += weigh(a, b);
-            for &(row, of_a, of_b) in &cluster.rows {
-                a -= of_a * steps[row];
-                b -= of_b * steps[row];
-            }
-            fall -= weigh(a, b);
+            cluster.step(&steps);
+            fall += weigh(a, b) - weigh(cluster.residuals[0], cluster.residuals[1]);
         }
         if all > 0.0 { fall / all } else { 0.0 }
     }

@@ -2,12 +2,10 @@
 
 use super::Ladder;
 use crate::inverse::cache::accumulate::Accumulated;
-use crate::inverse::cache::equations::NormalEquations;
 use crate::inverse::cache::errors::standard_errors;
-use crate::inverse::cache::fit::{LEAST_DAMPING, propose};
+use crate::inverse::cache::linear::descend;
 use crate::inverse::cache::path_noise::{self, share_paths};
 use crate::inverse::cache::roles;
-use crate::inverse::cache::trust::Trust;
 use crate::inverse::estimate::{ENOUGH_PIXELS, relative_to_albedo};
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::solver::Termination;
@@ -42,15 +40,13 @@ impl Ladder<'_, '_> {
         for round in 0..self.budget.rounds {
             // Path lengths are steered by what is believed at the start, the same in every round.
             sums.add(self.linearised(&lights, 2, round, &about, &places)?);
-            let mean = sums.mean();
-            self.trust = Trust::from_residuals(&mean, self.roles.len());
-            self.path_noise = path_noise::shares(&mean, self.roles.len());
-            let equations = NormalEquations::new(&mean, free.len(), &self.trust, &self.prior);
-            let (proposal, _) = propose(&equations, &free, &about, LEAST_DAMPING);
-            let errors = standard_errors(&equations, &free, self.roles.len());
-            let step = largest_step(&about, &proposal);
+            let found = descend(sums.mean(), &about, &free, &self.prior);
+            let errors = standard_errors(&found.equations, &free, self.roles.len());
+            self.unknowns = found.unknowns;
+            self.trust = found.trust;
+            self.path_noise = path_noise::shares(&found.clusters, self.roles.len());
+            let step = largest_step(&about, &self.unknowns);
             self.monitor.progress.iterations += 1;
-            self.unknowns = proposal;
             self.merge_errors(errors);
             self.describe();
             self.monitor
@@ -87,11 +83,9 @@ impl Ladder<'_, '_> {
     fn weigh_by_prediction(&mut self, lights: &Emitters) -> Result<(), Termination> {
         let paths = self.budget.round_paths / PREDICTING;
         share_paths(&mut self.clusters, self.roles.len(), paths);
-        let held = vec![usize::MAX; 2 * self.roles.len()];
-        let linearised = self.linearised(lights, 3, 0, &self.unknowns.clone(), &held)?;
-        for (cluster, found) in self.clusters.iter_mut().zip(linearised) {
-            let residual = (found.residuals[0] + found.residuals[1]) * 0.5;
-            cluster.weigh((cluster.measured.as_dvec3() - residual).as_vec3());
+        let levels = self.levels(lights, 3)?;
+        for (cluster, level) in self.clusters.iter_mut().zip(levels) {
+            cluster.weigh(level);
         }
         Ok(())
     }

@@ -11,6 +11,7 @@ use crate::inverse::measured::MeasuredRadiance;
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::solver::Termination;
 use crate::transport::emitters::Emitters;
+use glam::Vec3;
 use std::time::{Duration, Instant};
 
 /// Work between two reports to the observer.
@@ -57,6 +58,20 @@ impl Ladder<'_, '_> {
             false => String::new(),
         };
         Ok((cache, limit))
+    }
+
+    /// The clusters' levels as paths predict them at the present unknowns.
+    pub(super) fn levels(
+        &mut self,
+        lights: &Emitters,
+        stage: u64,
+    ) -> Result<Vec<Vec3>, Termination> {
+        let unknowns = self.unknowns.clone();
+        let mut all = Vec::with_capacity(self.clusters.len());
+        self.slices(lights, None, stage, 0, |slice| {
+            all.extend(slice.levels(&unknowns))
+        })?;
+        Ok(all)
     }
 
     /// The clusters' paths linearised about some unknowns and forgotten; `places` maps parameters to rows.
