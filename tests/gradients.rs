@@ -134,6 +134,7 @@ fn independent_samples_give_the_gradient_and_shared_samples_a_biased_one() {
         scene: &scene,
         lights: &lit.emitters,
         measured: None,
+        texels: None,
         sky: None,
         outside: None,
         surface_of: &scene.object_of,

@@ -82,6 +82,7 @@ fn rounds(scene: &Scene, sampling: LightSampling) -> Vec<PathCache> {
         scene,
         lights: &lights,
         measured: None,
+        texels: None,
         sky: None,
         outside: None,
         surface_of: &scene.object_of,
@@ -249,6 +250,7 @@ fn paths_that_end_in_photographed_radiance_hold_one_bounce_and_that_radiance() {
     let measured = MeasuredRadiance::new(&problem, &survey);
     let lights = Emitters::new(&scene, &[1.0; 6]);
     let tracer = Tracer {
+        texels: None,
         scene: &scene,
         lights: &lights,
         measured: Some(&measured),

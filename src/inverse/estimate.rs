@@ -82,6 +82,30 @@ pub struct TexelEstimate {
     pub textured: Vec<bool>,
 }
 
+impl TexelEstimate {
+    /// The same with the texels of each textured object multiplied, a factor a channel; albedos end at one.
+    pub fn scaled(&self, factor: impl Fn(usize) -> Vec3, object_of: &[u32]) -> Self {
+        let layout = &self.colors.layout;
+        let mut scaled = self.clone();
+        let mut colors = self.colors.colors.clone();
+        for (triangle, &object) in object_of.iter().enumerate() {
+            if self.textured.get(object as usize) == Some(&true) {
+                let factor = factor(object as usize);
+                let texels = layout.first[triangle] as usize..layout.first[triangle + 1] as usize;
+                for color in &mut colors[texels.clone()] {
+                    *color = (*color * factor).min(Vec3::ONE);
+                }
+                scaled.stderr[texels].iter_mut().for_each(|e| *e *= factor);
+            }
+        }
+        scaled.colors = Arc::new(TexelColors {
+            layout: layout.clone(),
+            colors,
+        });
+        scaled
+    }
+}
+
 /// Light arriving from outside the mesh.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outside {

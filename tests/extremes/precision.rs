@@ -31,6 +31,7 @@ fn cache() -> (PathCache, Vec<Cluster>, Vec<usize>) {
         scene: &problem.scene,
         lights: &lights,
         measured: None,
+        texels: None,
         sky: None,
         outside: None,
         surface_of: &problem.scene.object_of,

@@ -47,10 +47,29 @@ impl Gradient {
 /// Radiance of one path.
 #[inline]
 pub fn radiance(vertices: &[Vertex], unknowns: &Unknowns) -> Vec3 {
+    radiance_with(vertices, unknowns, |vertex| {
+        unknowns.albedo[vertex.surface as usize]
+    })
+}
+
+/// Radiance of one path where texels have their own albedos.
+#[inline]
+pub fn textured_radiance(vertices: &[Vertex], unknowns: &Unknowns, texels: &[Vec3]) -> Vec3 {
+    radiance_with(vertices, unknowns, |vertex| {
+        let texel = texels.get(vertex.texel as usize).copied();
+        texel.unwrap_or(unknowns.albedo[vertex.surface as usize])
+    })
+}
+
+#[inline]
+fn radiance_with(
+    vertices: &[Vertex],
+    unknowns: &Unknowns,
+    albedo: impl Fn(&Vertex) -> Vec3,
+) -> Vec3 {
     let leaving = |beyond: Vec3, vertex: &Vertex| {
-        let surface = vertex.surface as usize;
-        unknowns.emission[surface] * vertex.emission_weight
-            + unknowns.albedo[surface] * gathered_at(vertex, beyond, unknowns)
+        unknowns.emission[vertex.surface as usize] * vertex.emission_weight
+            + albedo(vertex) * gathered_at(vertex, beyond, unknowns)
     };
     vertices.iter().rev().fold(Vec3::ZERO, leaving)
 }
@@ -105,6 +124,7 @@ pub fn differentiate(
 
 #[cfg(test)]
 mod tests {
+    use super::super::NO_TEXEL;
     use super::*;
     use crate::math::rng::Stream;
     use glam::DVec3;
@@ -131,6 +151,7 @@ mod tests {
                 } else {
                     stream.uniform()
                 },
+                texel: NO_TEXEL,
                 known: if stream.uniform() < 0.3 {
                     color(stream)
                 } else {

@@ -1,7 +1,7 @@
 //! Radiance and derivatives of cached paths for given unknowns.
 
-use super::derivative::{Gradient, differentiate, radiance};
-use super::{CachedCluster, PathCache};
+use super::derivative::{Gradient, differentiate, radiance, textured_radiance};
+use super::{CachedCluster, PathCache, Vertex};
 use crate::inverse::parameters::Unknowns;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -54,6 +54,18 @@ impl PathCache {
             .collect()
     }
 
+    /// By how much textures change the radiance of each cluster: the mean of the difference path by path.
+    pub fn texture_offsets(&self, unknowns: &Unknowns, texels: &[Vec3]) -> Vec<DVec3> {
+        let clusters = self.clusters.par_iter();
+        let offset = |cached: &CachedCluster| {
+            let [a, b] = means(cached, |vertices, _| {
+                textured_radiance(vertices, unknowns, texels) - radiance(vertices, unknowns)
+            });
+            (a + b) * 0.5
+        };
+        clusters.map(offset).collect()
+    }
+
     /// The level of each cluster that its weight goes by, as its paths predict it.
     pub fn levels(&self, unknowns: &Unknowns) -> Vec<Vec3> {
         let clusters = self.clusters.par_iter();
@@ -85,6 +97,25 @@ fn level(cached: &CachedCluster, unknowns: &Unknowns) -> Vec3 {
         .as_vec3()
 }
 
+/// Mean over the paths of each set of what one path gives, told the set.
+fn means(cached: &CachedCluster, mut of: impl FnMut(&[Vertex], usize) -> Vec3) -> [DVec3; 2] {
+    let paths = cached.cluster.paths as usize;
+    let mut sums = [DVec3::ZERO; 2];
+    let mut start = 0;
+    for (path, &end) in cached.ends.iter().enumerate() {
+        let set = path / paths % 2;
+        sums[set] += of(&cached.vertices[start..end as usize], set).as_dvec3();
+        start = end as usize;
+    }
+    sums.map(|sum| sum * f64::from(scale(cached)))
+}
+
+/// One over the paths of each set.
+fn scale(cached: &CachedCluster) -> f32 {
+    let paths = cached.cluster.paths as usize * cached.cluster.pixels.len();
+    1.0 / paths.max(1) as f32
+}
+
 /// Evaluates all paths of a cluster.
 fn linearise(
     cached: &CachedCluster,
@@ -92,27 +123,19 @@ fn linearise(
     place: &[usize],
     scratch: &mut Scratch,
 ) -> Linearised {
-    let paths = cached.cluster.paths as usize;
-    let scale = 1.0 / (paths * cached.cluster.pixels.len()).max(1) as f32;
-    let mut sums = [DVec3::ZERO; 2];
-    scratch.gradients.iter_mut().for_each(Gradient::clear);
-    let mut start = 0;
-    for (path, &end) in cached.ends.iter().enumerate() {
-        let set = path / paths % 2;
-        let vertices = &cached.vertices[start..end as usize];
-        let radiance = differentiate(
-            vertices,
-            unknowns,
-            &mut scratch.gathered,
-            &mut scratch.gradients[set],
-        );
-        sums[set] += radiance.as_dvec3();
-        start = end as usize;
-    }
-    let residuals = sums.map(|sum| cached.cluster.measured.as_dvec3() - sum * f64::from(scale));
+    let Scratch {
+        gathered,
+        gradients,
+    } = scratch;
+    gradients.iter_mut().for_each(Gradient::clear);
+    let means = means(cached, |vertices, set| {
+        differentiate(vertices, unknowns, gathered, &mut gradients[set])
+    });
+    let residuals = means.map(|mean| cached.cluster.measured.as_dvec3() - mean);
 
     // The parameters that either set touches and that are free.
-    let [a, b] = &scratch.gradients;
+    let [a, b] = &*gradients;
+    let scale = scale(cached);
     let mut rows = Vec::new();
     for &t in a
         .touched
@@ -157,5 +180,75 @@ impl Scratch {
             gradients: [Gradient::new(parameters), Gradient::new(parameters)],
             gathered: Vec::new(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inverse::cache::clusters::Cluster;
+    use crate::inverse::cache::{NO_LAMP, NO_TEXEL};
+
+    /// A path over a textured surface (0) and then a plain one (1) that meets a lamp (2), a path over the plain one alone.
+    fn cached() -> CachedCluster {
+        let vertex = |surface: u32, texel: u32, lamp: u32| Vertex {
+            surface,
+            lamp,
+            lamp_weight: 0.5,
+            emission_weight: 0.0,
+            texel,
+            known: Vec3::ZERO,
+        };
+        CachedCluster {
+            cluster: Cluster {
+                frame: 0,
+                object: 0,
+                pixels: vec![0],
+                paths: 1,
+                measured: Vec3::ONE,
+                weight: Vec3::ONE,
+                dark: Vec3::ONE,
+            },
+            vertices: vec![
+                vertex(0, 1, NO_LAMP),
+                vertex(1, NO_TEXEL, 2),
+                vertex(1, NO_TEXEL, 2),
+            ],
+            ends: vec![2, 3],
+        }
+    }
+
+    fn unknowns() -> Unknowns {
+        let mut unknowns = Unknowns::new(3);
+        unknowns.albedo = [0.4, 0.8, 0.0].map(Vec3::splat).to_vec();
+        unknowns.emission[2] = Vec3::splat(10.0);
+        unknowns
+    }
+
+    #[test]
+    fn a_texture_changes_the_paths_that_meet_it_by_the_difference_of_its_texel() {
+        let cache = PathCache {
+            clusters: vec![cached()],
+            ..PathCache::default()
+        };
+        let texels = [Vec3::splat(0.1), Vec3::new(0.6, 0.4, 0.2)];
+        let [offset] = cache.texture_offsets(&unknowns(), &texels)[..] else {
+            panic!("there is one cluster");
+        };
+        // (texel - 0.4) * 0.8 * 10 * 0.5 in one of two paths.
+        let expected = (texels[1].as_dvec3() - DVec3::splat(0.4)) * 0.8 * 10.0 * 0.5 * 0.5;
+        assert!((offset - expected).length() < 1e-6, "{offset}");
+    }
+
+    #[test]
+    fn the_edge_of_a_lamp_is_as_uncertain_as_its_contrast() {
+        let mut edge = cached();
+        // One of two paths sees the lamp itself.
+        edge.vertices[2].surface = 2;
+        edge.vertices[2].lamp = NO_LAMP;
+        edge.vertices[2].emission_weight = 1.0;
+        let reflected = 0.4 * 0.8 * 10.0 * 0.5 / 2.0;
+        let expected = f32::sqrt(10.0 * 10.0 / 2.0 + reflected * reflected);
+        assert!((level(&edge, &unknowns()).x - expected).abs() < 1e-4);
     }
 }

@@ -41,7 +41,7 @@ pub fn paths_that_fit(allowed: u64, pilot: &PathCache) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse::cache::{CachedCluster, NO_LAMP, clusters::Cluster};
+    use crate::inverse::cache::{CachedCluster, NO_LAMP, NO_TEXEL, clusters::Cluster};
     use glam::Vec3;
 
     #[test]
@@ -51,6 +51,7 @@ mod tests {
             lamp: NO_LAMP,
             lamp_weight: 0.0,
             emission_weight: 0.0,
+            texel: NO_TEXEL,
             known: Vec3::ZERO,
         };
         let cluster = Cluster {

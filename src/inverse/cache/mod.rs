@@ -31,6 +31,9 @@ use glam::Vec3;
 /// No lamp was reached from this vertex.
 pub const NO_LAMP: u32 = u32::MAX;
 
+/// The vertex's surface has one colour.
+pub const NO_TEXEL: u32 = u32::MAX;
+
 /// One vertex of a stored path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vertex {
@@ -42,6 +45,8 @@ pub struct Vertex {
     pub lamp_weight: f32,
     /// Weight of this surface's own emission, before its albedo.
     pub emission_weight: f32,
+    /// The texel of its surface's texture, or [`NO_TEXEL`].
+    pub texel: u32,
     /// Known radiance that arrives here and is scattered by this vertex's albedo, weights included.
     pub known: Vec3,
 }

@@ -1,7 +1,8 @@
 //! Tracing the paths of a cache.
 
 use super::clusters::Cluster;
-use super::{CachedCluster, NO_LAMP, PathCache, Vertex};
+use super::{CachedCluster, NO_LAMP, NO_TEXEL, PathCache, Vertex};
+use crate::inverse::estimate::TexelEstimate;
 use crate::inverse::measured::MeasuredRadiance;
 use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::settings::LightSampling;
@@ -36,6 +37,8 @@ pub struct Tracer<'a> {
     pub surface_of: &'a [u32],
     /// For each surface, the largest channel of its albedo as believed now; only steers where paths end.
     pub believed_albedo: &'a [f32],
+    /// Textures whose texels are noted at the vertices.
+    pub texels: Option<&'a TexelEstimate>,
     /// Light from outside where photographs measured it; draws light samples too.
     pub sky: Option<&'a MeasuredOutside>,
     /// Surfaces that stand for light from elsewhere outside, by direction; `None` lets escaping rays find nothing.
@@ -81,6 +84,7 @@ impl OutsideGrid {
             lamp: NO_LAMP,
             lamp_weight: 0.0,
             emission_weight: weight,
+            texel: NO_TEXEL,
             known: Vec3::ZERO,
         }
     }
@@ -187,6 +191,7 @@ impl Tracer<'_> {
                 } else {
                     0.0
                 },
+                texel: self.texel(&hit),
                 known: Vec3::ZERO,
             };
             if bounce >= self.max_bounces {
@@ -371,6 +376,14 @@ impl Tracer<'_> {
             // What light sampling cannot draw is left to BSDF sampling.
             LightSampling::Emitter => f32::from(light_pdf <= 0.0),
         }
+    }
+
+    fn texel(&self, hit: &Hit) -> u32 {
+        let object = self.scene.object_of[hit.triangle as usize] as usize;
+        let textures = self
+            .texels
+            .filter(|t| t.textured.get(object) == Some(&true));
+        textures.map_or(NO_TEXEL, |t| t.colors.layout.texel(hit))
     }
 
     fn surface(&self, hit: &Hit, wo: Vec3) -> Surface {

@@ -158,6 +158,7 @@ impl Descent {
             measured: None,
             surface_of,
             believed_albedo: &believed,
+            texels: None,
             sky: None,
             outside: None,
             sampling: settings.light_sampling,

@@ -97,6 +97,17 @@ impl Refined {
         }
     }
 
+    /// Scales the textures as the mean albedos of their objects changed, given factors a channel by
+    /// object, and the object of each triangle.
+    pub fn scale(&mut self, factor: impl Fn(usize) -> Vec3, object_of: &[u32]) {
+        for (object, mean) in &mut self.means {
+            *mean = (*mean * factor(*object)).min(Vec3::ONE);
+        }
+        if let Some(texels) = &mut self.texels {
+            *texels = Arc::new(texels.scaled(factor, object_of));
+        }
+    }
+
     /// What was added where and what it bought, in a sentence.
     pub fn summary(&self, name: impl Fn(usize) -> String) -> String {
         let kept: Vec<String> = (self.attempts.iter().filter(|a| a.kept))

@@ -49,6 +49,7 @@ pub fn noise(
         measured: None,
         surface_of: &scene.object_of,
         believed_albedo: &vec![1.0; unknowns.surfaces()],
+        texels: None,
         sky: None,
         outside: None,
         sampling,

@@ -3,6 +3,7 @@
 mod detail;
 mod lamps;
 mod light_field;
+mod refit;
 mod rounds;
 mod trace;
 
@@ -28,6 +29,7 @@ use crate::inverse::solver::{Checkpoint, Problem, Solution, Stage, Termination};
 use crate::inverse::survey::Survey;
 use crate::inverse::texture::Refined;
 use glam::Vec3;
+use rounds::Summed;
 
 /// Gauss–Newton steps at most in one fit.
 const MOST_STEPS: u64 = 30;
@@ -35,7 +37,7 @@ const MOST_STEPS: u64 = 30;
 const OUTSIDE_WIDTH: usize = 12;
 const OUTSIDE_HEIGHT: usize = 6;
 /// Stages of a solve that goes all the way.
-const STAGES: u32 = 4;
+const STAGES: u32 = 3;
 
 /// The state of a solve.
 pub struct Ladder<'a, 'o> {
@@ -62,6 +64,8 @@ pub struct Ladder<'a, 'o> {
     /// Of each photograph, where they disagree.
     exposures: Option<Vec<Vec3>>,
     estimate: Estimate,
+    /// What the rounds know, once they are done.
+    summed: Option<Summed>,
     /// Spatial detail, once it was looked for.
     detail: Option<Refined>,
     /// Mean of each surface's brightest channel in the photographs; zero where none sees it.
@@ -146,6 +150,7 @@ pub fn solve(
         unknowns: start.unknowns,
         exposures: needed.map(|e| e.factors.clone()),
         estimate: Estimate::default(),
+        summed: None,
         detail: None,
         stages: start.stages,
     };
@@ -176,10 +181,10 @@ impl Ladder<'_, '_> {
         let mut ended = Termination::Converged;
         if self.stages < 3 {
             ended = self.rounds()?;
-            self.reached(3);
         }
-        if self.stages < STAGES && self.monitor.settings.textures {
+        if self.monitor.settings.textures {
             self.detail()?;
+            self.refit()?;
         }
         self.reached(STAGES);
         Ok(ended)

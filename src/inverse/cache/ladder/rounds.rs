@@ -3,6 +3,7 @@
 use super::Ladder;
 use crate::inverse::cache::accumulate::Accumulated;
 use crate::inverse::cache::errors::standard_errors;
+use crate::inverse::cache::evaluate::Linearised;
 use crate::inverse::cache::linear::descend;
 use crate::inverse::cache::path_noise::{self, share_paths};
 use crate::inverse::cache::roles;
@@ -19,6 +20,15 @@ const NONLINEAR: f64 = 10.0;
 const NEGLIGIBLE: f64 = 1.0 / 3.0;
 /// Levels that clusters are weighed by take this part of the paths of a round.
 const PREDICTING: u64 = 4;
+
+/// What all rounds know of the parameters that are free.
+#[derive(Debug)]
+pub struct Summed {
+    /// Means over the rounds.
+    pub clusters: Vec<Linearised>,
+    /// What they are linearised about.
+    pub about: Unknowns,
+}
 
 impl Ladder<'_, '_> {
     /// Third stage: rounds of independent paths, added up until the reported errors are small enough.
@@ -66,6 +76,10 @@ impl Ladder<'_, '_> {
                 break;
             }
         }
+        self.summed = Some(Summed {
+            clusters: sums.mean(),
+            about,
+        });
         let reported = self.reported();
         let [median, tail] = reported.all.map(|e| e * 100.0);
         let [median_of_paths, tail_of_paths] = reported.of_paths.map(|e| e * 100.0);

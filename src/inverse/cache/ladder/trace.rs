@@ -7,11 +7,12 @@ use crate::inverse::cache::evaluate::Linearised;
 use crate::inverse::cache::memory::{self, PILOT_CLUSTERS};
 use crate::inverse::cache::path_noise::share_paths;
 use crate::inverse::cache::trace::Tracer;
+use crate::inverse::estimate::TexelEstimate;
 use crate::inverse::measured::MeasuredRadiance;
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::solver::Termination;
 use crate::transport::emitters::Emitters;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use std::time::{Duration, Instant};
 
 /// Work between two reports to the observer.
@@ -70,6 +71,21 @@ impl Ladder<'_, '_> {
         let mut all = Vec::with_capacity(self.clusters.len());
         self.slices(lights, None, stage, 0, |slice| {
             all.extend(slice.levels(&unknowns))
+        })?;
+        Ok(all)
+    }
+
+    /// By how much the textures found change the radiance of each cluster at the present unknowns.
+    pub(super) fn texture_offsets(
+        &mut self,
+        lights: &Emitters,
+        stage: u64,
+        texels: &TexelEstimate,
+    ) -> Result<Vec<DVec3>, Termination> {
+        let unknowns = self.unknowns.clone();
+        let mut all = Vec::with_capacity(self.clusters.len());
+        self.slices(lights, None, stage, 0, |slice| {
+            all.extend(slice.texture_offsets(&unknowns, &texels.colors.colors));
         })?;
         Ok(all)
     }
@@ -145,6 +161,7 @@ impl Ladder<'_, '_> {
             measured,
             surface_of: &self.problem.scene.object_of,
             believed_albedo: believed,
+            texels: self.estimate.texels.as_deref(),
             sky: self.sky.as_ref(),
             outside: Some(self.outside),
             sampling: self.monitor.settings.light_sampling,

@@ -1,0 +1,84 @@
+//! After textures were found: all colours and lamps once more, in the light as the textures send it on.
+
+use super::Ladder;
+use crate::inverse::cache::errors::standard_errors;
+use crate::inverse::cache::linear::descend;
+use crate::inverse::cache::path_noise::share_paths;
+use crate::inverse::cache::roles;
+use crate::inverse::solver::Termination;
+use glam::Vec3;
+
+/// Held-out loss may rise by this share, its own noise, before what was found is taken back.
+const NOISE: f64 = 0.005;
+/// No texture grows brighter or darker by more than this factor.
+const MOST: f32 = 1.5;
+
+impl Ladder<'_, '_> {
+    /// Fits all rounds again to the photographs less what the textures change in them, which one set of paths tells; the
+    /// textures are scaled with their objects.
+    ///
+    /// The light that a printed poster sends to a wall, and what its border adds to the pixels of its frame, are otherwise
+    /// those of one mean colour.
+    pub(super) fn refit(&mut self) -> Result<(), Termination> {
+        let Some((texels, summed)) = self.estimate.texels.clone().zip(self.summed.take()) else {
+            return Ok(());
+        };
+        let started = self.monitor.seconds();
+        self.monitor.phase("fitting again with textures");
+        let before = (
+            self.unknowns.clone(),
+            self.errors.clone(),
+            self.detail.clone(),
+            self.losses.held_out(self.problem, &self.estimate),
+        );
+        let lights = self.lights();
+        share_paths(
+            &mut self.clusters,
+            self.roles.len(),
+            self.budget.round_paths,
+        );
+        let offsets = self.texture_offsets(&lights, 4, &texels)?;
+        let mut clusters = summed.clusters;
+        for (cluster, offset) in clusters.iter_mut().zip(offsets) {
+            cluster.residuals = cluster.residuals.map(|r| r - offset);
+        }
+        let free = roles::free(&self.roles);
+        let found = descend(clusters, &summed.about, &free, &self.prior);
+        self.monitor.progress.iterations += 1;
+        let errors = standard_errors(&found.equations, &free, self.roles.len());
+        self.unknowns = found.unknowns;
+        self.merge_errors(errors);
+        let factor = |object: usize| {
+            let (new, old) = (self.unknowns.albedo[object], before.0.albedo[object]);
+            let grown = new / old.max(Vec3::splat(f32::MIN_POSITIVE));
+            grown.clamp(Vec3::splat(1.0 / MOST), Vec3::splat(MOST))
+        };
+        if let Some(detail) = &mut self.detail {
+            detail.scale(factor, &self.problem.scene.object_of);
+        }
+        self.describe();
+
+        let after = self.losses.held_out(self.problem, &self.estimate);
+        let kept = (before.3.zip(after)).is_none_or(|(b, a)| a <= b * (1.0 + NOISE));
+        if !kept {
+            (self.unknowns, self.errors, self.detail) = (before.0.clone(), before.1, before.2);
+            self.describe();
+        }
+        let moved = (0..self.problem.scene.objects.len())
+            .filter(|&k| self.roles[k].reflects())
+            .map(|k| {
+                (self.unknowns.albedo[k] - before.0.albedo[k])
+                    .abs()
+                    .max_element()
+            })
+            .fold(0.0, f32::max);
+        let why = match kept {
+            true => {
+                format!("with the light that textures send on, albedos move by {moved:.3} at most")
+            }
+            false => "held-out pixels get worse, so what was found before stays".to_owned(),
+        };
+        self.record("refit", started, kept, why)?;
+        Ok(())
+    }
+}
