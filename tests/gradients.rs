@@ -139,6 +139,7 @@ fn independent_samples_give_the_gradient_and_shared_samples_a_biased_one() {
         outside: None,
         surface_of: &scene.object_of,
         believed_albedo: &believed,
+        lobes: &[],
         sampling: LightSampling::Mis,
         max_bounces: BOUNCES,
         seed: 0,

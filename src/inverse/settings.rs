@@ -219,6 +219,8 @@ parameters! {
         "Try light from outside the mesh, where rays leave it";
     exposures: bool = true, Kind::Flag, "", false,
         "Estimate the exposure and white balance of each photograph, where they disagree about surfaces that they share";
+    lobes: bool = true, Kind::Flag, "", false,
+        "Try a rough specular lobe on objects that look different from different sides";
     textures: bool = true, Kind::Flag, "", false,
         "Try albedo that varies over an object, where its pixels show more than one colour";
     pixels: u64 = 0, Kind::Whole { min: 0, max: 1_000_000_000 }, "", false,

@@ -53,10 +53,8 @@ impl Bsdf {
         let Some(lobe) = self.lobe else {
             return self.albedo * warp::cosine_hemisphere_pdf(wi.z);
         };
-        let specular = lobe.specular.as_dvec3();
-        let base = self.albedo.as_dvec3() * (DVec3::ONE - specular) * coupling(wo, wi);
-        let microfacet = Microfacet::new(alpha(&lobe), wo, wi);
-        (base + microfacet.fresnel(specular) * microfacet.eval()).as_vec3()
+        let base = self.albedo.as_dvec3() * lobe.base(wo, wi);
+        (base + lobe.reflected(wo, wi)).as_vec3()
     }
 
     /// Density per solid angle with which [`Bsdf::sample`] draws `wi`; zero at or below the horizon.
@@ -67,9 +65,8 @@ impl Bsdf {
         }
         let base = warp::cosine_hemisphere_pdf(wi.z);
         let Some(lobe) = self.lobe else { return base };
-        let p = lobe_probability(&lobe, wo);
-        let microfacet = Microfacet::new(alpha(&lobe), wo, wi);
-        (p * microfacet.pdf() + (1.0 - p) * f64::from(base)) as f32
+        let p = lobe.share(wo);
+        (p * lobe.pdf(wo, wi) + (1.0 - p) * f64::from(base)) as f32
     }
 
     /// Draws a direction: `choice` decides between lobe and base, `u` the direction.
@@ -81,9 +78,7 @@ impl Bsdf {
             return None;
         }
         let wi = match &self.lobe {
-            Some(lobe) if f64::from(choice) < lobe_probability(lobe, wo) => {
-                reflect_on_visible_normal(alpha(lobe), wo, u)
-            }
+            Some(lobe) if f64::from(choice) < lobe.share(wo) => lobe.sample(wo, u),
             _ => warp::cosine_hemisphere(u),
         };
         let pdf = self.pdf(wo, wi);
@@ -127,6 +122,41 @@ impl Bsdf {
     }
 }
 
+/// The two parts of scattering under a lobe, for directions above the horizon.
+impl Lobe {
+    /// f(wo, wi) cosθi of the lobe itself.
+    #[inline]
+    pub fn reflected(&self, wo: Vec3, wi: Vec3) -> DVec3 {
+        let microfacet = Microfacet::new(alpha(self), wo, wi);
+        microfacet.fresnel(self.specular.as_dvec3()) * microfacet.eval()
+    }
+
+    /// f(wo, wi) cosθi of the diffuse base below it, for unit albedo.
+    #[inline]
+    pub fn base(&self, wo: Vec3, wi: Vec3) -> DVec3 {
+        (DVec3::ONE - self.specular.as_dvec3()) * coupling(wo, wi)
+    }
+
+    /// Density per solid angle with which [`Lobe::sample`] draws `wi`.
+    #[inline]
+    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f64 {
+        Microfacet::new(alpha(self), wo, wi).pdf()
+    }
+
+    /// Draws a direction that the lobe reflects to; it may point below the horizon, where it carries nothing.
+    #[inline]
+    pub fn sample(&self, wo: Vec3, u: [f32; 2]) -> Vec3 {
+        reflect_on_visible_normal(alpha(self), wo, u)
+    }
+
+    /// At least the share of light that it reflects to `wo`, mean over the channels.
+    #[inline]
+    pub fn share(&self, wo: Vec3) -> f64 {
+        let specular = f64::from(self.specular.element_sum() / 3.0);
+        specular + (1.0 - specular) * reflected(f64::from(wo.z))
+    }
+}
+
 /// Slope of [`reflected`]; 1 would be Schlick's curve itself.
 const COUPLING_SLOPE: f64 = 0.85;
 
@@ -142,20 +172,13 @@ fn reflected(cos_theta: f64) -> f64 {
 /// As Ashikhmin and Shirley 2000: what the lobe may reflect at either end is taken from the base, symmetrically, and
 /// the rest is normalised, so that the base returns albedo × (1 − specular) × (1 − reflected(θo)) in all.
 #[inline]
-fn coupling(wo: Vec3, wi: Vec3) -> f64 {
+pub fn coupling(wo: Vec3, wi: Vec3) -> f64 {
     const A: f64 = COUPLING_SLOPE;
     let rest = 1.0 - A;
     // Cosine-weighted mean of `reflected` over the hemisphere.
     let mean = (1.0 - rest.powi(6) * (1.0 + 6.0 * A)) / (21.0 * A * A);
     let (cos_o, cos_i) = (f64::from(wo.z), f64::from(wi.z));
     FRAC_1_PI * cos_i * (1.0 - reflected(cos_o)) * (1.0 - reflected(cos_i)) / (1.0 - mean)
-}
-
-/// Probability of drawing from the lobe: at least the share of light that it reflects.
-#[inline]
-fn lobe_probability(lobe: &Lobe, wo: Vec3) -> f64 {
-    let specular = f64::from(lobe.specular.element_sum() / 3.0);
-    specular + (1.0 - specular) * reflected(f64::from(wo.z))
 }
 
 #[inline]
@@ -266,7 +289,7 @@ mod tests {
     /// Share of light reflected from `wo`, by a midpoint rule over the unit square of each technique.
     fn directional_albedo(bsdf: &Bsdf, wo: Vec3) -> f64 {
         let n = 192;
-        let p = bsdf.lobe.map_or(0.0, |lobe| lobe_probability(&lobe, wo));
+        let p = bsdf.lobe.map_or(0.0, |lobe| lobe.share(wo));
         let mut sum = 0.0;
         for i in 0..n * n {
             let u = [

@@ -1,5 +1,6 @@
 //! How light moves: paths, scattering, emitters, next-event estimation, multiple importance sampling.
 
+pub mod arrival;
 pub mod bsdf;
 pub mod emitters;
 pub mod environment;

@@ -155,12 +155,12 @@ pub fn white_radiance(
 }
 
 /// Where a path stands before its next ray.
-struct Leg {
-    ray: Ray,
-    throughput: Vec3,
+pub(super) struct Leg {
+    pub ray: Ray,
+    pub throughput: Vec3,
     /// Density of the last BSDF sample per solid angle; `None` on the camera ray, which no light sample competes with.
-    bsdf_pdf: Option<f32>,
-    bounce: u32,
+    pub bsdf_pdf: Option<f32>,
+    pub bounce: u32,
 }
 
 impl Leg {
@@ -175,7 +175,7 @@ impl Leg {
 }
 
 /// Follows a path from a leg on to its end; `found` hears what each vertex adds to the radiance, and where from.
-fn follow(
+pub(super) fn follow(
     world: &impl World,
     leg: Leg,
     stream: &mut Stream,
@@ -297,35 +297,57 @@ fn direct_light(
     options: &PathOptions,
     rays: &mut u32,
 ) -> (Origin, Vec3) {
+    let (origin, Some(light)) = draw_light(world, surface, stream) else {
+        return (Origin::Outside, Vec3::ZERO);
+    };
+    let local_wi = frame.to_local(light.wi);
+    let scattered = bsdf.eval(local_wo, local_wi);
+    if scattered == Vec3::ZERO {
+        return (origin, Vec3::ZERO);
+    }
+    *rays += 1;
+    if world.occluded(&light.ray) {
+        return (origin, Vec3::ZERO);
+    }
+    let weight = light_weight(light.pdf, bsdf.pdf(local_wo, local_wi), options);
+    (origin, scattered * light.radiance / light.pdf * weight)
+}
+
+/// A direction towards an emitter.
+pub(super) struct LightSample {
+    /// Unit direction.
+    pub wi: Vec3,
+    /// Radiance that arrives from there where nothing is in between.
+    pub radiance: Vec3,
+    /// Density per solid angle.
+    pub pdf: f32,
+    /// What must be free.
+    pub ray: Ray,
+}
+
+/// Draws a point on an emitter's front side or a direction towards the light from outside, as seen from a surface.
+pub(super) fn draw_light(
+    world: &impl World,
+    surface: &SurfacePoint,
+    stream: &mut Stream,
+) -> (Origin, Option<LightSample>) {
     let (pick, choice, u) = (stream.uniform(), stream.uniform_f64(), stream.uniform2());
     let share = emitter_share(world);
+    let leave = |wi| offset_origin(surface.point, surface.normal, &surface.corners, wi);
     if pick >= share {
-        // A direction towards the light from outside.
-        let Some((wi, pdf)) = world.environment().and_then(|e| e.sample(choice, u)) else {
-            return (Origin::Outside, Vec3::ZERO);
-        };
-        let local_wi = frame.to_local(wi);
-        let scattered = bsdf.eval(local_wo, local_wi);
-        if scattered == Vec3::ZERO {
-            return (Origin::Outside, Vec3::ZERO);
-        }
-        *rays += 1;
-        let ray = Ray::new(
-            offset_origin(surface.point, surface.normal, &surface.corners, wi),
-            wi,
-        );
-        if world.occluded(&ray) {
-            return (Origin::Outside, Vec3::ZERO);
-        }
-        let pdf = pdf * (1.0 - share);
-        let radiance = world.environment().map_or(Vec3::ZERO, |e| e.radiance(wi));
-        let weight = light_weight(pdf, bsdf.pdf(local_wo, local_wi), options);
-        return (Origin::Outside, scattered * radiance / pdf * weight);
+        let drawn = world.environment().and_then(|environment| {
+            let (wi, pdf) = environment.sample(choice, u)?;
+            Some(LightSample {
+                wi,
+                radiance: environment.radiance(wi),
+                pdf: pdf * (1.0 - share),
+                ray: Ray::new(leave(wi), wi),
+            })
+        });
+        return (Origin::Outside, drawn);
     }
-
-    // A point on an emitter's front side.
     let Some(light) = world.sample_emitter(choice, u) else {
-        return (Origin::Outside, Vec3::ZERO);
+        return (Origin::Outside, None);
     };
     let origin = Origin::Object(light.object);
     let to_light = light.point - surface.point;
@@ -333,22 +355,16 @@ fn direct_light(
     let wi = to_light.normalize_or_zero();
     let cos_emitter = -light.normal.dot(wi);
     if cos_emitter <= 0.0 || distance2 <= 0.0 {
-        return (origin, Vec3::ZERO);
+        return (origin, None);
     }
-    let local_wi = frame.to_local(wi);
-    let scattered = bsdf.eval(local_wo, local_wi);
-    if scattered == Vec3::ZERO {
-        return (origin, Vec3::ZERO);
-    }
-    *rays += 1;
-    let from = offset_origin(surface.point, surface.normal, &surface.corners, wi);
     let to = offset_origin(light.point, light.normal, &light.corners, -wi);
-    if world.occluded(&Ray::between(from, to)) {
-        return (origin, Vec3::ZERO);
-    }
-    let pdf = share * light.pdf * distance2 / cos_emitter;
-    let weight = light_weight(pdf, bsdf.pdf(local_wo, local_wi), options);
-    (origin, scattered * light.radiance / pdf * weight)
+    let drawn = LightSample {
+        wi,
+        radiance: light.radiance,
+        pdf: share * light.pdf * distance2 / cos_emitter,
+        ray: Ray::between(leave(wi), to),
+    };
+    (origin, Some(drawn))
 }
 
 /// Probability of sampling an emitter of the mesh rather than the light from outside.

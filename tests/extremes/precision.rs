@@ -36,6 +36,7 @@ fn cache() -> (PathCache, Vec<Cluster>, Vec<usize>) {
         outside: None,
         surface_of: &problem.scene.object_of,
         believed_albedo: &[0.6; SURFACES],
+        lobes: &[],
         sampling: LightSampling::Mis,
         max_bounces: 1000,
         seed: 131,

@@ -56,6 +56,11 @@ pub fn closed_box(half: f64, center: DVec3) -> Mesh {
     mesh
 }
 
+/// Adds a block, its faces looking outwards.
+pub fn block(mesh: &mut Mesh, name: &str, half: DVec3, center: DVec3) {
+    faces(mesh, [name; 6], half, center, false);
+}
+
 /// Adds a square lamp that looks down.
 pub fn lamp(mesh: &mut Mesh, half: f64, center: DVec3) {
     let at = |x: f64, z: f64| center + DVec3::new(x, 0.0, z) * half;

@@ -1,6 +1,6 @@
 //! Radiance of a stored path and its derivative with respect to every albedo and emission on it.
 
-use super::{NO_LAMP, Vertex};
+use super::{NO_LAMP, SPECULAR, Vertex};
 use crate::inverse::parameters::Unknowns;
 use glam::Vec3;
 
@@ -68,10 +68,24 @@ fn radiance_with(
     albedo: impl Fn(&Vertex) -> Vec3,
 ) -> Vec3 {
     let leaving = |beyond: Vec3, vertex: &Vertex| {
-        unknowns.emission[vertex.surface as usize] * vertex.emission_weight
-            + albedo(vertex) * gathered_at(vertex, beyond, unknowns)
+        let gathered = gathered_at(vertex, beyond, unknowns);
+        leaving(vertex, gathered, unknowns, &albedo)
     };
     vertices.iter().rev().fold(Vec3::ZERO, leaving)
+}
+
+/// Radiance that leaves a vertex of what it gathered, and of its own.
+#[inline]
+fn leaving(
+    vertex: &Vertex,
+    gathered: Vec3,
+    unknowns: &Unknowns,
+    albedo: impl Fn(&Vertex) -> Vec3,
+) -> Vec3 {
+    if vertex.surface == SPECULAR {
+        return gathered;
+    }
+    unknowns.emission[vertex.surface as usize] * vertex.emission_weight + albedo(vertex) * gathered
 }
 
 /// Radiance gathered at a vertex, where `beyond` leaves the next one towards it.
@@ -87,7 +101,8 @@ fn gathered_at(vertex: &Vertex, beyond: Vec3, unknowns: &Unknowns) -> Vec3 {
 /// Radiance of one path, its derivative added to `gradient`.
 ///
 /// With G_i the radiance gathered at vertex i, L_i = w_i E_i + ρ_i G_i is what leaves it towards the camera; the
-/// derivative with respect to ρ_i is G_i, with respect to an emission its weight, each times the albedos before it.
+/// derivative with respect to ρ_i is G_i, with respect to an emission its weight, each times the albedos before it. A
+/// vertex on a lobe has no ρ_i: there L_i = G_i.
 #[inline]
 pub fn differentiate(
     vertices: &[Vertex],
@@ -101,17 +116,18 @@ pub fn differentiate(
     for vertex in vertices.iter().rev() {
         let g = gathered_at(vertex, beyond, unknowns);
         gathered.push(g);
-        let surface = vertex.surface as usize;
-        beyond = unknowns.emission[surface] * vertex.emission_weight + unknowns.albedo[surface] * g;
+        beyond = leaving(vertex, g, unknowns, |v| unknowns.albedo[v.surface as usize]);
     }
     let mut throughput = Vec3::ONE;
     for (vertex, g) in vertices.iter().zip(gathered.iter().rev()) {
-        let surface = vertex.surface as usize;
-        if vertex.emission_weight != 0.0 {
-            gradient.add(surfaces + surface, throughput * vertex.emission_weight);
+        if vertex.surface != SPECULAR {
+            let surface = vertex.surface as usize;
+            if vertex.emission_weight != 0.0 {
+                gradient.add(surfaces + surface, throughput * vertex.emission_weight);
+            }
+            gradient.add(surface, throughput * *g);
+            throughput *= unknowns.albedo[surface];
         }
-        gradient.add(surface, throughput * *g);
-        throughput *= unknowns.albedo[surface];
         if vertex.lamp != NO_LAMP {
             gradient.add(
                 surfaces + vertex.lamp as usize,
@@ -139,7 +155,10 @@ mod tests {
     fn random_path(stream: &mut Stream) -> Vec<Vertex> {
         (0..1 + stream.below(7))
             .map(|_| Vertex {
-                surface: stream.below(SURFACES) as u32,
+                surface: match stream.below(SURFACES + 1) {
+                    SURFACES => SPECULAR,
+                    surface => surface as u32,
+                },
                 lamp: if stream.uniform() < 0.5 {
                     stream.below(SURFACES) as u32
                 } else {
@@ -173,11 +192,16 @@ mod tests {
     fn radiance(vertices: &[Vertex], albedo: &[DVec3], emission: &[DVec3]) -> DVec3 {
         let mut sum = DVec3::ZERO;
         for (i, vertex) in vertices.iter().enumerate() {
-            let before: DVec3 = (vertices[..i].iter())
-                .map(|v| albedo[v.surface as usize])
-                .product();
-            let after = before * albedo[vertex.surface as usize];
-            sum += before * emission[vertex.surface as usize] * f64::from(vertex.emission_weight);
+            let factor = |v: &Vertex| {
+                albedo
+                    .get(v.surface as usize)
+                    .copied()
+                    .unwrap_or(DVec3::ONE)
+            };
+            let before: DVec3 = vertices[..i].iter().map(factor).product();
+            let after = before * factor(vertex);
+            let shown = emission.get(vertex.surface as usize).copied();
+            sum += before * shown.unwrap_or_default() * f64::from(vertex.emission_weight);
             sum += after * vertex.known.as_dvec3();
             if vertex.lamp != NO_LAMP {
                 sum += after * emission[vertex.lamp as usize] * f64::from(vertex.lamp_weight);

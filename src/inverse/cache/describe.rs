@@ -10,6 +10,7 @@ use crate::inverse::parameters::Unknowns;
 use crate::inverse::survey::Survey;
 use crate::math::color::luminance;
 use crate::scene::Scene;
+use crate::transport::material::Lobe;
 use glam::{DVec3, Vec3};
 
 /// An albedo with a larger standard error than this is as good as unknown.
@@ -17,7 +18,8 @@ const UNKNOWN_ALBEDO: f32 = 0.2 * ALBEDO_DEVIATION;
 /// An emitting object that fewer pixels see is known only through its light.
 const FEW_PIXELS: u64 = 19;
 
-/// The estimate of some unknowns.
+/// The estimate of some unknowns and of the objects' lobes.
+#[expect(clippy::too_many_arguments, reason = "all that a solve has found out")]
 pub fn estimate(
     scene: &Scene,
     survey: &Survey,
@@ -26,6 +28,7 @@ pub fn estimate(
     errors: &StandardErrors,
     outside: OutsideGrid,
     sky: Option<&MeasuredOutside>,
+    lobes: &[Option<Lobe>],
 ) -> Estimate {
     let typical = typical_albedo(scene, roles, unknowns, errors);
     // Between surfaces that lose nothing any light lives for ever: without a source nothing tells how much they keep.
@@ -39,6 +42,8 @@ pub fn estimate(
                 emission: unknowns.emission[k],
                 emission_stderr: finite(errors.emission[k]),
                 seen_pixels: seen,
+                roughness: lobes[k].map(|lobe| lobe.roughness),
+                specular: lobes[k].map(|lobe| lobe.specular.x),
                 ..Default::default()
             };
             match roles[k] {

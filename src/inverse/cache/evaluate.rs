@@ -1,7 +1,7 @@
 //! Radiance and derivatives of cached paths for given unknowns.
 
 use super::derivative::{Gradient, differentiate, radiance, textured_radiance};
-use super::{CachedCluster, PathCache, Vertex};
+use super::{CachedCluster, PathCache, SPECULAR, Vertex};
 use crate::inverse::parameters::Unknowns;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -83,7 +83,8 @@ fn level(cached: &CachedCluster, unknowns: &Unknowns) -> Vec3 {
     let mut start = 0;
     for &end in &cached.ends {
         let vertices = &cached.vertices[start..end as usize];
-        let seen = vertices.first().map_or(Vec3::ZERO, |vertex| {
+        let first = vertices.first().filter(|v| v.surface != SPECULAR);
+        let seen = first.map_or(Vec3::ZERO, |vertex| {
             unknowns.emission[vertex.surface as usize] * vertex.emission_weight
         });
         seen_squared += (seen * seen).as_dvec3();

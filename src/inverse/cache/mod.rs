@@ -2,6 +2,7 @@
 //!
 //! For diffuse surfaces and cosine sampling a path's contribution is a product of albedos times one emission (or one
 //! measured radiance) times a weight. Any values of the unknowns are then evaluated, and differentiated, with no ray.
+//! Rough specular lobes are held while such paths are used; [`crate::inverse::lobe`] finds them.
 
 pub mod accumulate;
 pub mod budget;
@@ -21,6 +22,7 @@ pub mod prior;
 mod reached;
 pub mod roles;
 pub mod rows;
+mod scatter;
 pub mod step;
 pub mod trace;
 pub mod trust;
@@ -34,10 +36,13 @@ pub const NO_LAMP: u32 = u32::MAX;
 /// The vertex's surface has one colour.
 pub const NO_TEXEL: u32 = u32::MAX;
 
+/// In place of a surface: the path was scattered by a lobe, which holds no unknown.
+pub const SPECULAR: u32 = u32::MAX;
+
 /// One vertex of a stored path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vertex {
-    /// The surface (set of triangles sharing unknowns) that the vertex lies on.
+    /// The surface (set of triangles sharing unknowns) that the vertex lies on, or [`SPECULAR`].
     pub surface: u32,
     /// The surface whose emission a light sample from here reached, or [`NO_LAMP`].
     pub lamp: u32,
@@ -90,7 +95,10 @@ impl PathCache {
             let mut start = 0;
             for &end in &cached.ends {
                 let path = &cached.vertices[start..end as usize];
-                ending += u64::from(path.last().is_some_and(|v| v.surface >= first));
+                ending += u64::from(
+                    path.last()
+                        .is_some_and(|v| v.surface >= first && v.surface != SPECULAR),
+                );
                 start = end as usize;
             }
         }

@@ -52,6 +52,14 @@ impl Prior {
         self
     }
 
+    /// Forgets what was expected of a surface's albedo.
+    pub fn forget_albedo(&mut self, surface: usize) {
+        if let Some(expected) = &mut self.albedo {
+            expected.mean[surface] = Vec3::splat(ALBEDO_MEAN);
+            expected.deviation[surface] = Vec3::splat(ALBEDO_DEVIATION);
+        }
+    }
+
     /// What is expected of the albedos, if anything was found.
     pub fn albedo(&self) -> Option<&ExpectedAlbedo> {
         self.albedo.as_ref()

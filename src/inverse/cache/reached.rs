@@ -4,6 +4,7 @@ use super::errors::StandardErrors;
 use super::prior::ExpectedAlbedo;
 use super::roles::Role;
 use crate::inverse::parameters::Unknowns;
+use crate::transport::material::Lobe;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +24,9 @@ pub struct Reached {
     pub unknowns: Unknowns,
     albedo_errors: Vec<[Option<f32>; 3]>,
     emission_errors: Vec<[Option<f32>; 3]>,
+    /// Roughness and specular reflectance of each object that has a lobe.
+    #[serde(default)]
+    lobes: Vec<Option<(f32, f32)>>,
 }
 
 impl Reached {
@@ -34,6 +38,7 @@ impl Reached {
         roles: &[Role],
         unknowns: &Unknowns,
         errors: &StandardErrors,
+        lobes: &[Option<Lobe>],
     ) -> Self {
         let finite = |errors: &[Vec3]| {
             let finite = |e: f32| e.is_finite().then_some(e);
@@ -47,6 +52,9 @@ impl Reached {
             unknowns: unknowns.clone(),
             albedo_errors: finite(&errors.albedo),
             emission_errors: finite(&errors.emission),
+            lobes: (lobes.iter())
+                .map(|lobe| lobe.map(|l| (l.roughness, l.specular.x)))
+                .collect(),
         }
     }
 
@@ -59,6 +67,16 @@ impl Reached {
             && self.unknowns.emission.len() == objects
             && self.albedo_errors.len() == objects
             && self.emission_errors.len() == objects
+            && self.lobes.len() <= objects
+    }
+
+    /// The lobe of each object that has one.
+    pub fn lobes(&self) -> Vec<Option<Lobe>> {
+        let lobe = |(roughness, specular): (f32, f32)| Lobe {
+            roughness,
+            specular: Vec3::splat(specular),
+        };
+        self.lobes.iter().map(|l| l.map(lobe)).collect()
     }
 
     /// Standard errors of all parameters.

@@ -1,7 +1,8 @@
 //! Tracing the paths of a cache.
 
 use super::clusters::Cluster;
-use super::{CachedCluster, NO_LAMP, NO_TEXEL, PathCache, Vertex};
+use super::scatter::{Scattered, Scattering};
+use super::{CachedCluster, NO_LAMP, NO_TEXEL, PathCache, SPECULAR, Vertex};
 use crate::inverse::estimate::TexelEstimate;
 use crate::inverse::measured::MeasuredRadiance;
 use crate::inverse::outside::MeasuredOutside;
@@ -15,6 +16,7 @@ use crate::scene::camera::Camera;
 use crate::scene::geometry::{Hit, Ray, offset_origin};
 use crate::transport::emitters::Emitters;
 use crate::transport::environment::{direction_of, pixel_of};
+use crate::transport::material::Lobe;
 use crate::transport::path::power_heuristic;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -39,6 +41,8 @@ pub struct Tracer<'a> {
     pub believed_albedo: &'a [f32],
     /// Textures whose texels are noted at the vertices.
     pub texels: Option<&'a TexelEstimate>,
+    /// For each object its rough specular lobe, where it has one; empty where none has. What has a lobe gives no light.
+    pub lobes: &'a [Option<Lobe>],
     /// Light from outside where photographs measured it; draws light samples too.
     pub sky: Option<&'a MeasuredOutside>,
     /// Surfaces that stand for light from elsewhere outside, by direction; `None` lets escaping rays find nothing.
@@ -182,11 +186,19 @@ impl Tracer<'_> {
         loop {
             // Describe the vertex.
             let surface = self.surface(&hit, wo);
+            let albedo = self.believed_albedo[surface.id as usize];
+            let lobed = self.lobe(surface.seen.object).map(|lobe| {
+                let [choice, ..] = numbers.four();
+                Scattering::new(lobe, surface.seen.normal, wo, albedo, choice)
+            });
             let mut vertex = Vertex {
-                surface: surface.id,
+                surface: match &lobed {
+                    Some(scattering) if scattering.specular => SPECULAR,
+                    _ => surface.id,
+                },
                 lamp: NO_LAMP,
                 lamp_weight: 0.0,
-                emission_weight: if surface.front {
+                emission_weight: if surface.front && lobed.is_none() {
                     emission_weight * scale
                 } else {
                     0.0
@@ -204,15 +216,16 @@ impl Tracer<'_> {
             if self.sampling != LightSampling::Bsdf {
                 let choice = numbers.refine(choice);
                 rays += if pick < self.sky_share() {
-                    self.sky_sample(&surface, scale, choice, [u, v], &mut vertex)
+                    self.sky_sample(&surface, &lobed, scale, choice, [u, v], &mut vertex)
                 } else {
-                    self.light_sample(&surface, scale, choice, [u, v], &mut vertex)
+                    self.light_sample(&surface, &lobed, scale, choice, [u, v], &mut vertex)
                 };
             }
 
             // Decide whether to go on, by what is believed of the albedo and never by the unknowns themselves.
             let [u, v, end, _] = numbers.four();
-            let believed_here = believed * self.believed_albedo[surface.id as usize];
+            let left = (lobed.as_ref()).map_or(albedo, |scattering| scattering.believed(albedo));
+            let believed_here = believed * left;
             let mut survival = 1.0;
             if bounce >= ROULETTE_AFTER {
                 survival = believed_here.clamp(LEAST_SURVIVAL, 0.95);
@@ -226,17 +239,20 @@ impl Tracer<'_> {
             }
             scale /= survival;
 
-            // Scatter with density cosθ/π, so that the weight is the albedo alone.
-            let frame = Frame::around(surface.seen.normal);
-            let local = warp::cosine_hemisphere([u, v]);
-            let wi = frame.to_world(local);
+            // Scatter with density cosθ/π, so that the weight is the albedo alone; under a lobe by the part taken.
+            let Some(scattered) = surface.scatter(&lobed, [u, v]) else {
+                vertices.push(vertex);
+                return rays;
+            };
+            let (wi, bsdf_pdf) = (scattered.wi, scattered.pdf);
+            scale *= scattered.weight;
             let origin = surface.leave(wi);
             rays += 1;
             let next = self.scene.intersect(&Ray::new(origin, wi));
             let Some(next) = next else {
                 if let Some((sky, radiance)) = self.sky.and_then(|s| Some((s, s.at(wi)?))) {
                     let sky_pdf = sky.map().pdf(wi) * self.sky_share();
-                    let weight = self.met_weight(warp::cosine_hemisphere_pdf(local.z), sky_pdf);
+                    let weight = self.met_weight(bsdf_pdf, sky_pdf);
                     vertex.known += radiance * (weight * scale);
                     vertices.push(vertex);
                 } else {
@@ -249,7 +265,6 @@ impl Tracer<'_> {
 
             // Weigh what is found against light sampling.
             let met = self.surface(&next, -wi);
-            let bsdf_pdf = warp::cosine_hemisphere_pdf(local.z);
             let light_pdf = if met.front {
                 let cosine = met.seen.normal.dot(-wi);
                 self.light_pdf(met.seen.object) * next.t * next.t / cosine.max(f32::MIN_POSITIVE)
@@ -275,6 +290,7 @@ impl Tracer<'_> {
     fn light_sample(
         &self,
         surface: &Surface,
+        lobed: &Option<Scattering>,
         scale: f32,
         choice: f64,
         u: [f32; 2],
@@ -302,7 +318,7 @@ impl Tracer<'_> {
             return 1;
         }
         let light_pdf = self.light_pdf(object) * distance2 / cos_light;
-        let weight = self.drawn_weight(light_pdf, cos_surface * FRAC_1_PI) * scale;
+        let weight = self.drawn_weight(light_pdf, surface.value(lobed, wi)) * scale;
         let seen = SurveyPoint {
             point: sample.point,
             normal: light_normal,
@@ -322,6 +338,7 @@ impl Tracer<'_> {
     fn sky_sample(
         &self,
         surface: &Surface,
+        lobed: &Option<Scattering>,
         scale: f32,
         choice: f64,
         u: [f32; 2],
@@ -339,7 +356,7 @@ impl Tracer<'_> {
         if self.scene.occluded(&Ray::new(from, wi)) {
             return 1;
         }
-        let weight = self.drawn_weight(pdf * self.sky_share(), cosine * FRAC_1_PI) * scale;
+        let weight = self.drawn_weight(pdf * self.sky_share(), surface.value(lobed, wi)) * scale;
         vertex.known += sky.map().radiance(wi) * weight;
         1
     }
@@ -358,14 +375,14 @@ impl Tracer<'_> {
         self.lights.pdf(object) * (1.0 - self.sky_share())
     }
 
-    /// Weight of a light sample: cosine over π (the BSDF over its albedo, times the cosine) over its density, shared with
+    /// Weight of a light sample: `value` (the BSDF over its albedo, times the cosine) over its density, shared with
     /// BSDF sampling; both densities per solid angle.
-    fn drawn_weight(&self, light_pdf: f32, bsdf_pdf: f32) -> f32 {
+    fn drawn_weight(&self, light_pdf: f32, (value, bsdf_pdf): (f32, f32)) -> f32 {
         let share = match self.sampling {
             LightSampling::Mis => power_heuristic(light_pdf, bsdf_pdf),
             LightSampling::Emitter | LightSampling::Bsdf => 1.0,
         };
-        bsdf_pdf / light_pdf * share
+        value / light_pdf * share
     }
 
     /// Weight of light met by BSDF sampling against light sampling, given both densities per solid angle.
@@ -384,6 +401,10 @@ impl Tracer<'_> {
             .texels
             .filter(|t| t.textured.get(object) == Some(&true));
         textures.map_or(NO_TEXEL, |t| t.colors.layout.texel(hit))
+    }
+
+    fn lobe(&self, object: u32) -> Option<Lobe> {
+        self.lobes.get(object as usize).copied().flatten()
     }
 
     fn surface(&self, hit: &Hit, wo: Vec3) -> Surface {
@@ -415,5 +436,29 @@ impl Surface {
     /// Where a ray begins that leaves it in a direction.
     fn leave(&self, wi: Vec3) -> Vec3 {
         offset_origin(self.seen.point, self.seen.normal, &self.corners, wi)
+    }
+    /// The BSDF over its albedo, times the cosine, and the density with which it is sampled, for a unit direction above
+    /// the horizon: both cosθ/π, or those of the part that is taken under a lobe.
+    fn value(&self, lobed: &Option<Scattering>, wi: Vec3) -> (f32, f32) {
+        match lobed {
+            Some(scattering) => scattering.value(wi),
+            None => {
+                let cosine_pdf = self.seen.normal.dot(wi) * FRAC_1_PI;
+                (cosine_pdf, cosine_pdf)
+            }
+        }
+    }
+
+    /// Draws a direction; `None` where a lobe reflects it below the horizon.
+    fn scatter(&self, lobed: &Option<Scattering>, u: [f32; 2]) -> Option<Scattered> {
+        if let Some(scattering) = lobed {
+            return scattering.sample(u);
+        }
+        let local = warp::cosine_hemisphere(u);
+        Some(Scattered {
+            wi: Frame::around(self.seen.normal).to_world(local),
+            weight: 1.0,
+            pdf: warp::cosine_hemisphere_pdf(local.z),
+        })
     }
 }

@@ -159,6 +159,7 @@ impl Descent {
             surface_of,
             believed_albedo: &believed,
             texels: None,
+            lobes: &[],
             sky: None,
             outside: None,
             sampling: settings.light_sampling,

@@ -50,6 +50,7 @@ pub fn noise(
         surface_of: &scene.object_of,
         believed_albedo: &vec![1.0; unknowns.surfaces()],
         texels: None,
+        lobes: &[],
         sky: None,
         outside: None,
         sampling,

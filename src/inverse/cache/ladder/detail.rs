@@ -7,13 +7,15 @@ use crate::inverse::solver::Termination;
 use crate::inverse::texture::{Task, refine};
 
 impl Ladder<'_, '_> {
-    /// Tries a texture on every object that reflects and gives no light.
+    /// Tries a texture on every object that reflects and gives no light; what has a lobe keeps one colour.
     pub(super) fn detail(&mut self) -> Result<(), Termination> {
         let started = self.monitor.seconds();
         self.monitor.phase("looking for textures");
         let objects: Vec<usize> = (0..self.problem.scene.objects.len())
             .filter(|&k| {
-                self.roles[k] == Role::Reflector && self.estimate.objects[k].albedo_identifiable
+                self.roles[k] == Role::Reflector
+                    && self.lobes[k].is_none()
+                    && self.estimate.objects[k].albedo_identifiable
             })
             .collect();
         let settings = self.monitor.settings.clone();

@@ -27,7 +27,9 @@ impl Ladder<'_, '_> {
         let active = free.len();
         free.extend(
             (0..objects)
-                .filter(|&k| !self.roles[k].emits())
+                .filter(|&k| {
+                    !self.roles[k].emits() && self.lobes.get(k).is_none_or(Option::is_none)
+                })
                 .map(|k| objects + k),
         );
         let equations = cache.normal_equations(&self.unknowns, &free, &self.trust, &self.prior);

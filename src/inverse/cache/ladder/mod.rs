@@ -3,6 +3,7 @@
 mod detail;
 mod lamps;
 mod light_field;
+mod lobes;
 mod refit;
 mod rounds;
 mod trace;
@@ -28,6 +29,7 @@ use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Problem, Solution, Stage, Termination};
 use crate::inverse::survey::Survey;
 use crate::inverse::texture::Refined;
+use crate::transport::material::Lobe;
 use glam::Vec3;
 use rounds::Summed;
 
@@ -37,7 +39,7 @@ const MOST_STEPS: u64 = 30;
 const OUTSIDE_WIDTH: usize = 12;
 const OUTSIDE_HEIGHT: usize = 6;
 /// Stages of a solve that goes all the way.
-const STAGES: u32 = 3;
+const STAGES: u32 = 4;
 
 /// The state of a solve.
 pub struct Ladder<'a, 'o> {
@@ -61,6 +63,8 @@ pub struct Ladder<'a, 'o> {
     path_noise: Vec<f64>,
     unknowns: Unknowns,
     errors: StandardErrors,
+    /// The rough specular lobe of each object that has one.
+    lobes: Vec<Option<Lobe>>,
     /// Of each photograph, where they disagree.
     exposures: Option<Vec<Vec3>>,
     estimate: Estimate,
@@ -116,8 +120,11 @@ pub fn solve(
                 albedo: vec![Vec3::splat(0.5); surfaces],
                 emission: vec![Vec3::INFINITY; surfaces],
             },
+            &[],
         ),
     };
+    let mut lobes = start.lobes();
+    lobes.resize(objects, None);
     let clusters = cluster(problem, &survey, budget.pixels);
     let sky = (start.open)
         .then(|| MeasuredOutside::new(problem, &survey))
@@ -148,6 +155,7 @@ pub fn solve(
         prior,
         path_noise: vec![1.0; surfaces],
         unknowns: start.unknowns,
+        lobes,
         exposures: needed.map(|e| e.factors.clone()),
         estimate: Estimate::default(),
         summed: None,
@@ -180,12 +188,19 @@ impl Ladder<'_, '_> {
         }
         let mut ended = Termination::Converged;
         if self.stages < 3 {
+            if self.monitor.settings.lobes {
+                self.lobes()?;
+            }
+            self.reached(3);
+        }
+        if self.stages < STAGES {
             ended = self.rounds()?;
         }
         if self.monitor.settings.textures {
             self.detail()?;
             self.refit()?;
         }
+        self.settle_lobes()?;
         self.reached(STAGES);
         Ok(ended)
     }
@@ -308,6 +323,7 @@ impl Ladder<'_, '_> {
             &self.errors,
             self.outside,
             self.sky.as_ref(),
+            &self.lobes,
         );
         self.estimate.exposures.clone_from(&self.exposures);
         if let Some(detail) = &self.detail {
@@ -357,6 +373,7 @@ impl Ladder<'_, '_> {
             &self.roles,
             &self.unknowns,
             &self.errors,
+            &self.lobes,
         );
         self.checkpoint = Checkpoint::new(&self.monitor.progress, &reached);
     }

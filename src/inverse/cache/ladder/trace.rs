@@ -162,6 +162,7 @@ impl Ladder<'_, '_> {
             surface_of: &self.problem.scene.object_of,
             believed_albedo: believed,
             texels: self.estimate.texels.as_deref(),
+            lobes: &self.lobes,
             sky: self.sky.as_ref(),
             outside: Some(self.outside),
             sampling: self.monitor.settings.light_sampling,

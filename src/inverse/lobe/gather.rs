@@ -1,0 +1,214 @@
+//! The light that arrives at what pixels see, kept by direction: any lobe's share in it follows with no ray.
+
+use super::sights::Sight;
+use crate::math::frame::Frame;
+use crate::math::rng::Stream;
+use crate::math::warp;
+use crate::scene::camera::Camera;
+use crate::transport::arrival::{Arrival, Cast, arrivals};
+use crate::transport::bsdf::coupling;
+use crate::transport::lit::Lit;
+use crate::transport::microfacet::Microfacet;
+use crate::transport::path::PathOptions;
+use glam::{DVec3, Vec2};
+use std::ops::{Add, AddAssign, Div, Mul, Sub};
+
+/// First of the sample keys of these paths, far from those of other stages.
+const KEY: u64 = 9 << 59;
+
+/// How light is gathered.
+#[derive(Debug, Clone, Copy)]
+pub struct Gathering<'a> {
+    /// Scene, lights and materials as known so far.
+    pub lit: &'a Lit,
+    /// The object whose pixels are looked at.
+    pub object: u32,
+    /// Points in each of two sets.
+    pub points: u32,
+    /// GGX roughnesses that directions are drawn by, besides evenly.
+    pub roughnesses: &'a [f64],
+    /// How paths go on.
+    pub options: PathOptions,
+    /// Key of the random streams.
+    pub seed: u64,
+    /// Gatherings of other passes are independent.
+    pub pass: u64,
+}
+
+/// Light that arrives at random points of a sight: one independent set of paths.
+#[derive(Debug, Clone, Default)]
+pub struct Gathered {
+    arrivals: Vec<(glam::Vec3, Arrival)>,
+    points: u32,
+}
+
+/// What a sight shows per unit of each part of a material, per channel.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Parts {
+    /// A diffuse surface of unit albedo.
+    pub diffuse: DVec3,
+    /// The base under a lobe, of unit albedo, before the factor (1 − specular).
+    pub base: DVec3,
+    /// The lobe without its Fresnel term.
+    pub lobe: DVec3,
+    /// The lobe times Schlick's (1 − cos)⁵.
+    pub grazing: DVec3,
+}
+
+impl Parts {
+    fn map(self, other: Self, f: impl Fn(DVec3, DVec3) -> DVec3) -> Self {
+        Self {
+            diffuse: f(self.diffuse, other.diffuse),
+            base: f(self.base, other.base),
+            lobe: f(self.lobe, other.lobe),
+            grazing: f(self.grazing, other.grazing),
+        }
+    }
+}
+
+impl Add for Parts {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        self.map(other, |a, b| a + b)
+    }
+}
+
+impl AddAssign for Parts {
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl Sub for Parts {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        self.map(other, |a, b| a - b)
+    }
+}
+
+impl Mul<f64> for Parts {
+    type Output = Self;
+    fn mul(self, factor: f64) -> Self {
+        self.map(self, |a, _| a * factor)
+    }
+}
+
+impl Div<DVec3> for Parts {
+    type Output = Self;
+    fn div(self, level: DVec3) -> Self {
+        self.map(self, |a, _| a / level)
+    }
+}
+
+impl Gathering<'_> {
+    /// Gathers the light that arrives at one sight, in two independent sets.
+    pub fn sight(&self, camera: &Camera, sight: &Sight) -> ([Gathered; 2], Cast) {
+        let mut cast = Cast::default();
+        let sets = [0, 1].map(|set| {
+            let mut gathered = Gathered::default();
+            for point in 0..self.points {
+                let more = self.point(camera, sight, set, point, &mut gathered);
+                cast.rays += more.rays;
+                cast.rejected += more.rejected;
+            }
+            gathered
+        });
+        (sets, cast)
+    }
+
+    fn point(
+        &self,
+        camera: &Camera,
+        sight: &Sight,
+        set: u64,
+        point: u32,
+        gathered: &mut Gathered,
+    ) -> Cast {
+        // Points spread over the pixels.
+        let index = KEY + (self.pass << 40) + 2 * u64::from(point) + set;
+        let first = u64::from(sight.pixels[0]);
+        let mut stream = Stream::new(self.seed, u64::from(sight.frame), first, index);
+        let count = sight.pixels.len() as u32;
+        let place = if self.points < count {
+            point * count / self.points + stream.below(1 + (count / self.points) as usize) as u32
+        } else {
+            point
+        };
+        let pixel = sight.pixels[(place % count) as usize];
+        let width = camera.intrinsics.width;
+        let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+        let ray = camera.ray(corner + Vec2::from_array(stream.uniform2()));
+        let mut cast = Cast {
+            rays: 1,
+            rejected: 0,
+        };
+        let scene = &self.lit.scene;
+        let Some(hit) = scene.intersect(&ray) else {
+            return cast;
+        };
+        if scene.object_of[hit.triangle as usize] != self.object {
+            return cast;
+        }
+
+        // Light on the side that the camera sees.
+        let surface = self.lit.surface(&hit);
+        let to_camera = -ray.direction.normalize_or_zero();
+        let side = if surface.normal.dot(to_camera) < 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
+        let frame = Frame::around(surface.normal * side);
+        let wo = frame.to_local(to_camera);
+        if wo.z <= 0.0 {
+            return cast;
+        }
+        let mut found = Vec::new();
+        let more = arrivals(
+            self.lit,
+            &surface,
+            &frame,
+            wo,
+            self.roughnesses,
+            &mut stream,
+            &self.options,
+            &mut found,
+        );
+        cast.rays += more.rays;
+        cast.rejected += more.rejected;
+        gathered.points += 1;
+        gathered.arrivals.extend(found.into_iter().map(|a| (wo, a)));
+        cast
+    }
+}
+
+impl Gathered {
+    /// What the sight would show of each part, for a lobe of GGX roughness α; zero where no point was seen.
+    pub fn parts(&self, alpha: f64) -> Parts {
+        let mut sum = Parts::default();
+        for (wo, arrival) in &self.arrivals {
+            let light = arrival.light.as_dvec3();
+            let lobe = Microfacet::new(alpha, *wo, arrival.wi);
+            let value = lobe.eval();
+            sum += Parts {
+                diffuse: light * f64::from(warp::cosine_hemisphere_pdf(arrival.wi.z)),
+                base: light * coupling(*wo, arrival.wi),
+                lobe: light * value,
+                grazing: light * (value * lobe.schlick),
+            };
+        }
+        sum * (1.0 / f64::from(self.points.max(1)))
+    }
+
+    /// Whether any point was seen.
+    pub fn is_empty(&self) -> bool {
+        self.points == 0
+    }
+
+    /// Both sets as one.
+    pub fn joined([mut a, b]: [Self; 2]) -> Self {
+        a.arrivals.extend(b.arrivals);
+        a.points += b.points;
+        a
+    }
+}

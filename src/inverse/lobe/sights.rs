@@ -1,0 +1,90 @@
+//! Spots of a surface, and what each photograph that sees one shows of it.
+//!
+//! A diffuse spot looks the same from everywhere whatever its colour, so what differs between photographs of one spot
+//! speaks of gloss and never of texture.
+
+use crate::inverse::measured::cell_key;
+use crate::inverse::solver::Problem;
+use crate::inverse::survey::Survey;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Width of a spot in pixel footprints.
+const SPOT_FOOTPRINTS: f32 = 3.0;
+/// Pixels above this share of saturation may have been brighter than they show, and are left out.
+const BELOW_SATURATION: f32 = 0.97;
+
+/// The pixels of one photograph that see one spot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sight {
+    /// Frame index.
+    pub frame: u32,
+    /// Row by row from the top left.
+    pub pixels: Vec<u32>,
+    /// Their mean radiance.
+    pub measured: DVec3,
+    /// Whether they are kept out of every fit.
+    pub held_out: bool,
+}
+
+/// A spot's sights; those in the fit come first.
+pub type Spot = Vec<Sight>;
+
+/// Photographs in the fit that see a spot.
+pub fn views(spot: &[Sight]) -> usize {
+    spot.iter().filter(|s| !s.held_out).count()
+}
+
+/// The spots of each object, in an order that has nothing to do with where they lie.
+pub fn spots(problem: &Problem, survey: &Survey) -> Vec<Vec<Spot>> {
+    let mut of_object = vec![Vec::new(); problem.scene.objects.len()];
+    let size = survey.footprint * SPOT_FOOTPRINTS;
+    if size <= 0.0 {
+        return of_object;
+    }
+    let value = |frame: u32, pixel: u32| problem.photographs[frame as usize].pixels[pixel as usize];
+    let mut seen: Vec<(u32, u64, bool, u32, u32)> = (survey.pixels.par_iter())
+        .filter(|p| {
+            let saturation = problem.photographs[p.frame as usize].saturation;
+            p.pure && value(p.frame, p.pixel).max_element() < saturation * BELOW_SATURATION
+        })
+        .filter_map(|p| {
+            let point = p.points.iter().flatten().next()?;
+            let key = cell_key(size, point);
+            Some((p.object, key, p.held_out, p.frame, p.pixel))
+        })
+        .collect();
+    seen.par_sort_unstable();
+    for spot in seen.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+        let sights = spot.chunk_by(|a, b| (a.2, a.3) == (b.2, b.3)).map(|own| {
+            let pixels: Vec<u32> = own.iter().map(|s| s.4).collect();
+            let frame = own[0].3;
+            let sum: DVec3 = (pixels.iter()).map(|&p| value(frame, p).as_dvec3()).sum();
+            Sight {
+                frame,
+                measured: sum / pixels.len() as f64,
+                pixels,
+                held_out: own[0].2,
+            }
+        });
+        if let Some(spots) = of_object.get_mut(spot[0].0 as usize) {
+            spots.push(sights.collect());
+        }
+    }
+    of_object
+}
+
+/// Spots with up to about `most` sights in the fit, those that several photographs see first.
+pub fn choose(spots: &[Spot], least_views: usize, most: usize) -> Vec<&Spot> {
+    let several = spots.iter().filter(|s| views(s) >= 2.max(least_views));
+    let single = (spots.iter()).filter(|s| views(s) == 1 && least_views <= 1);
+    let mut count = 0;
+    several
+        .chain(single)
+        .take_while(|spot| {
+            let room = count < most;
+            count += views(spot);
+            room
+        })
+        .collect()
+}

@@ -1,0 +1,196 @@
+//! Light arriving at a surface point, kept by direction, so that any scattering can be integrated over it with no ray.
+
+use crate::math::frame::Frame;
+use crate::math::rng::Stream;
+use crate::math::warp;
+use crate::scene::geometry::{Ray, offset_origin};
+use crate::transport::microfacet::{Microfacet, reflect_on_visible_normal};
+use crate::transport::path::{Leg, PathOptions, draw_light, follow, power_heuristic};
+use crate::transport::world::{SurfacePoint, World};
+use glam::Vec3;
+
+/// Light from one drawn direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Arrival {
+    /// Unit direction in the local frame, above the horizon.
+    pub wi: Vec3,
+    /// Radiance over the density with which directions like this were drawn: Σ f(wi) cosθ · `light` over the arrivals of one
+    /// call is an unbiased estimate of what f scatters.
+    pub light: Vec3,
+}
+
+/// What drawing arrivals took.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Cast {
+    /// Rays cast.
+    pub rays: u64,
+    /// Samples dropped because they were not finite.
+    pub rejected: u64,
+}
+
+/// Appends light that arrives at a surface: from one direction drawn with density cosθ/π, one reflected on a normal of
+/// each of the given GGX roughnesses as seen from the local direction `wo`, and one towards an emitter. The directions
+/// share their densities (balance heuristic), and what they meet is shared with the light sample (power heuristic).
+#[expect(clippy::too_many_arguments, reason = "the state of one path vertex")]
+pub fn arrivals(
+    world: &impl World,
+    surface: &SurfacePoint,
+    frame: &Frame,
+    wo: Vec3,
+    roughnesses: &[f64],
+    stream: &mut Stream,
+    options: &PathOptions,
+    found: &mut Vec<Arrival>,
+) -> Cast {
+    let density = |wi: Vec3| {
+        let lobes = (roughnesses.iter()).map(|&alpha| Microfacet::new(alpha, wo, wi).pdf());
+        warp::cosine_hemisphere_pdf(wi.z) + lobes.sum::<f64>() as f32
+    };
+    let mut cast = Cast::default();
+    let mut keep = |wi: Vec3, light: Vec3| {
+        if !light.is_finite() {
+            return 1;
+        }
+        if light != Vec3::ZERO {
+            found.push(Arrival { wi, light });
+        }
+        0
+    };
+
+    // Towards an emitter.
+    if let (_, Some(light)) = draw_light(world, surface, stream) {
+        let wi = frame.to_local(light.wi);
+        if wi.z > 0.0 {
+            cast.rays += 1;
+            if !world.occluded(&light.ray) {
+                let weight = power_heuristic(light.pdf, density(wi));
+                cast.rejected += keep(wi, light.radiance * (weight / light.pdf));
+            }
+        }
+    }
+
+    // In directions drawn by what scatters.
+    let normal = frame.n;
+    for technique in 0..=roughnesses.len() {
+        let u = stream.uniform2();
+        let wi = match technique.checked_sub(1) {
+            None => warp::cosine_hemisphere(u),
+            Some(lobe) => reflect_on_visible_normal(roughnesses[lobe], wo, u),
+        };
+        let pdf = density(wi);
+        if wi.z <= 0.0 || !(pdf > 0.0 && pdf.is_finite()) {
+            continue;
+        }
+        let direction = frame.to_world(wi);
+        let origin = offset_origin(surface.point, normal, &surface.corners, direction);
+        let leg = Leg {
+            ray: Ray::new(origin, direction),
+            throughput: Vec3::ONE,
+            bsdf_pdf: Some(pdf),
+            bounce: 1,
+        };
+        let sample = follow(world, leg, stream, options, &mut |_, _| {});
+        cast.rays += u64::from(sample.rays);
+        cast.rejected += u64::from(sample.rejected) + keep(wi, sample.radiance / pdf);
+    }
+    cast
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::stats::Moments;
+    use crate::transport::bsdf::Bsdf;
+    use crate::transport::environment::Environment;
+    use crate::transport::material::Lobe;
+    use crate::transport::world::EmitterSample;
+
+    /// Nothing but light from outside, brighter towards one side.
+    struct Sky(Environment);
+
+    impl World for Sky {
+        fn intersect(&self, _: &Ray) -> Option<SurfacePoint> {
+            None
+        }
+        fn occluded(&self, _: &Ray) -> bool {
+            false
+        }
+        fn sample_emitter(&self, _: f64, _: [f32; 2]) -> Option<EmitterSample> {
+            None
+        }
+        fn emitter_pdf(&self, _: &SurfacePoint) -> f32 {
+            0.0
+        }
+        fn has_emitters(&self) -> bool {
+            false
+        }
+        fn environment(&self) -> Option<&Environment> {
+            Some(&self.0)
+        }
+    }
+
+    /// Means of two unbiased estimates differ by less than four and a half standard errors; 12 tests.
+    #[test]
+    fn any_scattering_is_integrated_over_the_same_arrivals_without_bias() {
+        let pixels = (0..32 * 16).map(|i| Vec3::splat(if i % 32 < 3 { 9.0 } else { 0.4 }));
+        let sky = Sky(Environment::new(32, 16, pixels.collect()).expect("light"));
+        let surface = SurfacePoint {
+            point: Vec3::ZERO,
+            corners: [Vec3::ZERO, Vec3::X, Vec3::Y],
+            normal: Vec3::Z,
+            shading_normal: Vec3::Z,
+            albedo: Vec3::ZERO,
+            emission: Vec3::ZERO,
+            lobe: None,
+            object: 0,
+            triangle: 0,
+            t: 1.0,
+        };
+        let frame = Frame::around(Vec3::Z);
+        let wo = Vec3::new(0.6, 0.2, 0.5).normalize();
+        let materials = [0.08, 0.2, 0.5, 1.0].map(|roughness| Bsdf {
+            albedo: Vec3::splat(0.3),
+            lobe: Some(Lobe {
+                roughness,
+                specular: Vec3::splat(0.4),
+            }),
+        });
+        let diffuse = Bsdf {
+            albedo: Vec3::ONE,
+            lobe: None,
+        };
+        for bsdf in materials.into_iter().chain([diffuse]) {
+            let (mut found, mut wanted) = (Moments::default(), Moments::default());
+            for sample in 0..60_000 {
+                let mut stream = Stream::new(3, 0, 0, sample);
+                let mut kept = Vec::new();
+                let options = PathOptions::default();
+                arrivals(
+                    &sky,
+                    &surface,
+                    &frame,
+                    wo,
+                    &[0.1, 0.4],
+                    &mut stream,
+                    &options,
+                    &mut kept,
+                );
+                found.push(
+                    kept.iter()
+                        .map(|a| f64::from((bsdf.eval(wo, a.wi) * a.light).x))
+                        .sum(),
+                );
+                let drawn = bsdf.sample(wo, stream.uniform(), stream.uniform2());
+                wanted.push(drawn.map_or(0.0, |s| {
+                    f64::from((s.weight * sky.0.radiance(frame.to_world(s.wi))).x)
+                }));
+            }
+            let error = found.standard_error().hypot(wanted.standard_error());
+            let difference = found.mean - wanted.mean;
+            assert!(
+                difference.abs() < 4.5 * error,
+                "{bsdf:?}: {difference} ± {error}"
+            );
+        }
+    }
+}
