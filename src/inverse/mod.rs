@@ -4,6 +4,7 @@ pub mod cache;
 pub mod estimate;
 pub mod exposure;
 pub mod held_out;
+pub mod known;
 pub mod lobe;
 pub mod loss;
 pub mod measured;

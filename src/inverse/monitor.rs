@@ -1,6 +1,7 @@
 //! The solver's clock and its line to the observer.
 
 use crate::inverse::estimate::Estimate;
+use crate::inverse::known::Known;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{
     Checkpoint, Control, LossPoint, Observer, Progress, Stage, Termination,
@@ -14,6 +15,8 @@ pub struct Monitor<'a> {
     pub progress: Progress,
     /// The parameters in force; live ones may change at any report.
     pub settings: Settings,
+    /// What is held.
+    pub known: Known,
     started: Instant,
     /// Time spent in the observer.
     away: Duration,
@@ -29,6 +32,7 @@ impl<'a> Monitor<'a> {
     /// Starts the clock at the seconds that `progress` already has.
     pub fn new(settings: &Settings, observer: &'a mut dyn Observer, progress: Progress) -> Self {
         Self {
+            known: observer.known(),
             observer,
             earlier: progress.seconds,
             progress,

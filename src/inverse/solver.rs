@@ -4,6 +4,7 @@ use crate::capture::photograph::Photograph;
 use crate::error::{Error, Result};
 use crate::inverse::cache::ladder;
 use crate::inverse::estimate::Estimate;
+use crate::inverse::known::Known;
 use crate::inverse::monitor::Monitor;
 use crate::inverse::paper;
 use crate::inverse::settings::{Preset, Settings};
@@ -96,6 +97,11 @@ pub enum Control {
 pub trait Observer {
     /// Hears how far the solve has come and may steer it.
     fn observe(&mut self, progress: &Progress, estimate: &Estimate) -> Control;
+
+    /// What is known beforehand and is to be held; asked for once, at the start.
+    fn known(&self) -> Known {
+        Known::default()
+    }
 
     /// Is offered a checkpoint of where the solve stands, just before it hears of it by [`Observer::observe`]; one that
     /// wants to keep it calls `make`. Solvers that can be taken up again offer it wherever they call `observe`.

@@ -1,8 +1,10 @@
 //! What is believed of an unknown before any photograph speaks: little, but enough to keep what no photograph
 //! determines within reason.
 
+use crate::inverse::known::Known;
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Standard deviation of an albedo of which nothing is known, about [`ALBEDO_MEAN`].
 pub const ALBEDO_DEVIATION: f32 = 0.5;
@@ -11,6 +13,9 @@ pub const ALBEDO_MEAN: f32 = 0.5;
 /// Standard deviation of light from a direction outside that no photograph looks in, in mean radiances of what the
 /// photographs show.
 const OUTSIDE_DEVIATION: f32 = 4.0;
+
+/// Standard deviation of a value that is known, relative to its size: so little that nothing moves it.
+const KNOWN: f64 = 1e-12;
 
 /// Normal distributions of albedos.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -31,6 +36,8 @@ pub struct Prior {
     /// One for each of those.
     means: Vec<Vec3>,
     deviation: Vec3,
+    /// Parameters that are known, with their values.
+    known: BTreeMap<usize, Vec3>,
 }
 
 impl Prior {
@@ -43,7 +50,20 @@ impl Prior {
             outside,
             means: vec![Vec3::ZERO; surfaces - outside],
             deviation: photographed * OUTSIDE_DEVIATION,
+            known: BTreeMap::new(),
         }
+    }
+
+    /// The same with values that are known.
+    pub fn with_known(mut self, known: &Known) -> Self {
+        for (k, pinned) in known.objects().filter(|(k, _)| *k < self.outside) {
+            let albedo = pinned.albedo.map(|albedo| (k, albedo));
+            let emission = pinned
+                .emission
+                .map(|emission| (self.surfaces + k, emission));
+            self.known.extend(albedo.into_iter().chain(emission));
+        }
+        self
     }
 
     /// The same with what to expect of each surface's albedo.
@@ -77,6 +97,16 @@ impl Prior {
     /// Mean of a parameter (albedos first, then emissions), and its precision in the units of the normal equations: the
     /// noise variance of one cluster over the prior's variance. Zero where nothing is believed.
     pub fn of(&self, parameter: usize, noise: DVec3) -> (DVec3, DVec3) {
+        if let Some(value) = self.known.get(&parameter) {
+            // One in the unit of the parameter, for those that are zero.
+            let unit = match parameter < self.surfaces {
+                true => Vec3::ONE,
+                false => self.deviation,
+            };
+            let deviation = value.max(unit).as_dvec3() * KNOWN;
+            let precision = (noise / (deviation * deviation)).min(DVec3::splat(f64::MAX));
+            return (value.as_dvec3(), precision);
+        }
         let (mean, deviation) = match parameter.checked_sub(self.surfaces) {
             None => match &self.albedo {
                 Some(expected) => (expected.mean[parameter], expected.deviation[parameter]),

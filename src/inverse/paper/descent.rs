@@ -4,6 +4,7 @@ use super::adam::Adam;
 use crate::inverse::cache::derivative::{Gradient, differentiate};
 use crate::inverse::cache::trace::Tracer;
 use crate::inverse::held_out::is_held_out;
+use crate::inverse::known::Known;
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::settings::{Loss, Settings};
 use crate::inverse::solver::Problem;
@@ -126,6 +127,34 @@ impl Descent {
             adam: Adam::new(2 * surfaces),
             steps: self.steps,
             emitters: None,
+        }
+    }
+
+    /// Gives what is known its values.
+    pub fn hold(&mut self, scene: &Scene, known: &Known) {
+        for (k, pinned) in known.objects() {
+            let Some(object) = scene.objects.get(k) else {
+                continue;
+            };
+            let own = [k as u32];
+            let surfaces = match self.grain {
+                Grain::Objects => &own[..],
+                Grain::Triangles => &object.triangles,
+            };
+            for &surface in surfaces {
+                if let Some(albedo) = pinned.albedo {
+                    self.unknowns.albedo[surface as usize] = albedo;
+                }
+                if let Some(emission) = pinned.emission {
+                    self.unknowns.emission[surface as usize] = emission;
+                }
+            }
+            if let Some(emission) = pinned.emission {
+                self.lights[k] = emission;
+                if let Some(emitters) = &mut self.emitters {
+                    emitters.set_weight(k, object.area * f64::from(luminance(emission)));
+                }
+            }
         }
     }
 

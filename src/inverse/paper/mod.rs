@@ -58,7 +58,7 @@ pub fn solve(
 ) -> error::Result<Solution> {
     let survey = Survey::new(problem, settings, 400_000);
     let bounces = settings.max_bounces();
-    let state = match resume {
+    let mut state = match resume {
         None => State {
             descent: Descent::new(problem, Grain::Objects),
             schedule: Schedule::default(),
@@ -69,6 +69,7 @@ pub fn solve(
         })?,
     };
     let notes = untold(problem, &survey);
+    state.descent.hold(&problem.scene, &monitor.known);
     let mut run = Run {
         estimate: describe(problem, &survey, &notes, &state.descent),
         losses: LossProbe::new(problem, settings, 400, 16, bounces),
@@ -144,6 +145,7 @@ impl Run<'_, '_> {
                     }
                 }
                 let outcome = (self.state.descent).step(self.problem, &settings, self.bounces);
+                (self.state.descent).hold(&self.problem.scene, &self.monitor.known);
                 self.state.schedule.traced(outcome.paths);
                 self.monitor.progress.rays += outcome.rays;
                 self.monitor
@@ -167,6 +169,18 @@ impl Run<'_, '_> {
 
     fn describe(&mut self) {
         self.estimate = describe(self.problem, &self.survey, &self.notes, &self.state.descent);
+        for (k, pinned) in self.monitor.known.objects() {
+            let Some(object) = self.estimate.objects.get_mut(k) else {
+                continue;
+            };
+            if pinned.albedo.is_some() {
+                object.albedo_stderr = Vec3::ZERO;
+            }
+            if pinned.emission.is_some() {
+                object.emission_stderr = Vec3::ZERO;
+            }
+            pinned.words().clone_into(&mut object.note);
+        }
     }
 
     /// Adds a point to the loss curve; returns the loss in the fit.

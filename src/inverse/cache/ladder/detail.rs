@@ -16,6 +16,7 @@ impl Ladder<'_, '_> {
                 self.roles[k] == Role::Reflector
                     && self.lobes[k].is_none()
                     && self.estimate.objects[k].albedo_identifiable
+                    && self.monitor.known.of(k).albedo.is_none()
             })
             .collect();
         let settings = self.monitor.settings.clone();

@@ -52,7 +52,7 @@ impl Ladder<'_, '_> {
             };
             let doubtful: Vec<usize> = (0..self.roles.len())
                 .filter(|&k| self.roles[k] == Role::Unseen && significance(k) < SIGNIFICANT)
-                .filter(|&k| k < self.problem.scene.objects.len())
+                .filter(|&k| k < self.problem.scene.objects.len() && !self.emission_is_known(k))
                 .collect();
             if doubtful.is_empty() {
                 return Ok(());
@@ -74,13 +74,14 @@ impl Ladder<'_, '_> {
             let mut changed = false;
             for change in judge(cache, &self.unknowns, &self.roles) {
                 let k = change.object;
-                // What has gone both ways is left a reflector.
-                if returned[k] {
+                let role = self.allowed(k, change.role);
+                // What has gone both ways is left a reflector; what is known, what it is.
+                if returned[k] || role == self.roles[k] {
                     continue;
                 }
                 changed = true;
-                self.roles[k] = change.role;
-                if change.role == Role::Emitter {
+                self.roles[k] = role;
+                if role.emits() {
                     self.unknowns.albedo[k] = Vec3::ZERO;
                     self.unknowns.emission[k] = change.value;
                 } else {
@@ -92,6 +93,7 @@ impl Ladder<'_, '_> {
             if !changed {
                 break;
             }
+            self.hold();
             let fitted = self.fit(cache)?;
             self.take(fitted);
         }
@@ -105,9 +107,13 @@ impl Ladder<'_, '_> {
         let in_mesh = self.problem.scene.objects.len();
         let mut added = Vec::new();
         while added.len() < 8 {
-            let of_the_mesh = |test: &Released| test.index - objects < in_mesh;
-            let strongest = (self.test_dark(cache).into_iter())
-                .filter(of_the_mesh)
+            let tested = self.test_dark(cache);
+            let open = |test: &Released| {
+                let k = test.index - objects;
+                k < in_mesh && !self.emission_is_known(k)
+            };
+            let strongest = (tested.into_iter())
+                .filter(open)
                 .max_by(|a, b| a.significance().total_cmp(&b.significance()));
             let Some(candidate) = strongest.filter(|c| c.significance() > SIGNIFICANT) else {
                 break;

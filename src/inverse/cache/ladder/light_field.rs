@@ -102,6 +102,7 @@ impl Ladder<'_, '_> {
             };
         }
         self.unknowns = Unknowns::new(self.roles.len());
+        self.hold();
         self.trust = Trust::even(self.roles.len());
         let fitted = self.fit(cache)?;
         self.take(fitted);

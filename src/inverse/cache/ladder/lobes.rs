@@ -2,6 +2,7 @@
 
 use super::Ladder;
 use crate::inverse::cache::roles::Role;
+use crate::inverse::known::Pinned;
 use crate::inverse::lobe::{Found, Lobes, Task};
 use crate::inverse::solver::{Stage, Termination};
 use crate::transport::arrival::Cast;
@@ -17,6 +18,7 @@ impl<'a> Ladder<'a, '_> {
         self.monitor.phase("looking for gloss");
         let objects: Vec<usize> = (0..self.problem.scene.objects.len())
             .filter(|&k| self.roles[k].reflects() || self.roles[k] == Role::Emitter)
+            .filter(|&k| self.monitor.known.of(k) == Pinned::default())
             .collect();
         let lobes = Lobes::new(self.lobe_task(), &self.survey);
         let estimate = self.estimate.clone();
@@ -80,7 +82,7 @@ impl<'a> Ladder<'a, '_> {
 
         // What was taken for light may have been gloss.
         let glowing: Vec<usize> = (0..self.roles.len())
-            .filter(|&k| self.roles[k] == Role::Glowing)
+            .filter(|&k| self.roles[k] == Role::Glowing && !self.emission_is_known(k))
             .collect();
         if !kept.is_empty() && !glowing.is_empty() {
             for k in glowing {

@@ -1,6 +1,7 @@
 //! The transport-cache solver: a light-field start, then rounds of full paths until the errors are small enough.
 
 mod detail;
+mod known;
 mod lamps;
 mod light_field;
 mod lobes;
@@ -129,8 +130,9 @@ pub fn solve(
     let sky = (start.open)
         .then(|| MeasuredOutside::new(problem, &survey))
         .flatten();
-    let prior =
-        Prior::new(surfaces, objects, mean_radiance(&clusters)).with_albedo(start.expected.clone());
+    let prior = (Prior::new(surfaces, objects, mean_radiance(&clusters))
+        .with_albedo(start.expected.clone()))
+    .with_known(&monitor.known);
     let mut ladder = Ladder {
         problem,
         budget,
@@ -163,6 +165,7 @@ pub fn solve(
         stages: start.stages,
     };
     ladder.expect_of_outside();
+    ladder.hold();
     ladder.describe();
     if let Some(exposures) = exposures.filter(|_| resume.is_none()) {
         ladder.tell_exposures(&exposures, started);
@@ -299,6 +302,7 @@ impl Ladder<'_, '_> {
         let errors = standard_errors(&fitted.equations, &free, self.roles.len());
         self.unknowns = fitted.unknowns;
         self.merge_errors(errors);
+        self.hold();
         self.describe();
     }
 
@@ -329,6 +333,7 @@ impl Ladder<'_, '_> {
         if let Some(detail) = &self.detail {
             detail.apply(&mut self.estimate);
         }
+        self.describe_known();
     }
 
     fn measure(&mut self) -> Losses {

@@ -58,6 +58,7 @@ impl Ladder<'_, '_> {
             let step = largest_step(&about, &self.unknowns);
             self.monitor.progress.iterations += 1;
             self.merge_errors(errors);
+            self.hold();
             self.describe();
             self.monitor
                 .report(&self.estimate, &|_| self.checkpoint.clone())?;
