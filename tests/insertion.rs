@@ -283,15 +283,25 @@ fn an_object_darkens_the_floor_beside_it() {
     insertion.pass(64);
     let layers = insertion.layers();
     // Floor pixels that the object does not cover, in the columns in front of it.
-    let mut delta = Moments::default();
+    let (mut delta, mut dimmed) = (Moments::default(), 0);
     for y in SIDE * 3 / 4..SIDE {
         for x in SIDE / 3..SIDE * 2 / 3 {
             let pixel = (y * SIDE + x) as usize;
             if layers.alpha[pixel] == 0.0 {
                 delta.push(f64::from(layers.delta.pixels[pixel].y));
+                let shadow = layers.shadow.pixels[pixel].y;
+                assert!((0.0..=1.0).contains(&shadow));
+                dimmed += u32::from(shadow < 1.0);
+                if shadow < 1.0 {
+                    let with = layers.without.pixels[pixel].y * shadow;
+                    assert!((with - layers.with.pixels[pixel].y).abs() < 1e-5);
+                }
+            } else {
+                assert_eq!(layers.shadow.pixels[pixel], Vec3::ONE);
             }
         }
     }
+    assert!(dimmed > 10, "{dimmed} pixels are shadowed");
     assert!(delta.count > 10, "{delta:?}");
     assert!(delta.mean < -4.0 * delta.standard_error(), "{delta:?}");
     let composite = insertion.composite();

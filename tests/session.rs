@@ -2,13 +2,14 @@
 
 mod common;
 
+use relit::capture::place::Coordinates;
 use relit::inverse::estimate::Estimate;
 use relit::inverse::settings::Settings;
 use relit::inverse::solver::{
     Checkpoint, Control, LossPoint, Observer, Problem, Solution, Termination,
 };
 use relit::session::Session;
-use relit::session::command::{Command, Source, ViewCamera, ViewRequest};
+use relit::session::command::{Command, OpenOptions, Placement, Source, ViewCamera, ViewRequest};
 use relit::session::edits::{Edits, ObjectEdit};
 use relit::session::snapshot::{Level, OpenCapture, Phase, Picture, Snapshot};
 use relit::session::worker::Backend;
@@ -24,9 +25,12 @@ fn count_up(
     steps: &AtomicU64,
     panic_at: Option<u64>,
     resume: Option<&Checkpoint>,
+    resumable: bool,
 ) -> Solution {
     let mut progress = resume.map(|c| c.progress.clone()).unwrap_or_default();
     let mut estimate = common::truth();
+    let known = observer.known();
+    estimate.objects[1].roughness = known.of(1).albedo.map(|albedo| albedo.x);
     loop {
         progress.iterations += 1;
         progress.rays += 1000;
@@ -45,9 +49,9 @@ fn count_up(
         if observer.observe(&progress, &estimate) == Control::Stop {
             return Solution {
                 estimate,
+                checkpoint: resumable.then(|| Checkpoint::new(&progress, &progress.iterations)),
                 progress,
                 termination: Termination::Cancelled,
-                checkpoint: None,
             };
         }
     }
@@ -61,6 +65,15 @@ struct Rig {
 impl Rig {
     /// A session on the tiny room whose first solve panics at a step, if one is given.
     fn new(panic_at: Option<u64>) -> Self {
+        Self::spawn(panic_at, false)
+    }
+
+    /// A session whose solves can be gone on with after their end.
+    fn resumable() -> Self {
+        Self::spawn(None, true)
+    }
+
+    fn spawn(panic_at: Option<u64>, resumable: bool) -> Self {
         let steps = Arc::new(AtomicU64::new(0));
         let shared = steps.clone();
         let mut fault = panic_at;
@@ -69,7 +82,7 @@ impl Rig {
                 OpenCapture::new(source.clone(), options.clone(), ROOM.clone())
             }),
             solve: Box::new(move |_: &Problem, _: &Settings, resume, observer| {
-                Ok(count_up(observer, &shared, fault.take(), resume))
+                Ok(count_up(observer, &shared, fault.take(), resume, resumable))
             }),
         };
         let session = Session::spawn_with(
@@ -249,6 +262,117 @@ fn a_save_during_a_solve_holds_the_solvers_state_and_a_resume_goes_on_from_it() 
     assert!(other.session.send(command));
     let resumed = other.until("going on", |s| iterations(s) >= at);
     assert!(iterations(&resumed) < at + 50, "{}", iterations(&resumed));
+}
+
+#[test]
+fn a_session_saves_by_itself_and_is_taken_up_with_its_changes_and_objects() {
+    let base = tempfile::tempdir().expect("a temporary folder");
+    let keep = || Command::Keep(base.path().join("sessions"));
+    let file = base.path().join("block.obj");
+    std::fs::write(&file, "v 0 0 0\nv 0.2 0 0\nv 0 0.2 0.2\nf 1 2 3\n").expect("written");
+    let block = Placement {
+        file,
+        at: Some(glam::DVec3::new(0.1, 0.0, -0.3)),
+        scale: 1.5,
+        rotate: 30.0,
+    };
+    let mut edits = Edits::default();
+    let off = ObjectEdit {
+        off: true,
+        ..ObjectEdit::default()
+    };
+    edits.set(3, off);
+
+    let rig = Rig::resumable();
+    assert!(rig.session.send(keep()));
+    rig.until("some steps", |s| iterations(s) > 50);
+    assert!(rig.session.send(Command::Edit(edits.clone())));
+    assert!(rig.session.send(Command::Insert(vec![block.clone()])));
+    rig.until("the edit", |s| s.edits == edits);
+    assert!(rig.session.send(Command::Pause));
+    let paused = rig.until("the pause", |s| s.phase == Phase::Paused);
+    // What came after the last save is saved at the worker's end.
+    rig.session.join();
+
+    let other = Rig::resumable();
+    assert!(other.session.send(keep()));
+    let found = other.until("the last session", |s| s.earlier.is_some());
+    assert!(found.edits.is_empty() && found.inserted.is_empty());
+    let folder = found.earlier.clone().expect("a folder");
+    assert!(other.session.send(Command::Resume(folder)));
+    let resumed = other.until("the changes", |s| s.edits == edits);
+    assert_eq!(*resumed.inserted, [block]);
+    other.until("going on", |s| iterations(s) >= iterations(&paused));
+    assert_eq!(resumed.earlier, None);
+    other.session.join();
+
+    // What goes on is kept in turn.
+    let third = Rig::resumable();
+    assert!(third.session.send(keep()));
+    let again = third.until("the last session", |s| s.earlier.is_some());
+    let saved = again.earlier.clone().expect("a folder");
+    let saved = relit::session::save::load(&saved).expect("reads");
+    let checkpoint = saved.checkpoint.as_ref().expect("a checkpoint");
+    assert!(checkpoint.progress.iterations >= iterations(&paused));
+}
+
+#[test]
+fn pinned_values_are_handed_to_the_solver_which_goes_on_from_its_checkpoint() {
+    let rig = Rig::new(None);
+    rig.until("some steps", |s| iterations(s) > 100);
+    let mut edits = Edits::default();
+    let pinned = ObjectEdit {
+        albedo: Some(glam::Vec3::splat(0.4)),
+        albedo_known: true,
+        ..ObjectEdit::default()
+    };
+    edits.set(1, pinned);
+    assert!(rig.session.send(Command::Edit(edits)));
+    assert!(rig.session.send(Command::SolveOn));
+    // The solver of these tests says what it was told by the roughness of the floor.
+    let on = rig.until("the pinned value", |s| {
+        s.estimate.objects.get(1).and_then(|o| o.roughness) == Some(0.4)
+    });
+    assert!(iterations(&on) >= 100, "{}", iterations(&on));
+}
+
+#[test]
+fn a_capture_is_put_into_other_coordinates_with_all_that_was_found_and_changed() {
+    let rig = Rig::resumable();
+    rig.until("some steps", |s| iterations(s) > 50);
+    let mut edits = Edits::default();
+    edits.set_outside(glam::Vec3::splat(0.5));
+    assert!(rig.session.send(Command::Edit(edits.clone())));
+    let options = OpenOptions {
+        coordinates: Coordinates {
+            scale: Some(2.0),
+            ground: Some(0.25),
+        },
+        ..OpenOptions::default()
+    };
+    assert!(rig.session.send(Command::Reframe(Box::new(options))));
+    let scaled = rig.until("a larger room", |s| {
+        s.capture.as_ref().is_some_and(|c| c.scene.diameter > 6.0)
+    });
+    let capture = scaled.capture.as_ref().expect("open");
+    let heights = capture.capture.mesh.positions.iter().map(|p| p.y);
+    let lowest = heights.fold(f64::INFINITY, f64::min);
+    assert!((lowest + 0.5).abs() < 1e-9, "{lowest}");
+    assert_eq!(scaled.edits, edits);
+    let on = rig.until("solving on", |s| {
+        s.phase == Phase::Solving && iterations(s) > iterations(&scaled)
+    });
+    assert!(iterations(&on) > 50);
+
+    // What is saved is read in the same coordinates, and belongs to the same capture.
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    assert!(rig.session.send(Command::Save(folder.path().to_owned())));
+    rig.until("the save", |s| {
+        s.events.iter().any(|e| e.message.starts_with("saved to"))
+    });
+    let saved = relit::session::save::load(folder.path()).expect("reads");
+    assert_eq!(saved.options.coordinates.scale, Some(2.0));
+    saved.estimate_for(capture).expect("the same capture");
 }
 
 #[test]

@@ -93,15 +93,22 @@ const fn ctrl_shift(key: Key) -> Option<KeyboardShortcut> {
 actions! {
     OpenFolder, File, "Open capture…", "Chooses a capture's folder with a file dialog", ctrl(Key::O);
     OpenRoom, File, "Open built-in room", "Opens the room that is built into the program", ctrl_shift(Key::O);
+    TakeUp, File, "Take up the last session", "Goes on from what was kept of the last session of this capture, with its changes and objects", None;
     StartPage, File, "Start page", "Shows recent captures and the field for a typed path", ctrl(Key::N);
     Save, File, "Save results…", "Writes estimate, report and pictures into a folder", ctrl(Key::S);
     Export, File, "Export…", "Writes one file for another program", ctrl(Key::E);
     SaveLayers, File, "Save light layers…", "Writes the light of each lamp as a layer of one OpenEXR file", ctrl_shift(Key::S);
+    SavePhotographs, File, "Save photographs…", "Writes all photographs, or one, with the inserted objects and in the changed light", ctrl_shift(Key::E);
+    CancelPhotographs, File, "Cancel photographs", "Ends the writing of photographs; those that are done stay", None;
+    Probe, File, "Light probe by click…", "The light at the place of the next click as a panorama (.hdr or .exr), for other programs", None;
+    SetScale, Edit, "Set the scale by two clicks…", "Two clicks in a view and the length between them make the capture's unit a metre", None;
+    SetGround, Edit, "Set the ground by a click", "The clicked surface lies at height 0, and up is its normal", None;
     Screenshot, File, "Screenshot of the window", "Writes a picture of the whole window into the current folder", key(Key::F12);
     Quit, File, "Quit", "Closes the window", ctrl(Key::Q);
 
     Undo, Edit, "Undo", "Takes back the last change to objects or light", ctrl(Key::Z);
     Redo, Edit, "Redo", "Makes the last change that was undone again", ctrl_shift(Key::Z);
+    CopyPicture, Edit, "Copy picture", "Copies the picture under the pointer, whole and as it is seen, to the clipboard", ctrl_shift(Key::C);
     InsertObject, Edit, "Insert object…", "Shows the panel that puts OBJ and GLB objects into the photographs", ctrl(Key::I);
     Place, Edit, "Place by click", "The next click in a view puts the chosen object there", key(Key::G);
     Duplicate, Edit, "Duplicate object", "Copies the chosen inserted object", ctrl(Key::D);
@@ -115,6 +122,7 @@ actions! {
     KeepMix, Edit, "Give lamps this light", "Makes the mixed light the lamps' own emission, for exports and composites", None;
     Material, Edit, "Material", "Shows albedo and emission of the selected object, to be changed", key(Key::M);
     SwitchLamp, Edit, "Switch lamp off / on", "Switches the selected lamp off, or on again", key(Key::K);
+    SolveOn, Solve, "Solve on with pinned values", "Holds the pinned values and solves the rest on from the last stage", ctrl_shift(Key::R);
     ResetMaterial, Edit, "Reset material", "Puts the selected object back to what was found", None;
     ResetEdits, Edit, "Reset all materials", "Puts all objects and the light from outside back to what was found", None;
     Deselect, Edit, "Deselect", "Selects nothing and ends placing", key(Key::Escape);
@@ -141,6 +149,9 @@ actions! {
 
     Thumbnails, Window, "Thumbnails", "Shows or hides the strip of photographs", ctrl(Key::T);
     ResetLayout, Window, "Reset layout", "Puts all panes back where they were at first", None;
+    Larger, Window, "Larger interface", "Makes everything in the window larger", ctrl(Key::Plus);
+    Smaller, Window, "Smaller interface", "Makes everything in the window smaller", ctrl(Key::Minus);
+    OwnSize, Window, "Interface as large as the screen asks for", "Takes the size of everything in the window back to that of the screen", ctrl(Key::Num0);
     Theme, Window, "Light / dark theme", "Changes between the light and the dark theme", ctrl(Key::L);
 
     Palette, Help, "Command palette", "Finds any command by name", ctrl(Key::P);

@@ -93,7 +93,11 @@ pub fn first_layout() -> Tree<Pane> {
         picture(Quantity::Composite),
     ]);
     let model = tabs(&[Pane::Model]);
-    let albedo = tabs(&[picture(Quantity::Albedo), picture(Quantity::Emission)]);
+    let albedo = tabs(&[
+        picture(Quantity::Albedo),
+        picture(Quantity::Emission),
+        picture(Quantity::Irradiance),
+    ]);
     let error = tabs(&[picture(Quantity::Error), picture(Quantity::StandardError)]);
     let side = tabs(&[
         Pane::Objects,
@@ -185,13 +189,14 @@ pub struct Panes<'a> {
 
 impl Behavior<Pane> for Panes<'_> {
     fn pane_ui(&mut self, ui: &mut egui::Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
-        ui.painter()
-            .rect_filled(ui.max_rect(), 0.0, theme::tokens(ui).panel);
+        // What fills itself needs no ground: on a software renderer every layer counts.
         match *pane {
             Pane::Picture(quantity) => picture::canvas::pane(ui, self.app, quantity),
             Pane::Compare => picture::compare::pane(ui, self.app),
             Pane::Model => model::pane::pane(ui, self.app),
             other => {
+                let tokens = theme::tokens(ui);
+                ui.painter().rect_filled(ui.max_rect(), 0.0, tokens.panel);
                 egui::Frame::NONE.inner_margin(theme::GAP).show(ui, |ui| {
                     ui.take_available_space();
                     match other {

@@ -1,18 +1,22 @@
 //! The window: panes over a session, drawn by egui and wgpu. Talks to the worker through [`connection::Connection`].
 
 pub mod action;
+pub mod batch;
 pub mod connection;
 pub mod document;
 pub mod insertion;
 pub mod layout;
 pub mod mixer;
 pub mod model;
+pub mod pace;
 pub mod panels;
 mod perform;
+pub mod pick;
 pub mod picture;
 pub mod preferences;
 mod run;
 pub mod shell;
+pub mod size;
 pub mod state;
 pub mod theme;
 pub mod trade;

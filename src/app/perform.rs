@@ -3,6 +3,7 @@
 use crate::app::action::Action;
 use crate::app::layout::Pane;
 use crate::app::mixer::Mix;
+use crate::app::pick::Pick;
 use crate::app::picture::compare::Mode;
 use crate::app::picture::quantity::Quantity;
 use crate::app::shell::dialogs::Ask;
@@ -13,6 +14,7 @@ use crate::session::command::{Command, Source};
 use crate::session::edits::Edits;
 use crate::session::snapshot::{Level, Phase};
 use egui::ViewportCommand;
+use glam::DVec3;
 
 impl App {
     /// Whether an action makes sense now.
@@ -23,6 +25,8 @@ impl App {
             Action::Redo => self.history.can_redo(),
             Action::SwitchLamp => self.can_switch_lamp(),
             Action::ResetMaterial => self.can_reset_material(),
+            Action::TakeUp => self.snapshot.earlier.is_some(),
+            Action::SolveOn => !self.edits.known().is_empty(),
             Action::ResetEdits => !self.edits.is_empty(),
             Action::KeepMix => {
                 let layers = self.view().is_some_and(|view| view.layers.is_some());
@@ -33,8 +37,14 @@ impl App {
             Action::Place | Action::Duplicate | Action::Delete => self.insertions.chosen.is_some(),
             Action::MeasureTrade => self.trade.doing().is_some() || self.can_measure(),
             Action::Finish => matches!(self.snapshot.phase, Phase::Solving | Phase::Paused),
+            Action::SavePhotographs => self.can_write_photographs(),
+            Action::CancelPhotographs => self.batch.is_some(),
             Action::Save
             | Action::Export
+            | Action::Probe
+            | Action::SetScale
+            | Action::SetGround
+            | Action::CopyPicture
             | Action::InsertObject
             | Action::Lights
             | Action::Material
@@ -60,15 +70,30 @@ impl App {
         match action {
             Action::OpenFolder => self.ask(Ask::Capture, ctx),
             Action::OpenRoom => self.open(Source::BuiltInRoom),
+            Action::TakeUp => {
+                if let Some(folder) = self.snapshot.earlier.clone() {
+                    self.send(Command::Resume(folder));
+                }
+            }
             Action::StartPage => self.start_page = !self.start_page,
             Action::Save => self.sheet = Sheet::save(self.capture_name()),
-            Action::Export => self.sheet = Sheet::export(self.capture_name()),
+            Action::Export => self.sheet = Sheet::export(self.capture_name(), self.probe_point()),
             Action::SaveLayers => self.sheet = Sheet::layers(self.capture_name()),
+            Action::SavePhotographs => self.sheet = Sheet::photographs(self.capture_name()),
+            Action::CancelPhotographs => {
+                if let Some(batch) = &self.batch {
+                    batch.cancel();
+                }
+            }
+            Action::Probe => self.pick(Pick::Probe),
+            Action::SetScale => self.pick(Pick::Length(None)),
+            Action::SetGround => self.pick(Pick::Ground),
             Action::Screenshot => self.screenshot(ctx),
             Action::Quit => ctx.send_viewport_cmd(ViewportCommand::Close),
 
             Action::Undo => self.undo(),
             Action::Redo => self.redo(),
+            Action::CopyPicture => self.copy_picture(ctx),
             Action::InsertObject => self.bring_forward = Some(Pane::Insert),
             Action::Place => self.insertions.placing = !self.insertions.placing,
             Action::Duplicate => self.duplicate(),
@@ -95,6 +120,7 @@ impl App {
             Action::Deselect => {
                 self.selected = None;
                 self.insertions.placing = false;
+                self.picking = None;
                 self.keys = false;
                 self.palette = None;
                 self.sheet = Sheet::default();
@@ -105,6 +131,10 @@ impl App {
             Action::Step => self.send(Command::Step),
             Action::Finish => self.send(Command::Finish),
             Action::Reset => self.send(Command::Reset),
+            Action::SolveOn => {
+                self.send_edits();
+                self.send(Command::SolveOn);
+            }
 
             Action::MeasureTrade => {
                 self.bring_forward = Some(Pane::Trade);
@@ -133,6 +163,9 @@ impl App {
 
             Action::Thumbnails => self.preferences.thumbnails = !self.preferences.thumbnails,
             Action::ResetLayout => self.reset_layout = true,
+            Action::Larger => self.resize(ctx, Some(1.0)),
+            Action::Smaller => self.resize(ctx, Some(-1.0)),
+            Action::OwnSize => self.resize(ctx, None),
             Action::Theme => {
                 self.preferences.light = !self.preferences.light;
                 self.apply_theme(ctx);
@@ -169,6 +202,19 @@ impl App {
             Command::Run
         };
         self.send(command);
+    }
+
+    /// Where a probe is taken that was not clicked: at the chosen inserted object, or at the 3D view's target.
+    fn probe_point(&self) -> DVec3 {
+        let chosen = self
+            .insertions
+            .chosen
+            .and_then(|index| self.insertions.objects.get(index));
+        let target = self.model.orbit.target.as_dvec3();
+        let origin = self
+            .capture()
+            .map_or(DVec3::ZERO, |capture| capture.scene.origin);
+        (chosen.and_then(|object| object.placement.at)).unwrap_or(target + origin)
     }
 
     fn compare_pictures(&mut self, mode: Mode, left: Quantity, right: Quantity) {

@@ -11,6 +11,8 @@ use std::path::{Path, PathBuf};
 pub struct Preferences {
     /// Whether the light theme is used.
     pub light: bool,
+    /// How large everything is; `None` as the screen asks for.
+    pub size: Option<f32>,
     /// Tone curve of radiance.
     pub tone: ToneCurve,
     /// Whether the strip of photographs is shown.
@@ -25,6 +27,7 @@ impl Default for Preferences {
     fn default() -> Self {
         Self {
             light: false,
+            size: None,
             tone: ToneCurve::None,
             thumbnails: true,
             recent: Vec::new(),
@@ -77,6 +80,19 @@ pub fn path() -> Option<PathBuf> {
         named("XDG_CONFIG_HOME").or_else(|| Some(std::env::home_dir()?.join(".config")))?
     };
     Some(folder.join("relit").join("window.json"))
+}
+
+/// The folder of this user's sessions, where the system names one for such things.
+pub fn sessions() -> Option<PathBuf> {
+    let named = |variable| std::env::var_os(variable).map(PathBuf::from);
+    let folder = if cfg!(windows) {
+        named("LOCALAPPDATA")?
+    } else if cfg!(target_os = "macos") {
+        std::env::home_dir()?.join("Library/Application Support")
+    } else {
+        named("XDG_STATE_HOME").or_else(|| Some(std::env::home_dir()?.join(".local/state")))?
+    };
+    Some(folder.join("relit").join("sessions"))
 }
 
 #[cfg(test)]

@@ -1,19 +1,19 @@
 //! Opening the window on a session of its own; where none can be opened, an error that says why in one line.
 
+use crate::app::pace::Pace;
 use crate::app::preferences::{self, Preferences};
 use crate::app::state::App;
 use crate::app::window::Window;
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
 use crate::session::Session;
-use crate::session::command::Source;
+use crate::session::command::{Command, Source};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
 
-/// Least time between passes for what the worker sends: where a graphics card draws, and where the processor has to.
-const REPAINT: [Duration; 2] = [Duration::from_millis(16), Duration::from_millis(250)];
+/// Size of the window at first, in points.
+pub const WINDOW: [f32; 2] = [1280.0, 800.0];
 
 /// Opens the window and returns when it is closed. With no `source` it shows the start page.
 ///
@@ -24,9 +24,11 @@ pub fn run(source: Option<Source>, settings: Settings) -> Result<()> {
         viewport: egui::ViewportBuilder::default()
             .with_title("relit")
             .with_app_id("relit")
-            .with_inner_size([1280.0, 800.0])
+            .with_inner_size(WINDOW)
             .with_min_inner_size([760.0, 480.0]),
         renderer: eframe::Renderer::Wgpu,
+        // Costs time at every pixel, for gradients that the window does not have.
+        dithering: false,
         ..Default::default()
     };
     let opened = Arc::new(AtomicBool::new(false));
@@ -84,19 +86,23 @@ fn window(
     let software = cc.wgpu_render_state.as_ref().is_none_or(|render_state| {
         render_state.adapter.get_info().device_type == wgpu::DeviceType::Cpu
     });
-    let interval = REPAINT[usize::from(software)];
-    let ctx = cc.egui_ctx.clone();
-    let wake = Arc::new(move || ctx.request_repaint_after(interval));
+    let pace = Arc::new(Pace::new(software));
+    let (ctx, paced) = (cc.egui_ctx.clone(), pace.clone());
+    let wake = Arc::new(move || ctx.request_repaint_after(paced.interval()));
     let mut preferences_of_user = Preferences::default();
     let kept = preferences::path();
     if let Some(path) = &kept {
         preferences_of_user = Preferences::load(path);
     }
     let session = Session::spawn(source.clone(), settings.clone(), wake)?;
+    if let Some(folder) = preferences::sessions() {
+        // The queue is empty yet.
+        session.send(Command::Keep(folder));
+    }
     let mut app = App::new(Box::new(session), preferences_of_user);
     app.settings = settings;
     app.opened_with(source);
-    Ok(Window::new(cc, app, kept))
+    Ok(Window::new(cc, app, kept).paced(pace))
 }
 
 /// The reason in one line.

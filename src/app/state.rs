@@ -1,5 +1,6 @@
 //! The state of the window: the newest snapshot, how it is looked at, and what is asked of the worker.
 
+use crate::app::batch::Batch;
 use crate::app::connection::Connection;
 use crate::app::document::Document;
 use crate::app::insertion::Insertions;
@@ -7,7 +8,9 @@ use crate::app::layout::Pane;
 use crate::app::mixer::Mixer;
 use crate::app::model::view::ModelView;
 use crate::app::panels::objects::ObjectsTable;
+use crate::app::pick::Pick;
 use crate::app::picture::compare::Compare;
+use crate::app::picture::irradiance::Irradiance;
 use crate::app::picture::look::Look;
 use crate::app::picture::ramp;
 use crate::app::preferences::Preferences;
@@ -25,7 +28,6 @@ use crate::scene::camera::Camera;
 use crate::session::command::{Command, Placement, Source, ViewCamera, ViewRequest};
 use crate::session::edits::{Edited, Edits};
 use crate::session::snapshot::{Level, OpenCapture, Phase, Picture, Snapshot};
-use glam::DVec3;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -73,6 +75,10 @@ pub struct App {
     pub objects: ObjectsTable,
     /// The trade of speed for exactness.
     pub trade: TradeView,
+    /// What the next click in a view is asked for.
+    pub picking: Option<Pick>,
+    /// Photographs that are being written.
+    pub batch: Option<Batch>,
     /// Events.
     pub notices: Notices,
     /// File dialogs.
@@ -89,6 +95,10 @@ pub struct App {
     pub path: String,
     /// What is remembered between runs.
     pub preferences: Preferences,
+    /// How large everything was made, once it was.
+    pub size: Option<f32>,
+    /// Whether the window is to grow with what is in it.
+    pub grows: bool,
     /// A pane to bring to the front in this pass.
     pub bring_forward: Option<Pane>,
     /// Whether the layout is to be reset in this pass.
@@ -101,6 +111,10 @@ pub struct App {
     pub pixels_needed: f32,
     /// Whether a pane showed the light of each lamp apart in this pass.
     pub layers_needed: bool,
+    /// Whether a pane showed the irradiance in this pass.
+    pub irradiance_needed: bool,
+    /// The irradiance of the shown view.
+    pub irradiance: Irradiance,
     photograph: Option<(usize, Arc<Picture>)>,
     pending: VecDeque<Command>,
     opening: Option<Source>,
@@ -134,6 +148,8 @@ impl App {
             model: ModelView::default(),
             objects: ObjectsTable::default(),
             trade: TradeView::default(),
+            picking: None,
+            batch: None,
             notices: Notices::default(),
             dialogs: Dialogs::default(),
             sheet: Sheet::default(),
@@ -142,6 +158,8 @@ impl App {
             start_page: false,
             path: String::new(),
             preferences,
+            size: None,
+            grows: false,
             bring_forward: None,
             reset_layout: false,
             memory: Memory::default(),
@@ -149,6 +167,8 @@ impl App {
             photograph: None,
             pixels_needed: 0.0,
             layers_needed: false,
+            irradiance_needed: false,
+            irradiance: Irradiance::default(),
             pending: VecDeque::new(),
             opening: None,
             sent_view: None,
@@ -245,6 +265,7 @@ impl App {
         self.convert_photograph();
         self.mix_light();
         self.take_trade();
+        self.take_batch();
         self.take_models(ctx);
         self.request();
         self.send_edits();
@@ -277,12 +298,13 @@ impl App {
         self.frame = 0;
         self.shown = Shown::Frame;
         self.selected = None;
+        self.picking = None;
         self.sent_view = None;
         self.photograph = None;
-        self.insertions.clear();
+        self.insertions.take_up(&self.snapshot.inserted);
         self.mixer = Mixer::default();
         self.take_edits();
-        self.sent_insertions.clear();
+        self.sent_insertions = self.insertions.placements();
         self.model = ModelView::default();
         self.look.fit();
         if self.capture().is_some() {
@@ -298,6 +320,8 @@ impl App {
     fn mix_light(&mut self) {
         let layers = self.view().and_then(|view| view.layers.clone());
         self.mixer.update(layers.as_ref());
+        let view = self.view().filter(|_| self.irradiance_needed).cloned();
+        self.irradiance.update(view.as_deref());
     }
 
     /// Puts the shown photograph's 99th percentile at 1.
@@ -401,20 +425,8 @@ impl App {
     /// Adds an object, at first where the middle of the view meets the scene.
     pub fn insert(&mut self, file: PathBuf) {
         let below_middle = egui::pos2(0.5, 0.65);
-        let at = self.surface_at(below_middle).map(|(point, _)| point);
+        let at = self.surface_at(below_middle).map(|at| at.point);
         self.insertions.add(file, at);
-    }
-
-    /// The surface at a point of the shown view, given in fractions of its size: its place in the capture's
-    /// coordinates, and its object.
-    pub fn surface_at(&self, at: egui::Pos2) -> Option<(DVec3, u32)> {
-        let scene = &self.capture()?.scene;
-        let camera = self.camera()?;
-        let k = &camera.intrinsics;
-        let ray = camera.ray(glam::vec2(at.x * k.width as f32, at.y * k.height as f32));
-        let hit = scene.intersect(&ray)?;
-        let object = *scene.object_of.get(hit.triangle as usize)?;
-        Some((scene.point(&hit).as_dvec3() + scene.origin, object))
     }
 
     /// Takes in the shapes of inserted objects, and scales down what is larger than the scene as modelled.

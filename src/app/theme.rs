@@ -109,6 +109,13 @@ pub fn of(visuals: &Visuals) -> &'static Tokens {
     if visuals.dark_mode { &DARK } else { &LIGHT }
 }
 
+/// The strip of controls above a picture.
+pub fn strip(ui: &Ui) -> egui::Frame {
+    egui::Frame::NONE
+        .fill(tokens(ui).panel)
+        .inner_margin(egui::Margin::symmetric(6, 3))
+}
+
 /// Installs both themes in a context.
 pub fn install(ctx: &egui::Context) {
     for (theme, tokens) in [(Theme::Dark, &DARK), (Theme::Light, &LIGHT)] {

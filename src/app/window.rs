@@ -1,6 +1,7 @@
 //! The window as eframe sees it: one pass draws bars, panes and what floats over them.
 
 use crate::app::layout::{self, Pane, Panes};
+use crate::app::pace::Pace;
 use crate::app::picture::inspect;
 use crate::app::preferences::Preferences;
 use crate::app::shell::{files, keys, menu, palette, start, status, thumbnails, toolbar};
@@ -9,6 +10,7 @@ use crate::app::{action, model, picture, theme};
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 use egui_tiles::Tree;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// The window.
 pub struct Window {
@@ -18,6 +20,7 @@ pub struct Window {
     pub tree: Tree<Pane>,
     kept: Option<PathBuf>,
     saved: Preferences,
+    pace: Option<Arc<Pace>>,
 }
 
 impl Window {
@@ -41,6 +44,15 @@ impl Window {
             tree,
             kept,
             saved,
+            pace: None,
+        }
+    }
+
+    /// The same, telling `pace` of every pass.
+    pub fn paced(self, pace: Arc<Pace>) -> Self {
+        Self {
+            pace: Some(pace),
+            ..self
         }
     }
 
@@ -91,6 +103,7 @@ impl Window {
                 }
                 self.app.pixels_needed = 0.0;
                 self.app.layers_needed = false;
+                self.app.irradiance_needed = false;
                 let mut panes = Panes { app: &mut self.app };
                 self.tree.ui(&mut panes, ui);
             });
@@ -114,6 +127,12 @@ impl Window {
 impl eframe::App for Window {
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
         self.app.update(ctx);
+        self.app.follow_size(ctx);
+        if let Some(pace) = &self.pace {
+            let size = ctx.viewport_rect().size() * ctx.pixels_per_point();
+            let touched = ctx.input(|input| !input.raw.events.is_empty());
+            pace.note((size.x * size.y) as u64, touched, self.app.is_running());
+        }
     }
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {

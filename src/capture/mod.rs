@@ -7,6 +7,7 @@ pub mod fuse;
 pub mod import;
 pub mod mesh;
 pub mod photograph;
+pub mod place;
 pub mod read;
 pub mod segment;
 pub mod truth;

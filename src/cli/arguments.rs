@@ -1,10 +1,12 @@
 //! The commands and their options.
 
+use crate::capture::place::Coordinates;
 use crate::cli::edit::EditArguments;
 use crate::cli::evaluate::EvaluateArguments;
 use crate::cli::export::{DemoArguments, ExportArguments};
 use crate::cli::import::ImportArguments;
 use crate::cli::insert::InsertArguments;
+use crate::cli::object_values::named_color;
 use crate::cli::parameters::{Parameters, duration};
 use crate::cli::render::RenderArguments;
 use crate::cli::study::StudyArguments;
@@ -13,7 +15,7 @@ use crate::inverse::settings::Settings;
 use crate::session::command::OpenOptions;
 use crate::session::save::pictures::Frames;
 use clap::{Args, Parser, Subcommand};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -65,6 +67,19 @@ pub struct SolveArguments {
     pub capture: PathBuf,
     #[command(flatten)]
     pub solve: SolveOptions,
+    #[command(flatten)]
+    pub known: KnownValues,
+}
+
+/// What is known beforehand.
+#[derive(Debug, Args)]
+pub struct KnownValues {
+    /// Radiance that an object is known to emit; held while the rest is solved
+    #[arg(long, value_name = "NAME=R,G,B", value_parser = named_color)]
+    pub known_emission: Vec<(String, Vec3)>,
+    /// Diffuse reflectance, 0 to 1, that an object is known to have; held while the rest is solved
+    #[arg(long, value_name = "NAME=R,G,B", value_parser = named_color)]
+    pub known_albedo: Vec<(String, Vec3)>,
 }
 
 /// How to solve, and what to write.
@@ -97,6 +112,9 @@ pub struct ReadOptions {
     /// Up axis of the capture [default: the cameras' mean up]
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
     pub up: Option<DVec3>,
+    /// Metres per unit of the capture's files [default: 1]
+    #[arg(long, value_name = "METRES")]
+    pub scale: Option<f64>,
     /// Segments that a mesh without objects is cut into, about
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub segments: Option<u64>,
@@ -117,6 +135,10 @@ impl ReadOptions {
     pub fn open(&self) -> OpenOptions {
         OpenOptions {
             up: self.up,
+            coordinates: Coordinates {
+                scale: self.scale,
+                ground: None,
+            },
             segments: self.segments,
             allow_outside: self.allow_outside,
         }

@@ -1,10 +1,11 @@
 //! `relit edit`: lamps off, walls recoloured.
 
-use crate::cli::arguments::triple;
+use crate::cli::object_values::{ObjectValues, named_color};
+use crate::cli::photographs::write_with_progress;
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
-use crate::scene::Scene;
 use crate::session::edits::Edits;
+use crate::session::photographs::Photographs;
 use crate::session::save::pictures::Frames;
 use crate::session::save::{self, Results};
 use clap::Args;
@@ -27,6 +28,15 @@ pub struct EditArguments {
     /// Pictures to write: all frames at full size, N frames, or none [default: 16, long side 1024]
     #[arg(long, value_name = "all|N|none", value_parser = crate::cli::arguments::frames)]
     views: Option<Frames>,
+    /// Also writes every photograph in the changed light, as photographs/NNN.relit.{exr,png}
+    #[arg(long)]
+    photographs: bool,
+    /// Samples a pixel of the light in photographs
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
+    spp: u32,
+    /// Smooths the noise of the light in photographs
+    #[arg(long)]
+    denoise: bool,
     /// Folder to write into
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -43,36 +53,27 @@ pub fn edit(arguments: &EditArguments) -> Result<()> {
         estimate,
     } = arguments.saved.load()?;
     let mut edits = Edits::default();
-    for (name, emission) in &arguments.emission {
-        let object = find(&capture.scene, name)?;
-        if emission.min_element() < 0.0 {
-            return Err(Error::usage(
-                format!("--emission {name}"),
-                "light cannot be negative",
-                "give values of 0 or more",
-            ));
-        }
-        let mut edit = edits.object(object);
-        edit.emission = Some(*emission);
-        edits.set(object, edit);
-    }
-    for (name, albedo) in &arguments.albedo {
-        let object = find(&capture.scene, name)?;
-        if albedo.min_element() < 0.0 || albedo.max_element() > 1.0 {
-            return Err(Error::usage(
-                format!("--albedo {name}"),
-                "a surface reflects between none and all of the light",
-                "give values from 0 to 1",
-            ));
-        }
-        let mut edit = edits.object(object);
-        edit.albedo = Some(*albedo);
-        edits.set(object, edit);
-    }
+    let values = ObjectValues {
+        emission: arguments.emission.clone(),
+        albedo: arguments.albedo.clone(),
+    };
+    values.change(&capture.scene, &mut edits)?;
+    let edited = Arc::new(edits.apply(&estimate));
+    let photographs = arguments.photographs.then(|| Photographs {
+        frames: (0..capture.scene.cameras.len()).collect(),
+        capture: capture.clone(),
+        found: Arc::new(estimate),
+        edited: edited.clone(),
+        settings: saved.settings.clone(),
+        placements: Vec::new(),
+        relight: true,
+        samples: arguments.spp,
+        denoise: arguments.denoise,
+    });
     let results = Results {
         capture,
         settings: saved.settings,
-        estimate: Arc::new(edits.apply(&estimate)),
+        estimate: edited,
         edits: Edits::default(),
         progress: Arc::default(),
         stopped_because: Some(saved.termination),
@@ -82,25 +83,11 @@ pub fn edit(arguments: &EditArguments) -> Result<()> {
         seconds_load: 0.0,
     };
     save::write_estimate(&arguments.out, &results)?;
+    if let Some(photographs) = &photographs {
+        let folder = arguments.out.join("photographs");
+        std::fs::create_dir_all(&folder).map_err(|error| Error::io(&folder, &error))?;
+        write_with_progress(photographs, &|frame| folder.join(format!("{frame:03}")))?;
+    }
     println!("results in {}", arguments.out.display());
     Ok(())
-}
-
-fn find(scene: &Scene, name: &str) -> Result<usize> {
-    let index = scene.objects.iter().position(|o| o.name == name);
-    index.ok_or_else(|| {
-        let names: Vec<&str> = scene.objects.iter().map(|o| o.name.as_str()).collect();
-        Error::usage(
-            name,
-            "the capture has no object of this name",
-            format!("choose among {}", names.join(", ")),
-        )
-    })
-}
-
-fn named_color(text: &str) -> std::result::Result<(String, Vec3), String> {
-    let (name, color) = text
-        .rsplit_once('=')
-        .ok_or("NAME=r,g,b is wanted".to_owned())?;
-    Ok((name.to_owned(), triple(color)?.as_vec3()))
 }

@@ -1,15 +1,14 @@
 //! `relit insert`: objects into a photograph, naively and by differential rendering.
 
 use crate::cli::arguments::triple;
+use crate::cli::photographs::write_with_progress;
 use crate::cli::saved::{Loaded, SavedOptions};
-use crate::compose::backdrop::Backdrop;
-use crate::compose::placement::{PlacedObject, Placement};
-use crate::compose::write::write_insertion;
+use crate::compose::placement::Placement;
 use crate::error::Result;
-use crate::session::insertion::{Inserted, Library};
-use crate::session::light::path_options;
+use crate::session::photographs::Photographs;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use glam::DVec3;
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -18,14 +17,17 @@ use std::sync::Arc;
 pub struct InsertArguments {
     #[command(flatten)]
     saved: SavedOptions,
-    /// The photograph, counted from 0
-    #[arg(long, value_name = "N")]
-    frame: usize,
+    /// The photograph, counted from 0, or all of them, as PREFIX.NNN
+    #[arg(long, value_name = "N|all", value_parser = which)]
+    frame: Which,
     #[command(flatten)]
     objects: Objects,
     /// Samples a pixel
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     spp: u32,
+    /// Smooths the noise of the light that the objects add and take away
+    #[arg(long)]
+    denoise: bool,
     /// Beginning of the names of the files to write
     #[arg(long, value_name = "PREFIX")]
     out: PathBuf,
@@ -41,41 +43,46 @@ pub fn insert(arguments: &InsertArguments) -> Result<()> {
         capture,
         estimate,
     } = arguments.saved.load()?;
-    let camera = capture.full_camera(arguments.frame)?;
-    let photograph = capture.full_photograph(arguments.frame)?;
-    let exposure = estimate.exposure(arguments.frame);
-    let backdrop = Backdrop::new(arguments.frame, &camera, &photograph, exposure)?;
-
-    let mut library = Library::default();
-    let mut objects = Vec::new();
-    for placement in &arguments.objects.0 {
-        let model = library.model(&placement.file)?;
-        for warning in &model.warnings {
-            eprintln!("warning: {warning}");
+    let estimate = Arc::new(estimate);
+    let work = Photographs {
+        frames: match arguments.frame {
+            Which::One(frame) => vec![frame],
+            Which::All => (0..capture.scene.cameras.len()).collect(),
+        },
+        capture,
+        found: estimate.clone(),
+        edited: estimate,
+        settings: saved.settings,
+        placements: arguments.objects.0.clone(),
+        relight: false,
+        samples: arguments.spp,
+        denoise: arguments.denoise,
+    };
+    write_with_progress(&work, &|frame| match arguments.frame {
+        Which::One(_) => arguments.out.clone(),
+        Which::All => {
+            let mut name = OsString::from(&arguments.out);
+            name.push(format!(".{frame:03}"));
+            PathBuf::from(name)
         }
-        objects.push(Arc::new(PlacedObject::new(
-            model,
-            placement,
-            &capture.scene,
-        )?));
+    })
+}
+
+/// Which photographs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Which {
+    One(usize),
+    All,
+}
+
+fn which(text: &str) -> std::result::Result<Which, String> {
+    match text {
+        "all" => Ok(Which::All),
+        _ => text
+            .parse()
+            .map(Which::One)
+            .map_err(|_| "a frame's number or all is wanted".to_owned()),
     }
-    let Inserted {
-        mut composite,
-        naive,
-        naive_estimate,
-    } = library.insert(
-        &capture,
-        &estimate,
-        backdrop,
-        objects,
-        &path_options(&saved.settings),
-        saved.settings.seed,
-    );
-    composite.pass(arguments.spp);
-    for path in write_insertion(&arguments.out, &composite, &naive, &naive_estimate)? {
-        println!("{}", path.display());
-    }
-    Ok(())
 }
 
 /// The objects with their placements, in the order of the command line.

@@ -7,7 +7,9 @@ mod export;
 mod import;
 mod insert;
 mod interrupt;
+mod object_values;
 mod parameters;
+mod photographs;
 mod progress;
 mod render;
 mod report;
@@ -22,6 +24,7 @@ use crate::session::command::Source;
 use arguments::{Action, Arguments};
 use clap::Parser;
 use clap::error::ErrorKind;
+use object_values::ObjectValues;
 
 /// Opens the window on a source and returns when it is closed.
 pub type Window = fn(Option<Source>, Settings) -> Result<()>;
@@ -63,7 +66,12 @@ fn act(arguments: Arguments, window: Option<Window>) -> Result<()> {
         Some(Action::Trade(measured)) => trade::trade(&measured),
         Some(Action::Study(studied)) => study::study(&studied),
         Some(Action::Solve(capture)) => {
-            solve::solve(&Source::Folder(capture.capture.clone()), &capture.solve)
+            let source = Source::Folder(capture.capture);
+            let known = ObjectValues {
+                emission: capture.known.known_emission,
+                albedo: capture.known.known_albedo,
+            };
+            solve::solve(&source, &capture.solve, &known)
         }
     }
 }
@@ -83,7 +91,7 @@ fn open(arguments: &Arguments, window: Option<Window>) -> Result<()> {
         },
     };
     eprintln!("relit: {reason}; solving without a window");
-    solve::solve(&source, &arguments.solve)
+    solve::solve(&source, &arguments.solve, &ObjectValues::default())
 }
 
 /// Whether there may be a display to open a window on.

@@ -9,6 +9,7 @@ use crate::export::picture::{percentile_exposure, write_png};
 use crate::math::picture::Picture;
 use crate::scene::camera::Camera;
 use crate::session::light::path_options;
+use crate::transport::denoise::{denoise, guides};
 use crate::transport::film::Film;
 use crate::transport::layers::Split;
 use clap::Args;
@@ -35,6 +36,9 @@ pub struct RenderArguments {
     /// Samples a pixel
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     spp: u32,
+    /// Smooths the noise, guided by what each pixel sees
+    #[arg(long, conflicts_with = "layers")]
+    denoise: bool,
     /// Writes the light of each lamp apart, as named layers of one .exr that add up to the picture
     #[arg(long)]
     layers: bool,
@@ -94,12 +98,22 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
         let named = split.sources().iter().copied().zip(&layers);
         return light_layers::write(&arguments.out, &capture.scene, named);
     }
-    let mut film = Film::new(&camera);
-    film.add(&lit, &camera, &options, seed, frame, spp);
-    let picture = Picture {
-        width: film.width,
-        height: film.height,
-        pixels: film.mean(),
+    let rendered = |seed, samples| {
+        let mut film = Film::new(&camera);
+        film.add(&lit, &camera, &options, seed, frame, samples);
+        Picture {
+            width: film.width,
+            height: film.height,
+            pixels: film.mean(),
+        }
+    };
+    let picture = if arguments.denoise {
+        // Two independent halves tell the noise.
+        let half = spp.div_ceil(2);
+        let [a, b] = [seed, seed.wrapping_add(1)].map(|seed| rendered(seed, half));
+        denoise(&a, &b, &guides(&lit, &camera))
+    } else {
+        rendered(seed, spp)
     };
     match format {
         Format::Exr => write_rgb(&arguments.out, &picture, Precision::Float),

@@ -2,10 +2,12 @@
 
 use crate::cli::arguments::SolveOptions;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::object_values::ObjectValues;
 use crate::cli::progress::Meter;
 use crate::cli::report;
 use crate::error::{Error, Result};
 use crate::inverse::estimate::Estimate;
+use crate::inverse::known::Known;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{self, Checkpoint, Control, Observer, Problem, Progress};
 use crate::session::command::Source;
@@ -21,7 +23,7 @@ use std::time::{Duration, Instant};
 ///
 /// # Errors
 /// The capture cannot be read or solved, or the results cannot be written.
-pub fn solve(source: &Source, options: &SolveOptions) -> Result<()> {
+pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> Result<()> {
     let started = Instant::now();
     use_threads(options.threads)?;
     let interrupt = Interrupt::listen()?;
@@ -55,6 +57,7 @@ pub fn solve(source: &Source, options: &SolveOptions) -> Result<()> {
         }
         None => None,
     };
+    known.hold(&capture.scene, &mut edits)?;
 
     if let Some(checkpoint) = checkpoint
         && settings.time > 0.0
@@ -135,6 +138,10 @@ struct Watch<'a> {
 }
 
 impl Observer for Watch<'_> {
+    fn known(&self) -> Known {
+        self.results.edits.known()
+    }
+
     fn observe(&mut self, progress: &Progress, estimate: &Estimate) -> Control {
         self.meter.show(progress, self.settings);
         if let Some(checkpoint) = self.offered.take() {

@@ -2,6 +2,7 @@
 
 use crate::capture::photograph::Photograph;
 use crate::error::{Error, Result};
+use crate::export::picture::percentile_exposure;
 use crate::math::picture::Picture;
 use crate::scene::camera::Camera;
 use glam::Vec3;
@@ -20,6 +21,8 @@ pub struct Backdrop {
     pub exposure: Vec3,
     /// The value at which the photograph saturates; infinite for linear files.
     pub saturation: f32,
+    /// The exposure at which it is shown as 8-bit sRGB: its own, or the 99th percentile of the photograph as taken at 1.
+    pub shown_at: f32,
 }
 
 impl Backdrop {
@@ -49,12 +52,18 @@ impl Backdrop {
                 "give both one size",
             ));
         }
+        let shown_at = if photograph.saturation.is_finite() {
+            photograph.saturation.recip()
+        } else {
+            percentile_exposure(&picture.pixels)
+        };
         Ok(Self {
             frame: frame as u64,
             camera: camera.clone(),
             photograph: Arc::new(picture),
             exposure: exposure.unwrap_or(Vec3::ONE),
             saturation: photograph.saturation,
+            shown_at,
         })
     }
 
@@ -73,14 +82,5 @@ impl Backdrop {
         let behind = Vec3::select(saturated, photograph.max(under), photograph);
         (over * alpha + (behind + over - under) * (1.0 - alpha))
             .clamp(Vec3::ZERO, Vec3::splat(self.saturation))
-    }
-
-    /// The exposure at which the photograph is shown as 8-bit sRGB: its own, or the 99th percentile at 1.
-    pub fn display_exposure(&self) -> f32 {
-        if self.saturation.is_finite() {
-            self.saturation.recip()
-        } else {
-            crate::export::picture::percentile_exposure(&self.photograph.pixels)
-        }
     }
 }

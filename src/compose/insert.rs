@@ -12,7 +12,7 @@ use crate::scene::geometry::Ray;
 use crate::transport::lit::Lit;
 use crate::transport::path::{PathOptions, PathSample, radiance};
 use crate::transport::world::World;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{BVec3, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -57,12 +57,29 @@ pub struct Layers {
     pub without: Picture,
     /// Radiance that the objects add or take away.
     pub delta: Picture,
+    /// Share of the light that the objects leave where they shadow it, 0 to 1; 1 where they cover the pixel or lighten it.
+    pub shadow: Picture,
     /// Share of the pixel that the objects cover, 0 to 1.
     pub alpha: Vec<f32>,
     /// Depth along the viewing direction at the pixel's centre, in metres; infinite where nothing is met.
     pub depth: Vec<f32>,
     /// Object index at the pixel's centre, inserted objects after the scene's; `u32::MAX` where nothing is met.
     pub object: Vec<u32>,
+}
+
+impl Layers {
+    /// [`Layers::shadow`] of the other layers.
+    pub fn shadow_of(with: &Picture, without: &Picture, alpha: &[f32]) -> Picture {
+        let pixels = with.pixels.iter().zip(&without.pixels).zip(alpha);
+        let shadow = pixels.map(|((&with, &without), &alpha)| {
+            let dimmed = with.cmplt(without) & BVec3::splat(alpha == 0.0);
+            Vec3::select(dimmed, (with / without).max(Vec3::ZERO), Vec3::ONE)
+        });
+        Picture {
+            pixels: shadow.collect(),
+            ..*with
+        }
+    }
 }
 
 impl Insertion {
@@ -148,14 +165,18 @@ impl Insertion {
                     })
             })
             .unzip();
+        let with = self.picture(|pixel| self.means(pixel).0);
+        let without = self.picture(|pixel| self.means(pixel).1);
+        let alpha: Vec<f32> = (0..self.pixels.len()).map(|p| self.means(p).2).collect();
         Layers {
-            with: self.picture(|pixel| self.means(pixel).0),
-            without: self.picture(|pixel| self.means(pixel).1),
             delta: self.picture(|pixel| {
                 let (with, without, _) = self.means(pixel);
                 with - without
             }),
-            alpha: (0..self.pixels.len()).map(|p| self.means(p).2).collect(),
+            shadow: Layers::shadow_of(&with, &without, &alpha),
+            with,
+            without,
+            alpha,
             depth,
             object,
         }

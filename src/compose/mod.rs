@@ -1,10 +1,12 @@
 //! Virtual objects in photographs: reading them, placing them, lighting them, and compositing.
 
 pub mod backdrop;
+pub mod denoise;
 pub mod insert;
 pub mod naive;
 pub mod object;
 pub mod pick;
 pub mod placement;
+pub mod relight;
 pub mod world;
 pub mod write;

@@ -6,11 +6,12 @@ use crate::scene::Scene;
 use crate::scene::bvh::Bvh;
 use crate::scene::geometry::{Hit, Ray};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::sync::Arc;
 
 /// An object inserted into the scene.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Placement {
     /// OBJ or GLB file.
     pub file: PathBuf,

@@ -1,6 +1,7 @@
-//! The files of an insertion.
+//! The files of an insertion and of a relit photograph.
 
-use crate::compose::insert::Insertion;
+use crate::compose::backdrop::Backdrop;
+use crate::compose::insert::Layers;
 use crate::error::Result;
 use crate::export::compare::write_row;
 use crate::export::exr::{Layer, Precision, Samples, write_layers, write_rgb};
@@ -18,22 +19,17 @@ use std::path::{Path, PathBuf};
 /// A file cannot be written.
 pub fn write_insertion(
     prefix: &Path,
-    insertion: &Insertion,
+    backdrop: &Backdrop,
+    (composite, layers): (&Picture, Layers),
     naive: &Picture,
     naive_estimate: &Picture,
 ) -> Result<Vec<PathBuf>> {
-    let file = |ending: &str| {
-        let mut name = OsString::from(prefix);
-        name.push(ending);
-        PathBuf::from(name)
-    };
-    let exposure = insertion.backdrop().display_exposure();
-    let composite = insertion.composite();
-    let layers = insertion.layers();
+    let file = |ending: &str| with_ending(prefix, ending);
+    let exposure = backdrop.shown_at;
     let mut written = Vec::new();
 
     // The two results.
-    for (name, picture) in [("composite", &composite), ("naive", naive)] {
+    for (name, picture) in [("composite", composite), ("naive", naive)] {
         let exr = file(&format!(".{name}.exr"));
         write_rgb(&exr, picture, Precision::Float)?;
         let png = file(&format!(".{name}.png"));
@@ -55,6 +51,7 @@ pub fn write_insertion(
             rgb("without", &layers.without),
             Layer::single("alpha", "A", Samples::Float(layers.alpha)),
             rgb("delta", &layers.delta),
+            rgb("shadow", &layers.shadow),
             Layer::single("depth", "Z", Samples::Float(layers.depth)),
             Layer::single("object id", "id", Samples::Index(layers.object)),
         ],
@@ -65,13 +62,31 @@ pub fn write_insertion(
     write_row(
         &compare,
         &[
-            ("photograph", &insertion.backdrop().photograph),
+            ("photograph", &backdrop.photograph),
             ("naive", naive),
             ("naive (estimate)", naive_estimate),
-            ("composite", &composite),
+            ("composite", composite),
         ],
         exposure,
     )?;
     written.extend([delta, all, compare]);
     Ok(written)
+}
+
+/// Writes PREFIX.relit.{exr,png}, the photograph of a backdrop that was relit; returns their paths.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write_relit(prefix: &Path, backdrop: &Backdrop) -> Result<[PathBuf; 2]> {
+    let exr = with_ending(prefix, ".relit.exr");
+    write_rgb(&exr, &backdrop.photograph, Precision::Float)?;
+    let png = with_ending(prefix, ".relit.png");
+    write_png(&png, &backdrop.photograph, backdrop.shown_at)?;
+    Ok([exr, png])
+}
+
+fn with_ending(prefix: &Path, ending: &str) -> PathBuf {
+    let mut name = OsString::from(prefix);
+    name.push(ending);
+    PathBuf::from(name)
 }

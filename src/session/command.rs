@@ -1,5 +1,6 @@
 //! What the window or the command line asks of the worker.
 
+use crate::capture::place::Coordinates;
 pub use crate::compose::placement::Placement;
 pub use crate::export::scene::Format as ExportFormat;
 use crate::inverse::settings::Settings;
@@ -47,6 +48,8 @@ pub enum Command {
     Reset,
     /// Ends the solve, keeping the estimate.
     Finish,
+    /// Solves on from the last checkpoint, or from the start where there is none, with what the edits say is known.
+    SolveOn,
     /// Replaces the parameters; those that are not live take effect at the next reset.
     Set(Box<Settings>),
     /// Which view to keep rendering; replaces the view asked for before.
@@ -61,8 +64,12 @@ pub enum Command {
     Export(ExportRequest),
     /// Writes the layers of the shown view's light as one OpenEXR file, as `relit render --layers` does.
     SaveLayers(PathBuf),
+    /// Saves the session by itself from now on, under a folder for those of all captures.
+    Keep(PathBuf),
     /// Takes up the estimate of a folder that `Save` or `relit solve` wrote.
     Resume(PathBuf),
+    /// Reads the open capture again with other options, keeping what was found and changed.
+    Reframe(Box<OpenOptions>),
     /// Ends the worker.
     Quit,
 }
@@ -102,6 +109,9 @@ pub struct ExportRequest {
 pub struct OpenOptions {
     /// Up axis in the capture's coordinates; `None` takes the cameras' mean up.
     pub up: Option<DVec3>,
+    /// Scale and ground.
+    #[serde(flatten)]
+    pub coordinates: Coordinates,
     /// Number of segments that a mesh without objects is cut into; `None` chooses.
     pub segments: Option<u64>,
     /// Whether paths in the capture may lead out of its folder. Never kept in files, which may be someone else's.

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::inverse::estimate::{Estimate, TexelEstimate};
+use crate::inverse::known::{Known, Pinned};
 use crate::scene::Scene;
 use crate::session::save::named::Named;
 use glam::Vec3;
@@ -22,6 +23,16 @@ pub struct ObjectEdit {
     pub emission: Option<Vec3>,
     /// Whether it emits nothing, whatever its emission.
     pub off: bool,
+    /// Whether `albedo` is known, and held while the rest is solved.
+    #[serde(skip_serializing_if = "is_false")]
+    pub albedo_known: bool,
+    /// Whether `emission` is known, and held while the rest is solved.
+    #[serde(skip_serializing_if = "is_false")]
+    pub emission_known: bool,
+}
+
+fn is_false(flag: &bool) -> bool {
+    !flag
 }
 
 impl ObjectEdit {
@@ -38,6 +49,15 @@ impl ObjectEdit {
     pub fn albedo(&self, found: Vec3) -> Vec3 {
         let albedo = self.albedo.map(|a| a.clamp(Vec3::ZERO, Vec3::ONE));
         albedo.unwrap_or(found)
+    }
+
+    /// What is known of the object.
+    pub fn known(&self) -> Pinned {
+        Pinned {
+            albedo: self.albedo.filter(|_| self.albedo_known),
+            emission: (self.emission.filter(|_| self.emission_known))
+                .map(|emission| if self.off { Vec3::ZERO } else { emission }),
+        }
     }
 }
 
@@ -61,6 +81,15 @@ impl Edits {
         } else {
             self.objects.insert(object, edit);
         }
+    }
+
+    /// What is known of the scene, and held while the rest is solved.
+    pub fn known(&self) -> Known {
+        let mut known = Known::default();
+        for (&object, edit) in &self.objects {
+            known.set(object, edit.known());
+        }
+        known
     }
 
     /// Factors on red, green and blue of the light from outside.
@@ -263,7 +292,7 @@ mod tests {
             ObjectEdit {
                 albedo: Some(Vec3::new(-1.0, 0.5, 7.0)),
                 emission: Some(Vec3::new(-2.0, 0.0, 1.0)),
-                off: false,
+                ..ObjectEdit::default()
             },
         );
         let object = &edits.apply(&estimate()).objects[0];

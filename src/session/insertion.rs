@@ -135,6 +135,11 @@ impl Inserting {
         self.stale = Some(Instant::now());
     }
 
+    /// The inserted objects.
+    pub fn placements(&self) -> &[Placement] {
+        &self.placements
+    }
+
     /// Moves to another frame.
     pub fn look(&mut self, frame: usize) {
         if frame != self.frame {

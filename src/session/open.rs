@@ -40,11 +40,14 @@ impl OpenCapture {
     /// # Errors
     /// The mesh holds nothing to solve, or a photograph cannot be read.
     pub fn new(source: Source, options: OpenOptions, capture: Capture) -> Result<Self> {
+        // Results belong to a capture in whatever coordinates.
+        let hash = hash(&capture)?;
+        let capture = capture.placed(options.up, &options.coordinates)?;
         let working = load_working(&capture, WORKING_PIXELS)?;
         let prepared = prepare(&capture, &working)?;
         Ok(Self {
             name: capture.name.clone(),
-            hash: hash(&capture)?,
+            hash,
             source,
             options,
             summary: prepared.summary(),

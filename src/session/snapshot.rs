@@ -2,6 +2,7 @@
 
 use crate::capture::Capture;
 use crate::capture::photograph::Photograph;
+use crate::compose::placement::Placement;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Progress, Termination};
@@ -10,6 +11,7 @@ use crate::session::command::{OpenOptions, Source};
 use crate::session::edits::Edits;
 use crate::transport::layers;
 use glam::Vec3;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 pub use crate::math::picture::Picture;
@@ -38,6 +40,10 @@ pub struct Snapshot {
     pub estimate: Arc<Estimate>,
     /// The changes made by hand to the estimate, which all pictures and exports show.
     pub edits: Edits,
+    /// The inserted objects that the open capture came with, as a session that was taken up.
+    pub inserted: Arc<Vec<Placement>>,
+    /// The folder of the capture's last session, where it was kept and not taken up.
+    pub earlier: Option<PathBuf>,
     /// Pictures of the requested view.
     pub view: Option<Arc<View>>,
     /// Inserted objects and their composites for the requested frame.

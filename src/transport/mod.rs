@@ -2,6 +2,7 @@
 
 pub mod arrival;
 pub mod bsdf;
+pub mod denoise;
 pub mod emitters;
 pub mod environment;
 pub mod film;

@@ -5,5 +5,7 @@ mod connection;
 mod flows;
 mod input;
 mod light;
+mod names;
+mod photographs;
 mod rendering;
 mod trade;

@@ -4,6 +4,10 @@ use crate::connection::solving;
 use egui::{Key, Modifiers, Pos2, Rect};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
+use relit::app::layout::Pane;
+use relit::app::picture::copy::as_seen;
+use relit::app::picture::look::ToneCurve;
+use relit::app::picture::quantity::Quantity;
 use relit::app::window::Window;
 use relit::math::color::linear_to_srgb;
 
@@ -137,4 +141,58 @@ fn the_mesh_is_drawn_and_its_selected_object_stands_out() {
     // Grey walls, and a floor in the accent colour once it is selected.
     assert!(colors[0][0].abs_diff(colors[0][2]) < 8, "{colors:?}");
     assert!(colors[1][0] > colors[1][2] + 15, "{colors:?}");
+}
+
+#[test]
+fn what_is_copied_is_what_is_seen() {
+    if !adapter() {
+        return;
+    }
+    let (mut harness, _recorder) = solving(Harness::builder().wgpu());
+    for quantity in [
+        Quantity::Render,
+        Quantity::Albedo,
+        Quantity::Irradiance,
+        Quantity::Error,
+        Quantity::StandardError,
+    ] {
+        for tone in ToneCurve::ALL {
+            let app = &mut harness.state_mut().app;
+            app.bring_forward = Some(Pane::Picture(quantity));
+            app.look.tone = tone;
+            harness.run_steps(4);
+            let image = harness.render().expect("rendered");
+            let app = &harness.state().app;
+            let drawn = app.drawn(quantity).expect("a picture");
+            let copied = as_seen(&drawn, &app.look);
+            let at = picture_rect(&harness, &format!("{} picture", quantity.name())).center();
+            let [r, g, b, _] = copied.pixels[24 * 64 + 32].to_array();
+            for (seen, copied) in pixel(&image, at).into_iter().zip([r, g, b]) {
+                let off = i32::from(seen) - i32::from(copied);
+                assert!(off.abs() <= 2, "{quantity:?} {tone:?}: {seen} {copied}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_handles_of_an_object_are_drawn_where_they_are_taken() {
+    if !adapter() {
+        return;
+    }
+    let (mut harness, _recorder) = solving(Harness::builder().wgpu());
+    let folder = tempfile::tempdir().expect("a folder");
+    crate::photographs::insert_block(&mut harness, folder.path());
+    let [foot, top] = [0.0, 0.6].map(|height| crate::photographs::seen(&harness, height));
+    // Handles are drawn in the picture under the pointer alone.
+    harness.hover_at(egui::pos2(640.0, 795.0));
+    harness.run_steps(3);
+    let bare = harness.render().expect("rendered");
+    harness.hover_at(foot + egui::vec2(60.0, 0.0));
+    harness.run_steps(3);
+    let image = harness.render().expect("rendered");
+    for at in [foot, top] {
+        let different = pixel(&image, at) != pixel(&bare, at);
+        assert!(different, "{at}: {:?}", pixel(&image, at));
+    }
 }

@@ -108,10 +108,14 @@ impl Insertions {
         }
     }
 
-    /// Takes everything away, for a new capture.
-    pub fn clear(&mut self) {
-        self.objects.clear();
-        self.chosen = None;
+    /// Takes up the objects that a new capture comes with, in place of those there are.
+    pub fn take_up(&mut self, placements: &[Placement]) {
+        let inserted = |placement: &Placement| Inserted {
+            placement: placement.clone(),
+            visible: true,
+        };
+        self.objects = placements.iter().map(inserted).collect();
+        self.chosen = self.objects.len().checked_sub(1);
         self.placing = false;
         self.dragged = None;
     }

@@ -1,8 +1,10 @@
 //! The pane of the 3D view: tool line, mouse and keys, and drawing.
 
+use crate::app::insertion::handles::Along;
 use crate::app::model::coloring::Coloring;
 use crate::app::model::gpu::{MeshPaint, SceneUniform};
 use crate::app::model::overlay;
+use crate::app::pick::Clicked;
 use crate::app::picture::gpu::rgba;
 use crate::app::picture::look::ToneCurve;
 use crate::app::state::{App, Shown};
@@ -14,13 +16,14 @@ use glam::{Vec2, Vec3};
 
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, app: &mut App) {
-    egui::Frame::NONE
-        .inner_margin(egui::Margin::symmetric(6, 3))
-        .show(ui, |ui| controls(ui, app));
+    theme::strip(ui).show(ui, |ui| {
+        ui.set_min_width(ui.available_width());
+        controls(ui, app);
+    });
     let rect = ui.available_rect_before_wrap();
     let tokens = theme::tokens(ui);
-    ui.painter().rect_filled(rect, 0.0, tokens.surround);
     let Some(capture) = app.capture().cloned() else {
+        ui.painter().rect_filled(rect, 0.0, tokens.surround);
         ui.centered_and_justified(|ui| ui.weak("No capture is open"));
         return;
     };
@@ -44,6 +47,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
 
     let estimate = app.estimate.clone();
     let Some((surface, colors)) = app.model.faces(ui.ctx(), &capture, &estimate) else {
+        ui.painter().rect_filled(rect, 0.0, tokens.surround);
         ui.put(rect, egui::Label::new("Preparing the mesh…"));
         return;
     };
@@ -186,7 +190,8 @@ fn move_object(ui: &Ui, app: &mut App, scene: &Scene, response: &Response) -> bo
     let at = pixel(ui, response.rect, pointer);
     let ray = app.model.orbit.camera(scene).ray(at);
     let surface = under(app, scene, at).map(|hit| scene.point(&hit).as_dvec3() + scene.origin);
-    app.insertions.drag_handle(scene, &ray, surface)
+    let along = Along::of(ui.input(|input| input.modifiers));
+    app.insertions.drag_handle(scene, &ray, surface, along)
 }
 
 /// A click looks through a camera, places the chosen object, or selects; a double click turns about what is there.
@@ -197,23 +202,20 @@ fn click(ui: &Ui, app: &mut App, scene: &Scene, response: &Response) {
     else {
         return;
     };
-    if !app.insertions.placing
+    if !app.aims()
         && let Some(frame) = overlay::camera_at(app, scene, response.rect, pointer)
     {
         app.jump_to_frame(frame);
         return;
     }
-    let hit = under(app, scene, pixel(ui, response.rect, pointer));
-    if let Some(hit) = &hit {
-        let point = scene.point(hit);
-        if response.double_clicked() {
-            let orbit = &mut app.model.orbit;
-            orbit.target = orbit.eye() + orbit.forward() * point.distance(orbit.eye());
-        }
-        if app.insertions.placing && app.insertions.place(point.as_dvec3() + scene.origin) {
-            app.insertions.placing = false;
-            return;
-        }
+    let at = pixel(ui, response.rect, pointer);
+    let hit = under(app, scene, at);
+    if let Some(hit) = &hit
+        && response.double_clicked()
+    {
+        let orbit = &mut app.model.orbit;
+        orbit.target = orbit.eye() + orbit.forward() * scene.point(hit).distance(orbit.eye());
     }
-    app.select(hit.and_then(|hit| scene.object_of.get(hit.triangle as usize).copied()));
+    let ray = app.model.orbit.camera(scene).ray(at);
+    app.clicked(hit.and_then(|hit| Clicked::new(scene, &ray, &hit)));
 }

@@ -54,6 +54,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
             app,
             &[
                 Action::SwitchLamp,
+                Action::SolveOn,
                 Action::ResetMaterial,
                 Action::ResetEdits,
             ],
@@ -88,7 +89,18 @@ fn albedo(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
         if changed {
             edit.albedo = Some(albedo);
         }
+        if pin(ui, "Pin albedo", &mut edit.albedo_known) {
+            edit.albedo.get_or_insert(albedo);
+        }
     });
+}
+
+/// A switch that holds a value while the rest is solved; true when it is switched on.
+fn pin(ui: &mut Ui, name: &str, known: &mut bool) -> bool {
+    let help = "Known: held at this value by the next “Solve on with pinned values”, Reset or Run";
+    let response = ui.checkbox(known, "Pin").on_hover_text(help);
+    response.widget_info(|| WidgetInfo::selected(Role::CheckBox, true, *known, name));
+    response.changed() && *known
 }
 
 /// Strength and colour of its light.
@@ -127,6 +139,9 @@ fn emission(ui: &mut Ui, app: &App, found: &ObjectEstimate, edit: &mut ObjectEdi
             let pure = if peak > 0.0 { color / peak } else { Vec3::ZERO };
             edit.emission = Some(pure * strength);
             edit.off = false;
+        }
+        if pin(ui, "Pin emission", &mut edit.emission_known) {
+            edit.emission.get_or_insert(found.emission);
         }
     });
 }

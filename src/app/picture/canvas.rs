@@ -1,5 +1,6 @@
 //! A pane with one picture: zoom and pan shared by all, clicks that select or place, numbers inside large pixels.
 
+use crate::app::insertion::handles::Along;
 use crate::app::picture::gpu::PicturePaint;
 use crate::app::picture::look::{Cursor, fraction};
 use crate::app::picture::quantity::{Quantity, Shading};
@@ -51,6 +52,7 @@ impl App {
             Quantity::Relit => self.mixer.picture(),
             Quantity::Albedo => view.and_then(|view| view.albedo.clone()),
             Quantity::Emission => view.and_then(|view| view.emission.clone()),
+            Quantity::Irradiance => self.irradiance.picture(),
             Quantity::Error => view.and_then(|view| view.error.clone()),
             Quantity::StandardError => view.and_then(|view| view.stderr.clone()),
             Quantity::Naive => insertion.map(|insertion| insertion.naive.clone()),
@@ -76,14 +78,12 @@ impl App {
 /// Draws the pane of one picture.
 pub fn pane(ui: &mut Ui, app: &mut App, quantity: Quantity) {
     let rect = ui.max_rect();
-    ui.painter()
-        .rect_filled(rect, 0.0, theme::tokens(ui).surround);
     let shown = if app.look.photograph {
         Quantity::Photograph
     } else {
         quantity
     };
-    app.layers_needed |= shown == Quantity::Relit;
+    app.need(shown);
     let Some(drawn) = app.drawn(shown) else {
         missing(ui, app, shown);
         return;
@@ -123,6 +123,8 @@ pub fn missing(ui: &mut Ui, app: &App, quantity: Quantity) {
         Quantity::Relit => "Tracing the light of each lamp…",
         _ => "Waiting for the first picture…",
     };
+    let surround = theme::tokens(ui).surround;
+    ui.painter().rect_filled(ui.max_rect(), 0.0, surround);
     ui.centered_and_justified(|ui| ui.weak(text));
 }
 
@@ -155,9 +157,10 @@ pub fn interact(ui: &mut Ui, app: &mut App, rect: Rect, drawn: &Drawn, name: &st
     } else if response.clicked()
         && let Some(pointer) = response.interact_pointer_pos()
     {
-        click(app, fraction(app.look.placement(rect, size), pointer));
+        let at = fraction(app.look.placement(rect, size), pointer);
+        app.clicked(app.surface_at(at));
     }
-    if app.insertions.placing || app.insertions.dragged.is_some() {
+    if app.aims() {
         response.on_hover_cursor(egui::CursorIcon::Crosshair);
     }
 }
@@ -184,8 +187,9 @@ fn drag(ui: &Ui, app: &mut App, rect: Rect, size: [u32; 2], response: &egui::Res
         let at = fraction(placement, pointer);
         let k = &camera.intrinsics;
         let ray = camera.ray(glam::vec2(at.x * k.width as f32, at.y * k.height as f32));
-        let surface = app.surface_at(at).map(|(point, _)| point);
-        if !app.insertions.drag_handle(&capture.scene, &ray, surface) {
+        let surface = app.surface_at(at).map(|at| at.point);
+        let along = Along::of(ui.input(|input| input.modifiers));
+        if !(app.insertions).drag_handle(&capture.scene, &ray, surface, along) {
             app.look.pan(rect, size, response.drag_delta());
         }
     }
@@ -199,20 +203,13 @@ fn on_screen(camera: &Camera, placement: Rect, point: glam::Vec3) -> Option<Pos2
     Some(placement.min + share * placement.size())
 }
 
-/// A click at a point of the view: places the chosen object, or selects what is there.
-fn click(app: &mut App, at: Pos2) {
-    let Some((point, object)) = app.surface_at(at) else {
-        app.selected = None;
-        return;
-    };
-    if app.insertions.placing && app.insertions.place(point) {
-        app.insertions.placing = false;
-        return;
-    }
-    app.select(Some(object));
-}
-
 impl App {
+    /// Notes that a picture is shown, for what has to be made for it.
+    pub fn need(&mut self, quantity: Quantity) {
+        self.layers_needed |= quantity == Quantity::Relit;
+        self.irradiance_needed |= quantity == Quantity::Irradiance;
+    }
+
     /// Selects an object of the scene and shows it in the table.
     pub fn select(&mut self, object: Option<u32>) {
         self.selected = object;

@@ -71,13 +71,13 @@ impl Compare {
 
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, app: &mut App) {
-    app.layers_needed |= [app.compare.left, app.compare.right].contains(&Quantity::Relit);
-    egui::Frame::NONE
-        .inner_margin(egui::Margin::symmetric(6, 3))
-        .show(ui, |ui| controls(ui, app));
+    app.need(app.compare.left);
+    app.need(app.compare.right);
+    theme::strip(ui).show(ui, |ui| {
+        ui.set_min_width(ui.available_width());
+        controls(ui, app);
+    });
     let rect = ui.available_rect_before_wrap();
-    ui.painter()
-        .rect_filled(rect, 0.0, theme::tokens(ui).surround);
     let left = if app.look.photograph {
         Quantity::Photograph
     } else {

@@ -34,9 +34,16 @@ pub fn triple(v: Vec3) -> String {
     format!("{r} {g} {b}")
 }
 
-/// One line about the pixel under the pointer.
+/// One line about the pixel under the pointer, or what the next click is asked for.
 pub fn bar(ui: &mut Ui, app: &App) {
     let tokens = theme::tokens(ui);
+    if let Some(pick) = app.picking {
+        ui.horizontal(|ui| {
+            ui.colored_label(tokens.accent, pick.prompt());
+            ui.weak("Esc ends this");
+        });
+        return;
+    }
     let Some(cursor) = app.look.cursor else {
         ui.label(RichText::new("Point at a picture to read its values").color(tokens.weak));
         return;

@@ -2,8 +2,10 @@
 
 pub mod canvas;
 pub mod compare;
+pub mod copy;
 pub mod gpu;
 pub mod inspect;
+pub mod irradiance;
 pub mod look;
 pub mod quantity;
 pub mod ramp;

@@ -15,6 +15,8 @@ pub enum Quantity {
     Albedo,
     /// Emitted radiance.
     Emission,
+    /// Light that arrives at the surface.
+    Irradiance,
     /// Render − photograph, signed radiance.
     Error,
     /// Standard error of the albedo.
@@ -42,12 +44,13 @@ pub enum Shading {
 
 impl Quantity {
     /// All, in the order in which menus show them.
-    pub const ALL: [Quantity; 10] = [
+    pub const ALL: [Quantity; 11] = [
         Self::Photograph,
         Self::Render,
         Self::Relit,
         Self::Albedo,
         Self::Emission,
+        Self::Irradiance,
         Self::Error,
         Self::StandardError,
         Self::Naive,
@@ -63,6 +66,7 @@ impl Quantity {
             Self::Relit => "Relit",
             Self::Albedo => "Albedo",
             Self::Emission => "Emission",
+            Self::Irradiance => "Irradiance",
             Self::Error => "Error",
             Self::StandardError => "Standard error",
             Self::Naive => "Naive composite",
@@ -79,6 +83,9 @@ impl Quantity {
             Self::Relit => "The re-render with each lamp as the pane Lights sets it",
             Self::Albedo => "Estimated diffuse reflectance; 1 is white",
             Self::Emission => "Estimated emitted radiance",
+            Self::Irradiance => {
+                "Light that arrives at each surface, by the re-render and the albedo"
+            }
             Self::Error => "Re-render minus photograph: blue is too dark, red is too bright",
             Self::StandardError => "Standard error of the estimated albedo",
             Self::Naive => "Objects lit by harmonics of the photographs, pasted without shadow",
@@ -93,6 +100,7 @@ impl Quantity {
     pub fn unit(self) -> &'static str {
         match self {
             Self::Albedo | Self::StandardError => "",
+            Self::Irradiance => "W/m²",
             _ => "W/(sr·m²)",
         }
     }
@@ -102,7 +110,7 @@ impl Quantity {
         match self {
             Self::Albedo => Shading::Reflectance,
             Self::Error => Shading::Signed,
-            Self::StandardError => Shading::Positive,
+            Self::StandardError | Self::Irradiance => Shading::Positive,
             _ => Shading::Radiance,
         }
     }

@@ -1,9 +1,10 @@
 //! The sheet for saving results and exporting: a typed path, a dialog where there is one.
 
 use crate::app::shell::dialogs::Ask;
+use crate::app::shell::photographs::{self, Wanted};
 use crate::app::state::App;
 use crate::session::command::{Command, ExportFormat, ExportRequest};
-use egui::{Id, Key, Modal, TextEdit, Ui};
+use egui::{DragValue, Id, Key, Modal, Role, TextEdit, Ui, WidgetInfo};
 use glam::DVec3;
 use std::path::PathBuf;
 
@@ -29,6 +30,17 @@ pub enum Sheet {
         file: String,
         /// Which of [`FORMATS`].
         format: usize,
+        /// Where a probe is taken, in the capture's coordinates.
+        at: DVec3,
+    },
+    /// Saving photographs.
+    Photographs(Wanted),
+    /// Setting the scale.
+    Length {
+        /// The length between the clicks in the capture's coordinates.
+        found: f64,
+        /// What it is.
+        metres: f64,
     },
 }
 
@@ -74,7 +86,7 @@ const FORMATS: [Format; 6] = [
     },
     Format {
         name: "Light probe",
-        help: "The light at the inserted object's place, or in the middle of the 3D view, as a panorama",
+        help: "The light at a point as a panorama (.hdr or .exr)",
         ending: "hdr",
         format: ExportFormat::Probe { at: DVec3::ZERO },
     },
@@ -95,19 +107,37 @@ impl Sheet {
         }
     }
 
-    /// The sheet for exporting.
-    pub fn export(name: &str) -> Self {
+    /// The sheet for exporting; `at` is where a probe would be taken.
+    pub fn export(name: &str, at: DVec3) -> Self {
         Self::Export {
             file: format!("{}.{}", file_name(name), FORMATS[0].ending),
             format: 0,
+            at,
         }
+    }
+
+    /// The sheet for exporting the light at a point.
+    pub fn probe(name: &str, at: DVec3) -> Self {
+        let last = FORMATS.len() - 1;
+        Self::Export {
+            file: format!("{}-light.{}", file_name(name), FORMATS[last].ending),
+            format: last,
+            at,
+        }
+    }
+
+    /// The sheet for photographs.
+    pub fn photographs(name: &str) -> Self {
+        Self::Photographs(Wanted::new(name))
     }
 
     /// Takes over what a dialog answered.
     pub fn chosen(&mut self, ask: Ask, path: PathBuf) {
         let text = path.to_string_lossy().into_owned();
         match (self, ask) {
-            (Self::Save { folder }, Ask::SaveFolder) => *folder = text,
+            (Self::Save { folder } | Self::Photographs(Wanted { folder, .. }), Ask::SaveFolder) => {
+                *folder = text
+            }
             (Self::Export { file, .. } | Self::Layers { file }, Ask::ExportFile) => *file = text,
             _ => {}
         }
@@ -115,7 +145,7 @@ impl Sheet {
 }
 
 /// A capture's name without what file systems object to.
-fn file_name(name: &str) -> String {
+pub(super) fn file_name(name: &str) -> String {
     name.chars()
         .map(|c| {
             if c.is_alphanumeric() || c == '-' || c == '_' {
@@ -139,7 +169,9 @@ pub fn show(ctx: &egui::Context, app: &mut App) {
             Sheet::Closed => true,
             Sheet::Save { folder } => save(ui, app, folder),
             Sheet::Layers { file } => layers(ui, app, file),
-            Sheet::Export { file, format } => export(ui, app, file, format),
+            Sheet::Export { file, format, at } => export(ui, app, file, format, at),
+            Sheet::Length { found, metres } => length(ui, app, *found, metres),
+            Sheet::Photographs(wanted) => photographs::sheet(ui, app, wanted),
         };
         app.sheet = if close { Sheet::Closed } else { sheet };
     });
@@ -177,7 +209,13 @@ fn layers(ui: &mut Ui, app: &mut App, file: &mut String) -> bool {
 }
 
 /// Draws the sheet for exporting; true when it is to close.
-fn export(ui: &mut Ui, app: &mut App, file: &mut String, chosen: &mut usize) -> bool {
+fn export(
+    ui: &mut Ui,
+    app: &mut App,
+    file: &mut String,
+    chosen: &mut usize,
+    at: &mut DVec3,
+) -> bool {
     ui.heading("Export");
     ui.horizontal_wrapped(|ui| {
         for (index, format) in FORMATS.iter().enumerate() {
@@ -195,14 +233,15 @@ fn export(ui: &mut Ui, app: &mut App, file: &mut String, chosen: &mut usize) -> 
     });
     let format = &FORMATS[(*chosen).min(FORMATS.len() - 1)];
     ui.weak(format.help);
+    if matches!(format.format, ExportFormat::Probe { .. }) {
+        probe_point(ui, app, at);
+    }
     let entered = path_field(ui, app, "File", file, Ask::ExportFile);
     let (clicked, cancel) = buttons(ui, "Export", !file.trim().is_empty());
     let go = (clicked || entered) && !file.trim().is_empty();
     if go {
         let format = match format.format {
-            ExportFormat::Probe { .. } => ExportFormat::Probe {
-                at: probe_point(app),
-            },
+            ExportFormat::Probe { .. } => ExportFormat::Probe { at: *at },
             other => other,
         };
         app.send(Command::Export(ExportRequest {
@@ -213,19 +252,55 @@ fn export(ui: &mut Ui, app: &mut App, file: &mut String, chosen: &mut usize) -> 
     go || cancel
 }
 
-/// Where a probe is taken: at the chosen inserted object, or at the 3D view's target.
-fn probe_point(app: &mut App) -> DVec3 {
-    let origin = app
-        .capture()
-        .map_or(DVec3::ZERO, |capture| capture.scene.origin);
-    app.insertions
-        .chosen()
-        .and_then(|object| object.placement.at)
-        .unwrap_or(app.model.orbit.target.as_dvec3() + origin)
+/// Draws the sheet for a length; true when it is to close.
+fn length(ui: &mut Ui, app: &mut App, found: f64, metres: &mut f64) -> bool {
+    ui.heading("Set the scale");
+    ui.label(format!(
+        "The clicked length is {found:.3} now. Inserted objects keep their own size in metres."
+    ));
+    ui.horizontal(|ui| {
+        let label = ui.label("Length");
+        let drag = DragValue::new(metres)
+            .range(1e-6..=1e6)
+            .speed(found * 1e-3)
+            .max_decimals(4)
+            .suffix(" m");
+        ui.add(drag).labelled_by(label.id);
+    });
+    let (clicked, cancel) = buttons(ui, "Set", *metres > 0.0);
+    if clicked {
+        app.set_length(found, *metres);
+    }
+    clicked || cancel
+}
+
+/// Three numbers for the point of a probe.
+fn probe_point(ui: &mut Ui, app: &App, at: &mut DVec3) {
+    let diameter = app.capture().map_or(1.0, |c| f64::from(c.scene.diameter));
+    ui.horizontal(|ui| {
+        ui.label("Point").on_hover_text(
+            "In the capture's coordinates; File > Light probe by click takes it from a view",
+        );
+        for (axis, value) in ["x", "y", "z"].into_iter().zip(at.as_mut()) {
+            let drag = DragValue::new(value)
+                .speed(diameter * 1e-3)
+                .max_decimals(3)
+                .prefix(format!("{axis} "));
+            ui.add(drag).widget_info(|| {
+                WidgetInfo::labeled(Role::SpinButton, true, format!("Point {axis}"))
+            });
+        }
+    });
 }
 
 /// A field for a path, which takes the keys at once; true when Enter is pressed in it.
-fn path_field(ui: &mut Ui, app: &mut App, name: &str, path: &mut String, ask: Ask) -> bool {
+pub(super) fn path_field(
+    ui: &mut Ui,
+    app: &mut App,
+    name: &str,
+    path: &mut String,
+    ask: Ask,
+) -> bool {
     ui.horizontal(|ui| {
         let label = ui.label(name);
         let response = ui
@@ -244,7 +319,7 @@ fn path_field(ui: &mut Ui, app: &mut App, name: &str, path: &mut String, ask: As
 }
 
 /// The two buttons at the end: whether each was clicked.
-fn buttons(ui: &mut Ui, go: &str, enabled: bool) -> (bool, bool) {
+pub(super) fn buttons(ui: &mut Ui, go: &str, enabled: bool) -> (bool, bool) {
     ui.horizontal(|ui| {
         let cancel = ui.button("Cancel").clicked();
         let go = ui.add_enabled(enabled, egui::Button::new(go)).clicked();

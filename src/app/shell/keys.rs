@@ -5,7 +5,7 @@ use crate::app::state::App;
 use egui::{Grid, ScrollArea, Window};
 
 /// What the mouse does: where, how, what.
-const MOUSE: [(&str, &str); 11] = [
+const MOUSE: [(&str, &str); 14] = [
     (
         "Picture: wheel",
         "Zoom to the pointer, in all pictures at once",
@@ -16,6 +16,12 @@ const MOUSE: [(&str, &str); 11] = [
         "Select the object, or place the chosen one",
     ),
     ("Picture: double click", "Fit"),
+    (
+        "Inserted object: drag its foot",
+        "Move it over surfaces; with Shift up and down, with Ctrl on its level",
+    ),
+    ("Inserted object: drag the ring beside it", "Turn"),
+    ("Inserted object: drag the square above it", "Scale"),
     ("3D view: drag", "Orbit"),
     ("3D view: right drag, middle drag, Shift + drag", "Pan"),
     ("3D view: wheel", "Zoom to the pointer"),

@@ -6,6 +6,7 @@ pub mod keys;
 pub mod menu;
 pub mod notices;
 pub mod palette;
+pub mod photographs;
 pub mod start;
 pub mod status;
 pub mod thumbnails;

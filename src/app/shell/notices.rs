@@ -67,7 +67,10 @@ impl Notices {
                     self.toasts.remove(index);
                 }
             });
-        ctx.request_repaint_after(Duration::from_millis(500));
+        // The next to go is the oldest.
+        if let Some((_, since)) = self.toasts.first() {
+            ctx.request_repaint_after(SHOWN.saturating_sub(since.elapsed()));
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! The status bar: what the worker does, how fast, how long still, and with how much memory.
 
 use crate::app::picture::inspect::number;
+use crate::app::shell::photographs;
 use crate::app::state::App;
 use crate::app::theme;
 use crate::session::snapshot::Phase;
@@ -61,7 +62,7 @@ pub fn phase_word(phase: &Phase) -> String {
 pub fn bar(ui: &mut Ui, app: &mut App) {
     let tokens = theme::tokens(ui);
     let bytes = app.memory.bytes();
-    let snapshot = &app.snapshot;
+    let snapshot = app.snapshot.clone();
     let color = match snapshot.phase {
         Phase::Solving | Phase::Loading => tokens.accent,
         Phase::Finished(_) => tokens.good,
@@ -93,6 +94,7 @@ pub fn bar(ui: &mut Ui, app: &mut App) {
                 stage.name
             ));
         }
+        photographs::progress(ui, app);
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             ui.label(format!("{} MB", bytes / 1_000_000))
                 .on_hover_text("Memory in use");

@@ -123,6 +123,11 @@ impl Views {
         }
     }
 
+    /// Whether the first complete picture of the requested view is still to come.
+    pub fn is_rough(&self) -> bool {
+        self.target.as_ref().is_some_and(Target::is_rough)
+    }
+
     fn sharpen(&mut self, options: &PathOptions) -> bool {
         let Some(target) = &mut self.target else {
             return false;

@@ -124,6 +124,11 @@ impl Target {
         self.coarse.is_none() && !self.stale && self.render.samples() >= ENOUGH
     }
 
+    /// Whether the first complete picture is still to come.
+    pub fn is_rough(&self) -> bool {
+        self.hits.is_none() || self.render.samples() == 0
+    }
+
     /// Draws the next slice; the pictures, if one of them is new.
     pub fn sharpen(&mut self, options: &PathOptions, sequence: u64) -> Option<View> {
         if let Some(coarse) = self.coarse.take() {

@@ -8,6 +8,7 @@ use crate::session::snapshot::{Level, Phase};
 use crate::session::worker::state::Worker;
 use crate::session::worker::work::Next;
 use std::path::Path;
+use std::time::Instant;
 
 impl Worker {
     /// Carries out a command. What cannot be done beside a running solve is returned: the solve ends first.
@@ -21,6 +22,13 @@ impl Worker {
                 self.step = false;
                 return self.capture.is_some().then_some(Next::Solve(None));
             }
+            Command::Reframe(options) => {
+                let go_on = self.solving && !self.paused;
+                return self
+                    .capture
+                    .is_some()
+                    .then_some(Next::Reframe(options, go_on));
+            }
             Command::Quit => return Some(Next::Quit),
             Command::Run => return self.go_on(false),
             Command::Step => return self.go_on(true),
@@ -32,20 +40,37 @@ impl Worker {
             }
             // Without a running solve there is nothing to finish.
             Command::Finish => return self.solving.then_some(Next::Wait),
+            Command::SolveOn => {
+                self.paused = false;
+                self.step = false;
+                let checkpoint = self.checkpoint.clone();
+                return self.capture.is_some().then_some(Next::Solve(checkpoint));
+            }
             Command::Set(settings) => self.settings = *settings,
             Command::View(request) => {
+                self.asked = Some(Instant::now());
                 if let ViewCamera::Frame(frame) = request.camera {
                     self.inserting.look(frame);
                 }
                 self.views.look(request);
             }
-            Command::Insert(placements) => self.inserting.place(placements),
+            Command::Insert(placements) => {
+                self.asked = Some(Instant::now());
+                self.keeper.touch();
+                self.inserting.place(placements);
+            }
             Command::Edit(edits) => {
                 if self.edits != edits {
+                    self.asked = Some(Instant::now());
+                    self.keeper.touch();
                     self.edits = edits;
                     self.views.look_again();
                     self.inserting.update();
                 }
+            }
+            Command::Keep(base) => {
+                self.keeper.begin(base);
+                self.set_aside();
             }
             Command::Save(folder) => self.save(&folder),
             Command::Export(request) => self.export(&request),
@@ -85,6 +110,32 @@ impl Worker {
             started: self.started,
             seconds_load: self.seconds_load,
         })
+    }
+
+    /// Sets the last session of the open capture aside, and says that it is there.
+    pub(super) fn set_aside(&mut self) {
+        let Some(capture) = self.capture.clone() else {
+            return;
+        };
+        if let Err(error) = self.keeper.opened(&capture.hash) {
+            self.fail(&error);
+        } else if self.keeper.earlier.is_some() {
+            let said = "the last session of this capture is kept; File > Take up the last session";
+            self.say(Level::Info, said);
+        }
+    }
+
+    /// Saves the session where that is due.
+    pub(super) fn keep(&mut self, now: bool) {
+        if !self.keeper.is_due(now) || self.estimate.objects.is_empty() {
+            return;
+        }
+        if let Some(results) = self.results()
+            && let Err(error) = (self.keeper).write(&results, self.inserting.placements())
+        {
+            let said = format!("the session is not kept any longer: {error}");
+            self.say(Level::Warning, said);
+        }
     }
 
     fn save(&mut self, folder: &Path) {

@@ -1,5 +1,6 @@
 //! What the worker holds, and what it shows of it.
 
+use crate::compose::placement::Placement;
 use crate::error::Error;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
@@ -7,6 +8,7 @@ use crate::inverse::solver::{Checkpoint, Progress};
 use crate::session::edits::{Edited, Edits};
 use crate::session::inbox::Inbox;
 use crate::session::insertion::Inserting;
+use crate::session::keep::Keeper;
 use crate::session::light::path_options;
 use crate::session::rates::Rates;
 use crate::session::slot::Slot;
@@ -43,6 +45,12 @@ pub(super) struct Worker {
     pub step: bool,
     pub seconds_load: f64,
     pub started: Instant,
+    /// Saves the session by itself, where that was asked for.
+    pub keeper: Keeper,
+    /// The inserted objects that the open capture came with.
+    pub inserted: Arc<Vec<Placement>>,
+    /// When something was last asked to be shown.
+    pub asked: Option<Instant>,
     edited: Edited,
     sequence: u64,
     changed: bool,
@@ -78,6 +86,9 @@ impl Worker {
             step: false,
             seconds_load: 0.0,
             started: Instant::now(),
+            keeper: Keeper::default(),
+            inserted: Arc::default(),
+            asked: None,
             edited: Edited::default(),
             sequence: 0,
             changed: true,
@@ -124,9 +135,15 @@ impl Worker {
         };
         let options = path_options(&self.settings);
         let estimate = self.edited();
+        // Views and composites share what there is.
+        let composites = !estimate.objects.is_empty() && self.inserting.is_busy();
+        let share = match composites && share < 1.0 {
+            true => share * 0.5,
+            false => share,
+        };
         let (drawn, more) = self.views.draw(&capture, &estimate, &options, share);
         self.changed |= drawn;
-        if estimate.objects.is_empty() || !self.inserting.is_busy() {
+        if !composites {
             return more;
         }
         match self.inserting.draw(&capture, &estimate, &options, share) {
@@ -161,6 +178,8 @@ impl Worker {
                 .flatten(),
             estimate: self.estimate.clone(),
             edits: self.edits.clone(),
+            inserted: self.inserted.clone(),
+            earlier: self.keeper.earlier.clone(),
             view: self.views.shown(),
             insertion: self.inserting.shown(),
             events: self.events.clone(),

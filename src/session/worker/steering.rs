@@ -1,6 +1,7 @@
 //! The worker's ear on a running solver: takes commands between iterations, holds the solver while paused.
 
 use crate::inverse::estimate::Estimate;
+use crate::inverse::known::Known;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Control, Observer, Progress};
 use crate::session::command::Command;
@@ -10,8 +11,10 @@ use crate::session::worker::work::Next;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Share of the solver's time that views may take.
-const VIEW_SHARE: f32 = 0.15;
+/// Share of the solver's time that views and composites may take while they are watched …
+const VIEW_SHARE: f32 = 0.03;
+/// … and for how long after a request, and until its first complete picture, how much more.
+const ANSWER: (Duration, f32) = (Duration::from_secs(2), 0.25);
 /// Time between two checkpoints that are kept in case the solver fails.
 const CHECKPOINT: Duration = Duration::from_secs(8);
 
@@ -73,8 +76,13 @@ impl<'a> Steering<'a> {
 }
 
 impl Observer for Steering<'_> {
+    fn known(&self) -> Known {
+        self.worker.edits.known()
+    }
+
     fn observe(&mut self, progress: &Progress, estimate: &Estimate) -> Control {
         self.record(progress, estimate);
+        self.worker.keep(false);
         // Nothing may come between a checkpoint and this report: what has come since then waits for the next one.
         let mut ready = self.seen.take().unwrap_or(usize::MAX);
         loop {
@@ -94,7 +102,10 @@ impl Observer for Steering<'_> {
                 break;
             }
             if !self.worker.paused {
-                self.worker.draw(VIEW_SHARE);
+                let asked = self.worker.asked;
+                let fresh = asked.is_some_and(|at| at.elapsed() < ANSWER.0);
+                let answer = fresh || self.worker.views.is_rough();
+                self.worker.draw(if answer { ANSWER.1 } else { VIEW_SHARE });
                 self.worker.publish(false);
                 break;
             }
@@ -119,12 +130,21 @@ impl Observer for Steering<'_> {
 
     /// Keeps a checkpoint now and then, and whenever what is about to be carried out may save it.
     fn offer(&mut self, make: &dyn Fn() -> Checkpoint) {
-        let saves = |mail: &Mail| matches!(mail, Mail::Command(Command::Save(_) | Command::Pause));
+        let keeps = |mail: &Mail| {
+            let Mail::Command(command) = mail else {
+                return false;
+            };
+            matches!(
+                command,
+                Command::Save(_) | Command::Pause | Command::SolveOn
+            )
+        };
         let waiting = self.worker.inbox.look_ahead();
         self.seen = Some(waiting.len());
-        let wanted = waiting.iter().any(saves) || self.worker.paused;
+        let wanted = waiting.iter().any(keeps) || self.worker.paused;
         if wanted || self.kept.elapsed() >= CHECKPOINT {
             self.worker.checkpoint = Some(make());
+            self.worker.keeper.touch();
             self.kept = Instant::now();
         }
     }

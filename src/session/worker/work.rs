@@ -5,6 +5,7 @@ use crate::inverse::solver::{Checkpoint, Problem};
 use crate::session::command::{OpenOptions, Source};
 use crate::session::edits::Edits;
 use crate::session::inbox::Mail;
+use crate::session::keep;
 use crate::session::save;
 use crate::session::snapshot::{Level, OpenCapture, Phase};
 use crate::session::worker::state::Worker;
@@ -25,6 +26,8 @@ pub(super) enum Next {
     Resume(PathBuf),
     /// Solve what is open, from the start or from a checkpoint.
     Solve(Option<Checkpoint>),
+    /// Read what is open again with other options, and solve on if so.
+    Reframe(Box<OpenOptions>, bool),
     /// End.
     Quit,
 }
@@ -35,6 +38,7 @@ impl Worker {
         let mut next = first;
         loop {
             if matches!(next, Next::Quit) {
+                self.keep(true);
                 break;
             }
             let step = std::mem::replace(&mut next, Next::Wait);
@@ -51,6 +55,7 @@ impl Worker {
             Next::Open(source) => self.open(&source, &OpenOptions::default()),
             Next::Resume(folder) => self.resume(&folder),
             Next::Solve(checkpoint) => self.solve(checkpoint.as_ref()),
+            Next::Reframe(options, go_on) => self.reframe(&options, go_on),
             Next::Quit => Next::Quit,
         }
     }
@@ -80,6 +85,9 @@ impl Worker {
         loop {
             let busy = self.draw(1.0);
             self.publish(!busy);
+            if !busy {
+                self.keep(false);
+            }
             let mail = if busy {
                 self.inbox.poll()
             } else {
@@ -105,6 +113,7 @@ impl Worker {
             Ok(capture) => {
                 self.seconds_load = self.started.elapsed().as_secs_f64();
                 self.adopt(capture);
+                self.set_aside();
                 Next::Solve(None)
             }
             // What was open stays open.
@@ -125,10 +134,45 @@ impl Worker {
             self.say(Level::Warning, warning.clone());
         }
         self.capture = Some(Arc::new(capture));
+        self.inserted = Arc::default();
         self.forget();
         self.edits = Edits::default();
         self.views.reset();
         self.inserting.reset();
+    }
+
+    /// Reads the open capture with other options; what was found and changed by hand stays.
+    fn reframe(&mut self, options: &OpenOptions, go_on: bool) -> Next {
+        let Some(old) = self.capture.clone() else {
+            return Next::Wait;
+        };
+        let before = std::mem::replace(&mut self.phase, Phase::Loading);
+        self.publish(true);
+        match (self.backend.open)(&old.source, options) {
+            Ok(capture) => {
+                let (from, to) = (old.options.coordinates, options.coordinates);
+                let (up, new_up) = (old.capture.up, capture.capture.up);
+                let mut inserted = self.inserting.placements().to_vec();
+                for placement in &mut inserted {
+                    let files = placement.at.map(|at| from.undo(at, up));
+                    placement.at = files.map(|at| to.apply(at, new_up));
+                }
+                let kept = (self.estimate.clone(), self.progress.clone());
+                let (checkpoint, edits) = (self.checkpoint.take(), self.edits.clone());
+                self.adopt(capture);
+                (self.estimate, self.progress) = kept;
+                (self.checkpoint, self.edits) = (checkpoint, edits);
+                self.inserting.place(inserted.clone());
+                self.inserted = Arc::new(inserted);
+                self.keeper.touch();
+            }
+            Err(error) => self.fail(&error),
+        }
+        self.phase = before;
+        match go_on {
+            true => Next::Solve(self.checkpoint.clone()),
+            false => Next::Wait,
+        }
     }
 
     fn resume(&mut self, folder: &Path) -> Next {
@@ -138,11 +182,15 @@ impl Worker {
             let capture = (self.backend.open)(&saved.source, &saved.options)?;
             let estimate = saved.estimate_for(&capture)?;
             let edits = saved.edits_for(&capture)?;
-            Ok((capture, estimate, edits, saved))
+            let inserted = keep::inserted(folder)?;
+            Ok((capture, estimate, edits, inserted, saved))
         });
         match loaded {
-            Ok((capture, estimate, edits, saved)) => {
+            Ok((capture, estimate, edits, inserted, saved)) => {
+                self.keeper.resumed(&capture.hash);
                 self.adopt(capture);
+                self.inserting.place(inserted.clone());
+                self.inserted = Arc::new(inserted);
                 self.edits = edits;
                 self.estimate = Arc::new(estimate);
                 self.settings = saved.settings;
@@ -206,6 +254,7 @@ impl Worker {
                 self.progress = Arc::new(solution.progress);
                 self.checkpoint = solution.checkpoint;
                 self.phase = Phase::Finished(solution.termination);
+                self.keeper.touch();
                 let edited = self.edited();
                 self.views.refresh(&edited);
                 self.inserting.update();

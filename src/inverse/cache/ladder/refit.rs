@@ -48,6 +48,7 @@ impl Ladder<'_, '_> {
         let errors = standard_errors(&found.equations, &free, self.roles.len());
         self.unknowns = found.unknowns;
         self.merge_errors(errors);
+        self.hold();
         let factor = |object: usize| {
             let (new, old) = (self.unknowns.albedo[object], before.0.albedo[object]);
             let grown = new / old.max(Vec3::splat(f32::MIN_POSITIVE));

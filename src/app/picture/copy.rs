@@ -1,0 +1,116 @@
+//! A picture as it is seen, for the clipboard: the arithmetic of `picture.wgsl` on the processor.
+
+use crate::app::picture::canvas::Drawn;
+use crate::app::picture::look::{Look, ToneCurve};
+use crate::app::picture::quantity::{Quantity, Shading};
+use crate::app::picture::ramp;
+use crate::app::state::App;
+use crate::math::color::to_srgb8;
+use crate::session::snapshot::Level;
+use egui::{Color32, ColorImage};
+use glam::Vec3;
+
+impl App {
+    /// Copies the picture under the pointer, or the re-render, whole and as it is seen, to the clipboard.
+    pub fn copy_picture(&mut self, ctx: &egui::Context) {
+        let over = self.look.cursor.map(|cursor| cursor.over);
+        let quantity = over.unwrap_or(Quantity::Render);
+        let Some(drawn) = self.drawn(quantity) else {
+            let message = format!("copy: there is no {} yet", quantity.name());
+            self.notices.say(Level::Warning, message);
+            return;
+        };
+        ctx.copy_image(as_seen(&drawn, &self.look));
+        let message = format!("{} copied to the clipboard", quantity.name());
+        self.notices.say(Level::Info, message);
+    }
+}
+
+/// All pixels of a picture in the colours that panes show.
+pub fn as_seen(drawn: &Drawn, look: &Look) -> ColorImage {
+    let picture = &drawn.picture;
+    let shading = drawn.quantity.shading();
+    let colors = picture.pixels.iter().map(|&value| {
+        let [r, g, b] = color(value, shading, drawn.range, look);
+        Color32::from_rgb(r, g, b)
+    });
+    ColorImage::new(
+        [picture.width as usize, picture.height as usize],
+        colors.collect(),
+    )
+}
+
+fn color(value: Vec3, shading: Shading, range: f32, look: &Look) -> [u8; 3] {
+    if !value.is_finite() {
+        return [255, 0, 255];
+    }
+    let mean = value.element_sum() / 3.0;
+    let ramp = |t: f32| ramp::color(shading, t.clamp(0.0, 1.0)).map(|v| (v * 255.0).round() as u8);
+    match shading {
+        Shading::Reflectance => to_srgb8(value, 1.0),
+        Shading::Signed => ramp(0.5 + 0.5 * mean / range),
+        Shading::Positive => ramp(mean / range),
+        Shading::Radiance => {
+            let x = value.max(Vec3::ZERO) * look.exposure.exp2();
+            let toned = match look.tone {
+                ToneCurve::None => x,
+                ToneCurve::Reinhard => x / (1.0 + x),
+                ToneCurve::Filmic => (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14),
+            };
+            to_srgb8(toned, 1.0)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::color::srgb_to_linear;
+    use crate::session::snapshot::Picture;
+    use std::sync::Arc;
+
+    fn seen(quantity: Quantity, value: Vec3, look: &Look) -> Color32 {
+        let drawn = Drawn {
+            quantity,
+            picture: Arc::new(Picture::from_fn(3, 2, |_, _| value)),
+            objects: None,
+            range: 1.0,
+        };
+        let image = as_seen(&drawn, look);
+        assert_eq!(image.size, [3, 2]);
+        image.pixels[5]
+    }
+
+    #[test]
+    fn radiance_is_exposed_and_reflectance_is_not() {
+        let look = Look {
+            exposure: 1.0,
+            ..Look::default()
+        };
+        let value = Vec3::splat(srgb_to_linear(128.0 / 255.0) * 0.5);
+        let grey = Color32::from_gray(128);
+        assert_eq!(seen(Quantity::Render, value, &look), grey);
+        assert_eq!(seen(Quantity::Albedo, value * 2.0, &look), grey);
+        let toned = Look {
+            tone: ToneCurve::Reinhard,
+            ..Look::default()
+        };
+        let one = seen(Quantity::Render, Vec3::ONE, &toned);
+        assert_eq!(one, Color32::from_gray(188));
+    }
+
+    #[test]
+    fn what_is_not_a_number_is_magenta_and_errors_have_a_sign() {
+        let look = Look::default();
+        let magenta = Color32::from_rgb(255, 0, 255);
+        assert_eq!(
+            seen(Quantity::Render, Vec3::splat(f32::NAN), &look),
+            magenta
+        );
+        let (dark, bright) = (
+            seen(Quantity::Error, Vec3::NEG_ONE, &look),
+            seen(Quantity::Error, Vec3::ONE, &look),
+        );
+        assert!(dark.b() > dark.r() && bright.r() > bright.b());
+    }
+}

@@ -1,0 +1,89 @@
+//! Values of objects as the command line names them: NAME=R,G,B.
+
+use crate::cli::arguments::triple;
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use crate::session::edits::{Edits, ObjectEdit};
+use glam::Vec3;
+
+/// Emission and albedo of named objects.
+#[derive(Debug, Clone, Default)]
+pub struct ObjectValues {
+    /// Radiance, W·sr⁻¹·m⁻².
+    pub emission: Vec<(String, Vec3)>,
+    /// Diffuse reflectance, 0 to 1.
+    pub albedo: Vec<(String, Vec3)>,
+}
+
+impl ObjectValues {
+    /// Makes them changes to an estimate.
+    ///
+    /// # Errors
+    /// An object is not there, or a value is none that a surface can have.
+    pub fn change(&self, scene: &Scene, edits: &mut Edits) -> Result<()> {
+        self.each(scene, edits, |_| {})
+    }
+
+    /// Makes them values that are known and held while the rest is solved.
+    ///
+    /// # Errors
+    /// As [`ObjectValues::change`].
+    pub fn hold(&self, scene: &Scene, edits: &mut Edits) -> Result<()> {
+        self.each(scene, edits, |edit| {
+            edit.emission_known |= edit.emission.is_some();
+            edit.albedo_known |= edit.albedo.is_some();
+        })
+    }
+
+    fn each(&self, scene: &Scene, edits: &mut Edits, and: impl Fn(&mut ObjectEdit)) -> Result<()> {
+        for (name, emission) in &self.emission {
+            if emission.min_element() < 0.0 {
+                return Err(Error::usage(
+                    format!("emission of {name}"),
+                    "light cannot be negative",
+                    "give values of 0 or more",
+                ));
+            }
+            let object = find(scene, name)?;
+            let mut edit = edits.object(object);
+            edit.emission = Some(*emission);
+            and(&mut edit);
+            edits.set(object, edit);
+        }
+        for (name, albedo) in &self.albedo {
+            if albedo.min_element() < 0.0 || albedo.max_element() > 1.0 {
+                return Err(Error::usage(
+                    format!("albedo of {name}"),
+                    "a surface reflects between none and all of the light",
+                    "give values from 0 to 1",
+                ));
+            }
+            let object = find(scene, name)?;
+            let mut edit = edits.object(object);
+            edit.albedo = Some(*albedo);
+            and(&mut edit);
+            edits.set(object, edit);
+        }
+        Ok(())
+    }
+}
+
+fn find(scene: &Scene, name: &str) -> Result<usize> {
+    let index = scene.objects.iter().position(|o| o.name == name);
+    index.ok_or_else(|| {
+        let names: Vec<&str> = scene.objects.iter().map(|o| o.name.as_str()).collect();
+        Error::usage(
+            name,
+            "the capture has no object of this name",
+            format!("choose among {}", names.join(", ")),
+        )
+    })
+}
+
+/// NAME=R,G,B.
+pub fn named_color(text: &str) -> std::result::Result<(String, Vec3), String> {
+    let (name, color) = text
+        .rsplit_once('=')
+        .ok_or("NAME=r,g,b is wanted".to_owned())?;
+    Ok((name.to_owned(), triple(color)?.as_vec3()))
+}

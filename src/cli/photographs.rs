@@ -1,0 +1,48 @@
+//! Photographs in one go, with progress; Ctrl-C ends after what is whole.
+
+use crate::cli::interrupt::Interrupt;
+use crate::error::Result;
+use crate::session::photographs::Photographs;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+use std::path::PathBuf;
+
+/// Steps of the bar.
+const LENGTH: u64 = 1000;
+
+/// Writes photographs and prints the paths of their files.
+///
+/// # Errors
+/// Something cannot be read or written.
+pub fn write_with_progress(work: &Photographs, prefix: &dyn Fn(usize) -> PathBuf) -> Result<()> {
+    let interrupt = Interrupt::listen()?;
+    let target = if std::io::stderr().is_terminal() {
+        ProgressDrawTarget::stderr()
+    } else {
+        ProgressDrawTarget::hidden()
+    };
+    let style = ProgressStyle::with_template("{bar:24} photograph {msg}, {eta} left");
+    let bar = ProgressBar::with_draw_target(Some(LENGTH), target)
+        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let written = work.write(prefix, &|doing| {
+        bar.set_position((f64::from(doing.share) * LENGTH as f64) as u64);
+        bar.set_message(format!("{:03}", doing.frame));
+        !interrupt.asked()
+    });
+    bar.finish_and_clear();
+    let written = written?;
+    for warning in &written.warnings {
+        eprintln!("warning: {warning}");
+    }
+    if written.photographs < work.frames.len() {
+        eprintln!(
+            "interrupted after {} of {} photographs",
+            written.photographs,
+            work.frames.len()
+        );
+    }
+    for path in &written.files {
+        println!("{}", path.display());
+    }
+    Ok(())
+}

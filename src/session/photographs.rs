@@ -1,0 +1,179 @@
+//! Photographs in one go: each relit by the changes made by hand and with the inserted objects in it, at the size of
+//! its file.
+
+use crate::compose::backdrop::Backdrop;
+use crate::compose::denoise::denoised;
+use crate::compose::placement::{PlacedObject, Placement};
+use crate::compose::relight::{relit, render_both};
+use crate::compose::write::{write_insertion, write_relit};
+use crate::error::Result;
+use crate::inverse::estimate::Estimate;
+use crate::inverse::settings::Settings;
+use crate::session::insertion::{Inserted, Library};
+use crate::session::light::path_options;
+use crate::session::snapshot::OpenCapture;
+use crate::transport::lit::Lit;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What is made of which photographs.
+#[derive(Debug, Clone)]
+pub struct Photographs {
+    /// What they were taken of.
+    pub capture: Arc<OpenCapture>,
+    /// The light and the materials that were found.
+    pub found: Arc<Estimate>,
+    /// The same with the changes made by hand.
+    pub edited: Arc<Estimate>,
+    /// The solve's parameters: depth of paths and seed.
+    pub settings: Settings,
+    /// The objects to put in; none leaves the composites out.
+    pub placements: Vec<Placement>,
+    /// Whether the photographs are brought from the light found to the changed one.
+    pub relight: bool,
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Whether the light's noise is smoothed.
+    pub denoise: bool,
+    /// Which photographs, by frame.
+    pub frames: Vec<usize>,
+}
+
+/// What is being done.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Doing {
+    /// The photograph's frame.
+    pub frame: usize,
+    /// Share of the whole work that is done, 0 to 1.
+    pub share: f32,
+}
+
+/// What was written.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Written {
+    /// Photographs that are done.
+    pub photographs: usize,
+    /// Their files.
+    pub files: Vec<PathBuf>,
+    /// What was odd about the objects.
+    pub warnings: Vec<String>,
+}
+
+impl Photographs {
+    /// Writes `prefix(frame)`.relit.{exr,png} and the files of an insertion, one photograph after the other. Between
+    /// pieces of work `tell` hears how far it is and may end it; what is written by then is whole.
+    ///
+    /// # Errors
+    /// An object or a photograph cannot be read, or a file cannot be written.
+    pub fn write(
+        &self,
+        prefix: &dyn Fn(usize) -> PathBuf,
+        tell: &dyn Fn(Doing) -> bool,
+    ) -> Result<Written> {
+        let mut library = Library::default();
+        let mut written = Written::default();
+        let mut objects = Vec::new();
+        for placement in &self.placements {
+            let model = library.model(&placement.file)?;
+            written.warnings.extend(model.warnings.iter().cloned());
+            let placed = PlacedObject::new(model, placement, &self.capture.scene)?;
+            objects.push(Arc::new(placed));
+        }
+        let scene = &self.capture.scene;
+        let lights = (self.relight).then(|| [self.found.lit(scene), self.edited.lit(scene)]);
+        let parts = u8::from(lights.is_some()) + u8::from(!objects.is_empty());
+        for (index, &frame) in self.frames.iter().enumerate() {
+            let share = |part: u8, share: f32| {
+                let part = (f32::from(part) + share) / f32::from(parts.max(1));
+                let share = (index as f32 + part) / self.frames.len() as f32;
+                tell(Doing { frame, share })
+            };
+            let prefix = prefix(frame);
+            let Some(backdrop) = self.backdrop(frame, lights.as_ref(), &|s| share(0, s))? else {
+                return Ok(written);
+            };
+            if lights.is_some() {
+                written.files.extend(write_relit(&prefix, &backdrop)?);
+            }
+            if !objects.is_empty() {
+                let go_on = |s| share(parts - 1, s);
+                if !go_on(0.0) {
+                    return Ok(written);
+                }
+                let Some(files) =
+                    self.composite(&mut library, backdrop, &objects, &prefix, &go_on)?
+                else {
+                    return Ok(written);
+                };
+                written.files.extend(files);
+            }
+            written.photographs += 1;
+        }
+        Ok(written)
+    }
+
+    /// The photograph, relit where there are two lights; `None` if that was ended.
+    fn backdrop(
+        &self,
+        frame: usize,
+        lights: Option<&[Lit; 2]>,
+        go_on: &dyn Fn(f32) -> bool,
+    ) -> Result<Option<Backdrop>> {
+        let camera = self.capture.full_camera(frame)?;
+        let photograph = self.capture.full_photograph(frame)?;
+        let exposure = self.found.exposure(frame);
+        let mut backdrop = Backdrop::new(frame, &camera, &photograph, exposure)?;
+        if let Some([before, after]) = lights {
+            let options = path_options(&self.settings);
+            let key = (self.settings.seed, frame as u64);
+            let both = [before, after];
+            let quality = (self.samples, self.denoise);
+            let renders = render_both(both, &camera, &options, key, quality, go_on);
+            let Some([before, after]) = renders else {
+                return Ok(None);
+            };
+            backdrop.photograph = Arc::new(relit(&backdrop, &before, &after));
+        }
+        Ok(Some(backdrop))
+    }
+
+    /// Puts the objects in and writes the composites; `None` if that was ended.
+    fn composite(
+        &self,
+        library: &mut Library,
+        backdrop: Backdrop,
+        objects: &[Arc<PlacedObject>],
+        prefix: &Path,
+        go_on: &dyn Fn(f32) -> bool,
+    ) -> Result<Option<Vec<PathBuf>>> {
+        // What is to be smoothed is made in two independent halves, which tell the noise.
+        let parts = if self.denoise { 2 } else { 1 };
+        let samples = self.samples.div_ceil(parts);
+        let mut made: Vec<Inserted> = Vec::new();
+        for part in 0..parts {
+            let mut inserted = library.insert(
+                &self.capture,
+                &self.edited,
+                backdrop.clone(),
+                objects.to_vec(),
+                &path_options(&self.settings),
+                self.settings.seed.wrapping_add(u64::from(part)),
+            );
+            for pass in 1..=samples {
+                let done = part as f32 + (pass - 1) as f32 / samples as f32;
+                let go_on = || go_on(done / parts as f32);
+                if !inserted.composite.refine_to(pass, go_on) {
+                    return Ok(None);
+                }
+            }
+            made.push(inserted);
+        }
+        let (composite, layers) = match &made[..] {
+            [a, b] => denoised([&a.composite, &b.composite]),
+            made => (made[0].composite.composite(), made[0].composite.layers()),
+        };
+        let (naive, naive_estimate) = (&made[0].naive, &made[0].naive_estimate);
+        let results = (&composite, layers);
+        write_insertion(prefix, &backdrop, results, naive, naive_estimate).map(Some)
+    }
+}

@@ -1,0 +1,290 @@
+//! A denoiser for pictures, guided by what each pixel sees. For people to look at, never for a fit.
+//!
+//! Light is taken apart from the surfaces' own colours, and smoothed by an à-trous wavelet transform (Dammertz et al.
+//! 2010) whose weights fall off across normals, depths, objects, and differences in brightness that the noise does not
+//! explain (Schied et al. 2017). The noise is told by two independent pictures of the same view.
+
+use crate::math::color::luminance;
+use crate::math::picture::Picture;
+use crate::scene::camera::Camera;
+use crate::transport::world::World;
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+/// Passes, each reaching twice as far: 5 × 5 taps out to 32 pixels.
+const PASSES: u32 = 5;
+/// The cubic B-spline's weights.
+const SPLINE: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
+/// Differences of brightness within so many standard deviations of the noise are smoothed.
+const BRIGHTNESS: f32 = 3.0;
+/// How fast weights fall with the angle between normals: the cosine to this power.
+const NORMAL: i32 = 64;
+/// Distance from a pixel's plane, as a share of its depth, at which weights have fallen to 1/e.
+const PLANE: f32 = 0.01;
+/// Pixels to each side over which the noise is averaged before anything is smoothed.
+const NOISE_REACH: isize = 3;
+/// Albedos are taken for at least this large where light is taken apart from them.
+const DARKEST: f32 = 0.02;
+
+/// What a pixel's centre sees.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Guide {
+    /// Point, scene coordinates.
+    pub point: Vec3,
+    /// Unit normal.
+    pub normal: Vec3,
+    /// Distance from the camera, metres.
+    pub depth: f32,
+    /// Diffuse reflectance.
+    pub albedo: Vec3,
+    /// Emitted radiance towards the camera.
+    pub emission: Vec3,
+    /// Which object.
+    pub object: u32,
+}
+
+/// What the pixels of a camera see. Albedo is the mean over a pixel's part of the object at its centre.
+pub fn guides(world: &impl World, camera: &Camera) -> Vec<Option<Guide>> {
+    let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
+    let guide = |pixel: u32| {
+        let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+        let ray = camera.ray(corner + 0.5);
+        let seen = world.intersect(&ray)?;
+        let towards = -ray.direction.normalize_or_zero();
+        let front = seen.normal.dot(towards) > 0.0;
+        let around = [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]];
+        let (mut albedo, mut taps) = (seen.albedo, 1.0);
+        for offset in around.map(Vec2::from_array) {
+            let beside = world.intersect(&camera.ray(corner + offset));
+            if let Some(beside) = beside.filter(|b| b.object == seen.object) {
+                albedo += beside.albedo;
+                taps += 1.0;
+            }
+        }
+        let normal = if front {
+            seen.shading_normal
+        } else {
+            -seen.shading_normal
+        };
+        Some(Guide {
+            point: seen.point,
+            normal,
+            depth: seen.point.distance(camera.center),
+            albedo: albedo / taps,
+            emission: if front { seen.emission } else { Vec3::ZERO },
+            object: seen.object,
+        })
+    };
+    (0..width * height).into_par_iter().map(guide).collect()
+}
+
+/// Smooths the mean of two independent pictures of one view; `guides` has one entry a pixel, `None` where nothing is seen.
+/// Lamps, pixels whose guides are `None`, and what is not finite stay as they are.
+pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
+    let width = a.width as usize;
+    let halves = a.pixels.iter().zip(&b.pixels);
+    let mean: Vec<Vec3> = halves.map(|(a, b)| (*a + *b) * 0.5).collect();
+    if guides.len() != mean.len() || b.pixels.len() != mean.len() {
+        return Picture { pixels: mean, ..*a };
+    }
+
+    // Light by itself, and the variance of its brightness, averaged over like pixels.
+    let light = |pixel: usize, value: Vec3| match &guides[pixel] {
+        Some(guide) => (value - guide.emission) / guide.albedo.max(Vec3::splat(DARKEST)),
+        None => value,
+    };
+    let mut smooth: Vec<Vec3> = (0..mean.len()).map(|i| light(i, mean[i])).collect();
+    let apart: Vec<f32> = (0..mean.len())
+        .map(|i| {
+            let half = luminance(light(i, a.pixels[i]) - light(i, b.pixels[i])) * 0.5;
+            let square = half * half;
+            if square.is_finite() { square } else { 0.0 }
+        })
+        .collect();
+    let around = Around {
+        width,
+        height: a.height as usize,
+    };
+    let mut noise: Vec<f32> = (0..mean.len())
+        .into_par_iter()
+        .map(|pixel| {
+            let alike = around.square(pixel, NOISE_REACH, 1);
+            let (sum, weights) = alike.fold((0.0, 0.0), |(sum, weights), (q, _)| {
+                let weight = alike_weight(guides[pixel].as_ref(), guides[q].as_ref());
+                (sum + weight * apart[q], weights + weight)
+            });
+            if weights > 0.0 { sum / weights } else { 0.0 }
+        })
+        .collect();
+
+    for pass in 0..PASSES {
+        let step = 1 << pass;
+        let filtered: Vec<(Vec3, f32)> = (0..mean.len())
+            .into_par_iter()
+            .map(|pixel| {
+                let here = (smooth[pixel], noise[pixel]);
+                let guide = guides[pixel].as_ref();
+                let Some(guide) = guide.filter(|g| g.emission == Vec3::ZERO && here.0.is_finite())
+                else {
+                    return here;
+                };
+                let allowed = BRIGHTNESS * here.1.sqrt() + f32::MIN_POSITIVE;
+                let (mut sum, mut spread, mut weights) = (Vec3::ZERO, 0.0, 0.0);
+                for (q, [dx, dy]) in around.square(pixel, 2, step) {
+                    let spline = SPLINE[dx.unsigned_abs()] * SPLINE[dy.unsigned_abs()];
+                    let like = alike_weight(Some(guide), guides[q].as_ref());
+                    if like == 0.0 || !smooth[q].is_finite() {
+                        continue;
+                    }
+                    let off = luminance(smooth[q] - here.0).abs() / allowed;
+                    let weight = spline * like * (-off).exp();
+                    sum += smooth[q] * weight;
+                    spread += noise[q] * weight * weight;
+                    weights += weight;
+                }
+                (sum / weights, spread / (weights * weights))
+            })
+            .collect();
+        (smooth, noise) = filtered.into_iter().unzip();
+    }
+
+    let pixels = (0..mean.len()).map(|pixel| match &guides[pixel] {
+        Some(guide) if smooth[pixel].is_finite() => {
+            smooth[pixel] * guide.albedo.max(Vec3::splat(DARKEST)) + guide.emission
+        }
+        _ => mean[pixel],
+    });
+    Picture {
+        pixels: pixels.collect(),
+        ..*a
+    }
+}
+
+/// How far two pixels see the same surface, 0 to 1.
+fn alike_weight(a: Option<&Guide>, b: Option<&Guide>) -> f32 {
+    match (a, b) {
+        (Some(a), Some(b)) if a.object == b.object => {
+            let turned = a.normal.dot(b.normal).max(0.0).powi(NORMAL);
+            let off = (b.point - a.point).dot(a.normal).abs();
+            turned * (-off / (PLANE * a.depth + f32::MIN_POSITIVE)).exp()
+        }
+        _ => 0.0,
+    }
+}
+
+/// The pixels of a picture around one of them.
+#[derive(Clone, Copy)]
+struct Around {
+    width: usize,
+    height: usize,
+}
+
+impl Around {
+    /// Those of a square `reach` taps to each side, `step` pixels apart, that lie in the picture, with their taps.
+    fn square(
+        self,
+        pixel: usize,
+        reach: isize,
+        step: isize,
+    ) -> impl Iterator<Item = (usize, [isize; 2])> {
+        let (x, y) = ((pixel % self.width) as isize, (pixel / self.width) as isize);
+        (-reach..=reach)
+            .flat_map(move |dy| (-reach..=reach).map(move |dx| [dx, dy]))
+            .filter_map(move |[dx, dy]| {
+                let at = |from: isize, by: isize, size: usize| {
+                    usize::try_from(from + by * step).ok().filter(|&v| v < size)
+                };
+                let (x, y) = (at(x, dx, self.width)?, at(y, dy, self.height)?);
+                Some((y * self.width + x, [dx, dy]))
+            })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::rng::Stream;
+
+    const SIDE: u32 = 48;
+
+    /// A floor in two colours under light that falls to the right, with a wall of another object on the upper half.
+    fn scene() -> (Vec<Option<Guide>>, Picture) {
+        let guide = |x: u32, y: u32| {
+            let wall = y < SIDE / 2;
+            Guide {
+                point: Vec3::new(
+                    x as f32,
+                    if wall { SIDE as f32 - y as f32 } else { 0.0 },
+                    10.0,
+                ),
+                normal: if wall { Vec3::Z } else { Vec3::Y },
+                depth: 50.0,
+                albedo: Vec3::splat(if x % 6 < 3 { 0.2 } else { 0.8 }),
+                emission: Vec3::ZERO,
+                object: u32::from(wall),
+            }
+        };
+        let light = |x: u32, y: u32| match y < SIDE / 2 {
+            true => 3.0,
+            false => 1.0 - 0.8 * x as f32 / SIDE as f32,
+        };
+        let guides = (0..SIDE * SIDE).map(|i| Some(guide(i % SIDE, i / SIDE)));
+        let picture = Picture::from_fn(SIDE, SIDE, |x, y| guide(x, y).albedo * light(x, y));
+        (guides.collect(), picture)
+    }
+
+    fn noisy(truth: &Picture, seed: u64, size: f32) -> Picture {
+        let mut pixel = 0;
+        Picture::from_fn(truth.width, truth.height, |x, y| {
+            let mut stream = Stream::new(seed, 0, pixel, 0);
+            pixel += 1;
+            let value = truth.pixels[(y * truth.width + x) as usize];
+            value * (1.0 + size * (2.0 * stream.uniform2()[0] - 1.0))
+        })
+    }
+
+    fn error(a: &Picture, b: &Picture) -> f32 {
+        let squares = a
+            .pixels
+            .iter()
+            .zip(&b.pixels)
+            .map(|(a, b)| (*a - *b).length_squared());
+        (squares.sum::<f32>() / a.pixels.len() as f32).sqrt()
+    }
+
+    #[test]
+    fn noise_goes_while_colours_edges_and_slopes_of_light_stay() {
+        let (guides, truth) = scene();
+        let (a, b) = (noisy(&truth, 1, 0.8), noisy(&truth, 2, 0.8));
+        let both = a.pixels.iter().zip(&b.pixels).map(|(a, b)| (*a + *b) * 0.5);
+        let mean = Picture {
+            pixels: both.collect(),
+            ..truth
+        };
+        let smooth = denoise(&a, &b, &guides);
+        let (before, after) = (error(&mean, &truth), error(&smooth, &truth));
+        assert!(after < 0.25 * before, "{before} {after}");
+        // What has no noise stays as it is, to rounding.
+        let clean = denoise(&truth, &truth, &guides);
+        assert!(error(&clean, &truth) < 1e-5, "{}", error(&clean, &truth));
+    }
+
+    #[test]
+    fn lamps_keep_their_light_and_what_nothing_is_known_of_stays() {
+        let (mut guides, truth) = scene();
+        let lamp = Vec3::new(9.0, 8.0, 7.0);
+        let (mut a, mut b) = (noisy(&truth, 1, 0.5), noisy(&truth, 2, 0.5));
+        guides[5] = None;
+        a.pixels[7] = Vec3::splat(f32::NAN);
+        if let Some(guide) = &mut guides[40] {
+            (guide.emission, guide.albedo, guide.object) = (lamp, Vec3::ZERO, 77);
+        }
+        (a.pixels[40], b.pixels[40]) = (lamp, lamp);
+        let smooth = denoise(&a, &b, &guides);
+        assert_eq!(smooth.pixels[5], (a.pixels[5] + b.pixels[5]) * 0.5);
+        assert!(smooth.pixels[7].is_nan());
+        assert!((smooth.pixels[40] - lamp).length() < 1e-5);
+        let spoilt = smooth.pixels.iter().filter(|p| !p.is_finite()).count();
+        assert_eq!(spoilt, 1);
+    }
+}

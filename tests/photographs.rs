@@ -1,0 +1,133 @@
+//! Photographs in one go: relit by the ratio of two renders, with objects in them, ended midway.
+
+mod common;
+
+use glam::{DVec3, Vec3};
+use relit::math::picture::Picture;
+use relit::session::command::{OpenOptions, Placement, Source};
+use relit::session::edits::{Edits, ObjectEdit};
+use relit::session::photographs::Photographs;
+use relit::session::snapshot::OpenCapture;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+fn work(edits: &Edits, placements: Vec<Placement>) -> Photographs {
+    let capture = OpenCapture::new(Source::BuiltInRoom, OpenOptions::default(), common::room());
+    let found = Arc::new(common::truth());
+    Photographs {
+        capture: Arc::new(capture.expect("the room can be solved")),
+        edited: Arc::new(edits.apply(&found)),
+        found,
+        settings: relit::inverse::settings::Settings::default(),
+        placements,
+        relight: !edits.is_empty(),
+        samples: 16,
+        denoise: false,
+        frames: vec![0, 1],
+    }
+}
+
+/// The lamp at a share of its strength.
+fn dimmed(share: f32) -> Edits {
+    let lamp = common::OBJECTS.len() - 1;
+    let full = Vec3::from_array(common::OBJECTS[lamp].2);
+    let mut edits = Edits::default();
+    let emission = Some(full * share);
+    edits.set(
+        lamp,
+        ObjectEdit {
+            emission,
+            ..ObjectEdit::default()
+        },
+    );
+    edits
+}
+
+fn block(folder: &Path) -> Placement {
+    let file = folder.join("block.obj");
+    let text = "v -0.2 0 -0.2\nv 0.2 0 -0.2\nv 0.2 0.4 0.2\nv -0.2 0.4 0.2\nf 1 2 3\nf 1 3 4\n";
+    std::fs::write(&file, text).expect("written");
+    Placement {
+        file,
+        at: Some(DVec3::new(0.0, 0.0, -0.4)),
+        scale: 1.0,
+        rotate: 0.0,
+    }
+}
+
+fn read(path: &Path) -> Picture {
+    let image = image::open(path).expect("an image").to_rgb32f();
+    Picture {
+        width: image.width(),
+        height: image.height(),
+        pixels: image.pixels().map(|p| Vec3::from_array(p.0)).collect(),
+    }
+}
+
+#[test]
+fn a_lamp_at_half_its_strength_halves_every_photograph_and_one_that_is_off_darkens_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (share, name) in [(0.5, "half"), (0.0, "off")] {
+        let work = work(&dimmed(share), Vec::new());
+        let prefix = |frame: usize| folder.path().join(format!("{name}{frame}"));
+        let written = work.write(&prefix, &|_| true).expect("written");
+        assert_eq!((written.photographs, written.files.len()), (2, 4));
+        for frame in [0, 1] {
+            let relit = read(&folder.path().join(format!("{name}{frame}.relit.exr")));
+            let photograph = work.capture.full_photograph(frame).expect("in memory");
+            for (relit, photograph) in relit.pixels.iter().zip(&photograph.pixels) {
+                let off = (*relit - *photograph * share).abs().max_element();
+                assert!(
+                    off <= 1e-4 * photograph.max_element(),
+                    "{relit} {photograph}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn composites_are_made_on_the_relit_photographs() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let work = work(&dimmed(0.25), vec![block(folder.path())]);
+    let prefix = |frame: usize| folder.path().join(format!("{frame:03}"));
+    let told = AtomicUsize::new(0);
+    let written = work.write(&prefix, &|doing| {
+        assert!((0.0..=1.0).contains(&doing.share));
+        told.fetch_add(1, Ordering::Relaxed);
+        true
+    });
+    assert_eq!(written.expect("written").photographs, 2);
+    assert!(told.load(Ordering::Relaxed) > 10);
+    let [relit, composite] =
+        ["relit", "composite"].map(|kind| read(&folder.path().join(format!("001.{kind}.exr"))));
+    let same = relit
+        .pixels
+        .iter()
+        .zip(&composite.pixels)
+        .filter(|(a, b)| a == b);
+    let (same, all) = (same.count(), relit.pixels.len());
+    assert!(same < all, "no object is seen");
+    let mean = |p: &Picture| p.pixels.iter().map(|c| c.y).sum::<f32>() / all as f32;
+    let photograph = work.capture.full_photograph(1).expect("in memory");
+    let whole = photograph.pixels.iter().map(|c| c.y).sum::<f32>() / all as f32;
+    let share = mean(&composite) / whole;
+    assert!((0.15..0.3).contains(&share), "{share}");
+}
+
+#[test]
+fn what_is_ended_midway_leaves_whole_photographs_and_nothing_of_the_next() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let work = work(&dimmed(0.5), vec![block(folder.path())]);
+    let prefix = |frame: usize| folder.path().join(format!("{frame:03}"));
+    let written = work
+        .write(&prefix, &|doing| doing.frame == 0)
+        .expect("written");
+    assert_eq!(written.photographs, 1);
+    assert!(written.files.iter().all(|file| file.is_file()));
+    let mut names = std::fs::read_dir(folder.path())
+        .expect("a folder")
+        .flatten();
+    assert!(!names.any(|entry| entry.file_name().to_string_lossy().starts_with("001")));
+}
