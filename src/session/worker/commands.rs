@@ -8,7 +8,12 @@ use crate::session::snapshot::{Level, Phase};
 use crate::session::worker::state::Worker;
 use crate::session::worker::work::Next;
 use std::path::Path;
-use std::time::Instant;
+use std::time::Duration;
+
+/// How long views have more of the solver's time after another one was asked for …
+const LOOKED: Duration = Duration::from_secs(2);
+/// … and after lamps, materials or inserted objects were changed, whose pictures a person waits for.
+const CHANGED: Duration = Duration::from_secs(15);
 
 impl Worker {
     /// Carries out a command. What cannot be done beside a running solve is returned: the solve ends first.
@@ -48,20 +53,20 @@ impl Worker {
             }
             Command::Set(settings) => self.settings = *settings,
             Command::View(request) => {
-                self.asked = Some(Instant::now());
+                self.answer_for(LOOKED);
                 if let ViewCamera::Frame(frame) = request.camera {
                     self.inserting.look(frame);
                 }
                 self.views.look(request);
             }
             Command::Insert(placements) => {
-                self.asked = Some(Instant::now());
+                self.answer_for(CHANGED);
                 self.keeper.touch();
                 self.inserting.place(placements);
             }
             Command::Edit(edits) => {
                 if self.edits != edits {
-                    self.asked = Some(Instant::now());
+                    self.answer_for(CHANGED);
                     self.keeper.touch();
                     self.edits = edits;
                     self.views.look_again();

@@ -49,8 +49,8 @@ pub(super) struct Worker {
     pub keeper: Keeper,
     /// The inserted objects that the open capture came with.
     pub inserted: Arc<Vec<Placement>>,
-    /// When something was last asked to be shown.
-    pub asked: Option<Instant>,
+    /// Until when what was asked for has a larger share of the time.
+    pub answer_until: Option<Instant>,
     edited: Edited,
     sequence: u64,
     changed: bool,
@@ -88,7 +88,7 @@ impl Worker {
             started: Instant::now(),
             keeper: Keeper::default(),
             inserted: Arc::default(),
-            asked: None,
+            answer_until: None,
             edited: Edited::default(),
             sequence: 0,
             changed: true,
@@ -121,6 +121,12 @@ impl Worker {
             message: message.into(),
         });
         self.changed = true;
+    }
+
+    /// Gives what was asked for a larger share of the time for a while.
+    pub fn answer_for(&mut self, time: Duration) {
+        let end = Instant::now() + time;
+        self.answer_until = self.answer_until.max(Some(end));
     }
 
     /// Marks the state as worth a new snapshot.

@@ -13,8 +13,8 @@ use std::time::{Duration, Instant};
 
 /// Share of the solver's time that views and composites may take while they are watched …
 const VIEW_SHARE: f32 = 0.03;
-/// … and for how long after a request, and until its first complete picture, how much more.
-const ANSWER: (Duration, f32) = (Duration::from_secs(2), 0.25);
+/// … and how much more for a while after a request, and until its first complete picture.
+const ANSWER_SHARE: f32 = 0.25;
 /// Time between two checkpoints that are kept in case the solver fails.
 const CHECKPOINT: Duration = Duration::from_secs(8);
 
@@ -102,10 +102,10 @@ impl Observer for Steering<'_> {
                 break;
             }
             if !self.worker.paused {
-                let asked = self.worker.asked;
-                let fresh = asked.is_some_and(|at| at.elapsed() < ANSWER.0);
+                let fresh = (self.worker.answer_until).is_some_and(|end| Instant::now() < end);
                 let answer = fresh || self.worker.views.is_rough();
-                self.worker.draw(if answer { ANSWER.1 } else { VIEW_SHARE });
+                self.worker
+                    .draw(if answer { ANSWER_SHARE } else { VIEW_SHARE });
                 self.worker.publish(false);
                 break;
             }
