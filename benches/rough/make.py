@@ -2,10 +2,11 @@
 """Renders a room with three rough objects among diffuse ones by Mitsuba 3, as a capture with its truth.
 
     pip install mitsuba
-    DRJIT_LIBLLVM_PATH=... benches/rough/make.py CAPTURE [--diffuse] [--samples 512] [--size 160]
+    DRJIT_LIBLLVM_PATH=... benches/rough/make.py CAPTURE [--plastic | --diffuse] [--samples 512] [--size 160]
     relit solve CAPTURE --out DIR && benches/rough/judge.py CAPTURE DIR
 
-The rough objects are Mitsuba's `roughplastic` (GGX, linear). It differs from relit's lobe: its Fresnel term is that of a
+The rough objects scatter as relit's formulas say, written here as a BSDF of their own; all else is Mitsuba. With --plastic
+they are Mitsuba's `roughplastic` (GGX, linear) of the same reflectance at normal incidence. It differs from relit's lobe: its Fresnel term is that of a
 dielectric where relit takes Schlick's with the same reflectance at normal incidence, and its base loses light in the
 interface. The albedo in truth.json is therefore what relit's base would have to have to reflect as much of light that leaves
 straight up: the ratio is found by quadrature. With --diffuse the same three objects are diffuse: none may get a lobe.
@@ -16,6 +17,7 @@ import math
 import os
 
 import mitsuba as mi
+import drjit as dr
 import numpy as np
 
 mi.set_variant("llvm_ad_rgb" if os.environ.get("DRJIT_LIBLLVM_PATH") else "scalar_rgb")
@@ -34,8 +36,8 @@ ALBEDO = {
     "ball": [0.15, 0.35, 0.20],
     "cabinet": [0.35, 0.30, 0.40],
 }
-# GGX roughness and index of refraction.
-ROUGH = {"table": (0.10, 1.5), "ball": (0.25, 2.2), "cabinet": (0.50, 3.0)}
+# GGX roughness and specular reflectance at normal incidence.
+ROUGH = {"table": (0.10, 0.04), "ball": (0.25, 0.14), "cabinet": (0.50, 0.25)}
 LAMP = [17.0, 15.0, 12.0]
 CAMERAS = [
     ((2.0, 1.6, 4.6), (2.0, 0.7, 1.5)),
@@ -51,6 +53,89 @@ CAMERAS = [
     ((0.8, 2.1, 3.3), (2.6, 0.6, 2.0)),
     ((2.6, 1.1, 1.0), (1.0, 1.9, 4.6)),
 ]
+
+
+class Rough(mi.BSDF):
+    """A GGX lobe (height-correlated Smith, Schlick) over a diffuse base: f cos is
+
+    albedo (1 - F0) cos_i/pi (1 - r(cos_o)) (1 - r(cos_i)) / (1 - mean r) + (F0 + (1 - F0) (1 - wo.h)^5) D G2 / (4 cos_o)
+    with r(c) = (1 - 0.85 c)^5.
+    """
+
+    def __init__(self, properties):
+        mi.BSDF.__init__(self, properties)
+        self.alpha = float(properties["alpha"])
+        self.specular = float(properties["specular"])
+        self.albedo = mi.Color3f(properties["albedo"])
+        self.normals = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, self.alpha, True)
+        flags = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
+        self.m_components = [flags]
+        self.m_flags = flags
+
+    def value_and_density(self, wi, wo):
+        above = (wi.z > 0) & (wo.z > 0)
+        h = dr.normalize(wi + wo)
+        a2 = self.alpha**2
+        q = (h.x * h.x + h.y * h.y) / a2 + h.z * h.z
+        distribution = 1 / (math.pi * a2 * q * q)
+
+        def smith(w):
+            return dr.sqrt(w.z * w.z + a2 * (w.x * w.x + w.y * w.y))
+
+        fresnel = self.specular + (1 - self.specular) * (1 - dr.clip(dr.dot(wi, h), 0, 1)) ** 5
+        lobe = fresnel * 0.5 * distribution * wo.z / (wo.z * smith(wi) + wi.z * smith(wo))
+
+        def taken(cosine):
+            return 1 - (1 - 0.85 * cosine) ** 5
+
+        mean = (1 - 0.15**6 * (1 + 6 * 0.85)) / (21 * 0.85**2)
+        coupling = wo.z / math.pi * taken(wi.z) * taken(wo.z) / (1 - mean)
+        value = self.albedo * ((1 - self.specular) * coupling) + lobe
+        density = 0.5 * self.normals.pdf(wi, h) / (4 * dr.dot(wo, h)) + 0.5 * wo.z / math.pi
+        return dr.select(above, value, 0), dr.select(above, density, 0)
+
+    def upwards(self, si, wo):
+        side = dr.select(si.wi.z < 0, -1.0, 1.0)
+        return side, mi.Vector3f(si.wi.x, si.wi.y, si.wi.z * side), mi.Vector3f(wo.x, wo.y, wo.z * side)
+
+    def sample(self, ctx, si, sample1, sample2, active):
+        side, wi, _ = self.upwards(si, si.wi)
+        h, _ = self.normals.sample(wi, sample2)
+        wo = dr.select(sample1 < 0.5, mi.reflect(wi, h), mi.warp.square_to_cosine_hemisphere(sample2))
+        value, density = self.value_and_density(wi, wo)
+        drawn = mi.BSDFSample3f()
+        drawn.wo = mi.Vector3f(wo.x, wo.y, wo.z * side)
+        drawn.pdf = density
+        drawn.eta = 1.0
+        drawn.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
+        drawn.sampled_component = 0
+        usable = active & (density > 0)
+        return drawn, dr.select(usable, value / density, 0)
+
+    def eval(self, ctx, si, wo, active):
+        _, wi, wo = self.upwards(si, wo)
+        return dr.select(active, self.value_and_density(wi, wo)[0], 0)
+
+    def pdf(self, ctx, si, wo, active):
+        _, wi, wo = self.upwards(si, wo)
+        return dr.select(active, self.value_and_density(wi, wo)[1], 0)
+
+    def eval_pdf(self, ctx, si, wo, active):
+        _, wi, wo = self.upwards(si, wo)
+        value, density = self.value_and_density(wi, wo)
+        return dr.select(active, value, 0), dr.select(active, density, 0)
+
+    def to_string(self):
+        return f"Rough[{self.alpha}, {self.specular}]"
+
+
+mi.register_bsdf("rough", lambda properties: Rough(properties))
+
+
+def refraction(specular):
+    """The index of refraction of a dielectric that reflects so much at normal incidence."""
+    root = math.sqrt(specular)
+    return (1 + root) / (1 - root)
 
 
 def room():
@@ -107,35 +192,32 @@ def room():
     return objects
 
 
-def bsdf(name, diffuse):
-    if name in ROUGH and not diffuse:
-        alpha, ior = ROUGH[name]
-        own = {
-            "type": "roughplastic",
-            "distribution": "ggx",
-            "alpha": alpha,
-            "int_ior": ior,
-            "ext_ior": 1.0,
-            "nonlinear": False,
-            "diffuse_reflectance": {"type": "rgb", "value": ALBEDO[name]},
-        }
+def plastic(alpha, specular, albedo):
+    return {
+        "type": "roughplastic",
+        "distribution": "ggx",
+        "alpha": alpha,
+        "int_ior": refraction(specular),
+        "ext_ior": 1.0,
+        "nonlinear": False,
+        "diffuse_reflectance": {"type": "rgb", "value": albedo},
+    }
+
+
+def bsdf(name, kind):
+    if name in ROUGH and kind == "plastic":
+        own = plastic(*ROUGH[name], ALBEDO[name])
+    elif name in ROUGH and kind == "rough":
+        alpha, specular = ROUGH[name]
+        return {"type": "rough", "alpha": alpha, "specular": specular, "albedo": {"type": "rgb", "value": ALBEDO[name]}}
     else:
         own = {"type": "diffuse", "reflectance": {"type": "rgb", "value": ALBEDO.get(name, [0.0] * 3)}}
     return {"type": "twosided", "own": own}
 
 
-def base_ratio(alpha, ior):
+def base_ratio(alpha, specular):
     """What roughplastic's white base reflects straight up, over what relit's does: (1 - F0) (1 - 0.15^5)."""
-    plastic = mi.load_dict({
-        "type": "roughplastic",
-        "distribution": "ggx",
-        "alpha": alpha,
-        "int_ior": ior,
-        "ext_ior": 1.0,
-        "nonlinear": False,
-        "diffuse_reflectance": {"type": "rgb", "value": [1.0] * 3},
-        "specular_reflectance": 0.0,
-    })
+    white = mi.load_dict(plastic(alpha, specular, [1.0] * 3) | {"specular_reflectance": 0.0})
     side, total = 64, 0.0
     for i in range(side):
         # Even in the squared cosine: the value over cos/pi averages to the share reflected.
@@ -144,16 +226,16 @@ def base_ratio(alpha, ior):
         interaction.wi = mi.Vector3f(0, 0, 1)
         interaction.n = [0, 0, 1]
         interaction.sh_frame = mi.Frame3f([0, 0, 1])
-        value = plastic.eval(mi.BSDFContext(), interaction, mi.Vector3f(math.sqrt(1 - z * z), 0, z))
+        value = white.eval(mi.BSDFContext(), interaction, mi.Vector3f(math.sqrt(1 - z * z), 0, z))
         total += float(np.array(value).ravel()[0]) * math.pi / z
-    specular = ((ior - 1) / (ior + 1)) ** 2
     return total / side / ((1 - specular) * (1 - 0.15**5))
 
 
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("capture")
-    parser.add_argument("--diffuse", action="store_true")
+    parser.add_argument("--diffuse", dest="kind", action="store_const", const="diffuse", default="rough")
+    parser.add_argument("--plastic", dest="kind", action="store_const", const="plastic")
     parser.add_argument("--samples", type=int, default=512)
     parser.add_argument("--size", type=int, default=160)
     arguments = parser.parse_args()
@@ -180,7 +262,7 @@ def main():
             parameters.update()
             path = f"{out}/{name}.ply"
             mesh.write_ply(path)
-            scene[name] = {"type": "ply", "filename": path, "face_normals": True, "bsdf": bsdf(name, arguments.diffuse)}
+            scene[name] = {"type": "ply", "filename": path, "face_normals": True, "bsdf": bsdf(name, arguments.kind)}
             if name == "lamp":
                 scene[name]["emitter"] = {"type": "area", "radiance": {"type": "rgb", "value": LAMP}}
     loaded = mi.load_dict(scene)
@@ -224,9 +306,9 @@ def main():
         }, file)
     truth = {}
     for name in objects:
-        rough = name in ROUGH and not arguments.diffuse
+        rough = name in ROUGH and arguments.kind != "diffuse"
         alpha = ROUGH[name][0] if rough else None
-        ratio = base_ratio(*ROUGH[name]) if rough else 1.0
+        ratio = base_ratio(*ROUGH[name]) if rough and arguments.kind == "plastic" else 1.0
         emission = LAMP if name == "lamp" else [0.0] * 3
         albedo = [a * ratio for a in ALBEDO.get(name, [0.0] * 3)]
         truth[name] = {"albedo": albedo, "emission": emission, "roughness": alpha, "textured": False}

@@ -36,8 +36,8 @@ const SCREENED_BOUNCES: u32 = 2;
 const MOST_SIGHTS: usize = 1200;
 /// Directions at a point in a first fit are drawn by these roughnesses.
 const FIRST_DRAWN: [f64; 2] = [0.08, 0.3];
-/// Points of a sight in each of two sets: in the first fit, and at least and at most in the last.
-const FIRST_POINTS: u32 = 24;
+/// Points of a sight in each of two sets, at least and at most: in the first fit, and in the last.
+const FIRST_POINTS: (u64, u64) = (8, 48);
 const LAST_POINTS: (u64, u64) = (12, 96);
 
 /// A last fit looks no further than so many times the roughness that directions were drawn by.
@@ -50,7 +50,7 @@ pub struct Task<'a> {
     pub problem: &'a Problem,
     /// Key of the random streams.
     pub seed: u64,
-    /// Directions to follow in an object's last fit.
+    /// Directions to follow for an object in each of its fits, about.
     pub paths: u64,
     /// Longest path in bounces.
     pub max_bounces: u32,
@@ -106,7 +106,8 @@ pub type Tell<'t> = dyn FnMut(Cast) -> Result<(), Termination> + 't;
 
 /// The spots of all objects, and what lobes are looked for with.
 pub struct Lobes<'a> {
-    task: Task<'a>,
+    /// What lobes are looked for in, and with how many paths.
+    pub task: Task<'a>,
     spots: Vec<Vec<Spot>>,
 }
 
@@ -158,6 +159,15 @@ impl<'a> Lobes<'a> {
         Ok(all)
     }
 
+    /// Points of each of an object's sights that its paths suffice for, where directions are drawn in so many ways besides
+    /// evenly.
+    fn points(&self, object: usize, ways: usize, (least, most): (u64, u64)) -> u32 {
+        let chosen = sights::choose(&self.spots[object], 1, MOST_SIGHTS);
+        let sights: usize = chosen.iter().map(|spot| spot.len()).sum();
+        let points = self.task.paths / (2 * (1 + ways) * sights.max(1)) as u64;
+        points.clamp(least, most) as u32
+    }
+
     /// Whether evidence calls for a trial.
     pub fn calls(evidence: Option<f64>) -> bool {
         evidence.is_some_and(|t| t > CALLING)
@@ -178,7 +188,8 @@ impl<'a> Lobes<'a> {
             Some(lobe) => (f64::from(lobe.roughness), 3),
             None => {
                 let mut gathering = self.gathering(lit, object, &FIRST_DRAWN);
-                (gathering.points, gathering.pass) = (FIRST_POINTS, 1);
+                gathering.points = self.points(object, FIRST_DRAWN.len(), FIRST_POINTS);
+                gathering.pass = 1;
                 let (evidence, cast) = Evidence::new(&gathering, scene, spots, MOST_SIGHTS);
                 tell(cast)?;
                 match find(&evidence, emits, [0.0, 1.0]) {
@@ -189,12 +200,8 @@ impl<'a> Lobes<'a> {
         };
         let drawn = [roughness];
         let mut gathering = self.gathering(lit, object, &drawn);
-        let sights: usize = (sights::choose(spots, 1, MOST_SIGHTS).iter())
-            .map(|spot| spot.len())
-            .sum();
-        let (least, most) = LAST_POINTS;
-        let points = self.task.paths / (2 * (1 + drawn.len() as u64) * sights.max(1) as u64);
-        (gathering.points, gathering.pass) = (points.clamp(least, most) as u32, pass);
+        gathering.points = self.points(object, drawn.len(), LAST_POINTS);
+        gathering.pass = pass;
         let (evidence, cast) = Evidence::new(&gathering, scene, spots, MOST_SIGHTS);
         tell(cast)?;
         let near = [roughness / NEAR, roughness * NEAR];

@@ -9,7 +9,9 @@ use crate::transport::arrival::Cast;
 use glam::Vec3;
 
 /// Share of a round's paths that the last fit of one lobe takes.
-const PATHS_SHARE: u64 = 8;
+const PATHS_SHARE: u64 = 4;
+/// More objects than this share what so many take.
+const FULL_SHARES: u64 = 4;
 
 impl<'a> Ladder<'a, '_> {
     /// Tries a lobe on each object that calls for one; where any is kept, what gives light is judged anew.
@@ -20,7 +22,7 @@ impl<'a> Ladder<'a, '_> {
             .filter(|&k| self.roles[k].reflects() || self.roles[k] == Role::Emitter)
             .filter(|&k| self.monitor.known.of(k) == Pinned::default())
             .collect();
-        let lobes = Lobes::new(self.lobe_task(), &self.survey);
+        let mut lobes = Lobes::new(self.lobe_task(1), &self.survey);
         let estimate = self.estimate.clone();
         let evidence = lobes.evidence(&estimate, &objects, &mut |cast| self.cast(cast))?;
         let called: Vec<usize> = (objects.iter().zip(&evidence))
@@ -46,6 +48,7 @@ impl<'a> Ladder<'a, '_> {
         }
 
         // Try those that call for one.
+        lobes.task = self.lobe_task(called.len());
         let lit = estimate.lit(&self.problem.scene);
         let (mut kept, mut refused) = (Vec::new(), Vec::new());
         for &k in &called {
@@ -104,7 +107,7 @@ impl<'a> Ladder<'a, '_> {
         }
         let started = self.monitor.seconds();
         self.monitor.phase("refining lobes");
-        let lobes = Lobes::new(self.lobe_task(), &self.survey);
+        let lobes = Lobes::new(self.lobe_task(glossy.len()), &self.survey);
         let lit = self.estimate.lit(&self.problem.scene);
         let mut names = Vec::new();
         for k in glossy {
@@ -120,11 +123,13 @@ impl<'a> Ladder<'a, '_> {
         Ok(())
     }
 
-    fn lobe_task(&self) -> Task<'a> {
+    /// The task of finding the lobes of so many objects.
+    fn lobe_task(&self, objects: usize) -> Task<'a> {
+        let share = FULL_SHARES.max(objects as u64);
         Task {
             problem: self.problem,
             seed: self.monitor.settings.seed,
-            paths: self.budget.round_paths / PATHS_SHARE,
+            paths: self.budget.round_paths / PATHS_SHARE * FULL_SHARES / share,
             max_bounces: self.max_bounces,
         }
     }
