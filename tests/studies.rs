@@ -25,7 +25,7 @@ fn quick(name: &str) -> Findings {
 fn rows(name: &str, findings: &Findings, suffix: &str) -> Vec<Vec<String>> {
     let folder = tempfile::tempdir().expect("temporary folder");
     let written = findings.write(study(name), folder.path()).expect("written");
-    let expected = findings.tables.len() + findings.plots.len() + 1;
+    let expected = findings.tables.len() + findings.plots.len() + findings.pictures.len() + 1;
     assert_eq!(written.len(), expected);
     assert_eq!(written.iter().collect::<BTreeSet<_>>().len(), expected);
     for path in &written {
@@ -172,4 +172,145 @@ fn the_same_samples_darken_an_l2_fit_as_predicted_and_two_sets_do_not() {
         "{}",
         mean(&two, &scales)
     );
+}
+
+#[test]
+fn one_bounce_makes_bright_walls_brighter_than_they_are_and_chosen_depth_does_not() {
+    let findings = quick("bounces");
+    let rows = rows("bounces", &findings, "");
+    let (kinds, errors) = (
+        column(&rows, "albedo, solver, bounces"),
+        numbers(&rows, "albedo_error"),
+    );
+    let last = |name: &str| {
+        let place = kinds.iter().rposition(|kind| kind == name);
+        errors[place.unwrap_or_else(|| panic!("no {name} in {kinds:?}"))]
+    };
+    let [one, two, chosen] =
+        ["1", "2", "adaptive"].map(|depth| last(&format!("0.8, transport cache, {depth}")));
+    assert!(chosen < 0.05 && two < one, "{one} {two} {chosen}");
+    assert!(one > 1.5 * chosen, "{one} {chosen}");
+    for depth in ["1", "2"] {
+        assert!(last(&format!("0.8, paper, {depth}")) > chosen);
+    }
+    let words = findings.seen.join(" ");
+    assert!(words.contains("Two are") || words.contains("Two bounces"));
+}
+
+#[test]
+fn a_convex_object_comes_out_as_exactly_as_its_closed_form_allows() {
+    let findings = quick("table1");
+    let rows = rows("table1", &findings, "");
+    let (objects, solvers) = (column(&rows, "object"), column(&rows, "solver"));
+    let errors = numbers(&rows, "relative_error");
+    let of = |object: &str, solver: &str| -> Vec<f64> {
+        let all = 0..objects.len();
+        all.filter(|&i| objects[i] == object && solvers[i] == solver)
+            .map(|i| errors[i])
+            .collect()
+    };
+    let convex = of("gem", "transport cache");
+    assert_eq!(convex.len(), 2);
+    assert!(convex.iter().all(|&error| error < 1e-3), "{convex:?}");
+    let shadowed = of("chair", "transport cache");
+    assert!(shadowed.iter().all(|&error| error < 0.1), "{shadowed:?}");
+    let paper = of("gem", "paper");
+    assert!(paper.iter().all(|&error| error > 1e-3), "{paper:?}");
+}
+
+#[test]
+fn composites_by_estimated_light_are_nearer_to_the_truth_than_pasted_objects() {
+    let findings = quick("insertion");
+    let rows = rows("insertion", &findings, "");
+    let [rooms, ways, places] = ["room", "way", "place"].map(|name| column(&rows, name));
+    let errors = numbers(&rows, "relative_error");
+    let of = |room: &str, way: &str, place: &str| {
+        let mut all = 0..rooms.len();
+        let found = all.find(|&i| rooms[i] == room && ways[i] == way && places[i] == place);
+        errors[found.expect("a row")]
+    };
+    for room in ["textured", "plain"] {
+        let at = |way, place| of(room, way, place);
+        let naive = at("naive, light of the photographs", "objects");
+        let ours = at("ours, transport cache", "objects");
+        assert!(ours < naive, "{room}: {ours} {naive}");
+        // The shadow is there, if noisy in so few samples.
+        for way in ["ours, transport cache", "ours, true light"] {
+            assert!(at(way, "shadow and bleed").is_finite(), "{room}, {way}");
+        }
+    }
+}
+
+#[test]
+fn single_precision_holds_at_any_size_and_ends_beside_something_far_away() {
+    let findings = quick("precision");
+    let rows = rows("precision", &findings, "");
+    let [axes, quantities] = ["axis", "quantity"].map(|name| column(&rows, name));
+    let (values, errors) = (numbers(&rows, "value"), numbers(&rows, "relative_error"));
+    let along = |axis: &str, quantity: &str| -> Vec<(f64, f64)> {
+        let here = |&i: &usize| axes[i].starts_with(axis) && quantities[i].starts_with(quantity);
+        let places = (0..axes.len()).filter(here);
+        places.map(|i| (values[i], errors[i])).collect()
+    };
+    let sizes = along("size", "hit points");
+    assert!(
+        sizes.len() > 2 && sizes.iter().all(|p| p.1 < 1e-6),
+        "{sizes:?}"
+    );
+    let far = along("distance", "hit points");
+    assert!(
+        far.last().expect("measured").1 > 100.0 * far[0].1,
+        "{far:?}"
+    );
+    let sums = along("paths", "32 bits a path");
+    assert!(sums.iter().all(|p| p.1 < 1e-6), "{sums:?}");
+    let dim = along("ratio", "light");
+    assert!(
+        dim[0].1 < 1e-6 && dim.last().expect("measured").1 > 1e-3,
+        "{dim:?}"
+    );
+}
+
+#[test]
+fn low_discrepancy_points_are_less_noisy_and_every_way_to_draw_pixels_descends() {
+    let findings = quick("sampling");
+    let paths = rows("sampling", &findings, "-paths");
+    let (random, sequence) = (
+        numbers(&paths, "random"),
+        numbers(&paths, "low_discrepancy"),
+    );
+    // One point of a sequence is as random as any; many are not.
+    let (first, last) = (0, random.len() - 1);
+    assert!((sequence[first] / random[first] - 1.0).abs() < 0.5);
+    assert!(
+        sequence[last] < 0.8 * random[last],
+        "{random:?} {sequence:?}"
+    );
+    let rows = rows("sampling", &findings, "");
+    let (kinds, losses) = (column(&rows, "pixels"), numbers(&rows, "loss"));
+    for kind in kinds.iter().collect::<BTreeSet<_>>() {
+        let of = |i: &usize| kinds[*i] == *kind;
+        let first = (0..kinds.len()).find(of).expect("marks");
+        let last = (0..kinds.len()).rfind(of).expect("marks");
+        assert!(losses[last] < losses[first], "{kind}: {losses:?}");
+    }
+}
+
+#[test]
+fn textures_of_the_transport_cache_beat_one_colour_an_object_and_triangles_have_more_unknowns() {
+    let findings = quick("textures");
+    let rows = rows("textures", &findings, "");
+    let states = column(&rows, "state");
+    let [unknowns, psnr] = ["unknowns", "psnr"].map(|name| numbers(&rows, name));
+    assert_eq!(states.len(), 5, "{states:?}");
+    assert!(
+        unknowns.windows(2).skip(2).all(|pair| pair[0] < pair[1]),
+        "{unknowns:?}"
+    );
+    assert!(psnr.iter().all(|p| p.is_finite()), "{psnr:?}");
+    assert!(psnr[1] > psnr[0] - 0.5, "{psnr:?}");
+    let [(_, grid)] = &findings.pictures[..] else {
+        panic!("one grid of pictures");
+    };
+    assert_eq!(grid.pictures.len(), 6);
 }

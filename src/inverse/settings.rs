@@ -208,7 +208,7 @@ parameters! {
     time: f64 = 0.0, Kind::Real { min: 0.0, max: 1e9, logarithmic: true }, "s", true,
         "Wall time after which the solve stops; 0 sets no limit";
     target_error: f64 = 0.0, Kind::Real { min: 0.0, max: 100.0, logarithmic: true }, "%", true,
-        "Stop once the median relative standard error of the albedos seen is below this; 0 leaves it to the preset";
+        "Go on until the median relative standard error of the albedos seen is below this; 0 leaves it to the preset";
     bounces: u64 = 0, Kind::Whole { min: 0, max: 1000 }, "", false,
         "Longest path in bounces; 0 chooses (2 for the paper solver, by the albedo found for the others)";
     held_out: f64 = 0.05, Kind::Real { min: 0.0, max: 0.9, logarithmic: false }, "of the pixels", false,

@@ -17,7 +17,7 @@ mod write;
 pub use write::write;
 
 use crate::capture::mesh::Mesh;
-use crate::capture::photograph::PhotographSource;
+use crate::capture::photograph::{Photograph, PhotographSource};
 use crate::capture::truth::Truth;
 use crate::capture::{Capture, Frame};
 use crate::error::Result;
@@ -105,11 +105,7 @@ impl Room {
     /// # Errors
     /// The program file is damaged.
     pub fn kept(&self) -> Result<Capture> {
-        let sources = photographs::kept()?
-            .into_iter()
-            .map(|photograph| PhotographSource::Memory(Arc::new(photograph)))
-            .collect();
-        Ok(self.capture(sources, photographs::KEPT.size))
+        Ok(self.capture_of(photographs::kept()?, photographs::KEPT.size))
     }
 
     /// The room photographed anew.
@@ -117,12 +113,16 @@ impl Room {
     /// # Errors
     /// As [`Room::lit`].
     pub fn photographed(&self, rendering: &Rendering) -> Result<Capture> {
-        let photographs = photographs::render(self, rendering)?;
+        Ok(self.capture_of(photographs::render(self, rendering)?, rendering.size))
+    }
+
+    /// The room as a capture with photographs in memory, one a camera and all of one size.
+    pub fn capture_of(&self, photographs: Vec<Photograph>, size: [u32; 2]) -> Capture {
         let sources = photographs
             .into_iter()
             .map(|photograph| PhotographSource::Memory(Arc::new(photograph)))
             .collect();
-        Ok(self.capture(sources, rendering.size))
+        self.capture(sources, size)
     }
 }
 

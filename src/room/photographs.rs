@@ -126,7 +126,7 @@ pub fn black([width, height]: [u32; 2]) -> Arc<Photograph> {
 }
 
 /// A linear photograph that may be used everywhere.
-fn linear([width, height]: [u32; 2], pixels: Vec<Vec3>) -> Photograph {
+pub fn linear([width, height]: [u32; 2], pixels: Vec<Vec3>) -> Photograph {
     Photograph {
         width,
         height,

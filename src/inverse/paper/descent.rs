@@ -64,6 +64,20 @@ pub struct StepOutcome {
     pub finite: bool,
 }
 
+/// A pixel of a batch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drawn {
+    /// Frame index.
+    pub frame: u32,
+    /// Row by row from the top left.
+    pub pixel: u32,
+    /// Factor on its gradient: its chance if drawn uniformly over its chance, or 1 to fit what is drawn more often more.
+    pub weight: f32,
+}
+
+/// Draws the pixels of a batch; `None` leaves one out.
+pub type Draw<'a> = &'a (dyn Fn(&mut Stream) -> Option<Drawn> + Sync);
+
 /// Gradient of the data term of one pixel, per parameter.
 struct PixelGradient {
     entries: Vec<(u32, Vec3)>,
@@ -107,15 +121,16 @@ impl Descent {
 
     /// The same state with an albedo for each triangle, and the lights fixed.
     pub fn refine(&self, problem: &Problem) -> Self {
-        let scene = &problem.scene;
+        self.refine_by(&problem.scene.object_of)
+    }
+
+    /// The same with triangles that each take over the values of a surface: of an object, or of the triangle that they
+    /// were cut from.
+    pub fn refine_by(&self, parents: &[u32]) -> Self {
         let spread = |values: &[Vec3]| {
-            scene
-                .object_of
-                .iter()
-                .map(|&k| values[k as usize])
-                .collect::<Vec<_>>()
+            let values = parents.iter().map(|&parent| values[parent as usize]);
+            values.collect::<Vec<_>>()
         };
-        let surfaces = scene.triangles.len();
         Self {
             grain: Grain::Triangles,
             unknowns: Unknowns {
@@ -124,7 +139,7 @@ impl Descent {
             },
             lights: self.lights.clone(),
             halvings: self.halvings.saturating_sub(REFINED),
-            adam: Adam::new(2 * surfaces),
+            adam: Adam::new(2 * parents.len()),
             steps: self.steps,
             emitters: None,
         }
@@ -160,6 +175,18 @@ impl Descent {
 
     /// One step: a batch of pixels, its gradient, ADAM, and the bounds. A gradient that is not finite changes nothing.
     pub fn step(&mut self, problem: &Problem, settings: &Settings, bounces: u32) -> StepOutcome {
+        let uniform = |stream: &mut Stream| draw(problem, settings, stream);
+        self.step_on(problem, settings, bounces, &uniform)
+    }
+
+    /// A step on pixels that are drawn in another way than uniformly.
+    pub fn step_on(
+        &mut self,
+        problem: &Problem,
+        settings: &Settings,
+        bounces: u32,
+        draw: Draw,
+    ) -> StepOutcome {
         let scene = &*problem.scene;
         let surfaces = self.unknowns.surfaces();
 
@@ -202,12 +229,17 @@ impl Descent {
         let batch = settings.batch << self.halvings.min(BATCH_DOUBLINGS);
         let samples = settings.samples << self.halvings;
         let (unknowns, step) = (&self.unknowns, self.steps);
-        let pixel =
-            |index: u64| pixel_gradient(problem, settings, &tracer, unknowns, samples, step, index);
+        let pixel = |index: u64| {
+            let mut stream = Stream::new(settings.seed, u64::MAX, step, index);
+            let drawn = draw(&mut stream)?;
+            Some(pixel_gradient(
+                problem, settings, &tracer, unknowns, samples, drawn, stream,
+            ))
+        };
         let pixels: Vec<PixelGradient> = if batch >= PARALLEL {
-            (0..batch).into_par_iter().map(pixel).collect()
+            (0..batch).into_par_iter().filter_map(pixel).collect()
         } else {
-            (0..batch).map(pixel).collect()
+            (0..batch).filter_map(pixel).collect()
         };
         let mut gradient = vec![Vec3::ZERO; 2 * surfaces];
         for entry in pixels.iter().flat_map(|p| &p.entries) {
@@ -255,26 +287,22 @@ impl Descent {
     }
 }
 
-/// Draws one pixel uniformly from all pixels of all photographs that are not held out, and differentiates its loss:
-/// colour and derivative from independent paths.
+/// Differentiates the loss of one pixel: colour and derivative from independent paths.
 fn pixel_gradient(
     problem: &Problem,
     settings: &Settings,
     tracer: &Tracer,
     unknowns: &Unknowns,
     samples: u64,
-    step: u64,
-    index: u64,
+    drawn: Drawn,
+    mut stream: Stream,
 ) -> PixelGradient {
-    let mut stream = Stream::new(settings.seed, u64::MAX, step, index);
     let mut result = PixelGradient {
         entries: Vec::new(),
         rays: 0,
         rejected: 0,
     };
-    let Some((frame, pixel)) = draw(problem, settings, &mut stream) else {
-        return result;
-    };
+    let (frame, pixel) = (drawn.frame, drawn.pixel);
     let photograph = &problem.photographs[frame as usize];
     let camera = &problem.scene.cameras[frame as usize];
     let corner = Vec2::new(
@@ -308,7 +336,8 @@ fn pixel_gradient(
             residual.signum() * Vec3::from_array(residual.to_array().map(|r| f32::from(r != 0.0)))
         }
         Loss::L2 => residual * 2.0,
-    } / samples as f32;
+    } * drawn.weight
+        / samples as f32;
     let derivative = &gradients[1];
     result.entries = derivative
         .touched
@@ -319,7 +348,7 @@ fn pixel_gradient(
 }
 
 /// A pixel uniform over all photographs; `None` where none may be used.
-fn draw(problem: &Problem, settings: &Settings, stream: &mut Stream) -> Option<(u32, u32)> {
+fn draw(problem: &Problem, settings: &Settings, stream: &mut Stream) -> Option<Drawn> {
     let total: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
     if total == 0 {
         return None;
@@ -333,7 +362,11 @@ fn draw(problem: &Problem, settings: &Settings, stream: &mut Stream) -> Option<(
             }
             let usable = photograph.usable.is_empty() || photograph.usable[at];
             if usable && !is_held_out(settings, frame as u32, at as u32) {
-                return Some((frame as u32, at as u32));
+                return Some(Drawn {
+                    frame: frame as u32,
+                    pixel: at as u32,
+                    weight: 1.0,
+                });
             }
             break;
         }

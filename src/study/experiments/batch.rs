@@ -5,7 +5,7 @@ use crate::inverse::settings::Settings;
 use crate::study::experiments::course::{
     Errors, Gauge, Mark, cache_settings, cached, descend, paper_settings,
 };
-use crate::study::experiments::courses::{Kind, Spread, common_mark, plot, table};
+use crate::study::experiments::courses::{Kind, Spread, common_mark, plot, table, words};
 use crate::study::experiments::findings::brief;
 use crate::study::experiments::{Bench, Findings, Study, Summary, box_room};
 
@@ -14,6 +14,7 @@ pub const STUDY: Study = Study {
     name: "batch",
     question: "The paper: at equal time too small a batch is noisy, too large a one wastes rays; 8 pixels are a good start.",
     takes_capture: true,
+    seeds: 5,
     run,
 };
 
@@ -104,6 +105,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         plots: vec![("", over_rays), ("-seconds", over_seconds)],
         summary: summary(&kinds, mark),
         seen: seen(&kinds, batches, &cache, mark, common),
+        ..Findings::default()
     })
 }
 
@@ -122,7 +124,6 @@ fn rays_when(kinds: &[Kind], mark: u32) -> f64 {
 }
 
 fn summary(kinds: &[Kind], mark: Option<u32>) -> Summary {
-    let words = |spread: Option<Spread>| spread.map_or("-".to_owned(), |s| s.words());
     let row = |kind: &Kind| {
         let equal = |quantity| mark.and_then(|mark| kind.at_mark(mark, quantity));
         vec![

@@ -1,15 +1,17 @@
 //! A small box of a room with a block and one lamp, whose mean albedo and lamp can be chosen.
 
 use crate::error::Result;
+use crate::inverse::parameters::Unknowns;
 use crate::room::Room;
 use crate::room::photographs::Rendering;
 use crate::room::shape::Modeller;
+use crate::scene::geometry::Hit;
 use crate::study::experiments::subject::Subject;
 use crate::transport::material::Material;
 use glam::{DVec3, Vec3};
 
 /// Key of the photographs' noise, far from those of solvers.
-const NOISE: u64 = 0x626f_7865_7300;
+pub const NOISE: u64 = 0x626f_7865_7300;
 /// Radiance times squared half side of the lamp, so that all lamps send out the same power.
 const LAMP_POWER: f64 = 0.2;
 /// Colour of the lamp.
@@ -29,6 +31,21 @@ const VIEWS: [[[f64; 3]; 2]; 6] = [
 /// A box of 2 m with six coloured sides, a block and a square lamp of half side `lamp` below the ceiling. The mean
 /// albedo over the seven reflectors is `albedo` in each channel; the lamp reflects nothing.
 pub fn box_room(name: &str, albedo: f64, lamp: f64) -> Room {
+    let block = |modeller: &mut Modeller| {
+        let half = DVec3::new(0.25, 0.3, 0.2);
+        modeller.rounded_box(DVec3::new(-0.35, 0.31, -0.3), half, 0.0, 0);
+    };
+    furnished(name, albedo, lamp, "block", block)
+}
+
+/// The same with another object in the place of the block.
+pub fn furnished(
+    name: &str,
+    albedo: f64,
+    lamp: f64,
+    object: &str,
+    shapes: impl FnOnce(&mut Modeller),
+) -> Room {
     let mut modeller = Modeller::default();
     let mut materials = Vec::new();
     let reach = 0.6 * albedo.min(0.98 - albedo);
@@ -54,10 +71,9 @@ pub fn box_room(name: &str, albedo: f64, lamp: f64) -> Room {
         materials.push(Material::diffuse(color(materials.len()), Vec3::ZERO));
     }
 
-    // The block and the lamp.
-    modeller.object("block");
-    let half = DVec3::new(0.25, 0.3, 0.2);
-    modeller.rounded_box(DVec3::new(-0.35, 0.31, -0.3), half, 0.0, 0);
+    // The object and the lamp.
+    modeller.object(object);
+    shapes(&mut modeller);
     materials.push(Material::diffuse(color(materials.len()), Vec3::ZERO));
     modeller.object("lamp");
     let corner = DVec3::new(0.1 - lamp, 1.9, -0.1 - lamp);
@@ -69,6 +85,21 @@ pub fn box_room(name: &str, albedo: f64, lamp: f64) -> Room {
         mesh: modeller.mesh,
         materials,
         views: VIEWS.iter().map(|view| view.map(DVec3::from)).collect(),
+    }
+}
+
+/// A room's true values; its materials have one colour each.
+pub fn truth(room: &Room) -> Unknowns {
+    let anywhere = Hit {
+        t: 0.0,
+        triangle: 0,
+        b1: 0.0,
+        b2: 0.0,
+    };
+    let materials = || room.materials.iter();
+    Unknowns {
+        albedo: materials().map(|m| m.albedo_at(&anywhere)).collect(),
+        emission: materials().map(|m| m.emission).collect(),
     }
 }
 

@@ -4,8 +4,9 @@
 use crate::error::Result;
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::inverse::loss::LossProbe;
-use crate::inverse::paper::descent::{Descent, Grain};
+use crate::inverse::paper::descent::{Descent, Grain, StepOutcome};
 use crate::inverse::settings::{Preset, Settings};
+use crate::inverse::solver::{Problem, Solution};
 use crate::study::experiments::{Limits, Subject};
 use crate::study::trade::plan::Run;
 use crate::study::trade::watch;
@@ -17,7 +18,7 @@ const FACTOR: f64 = std::f64::consts::SQRT_2;
 /// Held-out pixels that are rendered for the loss, and paths for each.
 const PIXELS: usize = 400;
 const SAMPLES: u64 = 64;
-/// Longest that the transport cache is waited for.
+/// Longest that a solve is waited for.
 const PATIENCE: Duration = Duration::from_secs(600);
 
 /// Where a solve stood.
@@ -44,12 +45,15 @@ pub struct Errors {
     pub albedo: Option<f64>,
     /// Median relative error of the lamps' emission.
     pub emission: Option<f64>,
+    /// Relative error of the albedo of the object that is watched, ‖ρ̂ − ρ‖₂ / ‖ρ‖₂ over RGB.
+    pub object: Option<f64>,
 }
 
 /// Measures estimates of one subject, always on the same pixels.
 pub struct Gauge<'a> {
     subject: &'a Subject,
     probe: LossProbe,
+    watched: Option<&'a str>,
 }
 
 impl<'a> Gauge<'a> {
@@ -57,7 +61,22 @@ impl<'a> Gauge<'a> {
     pub fn new(subject: &'a Subject, bounces: u32) -> Self {
         let settings = Settings::default();
         let probe = LossProbe::new(&subject.problem, &settings, PIXELS, SAMPLES, bounces);
-        Self { subject, probe }
+        Self {
+            subject,
+            probe,
+            watched: None,
+        }
+    }
+
+    /// The same, watching an object.
+    pub fn watching(mut self, object: &'a str) -> Self {
+        self.watched = Some(object);
+        self
+    }
+
+    /// What is solved.
+    pub fn problem(&self) -> &'a Problem {
+        &self.subject.problem
     }
 
     /// How far an estimate is off.
@@ -67,6 +86,13 @@ impl<'a> Gauge<'a> {
         Errors {
             loss: self.probe.held_out(&self.subject.problem, estimate),
             albedo: known.as_ref().and_then(|known| known.albedo_mae),
+            object: known.as_ref().and_then(|known| {
+                let mut objects = known.per_object.iter();
+                objects
+                    .find(|(name, _)| Some(name.as_str()) == self.watched)?
+                    .1
+                    .albedo_rel
+            }),
             emission: known.and_then(|known| known.emission_rel_median),
         }
     }
@@ -78,6 +104,17 @@ impl<'a> Gauge<'a> {
 /// limited seconds does not. Stops where the parameters leave the finite numbers.
 pub fn descend(gauge: &Gauge, settings: &Settings, limits: Limits) -> Vec<Mark> {
     let problem = &gauge.subject.problem;
+    let mut step = |descent: &mut Descent| descent.step(problem, settings, settings.max_bounces());
+    descend_by(gauge, limits, &mut step)
+}
+
+/// The same with steps of one's own.
+pub fn descend_by(
+    gauge: &Gauge,
+    limits: Limits,
+    step: &mut dyn FnMut(&mut Descent) -> StepOutcome,
+) -> Vec<Mark> {
+    let problem = &gauge.subject.problem;
     let mut descent = Descent::new(problem, Grain::Objects);
     let (mut rays, mut steps, mut seconds) = (0, 0, 0.0);
     let mut marks = Vec::new();
@@ -87,7 +124,7 @@ pub fn descend(gauge: &Gauge, settings: &Settings, limits: Limits) -> Vec<Mark> 
         let begun = Instant::now();
         let mut over = false;
         while rays < goal && !over {
-            let outcome = descent.step(problem, settings, settings.max_bounces());
+            let outcome = step(&mut descent);
             rays += outcome.rays;
             steps += 1;
             let late = seconds + begun.elapsed().as_secs_f64() >= limits.seconds;
@@ -110,7 +147,7 @@ pub fn descend(gauge: &Gauge, settings: &Settings, limits: Limits) -> Vec<Mark> 
 }
 
 /// Rays at a mark.
-fn rays_at(mark: u32) -> u64 {
+pub fn rays_at(mark: u32) -> u64 {
     (FIRST * FACTOR.powi(mark as i32)) as u64
 }
 
@@ -119,8 +156,8 @@ fn mark_at(rays: u64) -> Option<u32> {
     (0..).take_while(|&mark| rays_at(mark) <= rays).last()
 }
 
-/// Where the descent stands, as an estimate.
-fn estimate(descent: &Descent) -> Estimate {
+/// Where a descent per object stands, as an estimate.
+pub fn estimate(descent: &Descent) -> Estimate {
     let values = descent.unknowns.albedo.iter().zip(&descent.lights);
     Estimate {
         objects: values
@@ -134,20 +171,12 @@ fn estimate(descent: &Descent) -> Estimate {
     }
 }
 
-/// Where the transport cache ends, one colour an object.
+/// Where the transport cache ends.
 ///
 /// # Errors
 /// The solver cannot start.
 pub fn cached(gauge: &Gauge, settings: &Settings) -> Result<Mark> {
-    let run = Run {
-        name: settings.preset.word().to_owned(),
-        is_preset: false,
-        settings: settings.clone(),
-        weight: 1.0,
-    };
-    let deadline = Instant::now() + PATIENCE;
-    let subject = gauge.subject;
-    let (_, solution) = watch(&subject.problem, &subject.judge, &run, deadline, &|| false)?;
+    let solution = solved(gauge.subject, settings)?;
     Ok(Mark {
         index: None,
         rays: solution.progress.rays,
@@ -155,6 +184,22 @@ pub fn cached(gauge: &Gauge, settings: &Settings) -> Result<Mark> {
         steps: solution.progress.iterations,
         errors: gauge.errors(&solution.estimate),
     })
+}
+
+/// A whole solve by the solver of the settings' preset, as the program runs it.
+///
+/// # Errors
+/// The solver cannot start.
+pub fn solved(subject: &Subject, settings: &Settings) -> Result<Solution> {
+    let run = Run {
+        name: settings.preset.word().to_owned(),
+        is_preset: false,
+        settings: settings.clone(),
+        weight: 1.0,
+    };
+    let deadline = Instant::now() + PATIENCE;
+    let (_, solution) = watch(&subject.problem, &subject.judge, &run, deadline, &|| false)?;
+    Ok(solution)
 }
 
 /// The transport cache's settings in studies: the default preset, or the fastest where only tried.
@@ -168,6 +213,7 @@ pub fn cache_settings(seed: u64, quick: bool) -> Settings {
         seed,
         exposures: false,
         textures: false,
+        lobes: false,
         outside_light: false,
         ..Settings::default()
     }

@@ -61,9 +61,14 @@ impl Spread {
     }
 }
 
+/// A spread in words, or a dash where nothing was measured.
+pub fn words(spread: Option<Spread>) -> String {
+    spread.map_or("-".to_owned(), |spread| spread.words())
+}
+
 /// The last mark in rays that every course has passed, or `None` where one passed none.
-pub fn common_mark(kinds: &[Kind]) -> Option<u32> {
-    let ends = kinds.iter().flat_map(|kind| &kind.courses);
+pub fn common_mark<'a>(kinds: impl IntoIterator<Item = &'a Kind>) -> Option<u32> {
+    let ends = kinds.into_iter().flat_map(|kind| &kind.courses);
     ends.map(|course| course.last().and_then(|mark| mark.index))
         .min()
         .flatten()

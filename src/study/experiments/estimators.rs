@@ -20,6 +20,7 @@ pub const STUDY: Study = Study {
     question: "The paper takes colour and derivative of an l1 loss from independent samples. Is the fit then free of bias, \
         and what do an l2 loss with the same samples and one with two independent sets give?",
     takes_capture: false,
+    seeds: 5,
     run,
 };
 
@@ -145,7 +146,10 @@ fn run(bench: &Bench) -> Result<Findings> {
         }
         let mean = |estimator: usize, samples: u32| mean(&fits, estimator, samples);
         for (&count, prediction) in samples.iter().zip(&predictions) {
-            let value = |estimator| format!("{:.4}", mean(estimator, count).mean);
+            let value = |estimator| match mean(estimator, count) {
+                none if none.count == 0 => "no finite root".to_owned(),
+                some => format!("{:.4}", some.mean),
+            };
             summary.rows.push(vec![
                 (*name).to_owned(),
                 count.to_string(),
@@ -171,6 +175,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         plots,
         summary,
         seen,
+        ..Findings::default()
     })
 }
 

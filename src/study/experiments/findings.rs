@@ -2,8 +2,10 @@
 
 use crate::error::Result;
 use crate::export::atomic::write_bytes;
+use crate::export::compare::write_grid;
 use crate::export::plot::Plot;
 use crate::export::table::Table;
+use crate::math::picture::Picture;
 use crate::study::experiments::Study;
 use crate::study::machine::Machine;
 use std::path::{Path, PathBuf};
@@ -21,6 +23,40 @@ pub struct Findings {
     pub summary: Summary,
     /// What was seen, each a sentence or two.
     pub seen: Vec<String>,
+    /// Pictures side by side.
+    pub pictures: Vec<(&'static str, Grid)>,
+}
+
+/// Pictures with captions in rows, all at one exposure.
+#[derive(Debug, Clone)]
+pub struct Grid {
+    /// Pictures a row.
+    pub columns: usize,
+    /// Factor from linear values to what is shown.
+    pub exposure: f32,
+    /// Each with its caption.
+    pub pictures: Vec<(String, Picture)>,
+}
+
+impl Grid {
+    /// An empty grid.
+    pub fn new(columns: usize) -> Self {
+        Self {
+            columns,
+            exposure: 1.0,
+            pictures: Vec::new(),
+        }
+    }
+
+    fn write(&self, path: &Path) -> Result<()> {
+        let pictures = self.pictures.iter().map(|(name, p)| (name.as_str(), p));
+        write_grid(
+            path,
+            &pictures.collect::<Vec<_>>(),
+            self.columns,
+            self.exposure,
+        )
+    }
 }
 
 /// A small table of text.
@@ -49,6 +85,10 @@ impl Findings {
             written.push(file(suffix, "png"));
             plot.write(&file(suffix, "png"))?;
         }
+        for (suffix, grid) in &self.pictures {
+            written.push(file(suffix, "png"));
+            grid.write(&file(suffix, "png"))?;
+        }
         written.push(file("", "md"));
         write_bytes(&file("", "md"), self.markdown(study).as_bytes())?;
         Ok(written)
@@ -64,7 +104,8 @@ impl Findings {
             text += &format!("* {sentence}\n");
         }
         text += "\n";
-        for (suffix, _) in &self.plots {
+        let plots = self.plots.iter().map(|(suffix, _)| suffix);
+        for suffix in plots.chain(self.pictures.iter().map(|(suffix, _)| suffix)) {
             text += &format!("![{0}{suffix}]({0}{suffix}.png)\n\n", study.name);
         }
         let tables: Vec<String> = (self.tables.iter())

@@ -8,8 +8,9 @@ use crate::inverse::solver::Problem;
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::math::stats::Moments;
+use crate::scene::Scene;
 use crate::transport::emitters::Emitters;
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 /// Key of the paths, far from those of solvers.
@@ -39,26 +40,9 @@ pub fn noise(
     paths: u64,
 ) -> Noise {
     let scene = &*problem.scene;
-    let weights: Vec<f64> = (scene.objects.iter().zip(&unknowns.emission))
-        .map(|(object, emission)| object.area * f64::from(luminance(*emission)))
-        .collect();
-    let lights = Emitters::new(scene, &weights);
-    let tracer = Tracer {
-        scene,
-        lights: &lights,
-        measured: None,
-        surface_of: &scene.object_of,
-        believed_albedo: &vec![1.0; unknowns.surfaces()],
-        texels: None,
-        lobes: &[],
-        sky: None,
-        outside: None,
-        sampling,
-        max_bounces: BOUNCES,
-        seed: KEY,
-        stage: 0,
-        round: 0,
-    };
+    let lights = lamps(scene, &unknowns.emission);
+    let believed = vec![1.0; unknowns.surfaces()];
+    let tracer = tracer(scene, &lights, &believed, sampling, BOUNCES);
     let all: Vec<(usize, usize)> = (problem.photographs.iter().enumerate())
         .flat_map(|(frame, photograph)| {
             (0..photograph.pixels.len()).map(move |pixel| (frame, pixel))
@@ -80,6 +64,40 @@ pub fn noise(
         error: variance.standard_error(),
         rays: rays as f64 / (count as u64 * paths).max(1) as f64,
     }
+}
+
+/// A tracer of paths from lamps of the mesh alone, one surface an object.
+pub fn tracer<'a>(
+    scene: &'a Scene,
+    lights: &'a Emitters,
+    believed_albedo: &'a [f32],
+    sampling: LightSampling,
+    max_bounces: u32,
+) -> Tracer<'a> {
+    Tracer {
+        scene,
+        lights,
+        measured: None,
+        surface_of: &scene.object_of,
+        believed_albedo,
+        texels: None,
+        lobes: &[],
+        sky: None,
+        outside: None,
+        sampling,
+        max_bounces,
+        seed: KEY,
+        stage: 0,
+        round: 0,
+    }
+}
+
+/// Emitters of the mesh by area × luminance.
+pub fn lamps(scene: &Scene, emission: &[Vec3]) -> Emitters {
+    let weights: Vec<f64> = (scene.objects.iter().zip(emission))
+        .map(|(object, emission)| object.area * f64::from(luminance(*emission)))
+        .collect();
+    Emitters::new(scene, &weights)
 }
 
 /// Summed variance of one pixel's derivatives, and the rays that it took.

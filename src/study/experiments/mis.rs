@@ -2,14 +2,11 @@
 
 use crate::error::Result;
 use crate::export::table::Table;
-use crate::inverse::parameters::Unknowns;
 use crate::inverse::settings::{LightSampling, Settings};
-use crate::room::Room;
-use crate::scene::geometry::Hit;
 use crate::study::experiments::course::{
     Errors, Gauge, Mark, cache_settings, cached, descend, paper_settings,
 };
-use crate::study::experiments::courses::{Kind, Spread, common_mark, plot, table};
+use crate::study::experiments::courses::{Kind, Spread, common_mark, plot, table, words};
 use crate::study::experiments::findings::brief;
 use crate::study::experiments::gradient::{Noise, noise};
 use crate::study::experiments::{Bench, Findings, Study, Summary, box_room};
@@ -20,6 +17,7 @@ pub const STUDY: Study = Study {
     question: "The paper: multiple importance sampling speeds convergence markedly. Against light sampling alone and BSDF \
         sampling alone, under a small lamp and a large one.",
     takes_capture: false,
+    seeds: 5,
     run,
 };
 
@@ -50,7 +48,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     for (name, lamp) in LAMPS {
         (bench.say)(name);
         let subject = box_room::photographed(name, ALBEDO, lamp, bench.quick)?;
-        let truth = truth(&box_room::box_room(name, ALBEDO, lamp));
+        let truth = box_room::truth(&box_room::box_room(name, ALBEDO, lamp));
         let gauge = Gauge::new(&subject, paper_settings(1).max_bounces());
         let deep = Gauge::new(&subject, u32::MAX);
         let course = |light_sampling, seed| {
@@ -118,6 +116,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         plots,
         summary: summary(&scenes),
         seen: scenes.iter().flat_map(seen).collect(),
+        ..Findings::default()
     })
 }
 
@@ -126,24 +125,6 @@ fn word(sampling: LightSampling) -> &'static str {
         LightSampling::Mis => "both (MIS)",
         LightSampling::Emitter => "light sampling",
         LightSampling::Bsdf => "BSDF sampling",
-    }
-}
-
-/// The room's true values; its materials have one colour each.
-fn truth(room: &Room) -> Unknowns {
-    let anywhere = Hit {
-        t: 0.0,
-        triangle: 0,
-        b1: 0.0,
-        b2: 0.0,
-    };
-    Unknowns {
-        albedo: room
-            .materials
-            .iter()
-            .map(|m| m.albedo_at(&anywhere))
-            .collect(),
-        emission: room.materials.iter().map(|m| m.emission).collect(),
     }
 }
 
@@ -177,7 +158,6 @@ fn at_equal_rays(scene: &Scene, quantity: fn(&Errors) -> Option<f64>) -> Vec<Opt
 }
 
 fn summary(scenes: &[Scene]) -> Summary {
-    let words = |spread: Option<Spread>| spread.map_or("-".to_owned(), |s| s.words());
     let mut rows = Vec::new();
     for scene in scenes {
         let losses = at_equal_rays(scene, |e| e.loss);

@@ -4,16 +4,32 @@
 //! photographed in memory, and hands back tables, plots and what was seen, which [`Findings::write`] puts into files.
 
 mod batch;
+mod bounces;
 mod box_room;
+mod chair;
+mod closed_form;
 mod course;
 mod courses;
 mod estimators;
+mod evenness;
 mod findings;
+mod finer;
+mod furnished;
 mod gradient;
+mod insertion;
+mod likeness;
 mod mis;
+mod moved;
+mod objects;
+mod precision;
+mod sampling;
+mod selection;
 mod subject;
+mod summed;
+mod table1;
+mod textures;
 
-pub use findings::{Findings, Summary};
+pub use findings::{Findings, Grid, Summary};
 pub use subject::Subject;
 
 use crate::error::Result;
@@ -31,11 +47,23 @@ pub struct Study {
     pub question: &'static str,
     /// Whether it can be run on a capture instead of on rooms of its own.
     pub takes_capture: bool,
+    /// Seeds that it repeats solves with where none are named.
+    pub seeds: u64,
     run: fn(&Bench) -> Result<Findings>,
 }
 
 /// All studies, in the order in which `relit study all` runs them.
-pub const STUDIES: &[Study] = &[batch::STUDY, mis::STUDY, estimators::STUDY];
+pub const STUDIES: &[Study] = &[
+    batch::STUDY,
+    mis::STUDY,
+    bounces::STUDY,
+    textures::STUDY,
+    table1::STUDY,
+    insertion::STUDY,
+    precision::STUDY,
+    sampling::STUDY,
+    estimators::STUDY,
+];
 
 impl Study {
     /// Runs the study.

@@ -1,9 +1,10 @@
 //! What a study solves: a scene with photographs, and its truth where that is known.
 
+use crate::capture::photograph::Photograph;
 use crate::error::Result;
 use crate::inverse::solver::Problem;
 use crate::room::Room;
-use crate::room::photographs::Rendering;
+use crate::room::photographs::{self, Rendering};
 use crate::study::evaluate::Reference;
 use crate::study::trade::{Judge, rooms};
 
@@ -24,7 +25,15 @@ impl Subject {
     /// # Errors
     /// The room's mesh holds nothing to see.
     pub fn of_room(room: &Room, rendering: &Rendering) -> Result<Self> {
-        let (problem, reference) = rooms::photographed(room, rendering)?;
+        Self::of_photographs(room, photographs::render(room, rendering)?)
+    }
+
+    /// A room with photographs of it, one a view and all of one size.
+    ///
+    /// # Errors
+    /// The room's mesh holds nothing to see, or there is no photograph.
+    pub fn of_photographs(room: &Room, photographs: Vec<Photograph>) -> Result<Self> {
+        let (problem, reference) = rooms::with_photographs(room, photographs)?;
         Ok(Self {
             name: room.name.clone(),
             problem,

@@ -1,11 +1,12 @@
 //! The trade over generated rooms: what presets are chosen on.
 
+use crate::capture::photograph::Photograph;
 use crate::capture::truth::Truth;
 use crate::error::Result;
 use crate::inverse::solver::Problem;
 use crate::room::Room;
 use crate::room::generated::generate;
-use crate::room::photographs::Rendering;
+use crate::room::photographs::{self, Rendering};
 use crate::scene::Scene;
 use crate::study::evaluate::Reference;
 use crate::study::trade::judge::Judge;
@@ -29,14 +30,23 @@ pub fn problem(seed: u64, size: [u32; 2]) -> Result<(Problem, Judge)> {
 /// # Errors
 /// The room's mesh holds nothing to see.
 pub fn photographed(room: &Room, rendering: &Rendering) -> Result<(Problem, Reference)> {
-    let capture = room.photographed(rendering)?;
+    with_photographs(room, photographs::render(room, rendering)?)
+}
+
+/// Any room with photographs of it, one a view and all of one size, with its truth.
+///
+/// # Errors
+/// The room's mesh holds nothing to see, or there is no photograph.
+pub fn with_photographs(room: &Room, photographs: Vec<Photograph>) -> Result<(Problem, Reference)> {
+    let size = photographs.first().map_or([0; 2], |p| [p.width, p.height]);
+    let capture = room.capture_of(photographs, size);
     let photographs: Vec<_> = capture
         .frames
         .iter()
         .map(|frame| frame.load())
         .collect::<Result<_>>()?;
     let scene = Scene::new(&capture)?;
-    let truth: Truth = room.truth(rendering.size)?;
+    let truth: Truth = room.truth(size)?;
     let reference = Reference::new(truth, &capture, &scene, &photographs);
     let problem = Problem {
         scene: Arc::new(scene),

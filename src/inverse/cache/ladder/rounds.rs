@@ -47,7 +47,11 @@ impl Ladder<'_, '_> {
         let mut about = self.unknowns.clone();
         let mut sums = Accumulated::default();
         let mut outcome = Termination::Steps;
-        for round in 0..self.budget.rounds {
+        for round in 0.. {
+            let (most, aim) = self.aim();
+            if round >= most {
+                break;
+            }
             // Path lengths are steered by what is believed at the start, the same in every round.
             sums.add(self.linearised(&lights, 2, round, &about, &places)?);
             let found = descend(sums.mean(), &about, &free, &self.prior);
@@ -62,17 +66,15 @@ impl Ladder<'_, '_> {
             self.describe();
             self.monitor
                 .report(&self.estimate, &|_| self.checkpoint.clone())?;
-            if f64::from(step) > NONLINEAR * self.budget.median_error
-                && round < self.budget.rounds / 4
-            {
+            if f64::from(step) > NONLINEAR * aim && round < self.budget.rounds / 4 {
                 about = self.unknowns.clone();
                 sums = Accumulated::default();
                 continue;
             }
             let reported = self.reported();
-            let share = (self.budget.median_error / reported.all[0]).powi(2);
+            let share = (aim / reported.all[0]).powi(2);
             self.monitor.progress.fraction = Some(share.min(1.0) as f32);
-            if reported.is_enough([self.budget.median_error, self.budget.tail_error]) {
+            if reported.is_enough([aim, self.budget.tail_error]) {
                 outcome = Termination::Converged;
                 break;
             }
@@ -92,6 +94,17 @@ impl Ladder<'_, '_> {
         );
         self.record("refine", started, true, why)?;
         Ok(outcome)
+    }
+
+    /// Rounds at most, and the median relative standard error aimed at: the preset's, or without end a smaller one that
+    /// was asked for.
+    fn aim(&self) -> (u32, f64) {
+        let asked = self.monitor.settings.target_error * 0.01;
+        if asked > 0.0 && asked < self.budget.median_error {
+            (u32::MAX, asked)
+        } else {
+            (self.budget.rounds, self.budget.median_error)
+        }
     }
 
     /// Weighs the clusters by what a few paths of their own predict, of which those of the rounds are independent.

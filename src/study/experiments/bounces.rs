@@ -1,0 +1,282 @@
+//! How long paths must be in the fit.
+
+use crate::error::Result;
+use crate::export::plot::{Axis, Plot, Series};
+use crate::inverse::settings::Settings;
+use crate::study::experiments::course::{
+    Gauge, Mark, cache_settings, cached, descend, paper_settings, rays_at,
+};
+use crate::study::experiments::courses::{Kind, Quantity, Spread, common_mark, plot, table, words};
+use crate::study::experiments::{Bench, Findings, Study, Summary, box_room};
+
+/// The study.
+pub const STUDY: Study = Study {
+    name: "bounces",
+    question: "The paper, fitting photographs of many bounces: one bounce is fast but stays wrong, two are the balance, \
+        three are noisy and slow. Where do two stop being enough?",
+    takes_capture: false,
+    seeds: 5,
+    run,
+};
+
+/// Mean albedos of the rooms, each with the suffix of its plot.
+const ALBEDOS: &[(f64, &str)] = &[
+    (0.3, "-paper-30"),
+    (0.5, "-paper-50"),
+    (0.8, "-paper-80"),
+    (0.95, "-paper-95"),
+];
+/// Longest paths of the fit in bounces; 0 lets the solver choose by the albedo found, which the descent cannot.
+const DEPTHS: &[u64] = &[1, 2, 3, 5, 10, 0];
+const QUICK_ALBEDOS: &[(f64, &str)] = &[(0.8, "-paper-80")];
+const QUICK_DEPTHS: &[u64] = &[1, 2, 0];
+/// Where the chosen depth is drawn.
+const CHOSEN_AT: f64 = 20.0;
+/// Half side of the lamp in metres.
+const LAMP: f64 = 0.25;
+/// An error of albedo is too large if it is above this and above this factor on what adaptive depth reaches.
+const TOLERABLE: f64 = 0.01;
+const FACTOR: f64 = 2.0;
+
+/// One room, with a kind of solve for each depth.
+struct Scene {
+    albedo: f64,
+    /// The transport cache's ends.
+    cache: Vec<(u64, Kind)>,
+    /// The descent's courses.
+    paper: Vec<(u64, Kind)>,
+}
+
+fn run(bench: &Bench) -> Result<Findings> {
+    let (albedos, depths) = match bench.quick {
+        true => (QUICK_ALBEDOS, QUICK_DEPTHS),
+        false => (ALBEDOS, DEPTHS),
+    };
+    let limits = bench.limits(2 * albedos.len() * depths.len() * bench.seeds as usize);
+    let mut scenes = Vec::new();
+    for &(albedo, _) in albedos {
+        let subject =
+            box_room::photographed(&format!("mean albedo {albedo}"), albedo, LAMP, bench.quick)?;
+        // The loss is measured with all bounces, whatever the fit had.
+        let gauge = Gauge::new(&subject, u32::MAX);
+        let mut scene = Scene {
+            albedo,
+            cache: Vec::new(),
+            paper: Vec::new(),
+        };
+        for &bounces in depths {
+            (bench.say)(&format!("{}, {} bounces", subject.name, word(bounces)));
+            let with = |base: Settings| Settings { bounces, ..base };
+            let end = |seed| {
+                let settings = with(cache_settings(seed, bench.quick));
+                cached(&gauge, &settings).map(|end| vec![end])
+            };
+            let course = |seed| descend(&gauge, &with(paper_settings(seed)), limits);
+            let kind = |solver: &str, courses| Kind {
+                name: format!("{albedo}, {solver}, {}", word(bounces)),
+                courses,
+            };
+            let ends = bench.seeds().map(end).collect::<Result<_>>()?;
+            scene.cache.push((bounces, kind("transport cache", ends)));
+            if bounces > 0 {
+                let courses = bench.seeds().map(course).collect();
+                scene.paper.push((bounces, kind("paper", courses)));
+            }
+        }
+        scenes.push(scene);
+    }
+
+    let kinds: Vec<Kind> = (scenes.iter())
+        .flat_map(|scene| scene.cache.iter().chain(&scene.paper))
+        .map(|(_, kind)| kind.clone())
+        .collect();
+    let mut plots = vec![
+        (
+            "",
+            over_depth(&scenes, "mean absolute error of albedo", |e| e.albedo),
+        ),
+        (
+            "-emission",
+            over_depth(&scenes, "relative error of emission", |e| e.emission),
+        ),
+    ];
+    for (scene, (albedo, suffix)) in scenes.iter().zip(albedos) {
+        let title = format!("Bounces of the paper's descent, mean albedo {albedo}");
+        let drawn: Vec<Kind> = scene.paper.iter().map(|(_, kind)| kind.clone()).collect();
+        let rays = |mark: &Mark| mark.rays as f64;
+        let label = "mean absolute error of albedo";
+        plots.push((
+            *suffix,
+            plot(&title, "rays", label, rays, |e| e.albedo, &drawn, &[]),
+        ));
+    }
+    let at_most = if limits.seconds.is_finite() {
+        format!("{:.1} s each", limits.seconds)
+    } else {
+        "cut short to try the program".to_owned()
+    };
+    Ok(Findings {
+        how: format!(
+            "A box room of 2 m with seven reflectors of the mean albedo named, photographed with all bounces, {} seeds. The \
+             paper's descent ({at_most}) is compared at equal rays, where its errors are the same on every machine; the \
+             transport cache goes to where it ends by itself. The loss is measured with all bounces.",
+            bench.seeds,
+        ),
+        tables: vec![("", table("albedo, solver, bounces", &kinds, &[]))],
+        plots,
+        summary: summary(&scenes),
+        seen: seen(&scenes),
+        ..Findings::default()
+    })
+}
+
+fn word(bounces: u64) -> String {
+    match bounces {
+        0 => "adaptive".to_owned(),
+        bounces => bounces.to_string(),
+    }
+}
+
+/// Where the transport cache ends over the depth of its fit, a curve a room.
+fn over_depth(scenes: &[Scene], label: &str, quantity: Quantity) -> Plot {
+    let of = |scene: &Scene| {
+        let mut series = Series {
+            name: format!("mean albedo {}", scene.albedo),
+            ..Series::default()
+        };
+        for (depth, kind) in &scene.cache {
+            if let Some(spread) = kind.at_end(quantity) {
+                let x = if *depth == 0 {
+                    CHOSEN_AT
+                } else {
+                    *depth as f64
+                };
+                series.points.push([x, spread.mean]);
+                series.band.push(spread.band());
+            }
+        }
+        series
+    };
+    Plot {
+        title: "Bounces of the fit, transport cache".to_owned(),
+        x: Axis::logarithmic("bounces of the fit"),
+        y: Axis::logarithmic(label),
+        series: scenes.iter().map(of).collect(),
+        marks: vec![(CHOSEN_AT, "adaptive".to_owned())],
+        ..Plot::default()
+    }
+}
+
+/// The descent's kinds with their errors of albedo at the last mark that all of them passed, and that mark.
+fn at_equal_rays(scene: &Scene) -> (Option<u32>, Vec<(u64, Option<Spread>)>) {
+    let kinds = || scene.paper.iter().map(|(_, kind)| kind);
+    let mark = common_mark(kinds());
+    let error = |kind: &Kind| mark.and_then(|mark| kind.at_mark(mark, |e| e.albedo));
+    let errors = scene
+        .paper
+        .iter()
+        .map(|(depth, kind)| (*depth, error(kind)));
+    (mark, errors.collect())
+}
+
+fn summary(scenes: &[Scene]) -> Summary {
+    let mut rows = Vec::new();
+    for scene in scenes {
+        let mark = at_equal_rays(scene).0;
+        for (depth, kind) in &scene.cache {
+            let paper = scene.paper.iter().find(|(other, _)| other == depth);
+            let equal = |quantity: Quantity| {
+                words(
+                    paper
+                        .zip(mark)
+                        .and_then(|((_, k), m)| k.at_mark(m, quantity)),
+                )
+            };
+            rows.push(vec![
+                scene.albedo.to_string(),
+                word(*depth),
+                words(kind.at_end(|e| e.albedo)),
+                words(kind.at_end(|e| e.emission)),
+                words(kind.at_end(|e| e.loss)),
+                format!("{:.1}", kind.mean_end(|mark| mark.rays as f64) * 1e-6),
+                equal(|e| e.albedo),
+                equal(|e| e.emission),
+                equal(|e| e.loss),
+                mark.map_or("-".to_owned(), |mark| {
+                    format!("{:.2}", rays_at(mark) as f64 * 1e-6)
+                }),
+            ]);
+        }
+    }
+    Summary {
+        columns: vec![
+            "mean albedo",
+            "bounces",
+            "cache: albedo error",
+            "emission error",
+            "loss",
+            "M rays",
+            "paper, equal rays: albedo error",
+            "emission error",
+            "loss",
+            "M rays",
+        ],
+        rows,
+    }
+}
+
+fn seen(scenes: &[Scene]) -> Vec<String> {
+    let mut seen = Vec::new();
+    let mut first = None;
+    for scene in scenes {
+        let at = |depth: u64| {
+            let found = scene.cache.iter().find(|(d, _)| *d == depth);
+            found.and_then(|(_, kind)| kind.at_end(|e| e.albedo))
+        };
+        if let (Some(one), Some(two), Some(deep)) = (at(1), at(2), at(0)) {
+            let enough = two.mean <= TOLERABLE.max(FACTOR * deep.mean);
+            first = first.or((!enough).then_some(scene.albedo));
+            seen.push(format!(
+                "Mean albedo {}, transport cache: albedo is off by {} with one bounce, {} with two, {} with adaptive \
+                 depth. Two are {}.",
+                scene.albedo,
+                one.words(),
+                two.words(),
+                deep.words(),
+                if enough { "enough" } else { "not enough" },
+            ));
+        }
+        seen.extend(balance(scene));
+    }
+    seen.push(match first {
+        Some(albedo) => format!(
+            "By the transport cache, two bounces stop being enough (off by more than {TOLERABLE} and by more than {FACTOR} \
+             times what adaptive depth reaches) from a mean albedo of {albedo} on, of those tried.",
+        ),
+        None => "Two bounces were enough at every mean albedo tried.".to_owned(),
+    });
+    seen
+}
+
+/// Whether two bounces were the balance of the descent.
+fn balance(scene: &Scene) -> Option<String> {
+    let (mark, errors) = at_equal_rays(scene);
+    let known: Vec<(u64, Spread)> = (errors.into_iter())
+        .filter_map(|(depth, error)| Some((depth, error?)))
+        .collect();
+    let (best, least) = *known.iter().min_by(|a, b| a.1.mean.total_cmp(&b.1.mean))?;
+    let (_, two) = known.iter().find(|(depth, _)| *depth == 2)?;
+    let verdict = if best == 2 || !two.differs(&least) {
+        "two are as good as the best within noise: the paper is confirmed"
+    } else {
+        "the paper's two are not the balance here"
+    };
+    Some(format!(
+        "Mean albedo {}, the paper's descent at {:.2} million rays: least error of albedo with {best} bounces, {}; two give \
+         {}; {verdict}.",
+        scene.albedo,
+        rays_at(mark?) as f64 * 1e-6,
+        least.words(),
+        two.words(),
+    ))
+}

@@ -1,0 +1,25 @@
+//! A small chair, which shadows itself.
+
+use crate::room::shape::Modeller;
+use glam::DVec3;
+
+/// A chair of 0.85 m that stands on y = 0 over the origin and faces +z: a seat on four legs, and a back of three slats.
+pub fn chair(m: &mut Modeller) {
+    let (half, seat, top) = (0.21, 0.44, 0.85);
+    for x in [-1.0, 1.0] {
+        for (z, height) in [(-1.0, top), (1.0, seat - 0.04)] {
+            let foot = DVec3::new(x * (half - 0.005), 0.004, z * (half - 0.005));
+            let end = DVec3::new(x * (half - 0.025), height, z * (half - 0.025));
+            m.bar(foot, end, [0.015, 0.02], 8);
+        }
+    }
+    let slab = |m: &mut Modeller, y: f64, z: f64, size: [f64; 3]| {
+        let half = DVec3::from(size) * 0.5;
+        m.rounded_box(DVec3::new(0.0, y, z), half, 0.012, 2);
+    };
+    slab(m, seat, 0.0, [2.0 * half, 0.04, 2.0 * half]);
+    for i in 0..3 {
+        let y = 0.57 + 0.12 * f64::from(i);
+        slab(m, y, 0.025 - half, [2.0 * half - 0.05, 0.07, 0.028]);
+    }
+}

@@ -1,0 +1,119 @@
+//! How noisy the mean of a pixel's paths is by random numbers and by points of a low-discrepancy sequence.
+
+use crate::inverse::cache::derivative::{Gradient, differentiate};
+use crate::inverse::parameters::Unknowns;
+use crate::inverse::settings::LightSampling;
+use crate::inverse::solver::Problem;
+use crate::math::color::luminance;
+use crate::math::rng::Stream;
+use crate::math::sequence::{SequencePoint, Uniforms};
+use crate::math::stats::Moments;
+use crate::study::experiments::gradient::{lamps, tracer};
+use glam::Vec2;
+use rayon::prelude::*;
+
+/// Key of the numbers.
+const KEY: u64 = 0x6576_656e;
+/// Independent repetitions of each mean.
+const REPETITIONS: u64 = 16;
+/// Longest path in bounces.
+const BOUNCES: u32 = 64;
+
+/// Noise with some number of paths.
+#[derive(Debug, Clone, Copy)]
+pub struct Evenness {
+    /// Paths a pixel.
+    pub paths: u64,
+    /// Relative standard deviation of the mean by random numbers, root mean square over pixels.
+    pub random: f64,
+    /// The same by a sequence.
+    pub sequence: f64,
+}
+
+/// Measures at 1, 4, 16, … paths up to `most`, on so many pixels spread over all photographs; those without light are
+/// left out.
+pub fn measure(problem: &Problem, truth: &Unknowns, pixels: usize, most: u64) -> Vec<Evenness> {
+    let counts: Vec<u64> = (0..)
+        .map(|k| 4u64.pow(k))
+        .take_while(|&n| n <= most)
+        .collect();
+    let all: Vec<(usize, u32)> = (problem.photographs.iter().enumerate())
+        .flat_map(|(frame, p)| (0..p.pixels.len() as u32).map(move |pixel| (frame, pixel)))
+        .collect();
+    let squares: Vec<[Vec<f64>; 2]> = (0..pixels)
+        .into_par_iter()
+        .map(|index| {
+            let (frame, pixel) = all[(2 * index + 1) * all.len() / (2 * pixels)];
+            let key = |repetition: u64| [frame as u64, u64::from(pixel), repetition];
+            let random = |[frame, pixel, repetition]: [u64; 3], index| {
+                Stream::new(KEY + repetition, frame, pixel, index)
+            };
+            let sequence = |key, index| SequencePoint::new(KEY, key, index);
+            let at = |counts: &[u64]| {
+                [
+                    variances(problem, truth, (frame, pixel), counts, |r, i| {
+                        random(key(r), i)
+                    }),
+                    variances(problem, truth, (frame, pixel), counts, |r, i| {
+                        sequence(key(r), i)
+                    }),
+                ]
+            };
+            at(&counts)
+        })
+        .collect();
+    (counts.iter().enumerate())
+        .map(|(place, &paths)| {
+            let root = |kind: usize| {
+                let known: Vec<f64> = (squares.iter().map(|s| s[kind][place]))
+                    .filter(|v| v.is_finite())
+                    .collect();
+                (known.iter().sum::<f64>() / known.len().max(1) as f64).sqrt()
+            };
+            Evenness {
+                paths,
+                random: root(0),
+                sequence: root(1),
+            }
+        })
+        .collect()
+}
+
+/// Relative variance between repetitions of the mean over the first paths, for each of `counts`.
+fn variances<U: Uniforms>(
+    problem: &Problem,
+    truth: &Unknowns,
+    (frame, pixel): (usize, u32),
+    counts: &[u64],
+    numbers: impl Fn(u64, u64) -> U,
+) -> Vec<f64> {
+    let scene = &*problem.scene;
+    let lights = lamps(scene, &truth.emission);
+    let believed: Vec<f32> = truth.albedo.iter().map(|a| a.max_element()).collect();
+    let tracer = tracer(scene, &lights, &believed, LightSampling::Mis, BOUNCES);
+    let width = problem.photographs[frame].width;
+    let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+    let (mut vertices, mut gathered) = (Vec::new(), Vec::new());
+    let mut gradient = Gradient::new(2 * truth.surfaces());
+    let mut means = vec![Moments::default(); counts.len()];
+    for repetition in 0..REPETITIONS {
+        let (mut sum, mut next) = (0.0, 0);
+        for (&count, means) in counts.iter().zip(&mut means) {
+            while next < count {
+                vertices.clear();
+                gradient.clear();
+                let mut numbers = numbers(repetition, next);
+                tracer.pixel_path(&scene.cameras[frame], corner, &mut numbers, &mut vertices);
+                let radiance = differentiate(&vertices, truth, &mut gathered, &mut gradient);
+                sum += f64::from(luminance(radiance));
+                next += 1;
+            }
+            means.push(sum / count as f64);
+        }
+    }
+    let level = means.last().map_or(0.0, |m| m.mean);
+    means
+        .iter()
+        .map(|m| m.variance() / (level * level))
+        .collect()
+}

@@ -1,0 +1,202 @@
+//! Single objects whose photographs are far more exact than what is asked of a fit.
+
+use crate::capture::photograph::Photograph;
+use crate::error::Result;
+use crate::room::Room;
+use crate::room::photographs::{Rendering, linear, render};
+use crate::room::shape::Modeller;
+use crate::scene::visibility::NOTHING;
+use crate::study::experiments::chair::chair;
+use crate::study::experiments::subject::Subject;
+use crate::study::experiments::{box_room, closed_form};
+use crate::transport::material::Material;
+use glam::{DAffine3, DVec3, Vec3};
+
+/// An object in front of cameras.
+pub struct Posed {
+    /// In words.
+    pub name: &'static str,
+    /// Its name in the scene.
+    pub object: &'static str,
+    /// What it is and how it was photographed, a sentence.
+    pub how: String,
+    /// The scene with its photographs.
+    pub subject: Subject,
+    /// Whether light comes from other surfaces than lamps.
+    pub interreflects: bool,
+    /// The error in percent that the paper has.
+    pub target: f64,
+    /// Median relative standard error in percent at which a solve ends.
+    pub aim: f64,
+    /// Relative error that the photographs' own noise makes in the object's mean radiance.
+    pub floor: f64,
+}
+
+/// A convex object of one colour under a black lamp, photographed in closed form.
+///
+/// # Errors
+/// Never for the scene as it is.
+pub fn convex(quick: bool) -> Result<Posed> {
+    let size = if quick { [48, 36] } else { [128, 96] };
+    let room = gem();
+    let photographs = closed_form::photographs(&room, size);
+    Ok(Posed {
+        name: "convex, under a lamp",
+        object: "gem",
+        how: format!(
+            "A convex polyhedron of {} triangles below a square lamp, nothing else, in {} photographs of {} × {} pixels in \
+             closed form (Lambert's polygon irradiance, 25 points for each part of a pixel), rounded to 32 bits; they are \
+             taken from so near that no outline is seen, whose pixels would be most of the paths' noise.",
+            room.mesh.triangles.len() - 2,
+            room.views.len(),
+            size[0],
+            size[1],
+        ),
+        subject: Subject::of_photographs(&room, photographs)?,
+        interreflects: false,
+        target: 3.7e-4,
+        aim: 2.5e-4,
+        // One rounding bounds what rounding of many pixels does to their mean.
+        floor: f64::from(f32::EPSILON) * 0.5,
+    })
+}
+
+/// The convex object and its lamp, seen from close by.
+fn gem() -> Room {
+    let mut modeller = Modeller::default();
+    modeller.object("gem");
+    modeller.lathe(&[[0.2, 0.0], [0.5, 0.2], [0.15, 0.45]], 7);
+    modeller.object("lamp");
+    let corner = DVec3::new(-0.5, 1.6, -0.5);
+    modeller.grid(corner, DVec3::X, DVec3::Z, 1, 1);
+    let views = [
+        [[0.02, 0.57, 0.03], [0.0, 0.3, 0.0]],
+        [[0.06, 0.57, 0.05], [0.05, 0.3, 0.02]],
+        [[-0.05, 0.57, -0.04], [-0.05, 0.3, -0.02]],
+        [[0.0, 1.2, 0.03], [0.0, 1.6, 0.0]],
+    ];
+    Room {
+        name: "gem".to_owned(),
+        mesh: modeller.mesh,
+        materials: vec![
+            Material::diffuse(Vec3::new(0.65, 0.45, 0.25), Vec3::ZERO),
+            Material::diffuse(Vec3::ZERO, Vec3::new(12.0, 10.0, 8.0)),
+        ],
+        views: views.map(|view| view.map(DVec3::from)).to_vec(),
+    }
+}
+
+/// A chair that shadows itself in a room whose walls light it and each other, photographed by paths of all lengths.
+///
+/// # Errors
+/// Never for the scene as it is.
+pub fn shadowed(quick: bool) -> Result<Posed> {
+    let (size, samples) = if quick {
+        ([32, 24], 32)
+    } else {
+        ([96, 72], 128)
+    };
+    let mut room = box_room::furnished("chair in a room", 0.5, 0.25, "chair", |m| {
+        let turn = DAffine3::from_rotation_y(0.5);
+        let place = DAffine3::from_translation(DVec3::new(-0.3, 0.0, -0.25)) * turn;
+        m.placed(place, chair);
+    });
+    // The chair from nearby, besides the views of the room.
+    for eye in [[0.5, 0.8, 0.5], [-0.8, 1.0, 0.5], [0.5, 0.5, -0.7]] {
+        room.views
+            .push([DVec3::from(eye), DVec3::new(-0.3, 0.45, -0.25)]);
+    }
+    // Two halves of their own noise, whose difference tells how exact their mean is.
+    let half = |seed| {
+        let rendering = Rendering {
+            seed,
+            samples,
+            size,
+        };
+        render(&room, &rendering)
+    };
+    let halves = [half(box_room::NOISE)?, half(box_room::NOISE + 1)?];
+    let mean = |(a, b): (&Photograph, &Photograph)| {
+        let pixels = a.pixels.iter().zip(&b.pixels);
+        linear(size, pixels.map(|(&a, &b)| (a + b) * 0.5).collect())
+    };
+    let photographs: Vec<Photograph> = halves[0].iter().zip(&halves[1]).map(mean).collect();
+    let subject = Subject::of_photographs(&room, photographs)?;
+    let floor = noise_of(&subject, "chair", &halves);
+    Ok(Posed {
+        name: "self-shadowing, in a room",
+        object: "chair",
+        how: format!(
+            "A chair in a box room of mean albedo 0.5, all of whose seven reflectors and whose lamp are unknown too, in {} \
+             photographs of {} × {} pixels with {} paths each and all bounces, from random numbers that the solver does not \
+             use, kept in 32 bits.",
+            room.views.len(),
+            size[0],
+            size[1],
+            2 * samples,
+        ),
+        subject,
+        interreflects: true,
+        target: 0.14,
+        aim: 0.05,
+        floor,
+    })
+}
+
+/// Relative standard error of an object's mean radiance, channels pooled, from photographs in two independent halves.
+fn noise_of(subject: &Subject, object: &str, halves: &[Vec<Photograph>; 2]) -> f64 {
+    let scene = &subject.problem.scene;
+    let triangles = &scene.ids().triangles;
+    let (mut squares, mut count) = (0.0, 0.0);
+    for (frame, (a, b)) in halves[0].iter().zip(&halves[1]).enumerate() {
+        for (pixel, (&a, &b)) in a.pixels.iter().zip(&b.pixels).enumerate() {
+            let triangle = triangles[frame][pixel];
+            if triangle == NOTHING {
+                continue;
+            }
+            let seen = scene.object_of[triangle as usize] as usize;
+            let level = (a + b).as_dvec3();
+            if scene.objects[seen].name == object && level.min_element() > 0.0 {
+                let relative = (a - b).as_dvec3() / level;
+                squares += relative.length_squared() / 3.0;
+                count += 1.0;
+            }
+        }
+    }
+    f64::sqrt(squares) / f64::max(count, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_closed_form_is_what_paths_render_on_the_mean() {
+        // From further away too, where pixels see outlines.
+        let mut room = gem();
+        room.views
+            .push([DVec3::new(1.1, 0.9, 0.9), DVec3::new(0.0, 0.7, 0.0)]);
+        let size = [32, 24];
+        let exact = closed_form::photographs(&room, size);
+        let rendering = Rendering {
+            seed: 3,
+            samples: 1024,
+            size,
+        };
+        let rendered = render(&room, &rendering).expect("rendered");
+        for (frame, (exact, rendered)) in exact.iter().zip(&rendered).enumerate() {
+            let mut sums = [0.0; 2];
+            for (a, b) in exact.pixels.iter().zip(&rendered.pixels) {
+                // Five standard deviations where a pixel sees the edge of the lamp, whose radiance is 12.
+                let spread = (12.0 * a.max_element() / rendering.samples as f32).sqrt();
+                let off = (*a - *b).abs().max_element();
+                assert!(off < 0.05 + 5.0 * spread, "{frame}: {a} {b}");
+                sums[0] += f64::from(a.x);
+                sums[1] += f64::from(b.x);
+            }
+            // Where no outline is seen the noise is small.
+            let alike = (sums[1] - sums[0]).abs() <= 2e-3 * sums[0];
+            assert!(alike || frame == room.views.len() - 1, "{frame}: {sums:?}");
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! Better ways to draw pixels and paths.
+
+use crate::error::Result;
+use crate::export::plot::{Axis, Plot, Series};
+use crate::export::table::Table;
+use crate::inverse::paper::descent::Descent;
+use crate::inverse::settings::Settings;
+use crate::study::experiments::course::{
+    Errors, Gauge, Mark, descend, descend_by, estimate, paper_settings, rays_at,
+};
+use crate::study::experiments::courses::{Kind, common_mark, plot, table, words};
+use crate::study::experiments::evenness::{Evenness, measure};
+use crate::study::experiments::findings::brief;
+use crate::study::experiments::selection::Groups;
+use crate::study::experiments::{Bench, Findings, Limits, Study, Summary, box_room};
+use crate::transport::path::PathOptions;
+
+/// The study.
+pub const STUDY: Study = Study {
+    name: "sampling",
+    question: "The paper sees \"high potential in investigating better sampling strategies\". What do pixels drawn by object or \
+        by residual bring the descent, and points of a low-discrepancy sequence the transport cache?",
+    takes_capture: false,
+    seeds: 3,
+    run,
+};
+
+/// Mean albedo and half side of the lamp.
+const ALBEDO: f64 = 0.5;
+const LAMP: f64 = 0.25;
+/// Steps between two looks at the residual.
+const LOOK_EVERY: u64 = 500;
+const UNIFORM: &str = "uniform";
+
+/// How groups of pixels are drawn.
+#[derive(Clone, Copy)]
+enum Way {
+    Uniform,
+    Objects { weighed: bool },
+    Residual { weighed: bool },
+}
+
+const WAYS: [(&str, Way); 5] = [
+    (UNIFORM, Way::Uniform),
+    ("by object", Way::Objects { weighed: false }),
+    ("by object, weighed back", Way::Objects { weighed: true }),
+    ("by residual", Way::Residual { weighed: false }),
+    ("by residual, weighed back", Way::Residual { weighed: true }),
+];
+
+fn run(bench: &Bench) -> Result<Findings> {
+    let limits = bench.limits(WAYS.len() * bench.seeds as usize);
+    let subject = box_room::photographed("box room", ALBEDO, LAMP, bench.quick)?;
+    let gauge = Gauge::new(&subject, paper_settings(1).max_bounces());
+    let kinds: Vec<Kind> = (WAYS.iter())
+        .map(|&(name, way)| {
+            (bench.say)(name);
+            let course = |seed| descent(&gauge, way, &paper_settings(seed), limits);
+            Kind {
+                name: name.to_owned(),
+                courses: bench.seeds().map(course).collect(),
+            }
+        })
+        .collect();
+    (bench.say)("paths");
+    let truth = box_room::truth(&box_room::box_room("box room", ALBEDO, LAMP));
+    let (pixels, most) = if bench.quick { (16, 256) } else { (64, 4096) };
+    let evenness = measure(&subject.problem, &truth, pixels, most);
+
+    let rays = |mark: &Mark| mark.rays as f64;
+    let drawn = |label, quantity| {
+        plot(
+            "Pixels of the paper's descent",
+            "rays",
+            label,
+            rays,
+            quantity,
+            &kinds,
+            &[],
+        )
+    };
+    let albedo = |errors: &Errors| errors.albedo;
+    Ok(Findings {
+        how: format!(
+            "The paper's descent in a box room of mean albedo {ALBEDO}, {} seeds, batches of 8, nothing annealed, with \
+             pixels drawn uniformly, from each object alike, and from blocks of 8 × 8 pixels by their residual (looked at \
+             every {LOOK_EVERY} steps, whose rays count); each with gradients as they come and weighed back to what uniform \
+             draws fit. Held-out loss is over uniform pixels. Paths: standard deviation of a pixel's mean radiance over 16 \
+             repetitions, root mean square over {pixels} pixels, at the true values.",
+            bench.seeds,
+        ),
+        tables: vec![
+            ("", table("pixels", &kinds, &[])),
+            ("-paths", of_paths(&evenness)),
+        ],
+        plots: vec![
+            ("", drawn("held-out l1 loss, radiance", |e| e.loss)),
+            ("-albedo", drawn("mean absolute error of albedo", albedo)),
+            ("-paths", evenness_plot(&evenness)),
+        ],
+        summary: summary(&kinds, &evenness),
+        seen: seen(&kinds, &evenness),
+        ..Findings::default()
+    })
+}
+
+/// One course.
+fn descent(gauge: &Gauge, way: Way, settings: &Settings, limits: Limits) -> Vec<Mark> {
+    let problem = gauge.problem();
+    let bounces = settings.max_bounces();
+    let mut groups = match way {
+        Way::Uniform => return descend(gauge, settings, limits),
+        Way::Objects { weighed } => Groups::by_object(problem, settings, weighed),
+        Way::Residual { weighed } => Groups::by_block(problem, settings, weighed),
+    };
+    let options = PathOptions {
+        max_bounces: bounces,
+        ..PathOptions::default()
+    };
+    let mut steps = 0;
+    let mut step = |descent: &mut Descent| {
+        let mut rays = 0;
+        if matches!(way, Way::Residual { .. }) && steps % LOOK_EVERY == 0 {
+            let lit = estimate(descent).lit(&problem.scene);
+            rays = groups.look(problem, &lit, &options, settings.seed + steps);
+        }
+        steps += 1;
+        let mut outcome =
+            descent.step_on(problem, settings, bounces, &|stream| groups.draw(stream));
+        outcome.rays += rays;
+        outcome
+    };
+    descend_by(gauge, limits, &mut step)
+}
+
+fn of_paths(evenness: &[Evenness]) -> Table {
+    let mut table = Table::new(&["paths", "random", "low_discrepancy"]);
+    for at in evenness {
+        table.row(&[at.paths.into(), at.random.into(), at.sequence.into()]);
+    }
+    table
+}
+
+fn evenness_plot(evenness: &[Evenness]) -> Plot {
+    let series = |name: &str, of: fn(&Evenness) -> f64| Series {
+        name: name.to_owned(),
+        points: (evenness.iter())
+            .map(|at| [at.paths as f64, of(at)])
+            .collect(),
+        ..Series::default()
+    };
+    Plot {
+        title: "Noise of a pixel's mean".to_owned(),
+        x: Axis::logarithmic("paths"),
+        y: Axis::logarithmic("relative standard deviation"),
+        series: vec![
+            series("random numbers", |at| at.random),
+            series("low-discrepancy points", |at| at.sequence),
+        ],
+        ..Plot::default()
+    }
+}
+
+fn summary(kinds: &[Kind], evenness: &[Evenness]) -> Summary {
+    let mark = common_mark(kinds);
+    let mut rows: Vec<Vec<String>> = (kinds.iter())
+        .map(|kind| {
+            let at = |quantity| words(mark.and_then(|mark| kind.at_mark(mark, quantity)));
+            vec![
+                format!("pixels {}", kind.name),
+                at(|e| e.loss),
+                at(|e| e.albedo),
+                words(kind.at_end(|e| e.loss)),
+                words(kind.at_end(|e| e.albedo)),
+            ]
+        })
+        .collect();
+    rows.extend(evenness.iter().map(|at| {
+        vec![
+            format!("{} paths a pixel", at.paths),
+            format!("random: {}", brief(at.random)),
+            format!("low-discrepancy: {}", brief(at.sequence)),
+            format!("variance / {}", brief((at.random / at.sequence).powi(2))),
+            String::new(),
+        ]
+    }));
+    Summary {
+        columns: vec![
+            "what",
+            "loss at equal rays",
+            "albedo error at equal rays",
+            "loss at equal time",
+            "albedo error at equal time",
+        ],
+        rows,
+    }
+}
+
+fn seen(kinds: &[Kind], evenness: &[Evenness]) -> Vec<String> {
+    let mut seen = Vec::new();
+    if let Some(mark) = common_mark(kinds) {
+        let at = |kind: &Kind| kind.at_mark(mark, |e| e.albedo);
+        let uniform = kinds.iter().find(|kind| kind.name == UNIFORM).and_then(at);
+        for kind in kinds.iter().filter(|kind| kind.name != UNIFORM) {
+            let (Some(uniform), Some(other)) = (uniform, at(kind)) else {
+                continue;
+            };
+            let verdict = match (other.differs(&uniform), other.mean < uniform.mean) {
+                (false, _) => "no difference beyond the noise between seeds",
+                (true, true) => "better",
+                (true, false) => "worse",
+            };
+            seen.push(format!(
+                "Pixels {}, at {:.2} million rays: albedo off by {}, uniformly {}: {verdict}.",
+                kind.name,
+                rays_at(mark) as f64 * 1e-6,
+                other.words(),
+                uniform.words(),
+            ));
+        }
+    }
+    if let (Some(few), Some(many)) = (evenness.first(), evenness.last()) {
+        let gain = |at: &Evenness| brief((at.random / at.sequence).powi(2));
+        seen.push(format!(
+            "Low-discrepancy points have {} times less variance than random numbers with {} paths a pixel and {} times less \
+             with {}; the transport cache uses them.",
+            gain(few),
+            few.paths,
+            gain(many),
+            many.paths,
+        ));
+    }
+    seen
+}

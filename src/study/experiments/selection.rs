@@ -1,0 +1,190 @@
+//! Other ways to draw the pixels of a batch than uniformly.
+
+use crate::inverse::held_out::is_held_out;
+use crate::inverse::paper::descent::Drawn;
+use crate::inverse::settings::Settings;
+use crate::inverse::solver::Problem;
+use crate::math::rng::Stream;
+use crate::scene::visibility::NOTHING;
+use crate::transport::lit::Lit;
+use crate::transport::path::{PathOptions, radiance};
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+/// Sides of the blocks of pixels that share a residual.
+const BLOCK: u32 = 8;
+/// Paths for each block's residual.
+const PATHS: u64 = 4;
+/// Share of the draws that stay uniform.
+const UNIFORM: f64 = 0.2;
+
+/// Pixels in groups, each group drawn with a chance of its own.
+pub struct Groups {
+    /// Frame and pixel.
+    pixels: Vec<Vec<(u32, u32)>>,
+    /// Running sums of the chances.
+    ends: Vec<f64>,
+    total: usize,
+    /// Whether gradients are weighed so that their mean is that of uniform draws.
+    weighed: bool,
+}
+
+impl Groups {
+    /// The pixels of each object, all objects with the same chance.
+    pub fn by_object(problem: &Problem, settings: &Settings, weighed: bool) -> Self {
+        let scene = &problem.scene;
+        let seen = &scene.ids().triangles;
+        Self::new(problem, settings, weighed, |frame, pixel| {
+            let triangle = seen[frame][pixel as usize];
+            (triangle != NOTHING).then(|| scene.object_of[triangle as usize] as usize)
+        })
+    }
+
+    /// Blocks of pixels, at first all with the same chance.
+    pub fn by_block(problem: &Problem, settings: &Settings, weighed: bool) -> Self {
+        let width = problem.photographs.first().map_or(1, |p| p.width);
+        let height = problem.photographs.first().map_or(1, |p| p.height);
+        let (across, down) = (width.div_ceil(BLOCK), height.div_ceil(BLOCK));
+        Self::new(problem, settings, weighed, |frame, pixel| {
+            let (x, y) = (pixel % width / BLOCK, pixel / width / BLOCK);
+            Some(frame * (across * down) as usize + (y * across + x) as usize)
+        })
+    }
+
+    fn new(
+        problem: &Problem,
+        settings: &Settings,
+        weighed: bool,
+        group: impl Fn(usize, u32) -> Option<usize>,
+    ) -> Self {
+        let mut pixels: Vec<Vec<(u32, u32)>> = Vec::new();
+        for (frame, photograph) in problem.photographs.iter().enumerate() {
+            for pixel in 0..photograph.pixels.len() as u32 {
+                let usable = photograph.usable.is_empty() || photograph.usable[pixel as usize];
+                if !usable || is_held_out(settings, frame as u32, pixel) {
+                    continue;
+                }
+                let Some(place) = group(frame, pixel) else {
+                    continue;
+                };
+                if place >= pixels.len() {
+                    pixels.resize(place + 1, Vec::new());
+                }
+                pixels[place].push((frame as u32, pixel));
+            }
+        }
+        pixels.retain(|group| !group.is_empty());
+        let total = pixels.iter().map(Vec::len).sum();
+        let even = vec![1.0; pixels.len()];
+        let mut groups = Self {
+            pixels,
+            ends: Vec::new(),
+            total,
+            weighed,
+        };
+        groups.set(&even);
+        groups
+    }
+
+    /// Gives the groups chances in proportion to `shares`.
+    fn set(&mut self, shares: &[f64]) {
+        let sum: f64 = shares.iter().sum();
+        let mut end = 0.0;
+        self.ends = shares
+            .iter()
+            .map(|share| {
+                end += share / sum;
+                end
+            })
+            .collect();
+    }
+
+    /// A pixel.
+    pub fn draw(&self, stream: &mut Stream) -> Option<Drawn> {
+        let at = stream.uniform_f64();
+        let group = self
+            .ends
+            .partition_point(|&end| end <= at)
+            .min(self.ends.len().checked_sub(1)?);
+        let chance = self.ends[group] - group.checked_sub(1).map_or(0.0, |g| self.ends[g]);
+        let pixels = &self.pixels[group];
+        let (frame, pixel) = pixels[stream.below(pixels.len())];
+        let weight = if self.weighed {
+            (pixels.len() as f64 / self.total as f64 / chance) as f32
+        } else {
+            1.0
+        };
+        Some(Drawn {
+            frame,
+            pixel,
+            weight,
+        })
+    }
+
+    /// Gives each group a chance in proportion to its pixels times its residual now, found by a few paths, mixed with a
+    /// uniform share; the rays that it took.
+    pub fn look(&mut self, problem: &Problem, lit: &Lit, options: &PathOptions, key: u64) -> u64 {
+        let found: Vec<(f64, u64)> = (self.pixels.par_iter().enumerate())
+            .map(|(group, pixels)| {
+                let (mut difference, mut rays) = (Vec3::ZERO, 0);
+                for path in 0..PATHS {
+                    let mut stream = Stream::new(key, group as u64, 0, path);
+                    let (frame, pixel) = pixels[stream.below(pixels.len())];
+                    let photograph = &problem.photographs[frame as usize];
+                    let corner = Vec2::new(
+                        (pixel % photograph.width) as f32,
+                        (pixel / photograph.width) as f32,
+                    );
+                    let camera = &problem.scene.cameras[frame as usize];
+                    let ray = camera.ray(corner + Vec2::from(stream.uniform2()));
+                    let sample = radiance(lit, &ray, &mut stream, options);
+                    difference += sample.radiance - photograph.pixels[pixel as usize];
+                    rays += u64::from(sample.rays);
+                }
+                (f64::from(difference.abs().element_sum()), rays)
+            })
+            .collect();
+        let sizes = || self.pixels.iter().map(|p| p.len() as f64);
+        let each: Vec<f64> = found.iter().zip(sizes()).map(|((r, _), n)| r * n).collect();
+        let sum = each.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let shares: Vec<f64> = (each.iter().zip(sizes()))
+            .map(|(r, n)| UNIFORM * n / self.total as f64 + (1.0 - UNIFORM) * r / sum)
+            .collect();
+        self.set(&shares);
+        found.iter().map(|(_, rays)| rays).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::experiments::box_room::photographed;
+
+    #[test]
+    fn objects_are_drawn_alike_and_weights_make_every_pixel_count_the_same() {
+        let subject = photographed("room", 0.5, 0.25, true).expect("a room");
+        let (problem, settings) = (&subject.problem, Settings::default());
+        let groups = Groups::by_object(problem, &settings, true);
+        let objects = groups.pixels.len();
+        assert_eq!(objects, problem.scene.objects.len());
+        let mut counts = vec![(0.0, 0.0); objects];
+        let draws = 80_000;
+        for i in 0..draws {
+            let drawn = groups.draw(&mut Stream::new(5, 0, 0, i)).expect("a pixel");
+            let group = (groups.pixels.iter())
+                .position(|g| g.contains(&(drawn.frame, drawn.pixel)))
+                .expect("of a group");
+            counts[group].0 += 1.0 / draws as f64;
+            counts[group].1 += f64::from(drawn.weight) / draws as f64;
+        }
+        for ((chance, weight), pixels) in counts.iter().zip(&groups.pixels) {
+            // Five standard deviations of a binomial share of one in eight.
+            assert!(
+                (chance - 1.0 / objects as f64).abs() < 5.0 * 0.33 / 282.0,
+                "{chance}"
+            );
+            let share = pixels.len() as f64 / groups.total as f64;
+            assert!((weight / share - 1.0).abs() < 0.05, "{weight} {share}");
+        }
+    }
+}

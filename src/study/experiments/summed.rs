@@ -1,0 +1,130 @@
+//! Paths evaluated in 32 bits, as the fit does it, and in 64.
+
+use crate::inverse::cache::derivative::{Gradient, differentiate};
+use crate::inverse::cache::{NO_LAMP, Vertex};
+use crate::inverse::parameters::Unknowns;
+use crate::inverse::settings::LightSampling;
+use crate::inverse::solver::Problem;
+use crate::math::rng::Stream;
+use crate::study::experiments::gradient::tracer;
+use crate::transport::emitters::Emitters;
+use glam::{Vec2, Vec3};
+
+/// Key of the paths.
+const KEY: u64 = 0x7375_6d73;
+/// Albedo of every surface.
+const ALBEDO: f32 = 0.55;
+/// Longest path in bounces.
+const BOUNCES: u32 = 64;
+/// Paths of which the lamps' shares are taken.
+const SHARED: usize = 10_000;
+
+/// Paths through the pixels of all photographs, one after the other. The last two objects are their lamps, drawn alike.
+pub struct Paths {
+    vertices: Vec<Vertex>,
+    ends: Vec<usize>,
+    surfaces: usize,
+}
+
+impl Paths {
+    /// Traces so many paths.
+    pub fn trace(problem: &Problem, count: usize) -> Self {
+        let scene = &*problem.scene;
+        let surfaces = scene.objects.len();
+        let mut weights = vec![0.0; surfaces];
+        weights[surfaces.saturating_sub(2)..].fill(1.0);
+        let lights = Emitters::new(scene, &weights);
+        let believed = vec![ALBEDO; surfaces];
+        let tracer = tracer(scene, &lights, &believed, LightSampling::Mis, BOUNCES);
+        let (mut vertices, mut ends) = (Vec::new(), Vec::new());
+        for path in 0..count {
+            let frame = path % scene.cameras.len().max(1);
+            let camera = &scene.cameras[frame];
+            let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
+            let mut stream = Stream::new(KEY, frame as u64, 0, path as u64);
+            let pixel = stream.below((width * height) as usize) as u32;
+            let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+            tracer.pixel_path(camera, corner, &mut stream, &mut vertices);
+            ends.push(vertices.len());
+        }
+        Self {
+            vertices,
+            ends,
+            surfaces,
+        }
+    }
+
+    /// How many.
+    pub fn count(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// The first `count` paths.
+    fn first(&self, count: usize) -> impl Iterator<Item = &[Vertex]> {
+        let starts = std::iter::once(0).chain(self.ends.iter().copied());
+        let each = starts.zip(&self.ends).take(count);
+        each.map(|(start, &end)| &self.vertices[start..end])
+    }
+
+    /// Sum over the first `count` paths, with lamps of radiance one, by adding up 32 bits.
+    pub fn in_f32(&self, count: usize) -> f64 {
+        f64::from(self.radiances(count, [1.0, 1.0]).sum::<f32>())
+    }
+
+    /// The same with a sum of 64 bits.
+    pub fn in_f64(&self, count: usize) -> f64 {
+        self.radiances(count, [1.0, 1.0]).map(f64::from).sum()
+    }
+
+    /// Relative error of a sum over the first `count` paths.
+    pub fn error(&self, count: usize, sum: fn(&Self, usize) -> f64) -> f64 {
+        let exact = self.exact(count, [1.0, 1.0]);
+        (sum(self, count) / exact - 1.0).abs()
+    }
+
+    /// Relative error of the light that a lamp of radiance one adds to that of one `ratio` times as bright.
+    pub fn of_dim_lamp(&self, ratio: f64) -> f64 {
+        let sum = |lamps: [f32; 2]| -> f64 { self.radiances(SHARED, lamps).map(f64::from).sum() };
+        let found = sum([1.0, ratio as f32]) - sum([0.0, ratio as f32]);
+        (found / self.exact(SHARED, [1.0, 0.0]) - 1.0).abs()
+    }
+
+    /// Radiance of each path in 32 bits.
+    fn radiances(&self, count: usize, lamps: [f32; 2]) -> impl Iterator<Item = f32> {
+        let mut unknowns = Unknowns {
+            albedo: vec![Vec3::splat(ALBEDO); self.surfaces],
+            emission: vec![Vec3::ZERO; self.surfaces],
+        };
+        let first = self.surfaces - lamps.len();
+        for (emission, lamp) in unknowns.emission[first..].iter_mut().zip(lamps) {
+            *emission = Vec3::splat(lamp);
+        }
+        let mut gathered = Vec::new();
+        let mut gradient = Gradient::new(2 * self.surfaces);
+        self.first(count).map(move |path| {
+            gradient.clear();
+            differentiate(path, &unknowns, &mut gathered, &mut gradient).x
+        })
+    }
+
+    /// Sum over paths in 64 bits throughout, from the same weights.
+    fn exact(&self, count: usize, lamps: [f64; 2]) -> f64 {
+        let first = self.surfaces - lamps.len();
+        let emission = |surface: u32| {
+            let lamp = (surface as usize).checked_sub(first);
+            lamp.map_or(0.0, |lamp| lamps[lamp])
+        };
+        let of = |path: &[Vertex]| {
+            path.iter().rev().fold(0.0, |beyond, v| {
+                let lamp = if v.lamp == NO_LAMP {
+                    0.0
+                } else {
+                    emission(v.lamp) * f64::from(v.lamp_weight)
+                };
+                emission(v.surface) * f64::from(v.emission_weight)
+                    + f64::from(ALBEDO) * (beyond + lamp)
+            })
+        };
+        self.first(count).map(of).sum()
+    }
+}

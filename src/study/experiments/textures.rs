@@ -1,0 +1,373 @@
+//! How textures come out, coarse to fine.
+
+use crate::error::Result;
+use crate::export::plot::{Axis, Plot, Series};
+use crate::export::table::Table;
+use crate::inverse::estimate::{Estimate, TexelEstimate};
+use crate::inverse::loss::LossProbe;
+use crate::inverse::paper::descent::{Descent, Grain};
+use crate::inverse::settings::{Preset, Settings};
+use crate::inverse::solver::Problem;
+use crate::math::picture::Picture;
+use crate::room::truth::albedo_picture;
+use crate::scene::texels::TexelLayout;
+use crate::study::experiments::course::{cache_settings, paper_settings, solved};
+use crate::study::experiments::findings::{Grid, brief};
+use crate::study::experiments::furnished::built_in;
+use crate::study::experiments::{Bench, Findings, Limits, Study, Subject, Summary, finer};
+use crate::transport::lit::Lit;
+use crate::transport::material::TexelColors;
+use glam::Vec3;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// The study.
+pub const STUDY: Study = Study {
+    name: "textures",
+    question: "The paper: once lights are in place, albedos per triangle and then of ever finer triangles recover textures. At \
+        what cost, beside the transport cache's cells of the size of pixels?",
+    takes_capture: true,
+    seeds: 1,
+    run,
+};
+
+/// Subdivisions after the mesh's own triangles.
+const CUTS: usize = 2;
+/// Triangles seen by so many pixels are cut.
+const PIXELS: u64 = 16;
+/// The photograph whose albedo is shown.
+const SHOWN: usize = 0;
+
+/// Where textures stood.
+struct State {
+    name: String,
+    unknowns: usize,
+    /// Peak signal-to-noise ratio of the albedo pictures in dB, where the truth is known.
+    psnr: Option<f64>,
+    loss: Option<f64>,
+    seconds: f64,
+    rays: u64,
+    picture: Picture,
+}
+
+/// Measures states.
+struct Measure {
+    /// The true albedo seen by each camera.
+    truth: Option<Vec<Picture>>,
+    /// For each camera and pixel, whether it counts: no lamp, no edge of the mesh.
+    counts: Vec<Vec<bool>>,
+    probe: LossProbe,
+}
+
+fn run(bench: &Bench) -> Result<Findings> {
+    let room = match bench.subject {
+        Some(_) => None,
+        None => Some(built_in(true, bench.quick)?),
+    };
+    let subject = match (&room, bench.subject) {
+        (Some(room), _) => &room.subject,
+        (None, Some(subject)) => subject,
+        (None, None) => return Ok(Findings::default()),
+    };
+    let measure = Measure::new(subject, room.as_ref().map(|room| &room.lit));
+    let limits = bench.limits(1 + CUTS);
+
+    // The transport cache, with one colour an object and with textures.
+    (bench.say)("transport cache");
+    let own_light = room.is_some();
+    let of_objects = Settings {
+        exposures: !own_light,
+        outside_light: !own_light,
+        ..cache_settings(1, bench.quick)
+    };
+    let with_textures = Settings {
+        preset: Preset::Balanced,
+        textures: true,
+        ..of_objects.clone()
+    };
+    let mut states = Vec::new();
+    let mut objects = Estimate::default();
+    for (name, settings) in [
+        ("cache, one colour an object", &of_objects),
+        ("cache, textures", &with_textures),
+    ] {
+        let solution = solved(subject, settings)?;
+        let (seconds, rays) = (solution.progress.seconds, solution.progress.rays);
+        let estimate = solution.estimate;
+        let cells = |t: &Arc<TexelEstimate>| t.seen.iter().filter(|&&n| n > 0).count();
+        let unknowns = estimate
+            .texels
+            .as_ref()
+            .map_or(estimate.objects.len(), cells);
+        states.push(measure.state(name, &subject.problem, &estimate, unknowns, seconds, rays));
+        if objects.objects.is_empty() {
+            objects = estimate;
+        }
+    }
+    states.extend(descents(
+        bench,
+        &measure,
+        &subject.problem,
+        &objects,
+        limits,
+    )?);
+    let how = format!(
+        "{}: albedo pictures of all photographs against the true ones (peak 1, lamps left out), held-out loss with all \
+         bounces. The paper's descent starts from the transport cache's lamps and one colour an object, then has {} with the \
+         mesh's own triangles and as long after each of {CUTS} subdivisions, where every triangle is cut into four that {PIXELS} \
+         pixels or more see (the paper cuts by error). Its seconds and rays are added up from there.",
+        subject.name,
+        if limits.seconds.is_finite() {
+            format!("{:.0} s", limits.seconds)
+        } else {
+            "a few rays".to_owned()
+        },
+    );
+    Ok(findings(how, states, measure.truth))
+}
+
+/// The paper's descent per triangle, on finer and finer triangles.
+fn descents(
+    bench: &Bench,
+    measure: &Measure,
+    problem: &Problem,
+    start: &Estimate,
+    limits: Limits,
+) -> Result<Vec<State>> {
+    let settings = paper_settings(1);
+    let mut descent = Descent::new(problem, Grain::Objects);
+    for (index, object) in start.objects.iter().enumerate() {
+        descent.unknowns.albedo[index] = object.albedo;
+        descent.unknowns.emission[index] = object.emission;
+        descent.lights[index] = object.emission;
+    }
+    let mut problem = problem.clone();
+    let mut descent = descent.refine(&problem);
+    let (mut states, mut seconds, mut rays) = (Vec::new(), 0.0, 0);
+    for cuts in 0..=CUTS {
+        let name = match cuts {
+            0 => "paper, triangles".to_owned(),
+            cuts => format!("paper, cut {cuts} ×"),
+        };
+        (bench.say)(&name);
+        if cuts > 0 {
+            let (finer, parents) = finer::cut(&problem, PIXELS)?;
+            descent = descent.refine_by(&parents);
+            problem = finer;
+        }
+        let (begun, goal) = (Instant::now(), rays + limits.rays.min(u64::MAX / 8));
+        while rays < goal && begun.elapsed().as_secs_f64() < limits.seconds {
+            let outcome = descent.step(&problem, &settings, settings.max_bounces());
+            rays += outcome.rays;
+            if !outcome.finite || outcome.rays == 0 {
+                break;
+            }
+        }
+        seconds += begun.elapsed().as_secs_f64();
+        let estimate = of_triangles(&problem, start, &descent);
+        let unknowns = problem.scene.triangles.len();
+        states.push(measure.state(&name, &problem, &estimate, unknowns, seconds, rays));
+    }
+    Ok(states)
+}
+
+/// An estimate with the descent's albedo of each triangle.
+fn of_triangles(problem: &Problem, start: &Estimate, descent: &Descent) -> Estimate {
+    let count = problem.scene.triangles.len();
+    Estimate {
+        texels: Some(Arc::new(TexelEstimate {
+            colors: Arc::new(TexelColors {
+                layout: TexelLayout::new(vec![0; count]),
+                colors: descent.unknowns.albedo.clone(),
+            }),
+            stderr: vec![Vec3::ONE; count],
+            seen: vec![0; count],
+            textured: vec![true; start.objects.len()],
+        })),
+        ..start.clone()
+    }
+}
+
+impl Measure {
+    fn new(subject: &Subject, truth: Option<&Lit>) -> Self {
+        let scene = &subject.problem.scene;
+        let pictures = |lit: &Lit| {
+            scene
+                .cameras
+                .iter()
+                .map(|c| albedo_picture(lit, c))
+                .collect()
+        };
+        let counts = scene.ids().triangles.iter().map(|triangles| {
+            let reflects = |&triangle: &u32| {
+                let object = scene.object_of.get(triangle as usize);
+                let material = object
+                    .zip(truth)
+                    .map(|(&k, lit)| &lit.materials[k as usize]);
+                material.is_some_and(|material| material.emission == Vec3::ZERO)
+            };
+            triangles.iter().map(reflects).collect()
+        });
+        Self {
+            truth: truth.map(pictures),
+            counts: counts.collect(),
+            probe: LossProbe::new(&subject.problem, &Settings::default(), 400, 64, u32::MAX),
+        }
+    }
+
+    fn state(
+        &self,
+        name: &str,
+        problem: &Problem,
+        estimate: &Estimate,
+        unknowns: usize,
+        seconds: f64,
+        rays: u64,
+    ) -> State {
+        let lit = estimate.lit(&problem.scene);
+        let cameras = &problem.scene.cameras;
+        let psnr = self.truth.as_ref().map(|truth| {
+            let (mut squares, mut values) = (0.0, 0.0);
+            for ((camera, truth), counts) in cameras.iter().zip(truth).zip(&self.counts) {
+                let found = albedo_picture(&lit, camera);
+                let pixels = found.pixels.iter().zip(&truth.pixels).zip(counts);
+                for ((found, truth), _) in pixels.filter(|(_, counts)| **counts) {
+                    squares += f64::from((*found - *truth).length_squared());
+                    values += 3.0;
+                }
+            }
+            -10.0 * (squares / f64::max(values, 1.0)).log10()
+        });
+        State {
+            name: name.to_owned(),
+            unknowns,
+            psnr,
+            loss: self.probe.held_out(problem, estimate),
+            seconds,
+            rays,
+            picture: albedo_picture(&lit, &cameras[SHOWN]),
+        }
+    }
+}
+
+fn findings(how: String, states: Vec<State>, truth: Option<Vec<Picture>>) -> Findings {
+    let mut table = Table::new(&["state", "unknowns", "psnr", "loss", "seconds", "rays"]);
+    let mut rows = Vec::new();
+    let number = |value: Option<f64>, unit: &str| {
+        value.map_or("-".to_owned(), |value| format!("{}{unit}", brief(value)))
+    };
+    for state in &states {
+        table.row(&[
+            state.name.as_str().into(),
+            (state.unknowns as u64).into(),
+            state.psnr.into(),
+            state.loss.into(),
+            state.seconds.into(),
+            state.rays.into(),
+        ]);
+        rows.push(vec![
+            state.name.clone(),
+            state.unknowns.to_string(),
+            number(state.psnr, " dB"),
+            number(state.loss, ""),
+            format!("{:.0}", state.seconds),
+            format!("{:.1}", state.rays as f64 * 1e-6),
+        ]);
+    }
+    let point = |state: &State| Some([state.rays as f64, state.psnr.or(state.loss)?]);
+    let known = truth.is_some();
+    let series = |name: &str, solver: &str| Series {
+        name: name.to_owned(),
+        points: (states.iter().filter(|s| s.name.starts_with(solver)))
+            .filter_map(point)
+            .collect(),
+        ..Series::default()
+    };
+    let plot = Plot {
+        title: "Textures".to_owned(),
+        x: Axis::logarithmic("rays"),
+        y: Axis::linear(if known {
+            "PSNR of albedo pictures, dB"
+        } else {
+            "held-out l1 loss, radiance"
+        }),
+        series: vec![
+            series("transport cache: objects, textures", "cache"),
+            series("paper: triangles, subdivisions", "paper"),
+        ],
+        ..Plot::default()
+    };
+    let seen = seen(&states);
+    let mut grid = Grid::new(3);
+    let shown = truth.and_then(|pictures| pictures.into_iter().nth(SHOWN));
+    grid.pictures
+        .extend(shown.map(|picture| ("truth".to_owned(), picture)));
+    let pictures = states.into_iter().map(|state| (state.name, state.picture));
+    grid.pictures.extend(pictures);
+    Findings {
+        how,
+        tables: vec![("", table)],
+        plots: vec![("", plot)],
+        summary: Summary {
+            columns: vec![
+                "state",
+                "unknowns",
+                "albedo pictures, PSNR",
+                "held-out loss",
+                "seconds",
+                "M rays",
+            ],
+            rows,
+        },
+        seen,
+        pictures: vec![("-albedo", grid)],
+    }
+}
+
+fn seen(states: &[State]) -> Vec<String> {
+    let score = |state: &State| match (state.psnr, state.loss) {
+        (Some(psnr), _) => format!("{psnr:.1} dB"),
+        (None, Some(loss)) => format!("a loss of {}", brief(loss)),
+        (None, None) => "nothing measured".to_owned(),
+    };
+    let course: Vec<String> = states
+        .iter()
+        .map(|s| format!("{} {}", s.name, score(s)))
+        .collect();
+    // Higher is better for both.
+    let value = |state: &State| {
+        state
+            .psnr
+            .or(state.loss.map(|loss| -loss))
+            .unwrap_or(f64::NAN)
+    };
+    let mut seen = vec![format!("{}.", course.join("; "))];
+    if let [objects, textures, triangles @ ..] = states {
+        let best = triangles
+            .iter()
+            .max_by(|a, b| value(a).total_cmp(&value(b)));
+        let finest = triangles.last();
+        if let Some((best, finest)) = best.zip(finest) {
+            seen.push(format!(
+                "The paper's coarse-to-fine descent {} on one colour an object, is best with \"{}\", and {} each subdivision: the \
+                 paper is {} in this time.",
+                if value(best) > value(objects) { "improves" } else { "does not improve" },
+                best.name,
+                if best.name == finest.name { "gains with" } else { "does not gain with" },
+                if value(best) > value(objects) && best.name == finest.name {
+                    "confirmed"
+                } else {
+                    "not confirmed"
+                },
+            ));
+            seen.push(format!(
+                "The transport cache's textures stand at {} after {:.1} million rays, the descent's best at {} after {:.1}.",
+                score(textures),
+                textures.rays as f64 * 1e-6,
+                score(best),
+                best.rays as f64 * 1e-6,
+            ));
+        }
+    }
+    seen
+}
