@@ -59,7 +59,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     // The same room of other sizes, and with something far away.
     let mut lines = Vec::new();
     let sizes: Vec<f64> = powers(-6, 6);
-    let far: Vec<f64> = powers(1, 8);
+    let far: Vec<f64> = powers(1, 6);
     let changed: [(&str, Vec<f64>, moved::Change); 2] = [
         ("size of the room", sizes, moved::scaled),
         ("distance of an outlier, in rooms", far, moved::with_outlier),
