@@ -181,6 +181,7 @@ impl Ladder<'_, '_> {
         if self.stages < 1 {
             self.light_field()?;
             self.reached(1);
+            self.tell()?;
         }
         if self.budget.round_paths == 0 {
             return Ok(Termination::Converged);
@@ -188,6 +189,7 @@ impl Ladder<'_, '_> {
         if self.stages < 2 {
             self.objects()?;
             self.reached(2);
+            self.tell()?;
         }
         let mut ended = Termination::Converged;
         if self.stages < 3 {
@@ -195,6 +197,7 @@ impl Ladder<'_, '_> {
                 self.lobes()?;
             }
             self.reached(3);
+            self.tell()?;
         }
         if self.stages < STAGES {
             ended = self.rounds()?;
@@ -206,6 +209,12 @@ impl Ladder<'_, '_> {
         self.settle_lobes()?;
         self.reached(STAGES);
         Ok(ended)
+    }
+
+    /// Lets the observer keep the stage that has just been finished, however soon the next one is.
+    fn tell(&mut self) -> Result<(), Termination> {
+        self.monitor
+            .report(&self.estimate, &|_| self.checkpoint.clone())
     }
 
     /// Records what was found out about exposures.
