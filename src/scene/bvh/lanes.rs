@@ -19,6 +19,14 @@ pub(super) trait Lanes<const N: usize>: Copy {
     fn le(self, other: Self) -> u32;
     /// Bit i is set where lane i of `self` < lane i of `other`.
     fn lt(self, other: Self) -> u32;
+    /// Puts the entries whose bits are set first, in order; what comes behind them is undefined.
+    fn pack(entries: &[u32; N], mask: u32, packed: &mut [u32; N]);
+}
+
+/// The three coordinates, each in all lanes.
+#[inline(always)]
+pub(super) fn splat<const N: usize, L: Lanes<N>>([x, y, z]: [f32; 3]) -> [L; 3] {
+    [L::splat(x), L::splat(y), L::splat(z)]
 }
 
 /// Plain arrays; the compiler may use whatever vectors the target has.
@@ -86,6 +94,21 @@ impl<const N: usize> Lanes<N> for Portable<N> {
     fn lt(self, other: Self) -> u32 {
         self.mask(other, |a, b| a < b)
     }
+    #[inline(always)]
+    fn pack(entries: &[u32; N], mask: u32, packed: &mut [u32; N]) {
+        pack_each(entries, mask, packed);
+    }
+}
+
+#[inline(always)]
+fn pack_each<const N: usize>(entries: &[u32; N], mut mask: u32, packed: &mut [u32; N]) {
+    for slot in packed {
+        if mask == 0 {
+            return;
+        }
+        *slot = entries[mask.trailing_zeros() as usize & (N - 1)];
+        mask &= mask - 1;
+    }
 }
 
 /// Asks for the first four cache lines at an address, which need not be valid; does nothing where there is no such
@@ -107,7 +130,7 @@ pub(super) use vectors::{Eight, Four};
 
 #[cfg(target_arch = "x86_64")]
 mod vectors {
-    use super::Lanes;
+    use super::{Lanes, pack_each};
     use std::arch::x86_64::*;
 
     /// A 128-bit vector. Every x86-64 processor has SSE2.
@@ -120,7 +143,7 @@ mod vectors {
 
     macro_rules! lanes {
         ($name:ident, $width:literal, $set:ident, $load:ident, $store:ident, $add:ident, $sub:ident, $mul:ident,
-         $div:ident, $min:ident, $max:ident, $le:expr, $lt:expr, $mask:ident) => {
+         $div:ident, $min:ident, $max:ident, $le:expr, $lt:expr, $mask:ident, $pack:ident) => {
             // SAFETY of every block below: SSE2 is always there, and methods of `Eight` are reached only through
             // `traverse`'s functions with `#[target_feature(enable = "avx2")]`, which are called only where
             // `InstructionSet::widest` found AVX2; loads and stores are unaligned ones on references to arrays of
@@ -172,6 +195,10 @@ mod vectors {
                 fn lt(self, other: Self) -> u32 {
                     unsafe { $mask(($lt)(self.0, other.0)) as u32 }
                 }
+                #[inline(always)]
+                fn pack(entries: &[u32; $width], mask: u32, packed: &mut [u32; $width]) {
+                    $pack(entries, mask, packed);
+                }
             }
         };
     }
@@ -190,7 +217,8 @@ mod vectors {
         _mm_max_ps,
         _mm_cmple_ps,
         _mm_cmplt_ps,
-        _mm_movemask_ps
+        _mm_movemask_ps,
+        pack_each
     );
     lanes!(
         Eight,
@@ -206,6 +234,39 @@ mod vectors {
         _mm256_max_ps,
         _mm256_cmp_ps::<_CMP_LE_OQ>,
         _mm256_cmp_ps::<_CMP_LT_OQ>,
-        _mm256_movemask_ps
+        _mm256_movemask_ps,
+        pack_eight
     );
+
+    /// For each mask, a byte a lane: the lanes of the set bits, in order.
+    static PACKING: [u64; 256] = packing();
+
+    const fn packing() -> [u64; 256] {
+        let mut table = [0; 256];
+        let mut mask = 0;
+        while mask < 256 {
+            let (mut lane, mut place) = (0, 0);
+            while lane < 8 {
+                if mask >> lane & 1 == 1 {
+                    table[mask] |= lane << place;
+                    place += 8;
+                }
+                lane += 1;
+            }
+            mask += 1;
+        }
+        table
+    }
+
+    #[inline(always)]
+    fn pack_eight(entries: &[u32; 8], mask: u32, packed: &mut [u32; 8]) {
+        let lanes = PACKING[mask as usize & 0xff];
+        // SAFETY: as above; a permutation takes its lanes modulo eight.
+        unsafe {
+            let lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(lanes as i64));
+            let entries = _mm256_loadu_si256(entries.as_ptr().cast());
+            let ordered = _mm256_permutevar8x32_epi32(entries, lanes);
+            _mm256_storeu_si256(packed.as_mut_ptr().cast(), ordered);
+        }
+    }
 }

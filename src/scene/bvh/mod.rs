@@ -3,10 +3,14 @@
 //! A hit does not depend on the hierarchy: among equally near triangles the lowest index wins, and every
 //! instruction set does the same arithmetic in the same order (no fused multiply-add).
 
+mod any;
 mod binary;
 mod build;
 mod lanes;
+mod nearest;
 mod pages;
+mod shear;
+mod slabs;
 mod split;
 mod traverse;
 
@@ -114,6 +118,7 @@ impl InstructionSet {
             && std::arch::is_x86_feature_detected!("bmi1")
             && std::arch::is_x86_feature_detected!("bmi2")
             && std::arch::is_x86_feature_detected!("lzcnt")
+            && std::arch::is_x86_feature_detected!("popcnt")
         {
             let wide = std::arch::is_x86_feature_detected!("avx512f")
                 && std::arch::is_x86_feature_detected!("avx512vl")
@@ -173,5 +178,15 @@ impl Bvh {
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
         traverse::occluded(self, ray)
+    }
+}
+
+/// Asks for the memory of a child that will soon be visited.
+#[inline(always)]
+fn prefetch(nodes: &[Node], groups: &[Group], child: Child) {
+    if child.is_leaf() {
+        lanes::prefetch(groups.as_ptr().wrapping_add(child.groups().start));
+    } else {
+        lanes::prefetch(nodes.as_ptr().wrapping_add(child.0 as usize));
     }
 }
