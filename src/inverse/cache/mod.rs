@@ -15,6 +15,7 @@ pub mod evaluate;
 pub mod fit;
 pub mod judge;
 pub mod ladder;
+pub mod lamp_albedo;
 pub mod linear;
 pub mod memory;
 pub mod path_noise;

@@ -2,9 +2,9 @@
 
 use super::Ladder;
 use crate::inverse::cache::errors::standard_errors;
+use crate::inverse::cache::lamp_albedo;
 use crate::inverse::cache::linear::descend;
 use crate::inverse::cache::path_noise::share_paths;
-use crate::inverse::cache::roles;
 use crate::inverse::solver::Termination;
 use glam::Vec3;
 
@@ -42,11 +42,13 @@ impl Ladder<'_, '_> {
         for (cluster, offset) in clusters.iter_mut().zip(offsets) {
             cluster.residuals = cluster.residuals.map(|r| r - offset);
         }
-        let free = roles::free(&self.roles);
-        let found = descend(clusters, &summed.about, &free, &self.prior);
+        let free = lamp_albedo::free(&self.roles);
+        let prior = lamp_albedo::beliefs(&self.prior, &self.roles);
+        let found = descend(clusters, &summed.about, &free, &prior);
         self.monitor.progress.iterations += 1;
         let errors = standard_errors(&found.equations, &free, self.roles.len());
         self.unknowns = found.unknowns;
+        lamp_albedo::leave_out(&mut self.unknowns, &self.roles);
         self.merge_errors(errors);
         self.hold();
         let factor = |object: usize| {

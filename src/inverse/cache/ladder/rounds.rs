@@ -4,6 +4,7 @@ use super::Ladder;
 use crate::inverse::cache::accumulate::Accumulated;
 use crate::inverse::cache::errors::standard_errors;
 use crate::inverse::cache::evaluate::Linearised;
+use crate::inverse::cache::lamp_albedo;
 use crate::inverse::cache::linear::descend;
 use crate::inverse::cache::path_noise::{self, share_paths};
 use crate::inverse::cache::roles;
@@ -42,8 +43,9 @@ impl Ladder<'_, '_> {
             self.roles.len(),
             self.budget.round_paths,
         );
-        let free = roles::free(&self.roles);
+        let free = lamp_albedo::free(&self.roles);
         let places = roles::places(&free, self.roles.len());
+        let prior = lamp_albedo::beliefs(&self.prior, &self.roles);
         let mut about = self.unknowns.clone();
         let mut sums = Accumulated::default();
         let mut outcome = Termination::Steps;
@@ -54,9 +56,12 @@ impl Ladder<'_, '_> {
             }
             // Path lengths are steered by what is believed at the start, the same in every round.
             sums.add(self.linearised(&lights, 2, round, &about, &places)?);
-            let found = descend(sums.mean(), &about, &free, &self.prior);
+            let mut mean = sums.mean();
+            lamp_albedo::hold_exitance(&mut mean, &self.roles, &places);
+            let found = descend(mean, &about, &free, &prior);
             let errors = standard_errors(&found.equations, &free, self.roles.len());
             self.unknowns = found.unknowns;
+            lamp_albedo::leave_out(&mut self.unknowns, &self.roles);
             self.trust = found.trust;
             self.path_noise = path_noise::shares(&found.clusters, self.roles.len());
             let step = largest_step(&about, &self.unknowns);
@@ -79,10 +84,9 @@ impl Ladder<'_, '_> {
                 break;
             }
         }
-        self.summed = Some(Summed {
-            clusters: sums.mean(),
-            about,
-        });
+        let mut clusters = sums.mean();
+        lamp_albedo::hold_exitance(&mut clusters, &self.roles, &places);
+        self.summed = Some(Summed { clusters, about });
         let reported = self.reported();
         let [median, tail] = reported.all.map(|e| e * 100.0);
         let [median_of_paths, tail_of_paths] = reported.of_paths.map(|e| e * 100.0);
