@@ -12,6 +12,7 @@ use super::trust::Trust;
 use crate::inverse::parameters::Unknowns;
 use glam::DVec3;
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 /// Up to so many parameters, matrices over pairs of them are kept.
 const MOST_DENSE: usize = 256;
@@ -116,25 +117,66 @@ impl NormalEquations {
 impl Matrices {
     /// Of linearised clusters with `n` free parameters.
     pub fn new(linearised: &[Linearised], n: usize, trust: &Trust) -> Self {
-        let zeros = || std::array::from_fn(|_| DMatrix::zeros(n, n));
-        let (mut hessian, mut scatter): ([DMatrix<f64>; 3], [DMatrix<f64>; 3]) = (zeros(), zeros());
-        for cluster in linearised {
-            let weight = trust.weight(cluster);
-            let scores: Vec<DVec3> = cluster.scores(weight).collect();
-            for (&(i, ia, ib), &si) in cluster.rows.iter().zip(&scores) {
-                let row = weight * (ia + ib) * 0.25;
-                for (&(j, ja, jb), &sj) in cluster.rows.iter().zip(&scores) {
-                    if j > i {
-                        continue;
-                    }
-                    let (h, s) = (row * (ja + jb), si * sj);
-                    for c in 0..3 {
-                        hessian[c][(i, j)] += h[c];
-                        scatter[c][(i, j)] += s[c];
-                    }
-                }
+        let terms: Vec<Vec<Term>> = (linearised.par_iter())
+            .map(|cluster| Term::of(cluster, trust.weight(cluster)))
+            .collect();
+        let mut where_met: Vec<Vec<(usize, Term)>> = vec![Vec::new(); n];
+        for (cluster, terms) in terms.iter().enumerate() {
+            for term in terms {
+                where_met[term.place].push((cluster, *term));
             }
         }
-        Self { hessian, scatter }
+        // Each row of the lower triangles by itself, its clusters in order.
+        let rows: Vec<Vec<[DVec3; 2]>> = (where_met.par_iter().enumerate())
+            .map(|(i, met)| {
+                let mut row = vec![[DVec3::ZERO; 2]; i + 1];
+                for (cluster, own) in met {
+                    let weighted = own.weighted * 0.25;
+                    for other in terms[*cluster].iter().filter(|other| other.place <= i) {
+                        let [h, s] = &mut row[other.place];
+                        *h += weighted * other.derivative;
+                        *s += own.score * other.score;
+                    }
+                }
+                row
+            })
+            .collect();
+        let matrix = |which: usize, channel: usize| {
+            DMatrix::from_fn(n, n, |i, j| match rows[i].get(j) {
+                Some(both) => both[which][channel],
+                None => 0.0,
+            })
+        };
+        Self {
+            hessian: std::array::from_fn(|c| matrix(0, c)),
+            scatter: std::array::from_fn(|c| matrix(1, c)),
+        }
+    }
+}
+
+/// What one parameter adds to the matrices in one cluster.
+#[derive(Debug, Clone, Copy)]
+struct Term {
+    place: usize,
+    /// Sum of the derivatives of both sets.
+    derivative: DVec3,
+    /// The same times the cluster's weight.
+    weighted: DVec3,
+    /// Contribution to the descent.
+    score: DVec3,
+}
+
+impl Term {
+    fn of(cluster: &Linearised, weight: DVec3) -> Vec<Self> {
+        let scores = cluster.scores(weight);
+        let terms = cluster.rows.iter().zip(scores);
+        terms
+            .map(|(&(place, a, b), score)| Self {
+                place,
+                derivative: a + b,
+                weighted: weight * (a + b),
+                score,
+            })
+            .collect()
     }
 }

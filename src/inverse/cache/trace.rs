@@ -26,6 +26,9 @@ use std::f32::consts::FRAC_1_PI;
 const ROULETTE_AFTER: u32 = 2;
 /// Paths are never ended with a higher chance than this at one vertex.
 const LEAST_SURVIVAL: f32 = 0.1;
+/// Paths are never continued with a higher chance than this. Their variance is finite while the square of the albedo is
+/// below it.
+const MOST_SURVIVAL: f32 = 0.999;
 
 /// Everything that a path needs and that stays the same while a cache is traced.
 pub struct Tracer<'a> {
@@ -228,7 +231,7 @@ impl Tracer<'_> {
             let believed_here = believed * left;
             let mut survival = 1.0;
             if bounce >= ROULETTE_AFTER {
-                survival = believed_here.clamp(LEAST_SURVIVAL, 0.95);
+                survival = believed_here.clamp(LEAST_SURVIVAL, MOST_SURVIVAL);
                 if end >= survival {
                     vertices.push(vertex);
                     return rays;

@@ -20,6 +20,8 @@ const PATHS_A_PIXEL: (usize, usize) = (32, 512);
 /// Pixels used at most, and how many of them decide whether to go on with the rest.
 const MOST_PIXELS: usize = 2_000;
 const FIRST_PIXELS: usize = 250;
+/// A gain of so many standard errors on the first pixels needs no more of them.
+const PLAIN: f64 = 2.0 * SIGNIFICANT;
 /// One pixel's gain counts up to so many times what two of three stay below.
 const CLIP: f64 = 5.0;
 
@@ -53,8 +55,8 @@ pub struct Untouched<'a> {
 /// Compares one colour and a texture on pixels that the texture was fitted without.
 ///
 /// Both see the same light: full paths from the pixel's own points, in two independent sets whose errors are
-/// multiplied, so that the noise of the paths favours neither. Where a first part of the pixels leaves no hope that all
-/// of them together would speak for the texture, the rest are not traced.
+/// multiplied, so that the noise of the paths favours neither. Where a first part of the pixels speaks plainly for the
+/// texture, or leaves no hope that all of them together would, the rest are not traced.
 pub fn try_out(
     lit: &Lit,
     cells: &Cells,
@@ -86,10 +88,16 @@ pub fn try_out(
         comparison.compare(&pixels)
     };
     let mut compared = part(true);
-    if !is_hopeless(&Trial::of(&compared), count) {
+    let first = Trial::of(&compared);
+    if !is_plain(&first) && !is_hopeless(&first, count) {
         compared.extend(part(false));
     }
     Trial::of(&compared)
+}
+
+/// Whether the pixels compared so far decide for the texture already.
+fn is_plain(first: &Trial) -> bool {
+    first.pixels >= FIRST_PIXELS / 2 && first.gain > PLAIN * first.noise
 }
 
 /// Whether `count` pixels would hardly reach a significant gain, after what some of them showed.
@@ -198,7 +206,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_loss_ends_a_trial_early_and_a_promising_gain_does_not() {
+    fn a_loss_or_a_plain_gain_ends_a_trial_early_and_a_promising_gain_does_not() {
         let first = |gain: f64| Trial {
             gain,
             noise: 1.0,
@@ -209,6 +217,12 @@ mod tests {
         assert!(is_hopeless(&first(-1.0), 2000));
         assert!(is_hopeless(&first(0.3), 2000));
         assert!(!is_hopeless(&first(0.5), 2000));
+        assert!(is_plain(&first(8.5)) && !is_plain(&first(7.0)));
+        // A few pixels are never enough, whatever they show.
+        assert!(!is_plain(&Trial {
+            pixels: 40,
+            ..first(50.0)
+        }));
         // No noise at all: whatever is gained is significant.
         let silent = |gain: f64| Trial {
             noise: 0.0,
