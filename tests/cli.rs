@@ -355,6 +355,10 @@ fn results_are_rendered_edited_and_moved() {
         "1",
         "--albedo",
         "floor=0.1,0.2,0.3",
+        "--roughness",
+        "floor=0.25",
+        "--specular",
+        "floor=0.5",
     ];
     edit.extend(dark);
     done(&place.relit(&edit));
@@ -369,6 +373,26 @@ fn results_are_rendered_edited_and_moved() {
     assert_eq!(
         edited["objects"]["floor"]["albedo"],
         serde_json::json!([0.1, 0.2, 0.3])
+    );
+    assert_eq!(edited["objects"]["floor"]["roughness"], 0.25);
+    assert_eq!(edited["objects"]["floor"]["specular"], 0.5);
+    for (value, words) in [
+        ("floor=0", "above 0"),
+        ("floor=1.5", "not above 1"),
+        ("moon=0.5", "lamp"),
+        ("floor=NaN", "NaN"),
+        ("floor", "NAME=v"),
+    ] {
+        refused(
+            &place.relit(&["edit", "out", "--roughness", value, "--out", "x"]),
+            2,
+            &[words],
+        );
+    }
+    refused(
+        &place.relit(&["edit", "out", "--specular", "floor=-1", "--out", "x"]),
+        2,
+        &["floor", "from 0"],
     );
     refused(
         &place.relit(&["edit", "out", "--emission", "moon=1,1,1", "--out", "x"]),

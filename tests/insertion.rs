@@ -386,13 +386,15 @@ fn naive_pasting_is_lit_by_harmonics_and_hidden_behind_the_scene() {
         let error = harmonics.irradiance(Vec3::Y) / std::f32::consts::PI - 1.0;
         assert!(error.abs().max_element() < tolerance, "{error}");
         let object = placed(&lit, block(), gray(0.25, 0.0), DVec3::new(0.0, -0.5, 0.0));
-        let picture = naive::paste(&backdrop, &lit, &[object], &[harmonics], Vec3::ONE);
+        let pasted = naive::Pasted::new(&backdrop, &lit, &[object], &[harmonics], Vec3::ONE);
+        let picture = pasted.over(&backdrop.photograph);
         let middle = picture.pixels[(SIDE / 2 * SIDE + SIDE / 2) as usize];
         assert!((middle - 0.25).abs().max_element() < 0.25 * tolerance);
         assert_eq!(picture.pixels[0], backdrop.photograph.pixels[0]);
     }
     let object = placed(&lit, block(), gray(0.25, 0.0), DVec3::new(0.0, -0.5, -3.6));
-    let picture = naive::paste(&backdrop, &lit, &[object], &[seen], Vec3::ONE);
+    let pasted = naive::Pasted::new(&backdrop, &lit, &[object], &[seen], Vec3::ONE);
+    let picture = pasted.over(&backdrop.photograph);
     assert!(picture == *backdrop.photograph);
 }
 

@@ -6,6 +6,8 @@ use glam::{DVec3, Vec3};
 use relit::math::picture::Picture;
 use relit::session::command::{OpenOptions, Placement, Source};
 use relit::session::edits::{Edits, ObjectEdit};
+use relit::session::insertion::Inserting;
+use relit::session::light::Light;
 use relit::session::photographs::Photographs;
 use relit::session::snapshot::OpenCapture;
 use std::path::Path;
@@ -130,4 +132,46 @@ fn what_is_ended_midway_leaves_whole_photographs_and_nothing_of_the_next() {
         .expect("a folder")
         .flatten();
     assert!(!names.any(|entry| entry.file_name().to_string_lossy().starts_with("001")));
+}
+
+#[test]
+fn the_screen_shows_what_the_files_hold() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut edits = dimmed(0.25);
+    let red = ObjectEdit {
+        albedo: Some(Vec3::new(0.8, 0.1, 0.1)),
+        ..ObjectEdit::default()
+    };
+    edits.set(0, red);
+    let mut work = work(&edits, vec![block(folder.path())]);
+    (work.samples, work.denoise, work.frames) = (256, true, vec![1]);
+    let light = Light::new(work.found.clone(), work.edited.clone(), &work.settings);
+    let shown = |placements: &[Placement]| {
+        let mut inserting = Inserting::default();
+        inserting.look(1);
+        inserting.place(placements.to_vec());
+        while inserting.is_busy() {
+            inserting.draw(&work.capture, &light, 1.0).expect("drawn");
+        }
+        inserting.shown().expect("a composite")
+    };
+    let prefix = |_: usize| folder.path().join("file");
+    assert_eq!(
+        work.write(&prefix, &|_| true).expect("written").photographs,
+        1
+    );
+    let file = |kind: &str| read(&folder.path().join(format!("file.{kind}.exr")));
+
+    // Without objects the composite is the photograph in the changed light.
+    let (relit, empty) = (file("relit"), shown(&[]));
+    assert!(relit == *empty.composite && relit == *empty.naive);
+    // With objects it is what the file holds but for their own noise, which is smoothed in files only.
+    let (composite, full) = (file("composite"), shown(&work.placements));
+    assert!(file("naive") == *full.naive && *full.naive != relit);
+    let pixels = composite.pixels.iter().zip(&full.composite.pixels);
+    let error = pixels.map(|(file, screen)| (*file - *screen).abs().max_element());
+    let brightest = relit.pixels.iter().map(|p| p.max_element());
+    let brightest = brightest.fold(0.0, f32::max);
+    let mean = error.sum::<f32>() / composite.pixels.len() as f32;
+    assert!(mean < 0.01 * brightest, "{mean} of {brightest}");
 }

@@ -411,6 +411,10 @@ fn edits_show_at_once_are_saved_and_come_back_while_the_estimate_stays() {
     let asked = Instant::now();
     assert!(rig.session.send(Command::Edit(edits.clone())));
     let dark = rig.until("the lamp off", |s| light(s) == Some(0.0));
+    let composite = |s: &Snapshot| Some(mean(&s.insertion.as_ref()?.composite));
+    rig.until("the photograph without the lamp", |s| {
+        composite(s) == Some(0.0)
+    });
     println!("first picture after {:?}", asked.elapsed());
     assert_eq!(dark.edits, edits);
     assert!(dark.estimate.objects[lamp].emission.max_element() > 0.0);
@@ -424,9 +428,13 @@ fn edits_show_at_once_are_saved_and_come_back_while_the_estimate_stays() {
     let saved = image::open(out.join("views/000.render.exr")).expect("an image");
     assert!(saved.to_rgb32f().pixels().all(|p| p.0 == [0.0; 3]));
     assert!(rig.session.send(Command::Edit(Edits::default())));
-    rig.until("light again", |s| light(s).is_some_and(|l| l > 0.0));
+    rig.until("light again", |s| {
+        light(s).is_some_and(|l| l > 0.0) && s.insertion.is_none()
+    });
     assert!(rig.session.send(Command::Resume(out)));
-    let resumed = rig.until("the edits again", |s| !s.edits.is_empty());
+    let resumed = rig.until("the edits again", |s| {
+        !s.edits.is_empty() && composite(s).is_some_and(|light| light < 0.01)
+    });
     assert_eq!(resumed.edits, edits);
     assert!(resumed.estimate.objects[lamp].emission.max_element() > 0.0);
 }

@@ -120,7 +120,7 @@ actions! {
     CompareRelit, Edit, "Before and after relighting", "Shows the re-render and the mixed light under a wipe", key(Key::B);
     ResetMix, Edit, "Reset the light mixer", "Puts all lamps back to the light that was found", None;
     KeepMix, Edit, "Give lamps this light", "Makes the mixed light the lamps' own emission, for exports and composites", None;
-    Material, Edit, "Material", "Shows albedo and emission of the selected object, to be changed", key(Key::M);
+    Material, Edit, "Material", "Shows albedo, emission and gloss of the selected object, to be changed", key(Key::M);
     SwitchLamp, Edit, "Switch lamp off / on", "Switches the selected lamp off, or on again", key(Key::K);
     SolveOn, Solve, "Solve on with pinned values", "Holds the pinned values and solves the rest on from the last stage", ctrl_shift(Key::R);
     ResetMaterial, Edit, "Reset material", "Puts the selected object back to what was found", None;

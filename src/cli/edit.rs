@@ -1,6 +1,6 @@
-//! `relit edit`: lamps off, walls recoloured.
+//! `relit edit`: lamps off, walls recoloured, surfaces polished.
 
-use crate::cli::object_values::{ObjectValues, named_color};
+use crate::cli::object_values::{ObjectValues, named_color, named_number};
 use crate::cli::photographs::write_with_progress;
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
@@ -25,6 +25,12 @@ pub struct EditArguments {
     /// Diffuse reflectance of an object, 0 to 1
     #[arg(long, value_name = "NAME=R,G,B", value_parser = named_color)]
     albedo: Vec<(String, Vec3)>,
+    /// GGX roughness of an object's specular lobe, above 0 (mirror-like) to 1; gives it a lobe if it has none
+    #[arg(long, value_name = "NAME=V", value_parser = named_number)]
+    roughness: Vec<(String, f32)>,
+    /// Specular reflectance of an object at normal incidence, 0 to 1; gives it a lobe if it has none, 0 takes it away
+    #[arg(long, value_name = "NAME=V", value_parser = named_number)]
+    specular: Vec<(String, f32)>,
     /// Pictures to write: all frames at full size, N frames, or none [default: 16, long side 1024]
     #[arg(long, value_name = "all|N|none", value_parser = crate::cli::arguments::frames)]
     views: Option<Frames>,
@@ -56,6 +62,8 @@ pub fn edit(arguments: &EditArguments) -> Result<()> {
     let values = ObjectValues {
         emission: arguments.emission.clone(),
         albedo: arguments.albedo.clone(),
+        roughness: arguments.roughness.clone(),
+        specular: arguments.specular.clone(),
     };
     values.change(&capture.scene, &mut edits)?;
     let edited = Arc::new(edits.apply(&estimate));

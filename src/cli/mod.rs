@@ -70,6 +70,7 @@ fn act(arguments: Arguments, window: Option<Window>) -> Result<()> {
             let known = ObjectValues {
                 emission: capture.known.known_emission,
                 albedo: capture.known.known_albedo,
+                ..ObjectValues::default()
             };
             solve::solve(&source, &capture.solve, &known)
         }

@@ -1,4 +1,4 @@
-//! Values of objects as the command line names them: NAME=R,G,B.
+//! Values of objects as the command line names them: NAME=R,G,B and NAME=V.
 
 use crate::cli::arguments::triple;
 use crate::error::{Error, Result};
@@ -6,13 +6,17 @@ use crate::scene::Scene;
 use crate::session::edits::{Edits, ObjectEdit};
 use glam::Vec3;
 
-/// Emission and albedo of named objects.
+/// Emission and material of named objects.
 #[derive(Debug, Clone, Default)]
 pub struct ObjectValues {
     /// Radiance, W·sr⁻¹·m⁻².
     pub emission: Vec<(String, Vec3)>,
     /// Diffuse reflectance, 0 to 1.
     pub albedo: Vec<(String, Vec3)>,
+    /// GGX roughness α, above 0 and up to 1.
+    pub roughness: Vec<(String, f32)>,
+    /// Specular reflectance at normal incidence, 0 to 1; 0 takes the lobe away.
+    pub specular: Vec<(String, f32)>,
 }
 
 impl ObjectValues {
@@ -36,6 +40,14 @@ impl ObjectValues {
     }
 
     fn each(&self, scene: &Scene, edits: &mut Edits, and: impl Fn(&mut ObjectEdit)) -> Result<()> {
+        let mut set = |name: &str, set: &dyn Fn(&mut ObjectEdit)| {
+            let object = find(scene, name)?;
+            let mut edit = edits.object(object);
+            set(&mut edit);
+            and(&mut edit);
+            edits.set(object, edit);
+            Ok(())
+        };
         for (name, emission) in &self.emission {
             if emission.min_element() < 0.0 {
                 return Err(Error::usage(
@@ -44,11 +56,7 @@ impl ObjectValues {
                     "give values of 0 or more",
                 ));
             }
-            let object = find(scene, name)?;
-            let mut edit = edits.object(object);
-            edit.emission = Some(*emission);
-            and(&mut edit);
-            edits.set(object, edit);
+            set(name, &|edit| edit.emission = Some(*emission))?;
         }
         for (name, albedo) in &self.albedo {
             if albedo.min_element() < 0.0 || albedo.max_element() > 1.0 {
@@ -58,11 +66,27 @@ impl ObjectValues {
                     "give values from 0 to 1",
                 ));
             }
-            let object = find(scene, name)?;
-            let mut edit = edits.object(object);
-            edit.albedo = Some(*albedo);
-            and(&mut edit);
-            edits.set(object, edit);
+            set(name, &|edit| edit.albedo = Some(*albedo))?;
+        }
+        for (name, roughness) in &self.roughness {
+            if !(*roughness > 0.0 && *roughness <= 1.0) {
+                return Err(Error::usage(
+                    format!("roughness of {name}"),
+                    "a lobe's GGX roughness lies above 0 and not above 1",
+                    "give a value like 0.3",
+                ));
+            }
+            set(name, &|edit| edit.roughness = Some(*roughness))?;
+        }
+        for (name, specular) in &self.specular {
+            if !(0.0..=1.0).contains(specular) {
+                return Err(Error::usage(
+                    format!("specular reflectance of {name}"),
+                    "a surface reflects between none and all of the light",
+                    "give a value from 0 (no lobe) to 1",
+                ));
+            }
+            set(name, &|edit| edit.specular = Some(*specular))?;
         }
         Ok(())
     }
@@ -86,4 +110,16 @@ pub fn named_color(text: &str) -> std::result::Result<(String, Vec3), String> {
         .rsplit_once('=')
         .ok_or("NAME=r,g,b is wanted".to_owned())?;
     Ok((name.to_owned(), triple(color)?.as_vec3()))
+}
+
+/// NAME=V.
+pub fn named_number(text: &str) -> std::result::Result<(String, f32), String> {
+    let (name, value) = text.rsplit_once('=').ok_or("NAME=v is wanted".to_owned())?;
+    let value: f32 = value
+        .parse()
+        .map_err(|_| format!("{value:?} is no number"))?;
+    if !value.is_finite() {
+        return Err(format!("{value} is no finite number"));
+    }
+    Ok((name.to_owned(), value))
 }

@@ -187,6 +187,11 @@ impl Insertion {
         &self.backdrop
     }
 
+    /// Puts another photograph of the same view behind the objects.
+    pub fn put_behind(&mut self, photograph: Arc<Picture>) {
+        self.backdrop.photograph = photograph;
+    }
+
     /// The scene and its light.
     pub fn lit(&self) -> &Arc<Lit> {
         &self.lit

@@ -110,30 +110,34 @@ pub fn harmonics_of_estimate(
     harmonics
 }
 
-/// Pastes the objects into the photograph. Each has its own harmonics; `exposure` turns their light into the
-/// photograph's values (one for harmonics of the photographs, the backdrop's for those of the estimate).
-pub fn paste(
-    backdrop: &Backdrop,
-    lit: &Lit,
-    objects: &[Arc<PlacedObject>],
-    harmonics: &[Harmonics],
-    exposure: Vec3,
-) -> Picture {
-    let width = backdrop.photograph.width as usize;
-    let world = FurnishedScene::new(lit, objects);
-    let first = lit.scene.objects.len() as u32;
-    let lens = &backdrop.camera.intrinsics;
-    let pixel_angle = (1.0 / lens.fx.abs().min(lens.fy.abs())) as f32;
-    let pixels = backdrop
-        .photograph
-        .pixels
-        .par_iter()
-        .enumerate()
-        .map(|(pixel, &photograph)| {
+/// Objects to be laid over a photograph.
+#[derive(Debug, Clone)]
+pub struct Pasted {
+    /// Pixels with an object in them, its light in the photograph's values, and how much of the pixel it covers.
+    covered: Vec<(usize, Vec3, f32)>,
+    saturation: f32,
+}
+
+impl Pasted {
+    /// Objects before a backdrop. Each has its own harmonics; `exposure` turns their light into the photograph's values
+    /// (one for harmonics of the photographs, the backdrop's for those of the estimate).
+    pub fn new(
+        backdrop: &Backdrop,
+        lit: &Lit,
+        objects: &[Arc<PlacedObject>],
+        harmonics: &[Harmonics],
+        exposure: Vec3,
+    ) -> Self {
+        let width = backdrop.photograph.width as usize;
+        let world = FurnishedScene::new(lit, objects);
+        let first = lit.scene.objects.len() as u32;
+        let lens = &backdrop.camera.intrinsics;
+        let pixel_angle = (1.0 / lens.fx.abs().min(lens.fy.abs())) as f32;
+        let covered = |pixel: usize| {
             let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
             let middle = backdrop.camera.ray(corner + 0.5);
             if !objects.iter().any(|o| o.is_near(&middle, pixel_angle)) {
-                return photograph;
+                return None;
             }
             let (mut covered, mut sum) = (0, Vec3::ZERO);
             for cell in 0..GRID * GRID {
@@ -156,17 +160,25 @@ pub fn paste(
                     covered += 1;
                 }
             }
-            if covered == 0 {
-                return photograph;
-            }
-            let alpha = covered as f32 / (GRID * GRID) as f32;
-            let pasted = sum / (GRID * GRID) as f32 + photograph * (1.0 - alpha);
-            pasted.min(Vec3::splat(backdrop.saturation))
-        })
-        .collect();
-    Picture {
-        width: backdrop.photograph.width,
-        height: backdrop.photograph.height,
-        pixels,
+            let cells = (GRID * GRID) as f32;
+            (covered > 0).then(|| (pixel, sum / cells, covered as f32 / cells))
+        };
+        Self {
+            covered: (0..backdrop.photograph.pixels.len())
+                .into_par_iter()
+                .filter_map(covered)
+                .collect(),
+            saturation: backdrop.saturation,
+        }
+    }
+
+    /// The photograph with the objects over it.
+    pub fn over(&self, photograph: &Picture) -> Picture {
+        let mut picture = photograph.clone();
+        for &(pixel, light, alpha) in &self.covered {
+            let pasted = light + photograph.pixels[pixel] * (1.0 - alpha);
+            picture.pixels[pixel] = pasted.min(Vec3::splat(self.saturation));
+        }
+        picture
     }
 }

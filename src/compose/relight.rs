@@ -3,17 +3,20 @@
 
 use crate::compose::backdrop::Backdrop;
 use crate::math::picture::Picture;
-use crate::scene::camera::Camera;
-use crate::transport::denoise::{denoise, guides};
+use crate::transport::denoise::{Guide, denoise, guides};
 use crate::transport::film::Film;
 use crate::transport::lit::Lit;
 use crate::transport::path::PathOptions;
 use glam::Vec3;
+use std::sync::Arc;
 
 /// Above this ratio light is added rather than multiplied, since dark pixels have no detail to be brightened.
 const MOST: f32 = 4.0;
-/// Samples a pixel between two questions whether to go on.
-const PASS: u32 = 2;
+/// Rows between two questions whether to go on, at least.
+const BAND: u32 = 16;
+/// Long side and samples a pixel of the renders for a first look.
+const COARSE_LONG_SIDE: u32 = 128;
+const COARSE_SAMPLES: u32 = 4;
 
 /// The photograph's values, were its view lit by `after` instead of `before` (radiances, one a pixel).
 ///
@@ -52,49 +55,109 @@ fn changed(photograph: f32, before: f32, after: f32, saturation: f32) -> f32 {
     (seen * ratio + (after - before * ratio).max(0.0)).clamp(0.0, saturation)
 }
 
-/// Renders a view in two lights from the same random numbers, pass by pass; `None` if `go_on`, which hears the share
-/// that is done, said no. With `smooth` the noise is smoothed, the same way in both.
-pub fn render_both(
-    lights: [&Lit; 2],
-    camera: &Camera,
-    options: &PathOptions,
-    (seed, frame): (u64, u64),
-    (samples, smooth): (u32, bool),
-    go_on: &dyn Fn(f32) -> bool,
-) -> Option<[Vec<Vec3>; 2]> {
-    // What is to be smoothed is rendered in two independent halves, which tell the noise.
-    let parts = if smooth { 2 } else { 1 };
-    let samples = samples.div_ceil(parts);
-    let mut halves = Vec::new();
-    for part in 0..parts {
-        let mut films = [Film::new(camera), Film::new(camera)];
-        while films[1].samples < samples {
-            let done = part as f32 + films[1].samples as f32 / samples as f32;
-            if !go_on(done / parts as f32) {
-                return None;
-            }
-            let pass = PASS.min(samples - films[1].samples);
-            for (film, lit) in films.iter_mut().zip(lights) {
-                let seed = seed.wrapping_add(u64::from(part));
-                film.add(lit, camera, options, seed, frame, pass);
-            }
+/// A photograph on its way from one light into another, a band of rows at a time.
+#[derive(Debug)]
+pub struct Relighting {
+    backdrop: Backdrop,
+    lights: [Arc<Lit>; 2],
+    options: PathOptions,
+    seed: u64,
+    /// Renders in both lights from the same random numbers; two independent pairs where noise is smoothed, which tell it.
+    pairs: Vec<[Film; 2]>,
+    next_row: u32,
+    guides: Option<[Vec<Option<Guide>>; 2]>,
+}
+
+impl Relighting {
+    /// Brings the photograph of `backdrop` from the first light into the second. With `smooth` the noise of both renders
+    /// is smoothed, in the same way.
+    pub fn new(
+        backdrop: Backdrop,
+        lights: [Arc<Lit>; 2],
+        options: PathOptions,
+        seed: u64,
+        smooth: bool,
+    ) -> Self {
+        let pair = || [0; 2].map(|_| Film::new(&backdrop.camera));
+        Self {
+            pairs: (0..1 + u8::from(smooth)).map(|_| pair()).collect(),
+            backdrop,
+            lights,
+            options,
+            seed,
+            next_row: 0,
+            guides: None,
         }
-        halves.push(films.map(|film| Picture {
+    }
+
+    /// Paths a pixel and light.
+    pub fn samples(&self) -> u32 {
+        self.pairs.iter().map(|pair| pair[1].samples).sum()
+    }
+
+    /// Whether [`Relighting::photograph`] can be asked for.
+    pub fn is_begun(&self) -> bool {
+        self.samples() >= self.pairs.len() as u32
+    }
+
+    /// Brings every pixel to `samples` paths, but stops early, between two bands of rows, once `go_on` says no; the
+    /// next call takes up the work there. Returns whether all was done.
+    pub fn refine_to(&mut self, samples: u32, go_on: impl Fn() -> bool) -> bool {
+        let height = self.backdrop.camera.intrinsics.height;
+        let band = BAND.max(2 * rayon::current_num_threads() as u32);
+        while self.samples() < samples {
+            if !go_on() {
+                return false;
+            }
+            let rows = self.next_row..(self.next_row + band).min(height);
+            let part = self.samples() as usize % self.pairs.len();
+            let key = (self.seed.wrapping_add(part as u64), self.backdrop.frame);
+            for (film, lit) in self.pairs[part].iter_mut().zip(&self.lights) {
+                let camera = &self.backdrop.camera;
+                film.add_rows(&**lit, camera, &self.options, key, rows.clone());
+            }
+            self.next_row = rows.end % height.max(1);
+        }
+        true
+    }
+
+    /// The photograph in the other light, by the samples taken so far; only between passes.
+    pub fn photograph(&mut self) -> Picture {
+        let [before, after] = self.renders();
+        relit(&self.backdrop, &before.pixels, &after.pixels)
+    }
+
+    /// The same at once, by renders of few pixels.
+    pub fn coarse(&self) -> Picture {
+        let (width, height) = (
+            self.backdrop.photograph.width,
+            self.backdrop.photograph.height,
+        );
+        let small = Backdrop {
+            camera: self.backdrop.camera.shrunk(COARSE_LONG_SIDE),
+            ..self.backdrop.clone()
+        };
+        let mut rough = Self::new(small, self.lights.clone(), self.options, self.seed, true);
+        rough.refine_to(COARSE_SAMPLES, || true);
+        let [before, after] = rough.renders().map(|render| render.enlarged(width, height));
+        relit(&self.backdrop, &before.pixels, &after.pixels)
+    }
+
+    /// Radiance in both lights.
+    fn renders(&mut self) -> [Picture; 2] {
+        let mean = |film: &Film| Picture {
             width: film.width,
             height: film.height,
             pixels: film.mean(),
-        }));
+        };
+        let [first, second] = &self.pairs[..] else {
+            return [0, 1].map(|light| mean(&self.pairs[0][light]));
+        };
+        let camera = &self.backdrop.camera;
+        let seen = || self.lights.each_ref().map(|lit| guides(&**lit, camera));
+        let guides = self.guides.get_or_insert_with(seen);
+        [0, 1].map(|light| denoise(&mean(&first[light]), &mean(&second[light]), &guides[light]))
     }
-    let mut halves = halves.into_iter();
-    let first = halves.next()?;
-    let Some(second) = halves.next() else {
-        return Some(first.map(|picture| picture.pixels));
-    };
-    let lit = |index: usize| {
-        let seen = guides(lights[index], camera);
-        denoise(&first[index], &second[index], &seen).pixels
-    };
-    Some([lit(0), lit(1)])
 }
 
 #[cfg(test)]

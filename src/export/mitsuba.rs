@@ -69,7 +69,7 @@ fn describe(xml: &mut String, scene: &Scene, parts: &[Part], folder: &str) -> st
 }
 
 fn bsdf(xml: &mut String, part: &Part) -> std::fmt::Result {
-    let lobe = part.estimate.roughness.zip(part.estimate.specular);
+    let lobe = part.estimate.lobe();
     let (kind, parameter) = match lobe {
         Some(_) => ("principled", "base_color"),
         None => ("diffuse", "reflectance"),

@@ -22,7 +22,7 @@ pub fn write(path: &Path, parts: &[Part]) -> Result<()> {
             writeln!(out, "newmtl {}", material_name(index, part))?;
             writeln!(out, "Kd {} {} {}", kd.x, kd.y, kd.z)?;
             writeln!(out, "Ke {} {} {}", ke.x, ke.y, ke.z)?;
-            match estimate.roughness.zip(estimate.specular) {
+            match estimate.lobe() {
                 Some((alpha, specular)) => {
                     writeln!(out, "Ks {specular} {specular} {specular}")?;
                     writeln!(out, "Pr {}\n", alpha.max(0.0).sqrt())?;

@@ -69,6 +69,13 @@ impl Default for ObjectEstimate {
     }
 }
 
+impl ObjectEstimate {
+    /// GGX roughness α and specular reflectance at normal incidence, where there is a lobe.
+    pub fn lobe(&self) -> Option<(f32, f32)> {
+        self.roughness.zip(self.specular)
+    }
+}
+
 /// Albedo texels with their confidence.
 #[derive(Debug, Clone)]
 pub struct TexelEstimate {
@@ -165,13 +172,10 @@ impl Estimate {
                     }
                     _ => Albedo::Constant(object.albedo),
                 };
-                let lobe = object
-                    .roughness
-                    .zip(object.specular)
-                    .map(|(roughness, specular)| Lobe {
-                        roughness,
-                        specular: Vec3::splat(specular),
-                    });
+                let lobe = object.lobe().map(|(roughness, specular)| Lobe {
+                    roughness,
+                    specular: Vec3::splat(specular),
+                });
                 Material {
                     albedo,
                     emission: object.emission,

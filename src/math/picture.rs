@@ -32,4 +32,15 @@ impl Picture {
         let expected = u64::from(self.width) * u64::from(self.height);
         expected > 0 && self.pixels.len() as u64 == expected
     }
+
+    /// The picture at another size, each new pixel one of the old.
+    pub fn enlarged(&self, width: u32, height: u32) -> Self {
+        let at = |i: u32, from: u32, to: u32| {
+            (u64::from(i) * u64::from(from) / u64::from(to.max(1))) as usize
+        };
+        Self::from_fn(width, height, |x, y| {
+            let (x, y) = (at(x, self.width, width), at(y, self.height, height));
+            self.pixels[y * self.width as usize + x]
+        })
+    }
 }

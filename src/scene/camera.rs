@@ -59,6 +59,25 @@ impl Camera {
         inside.then_some(pixel)
     }
 
+    /// The camera with its picture shrunk to a long side of at most `long_side` pixels.
+    pub fn shrunk(&self, long_side: u32) -> Self {
+        let k = &self.intrinsics;
+        let factor = f64::from(long_side.max(1)) / f64::from(k.width.max(k.height).max(1));
+        if factor >= 1.0 {
+            return self.clone();
+        }
+        let width = ((f64::from(k.width) * factor).round() as u32).max(1);
+        let height = ((f64::from(k.height) * factor).round() as u32).max(1);
+        let sx = f64::from(width) / f64::from(k.width);
+        let sy = f64::from(height) / f64::from(k.height);
+        let mut camera = self.clone();
+        let k = &mut camera.intrinsics;
+        (k.width, k.height) = (width, height);
+        (k.fx, k.cx) = (k.fx * sx, k.cx * sx);
+        (k.fy, k.cy) = (k.fy * sy, k.cy * sy);
+        camera
+    }
+
     /// Unit viewing direction.
     pub fn forward(&self) -> Vec3 {
         -self.rotation.z_axis

@@ -1,15 +1,20 @@
-//! Changes made by hand to what a solver found: lamps off, walls recoloured.
+//! Changes made by hand to what a solver found: lamps off, walls recoloured, surfaces polished.
 
 use crate::error::{Error, Result};
 use crate::inverse::estimate::{Estimate, TexelEstimate};
 use crate::inverse::known::{Known, Pinned};
 use crate::scene::Scene;
 use crate::session::save::named::Named;
+use crate::transport::bsdf::MIN_ROUGHNESS;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
+
+/// GGX roughness α and specular reflectance of a lobe of which an edit leaves one open and none was found: a satin
+/// dielectric.
+const SATIN: (f32, f32) = (0.3, 0.04);
 
 /// What is changed of one object.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
@@ -23,6 +28,13 @@ pub struct ObjectEdit {
     pub emission: Option<Vec3>,
     /// Whether it emits nothing, whatever its emission.
     pub off: bool,
+    /// GGX roughness α in (0, 1] of its lobe, instead of the estimate's; gives it a lobe where none was found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub roughness: Option<f32>,
+    /// Specular reflectance at normal incidence in [0, 1], instead of the estimate's; gives it a lobe where none was
+    /// found, and 0 takes the lobe away.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub specular: Option<f32>,
     /// Whether `albedo` is known, and held while the rest is solved.
     #[serde(skip_serializing_if = "is_false")]
     pub albedo_known: bool,
@@ -49,6 +61,18 @@ impl ObjectEdit {
     pub fn albedo(&self, found: Vec3) -> Vec3 {
         let albedo = self.albedo.map(|a| a.clamp(Vec3::ZERO, Vec3::ONE));
         albedo.unwrap_or(found)
+    }
+
+    /// GGX roughness α and specular reflectance of an object for which an estimate has those of `found`; `None` where
+    /// it has no lobe.
+    pub fn lobe(&self, found: Option<(f32, f32)>) -> Option<(f32, f32)> {
+        if self.roughness.is_none() && self.specular.is_none() {
+            return found;
+        }
+        let (roughness, specular) = found.unwrap_or(SATIN);
+        let roughness = self.roughness.unwrap_or(roughness);
+        let specular = self.specular.unwrap_or(specular).clamp(0.0, 1.0);
+        (specular > 0.0).then_some((roughness.clamp(MIN_ROUGHNESS, 1.0), specular))
     }
 
     /// What is known of the object.
@@ -115,6 +139,7 @@ impl Edits {
                 continue;
             };
             entry.emission = edit.emission(entry.emission);
+            (entry.roughness, entry.specular) = edit.lobe(entry.lobe()).unzip();
             if edit.albedo.is_some() {
                 entry.albedo = edit.albedo(entry.albedo);
                 unpaint(&mut edited, object);
@@ -282,6 +307,34 @@ mod tests {
         edits.set(1, ObjectEdit::default());
         edits.set_outside(Vec3::ONE);
         assert!(edits.is_empty());
+    }
+
+    #[test]
+    fn a_lobe_is_given_changed_and_taken_away() {
+        let edit = |roughness, specular| ObjectEdit {
+            roughness,
+            specular,
+            ..ObjectEdit::default()
+        };
+        let found = Some((0.2, 0.1));
+        assert_eq!(edit(None, None).lobe(found), found);
+        assert_eq!(edit(Some(0.5), None).lobe(found), Some((0.5, 0.1)));
+        assert_eq!(edit(None, Some(0.7)).lobe(found), Some((0.2, 0.7)));
+        assert_eq!(edit(Some(0.5), Some(0.0)).lobe(found), None);
+        // What was left open is a satin dielectric's; what no surface has is brought into range.
+        assert_eq!(edit(Some(0.5), None).lobe(None), Some((0.5, 0.04)));
+        assert_eq!(edit(None, Some(0.7)).lobe(None), Some((0.3, 0.7)));
+        let odd = edit(Some(-4.0), Some(9.0)).lobe(None);
+        assert_eq!(odd, Some((MIN_ROUGHNESS, 1.0)));
+
+        let mut edits = Edits::default();
+        edits.set(0, edit(Some(0.1), Some(0.5)));
+        let polished = edits.apply(&estimate());
+        let lobe = polished.materials()[0].lobe.expect("a lobe");
+        assert_eq!((lobe.roughness, lobe.specular), (0.1, Vec3::splat(0.5)));
+        assert!(polished.materials()[1].lobe.is_none());
+        edits.set(0, edit(None, Some(0.0)));
+        assert!(edits.apply(&polished).materials()[0].lobe.is_none());
     }
 
     #[test]

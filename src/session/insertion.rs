@@ -1,14 +1,17 @@
-//! Inserted objects: from a request to composites, coarse at once and refined a slice at a time.
+//! Composites of the shown photograph: inserted objects in it, in the light as it was changed, coarse at once and refined
+//! a slice at a time.
 
 use crate::compose::backdrop::Backdrop;
 use crate::compose::insert::Insertion as Composite;
-use crate::compose::naive::{harmonics_of_estimate, harmonics_of_photographs, paste};
+use crate::compose::naive::{Pasted, harmonics_of_estimate, harmonics_of_photographs};
 use crate::compose::object::ObjectModel;
 use crate::compose::placement::{PlacedObject, Placement};
+use crate::compose::relight::Relighting;
 use crate::error::Result;
 use crate::inverse::estimate::Estimate;
 use crate::math::sh::Harmonics;
 use crate::scene::camera::Camera;
+use crate::session::light::Light;
 use crate::session::snapshot::{Insertion, OpenCapture, Picture};
 use crate::transport::path::PathOptions;
 use glam::Vec3;
@@ -30,9 +33,9 @@ pub struct Inserted {
     /// The photograph with the objects, refined pass by pass.
     pub composite: Composite,
     /// Pasted, lit by harmonics of the photographs alone.
-    pub naive: Picture,
+    pub naive: Pasted,
     /// Pasted, lit by harmonics of the estimate.
-    pub naive_estimate: Picture,
+    pub naive_estimate: Pasted,
 }
 
 /// Objects already read, and the photographs' light; both outlast a change of placement.
@@ -67,21 +70,19 @@ impl Library {
         seed: u64,
     ) -> Inserted {
         let lit = Arc::new(estimate.lit(&capture.scene));
-        let photographed = self
-            .photographed
-            .get_or_insert_with(|| light_of_photographs(capture));
-        let naive = paste(
-            &backdrop,
-            &lit,
-            &objects,
-            &vec![*photographed; objects.len()],
-            Vec3::ONE,
-        );
+        let photographed = match objects.is_empty() {
+            true => Harmonics::default(),
+            false => *self
+                .photographed
+                .get_or_insert_with(|| light_of_photographs(capture)),
+        };
+        let same = vec![photographed; objects.len()];
+        let naive = Pasted::new(&backdrop, &lit, &objects, &same, Vec3::ONE);
         let estimated: Vec<Harmonics> = objects
             .iter()
             .map(|object| harmonics_of_estimate(&lit, object.center, options, seed))
             .collect();
-        let naive_estimate = paste(&backdrop, &lit, &objects, &estimated, backdrop.exposure);
+        let naive_estimate = Pasted::new(&backdrop, &lit, &objects, &estimated, backdrop.exposure);
         Inserted {
             composite: Composite::new(backdrop, lit, objects, *options, seed),
             naive,
@@ -112,13 +113,25 @@ pub fn backdrop(capture: &OpenCapture, estimate: &Estimate, frame: usize) -> Res
     Backdrop::new(frame, camera, photograph, estimate.exposure(frame))
 }
 
-/// The worker's insertion under way.
+/// The shown photograph on its way into the changed light.
+#[derive(Debug)]
+struct Relit {
+    relighting: Relighting,
+    light: Light,
+    frame: usize,
+    /// Samples that the photograph behind the objects was made with.
+    samples: u32,
+    photograph: Arc<Picture>,
+}
+
+/// The worker's composites under way.
 #[derive(Debug, Default)]
 pub struct Inserting {
     library: Library,
     placements: Vec<Placement>,
     frame: usize,
     stale: Option<Instant>,
+    relit: Option<Relit>,
     inserted: Option<Inserted>,
     begun: Option<Instant>,
     /// When the last slice of refinement ended, and how long it took.
@@ -132,7 +145,7 @@ impl Inserting {
     /// Replaces the inserted objects.
     pub fn place(&mut self, placements: Vec<Placement>) {
         self.placements = placements;
-        self.stale = Some(Instant::now());
+        self.update();
     }
 
     /// The inserted objects.
@@ -148,11 +161,9 @@ impl Inserting {
         }
     }
 
-    /// Takes up another estimate.
+    /// Takes up another estimate, or other changes to it.
     pub fn update(&mut self) {
-        if !self.placements.is_empty() {
-            self.stale = Some(Instant::now());
-        }
+        self.stale = Some(Instant::now());
     }
 
     /// Forgets the objects, as when another capture is opened; files stay read.
@@ -172,28 +183,33 @@ impl Inserting {
 
     /// Whether there is more to draw.
     pub fn is_busy(&self) -> bool {
-        let refining = |inserted: &Inserted| inserted.composite.samples() < ENOUGH;
-        self.stale.is_some() || self.inserted.as_ref().is_some_and(refining)
+        self.stale.is_some() || self.samples().is_some_and(|samples| samples < ENOUGH)
+    }
+
+    /// Samples a pixel of what has the fewest; `None` where there is nothing to composite.
+    fn samples(&self) -> Option<u32> {
+        let relit = self.relit.as_ref().map(|relit| relit.relighting.samples());
+        let inserted = self
+            .inserted
+            .as_ref()
+            .filter(|_| !self.placements.is_empty());
+        let inserted = inserted.map(|inserted| inserted.composite.samples());
+        relit.into_iter().chain(inserted).min()
     }
 
     /// Draws for a moment, refining for at most about `share` of the time; whether the pictures changed.
     ///
     /// # Errors
     /// An object cannot be read or placed; the objects are then taken away.
-    pub fn draw(
-        &mut self,
-        capture: &OpenCapture,
-        estimate: &Estimate,
-        options: &PathOptions,
-        share: f32,
-    ) -> Result<bool> {
+    pub fn draw(&mut self, capture: &OpenCapture, light: &Light, share: f32) -> Result<bool> {
         let started = Instant::now();
         if let Some(asked) = self.stale.take() {
             self.begun = Some(asked);
             self.inserted = None;
-            let begun = self.begin(capture, estimate, options);
+            let begun = self.begin(capture, light);
             if begun.is_err() {
                 self.placements.clear();
+                self.relit = None;
                 self.shown = None;
             }
             return begun.map(|()| true);
@@ -201,32 +217,43 @@ impl Inserting {
         let rested = self.slice.is_none_or(|(end, took)| {
             end.elapsed().as_secs_f32() * share >= took.as_secs_f32() * (1.0 - share)
         });
-        let Some(inserted) = self.inserted.as_mut().filter(|_| rested) else {
+        let Some(samples) = self.samples().filter(|&s| rested && s < ENOUGH) else {
             return Ok(false);
         };
-        if inserted.composite.samples() >= ENOUGH {
-            return Ok(false);
-        }
-        let next = inserted.composite.samples() + 1;
-        inserted
-            .composite
-            .refine_to(next, || started.elapsed() < SLICE);
+        self.refine(samples + 1, started);
         self.slice = Some((Instant::now(), started.elapsed()));
         let due = self.pictured.is_none_or(|at| at.elapsed() >= PICTURE);
-        if due || inserted.composite.samples() >= ENOUGH {
+        if due || self.samples() >= Some(ENOUGH) {
             self.picture();
             return Ok(true);
         }
         Ok(false)
     }
 
-    fn begin(
-        &mut self,
-        capture: &OpenCapture,
-        estimate: &Estimate,
-        options: &PathOptions,
-    ) -> Result<()> {
-        if self.placements.is_empty() {
+    /// Brings what has fewer samples a slice further.
+    fn refine(&mut self, samples: u32, started: Instant) {
+        let go_on = || started.elapsed() < SLICE;
+        if let Some(relit) = &mut self.relit
+            && relit.relighting.samples() < samples
+        {
+            // Smoothing takes longer than a sample: it is done whenever there are twice as many.
+            let done = relit.relighting.refine_to(samples, go_on);
+            if done && relit.relighting.is_begun() && samples >= 2 * relit.samples {
+                relit.samples = samples;
+                relit.photograph = Arc::new(relit.relighting.photograph());
+                let photograph = relit.photograph.clone();
+                if let Some(inserted) = &mut self.inserted {
+                    inserted.composite.put_behind(photograph);
+                }
+            }
+        } else if let Some(inserted) = &mut self.inserted {
+            inserted.composite.refine_to(samples, go_on);
+        }
+    }
+
+    fn begin(&mut self, capture: &OpenCapture, light: &Light) -> Result<()> {
+        if self.placements.is_empty() && !light.is_changed() {
+            self.relit = None;
             self.shown = None;
             return Ok(());
         }
@@ -238,13 +265,42 @@ impl Inserting {
                 PlacedObject::new(model, placement, &capture.scene).map(Arc::new)
             })
             .collect::<Result<Vec<_>>>()?;
-        let backdrop = backdrop(capture, estimate, self.frame)?;
-        self.inserted = Some(
-            self.library
-                .insert(capture, estimate, backdrop, objects, options, 1),
-        );
+        let mut backdrop = backdrop(capture, &light.found, self.frame)?;
+        self.relight(capture, light, &backdrop);
+        if let Some(relit) = &self.relit {
+            backdrop.photograph = relit.photograph.clone();
+        }
+        self.inserted = Some(self.library.insert(
+            capture,
+            &light.edited,
+            backdrop,
+            objects,
+            &light.options,
+            light.seed,
+        ));
         self.picture();
         Ok(())
+    }
+
+    /// Begins to bring the photograph into the changed light, unless that is under way.
+    fn relight(&mut self, capture: &OpenCapture, light: &Light, taken: &Backdrop) {
+        if !light.is_changed() {
+            self.relit = None;
+            return;
+        }
+        let same = |relit: &Relit| relit.frame == self.frame && relit.light.is(light);
+        if self.relit.as_ref().is_some_and(same) {
+            return;
+        }
+        let lights = [&light.found, &light.edited].map(|e| Arc::new(e.lit(&capture.scene)));
+        let relighting = Relighting::new(taken.clone(), lights, light.options, light.seed, true);
+        self.relit = Some(Relit {
+            photograph: Arc::new(relighting.coarse()),
+            relighting,
+            light: light.clone(),
+            frame: self.frame,
+            samples: 1,
+        });
     }
 
     fn picture(&mut self) {
@@ -253,18 +309,21 @@ impl Inserting {
         };
         self.sequence += 1;
         self.pictured = Some(Instant::now());
-        let shared = |picture: &Picture, earlier: Option<&Arc<Picture>>| match earlier {
-            Some(earlier) if **earlier == *picture => earlier.clone(),
-            _ => Arc::new(picture.clone()),
+        let behind = &inserted.composite.backdrop().photograph;
+        let shared = |picture: Picture, earlier: Option<&Arc<Picture>>| match earlier {
+            Some(earlier) if **earlier == picture => earlier.clone(),
+            _ => Arc::new(picture),
         };
         let last = self.shown.as_ref();
+        let naive = inserted.naive.over(behind);
+        let naive_estimate = inserted.naive_estimate.over(behind);
         self.shown = Some(Arc::new(Insertion {
             sequence: self.sequence,
             frame: self.frame,
             composite: Arc::new(inserted.composite.composite()),
-            naive: shared(&inserted.naive, last.map(|l| &l.naive)),
-            naive_estimate: shared(&inserted.naive_estimate, last.map(|l| &l.naive_estimate)),
-            samples: inserted.composite.samples(),
+            naive: shared(naive, last.map(|l| &l.naive)),
+            naive_estimate: shared(naive_estimate, last.map(|l| &l.naive_estimate)),
+            samples: self.samples().unwrap_or(0),
             seconds: self.begun.map_or(0.0, |at| at.elapsed().as_secs_f64()),
         }));
     }

@@ -4,7 +4,7 @@
 use crate::compose::backdrop::Backdrop;
 use crate::compose::denoise::denoised;
 use crate::compose::placement::{PlacedObject, Placement};
-use crate::compose::relight::{relit, render_both};
+use crate::compose::relight::Relighting;
 use crate::compose::write::{write_insertion, write_relit};
 use crate::error::Result;
 use crate::inverse::estimate::Estimate;
@@ -80,7 +80,8 @@ impl Photographs {
             objects.push(Arc::new(placed));
         }
         let scene = &self.capture.scene;
-        let lights = (self.relight).then(|| [self.found.lit(scene), self.edited.lit(scene)]);
+        let lights =
+            (self.relight).then(|| [&self.found, &self.edited].map(|e| Arc::new(e.lit(scene))));
         let parts = u8::from(lights.is_some()) + u8::from(!objects.is_empty());
         for (index, &frame) in self.frames.iter().enumerate() {
             let share = |part: u8, share: f32| {
@@ -116,25 +117,33 @@ impl Photographs {
     fn backdrop(
         &self,
         frame: usize,
-        lights: Option<&[Lit; 2]>,
+        lights: Option<&[Arc<Lit>; 2]>,
         go_on: &dyn Fn(f32) -> bool,
     ) -> Result<Option<Backdrop>> {
         let camera = self.capture.full_camera(frame)?;
         let photograph = self.capture.full_photograph(frame)?;
         let exposure = self.found.exposure(frame);
         let mut backdrop = Backdrop::new(frame, &camera, &photograph, exposure)?;
-        if let Some([before, after]) = lights {
-            let options = path_options(&self.settings);
-            let key = (self.settings.seed, frame as u64);
-            let both = [before, after];
-            let quality = (self.samples, self.denoise);
-            let renders = render_both(both, &camera, &options, key, quality, go_on);
-            let Some([before, after]) = renders else {
-                return Ok(None);
-            };
-            backdrop.photograph = Arc::new(relit(&backdrop, &before, &after));
+        if let Some(lights) = lights {
+            let (options, seed) = (path_options(&self.settings), self.settings.seed);
+            let taken = backdrop.clone();
+            let mut relighting =
+                Relighting::new(taken, lights.clone(), options, seed, self.denoise);
+            let samples = self.in_parts();
+            for pass in 1..=samples {
+                let done = (pass - 1) as f32 / samples as f32;
+                if !relighting.refine_to(pass, || go_on(done)) {
+                    return Ok(None);
+                }
+            }
+            backdrop.photograph = Arc::new(relighting.photograph());
         }
         Ok(Some(backdrop))
+    }
+
+    /// Samples a pixel, an even number where two halves tell the noise.
+    fn in_parts(&self) -> u32 {
+        self.samples.next_multiple_of(1 + u32::from(self.denoise))
     }
 
     /// Puts the objects in and writes the composites; `None` if that was ended.
@@ -148,7 +157,7 @@ impl Photographs {
     ) -> Result<Option<Vec<PathBuf>>> {
         // What is to be smoothed is made in two independent halves, which tell the noise.
         let parts = if self.denoise { 2 } else { 1 };
-        let samples = self.samples.div_ceil(parts);
+        let samples = self.in_parts() / parts;
         let mut made: Vec<Inserted> = Vec::new();
         for part in 0..parts {
             let mut inserted = library.insert(
@@ -172,8 +181,10 @@ impl Photographs {
             [a, b] => denoised([&a.composite, &b.composite]),
             made => (made[0].composite.composite(), made[0].composite.layers()),
         };
-        let (naive, naive_estimate) = (&made[0].naive, &made[0].naive_estimate);
+        let behind = &backdrop.photograph;
+        let naive = made[0].naive.over(behind);
+        let naive_estimate = made[0].naive_estimate.over(behind);
         let results = (&composite, layers);
-        write_insertion(prefix, &backdrop, results, naive, naive_estimate).map(Some)
+        write_insertion(prefix, &backdrop, results, &naive, &naive_estimate).map(Some)
     }
 }

@@ -46,7 +46,7 @@ pub struct Snapshot {
     pub earlier: Option<PathBuf>,
     /// Pictures of the requested view.
     pub view: Option<Arc<View>>,
-    /// Inserted objects and their composites for the requested frame.
+    /// Composites of the requested frame, where objects are inserted or anything was changed by hand.
     pub insertion: Option<Arc<Insertion>>,
     /// Events since the session began, oldest first.
     pub events: Arc<Vec<Event>>,
@@ -137,7 +137,7 @@ impl LightLayers {
     }
 }
 
-/// Composites of the inserted objects into the requested frame.
+/// Composites of the requested frame: its photograph in the light as it was changed, with the inserted objects.
 #[derive(Debug, Clone)]
 pub struct Insertion {
     /// Grows with every change.
@@ -150,7 +150,7 @@ pub struct Insertion {
     pub naive: Arc<Picture>,
     /// Pasted, lit by harmonics of the estimate.
     pub naive_estimate: Arc<Picture>,
-    /// Samples a pixel in `composite`.
+    /// Samples a pixel in `composite`, of the changed light or of the objects, whichever are fewer.
     pub samples: u32,
     /// Seconds from the request to this picture.
     pub seconds: f64,

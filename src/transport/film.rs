@@ -6,6 +6,7 @@ use crate::transport::path::{PathOptions, radiance};
 use crate::transport::world::World;
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Sums of radiance over samples, in f64, one entry a pixel.
 #[derive(Debug, Clone)]
@@ -49,13 +50,44 @@ impl Film {
         frame: u64,
         samples: u32,
     ) {
+        let rows = 0..self.height;
+        self.trace(world, camera, options, (seed, frame), rows, samples);
+        self.samples += samples;
+    }
+
+    /// Adds one path to the pixels of some rows, keyed as in [`Film::add`]. The sample counts once the last row has it;
+    /// until then [`Film::mean`] is not to be asked for.
+    pub fn add_rows(
+        &mut self,
+        world: &impl World,
+        camera: &Camera,
+        options: &PathOptions,
+        key: (u64, u64),
+        rows: Range<u32>,
+    ) {
+        let last = rows.end >= self.height;
+        self.trace(world, camera, options, key, rows, 1);
+        self.samples += u32::from(last);
+    }
+
+    fn trace(
+        &mut self,
+        world: &impl World,
+        camera: &Camera,
+        options: &PathOptions,
+        (seed, frame): (u64, u64),
+        rows: Range<u32>,
+        samples: u32,
+    ) {
         let first = self.samples;
         let width = self.width as usize;
-        let counts: Vec<(u64, u64)> = self
-            .sums
+        let top = rows.start as usize;
+        let pixels = top * width..rows.end.min(self.height) as usize * width;
+        let counts: Vec<(u64, u64)> = self.sums[pixels]
             .par_chunks_mut(width.max(1))
             .enumerate()
             .map(|(row, sums)| {
+                let row = top + row;
                 let (mut rays, mut rejected) = (0, 0);
                 for (column, sum) in sums.iter_mut().enumerate() {
                     let pixel = (row * width + column) as u64;
@@ -72,7 +104,6 @@ impl Film {
                 (rays, rejected)
             })
             .collect();
-        self.samples += samples;
         self.rays += counts.iter().map(|c| c.0).sum::<u64>();
         self.rejected += counts.iter().map(|c| c.1).sum::<u64>();
     }

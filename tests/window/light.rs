@@ -170,6 +170,47 @@ fn a_wall_is_recoloured_taken_back_and_reset() {
 }
 
 #[test]
+fn a_wall_is_given_gloss_polished_made_dull_and_taken_back() {
+    let (mut harness, recorder) = solving(Harness::builder());
+    click(&mut harness, "Select wall");
+    press(&mut harness, Modifiers::NONE, Key::M);
+    assert!(harness.query_by_label("roughness").is_none());
+    let switch_gloss = |harness: &mut Harness<'_, Window>| {
+        harness
+            .get_by_role_and_label(Role::CheckBox, "Gloss")
+            .click();
+        harness.run_steps(3);
+    };
+    switch_gloss(&mut harness);
+    let lobe = |harness: &Harness<'_, Window>| harness.state().app.estimate.objects[1].lobe();
+    assert_eq!(lobe(&harness), Some((0.3, 0.04)));
+    type_value(&mut harness, "roughness", "0.1");
+    type_value(&mut harness, "specular", "0.6");
+    assert_eq!(lobe(&harness), Some((0.1, 0.6)));
+    let sent = edits(&recorder.sent()).expect("sent").object(1);
+    assert_eq!((sent.roughness, sent.specular), (Some(0.1), Some(0.6)));
+    assert_eq!(sent.albedo, None);
+    press(&mut harness, Modifiers::COMMAND, Key::Z);
+    assert_eq!(lobe(&harness), Some((0.1, 0.04)));
+    switch_gloss(&mut harness);
+    assert!(edits(&recorder.sent()).expect("sent").is_empty());
+
+    // What was found glossy can be made dull.
+    recorder.show(|snapshot| {
+        let estimate = Arc::make_mut(&mut snapshot.estimate);
+        let wall = &mut estimate.objects[1];
+        (wall.roughness, wall.specular) = (Some(0.2), Some(0.5));
+    });
+    harness.run_steps(3);
+    harness.get_by_label_contains("specular reflectance 0.5");
+    switch_gloss(&mut harness);
+    assert_eq!(lobe(&harness), None);
+    switch_gloss(&mut harness);
+    assert_eq!(lobe(&harness), Some((0.2, 0.5)));
+    assert!(edits(&recorder.sent()).expect("sent").is_empty());
+}
+
+#[test]
 fn a_drag_of_a_material_is_one_step_of_undo() {
     let (mut harness, recorder) = solving(Harness::builder());
     click(&mut harness, "Select lamp");

@@ -1,8 +1,8 @@
-//! The selected object's colour and light, changed by hand.
+//! The selected object's colour, light and gloss, changed by hand.
 
 use crate::app::action::Action;
 use crate::app::panels::color;
-use crate::app::picture::inspect::triple;
+use crate::app::picture::inspect::{number, triple};
 use crate::app::state::App;
 use crate::app::theme;
 use crate::inverse::estimate::ObjectEstimate;
@@ -12,6 +12,9 @@ use glam::Vec3;
 
 /// Names of the channels.
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
+
+/// Specular reflectance of most things that are no metal.
+const PLASTIC: f32 = 0.04;
 
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, app: &mut App) {
@@ -44,6 +47,8 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
             ui.end_row();
             emission(ui, app, found, &mut edit);
             ui.end_row();
+            gloss(ui, found, &mut edit);
+            ui.end_row();
         });
         if edit != before {
             app.edits.set(object, edit);
@@ -59,8 +64,16 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
                 Action::ResetEdits,
             ],
         );
+        let gloss = match found.lobe() {
+            Some((roughness, specular)) => format!(
+                "roughness {}, specular reflectance {}",
+                number(roughness),
+                number(specular)
+            ),
+            None => "no gloss".to_owned(),
+        };
         ui.weak(format!(
-            "found: albedo {}, emission {} W/(sr·m²)",
+            "found: albedo {}, emission {} W/(sr·m²), {gloss}",
             triple(found.albedo),
             triple(found.emission)
         ));
@@ -79,6 +92,7 @@ fn albedo(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
                 .range(0.0..=1.0)
                 .speed(0.005)
                 .max_decimals(3)
+                .prefix(format!("{} ", &channel[..1]))
                 .update_while_editing(false);
             let response = ui.add(drag).on_hover_text(help);
             response.widget_info(|| {
@@ -142,6 +156,48 @@ fn emission(ui: &mut Ui, app: &App, found: &ObjectEstimate, edit: &mut ObjectEdi
         }
         if pin(ui, "Pin emission", &mut edit.emission_known) {
             edit.emission.get_or_insert(found.emission);
+        }
+    });
+}
+
+/// The rough specular lobe over the surface's colour.
+fn gloss(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
+    let help = "A specular lobe (GGX) over the albedo: what shines";
+    ui.label("Gloss").on_hover_text(help);
+    ui.horizontal(|ui| {
+        let lobe = edit.lobe(found.lobe());
+        let mut glossy = lobe.is_some();
+        let response = ui.checkbox(&mut glossy, "").on_hover_text(help);
+        response.widget_info(|| WidgetInfo::selected(Role::CheckBox, true, glossy, "Gloss"));
+        if response.changed() {
+            // Back to what was found, where that is glossy or dull as asked.
+            (edit.roughness, edit.specular) = (None, None);
+            if found.lobe().is_some() != glossy {
+                edit.specular = Some(if glossy { PLASTIC } else { 0.0 });
+            }
+        }
+        let Some((mut roughness, mut specular)) = lobe else {
+            ui.weak("none, dull");
+            return;
+        };
+        let value = |ui: &mut Ui, value: &mut f32, name, range, help| {
+            let drag = DragValue::new(value)
+                .range(range)
+                .speed(0.005)
+                .max_decimals(3)
+                .prefix(format!("{name} "))
+                .update_while_editing(false);
+            let response = ui.add(drag).on_hover_text(help);
+            response.widget_info(|| WidgetInfo::labeled(Role::SpinButton, true, name));
+            response.changed()
+        };
+        let help = "GGX roughness α (no unit): near 0 a mirror, 1 as dull as gloss can be";
+        if value(ui, &mut roughness, "roughness", 0.01..=1.0, help) {
+            edit.roughness = Some(roughness);
+        }
+        let help = "Share of the light reflected straight on (no unit): 0.04 plastic, paint and wood, 0.5 and more metal";
+        if value(ui, &mut specular, "specular", 0.001..=1.0, help) {
+            edit.specular = Some(specular);
         }
     });
 }

@@ -257,7 +257,7 @@ fn details(ui: &mut Ui, name: &str, object: &ObjectEstimate) {
         triple(object.emission),
         triple(object.emission_stderr)
     ));
-    if let Some((roughness, specular)) = object.roughness.zip(object.specular) {
+    if let Some((roughness, specular)) = object.lobe() {
         ui.label(format!(
             "roughness {}, specular {}",
             number(roughness),

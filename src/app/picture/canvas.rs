@@ -114,8 +114,10 @@ pub fn missing(ui: &mut Ui, app: &App, quantity: Quantity) {
             "No photograph was taken from here"
         }
         Quantity::Naive | Quantity::NaiveEstimate | Quantity::Composite => {
-            if app.insertions.objects.is_empty() {
-                "Insert an object to see the composite"
+            if !matches!(app.shown, Shown::Frame) {
+                "No photograph was taken from here"
+            } else if app.insertions.objects.is_empty() && app.edits.is_empty() {
+                "Insert an object, or change a lamp or a material, to see the composite"
             } else {
                 "Compositing…"
             }

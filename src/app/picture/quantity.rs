@@ -25,7 +25,7 @@ pub enum Quantity {
     Naive,
     /// Objects pasted over the photograph, lit by harmonics of the estimate.
     NaiveEstimate,
-    /// Objects composited by differential rendering with the estimate.
+    /// The photograph in changed light, and with objects, by differential rendering with the estimate.
     Composite,
 }
 
@@ -92,7 +92,9 @@ impl Quantity {
             Self::NaiveEstimate => {
                 "Objects lit by harmonics of our estimate, pasted without shadow"
             }
-            Self::Composite => "Objects lit and shadowed by the estimate",
+            Self::Composite => {
+                "The photograph in the light as you changed it, with objects lit and shadowed by the estimate"
+            }
         }
     }
 

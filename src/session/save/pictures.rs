@@ -11,7 +11,6 @@ use crate::session::light::path_options;
 use crate::session::save::Results;
 use crate::session::save::staging::Staging;
 use crate::session::view::hits::Hits;
-use crate::session::view::sized::shrink;
 use crate::transport::film::Film;
 use crate::transport::lit::Lit;
 use glam::Vec3;
@@ -74,7 +73,7 @@ pub fn write(staging: &mut Staging, results: &Results) -> Result<()> {
         .into_iter()
         .map(|index| {
             let camera = capture.full_camera(index)?;
-            Ok((index, shrink(&camera, results.views.long_side())))
+            Ok((index, camera.shrunk(results.views.long_side())))
         })
         .collect::<Result<_>>()?;
     let pixels: u64 = cameras

@@ -1,28 +1,8 @@
-//! Cameras and pictures of other sizes.
+//! Photographs at the size of a view.
 
-use crate::scene::camera::Camera;
 use crate::session::snapshot::Picture;
 use glam::Vec3;
 use rayon::prelude::*;
-
-/// The camera with its picture shrunk to a long side of at most `long_side` pixels.
-pub fn shrink(camera: &Camera, long_side: u32) -> Camera {
-    let k = &camera.intrinsics;
-    let factor = f64::from(long_side.max(1)) / f64::from(k.width.max(k.height).max(1));
-    if factor >= 1.0 {
-        return camera.clone();
-    }
-    let width = ((f64::from(k.width) * factor).round() as u32).max(1);
-    let height = ((f64::from(k.height) * factor).round() as u32).max(1);
-    let sx = f64::from(width) / f64::from(k.width);
-    let sy = f64::from(height) / f64::from(k.height);
-    let mut camera = camera.clone();
-    let k = &mut camera.intrinsics;
-    (k.width, k.height) = (width, height);
-    (k.fx, k.cx) = (k.fx * sx, k.cx * sx);
-    (k.fy, k.cy) = (k.fy * sy, k.cy * sy);
-    camera
-}
 
 /// Box-filters a picture down to another size: each new pixel is the mean over the area that it covers.
 pub fn box_filter(from: &Picture, width: u32, height: u32) -> Picture {
@@ -70,25 +50,6 @@ fn shares(from: u32, to: u32) -> Vec<Vec<(usize, f32)>> {
         .collect()
 }
 
-/// Repeats pixels up to another size.
-pub fn repeat(from: &Picture, width: u32, height: u32) -> Picture {
-    let at = |i: u32, from: u32, to: u32| {
-        (u64::from(i) * u64::from(from) / u64::from(to.max(1))) as usize
-    };
-    let pixels = (0..height)
-        .flat_map(|y| (0..width).map(move |x| (x, y)))
-        .map(|(x, y)| {
-            let (x, y) = (at(x, from.width, width), at(y, from.height, height));
-            from.pixels[y * from.width as usize + x]
-        })
-        .collect();
-    Picture {
-        width,
-        height,
-        pixels,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -105,7 +66,7 @@ mod tests {
         assert!((to.pixels[0].x - (0.0 + 1.0 + 0.5 * 2.0) / 2.5).abs() < 1e-6);
         let mean = |p: &Picture| p.pixels.iter().map(|c| c.x).sum::<f32>() / p.pixels.len() as f32;
         assert!((mean(&to) - mean(&from)).abs() < 1e-5);
-        let back = repeat(&to, 5, 3);
+        let back = to.enlarged(5, 3);
         assert_eq!(back.pixels[0], to.pixels[0]);
         assert_eq!(back.pixels[14], to.pixels[5]);
     }

@@ -7,7 +7,7 @@ use crate::session::command::{ViewCamera, ViewRequest};
 use crate::session::snapshot::{LightLayers, OpenCapture, Picture, View};
 use crate::session::view::hits::Hits;
 use crate::session::view::progressive::{ENOUGH, Progressive};
-use crate::session::view::sized::{box_filter, repeat, shrink};
+use crate::session::view::sized::box_filter;
 use crate::transport::layers::Split;
 use crate::transport::lit::Lit;
 use crate::transport::path::PathOptions;
@@ -60,7 +60,7 @@ impl Target {
             true => request.long_side.min(LAYERED_LONG_SIDE),
             false => request.long_side,
         };
-        let camera = shrink(&camera, long_side);
+        let camera = camera.shrunk(long_side);
         let photograph = frame.and_then(|frame| {
             let photograph = capture.photographs.get(frame)?;
             let whole = Picture {
@@ -71,7 +71,7 @@ impl Target {
             let k = &camera.intrinsics;
             Some(Arc::new(box_filter(&whole, k.width, k.height)))
         });
-        let coarse = shrink(&camera, first_long_side);
+        let coarse = camera.shrunk(first_long_side);
         let world = estimate.lit(&scene);
         let split = request.layers.then(|| Arc::new(Split::new(&world)));
         Some(Self {
@@ -200,7 +200,7 @@ impl Target {
         if (picture.width, picture.height) == (k.width, k.height) {
             return Arc::new(picture);
         }
-        Arc::new(repeat(&picture, k.width, k.height))
+        Arc::new(picture.enlarged(k.width, k.height))
     }
 
     fn view(&self, sequence: u64) -> View {

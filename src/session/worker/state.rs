@@ -9,7 +9,7 @@ use crate::session::edits::{Edited, Edits};
 use crate::session::inbox::Inbox;
 use crate::session::insertion::Inserting;
 use crate::session::keep::Keeper;
-use crate::session::light::path_options;
+use crate::session::light::Light;
 use crate::session::rates::Rates;
 use crate::session::slot::Slot;
 use crate::session::snapshot::{Event, Level, OpenCapture, Phase, Snapshot};
@@ -139,20 +139,20 @@ impl Worker {
         let Some(capture) = self.capture.clone() else {
             return false;
         };
-        let options = path_options(&self.settings);
-        let estimate = self.edited();
+        let light = Light::new(self.estimate.clone(), self.edited(), &self.settings);
+        let estimate = &light.edited;
         // Views and composites share what there is.
         let composites = !estimate.objects.is_empty() && self.inserting.is_busy();
         let share = match composites && share < 1.0 {
             true => share * 0.5,
             false => share,
         };
-        let (drawn, more) = self.views.draw(&capture, &estimate, &options, share);
+        let (drawn, more) = self.views.draw(&capture, estimate, &light.options, share);
         self.changed |= drawn;
         if !composites {
             return more;
         }
-        match self.inserting.draw(&capture, &estimate, &options, share) {
+        match self.inserting.draw(&capture, &light, share) {
             Ok(drawn) => self.changed |= drawn,
             Err(error) => self.fail(&error),
         }

@@ -2,7 +2,7 @@
 
 use crate::compose::backdrop::Backdrop;
 use crate::compose::insert::Insertion;
-use crate::compose::naive::{harmonics_of_estimate, harmonics_of_photographs, paste};
+use crate::compose::naive::{Pasted, harmonics_of_estimate, harmonics_of_photographs};
 use crate::compose::placement::PlacedObject;
 use crate::error::Result;
 use crate::export::picture::percentile_exposure;
@@ -144,10 +144,14 @@ fn scene(room: &Furnished, cache: &Estimate, paper: &Estimate, quick: bool) -> R
             max_bounces: paper_settings(1).max_bounces(),
             ..full
         };
+        let pasted = |harmonics: &[_]| {
+            let pasted = Pasted::new(&backdrop, &lit, &objects, harmonics, Vec3::ONE);
+            pasted.over(&backdrop.photograph)
+        };
         let with_truth = composite(&Arc::new(room.lit.clone()), full);
         let ways = [
-            paste(&backdrop, &lit, &objects, &of_photographs, Vec3::ONE),
-            paste(&backdrop, &lit, &objects, &estimated, Vec3::ONE),
+            pasted(&of_photographs),
+            pasted(&estimated),
             composite(&lit, full).composite(),
             composite(&Arc::new(paper.lit(scene)), two).composite(),
             with_truth.composite(),
