@@ -17,6 +17,8 @@ fn quick(name: &str) -> Findings {
         seeds: 2,
         subject: None,
         say: &|_| {},
+        show: &|_| {},
+        stopped: &|| false,
     };
     study(name).run(&bench).expect("runs")
 }

@@ -133,6 +133,9 @@ actions! {
     Reset, Solve, "Reset", "Forgets the estimate and starts over", ctrl(Key::R);
     MeasureTrade, Solve, "Measure / cancel the trade", "Measures what exactness costs in seconds on this capture, or ends the measurement", ctrl(Key::M);
 
+    Studies, Solve, "Studies", "Shows the paper's experiments, to be run and plotted here", None;
+    RunStudy, Solve, "Start / cancel the study", "Runs the chosen experiment and writes its files, or ends it", None;
+
     PreviousFrame, View, "Previous photograph", "Steps to the photograph before", key(Key::OpenBracket);
     NextFrame, View, "Next photograph", "Steps to the next photograph", key(Key::CloseBracket);
     ShowPhotograph, View, "Hold to see the photograph", "While the key is down all pictures show the photograph", key(Key::P);

@@ -2,6 +2,7 @@
 
 use crate::app::state::App;
 use crate::error::{Error, Result};
+use crate::session::edits::Edits;
 use crate::session::photographs::{Doing, Photographs, Written};
 use crate::session::snapshot::Level;
 use std::path::{Path, PathBuf};
@@ -108,16 +109,18 @@ impl Course {
 impl App {
     /// Whether there is anything to make of photographs: an object to put in, or light to change.
     pub fn can_write_photographs(&self) -> bool {
-        let changed = !self.insertions.placements().is_empty() || !self.edits.is_empty();
+        let relit = !self.edits.is_empty() || !self.mixer.mix.is_neutral();
+        let changed = relit || !self.insertions.placements().is_empty();
         self.capture().is_some() && self.batch.is_none() && changed
     }
 
-    /// Begins to write photographs: one, or all where `frame` is `None`.
+    /// Begins to write photographs: one, or all where `frame` is `None`; in the light of the changes that are given.
     pub fn write_photographs(
         &mut self,
         ctx: &egui::Context,
         folder: PathBuf,
         frame: Option<usize>,
+        edits: &Edits,
         (samples, denoise): (u32, bool),
     ) {
         let Some(capture) = self.capture().filter(|_| self.can_write_photographs()) else {
@@ -127,10 +130,10 @@ impl App {
             frames: frame.map_or_else(|| (0..self.frames()).collect(), |frame| vec![frame]),
             capture: capture.clone(),
             found: self.snapshot.estimate.clone(),
-            edited: self.estimate.clone(),
+            edited: Arc::new(edits.apply(&self.snapshot.estimate)),
             settings: self.snapshot.settings.clone(),
             placements: self.insertions.placements(),
-            relight: !self.edits.is_empty(),
+            relight: !edits.is_empty(),
             samples,
             denoise,
         };

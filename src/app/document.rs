@@ -7,6 +7,7 @@ use crate::app::undo::History;
 use crate::session::command::Command;
 use crate::session::edits::{Edits, ObjectEdit};
 use crate::session::snapshot::LightSource;
+use crate::transport::layers::Split;
 use glam::Vec3;
 
 /// What undo and redo go back and forth in.
@@ -106,29 +107,29 @@ impl App {
         }
     }
 
-    /// Makes the mixed light the lamps' own, and the mix neutral.
-    pub fn keep_mix(&mut self) {
-        let Some(layers) = self.view().and_then(|view| view.layers.clone()) else {
-            return;
+    /// The changes with the mixed light as the lamps' own; those there are while nothing is mixed.
+    pub fn mixed_edits(&self) -> Edits {
+        let mut edits = self.edits.clone();
+        let Some(capture) = self.capture().filter(|_| !self.mixer.mix.is_neutral()) else {
+            return edits;
         };
         let factor = |source| self.mixer.mix.gain(source).factor();
-        let apart: Vec<LightSource> = layers.layers.iter().map(|(source, _)| *source).collect();
-        let mut edits = self.edits.clone();
+        let split = Split::new(&self.estimate.lit(&capture.scene));
         for (index, object) in self.estimate.objects.iter().enumerate() {
-            let own = LightSource::Lamp(index as u32);
-            let source = if apart.contains(&own) {
-                own
-            } else {
-                LightSource::OtherLamps
-            };
-            if object.emission != Vec3::ZERO && factor(source) != Vec3::ONE {
+            let source = split.source_of(index as u32);
+            if let Some(factor) = source.map(factor).filter(|&factor| factor != Vec3::ONE) {
                 let mut edit = edits.object(index);
-                edit.emission = Some(object.emission * factor(source));
+                edit.emission = Some(object.emission * factor);
                 edits.set(index, edit);
             }
         }
         edits.set_outside(edits.outside() * factor(LightSource::Outside));
-        self.edits = edits;
+        edits
+    }
+
+    /// Makes the mixed light the lamps' own, and the mix neutral.
+    pub fn keep_mix(&mut self) {
+        self.edits = self.mixed_edits();
         self.mixer.mix = Mix::default();
     }
 }

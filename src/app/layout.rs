@@ -33,6 +33,8 @@ pub enum Pane {
     Stages,
     /// Error over seconds, and where to stop.
     Trade,
+    /// The paper's experiments.
+    Studies,
     /// What happened.
     Log,
 }
@@ -53,6 +55,7 @@ impl Pane {
             Self::Loss,
             Self::Stages,
             Self::Trade,
+            Self::Studies,
             Self::Log,
         ];
         pictures.chain(rest).collect()
@@ -73,6 +76,7 @@ impl Pane {
             Self::Loss => "Loss",
             Self::Stages => "Stages",
             Self::Trade => "Trade",
+            Self::Studies => "Studies",
             Self::Log => "Log",
         }
     }
@@ -105,6 +109,7 @@ pub fn first_layout() -> Tree<Pane> {
         Pane::Insert,
         Pane::Settings,
         Pane::Trade,
+        Pane::Studies,
     ]);
     let course = tabs(&[
         Pane::Loss,
@@ -185,6 +190,8 @@ fn largest_tabs(tree: &Tree<Pane>, root: TileId) -> TileId {
 pub struct Panes<'a> {
     /// The state they show.
     pub app: &'a mut App,
+    /// The tabs in front. Only these have a button that closes them, so that all have room for their names.
+    pub front: Vec<TileId>,
 }
 
 impl Behavior<Pane> for Panes<'_> {
@@ -209,6 +216,7 @@ impl Behavior<Pane> for Panes<'_> {
                         Pane::Loss => panels::loss::pane(ui, self.app),
                         Pane::Stages => panels::stages::pane(ui, self.app),
                         Pane::Trade => panels::trade::pane(ui, self.app),
+                        Pane::Studies => panels::studies::pane(ui, self.app),
                         _ => panels::log::pane(ui, self.app),
                     }
                 });
@@ -221,8 +229,12 @@ impl Behavior<Pane> for Panes<'_> {
         pane.title().into()
     }
 
-    fn is_tab_closable(&self, _tiles: &Tiles<Pane>, _tile: TileId) -> bool {
-        true
+    fn is_tab_closable(&self, _tiles: &Tiles<Pane>, tile: TileId) -> bool {
+        self.front.contains(&tile)
+    }
+
+    fn close_button_outer_size(&self) -> f32 {
+        11.0
     }
 
     fn simplification_options(&self) -> SimplificationOptions {

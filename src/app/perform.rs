@@ -28,14 +28,11 @@ impl App {
             Action::TakeUp => self.snapshot.earlier.is_some(),
             Action::SolveOn => !self.edits.known().is_empty(),
             Action::ResetEdits => !self.edits.is_empty(),
-            Action::KeepMix => {
-                let layers = self.view().is_some_and(|view| view.layers.is_some());
-                layers && !self.mixer.mix.is_neutral()
-            }
-            Action::ResetMix => !self.mixer.mix.is_neutral(),
+            Action::KeepMix | Action::ResetMix => !self.mixer.mix.is_neutral(),
             Action::SaveLayers => self.view().is_some_and(|view| view.layers.is_some()),
             Action::Place | Action::Duplicate | Action::Delete => self.insertions.chosen.is_some(),
             Action::MeasureTrade => self.trade.doing().is_some() || self.can_measure(),
+            Action::RunStudy => self.can_run_study(),
             Action::Finish => matches!(self.snapshot.phase, Phase::Solving | Phase::Paused),
             Action::SavePhotographs => self.can_write_photographs(),
             Action::CancelPhotographs => self.batch.is_some(),
@@ -118,9 +115,13 @@ impl App {
             Action::ResetEdits => self.edits = Edits::default(),
             Action::ResetMix => self.mixer.mix = Mix::default(),
             Action::Deselect => {
-                self.selected = None;
-                self.insertions.placing = false;
-                self.picking = None;
+                // What covers the panes goes first.
+                let open = !matches!(self.sheet, Sheet::Closed);
+                if !(open || self.keys || self.palette.is_some() || self.start_page) {
+                    self.selected = None;
+                    self.insertions.placing = false;
+                    self.picking = None;
+                }
                 self.keys = false;
                 self.palette = None;
                 self.sheet = Sheet::default();
@@ -139,6 +140,12 @@ impl App {
             Action::MeasureTrade => {
                 self.bring_forward = Some(Pane::Trade);
                 self.measure_or_cancel(ctx);
+            }
+
+            Action::Studies => self.bring_forward = Some(Pane::Studies),
+            Action::RunStudy => {
+                self.bring_forward = Some(Pane::Studies);
+                self.run_or_cancel_study(ctx);
             }
 
             Action::PreviousFrame => self.step_frame(-1),

@@ -20,6 +20,7 @@ use crate::app::shell::notices::Notices;
 use crate::app::shell::palette::Palette;
 use crate::app::shell::status::Memory;
 use crate::app::shell::thumbnails::Thumbnails;
+use crate::app::studies::StudiesView;
 use crate::app::trade::TradeView;
 use crate::app::undo::History;
 use crate::inverse::estimate::Estimate;
@@ -75,6 +76,8 @@ pub struct App {
     pub objects: ObjectsTable,
     /// The trade of speed for exactness.
     pub trade: TradeView,
+    /// The paper's experiments.
+    pub studies: StudiesView,
     /// What the next click in a view is asked for.
     pub picking: Option<Pick>,
     /// Photographs that are being written.
@@ -148,6 +151,7 @@ impl App {
             model: ModelView::default(),
             objects: ObjectsTable::default(),
             trade: TradeView::default(),
+            studies: StudiesView::default(),
             picking: None,
             batch: None,
             notices: Notices::default(),
@@ -265,6 +269,7 @@ impl App {
         self.convert_photograph();
         self.mix_light();
         self.take_trade();
+        self.take_study();
         self.take_batch();
         self.take_models(ctx);
         self.request();

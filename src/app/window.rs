@@ -104,7 +104,10 @@ impl Window {
                 self.app.pixels_needed = 0.0;
                 self.app.layers_needed = false;
                 self.app.irradiance_needed = false;
-                let mut panes = Panes { app: &mut self.app };
+                let mut panes = Panes {
+                    app: &mut self.app,
+                    front: self.tree.active_tiles(),
+                };
                 self.tree.ui(&mut panes, ui);
             });
     }

@@ -4,10 +4,9 @@ use crate::cli::arguments::ReadOptions;
 use crate::cli::solve::use_threads;
 use crate::cli::trade::time;
 use crate::error::{Error, Result};
-use crate::inverse::solver::Problem;
 use crate::session::command::Source;
 use crate::session::open::open;
-use crate::study::experiments::{Bench, STUDIES, Study, Subject};
+use crate::study::experiments::{Bench, STUDIES, Study};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use std::path::PathBuf;
@@ -70,17 +69,10 @@ pub fn study(arguments: &StudyArguments) -> Result<()> {
             "leave the capture out",
         ));
     }
-    let subject = arguments.capture.clone().map(|folder| {
-        let capture = open(&Source::Folder(folder), &arguments.read.open())?;
-        Ok(Subject {
-            name: capture.name.clone(),
-            judge: capture.judge()?,
-            problem: Problem {
-                scene: capture.scene.clone(),
-                photographs: capture.photographs.clone(),
-            },
-        })
-    });
+    let subject = arguments
+        .capture
+        .clone()
+        .map(|folder| open(&Source::Folder(folder), &arguments.read.open())?.subject());
     let subject = subject.transpose()?;
     for study in wanted {
         let seeds = if arguments.quick {
@@ -94,6 +86,8 @@ pub fn study(arguments: &StudyArguments) -> Result<()> {
             seeds: arguments.seeds.unwrap_or(seeds),
             subject: subject.as_ref().filter(|_| study.takes_capture),
             say: &|what| eprintln!("{}: {what} …", study.name),
+            show: &|_| {},
+            stopped: &|| false,
         };
         let findings = study.run(&bench)?;
         for path in findings.write(study, &arguments.out)? {

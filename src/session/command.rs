@@ -101,6 +101,8 @@ pub struct ExportRequest {
     pub format: ExportFormat,
     /// Where.
     pub path: PathBuf,
+    /// The changes made by hand to write it with, where they are others than those sent before.
+    pub edits: Option<Edits>,
 }
 
 /// How a capture is read.

@@ -1,12 +1,14 @@
-//! What tells the errors of a capture's estimates: its truth, where it has one.
+//! A capture as something to be measured on: its problem, and what tells the errors of its estimates.
 
 use crate::capture::truth::Truth;
 use crate::error::Result;
+use crate::inverse::solver::Problem;
 use crate::room::Room;
 use crate::room::photographs::KEPT;
 use crate::session::command::Source;
 use crate::session::snapshot::OpenCapture;
 use crate::study::evaluate::Reference;
+use crate::study::experiments::Subject;
 use crate::study::trade::Judge;
 
 impl OpenCapture {
@@ -22,5 +24,20 @@ impl OpenCapture {
         };
         let reference = Reference::new(truth, &self.capture, &self.scene, &self.photographs);
         Ok(Judge::Truth(Box::new(reference)))
+    }
+
+    /// The capture for studies, with its truth where there is one.
+    ///
+    /// # Errors
+    /// The truth is broken.
+    pub fn subject(&self) -> Result<Subject> {
+        Ok(Subject {
+            name: self.name.clone(),
+            problem: Problem {
+                scene: self.scene.clone(),
+                photographs: self.photographs.clone(),
+            },
+            judge: self.judge()?,
+        })
     }
 }

@@ -24,3 +24,12 @@ pub fn type_into(harness: &mut Harness<'_, Window>, label: &str, text: &str) {
     harness.get_by_label(label).type_text(text);
     harness.run_steps(2);
 }
+
+/// Replaces the text of a field.
+pub fn retype(harness: &mut Harness<'_, Window>, label: &str, text: &str) {
+    harness.get_by_label(label).focus();
+    harness.run_steps(2);
+    press(harness, Modifiers::COMMAND, Key::A);
+    harness.get_by_label(label).type_text(text);
+    harness.run_steps(2);
+}

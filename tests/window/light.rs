@@ -264,6 +264,49 @@ fn a_lamp_is_switched_off_and_on_and_takes_up_the_mixed_light() {
 }
 
 #[test]
+fn files_are_written_in_the_mixed_light_unless_that_is_declined() {
+    let (mut harness, recorder) = solving(Harness::builder());
+    press(&mut harness, Modifiers::NONE, Key::L);
+    slide(&mut harness, "Strength of lamp", -0.2);
+    let exported = |recorder: &crate::connection::Recorder| {
+        let sent = recorder.sent();
+        sent.iter().rev().find_map(|command| match command {
+            Command::Export(request) => Some(request.edits.clone()),
+            _ => None,
+        })
+    };
+    press(&mut harness, Modifiers::COMMAND, Key::E);
+    harness
+        .get_by_role_and_label(Role::Button, "Export")
+        .click();
+    harness.run_steps(3);
+    let edits = exported(&recorder).expect("an export").expect("the mix");
+    assert_eq!(edits.object(2).emission, Some(Vec3::ZERO));
+    assert!(harness.state().app.edits.is_empty(), "the lamp stays");
+    press(&mut harness, Modifiers::COMMAND, Key::E);
+    click(&mut harness, "In the light of the mixer");
+    harness
+        .get_by_role_and_label(Role::Button, "Export")
+        .click();
+    harness.run_steps(3);
+    assert_eq!(exported(&recorder).expect("an export"), None);
+
+    press(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::E);
+    harness.get_by_label("At full size, in the light as you changed it.");
+    click(&mut harness, "In the light of the mixer");
+    harness.get_by_label("Insert an object, or change a lamp or a material first.");
+    // Reset, there is nothing to decline.
+    press(&mut harness, Modifiers::NONE, Key::Escape);
+    click(&mut harness, "Reset mix");
+    press(&mut harness, Modifiers::COMMAND, Key::E);
+    assert!(
+        harness
+            .query_by_label("In the light of the mixer")
+            .is_none()
+    );
+}
+
+#[test]
 fn the_readme_lists_what_every_key_does() {
     let readme = include_str!("../../README.md");
     let keys = Action::ALL.iter().filter(|a| a.shortcut().is_some());

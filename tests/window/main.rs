@@ -8,4 +8,5 @@ mod light;
 mod names;
 mod photographs;
 mod rendering;
+mod studies;
 mod trade;

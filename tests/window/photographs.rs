@@ -1,6 +1,7 @@
 //! Copying pictures, writing photographs in one go, light probes by click, and the handles of inserted objects.
 
 use crate::connection::{Recorder, solving};
+use crate::input::{click, press, retype};
 use egui::{Key, Modifiers, Pos2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
@@ -9,31 +10,12 @@ use relit::session::command::{Command, ExportFormat};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-fn click(harness: &mut Harness<'_, Window>, label: &str) {
-    harness.get_by_label(label).click();
-    harness.run_steps(3);
-}
-
-fn press(harness: &mut Harness<'_, Window>, modifiers: Modifiers, key: Key) {
-    harness.key_press_modifiers(modifiers, key);
-    harness.run_steps(3);
-}
-
 /// Runs a command of the palette.
 fn palette(harness: &mut Harness<'_, Window>, name: &str) {
     press(harness, Modifiers::COMMAND, Key::P);
     harness.get_by_label("Command").type_text(name);
     harness.run_steps(2);
     press(harness, Modifiers::NONE, Key::Enter);
-}
-
-/// Replaces the text of a field.
-fn retype(harness: &mut Harness<'_, Window>, label: &str, text: &str) {
-    harness.get_by_label(label).focus();
-    harness.run_steps(2);
-    press(harness, Modifiers::COMMAND, Key::A);
-    harness.get_by_label(label).type_text(text);
-    harness.run_steps(2);
 }
 
 /// A point of a picture, in fractions of its size, on the screen.

@@ -1,5 +1,6 @@
 //! The loss curve on a logarithmic axis, with the held-out loss and the ends of stages.
 
+use crate::app::panels::plot::decades;
 use crate::app::picture::inspect::number;
 use crate::app::state::App;
 use crate::app::theme;
@@ -46,6 +47,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
             )),
             HoverPosition::Elsewhere { .. } => None,
         })
+        .y_grid_spacer(decades)
         .y_axis_min_width(36.0)
         .show(ui, |plot| {
             for (at, name) in marks {

@@ -8,6 +8,8 @@ pub mod log;
 pub mod loss;
 pub mod material;
 pub mod objects;
+pub mod plot;
 pub mod settings;
 pub mod stages;
+pub mod studies;
 pub mod trade;

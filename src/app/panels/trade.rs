@@ -1,6 +1,7 @@
 //! The trade of the open capture: error over seconds, where the running solve is on it, and where to stop.
 
 use crate::app::action::Action;
+use crate::app::panels::plot::decades;
 use crate::app::picture::inspect::number;
 use crate::app::state::App;
 use crate::app::theme::{self, Tokens};
@@ -153,6 +154,8 @@ fn plot(ui: &mut Ui, app: &mut App, trade: &Trade) -> Option<(usize, Stop)> {
             )),
             HoverPosition::Elsewhere { .. } => None,
         })
+        .x_grid_spacer(decades)
+        .y_grid_spacer(decades)
         .y_axis_min_width(44.0)
         .show(ui, |plot| {
             let mut places = Vec::new();

@@ -2,7 +2,7 @@
 
 use crate::app::action::Action;
 use crate::app::shell::dialogs::Ask;
-use crate::app::shell::files::{buttons, file_name, path_field};
+use crate::app::shell::files::{buttons, file_name, mixed, path_field};
 use crate::app::state::App;
 use egui::{Button, DragValue, ProgressBar, Ui};
 use std::path::PathBuf;
@@ -18,6 +18,8 @@ pub struct Wanted {
     pub samples: u32,
     /// Whether noise is smoothed.
     pub denoise: bool,
+    /// Whether the light mixer counts.
+    pub mixed: bool,
 }
 
 impl Wanted {
@@ -28,6 +30,7 @@ impl Wanted {
             all: true,
             samples: 64,
             denoise: true,
+            mixed: true,
         }
     }
 }
@@ -36,7 +39,11 @@ impl Wanted {
 pub fn sheet(ui: &mut Ui, app: &mut App, wanted: &mut Wanted) -> bool {
     ui.heading("Save photographs");
     let objects = app.insertions.placements().len();
-    ui.label(match (objects, app.edits.is_empty()) {
+    let edits = match wanted.mixed {
+        true => app.mixed_edits(),
+        false => app.edits.clone(),
+    };
+    ui.label(match (objects, edits.is_empty()) {
         (0, true) => "Insert an object, or change a lamp or a material first.",
         (0, false) => "At full size, in the light as you changed it.",
         (_, true) => "At full size, with the inserted objects; naive composites and layers beside them.",
@@ -45,9 +52,7 @@ pub fn sheet(ui: &mut Ui, app: &mut App, wanted: &mut Wanted) -> bool {
              layers beside them."
         }
     });
-    if !app.mixer.mix.is_neutral() {
-        ui.weak("The light mixer counts once “Give lamps this light” has made it the lamps’ own.");
-    }
+    mixed(ui, app, &mut wanted.mixed);
     ui.horizontal(|ui| {
         let count = app.frames();
         ui.radio_value(&mut wanted.all, true, format!("All {count} photographs"));
@@ -63,7 +68,8 @@ pub fn sheet(ui: &mut Ui, app: &mut App, wanted: &mut Wanted) -> bool {
             .on_hover_text("Smooths the noise of light that is added or changed, guided by surfaces; never the photograph itself");
     });
     let entered = path_field(ui, app, "Folder", &mut wanted.folder, Ask::SaveFolder);
-    let ready = app.can_write_photographs() && !wanted.folder.trim().is_empty();
+    let nothing = objects == 0 && edits.is_empty();
+    let ready = app.can_write_photographs() && !nothing && !wanted.folder.trim().is_empty();
     let (clicked, cancel) = buttons(ui, "Write", ready);
     let go = (clicked || entered) && ready;
     if go {
@@ -73,6 +79,7 @@ pub fn sheet(ui: &mut Ui, app: &mut App, wanted: &mut Wanted) -> bool {
             &ui.ctx().clone(),
             folder,
             frame,
+            &edits,
             (wanted.samples, wanted.denoise),
         );
     }

@@ -5,7 +5,7 @@ pub mod choice;
 mod measuring;
 
 use crate::app::state::App;
-use crate::session::snapshot::{Level, OpenCapture, Phase};
+use crate::session::snapshot::{Level, OpenCapture};
 use crate::study::trade::Trade;
 use egui::Pos2;
 use measuring::Measuring;
@@ -70,21 +70,20 @@ impl TradeView {
 
     /// What is being measured now, in words.
     pub fn doing(&self) -> Option<String> {
-        self.measuring.as_ref().map(Measuring::doing)
+        self.measuring.as_ref().map(|m| m.task.doing())
     }
 }
 
 impl App {
-    /// Whether a measurement could begin: something is open, and neither a solve nor a measurement runs.
+    /// Whether a measurement could begin: something is open, and neither a solve nor a study runs.
     pub fn can_measure(&self) -> bool {
-        let busy = matches!(self.snapshot.phase, Phase::Solving | Phase::Loading);
-        self.capture().is_some() && !busy
+        self.capture().is_some() && !self.is_running() && self.studies.doing().is_none()
     }
 
     /// Begins to measure the open capture's trade, or ends it, keeping what is measured.
     pub fn measure_or_cancel(&mut self, ctx: &egui::Context) {
         if let Some(measuring) = &self.trade.measuring {
-            measuring.cancel();
+            measuring.task.cancel();
             return;
         }
         let Some(capture) = self.capture().filter(|_| self.can_measure()).cloned() else {
@@ -105,15 +104,15 @@ impl App {
             return;
         };
         if running {
-            measuring.cancel();
+            measuring.task.cancel();
         }
         let current = self.snapshot.capture.as_ref();
-        let same = current.is_some_and(|c| Arc::ptr_eq(c, measuring.capture()));
-        if let Some(trade) = measuring.newest().filter(|_| same) {
+        let same = current.is_some_and(|c| Arc::ptr_eq(c, &measuring.capture));
+        if let Some(trade) = measuring.task.newest().filter(|_| same) {
             self.trade.trade = Some(trade);
             self.trade.unsaved = true;
         }
-        if let Some(end) = measuring.ended() {
+        if let Some(end) = measuring.task.end() {
             self.trade.measuring = None;
             if let Err(message) = end {
                 self.notices.say(Level::Error, message);
@@ -124,7 +123,7 @@ impl App {
     /// Forgets the trade of the capture before and reads that of the one that is open now.
     pub(in crate::app) fn trade_of_capture(&mut self) {
         if let Some(measuring) = &self.trade.measuring {
-            measuring.cancel();
+            measuring.task.cancel();
         }
         self.trade.trade = None;
         self.trade.unsaved = false;

@@ -8,6 +8,7 @@ use crate::session::snapshot::{Level, Phase};
 use crate::session::worker::state::Worker;
 use crate::session::worker::work::Next;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// How long views have more of the solver's time after another one was asked for …
@@ -163,7 +164,11 @@ impl Worker {
             return;
         };
         let path = &request.path;
-        match scene::write(&capture.scene, &self.edited(), request.format, path) {
+        let estimate = match &request.edits {
+            Some(edits) => Arc::new(edits.apply(&self.estimate)),
+            None => self.edited(),
+        };
+        match scene::write(&capture.scene, &estimate, request.format, path) {
             Ok(()) => self.say(Level::Info, format!("exported to {}", path.display())),
             Err(error) => self.fail(&error),
         }

@@ -1,11 +1,12 @@
 //! How large a batch the paper's descent should take.
 
 use crate::error::Result;
+use crate::export::plot::Plot;
 use crate::inverse::settings::Settings;
 use crate::study::experiments::course::{
     Errors, Gauge, Mark, cache_settings, cached, descend, paper_settings,
 };
-use crate::study::experiments::courses::{Kind, Spread, common_mark, plot, table, words};
+use crate::study::experiments::courses::{self, Kind, Spread, common_mark, plot, table, words};
 use crate::study::experiments::findings::brief;
 use crate::study::experiments::{Bench, Findings, Study, Summary, box_room};
 
@@ -51,39 +52,28 @@ fn run(bench: &Bench) -> Result<Findings> {
 
     // The descents, and where the transport cache ends.
     let gauge = Gauge::new(subject, paper_settings(1).max_bounces());
-    let mut kinds = Vec::new();
-    for &(batch, samples) in batches {
-        let name = name((batch, samples));
-        (bench.say)(&name);
-        let course = |seed| {
-            let settings = Settings {
-                batch,
-                samples,
-                ..paper_settings(seed)
-            };
-            descend(&gauge, &settings, limits)
+    let course = |index: usize, seed| {
+        let (batch, samples) = batches[index];
+        let settings = Settings {
+            batch,
+            samples,
+            ..paper_settings(seed)
         };
-        let courses = bench.seeds().map(course).collect();
-        kinds.push(Kind { name, courses });
-    }
+        descend(bench, &gauge, &settings, limits)
+    };
+    let over_rays = |kinds: &[Kind], cache: &[Mark]| {
+        drawn("rays", |mark| mark.rays as f64, (kinds, batches), cache)
+    };
+    let names = batches.iter().map(|&batch| name(batch));
+    let kinds = courses::run(bench, names, course, |kinds| over_rays(kinds, &[]))?;
     // The cache's estimate is rendered as it was fitted, with all bounces.
-    (bench.say)("transport cache");
+    bench.begin("transport cache")?;
     let gauge = Gauge::new(subject, u32::MAX);
     let cache: Vec<Mark> = (bench.seeds())
-        .map(|seed| cached(&gauge, &cache_settings(seed, bench.quick)))
+        .map(|seed| cached(bench, &gauge, &cache_settings(seed, bench.quick)))
         .collect::<Result<_>>()?;
 
-    let loss = |errors: &Errors| errors.loss;
-    let rays = |mark: &Mark| mark.rays as f64;
-    let label = "held-out l1 loss, radiance";
-    // One colour each: as many as are told apart.
-    let drawn: Vec<Kind> = (kinds.iter().zip(batches))
-        .filter(|(_, (batch, samples))| *samples == 1 && *batch != 2)
-        .map(|(kind, _)| kind.clone())
-        .collect();
-    let over_rays = plot("Batches", "rays", label, rays, loss, &drawn, &cache);
-    let seconds = |mark: &Mark| mark.seconds;
-    let over_seconds = plot("Batches", "seconds", label, seconds, loss, &drawn, &cache);
+    let over_seconds = drawn("seconds", |mark| mark.seconds, (&kinds, batches), &cache);
     let mark = common_mark(&kinds);
     let common = mark.map_or(0.0, |mark| rays_when(&kinds, mark));
     Ok(Findings {
@@ -102,11 +92,28 @@ fn run(bench: &Bench) -> Result<Findings> {
             },
         ),
         tables: vec![("", table("batch", &kinds, &cache))],
-        plots: vec![("", over_rays), ("-seconds", over_seconds)],
+        plots: vec![("", over_rays(&kinds, &cache)), ("-seconds", over_seconds)],
         summary: summary(&kinds, mark),
         seen: seen(&kinds, batches, &cache, mark, common),
         ..Findings::default()
     })
+}
+
+/// Losses of the batches with one path a pixel.
+fn drawn(
+    label: &str,
+    x: fn(&Mark) -> f64,
+    (kinds, batches): (&[Kind], &[(u64, u64)]),
+    cache: &[Mark],
+) -> Plot {
+    // One colour each: as many as are told apart.
+    let drawn: Vec<Kind> = (kinds.iter().zip(batches))
+        .filter(|(_, (batch, samples))| *samples == 1 && *batch != 2)
+        .map(|(kind, _)| kind.clone())
+        .collect();
+    let loss = |errors: &Errors| errors.loss;
+    let held_out = "held-out l1 loss, radiance";
+    plot("Batches", label, held_out, x, loss, &drawn, cache)
 }
 
 fn name((batch, samples): (u64, u64)) -> String {

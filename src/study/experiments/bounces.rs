@@ -53,48 +53,50 @@ fn run(bench: &Bench) -> Result<Findings> {
         false => (ALBEDOS, DEPTHS),
     };
     let limits = bench.limits(2 * albedos.len() * depths.len() * bench.seeds as usize);
-    let mut scenes = Vec::new();
+    let mut scenes: Vec<Scene> = Vec::new();
     for &(albedo, _) in albedos {
         let subject =
             box_room::photographed(&format!("mean albedo {albedo}"), albedo, LAMP, bench.quick)?;
         // The loss is measured with all bounces, whatever the fit had.
         let gauge = Gauge::new(&subject, u32::MAX);
-        let mut scene = Scene {
+        scenes.push(Scene {
             albedo,
             cache: Vec::new(),
             paper: Vec::new(),
-        };
+        });
         for &bounces in depths {
-            (bench.say)(&format!("{}, {} bounces", subject.name, word(bounces)));
+            bench.begin(&format!("{}, {} bounces", subject.name, word(bounces)))?;
             let with = |base: Settings| Settings { bounces, ..base };
             let end = |seed| {
                 let settings = with(cache_settings(seed, bench.quick));
-                cached(&gauge, &settings).map(|end| vec![end])
+                cached(bench, &gauge, &settings).map(|end| vec![end])
             };
-            let course = |seed| descend(&gauge, &with(paper_settings(seed)), limits);
+            let course = |seed| descend(bench, &gauge, &with(paper_settings(seed)), limits);
             let kind = |solver: &str, courses| Kind {
                 name: format!("{albedo}, {solver}, {}", word(bounces)),
                 courses,
             };
             let ends = bench.seeds().map(end).collect::<Result<_>>()?;
-            scene.cache.push((bounces, kind("transport cache", ends)));
+            if let Some(scene) = scenes.last_mut() {
+                scene.cache.push((bounces, kind("transport cache", ends)));
+            }
+            (bench.show)(of_albedo(&scenes));
             if bounces > 0 {
                 let courses = bench.seeds().map(course).collect();
-                scene.paper.push((bounces, kind("paper", courses)));
+                if let Some(scene) = scenes.last_mut() {
+                    scene.paper.push((bounces, kind("paper", courses)));
+                }
             }
         }
-        scenes.push(scene);
     }
+    bench.go_on()?;
 
     let kinds: Vec<Kind> = (scenes.iter())
         .flat_map(|scene| scene.cache.iter().chain(&scene.paper))
         .map(|(_, kind)| kind.clone())
         .collect();
     let mut plots = vec![
-        (
-            "",
-            over_depth(&scenes, "mean absolute error of albedo", |e| e.albedo),
-        ),
+        ("", of_albedo(&scenes)),
         (
             "-emission",
             over_depth(&scenes, "relative error of emission", |e| e.emission),
@@ -135,6 +137,10 @@ fn word(bounces: u64) -> String {
         0 => "adaptive".to_owned(),
         bounces => bounces.to_string(),
     }
+}
+
+fn of_albedo(scenes: &[Scene]) -> Plot {
+    over_depth(scenes, "mean absolute error of albedo", |e| e.albedo)
 }
 
 /// Where the transport cache ends over the depth of its fit, a curve a room.

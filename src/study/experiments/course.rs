@@ -7,7 +7,7 @@ use crate::inverse::loss::LossProbe;
 use crate::inverse::paper::descent::{Descent, Grain, StepOutcome};
 use crate::inverse::settings::{Preset, Settings};
 use crate::inverse::solver::{Problem, Solution};
-use crate::study::experiments::{Limits, Subject};
+use crate::study::experiments::{Bench, Limits, Subject};
 use crate::study::trade::plan::Run;
 use crate::study::trade::watch;
 use std::time::{Duration, Instant};
@@ -101,15 +101,16 @@ impl<'a> Gauge<'a> {
 /// Runs the descent as published, per object and with nothing annealed, and measures it whenever its rays pass a mark.
 ///
 /// Which rays are cast, and with them all errors at a mark, depends on the settings alone; how many marks are passed in
-/// limited seconds does not. Stops where the parameters leave the finite numbers.
-pub fn descend(gauge: &Gauge, settings: &Settings, limits: Limits) -> Vec<Mark> {
+/// limited seconds does not. Stops where the parameters leave the finite numbers, and where the study is to end.
+pub fn descend(bench: &Bench, gauge: &Gauge, settings: &Settings, limits: Limits) -> Vec<Mark> {
     let problem = &gauge.subject.problem;
     let mut step = |descent: &mut Descent| descent.step(problem, settings, settings.max_bounces());
-    descend_by(gauge, limits, &mut step)
+    descend_by(bench, gauge, limits, &mut step)
 }
 
 /// The same with steps of one's own.
 pub fn descend_by(
+    bench: &Bench,
     gauge: &Gauge,
     limits: Limits,
     step: &mut dyn FnMut(&mut Descent) -> StepOutcome,
@@ -128,7 +129,7 @@ pub fn descend_by(
             rays += outcome.rays;
             steps += 1;
             let late = seconds + begun.elapsed().as_secs_f64() >= limits.seconds;
-            over = late || !outcome.finite || outcome.rays == 0;
+            over = late || !outcome.finite || outcome.rays == 0 || (bench.stopped)();
         }
         seconds += begun.elapsed().as_secs_f64();
 
@@ -174,9 +175,9 @@ pub fn estimate(descent: &Descent) -> Estimate {
 /// Where the transport cache ends.
 ///
 /// # Errors
-/// The solver cannot start.
-pub fn cached(gauge: &Gauge, settings: &Settings) -> Result<Mark> {
-    let solution = solved(gauge.subject, settings)?;
+/// The solver cannot start, or the study is to end.
+pub fn cached(bench: &Bench, gauge: &Gauge, settings: &Settings) -> Result<Mark> {
+    let solution = solved(bench, gauge.subject, settings)?;
     Ok(Mark {
         index: None,
         rays: solution.progress.rays,
@@ -189,8 +190,8 @@ pub fn cached(gauge: &Gauge, settings: &Settings) -> Result<Mark> {
 /// A whole solve by the solver of the settings' preset, as the program runs it.
 ///
 /// # Errors
-/// The solver cannot start.
-pub fn solved(subject: &Subject, settings: &Settings) -> Result<Solution> {
+/// The solver cannot start, or the study is to end.
+pub fn solved(bench: &Bench, subject: &Subject, settings: &Settings) -> Result<Solution> {
     let run = Run {
         name: settings.preset.word().to_owned(),
         is_preset: false,
@@ -198,7 +199,14 @@ pub fn solved(subject: &Subject, settings: &Settings) -> Result<Solution> {
         weight: 1.0,
     };
     let deadline = Instant::now() + PATIENCE;
-    let (_, solution) = watch(&subject.problem, &subject.judge, &run, deadline, &|| false)?;
+    let (_, solution) = watch(
+        &subject.problem,
+        &subject.judge,
+        &run,
+        deadline,
+        bench.stopped,
+    )?;
+    bench.go_on()?;
     Ok(solution)
 }
 

@@ -1,8 +1,10 @@
 //! Courses of several kinds of solves over several seeds, as tables, plots and comparisons.
 
+use crate::error::Result;
 use crate::export::plot::{Axis, Draw, Plot, Series};
 use crate::export::table::Table;
 use crate::math::stats::Moments;
+use crate::study::experiments::Bench;
 use crate::study::experiments::course::{Errors, Mark};
 use crate::study::experiments::findings::brief;
 
@@ -64,6 +66,35 @@ impl Spread {
 /// A spread in words, or a dash where nothing was measured.
 pub fn words(spread: Option<Spread>) -> String {
     spread.map_or("-".to_owned(), |spread| spread.words())
+}
+
+/// Runs a course of each kind and seed, one after the other, and shows the plot of those there are after each.
+///
+/// # Errors
+/// The study is to end.
+pub fn run(
+    bench: &Bench,
+    names: impl IntoIterator<Item = String>,
+    course: impl Fn(usize, u64) -> Vec<Mark>,
+    plot: impl Fn(&[Kind]) -> Plot,
+) -> Result<Vec<Kind>> {
+    let mut kinds: Vec<Kind> = Vec::new();
+    for (index, name) in names.into_iter().enumerate() {
+        let mut courses = Vec::new();
+        for seed in bench.seeds() {
+            bench.begin(&format!("{name}, seed {seed}"))?;
+            courses.push(course(index, seed));
+            let kind = Kind {
+                name: name.clone(),
+                courses: courses.clone(),
+            };
+            kinds.truncate(index);
+            kinds.push(kind);
+            (bench.show)(plot(&kinds));
+        }
+    }
+    bench.go_on()?;
+    Ok(kinds)
 }
 
 /// The last mark in rays that every course has passed, or `None` where one passed none.

@@ -88,7 +88,7 @@ fn run(bench: &Bench) -> Result<Findings> {
             };
             (name, options)
         });
-    (bench.say)("photographs");
+    bench.begin("photographs")?;
     let photographs = render(&lit, &options[1].1, [KEY, 0], reference);
     let mut table = Table::new(&[
         "sampling",
@@ -113,10 +113,10 @@ fn run(bench: &Bench) -> Result<Findings> {
     };
     let mut seen = Vec::new();
     for ((name, options), suffix) in options.iter().zip(["", "-mis"]) {
-        (bench.say)(name);
         let mut fits: Vec<Fit> = Vec::new();
         let mut predictions = Vec::new();
-        for &count in samples {
+        for (index, &count) in samples.iter().enumerate() {
+            bench.begin(&format!("{name}, {count} samples a pixel"))?;
             let mut predicted = Moments::default();
             for seed in bench.seeds() {
                 let sets = [1, 2].map(|set| render(&lit, options, [KEY + seed, set], count));
@@ -131,6 +131,8 @@ fn run(bench: &Bench) -> Result<Findings> {
                 }));
             }
             predictions.push(predicted.mean);
+            let so_far = |estimator: usize, samples: u32| mean(&fits, estimator, samples);
+            (bench.show)(plot(name, &samples[..=index], &so_far, &predictions));
         }
         for fit in &fits {
             let place = samples.iter().position(|&n| n == fit.samples);

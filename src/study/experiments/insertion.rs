@@ -56,30 +56,30 @@ struct Scene {
 
 fn run(bench: &Bench) -> Result<Findings> {
     let limits = bench.limits(4);
-    let scenes: Vec<Scene> = [true, false]
-        .map(|textured| -> Result<Scene> {
-            let room = built_in(textured, bench.quick)?;
-            (bench.say)(room.name);
-            let time = if limits.seconds.is_finite() {
-                limits.seconds
-            } else {
-                2.0
-            };
-            let cache = Settings {
-                textures: textured && !bench.quick,
-                ..cache_settings(1, bench.quick)
-            };
-            let paper = Settings {
-                time,
-                exposures: false,
-                ..paper_settings(1)
-            };
-            let cache = solved(&room.subject, &cache)?.estimate;
-            let paper = solved(&room.subject, &paper)?.estimate;
-            scene(&room, &cache, &paper, bench.quick)
-        })
-        .into_iter()
-        .collect::<Result<_>>()?;
+    let mut scenes = Vec::new();
+    for textured in [true, false] {
+        let room = built_in(textured, bench.quick)?;
+        bench.begin(room.name)?;
+        let time = if limits.seconds.is_finite() {
+            limits.seconds
+        } else {
+            2.0
+        };
+        let cache = Settings {
+            textures: textured && !bench.quick,
+            ..cache_settings(1, bench.quick)
+        };
+        let paper = Settings {
+            time,
+            exposures: false,
+            ..paper_settings(1)
+        };
+        let cache = solved(bench, &room.subject, &cache)?.estimate;
+        let paper = solved(bench, &room.subject, &paper)?.estimate;
+        bench.begin(&format!("{}, composites", room.name))?;
+        scenes.push(scene(&room, &cache, &paper, bench.quick)?);
+        (bench.show)(plot(&scenes));
+    }
     Ok(Findings {
         how: format!(
             "Two chairs of known colour beside the red wall of the built-in room, once with its textures and once with their \

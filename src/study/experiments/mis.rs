@@ -1,12 +1,13 @@
 //! What multiple importance sampling buys.
 
 use crate::error::Result;
+use crate::export::plot::Plot;
 use crate::export::table::Table;
 use crate::inverse::settings::{LightSampling, Settings};
 use crate::study::experiments::course::{
     Errors, Gauge, Mark, cache_settings, cached, descend, paper_settings,
 };
-use crate::study::experiments::courses::{Kind, Spread, common_mark, plot, table, words};
+use crate::study::experiments::courses::{self, Kind, Spread, common_mark, plot, table, words};
 use crate::study::experiments::findings::brief;
 use crate::study::experiments::gradient::{Noise, noise};
 use crate::study::experiments::{Bench, Findings, Study, Summary, box_room};
@@ -46,30 +47,30 @@ fn run(bench: &Bench) -> Result<Findings> {
     let (pixels, paths) = if bench.quick { (300, 128) } else { (1000, 512) };
     let mut scenes = Vec::new();
     for (name, lamp) in LAMPS {
-        (bench.say)(name);
+        bench.begin(name)?;
         let subject = box_room::photographed(name, ALBEDO, lamp, bench.quick)?;
         let truth = box_room::truth(&box_room::box_room(name, ALBEDO, lamp));
         let gauge = Gauge::new(&subject, paper_settings(1).max_bounces());
         let deep = Gauge::new(&subject, u32::MAX);
-        let course = |light_sampling, seed| {
+        let course = |index: usize, seed| {
             let settings = Settings {
-                light_sampling,
+                light_sampling: SAMPLINGS[index],
                 ..paper_settings(seed)
             };
-            descend(&gauge, &settings, limits)
+            descend(bench, &gauge, &settings, limits)
         };
-        let kind = |sampling: &LightSampling| Kind {
-            name: format!("{name}, {}", word(*sampling)),
-            courses: bench.seeds().map(|seed| course(*sampling, seed)).collect(),
-        };
+        let names = SAMPLINGS.map(|sampling| format!("{name}, {}", word(sampling)));
+        let over_rays = |kinds: &[Kind]| drawn(name, "rays", |mark| mark.rays as f64, kinds, &[]);
+        let kinds = courses::run(bench, names, course, over_rays)?;
+        bench.begin(&format!("{name}, variance of gradients"))?;
         let of =
             |sampling: &LightSampling| noise(&subject.problem, &truth, *sampling, pixels, paths);
         scenes.push(Scene {
             name,
-            kinds: SAMPLINGS.iter().map(kind).collect(),
+            kinds,
             noises: SAMPLINGS.iter().map(of).collect(),
             cache: (bench.seeds())
-                .map(|seed| cached(&deep, &cache_settings(seed, bench.quick)))
+                .map(|seed| cached(bench, &deep, &cache_settings(seed, bench.quick)))
                 .collect::<Result<_>>()?,
         });
     }
@@ -86,18 +87,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         .iter()
         .zip([("", "-seconds"), ("-large", "-large-seconds")])
     {
-        let draw = |label, x| {
-            let loss = |errors: &Errors| errors.loss;
-            plot(
-                scene.name,
-                label,
-                "held-out l1 loss, radiance",
-                x,
-                loss,
-                &scene.kinds,
-                &scene.cache,
-            )
-        };
+        let draw = |label, x| drawn(scene.name, label, x, &scene.kinds, &scene.cache);
         plots.push((over_rays, draw("rays", |mark| mark.rays as f64)));
         plots.push((over_seconds, draw("seconds", |mark| mark.seconds)));
     }
@@ -118,6 +108,13 @@ fn run(bench: &Bench) -> Result<Findings> {
         seen: scenes.iter().flat_map(seen).collect(),
         ..Findings::default()
     })
+}
+
+/// Losses in one room.
+fn drawn(name: &str, label: &str, x: fn(&Mark) -> f64, kinds: &[Kind], cache: &[Mark]) -> Plot {
+    let loss = |errors: &Errors| errors.loss;
+    let held_out = "held-out l1 loss, radiance";
+    plot(name, label, held_out, x, loss, kinds, cache)
 }
 
 fn word(sampling: LightSampling) -> &'static str {

@@ -32,7 +32,8 @@ mod textures;
 pub use findings::{Findings, Grid, Summary};
 pub use subject::Subject;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::export::plot::Plot;
 use std::time::Duration;
 
 /// Rays of each descent in the quick form, which is there to try the program rather than to learn from.
@@ -87,6 +88,10 @@ pub struct Bench<'a> {
     pub subject: Option<&'a Subject>,
     /// Hears what is being done.
     pub say: &'a dyn Fn(&str),
+    /// Sees the plot that matters, as far as it has come, whenever there is more of it.
+    pub show: &'a dyn Fn(Plot),
+    /// Says whether the study is to end now, without a result.
+    pub stopped: &'a dyn Fn() -> bool,
 }
 
 /// When a solve ends.
@@ -110,6 +115,21 @@ impl Bench<'_> {
         Limits {
             rays: u64::MAX,
             seconds: self.time.as_secs_f64() / runs.max(1) as f64,
+        }
+    }
+
+    /// Says what is done next, unless the study is to end.
+    fn begin(&self, what: &str) -> Result<()> {
+        self.go_on()?;
+        (self.say)(what);
+        Ok(())
+    }
+
+    /// An error where the study is to end.
+    fn go_on(&self) -> Result<()> {
+        match (self.stopped)() {
+            true => Err(Error::new("study", "it was ended", "start it again")),
+            false => Ok(()),
         }
     }
 

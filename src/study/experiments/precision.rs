@@ -47,7 +47,7 @@ fn run(bench: &Bench) -> Result<Findings> {
             preset: Preset::Preview,
             ..cache_settings(1, bench.quick)
         };
-        let objects = solved(subject, &settings)?.estimate.objects;
+        let objects = solved(bench, subject, &settings)?.estimate.objects;
         let reflectors = objects.iter().take(moved::REFLECTORS);
         Ok(reflectors
             .flat_map(|object| object.albedo.to_array())
@@ -65,7 +65,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         ("distance of an outlier, in rooms", far, moved::with_outlier),
     ];
     for (axis, values, change) in changed {
-        (bench.say)(axis);
+        bench.begin(axis)?;
         let (mut hits, mut off) = (Vec::new(), Vec::new());
         for value in values {
             let (room, size) = change(&room, value);
@@ -86,8 +86,10 @@ fn run(bench: &Bench) -> Result<Findings> {
             quantity: "albedos of a fit, against the room as it is",
             points: off,
         });
+        (bench.show)(plot(&lines));
     }
 
+    bench.begin("sums of paths")?;
     // Sums of paths, and two lamps of very unequal radiance.
     let paths = Paths::trace(
         &subject.problem,
@@ -132,11 +134,6 @@ fn findings(lines: &[Line]) -> Findings {
             ]);
         }
     }
-    let series = |line: &Line| Series {
-        name: format!("{}: {}", line.axis, line.quantity),
-        points: line.points.iter().map(|&(x, y)| [x, y]).collect(),
-        ..Series::default()
-    };
     let row = |line: &Line| {
         let errors = line.points.iter().map(|p| p.1);
         vec![
@@ -155,16 +152,7 @@ fn findings(lines: &[Line]) -> Findings {
              products in 64 bits. Every number is the same on every machine.",
         ),
         tables: vec![("", table)],
-        plots: vec![(
-            "",
-            Plot {
-                title: "Relative errors of 32 bits".to_owned(),
-                x: Axis::logarithmic("value on the axis named"),
-                y: Axis::logarithmic("relative error"),
-                series: lines.iter().map(series).collect(),
-                ..Plot::default()
-            },
-        )],
+        plots: vec![("", plot(lines))],
         summary: Summary {
             columns: vec![
                 "axis",
@@ -179,6 +167,21 @@ fn findings(lines: &[Line]) -> Findings {
             .map(|line| format!("{}, {}: {}.", line.axis, line.quantity, sentence(line)))
             .collect(),
         ..Findings::default()
+    }
+}
+
+fn plot(lines: &[Line]) -> Plot {
+    let series = |line: &Line| Series {
+        name: format!("{}: {}", line.axis, line.quantity),
+        points: line.points.iter().map(|&(x, y)| [x, y]).collect(),
+        ..Series::default()
+    };
+    Plot {
+        title: "Relative errors of 32 bits".to_owned(),
+        x: Axis::logarithmic("value on the axis named"),
+        y: Axis::logarithmic("relative error"),
+        series: lines.iter().map(series).collect(),
+        ..Plot::default()
     }
 }
 

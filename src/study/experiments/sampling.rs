@@ -6,9 +6,9 @@ use crate::export::table::Table;
 use crate::inverse::paper::descent::Descent;
 use crate::inverse::settings::Settings;
 use crate::study::experiments::course::{
-    Errors, Gauge, Mark, descend, descend_by, estimate, paper_settings, rays_at,
+    Gauge, Mark, descend, descend_by, estimate, paper_settings, rays_at,
 };
-use crate::study::experiments::courses::{Kind, common_mark, plot, table, words};
+use crate::study::experiments::courses::{self, Kind, Quantity, common_mark, plot, table, words};
 use crate::study::experiments::evenness::{Evenness, measure};
 use crate::study::experiments::findings::brief;
 use crate::study::experiments::selection::Groups;
@@ -52,34 +52,17 @@ fn run(bench: &Bench) -> Result<Findings> {
     let limits = bench.limits(WAYS.len() * bench.seeds as usize);
     let subject = box_room::photographed("box room", ALBEDO, LAMP, bench.quick)?;
     let gauge = Gauge::new(&subject, paper_settings(1).max_bounces());
-    let kinds: Vec<Kind> = (WAYS.iter())
-        .map(|&(name, way)| {
-            (bench.say)(name);
-            let course = |seed| descent(&gauge, way, &paper_settings(seed), limits);
-            Kind {
-                name: name.to_owned(),
-                courses: bench.seeds().map(course).collect(),
-            }
-        })
-        .collect();
-    (bench.say)("paths");
+    let names = WAYS.iter().map(|(name, _)| (*name).to_owned());
+    let course = |index: usize, seed| {
+        let way = WAYS[index].1;
+        descent(bench, &gauge, way, &paper_settings(seed), limits)
+    };
+    let kinds = courses::run(bench, names, course, of_loss)?;
+    bench.begin("paths")?;
     let truth = box_room::truth(&box_room::box_room("box room", ALBEDO, LAMP));
     let (pixels, most) = if bench.quick { (16, 256) } else { (64, 4096) };
     let evenness = measure(&subject.problem, &truth, pixels, most);
 
-    let rays = |mark: &Mark| mark.rays as f64;
-    let drawn = |label, quantity| {
-        plot(
-            "Pixels of the paper's descent",
-            "rays",
-            label,
-            rays,
-            quantity,
-            &kinds,
-            &[],
-        )
-    };
-    let albedo = |errors: &Errors| errors.albedo;
     Ok(Findings {
         how: format!(
             "The paper's descent in a box room of mean albedo {ALBEDO}, {} seeds, batches of 8, nothing annealed, with \
@@ -94,8 +77,11 @@ fn run(bench: &Bench) -> Result<Findings> {
             ("-paths", of_paths(&evenness)),
         ],
         plots: vec![
-            ("", drawn("held-out l1 loss, radiance", |e| e.loss)),
-            ("-albedo", drawn("mean absolute error of albedo", albedo)),
+            ("", of_loss(&kinds)),
+            (
+                "-albedo",
+                drawn(&kinds, "mean absolute error of albedo", |e| e.albedo),
+            ),
             ("-paths", evenness_plot(&evenness)),
         ],
         summary: summary(&kinds, &evenness),
@@ -104,12 +90,28 @@ fn run(bench: &Bench) -> Result<Findings> {
     })
 }
 
+fn of_loss(kinds: &[Kind]) -> Plot {
+    drawn(kinds, "held-out l1 loss, radiance", |e| e.loss)
+}
+
+fn drawn(kinds: &[Kind], label: &str, quantity: Quantity) -> Plot {
+    let title = "Pixels of the paper's descent";
+    let rays = |mark: &Mark| mark.rays as f64;
+    plot(title, "rays", label, rays, quantity, kinds, &[])
+}
+
 /// One course.
-fn descent(gauge: &Gauge, way: Way, settings: &Settings, limits: Limits) -> Vec<Mark> {
+fn descent(
+    bench: &Bench,
+    gauge: &Gauge,
+    way: Way,
+    settings: &Settings,
+    limits: Limits,
+) -> Vec<Mark> {
     let problem = gauge.problem();
     let bounces = settings.max_bounces();
     let mut groups = match way {
-        Way::Uniform => return descend(gauge, settings, limits),
+        Way::Uniform => return descend(bench, gauge, settings, limits),
         Way::Objects { weighed } => Groups::by_object(problem, settings, weighed),
         Way::Residual { weighed } => Groups::by_block(problem, settings, weighed),
     };
@@ -130,7 +132,7 @@ fn descent(gauge: &Gauge, way: Way, settings: &Settings, limits: Limits) -> Vec<
         outcome.rays += rays;
         outcome
     };
-    descend_by(gauge, limits, &mut step)
+    descend_by(bench, gauge, limits, &mut step)
 }
 
 fn of_paths(evenness: &[Evenness]) -> Table {

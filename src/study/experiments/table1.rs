@@ -9,7 +9,7 @@ use crate::study::experiments::course::{
 };
 use crate::study::experiments::findings::brief;
 use crate::study::experiments::objects::{self, Posed};
-use crate::study::experiments::{Bench, Findings, Study, Summary};
+use crate::study::experiments::{Bench, Findings, Limits, Study, Summary};
 
 /// The study.
 pub const STUDY: Study = Study {
@@ -36,27 +36,42 @@ struct Solved {
 fn run(bench: &Bench) -> Result<Findings> {
     let shares = 2 * bench.seeds as usize + (4.0 * PAPER_SHARE) as usize;
     let limits = bench.limits(shares);
-    let mut all = Vec::new();
+    let mut all: Vec<Solved> = Vec::new();
     for posed in [
         objects::convex(bench.quick)?,
         objects::shadowed(bench.quick)?,
     ] {
-        (bench.say)(posed.name);
-        let gauge = Gauge::new(&posed.subject, u32::MAX).watching(posed.object);
-        let end = |seed| cached(&gauge, &settings(&posed, seed, bench.quick, limits.seconds));
-        let cache = bench.seeds().map(end).collect::<Result<_>>()?;
-        let mut longer = limits;
-        longer.seconds *= PAPER_SHARE;
-        let course = |seed| descend(&gauge, &paper_settings(seed), longer).pop();
-        let paper = (1..=PAPER_SEEDS.min(bench.seeds))
-            .filter_map(course)
-            .collect();
         all.push(Solved {
             posed,
-            cache,
-            paper,
+            cache: Vec::new(),
+            paper: Vec::new(),
         });
+        let (cache, paper) = (bench.seeds(), 1..=PAPER_SEEDS.min(bench.seeds));
+        let solves = cache
+            .map(|seed| (seed, true))
+            .chain(paper.map(|seed| (seed, false)));
+        for (seed, by_cache) in solves {
+            let last = all.len() - 1;
+            let posed = &all[last].posed;
+            let solver = if by_cache { "transport cache" } else { "paper" };
+            bench.begin(&format!("{}, {solver}, seed {seed}", posed.name))?;
+            let gauge = Gauge::new(&posed.subject, u32::MAX).watching(posed.object);
+            if by_cache {
+                let settings = settings(posed, seed, bench.quick, limits.seconds);
+                let end = cached(bench, &gauge, &settings)?;
+                all[last].cache.push(end);
+            } else {
+                let longer = Limits {
+                    seconds: limits.seconds * PAPER_SHARE,
+                    ..limits
+                };
+                let end = descend(bench, &gauge, &paper_settings(seed), longer).pop();
+                all[last].paper.extend(end);
+            }
+            (bench.show)(plot(&all));
+        }
     }
+    bench.go_on()?;
     Ok(Findings {
         how: format!(
             "{} {} Both solved by the transport cache with preset `balanced`, light sampling alone where nothing but lamps \

@@ -73,7 +73,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     let limits = bench.limits(1 + CUTS);
 
     // The transport cache, with one colour an object and with textures.
-    (bench.say)("transport cache");
+    bench.begin("transport cache")?;
     let own_light = room.is_some();
     let of_objects = Settings {
         exposures: !own_light,
@@ -91,7 +91,8 @@ fn run(bench: &Bench) -> Result<Findings> {
         ("cache, one colour an object", &of_objects),
         ("cache, textures", &with_textures),
     ] {
-        let solution = solved(subject, settings)?;
+        bench.begin(name)?;
+        let solution = solved(bench, subject, settings)?;
         let (seconds, rays) = (solution.progress.seconds, solution.progress.rays);
         let estimate = solution.estimate;
         let cells = |t: &Arc<TexelEstimate>| t.seen.iter().filter(|&&n| n > 0).count();
@@ -100,17 +101,13 @@ fn run(bench: &Bench) -> Result<Findings> {
             .as_ref()
             .map_or(estimate.objects.len(), cells);
         states.push(measure.state(name, &subject.problem, &estimate, unknowns, seconds, rays));
+        (bench.show)(plot(&states, measure.truth.is_some()));
         if objects.objects.is_empty() {
             objects = estimate;
         }
     }
-    states.extend(descents(
-        bench,
-        &measure,
-        &subject.problem,
-        &objects,
-        limits,
-    )?);
+    let problem = &subject.problem;
+    descents(bench, &measure, problem, &objects, limits, &mut states)?;
     let how = format!(
         "{}: albedo pictures of all photographs against the true ones (peak 1, lamps left out), held-out loss with all \
          bounces. The paper's descent starts from the transport cache's lamps and one colour an object, then has {} with the \
@@ -126,14 +123,15 @@ fn run(bench: &Bench) -> Result<Findings> {
     Ok(findings(how, states, measure.truth))
 }
 
-/// The paper's descent per triangle, on finer and finer triangles.
+/// Adds the paper's descent per triangle, on finer and finer triangles.
 fn descents(
     bench: &Bench,
     measure: &Measure,
     problem: &Problem,
     start: &Estimate,
     limits: Limits,
-) -> Result<Vec<State>> {
+    states: &mut Vec<State>,
+) -> Result<()> {
     let settings = paper_settings(1);
     let mut descent = Descent::new(problem, Grain::Objects);
     for (index, object) in start.objects.iter().enumerate() {
@@ -143,13 +141,13 @@ fn descents(
     }
     let mut problem = problem.clone();
     let mut descent = descent.refine(&problem);
-    let (mut states, mut seconds, mut rays) = (Vec::new(), 0.0, 0);
+    let (mut seconds, mut rays) = (0.0, 0);
     for cuts in 0..=CUTS {
         let name = match cuts {
             0 => "paper, triangles".to_owned(),
             cuts => format!("paper, cut {cuts} ×"),
         };
-        (bench.say)(&name);
+        bench.begin(&name)?;
         if cuts > 0 {
             let (finer, parents) = finer::cut(&problem, PIXELS)?;
             descent = descent.refine_by(&parents);
@@ -159,7 +157,7 @@ fn descents(
         while rays < goal && begun.elapsed().as_secs_f64() < limits.seconds {
             let outcome = descent.step(&problem, &settings, settings.max_bounces());
             rays += outcome.rays;
-            if !outcome.finite || outcome.rays == 0 {
+            if !outcome.finite || outcome.rays == 0 || (bench.stopped)() {
                 break;
             }
         }
@@ -167,8 +165,9 @@ fn descents(
         let estimate = of_triangles(&problem, start, &descent);
         let unknowns = problem.scene.triangles.len();
         states.push(measure.state(&name, &problem, &estimate, unknowns, seconds, rays));
+        (bench.show)(plot(states, measure.truth.is_some()));
     }
-    Ok(states)
+    bench.go_on()
 }
 
 /// An estimate with the descent's albedo of each triangle.
@@ -274,29 +273,7 @@ fn findings(how: String, states: Vec<State>, truth: Option<Vec<Picture>>) -> Fin
             format!("{:.1}", state.rays as f64 * 1e-6),
         ]);
     }
-    let point = |state: &State| Some([state.rays as f64, state.psnr.or(state.loss)?]);
-    let known = truth.is_some();
-    let series = |name: &str, solver: &str| Series {
-        name: name.to_owned(),
-        points: (states.iter().filter(|s| s.name.starts_with(solver)))
-            .filter_map(point)
-            .collect(),
-        ..Series::default()
-    };
-    let plot = Plot {
-        title: "Textures".to_owned(),
-        x: Axis::logarithmic("rays"),
-        y: Axis::linear(if known {
-            "PSNR of albedo pictures, dB"
-        } else {
-            "held-out l1 loss, radiance"
-        }),
-        series: vec![
-            series("transport cache: objects, textures", "cache"),
-            series("paper: triangles, subdivisions", "paper"),
-        ],
-        ..Plot::default()
-    };
+    let plot = plot(&states, truth.is_some());
     let seen = seen(&states);
     let mut grid = Grid::new(3);
     let shown = truth.and_then(|pictures| pictures.into_iter().nth(SHOWN));
@@ -321,6 +298,32 @@ fn findings(how: String, states: Vec<State>, truth: Option<Vec<Picture>>) -> Fin
         },
         seen,
         pictures: vec![("-albedo", grid)],
+    }
+}
+
+/// How right the albedo pictures are over rays; `known` says whether the truth is.
+fn plot(states: &[State], known: bool) -> Plot {
+    let point = |state: &State| Some([state.rays as f64, state.psnr.or(state.loss)?]);
+    let series = |name: &str, solver: &str| Series {
+        name: name.to_owned(),
+        points: (states.iter().filter(|s| s.name.starts_with(solver)))
+            .filter_map(point)
+            .collect(),
+        ..Series::default()
+    };
+    Plot {
+        title: "Textures".to_owned(),
+        x: Axis::logarithmic("rays"),
+        y: Axis::linear(if known {
+            "PSNR of albedo pictures, dB"
+        } else {
+            "held-out l1 loss, radiance"
+        }),
+        series: vec![
+            series("transport cache: objects, textures", "cache"),
+            series("paper: triangles, subdivisions", "paper"),
+        ],
+        ..Plot::default()
     }
 }
 
