@@ -61,8 +61,9 @@ pub fn show(ui: &mut Ui, id: &str, plot: &Plot, height: f32) {
                 let color = tokens.series[index % tokens.series.len()];
                 let points: Vec<[f64; 2]> = places(plot, series).map(|(point, _)| point).collect();
                 let [xs, low, high] = band(plot, series);
+                // Without a name, so that the legend shows the curve's colour alone.
                 if xs.len() > 1 {
-                    let area = FilledArea::new(&series.name, &xs, &low, &high);
+                    let area = FilledArea::new("", &xs, &low, &high);
                     drawn.add(area.fill_color(color.gamma_multiply(BAND)));
                 }
                 let dots = Points::new(&series.name, points.clone()).color(color);
