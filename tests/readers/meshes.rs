@@ -160,6 +160,26 @@ fn gltf_flaws_are_errors() {
     }
 }
 
+/// A few megabytes that name the same triangle 40 million times.
+#[test]
+fn gltf_nodes_that_use_a_mesh_over_and_over_are_refused_before_it_is_read() {
+    let bytes = glb(|g| {
+        let primitive = g["meshes"][0]["primitives"][0].clone();
+        g["meshes"][0]["primitives"] = json!(vec![primitive; 10_000]);
+        g["nodes"] = json!(vec![json!({"mesh": 0}); 4_000]);
+        g["scenes"][0]["nodes"] = json!((0..4_000).collect::<Vec<_>>());
+    });
+    let started = std::time::Instant::now();
+    let error = with_mesh("scan.glb", &bytes).unwrap_err();
+    assert!(error.problem.contains("over and over"), "{error}");
+    let folder = folder("");
+    write(folder.path(), "object.glb", &bytes);
+    let error = relit::compose::object::ObjectModel::read(&folder.path().join("object.glb"));
+    let error = error.unwrap_err();
+    assert!(error.problem.contains("over and over"), "{error}");
+    assert!(started.elapsed().as_secs() < 10);
+}
+
 #[test]
 fn the_mesh_is_glb_then_ply_then_obj() {
     let folder = folder(&transforms(""));

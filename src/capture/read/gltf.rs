@@ -2,14 +2,12 @@
 
 use crate::capture::read::accessor::numbers;
 use crate::capture::read::confine::Confine;
-use crate::capture::read::gltf_file;
 use crate::capture::read::mesh::RawMesh;
+use crate::capture::read::{gltf_file, gltf_scene};
 use crate::error::{Error, Result};
 use ::gltf::accessor::Dimensions::{Scalar, Vec2 as Two, Vec3 as Three, Vec4 as Four};
-use ::gltf::mesh::Mode;
-use ::gltf::scene::Transform;
-use ::gltf::{Gltf, Node, Primitive, Semantic};
-use glam::{DMat4, DQuat, DVec3, Vec2, Vec3};
+use ::gltf::{Node, Primitive, Semantic};
+use glam::{DMat4, DVec3, Vec2, Vec3};
 use std::path::Path;
 
 /// Reads the default scene (or the first, or all nodes where there is none).
@@ -22,71 +20,20 @@ pub fn read(path: &Path, confine: &Confine) -> Result<RawMesh> {
     let broken = |problem: String| Error::file(path, problem, "export the mesh again");
     let gltf = gltf_file::parse(path, &bytes)?;
     drop(bytes);
-    let buffers = gltf_file::buffers(&gltf, path, confine)?;
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let buffers = gltf_file::buffers(&gltf, path, &|place, name| {
+        let file = confine.file_from(folder, place, name)?;
+        std::fs::read(&file).map_err(|e| Error::io(&file, &e))
+    })?;
 
     let mut raw = RawMesh {
         has_objects: true,
         ..RawMesh::default()
     };
-    let mut visited = vec![false; gltf.nodes().len()];
-    let scene = gltf.default_scene().or_else(|| gltf.scenes().next());
-    let mut stack: Vec<(Node, DMat4)> = match &scene {
-        Some(scene) => scene.nodes().map(|n| (n, DMat4::IDENTITY)).collect(),
-        None => roots(&gltf).map(|n| (n, DMat4::IDENTITY)).collect(),
-    };
-    stack.reverse();
-    while let Some((node, parent)) = stack.pop() {
-        if std::mem::replace(&mut visited[node.index()], true) {
-            return Err(broken(format!(
-                "nodes[{}] is its own ancestor or has two parents",
-                node.index()
-            )));
-        }
-        let to_world = parent * matrix(&node.transform());
+    for (node, to_world) in gltf_scene::nodes(&gltf, &buffers).map_err(broken)? {
         add_node(&mut raw, &node, &to_world, &buffers).map_err(broken)?;
-        let first = stack.len();
-        stack.extend(node.children().map(|child| (child, to_world)));
-        stack[first..].reverse();
     }
     Ok(raw)
-}
-
-/// Nodes that are nobody's child.
-fn roots(gltf: &Gltf) -> impl Iterator<Item = Node<'_>> {
-    let mut child = vec![false; gltf.nodes().len()];
-    for node in gltf.nodes() {
-        for c in node.children() {
-            child[c.index()] = true;
-        }
-    }
-    gltf.nodes().filter(move |node| !child[node.index()])
-}
-
-/// A node's transform, composed in f64.
-fn matrix(transform: &Transform) -> DMat4 {
-    match *transform {
-        Transform::Matrix { matrix } => {
-            DMat4::from_cols_array_2d(&matrix.map(|c| c.map(f64::from)))
-        }
-        Transform::Decomposed {
-            translation,
-            rotation,
-            scale,
-        } => {
-            let rotation = DQuat::from_array(rotation.map(f64::from));
-            // A quaternion of no length turns nothing; others may be off by rounding.
-            let rotation = if rotation.length() > 0.0 {
-                rotation.normalize()
-            } else {
-                DQuat::IDENTITY
-            };
-            DMat4::from_scale_rotation_translation(
-                DVec3::from_array(scale.map(f64::from)),
-                rotation,
-                DVec3::from_array(translation.map(f64::from)),
-            )
-        }
-    }
 }
 
 /// Adds a node's mesh as an object.
@@ -176,7 +123,13 @@ fn add_primitive(
     };
     let mirrored = to_world.determinant() < 0.0;
     let before = mesh.triangles.len();
-    for [a, b, c] in triangles(primitive.mode(), &indices, &mut raw.warnings) {
+    let triangles = gltf_scene::triangles(primitive.mode(), &indices);
+    if triangles.is_none() {
+        let mode = primitive.mode();
+        raw.warnings
+            .push(format!("a primitive of {mode:?} was left out"));
+    }
+    for [a, b, c] in triangles.unwrap_or_default() {
         let local = if mirrored { [a, c, b] } else { [a, b, c] };
         if !uvs.is_empty() || !mesh.corner_uvs.is_empty() {
             mesh.corner_uvs
@@ -191,34 +144,4 @@ fn add_primitive(
         mesh.vertex_colors.truncate(first as usize);
     }
     Ok(())
-}
-
-/// The triangles of a list, strip or fan; points and lines are left out with a warning.
-fn triangles(mode: Mode, indices: &[u32], warnings: &mut Vec<String>) -> Vec<[u32; 3]> {
-    match mode {
-        Mode::Triangles => indices
-            .chunks_exact(3)
-            .map(|t| [t[0], t[1], t[2]])
-            .collect(),
-        Mode::TriangleStrip => indices
-            .windows(3)
-            .enumerate()
-            .map(|(i, t)| {
-                if i % 2 == 0 {
-                    [t[0], t[1], t[2]]
-                } else {
-                    [t[0], t[2], t[1]]
-                }
-            })
-            .collect(),
-        Mode::TriangleFan => indices
-            .windows(2)
-            .skip(1)
-            .map(|t| [indices[0], t[0], t[1]])
-            .collect(),
-        _ => {
-            warnings.push(format!("a primitive of {mode:?} was left out"));
-            Vec::new()
-        }
-    }
 }

@@ -1,11 +1,9 @@
 //! glTF and GLB files and their buffers, checked before the gltf crate trusts them.
 
-use crate::capture::read::confine::Confine;
 use crate::error::{Error, Result};
 use gltf::buffer::{Data, Source};
 use gltf::json::Root;
-use gltf::json::validation::Checked;
-use gltf::{Document, Glb, Gltf, Semantic};
+use gltf::{Document, Glb, Gltf};
 use std::path::Path;
 
 /// Bytes of a GLB file's header.
@@ -29,23 +27,19 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Gltf> {
         (gltf::json::deserialize::from_slice(bytes), None)
     };
     let root = root.map_err(|e| invalid(gltf::Error::Deserialize(e)))?;
-    check_positions(&root).map_err(broken)?;
+    check_accessors(&root).map_err(broken)?;
     let document = Document::from_json(root).map_err(invalid)?;
     Ok(Gltf { document, blob })
 }
 
 /// The crate's validation looks up the POSITION accessors before it knows that they exist.
-fn check_positions(root: &Root) -> std::result::Result<(), String> {
+fn check_accessors(root: &Root) -> std::result::Result<(), String> {
     for (index, mesh) in root.meshes.iter().enumerate() {
-        for primitive in &mesh.primitives {
-            let positions = primitive
-                .attributes
-                .get(&Checked::Valid(Semantic::Positions));
-            if positions.is_some_and(|accessor| accessor.value() >= root.accessors.len()) {
-                return Err(format!(
-                    "is no valid glTF: meshes[{index}] names a POSITION accessor that is not there"
-                ));
-            }
+        let mut accessors = (mesh.primitives.iter()).flat_map(|p| p.attributes.values());
+        if accessors.any(|accessor| accessor.value() >= root.accessors.len()) {
+            return Err(format!(
+                "is no valid glTF: meshes[{index}] names an accessor that is not there"
+            ));
         }
     }
     Ok(())
@@ -57,12 +51,14 @@ fn declared_length(bytes: &[u8]) -> Option<usize> {
     Some(u32::from_le_bytes(field.try_into().ok()?) as usize)
 }
 
-/// The bytes of all buffers: the GLB's own, data URIs, and files inside the confined folder.
+/// Reads the file of a name that a glTF file holds; the first argument is the field, for messages.
+pub type ReadFile<'a> = &'a dyn Fn(&str, &str) -> Result<Vec<u8>>;
+
+/// The bytes of all buffers: the GLB's own, data URIs, and what `file` reads.
 ///
 /// # Errors
-/// A buffer is missing, shorter than promised, or leaves the folder.
-pub fn buffers(gltf: &Gltf, path: &Path, confine: &Confine) -> Result<Vec<Vec<u8>>> {
-    let folder = path.parent().unwrap_or(Path::new("."));
+/// A buffer is missing or shorter than promised, or `file` fails.
+pub fn buffers(gltf: &Gltf, path: &Path, file: ReadFile<'_>) -> Result<Vec<Vec<u8>>> {
     let mut blob = gltf.blob.clone();
     gltf.buffers()
         .map(|buffer| {
@@ -71,15 +67,7 @@ pub fn buffers(gltf: &Gltf, path: &Path, confine: &Confine) -> Result<Vec<Vec<u8
                 Source::Bin => blob
                     .take()
                     .ok_or_else(|| Error::new(&place, "has no data", "export the mesh again"))?,
-                Source::Uri(uri) if uri.starts_with("data:") => {
-                    Data::from_source(Source::Uri(uri), None)
-                        .map_err(|e| Error::new(&place, e, "export the mesh again"))?
-                        .0
-                }
-                Source::Uri(uri) => {
-                    let file = confine.file_from(folder, &place, &uri.replace("%20", " "))?;
-                    std::fs::read(&file).map_err(|e| Error::io(&file, &e))?
-                }
+                Source::Uri(uri) => resource(&place, uri, file)?,
             };
             if bytes.len() < buffer.length() {
                 return Err(Error::new(
@@ -95,4 +83,35 @@ pub fn buffers(gltf: &Gltf, path: &Path, confine: &Confine) -> Result<Vec<Vec<u8
             Ok(bytes)
         })
         .collect()
+}
+
+/// The bytes behind a URI: inline data, or what `file` reads. `place` names the field for messages.
+///
+/// # Errors
+/// The inline data is broken, or `file` fails.
+pub fn resource(place: &str, uri: &str, file: ReadFile<'_>) -> Result<Vec<u8>> {
+    if uri.starts_with("data:") {
+        let data = Data::from_source(Source::Uri(uri), None);
+        return data
+            .map(|data| data.0)
+            .map_err(|e| Error::new(place, e, "export it again"));
+    }
+    file(place, &percent_decoded(uri))
+}
+
+/// A URI's path with its %XX decoded.
+fn percent_decoded(uri: &str) -> String {
+    let bytes = uri.as_bytes();
+    let mut decoded = Vec::with_capacity(bytes.len());
+    let mut i = 0;
+    while let Some(&byte) = bytes.get(i) {
+        let hex = bytes
+            .get(i + 1..i + 3)
+            .filter(|_| byte == b'%')
+            .and_then(|h| std::str::from_utf8(h).ok())
+            .and_then(|h| u8::from_str_radix(h, 16).ok());
+        decoded.push(hex.unwrap_or(byte));
+        i += if hex.is_some() { 3 } else { 1 };
+    }
+    String::from_utf8_lossy(&decoded).into_owned()
 }

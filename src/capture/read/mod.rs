@@ -11,12 +11,13 @@
 //! A capture from someone else is data: nothing outside its folder is opened unless the person allows it, and no
 //! header is believed before it was compared with the file's length or the camera's size.
 
-mod accessor;
+pub mod accessor;
 pub mod confine;
 mod exposure;
 pub(in crate::capture) mod fields;
 mod gltf;
 pub mod gltf_file;
+pub mod gltf_scene;
 pub mod image;
 pub(in crate::capture) mod lens;
 pub(in crate::capture) mod mesh;

@@ -146,6 +146,18 @@ impl Parts {
         }
     }
 
+    /// Refuses an object with more than [`MAX_TRIANGLES`].
+    fn check_size(&self, path: &Path) -> Result<()> {
+        if self.triangles.len() > MAX_TRIANGLES {
+            return Err(Error::file(
+                path,
+                format!("has {} triangles or more", self.triangles.len()),
+                format!("reduce the object to {MAX_TRIANGLES} triangles or fewer"),
+            ));
+        }
+        Ok(())
+    }
+
     fn finish(mut self, name: String, path: &Path) -> Result<ObjectModel> {
         if self.triangles.is_empty() {
             return Err(Error::file(
@@ -154,13 +166,7 @@ impl Parts {
                 "export the object as a triangle mesh",
             ));
         }
-        if self.triangles.len() > MAX_TRIANGLES {
-            return Err(Error::file(
-                path,
-                format!("has {} triangles", self.triangles.len()),
-                format!("reduce the object to {MAX_TRIANGLES} triangles or fewer"),
-            ));
-        }
+        self.check_size(path)?;
         for (count, what) in [
             (self.skipped, "have no area"),
             (self.not_finite, "have coordinates that are not finite"),

@@ -1,0 +1,132 @@
+//! The nodes of a glTF scene where they stand in the world, and the triangles of its primitives.
+
+use glam::{DMat4, DQuat, DVec3};
+use gltf::mesh::Mode;
+use gltf::scene::Transform;
+use gltf::{Accessor, Gltf, Mesh, Node, Semantic};
+
+/// Vertices that a scene may have however small its file, since nodes may share a mesh.
+const ALWAYS_ALLOWED: usize = 1 << 25;
+
+/// The nodes of the default scene (or the first, or all nodes where there is none), parents before their children, each
+/// with the map from its own coordinates to the world's, composed in f64.
+///
+/// # Errors
+/// As a phrase: the nodes form no tree, or they use meshes over and over, to more vertices than `buffers` have bytes and than
+/// [`ALWAYS_ALLOWED`].
+pub fn nodes<'a>(gltf: &'a Gltf, buffers: &[Vec<u8>]) -> Result<Vec<(Node<'a>, DMat4)>, String> {
+    let bytes: usize = buffers.iter().map(Vec::len).sum();
+    let most = bytes.max(ALWAYS_ALLOWED);
+    let mut vertices = 0_usize;
+    let mut visited = vec![false; gltf.nodes().len()];
+    let scene = gltf.default_scene().or_else(|| gltf.scenes().next());
+    let mut stack: Vec<(Node, DMat4)> = match &scene {
+        Some(scene) => scene.nodes().map(|n| (n, DMat4::IDENTITY)).collect(),
+        None => roots(gltf).map(|n| (n, DMat4::IDENTITY)).collect(),
+    };
+    stack.reverse();
+    let mut nodes = Vec::new();
+    while let Some((node, parent)) = stack.pop() {
+        if std::mem::replace(&mut visited[node.index()], true) {
+            return Err(format!(
+                "nodes[{}] is its own ancestor or has two parents",
+                node.index()
+            ));
+        }
+        // A count beyond the bytes there are is found out when it is read.
+        let count = |accessor: Option<Accessor>| accessor.map_or(0, |a| a.count().min(bytes));
+        for primitive in node.mesh().iter().flat_map(Mesh::primitives) {
+            let positions = count(primitive.get(&Semantic::Positions));
+            vertices += 1 + positions.max(count(primitive.indices()));
+            if vertices > most {
+                return Err(format!(
+                    "its nodes use meshes over and over, to more than {most} vertices"
+                ));
+            }
+        }
+        let to_world = parent * matrix(&node.transform());
+        let first = stack.len();
+        stack.extend(node.children().map(|child| (child, to_world)));
+        stack[first..].reverse();
+        nodes.push((node, to_world));
+    }
+    Ok(nodes)
+}
+
+/// Nodes that are nobody's child.
+fn roots(gltf: &Gltf) -> impl Iterator<Item = Node<'_>> {
+    let mut child = vec![false; gltf.nodes().len()];
+    for node in gltf.nodes() {
+        for c in node.children() {
+            child[c.index()] = true;
+        }
+    }
+    gltf.nodes().filter(move |node| !child[node.index()])
+}
+
+/// A node's transform, composed in f64.
+fn matrix(transform: &Transform) -> DMat4 {
+    match *transform {
+        Transform::Matrix { matrix } => {
+            DMat4::from_cols_array_2d(&matrix.map(|c| c.map(f64::from)))
+        }
+        Transform::Decomposed {
+            translation,
+            rotation,
+            scale,
+        } => {
+            let rotation = DQuat::from_array(rotation.map(f64::from));
+            // A quaternion of no length turns nothing; others may be off by rounding.
+            let rotation = if rotation.length() > 0.0 {
+                rotation.normalize()
+            } else {
+                DQuat::IDENTITY
+            };
+            DMat4::from_scale_rotation_translation(
+                DVec3::from_array(scale.map(f64::from)),
+                rotation,
+                DVec3::from_array(translation.map(f64::from)),
+            )
+        }
+    }
+}
+
+/// The triangles of a list, strip or fan, all with the same winding; `None` for points and lines.
+pub fn triangles(mode: Mode, indices: &[u32]) -> Option<Vec<[u32; 3]>> {
+    let triangles = match mode {
+        Mode::Triangles => (indices.chunks_exact(3))
+            .map(|t| [t[0], t[1], t[2]])
+            .collect(),
+        Mode::TriangleStrip => (indices.windows(3).enumerate())
+            .map(|(i, t)| match i % 2 {
+                0 => [t[0], t[1], t[2]],
+                _ => [t[0], t[2], t[1]],
+            })
+            .collect(),
+        Mode::TriangleFan => (indices.windows(2).skip(1))
+            .map(|t| [indices[0], t[0], t[1]])
+            .collect(),
+        Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => return None,
+    };
+    Some(triangles)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strips_and_fans_are_lists_with_the_same_winding() {
+        let unrolled = |mode, indices: &[u32]| triangles(mode, indices).expect("triangles");
+        let list = unrolled(Mode::Triangles, &[0, 1, 2, 2, 1, 3, 9, 9]);
+        assert_eq!(list, [[0, 1, 2], [2, 1, 3]]);
+        let strip = unrolled(Mode::TriangleStrip, &[0, 1, 2, 3, 4]);
+        assert_eq!(strip, [[0, 1, 2], [1, 3, 2], [2, 3, 4]]);
+        let fan = unrolled(Mode::TriangleFan, &[7, 1, 2, 3]);
+        assert_eq!(fan, [[7, 1, 2], [7, 2, 3]]);
+        for mode in [Mode::Triangles, Mode::TriangleStrip, Mode::TriangleFan] {
+            assert!(unrolled(mode, &[]).is_empty() && unrolled(mode, &[1, 2]).is_empty());
+        }
+        assert_eq!(triangles(Mode::LineStrip, &[0, 1, 2]), None);
+    }
+}
