@@ -94,7 +94,9 @@ pub fn edit(arguments: &EditArguments) -> Result<()> {
     if let Some(photographs) = &photographs {
         let folder = arguments.out.join("photographs");
         std::fs::create_dir_all(&folder).map_err(|error| Error::io(&folder, &error))?;
-        write_with_progress(photographs, &|frame| folder.join(format!("{frame:03}")))?;
+        write_with_progress(photographs, &[], &|frame| {
+            folder.join(format!("{frame:03}"))
+        })?;
     }
     println!("results in {}", arguments.out.display());
     Ok(())

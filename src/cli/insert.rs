@@ -3,13 +3,14 @@
 use crate::cli::arguments::triple;
 use crate::cli::photographs::write_with_progress;
 use crate::cli::saved::{Loaded, SavedOptions};
+use crate::compose::object::surface::{DIELECTRIC, Surface};
 use crate::compose::placement::Placement;
 use crate::error::Result;
 use crate::session::photographs::Photographs;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// `relit insert`.
@@ -44,6 +45,7 @@ pub fn insert(arguments: &InsertArguments) -> Result<()> {
         estimate,
     } = arguments.saved.load()?;
     let estimate = Arc::new(estimate);
+    let (placements, materials): (_, Vec<_>) = arguments.objects.0.iter().cloned().unzip();
     let work = Photographs {
         frames: match arguments.frame {
             Which::One(frame) => vec![frame],
@@ -53,12 +55,12 @@ pub fn insert(arguments: &InsertArguments) -> Result<()> {
         found: estimate.clone(),
         edited: estimate,
         settings: saved.settings,
-        placements: arguments.objects.0.clone(),
+        placements,
         relight: false,
         samples: arguments.spp,
         denoise: arguments.denoise,
     };
-    write_with_progress(&work, &|frame| match arguments.frame {
+    write_with_progress(&work, &materials, &|frame| match arguments.frame {
         Which::One(_) => arguments.out.clone(),
         Which::All => {
             let mut name = OsString::from(&arguments.out);
@@ -85,9 +87,30 @@ fn which(text: &str) -> std::result::Result<Which, String> {
     }
 }
 
-/// The objects with their placements, in the order of the command line.
+/// The objects with their placements and the materials that replace those of their files, in the order of the command line.
 #[derive(Debug, Clone, Default)]
-struct Objects(Vec<Placement>);
+struct Objects(Vec<(Placement, Option<Surface>)>);
+
+/// KIND:R,G,B or KIND:R,G,B,ROUGHNESS: a linear base colour and GGX roughness α, all from 0 to 1.
+fn material(text: &str) -> std::result::Result<Surface, String> {
+    const WANTED: &str = "diffuse:R,G,B, plastic:R,G,B,ROUGHNESS or metal:R,G,B,ROUGHNESS is wanted, with numbers from 0 to 1";
+    let (kind, numbers) = text.split_once(':').ok_or(WANTED)?;
+    let numbers: Vec<f32> = numbers
+        .split(',')
+        .map(|part| part.trim().parse().ok().filter(|v| (0.0..=1.0).contains(v)))
+        .collect::<Option<_>>()
+        .ok_or(WANTED)?;
+    match (kind, &numbers[..]) {
+        ("diffuse", &[r, g, b]) => Ok(Surface::diffuse(Vec3::new(r, g, b))),
+        ("plastic" | "metal", &[r, g, b, roughness]) => Ok(Surface {
+            metallic: if kind == "metal" { 1.0 } else { 0.0 },
+            alpha: Some(roughness),
+            dielectric: DIELECTRIC,
+            ..Surface::diffuse(Vec3::new(r, g, b))
+        }),
+        _ => Err(WANTED.to_owned()),
+    }
+}
 
 impl Args for Objects {
     fn augment_args(command: Command) -> Command {
@@ -137,10 +160,28 @@ impl Args for Objects {
                 .allow_hyphen_values(true)
                 .value_parser(clap::value_parser!(f64)),
             )
+            .arg(
+                option(
+                    "material",
+                    "KIND:R,G,B[,ROUGHNESS]",
+                    "Replaces the file's materials: diffuse:R,G,B, plastic:R,G,B,ROUGHNESS or metal:R,G,B,ROUGHNESS",
+                )
+                .value_parser(material),
+            )
     }
 
     fn augment_args_for_update(command: Command) -> Command {
         Self::augment_args(command)
+    }
+}
+
+/// An object as its file has it.
+fn unplaced(file: &Path) -> Placement {
+    Placement {
+        file: file.to_owned(),
+        at: None,
+        scale: 1.0,
+        rotate: 0.0,
     }
 }
 
@@ -163,39 +204,37 @@ impl FromArgMatches for Objects {
                 .checked_sub(1)
                 .ok_or_else(|| wrong(format!("--{name} stands before any --object")))
         };
-        let mut placements: Vec<(Placement, bool)> = files
-            .iter()
-            .map(|(_, file)| {
-                let placement = Placement {
-                    file: file.clone(),
-                    at: None,
-                    scale: 1.0,
-                    rotate: 0.0,
-                };
-                (placement, false)
-            })
-            .collect();
+        let mut objects = Self(
+            files
+                .iter()
+                .map(|(_, file)| (unplaced(file), None))
+                .collect(),
+        );
+        let mut as_modelled = vec![false; files.len()];
         for (place, at) in given::<DVec3>(matches, "at") {
-            placements[owner(place, "at")?].0.at = Some(at);
+            objects.0[owner(place, "at")?].0.at = Some(at);
         }
         for (place, flag) in given::<bool>(matches, "as-modelled") {
-            placements[owner(place, "as-modelled")?].1 = flag;
+            as_modelled[owner(place, "as-modelled")?] = flag;
         }
         for (place, scale) in given::<f64>(matches, "scale") {
-            placements[owner(place, "scale")?].0.scale = scale;
+            objects.0[owner(place, "scale")?].0.scale = scale;
         }
         for (place, rotate) in given::<f64>(matches, "rotate") {
-            placements[owner(place, "rotate")?].0.rotate = rotate;
+            objects.0[owner(place, "rotate")?].0.rotate = rotate;
         }
-        for (placement, as_modelled) in &placements {
-            if placement.at.is_some() == *as_modelled {
+        for (place, surface) in given::<Surface>(matches, "material") {
+            objects.0[owner(place, "material")?].1 = Some(surface);
+        }
+        for ((placement, _), as_modelled) in objects.0.iter().zip(as_modelled) {
+            if placement.at.is_some() == as_modelled {
                 return Err(wrong(format!(
                     "--object {} needs either --at x,y,z or --as-modelled",
                     placement.file.display()
                 )));
             }
         }
-        Ok(Self(placements.into_iter().map(|(p, _)| p).collect()))
+        Ok(objects)
     }
 
     fn update_from_arg_matches(
@@ -211,7 +250,7 @@ impl FromArgMatches for Objects {
 mod tests {
     use super::*;
 
-    fn parse(arguments: &[&str]) -> std::result::Result<Vec<Placement>, String> {
+    fn parse(arguments: &[&str]) -> std::result::Result<Vec<(Placement, Option<Surface>)>, String> {
         let command = Objects::augment_args(Command::new("insert"));
         let all = std::iter::once(&"insert").chain(arguments);
         let matches = command
@@ -236,13 +275,22 @@ mod tests {
             "--scale",
             "0.01",
             "--as-modelled",
+            "--material",
+            "metal:0.9,0.6,0.3,0.25",
         ])
         .expect("valid");
         assert_eq!(parsed.len(), 2);
-        assert_eq!(parsed[0].at, Some(DVec3::new(-1.0, 0.0, 2.0)));
-        assert_eq!((parsed[0].scale, parsed[0].rotate), (1.0, -90.0));
-        assert_eq!(parsed[1].at, None);
-        assert_eq!((parsed[1].scale, parsed[1].rotate), (0.01, 0.0));
+        assert!(parsed[0].1.is_none());
+        let made = parsed[1].1.as_ref().expect("a material").material(None);
+        let lobe = made.lobe.expect("a metal shines");
+        assert_eq!(
+            (lobe.roughness, lobe.specular),
+            (0.25, Vec3::new(0.9, 0.6, 0.3))
+        );
+        assert_eq!(parsed[0].0.at, Some(DVec3::new(-1.0, 0.0, 2.0)));
+        assert_eq!((parsed[0].0.scale, parsed[0].0.rotate), (1.0, -90.0));
+        assert_eq!(parsed[1].0.at, None);
+        assert_eq!((parsed[1].0.scale, parsed[1].0.rotate), (0.01, 0.0));
     }
 
     #[test]
@@ -252,5 +300,35 @@ mod tests {
         assert!(both.is_err_and(|e| e.contains("needs either")));
         let early = parse(&["--scale", "2", "--object", "a.obj", "--as-modelled"]);
         assert!(early.is_err_and(|e| e.contains("before any")));
+    }
+
+    #[test]
+    fn materials_are_what_they_are_called_and_others_are_refused() {
+        let made = |text| material(text).expect("valid").material(None);
+        assert!(made("diffuse:0.1,0.2,0.3").lobe.is_none());
+        let lobe = made("plastic:0.1,0.2,0.3,0.5")
+            .lobe
+            .expect("plastic shines");
+        assert_eq!(
+            (lobe.roughness, lobe.specular),
+            (0.5, Vec3::splat(DIELECTRIC))
+        );
+        for text in [
+            "",
+            "diffuse",
+            "0.1,0.2,0.3",
+            "diffuse:0.1,0.2",
+            "diffuse:0.1,0.2,0.3,0.4",
+            "metal:0.1,0.2,0.3",
+            "metal:0.1,0.2,0.3,1.5",
+            "plastic:0.1,-0.2,0.3,0.5",
+            "plastic:0.1,NaN,0.3,0.5",
+            "glass:0.1,0.2,0.3,0.5",
+        ] {
+            assert!(
+                material(text).is_err_and(|e| e.contains("is wanted")),
+                "{text}"
+            );
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Photographs in one go, with progress; Ctrl-C ends after what is whole.
 
 use crate::cli::interrupt::Interrupt;
+use crate::compose::object::surface::Surface;
 use crate::error::Result;
 use crate::session::photographs::Photographs;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -10,11 +11,15 @@ use std::path::PathBuf;
 /// Steps of the bar.
 const LENGTH: u64 = 1000;
 
-/// Writes photographs and prints the paths of their files.
+/// Writes photographs and prints the paths of their files; `materials` as in [`Photographs::write_made_of`].
 ///
 /// # Errors
 /// Something cannot be read or written.
-pub fn write_with_progress(work: &Photographs, prefix: &dyn Fn(usize) -> PathBuf) -> Result<()> {
+pub fn write_with_progress(
+    work: &Photographs,
+    materials: &[Option<Surface>],
+    prefix: &dyn Fn(usize) -> PathBuf,
+) -> Result<()> {
     let interrupt = Interrupt::listen()?;
     let target = if std::io::stderr().is_terminal() {
         ProgressDrawTarget::stderr()
@@ -24,7 +29,7 @@ pub fn write_with_progress(work: &Photographs, prefix: &dyn Fn(usize) -> PathBuf
     let style = ProgressStyle::with_template("{bar:24} photograph {msg}, {eta} left");
     let bar = ProgressBar::with_draw_target(Some(LENGTH), target)
         .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    let written = work.write(prefix, &|doing| {
+    let written = work.write_made_of(materials, prefix, &|doing| {
         bar.set_position((f64::from(doing.share) * LENGTH as f64) as u64);
         bar.set_message(format!("{:03}", doing.frame));
         !interrupt.asked()

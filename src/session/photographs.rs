@@ -3,6 +3,7 @@
 
 use crate::compose::backdrop::Backdrop;
 use crate::compose::denoise::denoised;
+use crate::compose::object::surface::Surface;
 use crate::compose::placement::{PlacedObject, Placement};
 use crate::compose::relight::Relighting;
 use crate::compose::write::{write_insertion, write_relit};
@@ -70,12 +71,29 @@ impl Photographs {
         prefix: &dyn Fn(usize) -> PathBuf,
         tell: &dyn Fn(Doing) -> bool,
     ) -> Result<Written> {
+        self.write_made_of(&[], prefix, tell)
+    }
+
+    /// [`Photographs::write`] with materials that replace all those of an object's file: one a placement, in their order;
+    /// `None`, or none at all, leaves the file's own.
+    ///
+    /// # Errors
+    /// As [`Photographs::write`].
+    pub fn write_made_of(
+        &self,
+        materials: &[Option<Surface>],
+        prefix: &dyn Fn(usize) -> PathBuf,
+        tell: &dyn Fn(Doing) -> bool,
+    ) -> Result<Written> {
         let mut library = Library::default();
         let mut written = Written::default();
         let mut objects = Vec::new();
-        for placement in &self.placements {
-            let model = library.model(&placement.file)?;
+        for (index, placement) in self.placements.iter().enumerate() {
+            let mut model = library.model(&placement.file)?;
             written.warnings.extend(model.warnings.iter().cloned());
+            if let Some(Some(surface)) = materials.get(index) {
+                model = Arc::new(model.as_ref().clone().with_material(surface));
+            }
             let placed = PlacedObject::new(model, placement, &self.capture.scene)?;
             objects.push(Arc::new(placed));
         }

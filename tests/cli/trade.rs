@@ -1,0 +1,38 @@
+//! `relit trade`: the curve against the truth, or held-out pixels.
+
+use crate::place::Place;
+use crate::{done, refused};
+use serde_json::Value;
+use std::fs;
+
+#[test]
+fn the_trade_is_measured_against_the_truth_or_held_out_pixels() {
+    let place = Place::new();
+    let measured = |time: &str, out: &str| {
+        let output = place.relit(&["trade", "room", "--presets", "--time", time, "--out", out]);
+        done(&output);
+        let text = fs::read_to_string(place.path(out).join("trade.json")).expect("written");
+        for name in ["trade.csv", "trade.png"] {
+            assert!(place.path(out).join(name).metadata().expect(name).len() > 50);
+        }
+        serde_json::from_str::<Value>(&text).expect("JSON")
+    };
+    let trade = measured("3s", "with");
+    assert_eq!(trade["measure"], "albedo");
+    assert_eq!(trade["curves"].as_array().map(Vec::len), Some(4));
+    assert!(trade["machine"]["threads"].as_u64().is_some_and(|n| n > 0));
+    fs::remove_file(place.path("room/truth.json")).expect("removed");
+    assert_eq!(measured("1s", "without")["measure"], "held_out");
+
+    refused(
+        &place.relit(&["trade", "room", "--time", "0"]),
+        2,
+        &["--time"],
+    );
+    refused(
+        &place.relit(&["trade", "room", "--rooms", "2"]),
+        2,
+        &["--rooms"],
+    );
+    refused(&place.relit(&["trade", "nowhere"]), 1, &["nowhere"]);
+}
