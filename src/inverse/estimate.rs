@@ -1,5 +1,6 @@
 //! What comes out: emission, materials, outside light, exposures, each with a confidence.
 
+use crate::math::nullable;
 use crate::math::stats::quantile;
 use crate::scene::Scene;
 use crate::transport::environment::Environment;
@@ -27,20 +28,38 @@ pub struct Estimate {
     pub exposures: Option<Vec<Vec3>>,
 }
 
-/// What is known of one object.
+/// What is known of one object; also its entry in `estimate.json` and `report.json`, where what is no number is `null`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ObjectEstimate {
     /// Diffuse reflectance, linear RGB in [0, 1].
+    #[serde(
+        serialize_with = "nullable::color",
+        deserialize_with = "nullable::or_zero"
+    )]
     pub albedo: Vec3,
     /// Standard error of `albedo`.
+    #[serde(
+        serialize_with = "nullable::color",
+        deserialize_with = "nullable::or_infinity"
+    )]
     pub albedo_stderr: Vec3,
     /// Emitted radiance, W·sr⁻¹·m⁻².
+    #[serde(
+        serialize_with = "nullable::color",
+        deserialize_with = "nullable::or_zero"
+    )]
     pub emission: Vec3,
     /// Standard error of `emission`.
+    #[serde(
+        serialize_with = "nullable::color",
+        deserialize_with = "nullable::or_infinity"
+    )]
     pub emission_stderr: Vec3,
     /// GGX roughness α, where a lobe was kept.
+    #[serde(serialize_with = "nullable::number")]
     pub roughness: Option<f32>,
     /// Specular reflectance at normal incidence, where a lobe was kept.
+    #[serde(serialize_with = "nullable::number")]
     pub specular: Option<f32>,
     /// Pixels of all photographs whose centre sees the object.
     pub seen_pixels: u64,
@@ -183,5 +202,33 @@ impl Estimate {
                 }
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_entry_round_trips_and_what_is_no_number_is_null() {
+        let object = ObjectEstimate {
+            albedo: Vec3::new(0.1, 0.25, 1.0 / 3.0),
+            albedo_stderr: Vec3::new(0.01, f32::INFINITY, f32::INFINITY),
+            emission: Vec3::new(1e-30, 17.25, 1e30),
+            roughness: Some(0.3),
+            specular: Some(f32::NAN),
+            seen_pixels: u64::MAX,
+            note: "a \"note\"".into(),
+            ..Default::default()
+        };
+        let text = serde_json::to_string(&object).expect("serialises");
+        assert!(text.contains("\"specular\":null"), "{text}");
+        assert!(text.contains("[0.01,null,null]"), "{text}");
+        let back: ObjectEstimate = serde_json::from_str(&text).expect("parses");
+        let expected = ObjectEstimate {
+            specular: None,
+            ..object
+        };
+        assert_eq!(back, expected);
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod color;
 pub mod frame;
+pub mod nullable;
 pub mod picture;
 pub mod rng;
 pub mod sequence;

@@ -1,14 +1,14 @@
 //! `estimate.json`: everything that later commands need, with the maps beside it.
 
 use crate::error::{Error, Result};
-use crate::inverse::estimate::Estimate;
+use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::inverse::settings::{PARAMETERS, Settings};
 use crate::inverse::solver::Termination;
+use crate::math::nullable::{Rgb, rgb};
 use crate::session::command::{OpenOptions, Source};
 use crate::session::edits::{Edits, EditsRecord};
 use crate::session::save::maps::{self, Maps};
 use crate::session::save::named::Named;
-use crate::session::save::objects::{ObjectRecord, Rgb, records, rgb};
 use crate::session::snapshot::OpenCapture;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -32,7 +32,7 @@ pub struct EstimateFile {
     /// Why the solve ended; `null` while it runs.
     pub stopped_because: Option<Termination>,
     /// One entry an object, in the scene's order.
-    pub objects: Named<ObjectRecord>,
+    pub objects: Named<ObjectEstimate>,
     /// The file with the maps (see [`maps::encode`]), beside this one.
     pub maps: Option<String>,
     /// Each frame's linear exposure and white balance relative to the median frame.
@@ -84,7 +84,7 @@ impl EstimateFile {
             capture: CaptureReference::new(folder, capture),
             settings: settings.clone(),
             stopped_because,
-            objects: records(&capture.scene, estimate),
+            objects: Named::objects(&capture.scene, estimate),
             maps,
             exposures: estimate
                 .exposures
@@ -148,16 +148,13 @@ impl EstimateFile {
             .objects
             .iter()
             .map(|object| {
-                self.objects
-                    .get(&object.name)
-                    .map(Into::into)
-                    .ok_or_else(|| {
-                        Error::new(
-                            place("objects"),
-                            format!("no entry for object \"{}\" of the capture", object.name),
-                            "name the capture it was made from with --capture, or solve again",
-                        )
-                    })
+                self.objects.get(&object.name).cloned().ok_or_else(|| {
+                    Error::new(
+                        place("objects"),
+                        format!("no entry for object \"{}\" of the capture", object.name),
+                        "name the capture it was made from with --capture, or solve again",
+                    )
+                })
             })
             .collect::<Result<Vec<_>>>()?;
         let misfit = |field: &str| {

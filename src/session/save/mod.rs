@@ -4,7 +4,6 @@ pub mod estimate;
 pub mod maps;
 mod memory;
 pub mod named;
-pub mod objects;
 pub mod pictures;
 pub mod report;
 mod saved;

@@ -1,5 +1,7 @@
 //! A map in files that keeps the scene's order of objects.
 
+use crate::inverse::estimate::{Estimate, ObjectEstimate};
+use crate::scene::Scene;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde::ser::{Serialize, Serializer};
 use std::fmt;
@@ -16,6 +18,18 @@ impl<T> Named<T> {
             .iter()
             .find(|(n, _)| n == name)
             .map(|(_, value)| value)
+    }
+}
+
+impl Named<ObjectEstimate> {
+    /// All objects of an estimate by name.
+    pub fn objects(scene: &Scene, estimate: &Estimate) -> Self {
+        let named = scene.objects.iter().zip(&estimate.objects);
+        Self(
+            named
+                .map(|(o, estimate)| (o.name.clone(), estimate.clone()))
+                .collect(),
+        )
     }
 }
 

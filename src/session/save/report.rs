@@ -1,12 +1,12 @@
 //! `report.json`: what a solve did and found, in numbers.
 
-use crate::inverse::estimate::Estimate;
+use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::inverse::settings::{Preset, Settings};
 use crate::inverse::solver::{Progress, Stage, Termination};
 use crate::math::color::luminance;
+use crate::math::nullable::{Rgb, rgb};
 use crate::session::save::memory::peak_memory_bytes;
 use crate::session::save::named::Named;
-use crate::session::save::objects::{ObjectRecord, Rgb, records, rgb};
 use crate::session::snapshot::OpenCapture;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -45,7 +45,7 @@ pub struct Report {
     /// The model ladder.
     pub stages: Vec<Stage>,
     /// One entry an object.
-    pub objects: Named<ObjectRecord>,
+    pub objects: Named<ObjectEstimate>,
     /// Light from outside the mesh.
     pub outside_light: Option<OutsideSummary>,
     /// Each frame's exposure relative to the median frame.
@@ -134,7 +134,7 @@ impl Report {
             peak_memory_bytes: peak_memory_bytes(),
             stopped_because,
             stages: progress.stages.clone(),
-            objects: records(&capture.scene, estimate),
+            objects: Named::objects(&capture.scene, estimate),
             outside_light: estimate.outside.as_ref().map(|outside| {
                 let row_angle = |row: usize| {
                     let edge = |r: usize| {
