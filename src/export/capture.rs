@@ -19,9 +19,7 @@ use std::path::Path;
 /// # Errors
 /// A photograph cannot be read or a file cannot be written.
 pub fn write(folder: &Path, capture: &Capture, precision: Precision) -> Result<()> {
-    write_atomically(&folder.join("mesh.obj"), |out| {
-        write_obj(out, &capture.mesh)
-    })?;
+    write_mesh(folder, &capture.mesh)?;
     for (index, frame) in capture.frames.iter().enumerate() {
         let photograph = frame.load()?;
         let picture = Picture {
@@ -31,17 +29,36 @@ pub fn write(folder: &Path, capture: &Capture, precision: Precision) -> Result<(
         };
         write_rgb(&folder.join(image_name(index)), &picture, precision)?;
     }
-    let entries: Vec<Entry> = (capture.frames.iter().enumerate())
-        .map(|(index, frame)| Entry {
-            file_path: image_name(index),
-            intrinsics: frame.intrinsics,
-            pose: frame.pose,
-            exposure: None,
-            depth: None,
-        })
-        .collect();
-    let file = transforms(&entries, "mesh.obj", Some(capture.up));
-    let text = format!("{file:#}\n");
+    let cameras = capture.frames.iter().map(|f| (f.intrinsics, f.pose));
+    write_transforms(folder, cameras, capture.up)
+}
+
+/// Writes mesh.obj.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_mesh(folder: &Path, mesh: &Mesh) -> Result<()> {
+    write_atomically(&folder.join("mesh.obj"), |out| write_obj(out, mesh))
+}
+
+/// Writes transforms.json of photographs that are linear EXR files, images/NNN.exr.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_transforms(
+    folder: &Path,
+    cameras: impl Iterator<Item = (Intrinsics, Pose)>,
+    up: DVec3,
+) -> Result<()> {
+    let entry = |(index, (intrinsics, pose))| Entry {
+        file_path: image_name(index),
+        intrinsics,
+        pose,
+        exposure: None,
+        depth: None,
+    };
+    let entries: Vec<Entry> = cameras.enumerate().map(entry).collect();
+    let text = format!("{:#}\n", transforms(&entries, "mesh.obj", Some(up)));
     write_bytes(&folder.join("transforms.json"), text.as_bytes())
 }
 
