@@ -1,13 +1,16 @@
 //! What a fuzzer does with the bytes of a file: reads it as relit does, and uses what was read. Nothing may panic, hang or
 //! take memory out of proportion. `tests/readers/corpus.rs` does the same with spoilt seeds on the stable toolchain.
 
+use relit::capture::import::{self, ImportOptions};
 use relit::capture::read::{ReadOptions, read};
 use relit::capture::truth::Truth;
 use relit::compose::object::ObjectModel;
 use relit::error::Result;
+use relit::export;
 use relit::inverse::estimate::Estimate;
 use relit::inverse::solver::{Control, Observer, Problem, Progress, solve};
 use relit::session::command::{OpenOptions, Source};
+use relit::session::keep;
 use relit::session::open::open;
 use relit::session::save;
 use relit::session::snapshot::OpenCapture;
@@ -33,10 +36,17 @@ pub const READERS: &[(&str, Reader)] = &[
     ("checkpoint", checkpoint),
     ("maps", maps),
     ("truth", truth),
+    ("session", session),
+    ("colmap_cameras", colmap_cameras),
+    ("colmap_images", colmap_images),
+    ("nerfstudio", nerfstudio),
+    ("trajectory", trajectory),
 ];
 
 const TRANSFORMS: &str = include_str!("../seeds/transforms/plain.json");
 const MESH: &str = include_str!("../seeds/obj/triangle.obj");
+const SCANNED: &[u8] = include_bytes!("../seeds/ply/ascii.ply");
+const DEPTH: &[u8] = include_bytes!("../seeds/depth.png");
 const PHOTOGRAPH: &[u8] = include_bytes!("../seeds/photograph/grey.png");
 
 /// A sound capture in a folder of its own, but for one file.
@@ -211,4 +221,115 @@ pub fn truth(bytes: &[u8]) {
     if let Ok(folder) = results_with("truth.json", bytes) {
         let _ = Truth::read(folder.path());
     }
+}
+
+/// The objects that were inserted in a session that saved by itself.
+pub fn session(bytes: &[u8]) {
+    if let Ok(folder) = results_with("inserted.json", bytes) {
+        let _ = keep::inserted(folder.path());
+    }
+}
+
+/// A file's ending by whether it is a text.
+fn ending(bytes: &[u8]) -> &'static str {
+    let text = std::str::from_utf8(bytes).is_ok_and(|text| !text.contains('\0'));
+    if text { "txt" } else { "bin" }
+}
+
+/// Files in a folder of their own.
+fn folder_of(files: &[(&str, &[u8])]) -> Io<TempDir> {
+    let folder = tempdir()?;
+    for (name, bytes) in files {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap_or(folder.path()))?;
+        fs::write(path, bytes)?;
+    }
+    Ok(folder)
+}
+
+/// A scan of COLMAP, with a photograph and a mesh.
+///
+/// # Errors
+/// The disk fails.
+pub fn colmap(cameras: &[u8], images: &[u8]) -> Io<TempDir> {
+    let end = ending(images);
+    folder_of(&[
+        (&format!("cameras.{end}"), cameras),
+        (&format!("images.{end}"), images),
+        ("images/a.png", PHOTOGRAPH),
+        ("meshed-poisson.ply", SCANNED),
+    ])
+}
+
+/// A scan of Nerfstudio: its transforms.json, of which captures know a part, with a photograph and a mesh.
+///
+/// # Errors
+/// The disk fails.
+pub fn nerfstudio_scan(bytes: &[u8]) -> Io<TempDir> {
+    folder_of(&[
+        ("transforms.json", bytes),
+        ("images/a.png", PHOTOGRAPH),
+        ("mesh.ply", SCANNED),
+    ])
+}
+
+/// A scan of Open3D: its trajectory as `.log` or JSON, with a photograph, a depth image and a mesh.
+///
+/// # Errors
+/// The disk fails.
+pub fn trajectory_scan(bytes: &[u8]) -> Io<TempDir> {
+    let end = if bytes.first() == Some(&b'{') {
+        "json"
+    } else {
+        "log"
+    };
+    folder_of(&[
+        (&format!("trajectory.{end}"), bytes),
+        ("color/0.png", PHOTOGRAPH),
+        ("depth/0.png", DEPTH),
+        ("integrated.ply", SCANNED),
+    ])
+}
+
+/// Imports a scan, writes it as a capture and reads that.
+fn import(scan: Io<TempDir>) {
+    let Ok(folder) = scan else { return };
+    let options = ImportOptions::default();
+    let Ok(scan) = import::read(folder.path(), &options, &mut |_, _| {}) else {
+        return;
+    };
+    assert!(scan.frames.iter().all(|f| f.pose.center.is_finite()));
+    assert!(scan.mesh.positions.iter().all(|p| p.is_finite()));
+    let out = folder.path().join("capture");
+    if export::import::write(&out, &scan).is_ok() {
+        let _ = read(&out, &ReadOptions::default());
+    }
+}
+
+/// cameras.txt or cameras.bin of a COLMAP model.
+pub fn colmap_cameras(bytes: &[u8]) {
+    let images: &[u8] = match ending(bytes) {
+        "txt" => include_bytes!("../seeds/colmap_images/images.txt"),
+        _ => include_bytes!("../seeds/colmap_images/images.bin"),
+    };
+    import(colmap(bytes, images));
+}
+
+/// images.txt or images.bin of a COLMAP model.
+pub fn colmap_images(bytes: &[u8]) {
+    let cameras: &[u8] = match ending(bytes) {
+        "txt" => include_bytes!("../seeds/colmap_cameras/opencv.txt"),
+        _ => include_bytes!("../seeds/colmap_cameras/fisheye.bin"),
+    };
+    import(colmap(cameras, bytes));
+}
+
+/// transforms.json of a scan of Nerfstudio.
+pub fn nerfstudio(bytes: &[u8]) {
+    import(nerfstudio_scan(bytes));
+}
+
+/// The trajectory of a scan of Open3D.
+pub fn trajectory(bytes: &[u8]) {
+    import(trajectory_scan(bytes));
 }

@@ -103,6 +103,12 @@ fn spoilt_seeds_neither_panic_nor_hang_nor_fill_the_memory() {
     }
 }
 
+/// A seed of the fuzz targets.
+fn seed(file: &str) -> Vec<u8> {
+    let seeds = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds");
+    std::fs::read(seeds.join(file)).unwrap()
+}
+
 /// The seeds that are sound must be read, or their spoilt copies would test nothing.
 #[test]
 fn sound_seeds_are_read() {
@@ -117,12 +123,7 @@ fn sound_seeds_are_read() {
         ("images/000.png", "photograph/grey.hdr"),
         ("transforms.json", "transforms/everything.json"),
     ] {
-        let bytes = std::fs::read(
-            Path::new(env!("CARGO_MANIFEST_DIR"))
-                .join("fuzz/seeds")
-                .join(file),
-        )
-        .unwrap();
+        let bytes = seed(file);
         let folder = targets::capture_with(name, &bytes).unwrap();
         let capture =
             read(folder.path(), &ReadOptions::default()).unwrap_or_else(|e| panic!("{file}: {e}"));
@@ -135,12 +136,7 @@ fn sound_seeds_are_read() {
         "checkpoint/begun.json",
         "checkpoint/paper.json",
     ] {
-        let bytes = std::fs::read(
-            Path::new(env!("CARGO_MANIFEST_DIR"))
-                .join("fuzz/seeds")
-                .join(file),
-        )
-        .unwrap();
+        let bytes = seed(file);
         let name = if file.starts_with("estimate") {
             "estimate.json"
         } else {
@@ -154,20 +150,57 @@ fn sound_seeds_are_read() {
             .unwrap_or_else(|e| panic!("{file}: {e}"));
         assert_eq!(saved.checkpoint.is_some(), file.starts_with("checkpoint"));
     }
+    for (scan, what) in [
+        (
+            targets::colmap(
+                &seed("colmap_cameras/opencv.txt"),
+                &seed("colmap_images/images.txt"),
+            ),
+            "text",
+        ),
+        (
+            targets::colmap(
+                &seed("colmap_cameras/fisheye.bin"),
+                &seed("colmap_images/images.bin"),
+            ),
+            "binary",
+        ),
+        (
+            targets::nerfstudio_scan(&seed("nerfstudio/fisheye.json")),
+            "nerfstudio",
+        ),
+        (
+            targets::trajectory_scan(&seed("trajectory/plain.log")),
+            "log",
+        ),
+        (
+            targets::trajectory_scan(&seed("trajectory/list.json")),
+            "list",
+        ),
+    ] {
+        use relit::capture::import::{ImportOptions, read};
+        let scan = read(
+            scan.unwrap().path(),
+            &ImportOptions::default(),
+            &mut |_, _| {},
+        );
+        assert_eq!(
+            scan.unwrap_or_else(|e| panic!("{what}: {e}")).frames.len(),
+            1,
+            "{what}"
+        );
+    }
+    let folder = targets::results_with("inserted.json", &seed("session/block.json")).unwrap();
+    assert_eq!(
+        relit::session::keep::inserted(folder.path()).unwrap().len(),
+        2
+    );
 }
 
 /// What a person is told of the most brazen claims, and how soon.
 #[test]
 fn brazen_claims_are_refused_at_once() {
     use relit::capture::read::{ReadOptions, read};
-    let seed = |file: &str| {
-        std::fs::read(
-            Path::new(env!("CARGO_MANIFEST_DIR"))
-                .join("fuzz/seeds")
-                .join(file),
-        )
-        .unwrap()
-    };
     let started = Instant::now();
     for (name, bytes, word) in [
         (
@@ -204,13 +237,7 @@ fn brazen_claims_are_refused_at_once() {
 /// Results from someone else may not name maps elsewhere, nor parameters that no person could set.
 #[test]
 fn results_name_no_files_elsewhere_and_no_impossible_parameters() {
-    let text = String::from_utf8(
-        std::fs::read(
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/estimate/solved.json"),
-        )
-        .unwrap(),
-    )
-    .unwrap();
+    let text = String::from_utf8(seed("estimate/solved.json")).unwrap();
     let sound: serde_json::Value = serde_json::from_str(&text).unwrap();
     for maps in ["../../etc/passwd", "/etc/passwd", "..", "a/b"] {
         let mut file = sound.clone();
