@@ -144,8 +144,8 @@ fn nearest_hits_and_visibility_agree_with_brute_force_in_f64() {
     }
 }
 
-#[test]
-fn vectors_and_plain_arrays_give_the_same_bits() {
+/// The instruction sets beyond plain arrays that this processor has.
+fn wider() -> Vec<InstructionSet> {
     let wider: Vec<_> = [InstructionSet::Avx2, InstructionSet::Avx512]
         .into_iter()
         .filter(|&set| set <= InstructionSet::widest())
@@ -153,20 +153,85 @@ fn vectors_and_plain_arrays_give_the_same_bits() {
     if wider.is_empty() {
         println!("skipped: this processor has no wider instruction set");
     }
-    let soup = Soup::random(9, 5000, 0.2);
+    wider
+}
+
+/// Every wider instruction set sees along rays what plain arrays see, to the bit; how many rays hit something.
+fn assert_same_bits(soup: &Soup, rays: &[Ray]) -> usize {
     let plain = soup.bvh().with_instructions(InstructionSet::Portable);
-    for set in wider {
+    let bits =
+        |hit: Option<Hit>| hit.map(|h| (h.t.to_bits(), h.triangle, h.b1.to_bits(), h.b2.to_bits()));
+    for set in wider() {
         let wide = soup.bvh().with_instructions(set);
-        let mut stream = Stream::new(9, 1, 0, 0);
-        for _ in 0..20_000 {
-            let ray = random_ray(&mut stream);
-            let bits = |hit: Option<Hit>| {
-                hit.map(|h| (h.t.to_bits(), h.triangle, h.b1.to_bits(), h.b2.to_bits()))
-            };
-            assert_eq!(bits(wide.intersect(&ray)), bits(plain.intersect(&ray)));
-            assert_eq!(wide.occluded(&ray), plain.occluded(&ray));
+        for ray in rays {
+            let (met, expected) = (bits(wide.intersect(ray)), bits(plain.intersect(ray)));
+            assert_eq!(met, expected, "{set:?}: {ray:?}");
+            assert_eq!(wide.occluded(ray), plain.occluded(ray), "{set:?}: {ray:?}");
         }
     }
+    rays.iter()
+        .filter(|ray| plain.intersect(ray).is_some())
+        .count()
+}
+
+/// How many of so many cases are tried under Miri, which takes a thousand times as long.
+fn cases(many: usize) -> usize {
+    if cfg!(miri) { many / 100 } else { many }
+}
+
+#[test]
+fn vectors_and_plain_arrays_give_the_same_bits() {
+    let soup = Soup::random(9, cases(5000), 0.2);
+    let mut stream = Stream::new(9, 1, 0, 0);
+    let rays: Vec<Ray> = (0..cases(20_000))
+        .map(|_| random_ray(&mut stream))
+        .collect();
+    assert!(assert_same_bits(&soup, &rays) > rays.len() / 20);
+}
+
+/// Where `min`, `max` and comparisons of vectors could differ from those of single numbers: signed zeros, infinities,
+/// numbers next to zero, and what is no number, in meshes, in rays and in their ends.
+#[test]
+fn vectors_and_plain_arrays_give_the_same_bits_of_numbers_at_the_ends_of_their_range() {
+    const ENDS: [f32; 14] = [
+        0.0,
+        -0.0,
+        1e-45,
+        -1e-45,
+        1.2e-38,
+        0.5,
+        -0.5,
+        1.0,
+        1e18,
+        -1e30,
+        f32::MAX,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        f32::NAN,
+    ];
+    let mut stream = Stream::new(10, 0, 0, 0);
+    // One number in eight is extreme.
+    let mut number = |calm: f32| match stream.below(8) {
+        0 => ENDS[stream.below(ENDS.len())],
+        _ => calm * (2.0 * stream.uniform() - 1.0),
+    };
+    let mut soup = Soup::random(10, cases(1000), 0.4);
+    soup.positions = (soup.positions.iter())
+        .map(|p| *p + Vec3::from_array([0; 3].map(|_| number(0.0))))
+        .collect();
+    let rays: Vec<Ray> = (0..cases(20_000))
+        .map(|_| Ray {
+            origin: Vec3::from_array([0; 3].map(|_| number(1.0))),
+            direction: Vec3::from_array([0; 3].map(|_| number(1.0))),
+            t_min: number(0.0).abs(),
+            t_max: if number(1.0) > 0.0 {
+                f32::INFINITY
+            } else {
+                number(3.0)
+            },
+        })
+        .collect();
+    assert!(assert_same_bits(&soup, &rays) > rays.len() / 100);
 }
 
 /// More triangles than are built in one piece and than lie on small pages.

@@ -303,6 +303,62 @@ fn a_full_disk_is_one_line_and_leaves_what_was_there() {
     );
 }
 
+/// A disk of a megabyte that fills up and is then made read-only, in a name space where anybody may mount one.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_disk_that_fills_up_or_cannot_be_written_costs_no_earlier_work() {
+    let script = r#"
+        mkdir disk && mount -t tmpfs -o size=1m none disk || { echo skipped; exit 0; }
+        solve() { "$0" solve room --out disk/out --preset paper --batch 50 --views none --checkpoint 0.02s "$@"; }
+        solve --steps 3 2>first || exit 1
+        head -c 2m /dev/zero >disk/filler 2>/dev/null
+        solve --time 1s --steps 0 --resume 2>full; echo "full $?"
+        cp disk/out/checkpoint.json disk/out/estimate.json . || exit 1
+        rm disk/filler
+        solve --steps 6 --resume 2>again; echo "again $?"
+        mount -o remount,ro disk && { solve --steps 9 --resume 2>readonly; echo "readonly $?"; }
+    "#;
+    let place = Place::new();
+    let output = Command::new("unshare")
+        .args(["-rm", "sh", "-c", script, env!("CARGO_BIN_EXE_relit")])
+        .current_dir(place.path(""))
+        .output();
+    let said = match output {
+        Ok(output) if output.status.success() => {
+            String::from_utf8_lossy(&output.stdout).into_owned()
+        }
+        other => {
+            println!("skipped, as there are no name spaces: {other:?}");
+            return;
+        }
+    };
+    if said.contains("skipped") {
+        println!("skipped, as nothing can be mounted");
+        return;
+    }
+    let errors = |name: &str| fs::read_to_string(place.path(name)).expect("was said");
+    assert!(
+        said.contains("full 1") && said.contains("again 0"),
+        "{said}"
+    );
+    refused((Some(1), errors("full")), "disk/out");
+    assert!(
+        errors("full").contains("warning: "),
+        "it went on without checkpoints"
+    );
+    for name in ["checkpoint.json", "estimate.json"] {
+        let bytes = fs::read(place.path(name)).expect("copied");
+        assert!(
+            serde_json::from_slice::<serde_json::Value>(&bytes).is_ok(),
+            "{name}"
+        );
+    }
+    if said.contains("readonly") {
+        assert!(said.contains("readonly 1"), "{said}");
+        refused((Some(1), errors("readonly")), "disk/out");
+    }
+}
+
 #[test]
 fn a_folder_that_vanishes_while_solving_is_made_again() {
     let place = Place::new();
