@@ -120,19 +120,22 @@ impl Matrices {
         let terms: Vec<Vec<Term>> = (linearised.par_iter())
             .map(|cluster| Term::of(cluster, trust.weight(cluster)))
             .collect();
-        let mut where_met: Vec<Vec<(usize, Term)>> = vec![Vec::new(); n];
+        // For each row, the clusters that meet it and the place of its term there.
+        let mut where_met: Vec<Vec<(u32, u32)>> = vec![Vec::new(); n];
         for (cluster, terms) in terms.iter().enumerate() {
-            for term in terms {
-                where_met[term.place].push((cluster, *term));
+            for (place, term) in terms.iter().enumerate() {
+                where_met[term.place].push((cluster as u32, place as u32));
             }
         }
         // Each row of the lower triangles by itself, its clusters in order.
         let rows: Vec<Vec<[DVec3; 2]>> = (where_met.par_iter().enumerate())
             .map(|(i, met)| {
                 let mut row = vec![[DVec3::ZERO; 2]; i + 1];
-                for (cluster, own) in met {
+                for &(cluster, place) in met {
+                    let here = &terms[cluster as usize];
+                    let own = here[place as usize];
                     let weighted = own.weighted * 0.25;
-                    for other in terms[*cluster].iter().filter(|other| other.place <= i) {
+                    for other in here.iter().filter(|other| other.place <= i) {
                         let [h, s] = &mut row[other.place];
                         *h += weighted * other.derivative;
                         *s += own.score * other.score;

@@ -8,17 +8,13 @@
 
 use super::evaluate::Linearised;
 use super::prior::Prior;
-use super::roles::Role;
+use super::roles::{Role, free_with};
 use crate::inverse::parameters::Unknowns;
 use glam::{DVec3, Vec3};
 
 /// The parameters that are fitted under some roles, the albedos of lamps among them: indices into albedos, then emissions.
 pub fn free(roles: &[Role]) -> Vec<usize> {
-    let albedo = (0..roles.len()).filter(|&k| roles[k].reflects() || roles[k] == Role::Emitter);
-    let emission = (0..roles.len())
-        .filter(|&k| roles[k].emits())
-        .map(|k| roles.len() + k);
-    albedo.chain(emission).collect()
+    free_with(roles, |role| role.reflects() || role == Role::Emitter)
 }
 
 /// The same beliefs with nothing expected of the albedos of lamps.

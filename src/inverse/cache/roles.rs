@@ -40,7 +40,12 @@ pub fn places(free: &[usize], surfaces: usize) -> Vec<usize> {
 
 /// The parameters that are fitted under some roles: indices into albedos, then emissions.
 pub fn free(roles: &[Role]) -> Vec<usize> {
-    let albedo = (0..roles.len()).filter(|&k| roles[k].reflects());
+    free_with(roles, Role::reflects)
+}
+
+/// The same where other albedos are fitted.
+pub fn free_with(roles: &[Role], has_albedo: impl Fn(Role) -> bool) -> Vec<usize> {
+    let albedo = (0..roles.len()).filter(|&k| has_albedo(roles[k]));
     let emission = (0..roles.len())
         .filter(|&k| roles[k].emits())
         .map(|k| roles.len() + k);
