@@ -45,6 +45,8 @@ const WAYS: [&str; 5] = [
     "ours, the paper's descent",
     "ours, true light",
 ];
+/// What stands over the pictures, which are narrow.
+const TITLES: [&str; 4] = ["truth", "naive, photographs", "naive, estimate", "ours"];
 const PLACES: [&str; 2] = ["objects", "shadow and bleed"];
 
 /// What was found in one room: a likeness for each way and place.
@@ -187,11 +189,9 @@ fn scene(room: &Furnished, cache: &Estimate, paper: &Estimate, quick: bool) -> R
             }
         }
         found.grid.exposure = exposure;
-        let shown = [("truth", truth)]
-            .into_iter()
-            .chain(WAYS.into_iter().zip(ways).take(3));
-        let shown = shown.map(|(name, picture)| (name.to_owned(), picture));
-        found.grid.pictures.extend(shown);
+        let shown = std::iter::once(truth).chain(ways);
+        let titles = TITLES.iter().map(|title| (*title).to_owned());
+        found.grid.pictures.extend(titles.zip(shown));
     }
     Ok(found)
 }
