@@ -6,7 +6,8 @@ use super::slabs::Slabs;
 use super::{Bvh, Child, GROUP, Group, Node, WIDTH, prefetch};
 use crate::scene::geometry::Ray;
 
-/// Whether anything is hit; `stack` holds `Bvh::stack_size` entries and [`WIDTH`] more.
+/// Whether anything is hit in a hierarchy that holds something; `stack` holds `Bvh::stack_size` entries and
+/// [`WIDTH`] more.
 #[inline(always)]
 pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
     bvh: &Bvh,
@@ -14,9 +15,6 @@ pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
     stack: &mut [u32],
 ) -> bool {
     let (nodes, groups): (&[Node], &[Group]) = (&bvh.nodes, &bvh.groups);
-    if nodes.is_empty() {
-        return false;
-    }
     let slabs = Slabs::<B>::new(ray);
     let shear = Shear::<T>::new(ray);
     let mut depth = 0;
@@ -33,10 +31,7 @@ pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
             current = node.child(mask.trailing_zeros() as usize);
             let others = mask & (mask - 1);
             if others != 0 {
-                let Some(top) = stack[depth..].first_chunk_mut() else {
-                    return false;
-                };
-                B::pack(&node.rows[Node::CHILDREN], others, top);
+                B::pack(&node.rows[Node::CHILDREN], others, &mut stack[depth..]);
                 depth += others.count_ones() as usize;
             }
         }

@@ -19,8 +19,9 @@ pub(super) trait Lanes<const N: usize>: Copy {
     fn le(self, other: Self) -> u32;
     /// Bit i is set where lane i of `self` < lane i of `other`.
     fn lt(self, other: Self) -> u32;
-    /// Puts the entries whose bits are set first, in order; what comes behind them is undefined.
-    fn pack(entries: &[u32; N], mask: u32, packed: &mut [u32; N]);
+    /// Puts the entries whose bits are set first, in order, into a slice of at least N; what comes behind them in its first N
+    /// is undefined.
+    fn pack(entries: &[u32; N], mask: u32, packed: &mut [u32]);
 }
 
 /// The three coordinates, each in all lanes.
@@ -95,14 +96,14 @@ impl<const N: usize> Lanes<N> for Portable<N> {
         self.mask(other, |a, b| a < b)
     }
     #[inline(always)]
-    fn pack(entries: &[u32; N], mask: u32, packed: &mut [u32; N]) {
+    fn pack(entries: &[u32; N], mask: u32, packed: &mut [u32]) {
         pack_each(entries, mask, packed);
     }
 }
 
 #[inline(always)]
-fn pack_each<const N: usize>(entries: &[u32; N], mut mask: u32, packed: &mut [u32; N]) {
-    for slot in packed {
+fn pack_each<const N: usize>(entries: &[u32; N], mut mask: u32, packed: &mut [u32]) {
+    for slot in &mut packed[..N] {
         if mask == 0 {
             return;
         }
@@ -196,7 +197,7 @@ mod vectors {
                     unsafe { $mask(($lt)(self.0, other.0)) as u32 }
                 }
                 #[inline(always)]
-                fn pack(entries: &[u32; $width], mask: u32, packed: &mut [u32; $width]) {
+                fn pack(entries: &[u32; $width], mask: u32, packed: &mut [u32]) {
                     $pack(entries, mask, packed);
                 }
             }
@@ -259,9 +260,10 @@ mod vectors {
     }
 
     #[inline(always)]
-    fn pack_eight(entries: &[u32; 8], mask: u32, packed: &mut [u32; 8]) {
+    fn pack_eight(entries: &[u32; 8], mask: u32, packed: &mut [u32]) {
+        let packed = &mut packed[..8];
         let lanes = PACKING[mask as usize & 0xff];
-        // SAFETY: as above; a permutation takes its lanes modulo eight.
+        // SAFETY: as above; a permutation takes its lanes modulo eight, and `packed` has room for all eight.
         unsafe {
             let lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(lanes as i64));
             let entries = _mm256_loadu_si256(entries.as_ptr().cast());

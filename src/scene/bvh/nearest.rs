@@ -14,7 +14,8 @@ fn entry(child: Child, t: f32) -> Entry {
     u64::from(t.to_bits()) << 32 | u64::from(child.0)
 }
 
-/// The nearest hit, `u32::MAX` its triangle where there is none; `stack` holds `Bvh::stack_size` entries.
+/// The nearest hit in a hierarchy that holds something, `u32::MAX` its triangle where there is none; `stack` holds
+/// `Bvh::stack_size` entries.
 #[inline(always)]
 pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
     bvh: &Bvh,
@@ -28,9 +29,6 @@ pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
         b2: 0.0,
     };
     let (nodes, groups): (&[Node], &[Group]) = (&bvh.nodes, &bvh.groups);
-    if nodes.is_empty() {
-        return nearest;
-    }
     let slabs = Slabs::<B>::new(ray);
     let shear = Shear::<T>::new(ray);
     let mut depth = 0;
@@ -60,25 +58,14 @@ pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
             let (mut best, mut rest) = (a.min(b), a.max(b));
             let base = depth;
             while mask != 0 {
-                // Insert so that the nearest lies on top.
                 let next = of(mask.trailing_zeros() as usize);
                 prefetch(nodes, groups, node.child(mask.trailing_zeros() as usize));
                 mask &= mask - 1;
-                let mut place = depth;
-                while place > base && stack[place - 1] < rest {
-                    stack[place] = stack[place - 1];
-                    place -= 1;
-                }
-                stack[place] = rest;
+                insert(stack, base, depth, rest);
                 depth += 1;
                 (best, rest) = (best.min(next), best.max(next));
             }
-            let mut place = depth;
-            while place > base && stack[place - 1] < rest {
-                stack[place] = stack[place - 1];
-                place -= 1;
-            }
-            stack[place] = rest;
+            insert(stack, base, depth, rest);
             depth += 1;
             current = Child(best as u32);
         }
@@ -103,4 +90,15 @@ pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
             }
         }
     }
+}
+
+/// Puts an entry among those from `base` to `depth`, of which the nearest lies on top.
+#[inline(always)]
+fn insert(stack: &mut [Entry], base: usize, depth: usize, entry: Entry) {
+    let mut place = depth;
+    while place > base && stack[place - 1] < entry {
+        stack[place] = stack[place - 1];
+        place -= 1;
+    }
+    stack[place] = entry;
 }

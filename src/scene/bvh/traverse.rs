@@ -11,6 +11,9 @@ const SHALLOW: usize = 64;
 
 #[inline]
 pub(super) fn intersect(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
+    if bvh.nodes.is_empty() {
+        return None;
+    }
     let hit = match bvh.instructions {
         // SAFETY: `Bvh::instructions` is at most what `InstructionSet::widest` detected.
         #[cfg(target_arch = "x86_64")]
@@ -24,6 +27,9 @@ pub(super) fn intersect(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
 
 #[inline]
 pub(super) fn occluded(bvh: &Bvh, ray: &Ray) -> bool {
+    if bvh.nodes.is_empty() {
+        return false;
+    }
     match bvh.instructions {
         // SAFETY: `Bvh::instructions` is at most what `InstructionSet::widest` detected.
         #[cfg(target_arch = "x86_64")]
