@@ -3,10 +3,11 @@
 use crate::cli::arguments::triple;
 use crate::cli::photographs::write_with_progress;
 use crate::cli::saved::{Loaded, SavedOptions};
-use crate::compose::object::surface::{DIELECTRIC, Surface};
+use crate::compose::object::surface::Surface;
 use crate::compose::placement::Placement;
 use crate::error::Result;
 use crate::session::photographs::Photographs;
+use crate::transport::material::DIELECTRIC;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use glam::{DVec3, Vec3};
 use std::ffi::OsString;

@@ -6,6 +6,7 @@ use crate::inverse::known::{Known, Pinned};
 use crate::scene::Scene;
 use crate::session::save::named::Named;
 use crate::transport::bsdf::MIN_ROUGHNESS;
+use crate::transport::material::DIELECTRIC;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -14,7 +15,7 @@ use std::sync::Arc;
 
 /// GGX roughness α and specular reflectance of a lobe of which an edit leaves one open and none was found: a satin
 /// dielectric.
-const SATIN: (f32, f32) = (0.3, 0.04);
+const SATIN: (f32, f32) = (0.3, DIELECTRIC);
 
 /// What is changed of one object.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]

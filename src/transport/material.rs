@@ -5,6 +5,9 @@ use crate::scene::texels::TexelLayout;
 use glam::{Vec2, Vec3};
 use std::sync::Arc;
 
+/// Specular reflectance of a dielectric at normal incidence (index of refraction 1.5), as glTF fixes it.
+pub const DIELECTRIC: f32 = 0.04;
+
 /// Diffuse reflectance over an object.
 #[derive(Debug, Clone)]
 pub enum Albedo {

@@ -7,14 +7,12 @@ use crate::app::state::App;
 use crate::app::theme;
 use crate::inverse::estimate::ObjectEstimate;
 use crate::session::edits::ObjectEdit;
+use crate::transport::material::DIELECTRIC;
 use egui::{Button, DragValue, Grid, Role, ScrollArea, Ui, WidgetInfo};
 use glam::Vec3;
 
 /// Names of the channels.
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
-
-/// Specular reflectance of most things that are no metal.
-const PLASTIC: f32 = 0.04;
 
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, app: &mut App) {
@@ -173,7 +171,7 @@ fn gloss(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
             // Back to what was found, where that is glossy or dull as asked.
             (edit.roughness, edit.specular) = (None, None);
             if found.lobe().is_some() != glossy {
-                edit.specular = Some(if glossy { PLASTIC } else { 0.0 });
+                edit.specular = Some(if glossy { DIELECTRIC } else { 0.0 });
             }
         }
         let Some((mut roughness, mut specular)) = lobe else {

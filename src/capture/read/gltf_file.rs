@@ -32,7 +32,7 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Gltf> {
     Ok(Gltf { document, blob })
 }
 
-/// The crate's validation looks up the POSITION accessors before it knows that they exist.
+/// The crate's validation looks up accessors of attributes before it knows that they exist.
 fn check_accessors(root: &Root) -> std::result::Result<(), String> {
     for (index, mesh) in root.meshes.iter().enumerate() {
         let mut accessors = (mesh.primitives.iter()).flat_map(|p| p.attributes.values());

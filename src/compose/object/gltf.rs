@@ -1,13 +1,14 @@
 //! Binary and JSON glTF 2.0: the default scene's triangles with their metallic-roughness materials.
 
 use super::files::{self, Meaning};
-use super::surface::{DIELECTRIC, Surface, mean};
+use super::surface::{Surface, mean};
 use super::{Corners, Parts};
 use crate::capture::read::accessor::numbers;
 use crate::capture::read::gltf_file::{self, ReadFile};
 use crate::capture::read::gltf_scene;
 use crate::error::{Error, Result};
 use crate::math::picture::Picture;
+use crate::transport::material::DIELECTRIC;
 use ::gltf::accessor::Dimensions;
 use ::gltf::material::AlphaMode;
 use ::gltf::{Primitive, Semantic};

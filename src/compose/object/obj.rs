@@ -6,10 +6,11 @@
 //! a file has them, are roughness (α = Pr²) and metalness.
 
 use super::files::{self, Meaning};
-use super::surface::{DIELECTRIC, Surface};
+use super::surface::Surface;
 use super::{Corners, Parts};
 use crate::error::{Error, Result};
 use crate::math::picture::Picture;
+use crate::transport::material::DIELECTRIC;
 use glam::{DVec3, Vec2, Vec3};
 use std::cell::RefCell;
 use std::collections::HashMap;

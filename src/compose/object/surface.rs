@@ -5,9 +5,6 @@ use crate::transport::material::{Albedo, Lobe, Material, Texture};
 use glam::{Vec2, Vec3};
 use std::sync::Arc;
 
-/// Specular reflectance of a dielectric at normal incidence (index of refraction 1.5), as glTF fixes it.
-pub const DIELECTRIC: f32 = 0.04;
-
 /// Base colour, metalness and roughness.
 #[derive(Debug, Clone)]
 pub struct Surface {

@@ -134,10 +134,9 @@ impl Matrices {
                 for &(cluster, place) in met {
                     let here = &terms[cluster as usize];
                     let own = here[place as usize];
-                    let weighted = own.weighted * 0.25;
                     for other in here.iter().filter(|other| other.place <= i) {
                         let [h, s] = &mut row[other.place];
-                        *h += weighted * other.derivative;
+                        *h += own.weighted * other.derivative;
                         *s += own.score * other.score;
                     }
                 }
@@ -163,7 +162,7 @@ struct Term {
     place: usize,
     /// Sum of the derivatives of both sets.
     derivative: DVec3,
-    /// The same times the cluster's weight.
+    /// A quarter of the same times the cluster's weight, so that products are those of means.
     weighted: DVec3,
     /// Contribution to the descent.
     score: DVec3,
@@ -177,7 +176,7 @@ impl Term {
             .map(|(&(place, a, b), score)| Self {
                 place,
                 derivative: a + b,
-                weighted: weight * (a + b),
+                weighted: weight * (a + b) * 0.25,
                 score,
             })
             .collect()

@@ -1,9 +1,6 @@
 //! After textures were found: all colours and lamps once more, in the light as the textures send it on.
 
 use super::Ladder;
-use crate::inverse::cache::errors::standard_errors;
-use crate::inverse::cache::lamp_albedo;
-use crate::inverse::cache::linear::descend;
 use crate::inverse::cache::path_noise::share_paths;
 use crate::inverse::solver::Termination;
 use glam::Vec3;
@@ -42,15 +39,7 @@ impl Ladder<'_, '_> {
         for (cluster, offset) in clusters.iter_mut().zip(offsets) {
             cluster.residuals = cluster.residuals.map(|r| r - offset);
         }
-        let free = lamp_albedo::free(&self.roles);
-        let prior = lamp_albedo::beliefs(&self.prior, &self.roles);
-        let found = descend(clusters, &summed.about, &free, &prior);
-        self.monitor.progress.iterations += 1;
-        let errors = standard_errors(&found.equations, &free, self.roles.len());
-        self.unknowns = found.unknowns;
-        lamp_albedo::leave_out(&mut self.unknowns, &self.roles);
-        self.merge_errors(errors);
-        self.hold();
+        self.descend(clusters, &summed.about);
         let factor = |object: usize| {
             let (new, old) = (self.unknowns.albedo[object], before.0.albedo[object]);
             let grown = new / old.max(Vec3::splat(f32::MIN_POSITIVE));

@@ -5,9 +5,9 @@ use crate::inverse::cache::accumulate::Accumulated;
 use crate::inverse::cache::errors::standard_errors;
 use crate::inverse::cache::evaluate::Linearised;
 use crate::inverse::cache::lamp_albedo;
-use crate::inverse::cache::linear::descend;
+use crate::inverse::cache::linear::{Descended, descend};
 use crate::inverse::cache::path_noise::{self, share_paths};
-use crate::inverse::cache::roles;
+use crate::inverse::cache::roles::{self, Role};
 use crate::inverse::estimate::{ENOUGH_PIXELS, relative_to_albedo};
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::solver::Termination;
@@ -45,7 +45,11 @@ impl Ladder<'_, '_> {
         );
         let free = lamp_albedo::free(&self.roles);
         let places = roles::places(&free, self.roles.len());
-        let prior = lamp_albedo::beliefs(&self.prior, &self.roles);
+        let mean = |sums: &Accumulated, roles: &[Role]| {
+            let mut clusters = sums.mean();
+            lamp_albedo::hold_exitance(&mut clusters, roles, &places);
+            clusters
+        };
         let mut about = self.unknowns.clone();
         let mut sums = Accumulated::default();
         let mut outcome = Termination::Steps;
@@ -56,18 +60,10 @@ impl Ladder<'_, '_> {
             }
             // Path lengths are steered by what is believed at the start, the same in every round.
             sums.add(self.linearised(&lights, 2, round, &about, &places)?);
-            let mut mean = sums.mean();
-            lamp_albedo::hold_exitance(&mut mean, &self.roles, &places);
-            let found = descend(mean, &about, &free, &prior);
-            let errors = standard_errors(&found.equations, &free, self.roles.len());
-            self.unknowns = found.unknowns;
-            lamp_albedo::leave_out(&mut self.unknowns, &self.roles);
+            let found = self.descend(mean(&sums, &self.roles), &about);
             self.trust = found.trust;
             self.path_noise = path_noise::shares(&found.clusters, self.roles.len());
             let step = largest_step(&about, &self.unknowns);
-            self.monitor.progress.iterations += 1;
-            self.merge_errors(errors);
-            self.hold();
             self.describe();
             self.monitor
                 .report(&self.estimate, &|_| self.checkpoint.clone())?;
@@ -84,8 +80,7 @@ impl Ladder<'_, '_> {
                 break;
             }
         }
-        let mut clusters = sums.mean();
-        lamp_albedo::hold_exitance(&mut clusters, &self.roles, &places);
+        let clusters = mean(&sums, &self.roles);
         self.summed = Some(Summed { clusters, about });
         let reported = self.reported();
         let [median, tail] = reported.all.map(|e| e * 100.0);
@@ -98,6 +93,20 @@ impl Ladder<'_, '_> {
         );
         self.record("refine", started, true, why)?;
         Ok(outcome)
+    }
+
+    /// Fits all that is free, the lamps' own albedos among it, to clusters linearised about `about`, and takes what was found.
+    pub(super) fn descend(&mut self, clusters: Vec<Linearised>, about: &Unknowns) -> Descended {
+        let free = lamp_albedo::free(&self.roles);
+        let prior = lamp_albedo::beliefs(&self.prior, &self.roles);
+        let found = descend(clusters, about, &free, &prior);
+        let errors = standard_errors(&found.equations, &free, self.roles.len());
+        self.unknowns.clone_from(&found.unknowns);
+        lamp_albedo::leave_out(&mut self.unknowns, &self.roles);
+        self.monitor.progress.iterations += 1;
+        self.merge_errors(errors);
+        self.hold();
+        found
     }
 
     /// Rounds at most, and the median relative standard error aimed at: the preset's, or without end a smaller one that
