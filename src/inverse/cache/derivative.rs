@@ -2,13 +2,13 @@
 
 use super::{NO_LAMP, SPECULAR, Vertex};
 use crate::inverse::parameters::Unknowns;
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 /// Derivative of a radiance: dense over parameters (albedos first, then emissions), with the list of
 /// those that were touched.
 pub struct Gradient {
     /// Derivative with respect to each parameter.
-    pub values: Vec<Vec3>,
+    pub values: Vec<Vec3A>,
     /// Parameters with a derivative, in the order in which paths met them.
     pub touched: Vec<u32>,
     /// Whether a parameter is in `touched`.
@@ -19,14 +19,14 @@ impl Gradient {
     /// All zero.
     pub fn new(parameters: usize) -> Self {
         Self {
-            values: vec![Vec3::ZERO; parameters],
+            values: vec![Vec3A::ZERO; parameters],
             touched: Vec::new(),
             marked: vec![false; parameters],
         }
     }
 
     #[inline]
-    fn add(&mut self, index: usize, value: Vec3) {
+    fn add(&mut self, index: usize, value: Vec3A) {
         if !self.marked[index] {
             self.marked[index] = true;
             self.touched.push(index as u32);
@@ -37,7 +37,7 @@ impl Gradient {
     /// Sets everything touched back to zero.
     pub fn clear(&mut self) {
         for &index in &self.touched {
-            self.values[index as usize] = Vec3::ZERO;
+            self.values[index as usize] = Vec3A::ZERO;
             self.marked[index as usize] = false;
         }
         self.touched.clear();
@@ -67,33 +67,34 @@ fn radiance_with(
     unknowns: &Unknowns,
     albedo: impl Fn(&Vertex) -> Vec3,
 ) -> Vec3 {
-    let leaving = |beyond: Vec3, vertex: &Vertex| {
+    let leaving = |beyond: Vec3A, vertex: &Vertex| {
         let gathered = gathered_at(vertex, beyond, unknowns);
         leaving(vertex, gathered, unknowns, &albedo)
     };
-    vertices.iter().rev().fold(Vec3::ZERO, leaving)
+    vertices.iter().rev().fold(Vec3A::ZERO, leaving).into()
 }
 
 /// Radiance that leaves a vertex of what it gathered, and of its own.
 #[inline]
 fn leaving(
     vertex: &Vertex,
-    gathered: Vec3,
+    gathered: Vec3A,
     unknowns: &Unknowns,
     albedo: impl Fn(&Vertex) -> Vec3,
-) -> Vec3 {
+) -> Vec3A {
     if vertex.surface == SPECULAR {
         return gathered;
     }
-    unknowns.emission[vertex.surface as usize] * vertex.emission_weight + albedo(vertex) * gathered
+    let emission = Vec3A::from(unknowns.emission[vertex.surface as usize]);
+    emission * vertex.emission_weight + Vec3A::from(albedo(vertex)) * gathered
 }
 
 /// Radiance gathered at a vertex, where `beyond` leaves the next one towards it.
 #[inline]
-fn gathered_at(vertex: &Vertex, beyond: Vec3, unknowns: &Unknowns) -> Vec3 {
-    let mut gathered = beyond + vertex.known;
+fn gathered_at(vertex: &Vertex, beyond: Vec3A, unknowns: &Unknowns) -> Vec3A {
+    let mut gathered = beyond + Vec3A::from(vertex.known);
     if vertex.lamp != NO_LAMP {
-        gathered += unknowns.emission[vertex.lamp as usize] * vertex.lamp_weight;
+        gathered += Vec3A::from(unknowns.emission[vertex.lamp as usize]) * vertex.lamp_weight;
     }
     gathered
 }
@@ -107,26 +108,27 @@ fn gathered_at(vertex: &Vertex, beyond: Vec3, unknowns: &Unknowns) -> Vec3 {
 pub fn differentiate(
     vertices: &[Vertex],
     unknowns: &Unknowns,
-    gathered: &mut Vec<Vec3>,
+    gathered: &mut Vec<Vec3A>,
     gradient: &mut Gradient,
 ) -> Vec3 {
     let surfaces = unknowns.surfaces();
-    gathered.clear();
-    let mut beyond = Vec3::ZERO;
-    for vertex in vertices.iter().rev() {
-        let g = gathered_at(vertex, beyond, unknowns);
-        gathered.push(g);
-        beyond = leaving(vertex, g, unknowns, |v| unknowns.albedo[v.surface as usize]);
+    gathered.resize(vertices.len().max(gathered.len()), Vec3A::ZERO);
+    let mut beyond = Vec3A::ZERO;
+    for (vertex, gathered) in vertices.iter().zip(&mut *gathered).rev() {
+        *gathered = gathered_at(vertex, beyond, unknowns);
+        beyond = leaving(vertex, *gathered, unknowns, |v| {
+            unknowns.albedo[v.surface as usize]
+        });
     }
-    let mut throughput = Vec3::ONE;
-    for (vertex, g) in vertices.iter().zip(gathered.iter().rev()) {
+    let mut throughput = Vec3A::ONE;
+    for (vertex, g) in vertices.iter().zip(&*gathered) {
         if vertex.surface != SPECULAR {
             let surface = vertex.surface as usize;
             if vertex.emission_weight != 0.0 {
                 gradient.add(surfaces + surface, throughput * vertex.emission_weight);
             }
             gradient.add(surface, throughput * *g);
-            throughput *= unknowns.albedo[surface];
+            throughput *= Vec3A::from(unknowns.albedo[surface]);
         }
         if vertex.lamp != NO_LAMP {
             gradient.add(
@@ -135,7 +137,7 @@ pub fn differentiate(
             );
         }
     }
-    beyond
+    beyond.into()
 }
 
 #[cfg(test)]
@@ -250,7 +252,7 @@ mod tests {
         let unknowns = random_unknowns(&mut stream);
         let paths = [random_path(&mut stream), random_path(&mut stream)];
         let (mut gathered, mut both) = (Vec::new(), Gradient::new(2 * SURFACES));
-        let mut each = [Vec3::ZERO; 2 * SURFACES];
+        let mut each = [Vec3A::ZERO; 2 * SURFACES];
         for path in &paths {
             differentiate(path, &unknowns, &mut gathered, &mut both);
             let mut alone = Gradient::new(2 * SURFACES);
@@ -263,7 +265,7 @@ mod tests {
             assert!((*sum - *value).length() < 1e-5, "{sum} {value}");
         }
         both.clear();
-        assert!(both.values.iter().all(|v| *v == Vec3::ZERO));
+        assert!(both.values.iter().all(|v| *v == Vec3A::ZERO));
         assert!(both.touched.is_empty() && !both.marked.contains(&true));
     }
 

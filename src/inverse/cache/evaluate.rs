@@ -3,7 +3,7 @@
 use super::derivative::{Gradient, differentiate, radiance, textured_radiance};
 use super::{CachedCluster, PathCache, SPECULAR, Vertex};
 use crate::inverse::parameters::Unknowns;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec3A};
 use rayon::prelude::*;
 
 /// One cluster's residual and derivative from both sets.
@@ -145,7 +145,7 @@ fn linearise(
     {
         let place = place[t as usize];
         if place != usize::MAX {
-            let scaled = |g: &Gradient| (g.values[t as usize] * scale).as_dvec3();
+            let scaled = |g: &Gradient| Vec3::from(g.values[t as usize] * scale).as_dvec3();
             rows.push((place, scaled(a), scaled(b)));
         }
     }
@@ -159,7 +159,7 @@ fn linearise(
             0
         };
     Linearised {
-        own: ((a.values[own] + b.values[own]) * (0.5 * scale)).as_dvec3(),
+        own: Vec3::from((a.values[own] + b.values[own]) * (0.5 * scale)).as_dvec3(),
         object: cached.cluster.object,
         weight: cached.cluster.weight.as_dvec3(),
         floor: (cached.cluster.weight * cached.cluster.measured * cached.cluster.measured)
@@ -172,7 +172,7 @@ fn linearise(
 /// Memory reused from cluster to cluster.
 struct Scratch {
     gradients: [Gradient; 2],
-    gathered: Vec<Vec3>,
+    gathered: Vec<Vec3A>,
 }
 
 impl Scratch {

@@ -14,6 +14,8 @@ use nalgebra::DVector;
 pub const LEAST_DAMPING: f64 = 1e-10;
 /// A step below this many standard errors in every parameter ends the fit.
 pub const STEP_TOLERANCE: f64 = 0.1;
+/// Values that differ by a few units in the last place of single precision, over [`STEP_TOLERANCE`].
+const ROUNDING: f64 = 4.0 * f32::EPSILON as f64 / STEP_TOLERANCE;
 
 /// Where a fit ended.
 #[derive(Debug, Clone)]
@@ -116,8 +118,11 @@ pub fn propose(
     let mut largest = 0.0f64;
     for (row, &i) in free.iter().enumerate() {
         let y = (x[row] + step[row]).clamp(DVec3::ZERO, DVec3::splat(upper[row]));
-        let information = equations.diagonal[row] / variance;
-        largest = largest.max(((x[row] - y).abs() * information.powf(0.5)).max_element());
+        // By itself a parameter has the standard error √scatter / diagonal; values cannot be told apart below their rounding.
+        let moved = (y - x[row]).abs() * equations.diagonal[row];
+        let noise = equations.scatter[row].powf(0.5) + x[row] * equations.diagonal[row] * ROUNDING;
+        let counted = moved.cmpgt(DVec3::ZERO);
+        largest = largest.max(DVec3::select(counted, moved / noise, DVec3::ZERO).max_element());
         *proposal.value_mut(i) = y.as_vec3();
     }
     (proposal, largest)
@@ -154,4 +159,72 @@ fn dense_step(
         }
     }
     steps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inverse::cache::clusters::Cluster;
+    use crate::inverse::cache::roles::{self, Role};
+    use crate::inverse::cache::{CachedCluster, NO_LAMP, NO_TEXEL, Vertex};
+    use glam::Vec3;
+
+    /// Photographs without noise of a lamp and of a wall, of which one set of paths says too much light and the other too
+    /// little, so that the product of their residuals is negative.
+    fn opposed(index: usize) -> CachedCluster {
+        let lamp = index % 2 == 0;
+        let off = [0.03, -0.03][index / 2 % 2];
+        let vertex = |set: usize| Vertex {
+            surface: u32::from(lamp),
+            lamp: NO_LAMP,
+            lamp_weight: 0.0,
+            emission_weight: [1.0 + off, 1.0 - off][set],
+            texel: NO_TEXEL,
+            known: Vec3::splat([1.0 + off, 1.0 - off][set]),
+        };
+        let measured = if lamp { 17.3 } else { 0.37 };
+        CachedCluster {
+            cluster: Cluster {
+                frame: 0,
+                object: u32::from(lamp),
+                pixels: vec![0],
+                paths: 1,
+                measured: Vec3::splat(measured),
+                weight: Vec3::splat(measured.powi(-2)),
+                dark: Vec3::ONE,
+            },
+            vertices: vec![vertex(0), vertex(1)],
+            ends: vec![1, 2],
+        }
+    }
+
+    #[test]
+    fn a_fit_ends_where_only_the_paths_are_noisy() {
+        let cache = PathCache {
+            clusters: (0..80).map(opposed).collect(),
+            ..PathCache::default()
+        };
+        let roles = [Role::Reflector, Role::Emitter];
+        let mut start = Unknowns::new(2);
+        start.albedo[1] = Vec3::ZERO;
+        let even = Trust::even(2);
+        let prior = Prior::new(2, 2, Vec3::ONE);
+        let free = roles::free(&roles);
+        let fitted = fit(
+            &cache,
+            &start,
+            &free,
+            &even,
+            &prior,
+            30,
+            |_| Ok::<_, ()>(()),
+        )
+        .unwrap();
+        assert!(fitted.equations.objective.max_element() < 0.0);
+        assert!(fitted.iterations < 6, "{} steps", fitted.iterations);
+        // Two sets whose noise is opposed are off by its square.
+        let [albedo, emission] = [fitted.unknowns.albedo[0].x, fitted.unknowns.emission[1].x];
+        assert!((albedo / 0.37 - 1.0).abs() < 2e-3, "{albedo}");
+        assert!((emission / 17.3 - 1.0).abs() < 2e-3, "{emission}");
+    }
 }

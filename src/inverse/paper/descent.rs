@@ -342,7 +342,7 @@ fn pixel_gradient(
     result.entries = derivative
         .touched
         .iter()
-        .map(|&t| (t, derivative.values[t as usize] * slope))
+        .map(|&t| (t, Vec3::from(derivative.values[t as usize]) * slope))
         .collect();
     result
 }

@@ -129,7 +129,7 @@ fn of_pixel(
         gradient.clear();
         differentiate(&vertices, unknowns, &mut gathered, &mut gradient);
         for (parameter, moments) in moments.iter_mut().enumerate() {
-            let mut value = gradient.values[parameter];
+            let mut value = Vec3::from(gradient.values[parameter]);
             if parameter >= unknowns.surfaces() {
                 value *= unknowns.value(parameter);
             }
