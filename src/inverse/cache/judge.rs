@@ -11,6 +11,8 @@ const DECISIVE: f64 = 10.0;
 const SURE: [f64; 2] = [5.0, 2.0];
 /// No single cluster counts for more than so many typical squared errors, however far its paths strayed.
 const MOST: f64 = 400.0;
+/// The noise of a cluster's paths counts in full up to so many times the usual one; beyond it the cluster counts for less.
+const STRAYED: f64 = 4.0;
 /// An emitter must leave at most this share of the squared error that a reflector leaves.
 const EXPLAINED: f64 = 0.25;
 /// What was taken for an emitter stays one down to this share of the advantage that it took to become one.
@@ -37,7 +39,7 @@ struct Part {
 
 /// Judges all seen reflectors and emitters, given a fit under their present roles.
 pub fn judge(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<Change> {
-    let parts = parts(cache, unknowns, roles);
+    let mut parts = parts(cache, unknowns, roles);
     let verdicts: Vec<Option<Verdict>> = parts.iter().map(|p| Verdict::new(p)).collect();
 
     // The typical error of a cluster, under whichever role explains it better.
@@ -45,9 +47,10 @@ pub fn judge(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<Chan
         .flat_map(|v| v.errors.iter().copied())
         .collect();
     let typical = crate::math::stats::quantile(&mut errors, 0.5).unwrap_or(0.0);
-    (verdicts.iter().enumerate())
-        .filter_map(|(object, verdict)| {
-            let verdict = verdict.as_ref()?;
+    (parts.iter_mut().zip(verdicts).enumerate())
+        .filter_map(|(object, (parts, verdict))| {
+            verdict?.steady(parts, typical);
+            let verdict = Verdict::new(parts)?;
             let share = verdict.share_of_decision(typical);
             match roles[object] {
                 Role::Reflector if share > 1.0 => Some((Role::Emitter, verdict.emission)),
@@ -157,6 +160,18 @@ impl Verdict {
         })
     }
 
+    /// Takes weight from the clusters of which a few paths strayed far, so that they say no more than they know.
+    fn steady(&self, parts: &mut [Part], typical: f64) {
+        let usual = crate::math::stats::quantile(&mut self.noise.clone(), 0.5).unwrap_or(0.0)
+            + typical * typical;
+        for (part, noise) in parts.iter_mut().zip(&self.noise) {
+            let most = usual * STRAYED;
+            if *noise > most {
+                part.weight *= (most / noise).sqrt();
+            }
+        }
+    }
+
     /// The advantage of being an emitter as a share of what it takes to be sure of it.
     fn share_of_decision(&self, typical: f64) -> f64 {
         let [reflecting, emitting] = self.sums;
@@ -257,6 +272,28 @@ mod tests {
         assert_eq!(changes.len(), 1, "{changes:?}");
         assert_eq!((changes[0].object, changes[0].role), (1, Role::Emitter));
         assert!((changes[0].value - Vec3::splat(8.0)).length() < 1e-5);
+    }
+
+    /// One path of a thousand strays to a light so near that its cluster seems to receive a hundred times what it does: what
+    /// the other clusters say still holds, for the lamp as for the wall.
+    #[test]
+    fn a_path_that_strays_decides_nothing() {
+        let mut strayed = room();
+        for object in 0..2 {
+            let mut own = (strayed.clusters.iter_mut()).filter(|c| c.cluster.object == object);
+            if let Some(cluster) = own.next() {
+                cluster.vertices[0].known *= 100.0;
+            }
+        }
+        let mut unknowns = Unknowns::new(2);
+        unknowns.albedo = vec![Vec3::splat(0.6), Vec3::ONE];
+        let changes = judge(&strayed, &unknowns, &[Role::Reflector; 2]);
+        assert_eq!(changes.len(), 1, "{changes:?}");
+        assert_eq!((changes[0].object, changes[0].role), (1, Role::Emitter));
+        assert!((changes[0].value - Vec3::splat(8.0)).length() < 1e-5);
+        unknowns.emission[1] = Vec3::splat(8.0);
+        let settled = judge(&strayed, &unknowns, &[Role::Reflector, Role::Emitter]);
+        assert_eq!(settled, []);
     }
 
     #[test]

@@ -18,8 +18,9 @@ const PRIOR_CLUSTERS: f64 = 4.0;
 const FLOOR: f64 = 1e-3;
 /// Median of χ² with one degree of freedom.
 const MEDIAN_CHI2: f64 = 0.454_936;
-/// Deviations beyond which a cluster's pull no longer grows: one in 16,000 of normal ones.
-const FAR_OUT: f64 = 4.0;
+/// Deviations beyond which a cluster's pull no longer grows. Noise of photographs and of paths at the edges of lamps is
+/// skewed, and a closer bound would make a bias of its rare large values.
+const FAR_OUT: f64 = 10.0;
 
 /// Factors on the weights of the clusters, per channel.
 #[derive(Debug, Clone, PartialEq)]
@@ -177,20 +178,22 @@ mod tests {
     }
 
     #[test]
-    fn clusters_far_out_pull_no_more_than_others_and_cost_no_trust() {
+    fn a_cluster_far_out_pulls_and_costs_trust_within_bounds() {
         let quiet: Vec<Linearised> = clusters(0, noise(400, 0.1))
             .chain(clusters(1, noise(40, 0.1)))
             .collect();
         let mut edges = quiet.clone();
-        for cluster in &mut edges[400..403] {
+        for cluster in &mut edges[400..401] {
             cluster.residuals = [DVec3::splat(50.0); 2];
         }
         let [quiet, disturbed] = [&quiet, &edges].map(|c| Trust::from_residuals(c, 2));
-        assert!((disturbed.of(1) / quiet.of(1)).min_element() > 0.3);
+        // It counts for ten deviations, of forty clusters; in full it would cost all but a 50,000th.
+        assert!((disturbed.of(1) / quiet.of(1)).min_element() > 0.15);
         let pull = |cluster: &Linearised| disturbed.weight(cluster) * cluster.residuals[0];
         let usual = disturbed.of(1) * 0.1;
         let ratio = (pull(&edges[400]) / usual).x;
-        assert!((2.0..10.0).contains(&ratio), "{ratio}");
+        // Ten deviations, which the cluster itself doubles, and not the 500 that it lies off.
+        assert!((10.0..30.0).contains(&ratio), "{ratio}");
         // Where nothing is known all weigh what they weigh.
         assert_eq!(Trust::even(2).weight(&edges[400]), DVec3::ONE);
     }
