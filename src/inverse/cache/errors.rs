@@ -74,7 +74,7 @@ pub fn standard_errors(
     };
     let curvatures = equations.diagonal.iter().zip(&equations.across);
     for ((&index, variance), (diagonal, across)) in free.iter().zip(variances).zip(curvatures) {
-        let noisy = (*diagonal / across.max(*diagonal * LEAST_SIGNAL)).max(DVec3::ONE);
+        let noisy = (*diagonal / signal(*diagonal, *across)).max(DVec3::ONE);
         let error = (variance.max(DVec3::ZERO).powf(0.5) * noisy).as_vec3();
         let target = match index.checked_sub(objects) {
             None => &mut errors.albedo[index],
@@ -84,6 +84,11 @@ pub fn standard_errors(
         *target = Vec3::select(known, error, *target);
     }
     errors
+}
+
+/// The part of a parameter's curvature that is no noise of its derivatives, given its curvature and that across the two sets.
+pub fn signal(diagonal: DVec3, across: DVec3) -> DVec3 {
+    across.max(diagonal * LEAST_SIGNAL)
 }
 
 /// What is believed of the free parameters, in the units of the normal equations.

@@ -2,6 +2,7 @@
 
 use super::PathCache;
 use super::equations::{Coupling, Matrices, NormalEquations};
+use super::errors::signal;
 use super::prior::Prior;
 use super::rows::Bounded;
 use super::step::Step;
@@ -48,7 +49,7 @@ pub fn fit<E>(
     let mut iterations = 0;
     let mut damping = LEAST_DAMPING;
     while iterations < most_steps {
-        let (proposal, largest) = propose(&equations, free, &unknowns, damping);
+        let (proposal, length) = propose(&equations, free, &unknowns, damping);
         let after = cache.normal_equations(&proposal, free, trust, prior);
         iterations += 1;
         between(&proposal)?;
@@ -59,7 +60,7 @@ pub fn fit<E>(
         }
         damping = (damping * 0.01).max(LEAST_DAMPING);
         (unknowns, equations) = (proposal, after);
-        if largest < STEP_TOLERANCE {
+        if length.step < STEP_TOLERANCE {
             break;
         }
     }
@@ -77,13 +78,23 @@ fn worse(before: &NormalEquations, after: &NormalEquations) -> bool {
     !after.objective.is_finite() || rise.cmpgt(size(before.objective) * 0.5).any()
 }
 
-/// Unknowns after one step, and its largest component in standard errors.
+/// How far a step goes: its largest component, in standard errors of the parameters.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Length {
+    /// Of the step itself.
+    pub step: f64,
+    /// Of all steps to come, if they go on like this one: noise in the derivatives makes each too short, and the more so the
+    /// less is known.
+    pub left: f64,
+}
+
+/// Unknowns after one step, and its length.
 pub fn propose(
     equations: &NormalEquations,
     free: &[usize],
     from: &Unknowns,
     damping: f64,
-) -> (Unknowns, f64) {
+) -> (Unknowns, Length) {
     // What is believed besides pulls like measurements; what no path touches stays where it is.
     let x: Vec<DVec3> = free.iter().map(|&i| from.value(i).as_dvec3()).collect();
     let variance = noise(equations);
@@ -115,17 +126,23 @@ pub fn propose(
     };
 
     let mut proposal = from.clone();
-    let mut largest = 0.0f64;
+    let mut length = Length::default();
     for (row, &i) in free.iter().enumerate() {
         let y = (x[row] + step[row]).clamp(DVec3::ZERO, DVec3::splat(upper[row]));
-        // By itself a parameter has the standard error √scatter / diagonal; values cannot be told apart below their rounding.
-        let moved = (y - x[row]).abs() * equations.diagonal[row];
-        let noise = equations.scatter[row].powf(0.5) + x[row] * equations.diagonal[row] * ROUNDING;
-        let counted = moved.cmpgt(DVec3::ZERO);
-        largest = largest.max(DVec3::select(counted, moved / noise, DVec3::ZERO).max_element());
+        // By itself a parameter has the standard error √scatter / across; values cannot be told apart below their rounding.
+        let moved = (y - x[row]).abs();
+        let rounding = x[row] * ROUNDING;
+        let of = |curvature: DVec3| {
+            let noise = equations.scatter[row].powf(0.5) / curvature + rounding;
+            let counted = moved.cmpgt(DVec3::ZERO) & curvature.cmpgt(DVec3::ZERO);
+            DVec3::select(counted, moved / noise, DVec3::ZERO).max_element()
+        };
+        let across = signal(equations.diagonal[row], equations.across[row]);
+        length.step = length.step.max(of(across));
+        length.left = length.left.max(of(equations.diagonal[row]));
         *proposal.value_mut(i) = y.as_vec3();
     }
-    (proposal, largest)
+    (proposal, length)
 }
 
 /// The step of each channel by itself, damped as far as its equations must be; none where no damping helps.

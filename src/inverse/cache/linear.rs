@@ -40,8 +40,8 @@ pub fn descend(
     loop {
         let trust = Trust::from_residuals(&clusters, about.surfaces());
         let equations = NormalEquations::new(&clusters, free.len(), &trust, prior);
-        let (next, largest) = propose(&equations, free, &unknowns, LEAST_DAMPING);
-        if largest < STEP_TOLERANCE || steps == MOST_STEPS {
+        let (next, length) = propose(&equations, free, &unknowns, LEAST_DAMPING);
+        if length.left < STEP_TOLERANCE || steps == MOST_STEPS {
             return Descended {
                 unknowns,
                 trust,
