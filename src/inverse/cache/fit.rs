@@ -189,7 +189,7 @@ mod tests {
     /// Photographs without noise of a lamp and of a wall, of which one set of paths says too much light and the other too
     /// little, so that the product of their residuals is negative.
     fn opposed(index: usize) -> CachedCluster {
-        let lamp = index % 2 == 0;
+        let lamp = index.is_multiple_of(2);
         let off = [0.03, -0.03][index / 2 % 2];
         let vertex = |set: usize| Vertex {
             surface: u32::from(lamp),
