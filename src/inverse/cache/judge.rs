@@ -3,6 +3,7 @@
 use super::PathCache;
 use super::roles::Role;
 use crate::inverse::parameters::Unknowns;
+use crate::math::stats::quantile;
 use glam::{DVec3, Vec3};
 
 /// An advantage of so many typical squared errors decides.
@@ -46,7 +47,7 @@ pub fn judge(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<Chan
     let mut errors: Vec<f64> = (verdicts.iter().flatten())
         .flat_map(|v| v.errors.iter().copied())
         .collect();
-    let typical = crate::math::stats::quantile(&mut errors, 0.5).unwrap_or(0.0);
+    let typical = quantile(&mut errors, 0.5).unwrap_or(0.0);
     (parts.iter_mut().zip(verdicts).enumerate())
         .filter_map(|(object, (parts, verdict))| {
             verdict?.steady(parts, typical);
@@ -162,8 +163,7 @@ impl Verdict {
 
     /// Takes weight from the clusters of which a few paths strayed far, so that they say no more than they know.
     fn steady(&self, parts: &mut [Part], typical: f64) {
-        let usual = crate::math::stats::quantile(&mut self.noise.clone(), 0.5).unwrap_or(0.0)
-            + typical * typical;
+        let usual = quantile(&mut self.noise.clone(), 0.5).unwrap_or(0.0) + typical * typical;
         for (part, noise) in parts.iter_mut().zip(&self.noise) {
             let most = usual * STRAYED;
             if *noise > most {
