@@ -91,6 +91,29 @@ fn pure_pixels_see_one_surface_of_one_object_and_most_are_pure() {
     assert!(survey.pixels.iter().filter(mixed).count() > 100);
 }
 
+/// No ray anywhere in a pixel that is inside an object leaves it, on a mesh whose edges are straight.
+#[test]
+fn inside_an_object_no_part_of_a_pixel_sees_another() {
+    let problem = room();
+    let survey = survey(&problem);
+    let inside: Vec<_> = survey.pixels.iter().filter(|p| p.inside).collect();
+    assert!(inside.len() * 2 > survey.pixels.len(), "{}", inside.len());
+    for pixel in inside {
+        assert!(pixel.pure);
+        let corner = Vec2::new(
+            (pixel.pixel % SIZE[0]) as f32,
+            (pixel.pixel / SIZE[0]) as f32,
+        );
+        for part in 0..64 {
+            let offset = Vec2::new((part % 8) as f32 + 0.5, (part / 8) as f32 + 0.5) / 8.0;
+            let ray = problem.scene.cameras[pixel.frame as usize].ray(corner + offset);
+            let hit = problem.scene.intersect(&ray).expect("the room is closed");
+            let object = problem.scene.object_of[hit.triangle as usize];
+            assert_eq!(object, pixel.object, "{pixel:?}");
+        }
+    }
+}
+
 /// Points on planes are found without rays; they are where rays would have met the mesh.
 #[test]
 fn points_lie_where_the_quarters_of_their_pixel_see_the_mesh() {

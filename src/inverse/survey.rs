@@ -30,6 +30,8 @@ pub struct SurveyedPixel {
     pub object: u32,
     /// Whether all its rays meet one side of one smooth surface of one object.
     pub pure: bool,
+    /// Whether it is pure and the eight pixels around see the same object too, so that no edge can be within it.
+    pub inside: bool,
     /// Whether it is kept out of the fit.
     pub held_out: bool,
     /// Points behind the quarters, with the normal of the side that is seen; unset where a ray leaves the mesh.
@@ -108,6 +110,7 @@ impl Survey {
                         pixel: pixel as u32,
                         object: looked.object,
                         pure: looked.pure,
+                        inside: looked.inside,
                         held_out: is_held_out(settings, frame as u32, pixel as u32),
                         points: looked.points,
                     });
@@ -165,6 +168,7 @@ struct FrameView<'a> {
 struct Looked {
     object: u32,
     pure: bool,
+    inside: bool,
     points: [Option<SurveyPoint>; QUARTERS],
     /// Width of the pixel on the surface.
     footprint: Option<f32>,
@@ -181,7 +185,8 @@ impl FrameView<'_> {
         let center = (triangle != NOTHING)
             .then(|| self.on_plane(triangle, corner + 0.5))
             .flatten();
-        let flat = center.is_some() && self.is_flat(pixel, width);
+        let around = self.around(pixel, width);
+        let flat = center.is_some() && around.is_some_and(|seen| self.is_flat(triangle, seen));
         let points: [Option<SurveyPoint>; QUARTERS] = std::array::from_fn(|quarter| {
             let [dx, dy] = stream.uniform2();
             let offset = Vec2::new((quarter % 2) as f32 + dx, (quarter / 2) as f32 + dy) * 0.5;
@@ -212,6 +217,7 @@ impl FrameView<'_> {
         Looked {
             object: center.map_or(u32::MAX, |c| c.object),
             pure,
+            inside: pure && around.is_some_and(|seen| self.is_one_object(triangle, seen)),
             points,
             footprint,
             rays: if flat { 0 } else { QUARTERS as u64 },
@@ -239,30 +245,33 @@ impl FrameView<'_> {
         (t > 0.0 && point.is_finite()).then(|| self.seen_from(triangle, point))
     }
 
-    /// Whether the eight pixels around see the same object on the same plane.
-    fn is_flat(&self, pixel: usize, width: usize) -> bool {
+    /// The triangles that a pixel and the eight around it see, a row after the other; `None` on the picture's border.
+    fn around(&self, pixel: usize, width: usize) -> Option<[&[u32]; 3]> {
         let height = self.triangles.len() / width;
         let (x, y) = (pixel % width, pixel / width);
-        if x == 0 || y == 0 || x + 1 >= width || y + 1 >= height {
-            return false;
-        }
-        let own = self.triangles[pixel];
+        let bordered = x > 0 && y > 0 && x + 1 < width && y + 1 < height;
+        bordered.then(|| {
+            [y - 1, y, y + 1].map(|y| &self.triangles[y * width + x - 1..=y * width + x + 1])
+        })
+    }
+
+    /// Whether all of some triangles belong to the object of one.
+    fn is_one_object(&self, own: u32, seen: [&[u32]; 3]) -> bool {
+        let object = |triangle: u32| self.scene.object_of.get(triangle as usize);
+        (seen.into_iter().flatten()).all(|&other| other == own || object(other) == object(own))
+    }
+
+    /// Whether all of some triangles belong to the object of one and lie on its plane.
+    fn is_flat(&self, own: u32, seen: [&[u32]; 3]) -> bool {
         let scene = self.scene;
         let [on_plane, _, _] = scene.corners(own);
         let normal = scene.normals[own as usize];
         let tolerance = COPLANAR * scene.diameter;
-        let same = |other: u32| {
-            other == own
-                || other != NOTHING
-                    && scene.object_of[other as usize] == scene.object_of[own as usize]
-                    && scene
-                        .corners(other)
-                        .iter()
-                        .all(|c| (*c - on_plane).dot(normal).abs() <= tolerance)
+        let coplanar = |other: u32| {
+            let corners = scene.corners(other);
+            (corners.iter()).all(|c| (*c - on_plane).dot(normal).abs() <= tolerance)
         };
-        (y - 1..=y + 1).all(|y| {
-            let row = &self.triangles[y * width + x - 1..=y * width + x + 1];
-            row.iter().all(|&other| same(other))
-        })
+        self.is_one_object(own, seen)
+            && (seen.into_iter().flatten()).all(|&other| other == own || coplanar(other))
     }
 }

@@ -4,13 +4,15 @@
 //! noise of photographs and of paths averages out before products are taken.
 
 use crate::inverse::solver::Problem;
-use crate::inverse::survey::Survey;
+use crate::inverse::survey::{Survey, SurveyedPixel};
 use glam::{DVec3, Vec3};
 use std::collections::BTreeMap;
 
 /// Pixels of a cluster aimed at.
 const CLUSTER_PIXELS: f64 = 48.0;
-/// Objects seen by fewer pixels than this are also fitted at their edges.
+/// Objects with fewer pixels than this away from their edges are fitted at their edges too.
+const ENOUGH: u64 = 48;
+/// Objects seen by fewer pixels than this keep all of theirs.
 const SMALL: u64 = 400;
 /// Pixels above this share of saturation may have been brighter than they show, and are left out.
 const BELOW_SATURATION: f32 = 0.97;
@@ -48,18 +50,20 @@ impl Cluster {
 
 /// Gathers the pixels that are in the fit. `most_pixels` bounds how many are used; small objects keep all of theirs.
 pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cluster> {
-    // Usable pixels: inside one object, or anywhere on objects that have few.
+    // Usable pixels: away from all edges, or nearer to them on objects that have few.
     let seen = |object: u32| survey.seen.get(object as usize).copied().unwrap_or(0);
-    let usable: Vec<_> = survey
+    let mut usable: Vec<&SurveyedPixel> = survey
         .pixels
         .iter()
-        .filter(|p| !p.held_out && p.object != u32::MAX && (p.pure || seen(p.object) < SMALL))
+        .filter(|p| !p.held_out && p.object != u32::MAX)
         .filter(|p| {
             let photograph = &problem.photographs[p.frame as usize];
             photograph.pixels[p.pixel as usize].max_element()
                 < photograph.saturation * BELOW_SATURATION
         })
         .collect();
+    let nearest = nearest_to_edges(&usable, survey.seen.len());
+    usable.retain(|p| Edge::of(p) <= nearest[p.object as usize]);
     let thinning = (usable.len() as f64 / most_pixels.max(1) as f64).max(1.0);
     let tile = (CLUSTER_PIXELS * thinning).sqrt().round().max(1.0) as u32;
 
@@ -101,6 +105,44 @@ pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cl
             cluster
         })
         .collect()
+}
+
+/// How near to an edge of what it sees a pixel lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Edge {
+    /// None of the pixels around is on one.
+    Far,
+    /// It sees one surface, as far as its rays tell: a sliver may have slipped between them.
+    Near,
+    /// It sees more than one.
+    On,
+}
+
+impl Edge {
+    fn of(pixel: &SurveyedPixel) -> Self {
+        match (pixel.inside, pixel.pure) {
+            (true, _) => Self::Far,
+            (false, true) => Self::Near,
+            (false, false) => Self::On,
+        }
+    }
+}
+
+/// How near to its edges each object is fitted: as far as there are enough pixels. A sliver of a lamp in a pixel of the
+/// ceiling outshines it, and its share of the pixel is known no better than the photograph's noise and the camera's place.
+fn nearest_to_edges(pixels: &[&SurveyedPixel], objects: usize) -> Vec<Edge> {
+    let mut counts = vec![[0u64; 2]; objects];
+    for pixel in pixels {
+        let [far, off] = &mut counts[pixel.object as usize];
+        *far += u64::from(Edge::of(pixel) == Edge::Far);
+        *off += u64::from(Edge::of(pixel) != Edge::On);
+    }
+    let nearest = |[far, off]: [u64; 2]| match (far >= ENOUGH, off >= ENOUGH) {
+        (true, _) => Edge::Far,
+        (false, true) => Edge::Near,
+        (false, false) => Edge::On,
+    };
+    counts.into_iter().map(nearest).collect()
 }
 
 /// Median over photographed pixels that are in the fit, per channel; one where all are black.
@@ -171,5 +213,30 @@ mod tests {
         }
         assert!((mean(&spots) - 1.0).abs() < 1e-6);
         assert!((spots[0].weight.x - 10.0 / 1.01).abs() < 1e-4);
+    }
+
+    #[test]
+    fn objects_are_fitted_as_far_from_their_edges_as_there_are_enough_pixels() {
+        let pixel = |object: u32, edge: Edge| SurveyedPixel {
+            frame: 0,
+            pixel: 0,
+            object,
+            pure: edge != Edge::On,
+            inside: edge == Edge::Far,
+            held_out: false,
+            points: [None; 4],
+        };
+        let of = |object: u32, counts: [u64; 3]| {
+            let edges = [Edge::Far, Edge::Near, Edge::On];
+            (edges.into_iter().zip(counts))
+                .flat_map(move |(edge, n)| (0..n).map(move |_| pixel(object, edge)))
+        };
+        let pixels: Vec<SurveyedPixel> = of(0, [ENOUGH, 500, 500])
+            .chain(of(1, [ENOUGH - 1, 1, 500]))
+            .chain(of(2, [10, 20, 5]))
+            .collect();
+        let pixels: Vec<&SurveyedPixel> = pixels.iter().collect();
+        let nearest = nearest_to_edges(&pixels, 4);
+        assert_eq!(nearest, [Edge::Far, Edge::Near, Edge::On, Edge::On]);
     }
 }
