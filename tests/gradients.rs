@@ -70,7 +70,7 @@ fn gradients(tracer: &Tracer, unknowns: &Unknowns, pass: u64) -> [Vec<DVec3>; 2]
             vertices.clear();
             let camera = &tracer.scene.cameras[0];
             tracer.pixel_path(camera, corner(pixel), &mut stream, &mut vertices);
-            differentiate(&vertices, unknowns, &mut gathered, &mut sets[set])
+            differentiate(&vertices, unknowns, &[], &mut gathered, &mut sets[set])
         });
         let slope = (colors[0] - target(pixel)).as_dvec3() * (2.0 / f64::from(pixels));
         for (sum, set) in sums.iter_mut().zip([1, 0]) {
@@ -140,6 +140,7 @@ fn independent_samples_give_the_gradient_and_shared_samples_a_biased_one() {
         surface_of: &scene.object_of,
         believed_albedo: &believed,
         lobes: &[],
+        patches: None,
         sampling: LightSampling::Mis,
         max_bounces: BOUNCES,
         seed: 0,

@@ -37,6 +37,7 @@ fn cache() -> (PathCache, Vec<Cluster>, Vec<usize>) {
         surface_of: &problem.scene.object_of,
         believed_albedo: &[0.6; SURFACES],
         lobes: &[],
+        patches: None,
         sampling: LightSampling::Mis,
         max_bounces: 1000,
         seed: 131,
@@ -209,7 +210,7 @@ fn precision_is_lost_nowhere_but_in_the_last_digits() {
             start = end as usize;
             longest = longest.max(vertices.len());
             gradient.clear();
-            let found = differentiate(vertices, &unknowns, &mut gathered, &mut gradient).x;
+            let found = differentiate(vertices, &unknowns, &[], &mut gathered, &mut gradient).x;
             let mut wanted = [0.0; 2 * SURFACES];
             let radiance = exact(vertices, &x, 0, &mut wanted);
             path = path.max((f64::from(found) - radiance).abs() / radiance.max(1e-30));
@@ -223,7 +224,7 @@ fn precision_is_lost_nowhere_but_in_the_last_digits() {
             clusters: vec![cached.clone()],
             ..PathCache::default()
         };
-        let residuals = one.linearise(&unknowns, &place)[0].residuals;
+        let residuals = one.linearise(&unknowns, &place, &[])[0].residuals;
         let wanted = DVec3::new(a.0, b.0, 0.0);
         for (found, wanted) in residuals.iter().zip([wanted.x, wanted.y]) {
             let found = f64::from(cached.cluster.measured.x) - found.x;

@@ -51,7 +51,7 @@ impl Accumulated {
             .map(|c| Linearised {
                 object: c.object,
                 weight: c.weight,
-                floor: c.floor,
+                pixels: c.pixels,
                 residuals: c.residuals.map(|r: DVec3| r * scale),
                 own: c.own * scale,
                 rows: c
@@ -71,7 +71,7 @@ mod tests {
     use crate::inverse::cache::equations::{Coupling, NormalEquations};
     use crate::inverse::cache::prior::Prior;
     use crate::inverse::cache::trust::Trust;
-    use crate::inverse::cache::{CachedCluster, NO_LAMP, NO_TEXEL, PathCache, Vertex};
+    use crate::inverse::cache::{CachedCluster, NO_LAMP, NO_PATCH, NO_TEXEL, PathCache, Vertex};
     use crate::inverse::parameters::Unknowns;
     use crate::math::rng::Stream;
     use glam::Vec3;
@@ -88,6 +88,7 @@ mod tests {
                 surface: stream.below(SURFACES) as u32,
                 lamp: [NO_LAMP, stream.below(SURFACES) as u32][stream.below(2)],
                 lamp_weight: stream.uniform(),
+                patch: NO_PATCH,
                 emission_weight: stream.uniform(),
                 texel: NO_TEXEL,
                 known: Vec3::splat(stream.uniform()),
@@ -146,7 +147,7 @@ mod tests {
         let mut sums = Accumulated::default();
         for r in 0..ROUNDS {
             let cache = cache(|pixel, set| round(r, pixel, set));
-            sums.add(cache.linearise(&unknowns, &place));
+            sums.add(cache.linearise(&unknowns, &place, &[]));
         }
         assert_eq!(sums.rounds(), ROUNDS as u32);
         let even = Trust::even(SURFACES);

@@ -1,6 +1,6 @@
 //! Radiance of a stored path and its derivative with respect to every albedo and emission on it.
 
-use super::{NO_LAMP, SPECULAR, Vertex};
+use super::{NO_LAMP, NO_PATCH, SPECULAR, Vertex};
 use crate::inverse::parameters::Unknowns;
 use glam::{Vec3, Vec3A};
 
@@ -103,11 +103,13 @@ fn gathered_at(vertex: &Vertex, beyond: Vec3A, unknowns: &Unknowns) -> Vec3A {
 ///
 /// With G_i the radiance gathered at vertex i, L_i = w_i E_i + ρ_i G_i is what leaves it towards the camera; the
 /// derivative with respect to ρ_i is G_i, with respect to an emission its weight, each times the albedos before it. A
-/// vertex on a lobe has no ρ_i: there L_i = G_i.
+/// vertex on a lobe has no ρ_i: there L_i = G_i. A patch of a lamp, whose albedo is held at zero, is known to send
+/// `reflected` for an albedo of one.
 #[inline]
 pub fn differentiate(
     vertices: &[Vertex],
     unknowns: &Unknowns,
+    reflected: &[Vec3],
     gathered: &mut Vec<Vec3A>,
     gradient: &mut Gradient,
 ) -> Vec3 {
@@ -120,21 +122,27 @@ pub fn differentiate(
             unknowns.albedo[v.surface as usize]
         });
     }
+    let patch = |patch: u32| Vec3A::from(reflected[patch as usize]);
     let mut throughput = Vec3A::ONE;
     for (vertex, g) in vertices.iter().zip(&*gathered) {
         if vertex.surface != SPECULAR {
             let surface = vertex.surface as usize;
             if vertex.emission_weight != 0.0 {
-                gradient.add(surfaces + surface, throughput * vertex.emission_weight);
+                let weight = throughput * vertex.emission_weight;
+                gradient.add(surfaces + surface, weight);
+                if vertex.patch != NO_PATCH && vertex.lamp == NO_LAMP {
+                    gradient.add(surface, weight * patch(vertex.patch));
+                }
             }
             gradient.add(surface, throughput * *g);
             throughput *= Vec3A::from(unknowns.albedo[surface]);
         }
         if vertex.lamp != NO_LAMP {
-            gradient.add(
-                surfaces + vertex.lamp as usize,
-                throughput * vertex.lamp_weight,
-            );
+            let (lamp, weight) = (vertex.lamp as usize, throughput * vertex.lamp_weight);
+            gradient.add(surfaces + lamp, weight);
+            if vertex.patch != NO_PATCH {
+                gradient.add(lamp, weight * patch(vertex.patch));
+            }
         }
     }
     beyond.into()
@@ -167,6 +175,7 @@ mod tests {
                     NO_LAMP
                 },
                 lamp_weight: stream.uniform(),
+                patch: NO_PATCH,
                 emission_weight: if stream.uniform() < 0.3 {
                     0.0
                 } else {
@@ -221,7 +230,8 @@ mod tests {
             let widen = |values: &[Vec3]| values.iter().map(|v| v.as_dvec3()).collect::<Vec<_>>();
             let (albedo, emission) = (widen(&unknowns.albedo), widen(&unknowns.emission));
             gradient.clear();
-            let found = differentiate(&path, &unknowns, &mut gathered, &mut gradient).as_dvec3();
+            let found =
+                differentiate(&path, &unknowns, &[], &mut gathered, &mut gradient).as_dvec3();
             let wanted = radiance(&path, &albedo, &emission);
             assert!((found - wanted).length() < 1e-5 * (1.0 + wanted.length()));
             for parameter in 0..2 * SURFACES {
@@ -254,9 +264,9 @@ mod tests {
         let (mut gathered, mut both) = (Vec::new(), Gradient::new(2 * SURFACES));
         let mut each = [Vec3A::ZERO; 2 * SURFACES];
         for path in &paths {
-            differentiate(path, &unknowns, &mut gathered, &mut both);
+            differentiate(path, &unknowns, &[], &mut gathered, &mut both);
             let mut alone = Gradient::new(2 * SURFACES);
-            differentiate(path, &unknowns, &mut gathered, &mut alone);
+            differentiate(path, &unknowns, &[], &mut gathered, &mut alone);
             each.iter_mut()
                 .zip(&alone.values)
                 .for_each(|(sum, v)| *sum += *v);
@@ -275,10 +285,50 @@ mod tests {
         let dark = differentiate(
             &[],
             &Unknowns::new(SURFACES),
+            &[],
             &mut Vec::new(),
             &mut gradient,
         );
         assert_eq!(dark, Vec3::ZERO);
         assert!(gradient.touched.is_empty());
+    }
+
+    /// A patch sends what it reflects for the lamp's albedo besides its emission: where light samples reach it, and where
+    /// the path ends at it.
+    #[test]
+    fn a_lamp_s_albedo_changes_what_its_patches_send() {
+        let on = |surface: u32| Vertex {
+            surface,
+            lamp: NO_LAMP,
+            lamp_weight: 0.0,
+            patch: NO_PATCH,
+            emission_weight: 0.0,
+            texel: NO_TEXEL,
+            known: Vec3::ZERO,
+        };
+        let path = [
+            Vertex {
+                lamp: 1,
+                lamp_weight: 0.25,
+                patch: 1,
+                ..on(0)
+            },
+            Vertex {
+                patch: 0,
+                emission_weight: 0.5,
+                ..on(1)
+            },
+        ];
+        let unknowns = Unknowns {
+            albedo: vec![Vec3::splat(0.4), Vec3::ZERO],
+            emission: vec![Vec3::ZERO, Vec3::splat(10.0)],
+        };
+        let reflected = [Vec3::new(1.0, 2.0, 3.0), Vec3::new(0.1, 0.2, 0.4)];
+        let mut gradient = Gradient::new(4);
+        let found = differentiate(&path, &unknowns, &reflected, &mut Vec::new(), &mut gradient);
+        assert!((found - Vec3::splat(0.4 * 10.0 * 0.75)).length() < 1e-6);
+        let wanted = (reflected[1] * 0.25 + reflected[0] * 0.5) * 0.4;
+        assert!((Vec3::from(gradient.values[1]) - wanted).length() < 1e-6);
+        assert!((Vec3::from(gradient.values[3]) - Vec3::splat(0.4 * 0.75)).length() < 1e-6);
     }
 }

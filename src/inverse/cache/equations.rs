@@ -66,7 +66,12 @@ impl PathCache {
         prior: &Prior,
     ) -> NormalEquations {
         let places = places(free, unknowns.surfaces());
-        NormalEquations::new(&self.linearise(unknowns, &places), free.len(), trust, prior)
+        NormalEquations::new(
+            &self.linearise(unknowns, &places, &[]),
+            free.len(),
+            trust,
+            prior,
+        )
     }
 }
 
@@ -117,8 +122,19 @@ impl NormalEquations {
 impl Matrices {
     /// Of linearised clusters with `n` free parameters.
     pub fn new(linearised: &[Linearised], n: usize, trust: &Trust) -> Self {
-        let terms: Vec<Vec<Term>> = (linearised.par_iter())
-            .map(|cluster| Term::of(cluster, trust.weight(cluster)))
+        let all = vec![DVec3::ONE; linearised.len()];
+        Self::with_residuals_kept(linearised, n, trust, &all)
+    }
+
+    /// The same with each cluster's score over the share of its residual that it keeps, in the scatter alone.
+    pub fn with_residuals_kept(
+        linearised: &[Linearised],
+        n: usize,
+        trust: &Trust,
+        kept: &[DVec3],
+    ) -> Self {
+        let terms: Vec<Vec<Term>> = (linearised.par_iter().zip(kept))
+            .map(|(cluster, kept)| Term::of(cluster, trust.weight(cluster), *kept))
             .collect();
         // For each row, the clusters that meet it and the place of its term there.
         let mut where_met: Vec<Vec<(u32, u32)>> = vec![Vec::new(); n];
@@ -164,12 +180,12 @@ struct Term {
     derivative: DVec3,
     /// A quarter of the same times the cluster's weight, so that products are those of means.
     weighted: DVec3,
-    /// Contribution to the descent.
+    /// Contribution to the descent, over the share of the residual that is kept.
     score: DVec3,
 }
 
 impl Term {
-    fn of(cluster: &Linearised, weight: DVec3) -> Vec<Self> {
+    fn of(cluster: &Linearised, weight: DVec3, kept: DVec3) -> Vec<Self> {
         let scores = cluster.scores(weight);
         let terms = cluster.rows.iter().zip(scores);
         terms
@@ -177,7 +193,7 @@ impl Term {
                 place,
                 derivative: a + b,
                 weighted: weight * (a + b) * 0.25,
-                score,
+                score: score / kept,
             })
             .collect()
     }

@@ -1,9 +1,11 @@
 //! How sure a fit is: standard errors of what was fitted, and tests of what was left out.
 
 use super::equations::{Coupling, Matrices, NormalEquations};
+use super::evaluate::Linearised;
 use super::fit::noise;
 use super::prior::ALBEDO_DEVIATION;
 use super::rows::Rows;
+use super::trust::Trust;
 use crate::math::rng::Stream;
 use glam::{DVec3, Vec3};
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -20,6 +22,8 @@ const KEY: u64 = 0x6d75_6c74;
 const MOST_EXACT: usize = 24;
 /// Share of a curvature that is taken not to be noise at least.
 const LEAST_SIGNAL: f64 = 0.05;
+/// Share of a cluster's residual that it is taken to keep at least when the fit follows it.
+const LEAST_KEPT: f64 = 0.1;
 /// Share of its curvature that a parameter must keep when the others follow it, to be told apart from them.
 const LEAST_OWN: f64 = 1e-9;
 
@@ -84,6 +88,49 @@ pub fn standard_errors(
         *target = Vec3::select(known, error, *target);
     }
     errors
+}
+
+/// The same equations with the scatter that the clusters' scores have before the fit follows them: each over what it keeps
+/// of its residual, one less its leverage (MacKinnon and White 1985, HC3). Few clusters know a lamp or a small object, and
+/// the fit goes through them as if they had no noise. Matrices only: with as many unknowns as need rows, no cluster leads.
+pub fn jackknifed(
+    mut equations: NormalEquations,
+    clusters: &[Linearised],
+    trust: &Trust,
+    free: &[usize],
+) -> NormalEquations {
+    let beliefs = Beliefs::new(&equations, free);
+    if let Coupling::Dense(matrices) = &mut equations.coupling {
+        let inverses = [0, 1, 2].map(|c| inverse(&matrices.hessian[c], &beliefs.added, c));
+        let kept: Vec<DVec3> = (clusters.par_iter())
+            .map(|cluster| {
+                let weight = trust.weight(cluster);
+                DVec3::from_array(std::array::from_fn(|c| {
+                    let leverage = (inverses[c].as_ref()).map_or(0.0, |m| along(m, cluster, c));
+                    (1.0 - weight[c] * leverage).max(LEAST_KEPT)
+                }))
+            })
+            .collect();
+        *matrices = Matrices::with_residuals_kept(clusters, free.len(), trust, &kept);
+    }
+    equations
+}
+
+/// J̄ᵀ M J̄ of a cluster's derivatives in one channel.
+fn along(matrix: &DMatrix<f64>, cluster: &Linearised, channel: usize) -> f64 {
+    let slope = |&(row, a, b): &(usize, DVec3, DVec3)| (row, 0.5 * (a[channel] + b[channel]));
+    let mut sum = 0.0;
+    for (i, left) in cluster.rows.iter().map(slope) {
+        let column = matrix.column(i);
+        let product: f64 = cluster
+            .rows
+            .iter()
+            .map(slope)
+            .map(|(j, right)| column[j] * right)
+            .sum();
+        sum += left * product;
+    }
+    sum
 }
 
 /// The part of a parameter's curvature that is no noise of its derivatives, given its curvature and that across the two sets.
@@ -309,6 +356,39 @@ impl Tested {
         Self {
             curvature: DVec3::ZERO,
             variance: DVec3::ZERO,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inverse::cache::prior::Prior;
+
+    /// The mean of `count` values of deviation one: with its residuals over what each keeps, one less 1/n, its variance is
+    /// the textbook's Σ r² / (n (n - 1)) times n / (n - 1), and not the Σ r² / n² that the scores alone would say.
+    #[test]
+    fn few_clusters_know_less_than_their_own_scatter_says() {
+        for count in [4, 40] {
+            let clusters: Vec<Linearised> = (0..count)
+                .map(|i| Linearised {
+                    object: 0,
+                    weight: DVec3::ONE,
+                    pixels: 1.0,
+                    residuals: [DVec3::splat([1.0, -1.0][i % 2]); 2],
+                    own: DVec3::ONE,
+                    rows: vec![(0, DVec3::ONE, DVec3::ONE)],
+                })
+                .collect();
+            let prior = Prior::new(1, 1, Vec3::ONE);
+            let (even, free) = (Trust::even(1), [1]);
+            let equations = NormalEquations::new(&clusters, 1, &even, &prior);
+            let plain = standard_errors(&equations, &free, 1).emission[0].x;
+            let kept = jackknifed(equations, &clusters, &even, &free);
+            let error = standard_errors(&kept, &free, 1).emission[0].x;
+            let n = count as f32;
+            assert!((plain - n.sqrt().recip()).abs() < 1e-4, "{plain}");
+            assert!((error - n.sqrt() / (n - 1.0)).abs() < 1e-4, "{error}");
         }
     }
 }

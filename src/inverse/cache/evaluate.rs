@@ -13,8 +13,8 @@ pub struct Linearised {
     pub object: u32,
     /// Weight of the squared residual, per channel.
     pub weight: DVec3,
-    /// What the squared residual would weigh if all of the photographed radiance were wrong.
-    pub floor: DVec3,
+    /// Its pixels: what the squared residual would weigh if it were as large as the level that it is weighed by.
+    pub pixels: f64,
     /// Photograph minus model, from set A and from set B.
     pub residuals: [DVec3; 2],
     /// Derivative with respect to the object's own emission if that is all its light, else to its own albedo; mean of
@@ -42,14 +42,20 @@ impl Linearised {
 }
 
 impl PathCache {
-    /// Linearises every cluster about some unknowns; `place` maps parameters to rows.
-    pub fn linearise(&self, unknowns: &Unknowns, place: &[usize]) -> Vec<Linearised> {
+    /// Linearises every cluster about some unknowns; `place` maps parameters to rows. `reflected` is what the patches of
+    /// lamps would send if they were white, if paths note any.
+    pub fn linearise(
+        &self,
+        unknowns: &Unknowns,
+        place: &[usize],
+        reflected: &[Vec3],
+    ) -> Vec<Linearised> {
         let parameters = 2 * unknowns.surfaces();
         self.clusters
             .par_iter()
             .map_init(
                 || Scratch::new(parameters),
-                |scratch, cluster| linearise(cluster, unknowns, place, scratch),
+                |scratch, cluster| linearise(cluster, unknowns, place, reflected, scratch),
             )
             .collect()
     }
@@ -122,6 +128,7 @@ fn linearise(
     cached: &CachedCluster,
     unknowns: &Unknowns,
     place: &[usize],
+    reflected: &[Vec3],
     scratch: &mut Scratch,
 ) -> Linearised {
     let Scratch {
@@ -130,7 +137,7 @@ fn linearise(
     } = scratch;
     gradients.iter_mut().for_each(Gradient::clear);
     let means = means(cached, |vertices, set| {
-        differentiate(vertices, unknowns, gathered, &mut gradients[set])
+        differentiate(vertices, unknowns, reflected, gathered, &mut gradients[set])
     });
     let residuals = means.map(|mean| cached.cluster.measured.as_dvec3() - mean);
 
@@ -162,8 +169,7 @@ fn linearise(
         own: Vec3::from((a.values[own] + b.values[own]) * (0.5 * scale)).as_dvec3(),
         object: cached.cluster.object,
         weight: cached.cluster.weight.as_dvec3(),
-        floor: (cached.cluster.weight * cached.cluster.measured * cached.cluster.measured)
-            .as_dvec3(),
+        pixels: cached.cluster.pixels.len() as f64,
         residuals,
         rows,
     }
@@ -188,7 +194,7 @@ impl Scratch {
 mod tests {
     use super::*;
     use crate::inverse::cache::clusters::Cluster;
-    use crate::inverse::cache::{NO_LAMP, NO_TEXEL};
+    use crate::inverse::cache::{NO_LAMP, NO_PATCH, NO_TEXEL};
 
     /// A path over a textured surface (0) and then a plain one (1) that meets a lamp (2), a path over the plain one alone.
     fn cached() -> CachedCluster {
@@ -196,6 +202,7 @@ mod tests {
             surface,
             lamp,
             lamp_weight: 0.5,
+            patch: NO_PATCH,
             emission_weight: 0.0,
             texel,
             known: Vec3::ZERO,

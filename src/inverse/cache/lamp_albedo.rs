@@ -93,7 +93,7 @@ mod tests {
         let cluster = |object: u32, measured: f64, model: f64, rows: &[(usize, f64)]| Linearised {
             object,
             weight: DVec3::ONE,
-            floor: DVec3::ONE,
+            pixels: 1.0,
             residuals: [DVec3::splat(measured - model); 2],
             own: DVec3::splat(rows[0].1),
             rows: (rows.iter())

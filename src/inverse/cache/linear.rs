@@ -77,7 +77,7 @@ mod tests {
                 Linearised {
                     object: 0,
                     weight: DVec3::ONE,
-                    floor: DVec3::ONE,
+                    pixels: 1.0,
                     residuals: [a, b].map(|j| DVec3::splat(truth) - j * begun),
                     own: (a + b) * 0.5,
                     rows: vec![(0, a, b)],

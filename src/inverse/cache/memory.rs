@@ -41,7 +41,7 @@ pub fn paths_that_fit(allowed: u64, pilot: &PathCache) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse::cache::{CachedCluster, NO_LAMP, NO_TEXEL, clusters::Cluster};
+    use crate::inverse::cache::{CachedCluster, NO_LAMP, NO_PATCH, NO_TEXEL, clusters::Cluster};
     use glam::Vec3;
 
     #[test]
@@ -50,6 +50,7 @@ mod tests {
             surface: 0,
             lamp: NO_LAMP,
             lamp_weight: 0.0,
+            patch: NO_PATCH,
             emission_weight: 0.0,
             texel: NO_TEXEL,
             known: Vec3::ZERO,

@@ -16,6 +16,7 @@ pub mod fit;
 pub mod judge;
 pub mod ladder;
 pub mod lamp_albedo;
+pub mod lamp_patches;
 pub mod linear;
 pub mod memory;
 pub mod path_noise;
@@ -34,6 +35,9 @@ use glam::Vec3;
 /// No lamp was reached from this vertex.
 pub const NO_LAMP: u32 = u32::MAX;
 
+/// No patch of a lamp was reached.
+pub const NO_PATCH: u32 = u32::MAX;
+
 /// The vertex's surface has one colour.
 pub const NO_TEXEL: u32 = u32::MAX;
 
@@ -49,6 +53,8 @@ pub struct Vertex {
     pub lamp: u32,
     /// Weight of that emission, after this vertex's albedo.
     pub lamp_weight: f32,
+    /// The patch of a lamp that the light sample reached, or that the vertex lies on and the path ends at; or [`NO_PATCH`].
+    pub patch: u32,
     /// Weight of this surface's own emission, before its albedo.
     pub emission_weight: f32,
     /// The texel of its surface's texture, or [`NO_TEXEL`].

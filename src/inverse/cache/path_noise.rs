@@ -92,7 +92,7 @@ mod tests {
         Linearised {
             object,
             weight: DVec3::ONE,
-            floor: DVec3::ONE,
+            pixels: 1.0,
             residuals: [DVec3::splat(a), DVec3::splat(b)],
             own: DVec3::ZERO,
             rows: Vec::new(),

@@ -279,7 +279,7 @@ mod tests {
                 Linearised {
                     object: object as u32,
                     weight: DVec3::ONE + color(1.0),
-                    floor: DVec3::ONE,
+                    pixels: 1.0,
                     residuals: [residual, residual + color(0.05)],
                     own: DVec3::ZERO,
                     rows,

@@ -1,8 +1,9 @@
 //! Tracing the paths of a cache.
 
 use super::clusters::Cluster;
+use super::lamp_patches::LampPatches;
 use super::scatter::{Scattered, Scattering};
-use super::{CachedCluster, NO_LAMP, NO_TEXEL, PathCache, SPECULAR, Vertex};
+use super::{CachedCluster, NO_LAMP, NO_PATCH, NO_TEXEL, PathCache, SPECULAR, Vertex};
 use crate::inverse::estimate::TexelEstimate;
 use crate::inverse::measured::MeasuredRadiance;
 use crate::inverse::outside::MeasuredOutside;
@@ -46,6 +47,9 @@ pub struct Tracer<'a> {
     pub texels: Option<&'a TexelEstimate>,
     /// For each object its rough specular lobe, where it has one; empty where none has. What has a lobe gives no light.
     pub lobes: &'a [Option<Lobe>],
+    /// Patches of lamps, at which paths end unless the camera sees them: what they reflect is known. `None` follows all
+    /// paths on.
+    pub patches: Option<&'a LampPatches>,
     /// Light from outside where photographs measured it; draws light samples too.
     pub sky: Option<&'a MeasuredOutside>,
     /// Surfaces that stand for light from elsewhere outside, by direction; `None` lets escaping rays find nothing.
@@ -90,6 +94,7 @@ impl OutsideGrid {
             surface: self.surface(direction),
             lamp: NO_LAMP,
             lamp_weight: 0.0,
+            patch: NO_PATCH,
             emission_weight: weight,
             texel: NO_TEXEL,
             known: Vec3::ZERO,
@@ -201,6 +206,7 @@ impl Tracer<'_> {
                 },
                 lamp: NO_LAMP,
                 lamp_weight: 0.0,
+                patch: NO_PATCH,
                 emission_weight: if surface.front && lobed.is_none() {
                     emission_weight * scale
                 } else {
@@ -209,7 +215,10 @@ impl Tracer<'_> {
                 texel: self.texel(&hit),
                 known: Vec3::ZERO,
             };
-            if bounce >= self.max_bounces {
+            if bounce > 0 && surface.front {
+                vertex.patch = self.patch(hit.triangle);
+            }
+            if bounce >= self.max_bounces || vertex.patch != NO_PATCH {
                 vertices.push(vertex);
                 return rays;
             }
@@ -332,6 +341,7 @@ impl Tracer<'_> {
             None => {
                 vertex.lamp = self.surface_of[sample.triangle as usize];
                 vertex.lamp_weight = weight;
+                vertex.patch = self.patch(sample.triangle);
             }
         }
         1
@@ -404,6 +414,10 @@ impl Tracer<'_> {
             .texels
             .filter(|t| t.textured.get(object) == Some(&true));
         textures.map_or(NO_TEXEL, |t| t.colors.layout.texel(hit))
+    }
+
+    fn patch(&self, triangle: u32) -> u32 {
+        self.patches.map_or(NO_PATCH, |p| p.of(triangle))
     }
 
     fn lobe(&self, object: u32) -> Option<Lobe> {

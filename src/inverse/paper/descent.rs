@@ -216,6 +216,7 @@ impl Descent {
             believed_albedo: &believed,
             texels: None,
             lobes: &[],
+            patches: None,
             sky: None,
             outside: None,
             sampling: settings.light_sampling,
@@ -323,7 +324,7 @@ fn pixel_gradient(
             let (rays, finite) = tracer.pixel_path(camera, corner, &mut stream, &mut vertices);
             result.rays += rays;
             result.rejected += u64::from(!finite);
-            sum += differentiate(&vertices, unknowns, &mut gathered, gradient);
+            sum += differentiate(&vertices, unknowns, &[], &mut gathered, gradient);
         }
         if set == 0 {
             colour = sum / samples as f32;

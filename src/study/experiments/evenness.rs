@@ -104,7 +104,7 @@ fn variances<U: Uniforms>(
                 gradient.clear();
                 let mut numbers = numbers(repetition, next);
                 tracer.pixel_path(&scene.cameras[frame], corner, &mut numbers, &mut vertices);
-                let radiance = differentiate(&vertices, truth, &mut gathered, &mut gradient);
+                let radiance = differentiate(&vertices, truth, &[], &mut gathered, &mut gradient);
                 sum += f64::from(luminance(radiance));
                 next += 1;
             }

@@ -82,6 +82,7 @@ pub fn tracer<'a>(
         believed_albedo,
         texels: None,
         lobes: &[],
+        patches: None,
         sky: None,
         outside: None,
         sampling,
@@ -127,7 +128,7 @@ fn of_pixel(
         );
         rays += cast;
         gradient.clear();
-        differentiate(&vertices, unknowns, &mut gathered, &mut gradient);
+        differentiate(&vertices, unknowns, &[], &mut gathered, &mut gradient);
         for (parameter, moments) in moments.iter_mut().enumerate() {
             let mut value = Vec3::from(gradient.values[parameter]);
             if parameter >= unknowns.surfaces() {

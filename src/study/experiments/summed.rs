@@ -103,7 +103,7 @@ impl Paths {
         let mut gradient = Gradient::new(2 * self.surfaces);
         self.first(count).map(move |path| {
             gradient.clear();
-            differentiate(path, &unknowns, &mut gathered, &mut gradient).x
+            differentiate(path, &unknowns, &[], &mut gathered, &mut gradient).x
         })
     }
 

@@ -187,7 +187,7 @@ impl Ladder<'_, '_> {
         let surfaces = self.roles.len();
         let mut free = roles::free(&self.roles);
         free.extend(surfaces + self.outside.first as usize..2 * surfaces);
-        let linearised = cache.linearise(&self.unknowns, &roles::places(&free, surfaces));
+        let linearised = cache.linearise(&self.unknowns, &roles::places(&free, surfaces), &[]);
         let even = Trust::even(surfaces);
         let equations = NormalEquations::new(&linearised, free.len(), &even, &self.prior);
         let (after, _) = propose(&equations, &free, &self.unknowns, LEAST_DAMPING);

@@ -13,6 +13,7 @@ use super::budget::Budget;
 use super::clusters::{Cluster, brightness, cluster, mean_radiance};
 use super::errors::{StandardErrors, standard_errors};
 use super::fit::{Fit, fit};
+use super::lamp_patches::LampPatches;
 use super::prior::Prior;
 use super::reached::Reached;
 use super::roles::{self, Role};
@@ -60,6 +61,8 @@ pub struct Ladder<'a, 'o> {
     roles: Vec<Role>,
     trust: Trust,
     prior: Prior,
+    /// Of the lamps, once all of them are found.
+    patches: LampPatches,
     /// For each surface, the share of the paths' noise in its residuals.
     path_noise: Vec<f64>,
     unknowns: Unknowns,
@@ -155,6 +158,7 @@ pub fn solve(
         roles: start.roles,
         trust: Trust::even(surfaces),
         prior,
+        patches: LampPatches::default(),
         path_noise: vec![1.0; surfaces],
         unknowns: start.unknowns,
         lobes,
@@ -298,7 +302,8 @@ impl Ladder<'_, '_> {
 
     /// Weighs the clusters by the residuals that the last fit left, and fits again.
     fn weigh(&mut self, cache: &PathCache) -> Result<(), Termination> {
-        let residuals = cache.linearise(&self.unknowns, &vec![usize::MAX; 2 * self.roles.len()]);
+        let residuals =
+            cache.linearise(&self.unknowns, &vec![usize::MAX; 2 * self.roles.len()], &[]);
         self.trust = Trust::from_residuals(&residuals, self.roles.len());
         let fitted = self.fit(cache)?;
         self.take(fitted);

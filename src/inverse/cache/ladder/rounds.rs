@@ -2,9 +2,10 @@
 
 use super::Ladder;
 use crate::inverse::cache::accumulate::Accumulated;
-use crate::inverse::cache::errors::standard_errors;
+use crate::inverse::cache::errors::{jackknifed, standard_errors};
 use crate::inverse::cache::evaluate::Linearised;
 use crate::inverse::cache::lamp_albedo;
+use crate::inverse::cache::lamp_patches::LampPatches;
 use crate::inverse::cache::linear::{Descended, descend};
 use crate::inverse::cache::path_noise::{self, share_paths};
 use crate::inverse::cache::roles::{self, Role};
@@ -13,6 +14,7 @@ use crate::inverse::parameters::Unknowns;
 use crate::inverse::solver::Termination;
 use crate::math::stats::quantile;
 use crate::transport::emitters::Emitters;
+use crate::transport::path::PathOptions;
 
 /// A step (in albedo, or relative in emission) asks for linearising anew when it is larger than so many times the
 /// median error aimed at.
@@ -21,6 +23,8 @@ const NONLINEAR: f64 = 10.0;
 const NEGLIGIBLE: f64 = 1.0 / 3.0;
 /// Levels that clusters are weighed by take this part of the paths of a round.
 const PREDICTING: u64 = 4;
+/// What arrives at lamps takes this part of them.
+const LIGHTING_LAMPS: u64 = 32;
 
 /// What all rounds know of the parameters that are free.
 #[derive(Debug)]
@@ -58,6 +62,8 @@ impl Ladder<'_, '_> {
             if round >= most {
                 break;
             }
+            // What lamps reflect is not linearised but followed.
+            self.find_patches(round);
             // Path lengths are steered by what is believed at the start, the same in every round.
             sums.add(self.linearised(&lights, 2, round, &about, &places)?);
             let found = self.descend(mean(&sums, &self.roles), &about);
@@ -100,7 +106,13 @@ impl Ladder<'_, '_> {
         let free = lamp_albedo::free(&self.roles);
         let prior = lamp_albedo::beliefs(&self.prior, &self.roles);
         let found = descend(clusters, about, &free, &prior);
-        let errors = standard_errors(&found.equations, &free, self.roles.len());
+        let equations = jackknifed(
+            found.equations.clone(),
+            &found.clusters,
+            &found.trust,
+            &free,
+        );
+        let errors = standard_errors(&equations, &free, self.roles.len());
         self.unknowns.clone_from(&found.unknowns);
         lamp_albedo::leave_out(&mut self.unknowns, &self.roles);
         self.monitor.progress.iterations += 1;
@@ -118,6 +130,24 @@ impl Ladder<'_, '_> {
         } else {
             (self.budget.rounds, self.budget.median_error)
         }
+    }
+
+    /// Finds out what the patches of lamps reflect, as the room is known by now.
+    fn find_patches(&mut self, round: u32) {
+        let options = PathOptions {
+            max_bounces: self.max_bounces,
+            ..PathOptions::default()
+        };
+        self.patches = LampPatches::new(
+            &self.estimate.lit(&self.problem.scene),
+            &self.roles,
+            self.budget.round_paths / LIGHTING_LAMPS,
+            &options,
+            [self.monitor.settings.seed, u64::from(round)],
+        );
+        self.monitor.progress.rays += self.patches.rays;
+        self.monitor
+            .rejected("path weight not finite", self.patches.rejected);
     }
 
     /// Weighs the clusters by what a few paths of their own predict, of which those of the rounds are independent.

@@ -6,6 +6,8 @@ use crate::inverse::cache::clusters::cluster;
 use crate::inverse::cache::evaluate::Linearised;
 use crate::inverse::cache::memory::{self, PILOT_CLUSTERS};
 use crate::inverse::cache::path_noise::share_paths;
+use crate::inverse::cache::prior::ALBEDO_MEAN;
+use crate::inverse::cache::roles::Role;
 use crate::inverse::cache::trace::Tracer;
 use crate::inverse::estimate::TexelEstimate;
 use crate::inverse::measured::MeasuredRadiance;
@@ -100,8 +102,9 @@ impl Ladder<'_, '_> {
         places: &[usize],
     ) -> Result<Vec<Linearised>, Termination> {
         let mut all = Vec::with_capacity(self.clusters.len());
+        let reflected = self.patches.reflected.clone();
         self.slices(lights, None, stage, round, |slice| {
-            all.extend(slice.linearise(about, places));
+            all.extend(slice.linearise(about, places, &reflected));
         })?;
         Ok(all)
     }
@@ -141,10 +144,15 @@ impl Ladder<'_, '_> {
         Ok(())
     }
 
-    /// For each surface, the largest channel of its albedo as believed now.
+    /// For each surface, the largest channel of its albedo as believed now; of a lamp, whose own is left out, what may be.
     fn believed(&self) -> Vec<f32> {
-        let albedo = &self.unknowns.albedo;
-        albedo.iter().map(|a| a.max_element()).collect()
+        let albedo = self.unknowns.albedo.iter().zip(&self.roles);
+        albedo
+            .map(|(albedo, role)| match role {
+                Role::Emitter => ALBEDO_MEAN,
+                _ => albedo.max_element(),
+            })
+            .collect()
     }
 
     fn tracer<'t>(
@@ -163,6 +171,7 @@ impl Ladder<'_, '_> {
             believed_albedo: believed,
             texels: self.estimate.texels.as_deref(),
             lobes: &self.lobes,
+            patches: Some(&self.patches),
             sky: self.sky.as_ref(),
             outside: Some(self.outside),
             sampling: self.monitor.settings.light_sampling,

@@ -1,0 +1,105 @@
+//! What lamps reflect, triangle by triangle: how bright each patch of a lamp would be if it were white and gave no light.
+//!
+//! A lamp's albedo changes by little what leaves it, but by how much differs over the lamp. Paths that meet a lamp and go
+//! on from there would tell, with a noise that drowns it for every surface but the lamp itself. Traced once from the
+//! patches, it is known wherever a light sample or a path reaches one.
+
+use super::NO_PATCH;
+use super::roles::Role;
+use crate::math::rng::Stream;
+use crate::math::warp;
+use crate::scene::Scene;
+use crate::scene::geometry::Hit;
+use crate::transport::lit::Lit;
+use crate::transport::path::{PathOptions, white_radiance};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// Paths of a patch at least and at most.
+const PATHS: [f64; 2] = [4.0, 1024.0];
+/// Key of their random streams.
+const KEY: u64 = 0x7061_7463;
+
+/// The triangles of all lamps.
+#[derive(Debug, Default)]
+pub struct LampPatches {
+    /// For each triangle of the scene its patch, or [`NO_PATCH`]; empty where there are no lamps.
+    patch_of: Vec<u32>,
+    /// Mean radiance (irradiance / π) that each patch would reflect from its front if it were white.
+    pub reflected: Vec<Vec3>,
+    /// Rays cast.
+    pub rays: u64,
+    /// Paths dropped because they were not finite.
+    pub rejected: u64,
+}
+
+impl LampPatches {
+    /// Traces about `paths` paths from the lamps, in proportion to area, through a scene as it is believed to be lit; those
+    /// of another `round` are independent.
+    pub fn new(
+        lit: &Lit,
+        roles: &[Role],
+        paths: u64,
+        options: &PathOptions,
+        [seed, round]: [u64; 2],
+    ) -> Self {
+        let scene = &*lit.scene;
+        let lamps = scene.objects.iter().zip(roles);
+        let triangles: Vec<u32> = lamps
+            .filter(|(_, role)| **role == Role::Emitter)
+            .flat_map(|(object, _)| object.triangles.iter().copied())
+            .collect();
+        let area: f64 = triangles.iter().map(|&t| area_of(scene, t)).sum();
+        let traced: Vec<(Vec3, u64, u64)> = (triangles.par_iter())
+            .map(|&triangle| {
+                let share = paths as f64 * area_of(scene, triangle) / area;
+                // A lamp without any area has no share; the least is then the most.
+                let count = share.clamp(PATHS[0], PATHS[1]) as u64;
+                let (mut sum, mut rays, mut rejected) = (DVec3::ZERO, 0, 0);
+                for path in 0..count {
+                    let mut stream = Stream::new(seed, KEY + round, u64::from(triangle), path);
+                    let [b1, b2] = warp::uniform_triangle(stream.uniform2());
+                    let hit = Hit {
+                        t: 0.0,
+                        triangle,
+                        b1,
+                        b2,
+                    };
+                    let normal = scene.normals[triangle as usize];
+                    let surface = lit.surface(&hit);
+                    let sample = white_radiance(lit, &surface, normal, &mut stream, options);
+                    sum += sample.radiance.as_dvec3();
+                    rays += u64::from(sample.rays);
+                    rejected += u64::from(sample.rejected);
+                }
+                ((sum / count as f64).as_vec3(), rays, rejected)
+            })
+            .collect();
+
+        let mut patches = Self::default();
+        if !triangles.is_empty() {
+            patches.patch_of = vec![NO_PATCH; scene.triangles.len()];
+        }
+        for (patch, (triangle, (reflected, rays, rejected))) in
+            (0..).zip(triangles.iter().zip(traced))
+        {
+            patches.patch_of[*triangle as usize] = patch;
+            patches.reflected.push(reflected);
+            patches.rays += rays;
+            patches.rejected += rejected;
+        }
+        patches
+    }
+
+    /// The patch of a triangle, or [`NO_PATCH`].
+    pub fn of(&self, triangle: u32) -> u32 {
+        self.patch_of
+            .get(triangle as usize)
+            .copied()
+            .unwrap_or(NO_PATCH)
+    }
+}
+
+fn area_of(scene: &Scene, triangle: u32) -> f64 {
+    f64::from(scene.areas[triangle as usize])
+}
