@@ -83,27 +83,27 @@ impl LossProbe {
     /// Renders both sets with an estimate.
     pub fn measure(&self, problem: &Problem, estimate: &Estimate) -> Losses {
         let lit = estimate.lit(&problem.scene);
-        let (train, train_rays) = self.difference(problem, &lit, &self.train);
-        let (held_out, held_out_rays) = self.difference(problem, &lit, &self.held_out);
+        let (train, train_rays) = self.differences(problem, &lit, &self.train);
+        let (held_out, held_out_rays) = self.differences(problem, &lit, &self.held_out);
         Losses {
-            train,
-            held_out,
+            train: mean(&train),
+            held_out: mean(&held_out),
             rays: train_rays + held_out_rays,
         }
     }
 
     /// Mean absolute difference on the held-out pixels alone; `None` where there are none.
     pub fn held_out(&self, problem: &Problem, estimate: &Estimate) -> Option<f64> {
-        let lit = estimate.lit(&problem.scene);
-        self.difference(problem, &lit, &self.held_out).0
+        mean(&self.held_out_each(problem, estimate))
     }
 
-    fn difference(
-        &self,
-        problem: &Problem,
-        lit: &Lit,
-        pixels: &[(u32, u32)],
-    ) -> (Option<f64>, u64) {
+    /// Mean absolute difference over the channels of each held-out pixel, the same ones in the same order for any estimate.
+    pub fn held_out_each(&self, problem: &Problem, estimate: &Estimate) -> Vec<f64> {
+        let lit = estimate.lit(&problem.scene);
+        self.differences(problem, &lit, &self.held_out).0
+    }
+
+    fn differences(&self, problem: &Problem, lit: &Lit, pixels: &[(u32, u32)]) -> (Vec<f64>, u64) {
         let options = PathOptions {
             max_bounces: self.max_bounces,
             ..Default::default()
@@ -140,7 +140,11 @@ impl LossProbe {
             })
             .collect();
         let rays = each.iter().map(|e| e.1).sum();
-        let mean = each.iter().map(|e| e.0).sum::<f64>() / each.len() as f64;
-        ((!each.is_empty()).then_some(mean), rays)
+        (each.into_iter().map(|e| e.0).collect(), rays)
     }
+}
+
+/// Their mean; `None` for none.
+fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }

@@ -3,10 +3,11 @@
 use super::Ladder;
 use crate::inverse::cache::path_noise::share_paths;
 use crate::inverse::solver::Termination;
+use crate::math::stats::Moments;
 use glam::Vec3;
 
-/// Held-out loss may rise by this share, its own noise, before what was found is taken back.
-const NOISE: f64 = 0.005;
+/// Held-out loss may rise by so many standard errors of the rise before what was found is taken back.
+const SIGNIFICANT: f64 = 2.0;
 /// No texture grows brighter or darker by more than this factor.
 const MOST: f32 = 1.5;
 
@@ -26,7 +27,7 @@ impl Ladder<'_, '_> {
             self.unknowns.clone(),
             self.errors.clone(),
             self.detail.clone(),
-            self.losses.held_out(self.problem, &self.estimate),
+            self.losses.held_out_each(self.problem, &self.estimate),
         );
         let lights = self.lights();
         share_paths(
@@ -50,8 +51,12 @@ impl Ladder<'_, '_> {
         }
         self.describe();
 
-        let after = self.losses.held_out(self.problem, &self.estimate);
-        let kept = (before.3.zip(after)).is_none_or(|(b, a)| a <= b * (1.0 + NOISE));
+        let after = self.losses.held_out_each(self.problem, &self.estimate);
+        let mut rise = Moments::default();
+        for (before, after) in before.3.iter().zip(&after) {
+            rise.push(after - before);
+        }
+        let kept = after.is_empty() || rise.mean <= SIGNIFICANT * rise.standard_error();
         if !kept {
             (self.unknowns, self.errors, self.detail) = (before.0.clone(), before.1, before.2);
             self.describe();
@@ -68,7 +73,10 @@ impl Ladder<'_, '_> {
             true => {
                 format!("with the light that textures send on, albedos move by {moved:.3} at most")
             }
-            false => "held-out pixels get worse, so what was found before stays".to_owned(),
+            false => format!(
+                "held-out pixels get worse by {:.1} standard errors, so what was found before stays",
+                rise.mean / rise.standard_error()
+            ),
         };
         self.record("refit", started, kept, why)?;
         Ok(())

@@ -63,13 +63,19 @@ impl Ladder<'_, '_> {
         Ok((cache, limit))
     }
 
-    /// The clusters' levels as paths predict them at the present unknowns.
+    /// The clusters' levels as paths predict them, where each albedo is as high as it may well be: what was taken for black
+    /// by mistake would else weigh as if its photographs had no noise.
     pub(super) fn levels(
         &mut self,
         lights: &Emitters,
         stage: u64,
     ) -> Result<Vec<Vec3>, Termination> {
-        let unknowns = self.unknowns.clone();
+        let mut unknowns = self.unknowns.clone();
+        for (k, albedo) in unknowns.albedo.iter_mut().enumerate() {
+            if self.roles[k].reflects() {
+                *albedo = (*albedo + self.errors.albedo[k]).min(Vec3::ONE);
+            }
+        }
         let mut all = Vec::with_capacity(self.clusters.len());
         self.slices(lights, None, stage, 0, |slice| {
             all.extend(slice.levels(&unknowns))
