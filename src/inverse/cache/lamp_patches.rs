@@ -15,7 +15,7 @@ use crate::transport::path::{PathOptions, white_radiance};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Paths of a patch at least and at most.
+/// Paths of a patch at least, where there are enough for all, and at most.
 const PATHS: [f64; 2] = [4.0, 1024.0];
 /// Key of their random streams.
 const KEY: u64 = 0x7061_7463;
@@ -50,11 +50,13 @@ impl LampPatches {
             .flat_map(|(object, _)| object.triangles.iter().copied())
             .collect();
         let area: f64 = triangles.iter().map(|&t| area_of(scene, t)).sum();
+        let even = paths as f64 / triangles.len() as f64;
+        let least = even.clamp(1.0, PATHS[0]);
         let traced: Vec<(Vec3, u64, u64)> = (triangles.par_iter())
             .map(|&triangle| {
                 let share = paths as f64 * area_of(scene, triangle) / area;
-                // A lamp without any area has no share; the least is then the most.
-                let count = share.clamp(PATHS[0], PATHS[1]) as u64;
+                // Lamps without any area have no share; the least is then the most.
+                let count = share.max(least).min(PATHS[1]) as u64;
                 let (mut sum, mut rays, mut rejected) = (DVec3::ZERO, 0, 0);
                 for path in 0..count {
                     let mut stream = Stream::new(seed, KEY + round, u64::from(triangle), path);
