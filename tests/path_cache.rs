@@ -384,7 +384,8 @@ fn patches_of_a_lamp_tell_what_its_albedo_does_as_paths_beyond_it_do() {
     let lit = Lit::new(scene.clone(), materials(&unknowns, &[]), None);
     let mut roles = vec![Role::Reflector; scene.objects.len()];
     roles[LAMP] = Role::Emitter;
-    let patches = LampPatches::new(&lit, &roles, 20_000, &PathOptions::default(), [1, 0]);
+    let mut patches = LampPatches::new(&scene, &roles);
+    patches.light(&lit, 20_000, &PathOptions::default(), [1, 0]);
     assert_eq!(patches.reflected.len(), scene.objects[LAMP].triangles.len());
     let mis = LightSampling::Mis;
     let beyond = by_lamp_albedo(&rounds(&scene, mis, &[]), &unknowns, &[]);

@@ -185,7 +185,8 @@ impl FrameView<'_> {
         let center = (triangle != NOTHING)
             .then(|| self.on_plane(triangle, corner + 0.5))
             .flatten();
-        let around = self.around(pixel, width);
+        // The pixels around, where they see the same object.
+        let around = (self.around(pixel, width)).filter(|seen| self.is_one_object(triangle, *seen));
         let flat = center.is_some() && around.is_some_and(|seen| self.is_flat(triangle, seen));
         let points: [Option<SurveyPoint>; QUARTERS] = std::array::from_fn(|quarter| {
             let [dx, dy] = stream.uniform2();
@@ -217,7 +218,7 @@ impl FrameView<'_> {
         Looked {
             object: center.map_or(u32::MAX, |c| c.object),
             pure,
-            inside: pure && around.is_some_and(|seen| self.is_one_object(triangle, seen)),
+            inside: pure && around.is_some(),
             points,
             footprint,
             rays: if flat { 0 } else { QUARTERS as u64 },
@@ -249,8 +250,8 @@ impl FrameView<'_> {
     fn around(&self, pixel: usize, width: usize) -> Option<[&[u32]; 3]> {
         let height = self.triangles.len() / width;
         let (x, y) = (pixel % width, pixel / width);
-        let bordered = x > 0 && y > 0 && x + 1 < width && y + 1 < height;
-        bordered.then(|| {
+        let surrounded = x > 0 && y > 0 && x + 1 < width && y + 1 < height;
+        surrounded.then(|| {
             [y - 1, y, y + 1].map(|y| &self.triangles[y * width + x - 1..=y * width + x + 1])
         })
     }
@@ -261,7 +262,7 @@ impl FrameView<'_> {
         (seen.into_iter().flatten()).all(|&other| other == own || object(other) == object(own))
     }
 
-    /// Whether all of some triangles belong to the object of one and lie on its plane.
+    /// Whether all of some triangles of an object lie on the plane of one.
     fn is_flat(&self, own: u32, seen: [&[u32]; 3]) -> bool {
         let scene = self.scene;
         let [on_plane, _, _] = scene.corners(own);
@@ -271,7 +272,6 @@ impl FrameView<'_> {
             let corners = scene.corners(other);
             (corners.iter()).all(|c| (*c - on_plane).dot(normal).abs() <= tolerance)
         };
-        self.is_one_object(own, seen)
-            && (seen.into_iter().flatten()).all(|&other| other == own || coplanar(other))
+        (seen.into_iter().flatten()).all(|&other| other == own || coplanar(other))
     }
 }

@@ -71,7 +71,7 @@ mod tests {
     use crate::inverse::cache::equations::{Coupling, NormalEquations};
     use crate::inverse::cache::prior::Prior;
     use crate::inverse::cache::trust::Trust;
-    use crate::inverse::cache::{CachedCluster, NO_LAMP, NO_PATCH, NO_TEXEL, PathCache, Vertex};
+    use crate::inverse::cache::{CachedCluster, NO_LAMP, PathCache, Vertex};
     use crate::inverse::parameters::Unknowns;
     use crate::math::rng::Stream;
     use glam::Vec3;
@@ -88,10 +88,9 @@ mod tests {
                 surface: stream.below(SURFACES) as u32,
                 lamp: [NO_LAMP, stream.below(SURFACES) as u32][stream.below(2)],
                 lamp_weight: stream.uniform(),
-                patch: NO_PATCH,
                 emission_weight: stream.uniform(),
-                texel: NO_TEXEL,
                 known: Vec3::splat(stream.uniform()),
+                ..Vertex::on(0)
             })
             .collect()
     }

@@ -150,7 +150,6 @@ pub fn differentiate(
 
 #[cfg(test)]
 mod tests {
-    use super::super::NO_TEXEL;
     use super::*;
     use crate::math::rng::Stream;
     use glam::DVec3;
@@ -175,18 +174,17 @@ mod tests {
                     NO_LAMP
                 },
                 lamp_weight: stream.uniform(),
-                patch: NO_PATCH,
                 emission_weight: if stream.uniform() < 0.3 {
                     0.0
                 } else {
                     stream.uniform()
                 },
-                texel: NO_TEXEL,
                 known: if stream.uniform() < 0.3 {
                     color(stream)
                 } else {
                     Vec3::ZERO
                 },
+                ..Vertex::on(0)
             })
             .collect()
     }
@@ -297,26 +295,17 @@ mod tests {
     /// the path ends at it.
     #[test]
     fn a_lamp_s_albedo_changes_what_its_patches_send() {
-        let on = |surface: u32| Vertex {
-            surface,
-            lamp: NO_LAMP,
-            lamp_weight: 0.0,
-            patch: NO_PATCH,
-            emission_weight: 0.0,
-            texel: NO_TEXEL,
-            known: Vec3::ZERO,
-        };
         let path = [
             Vertex {
                 lamp: 1,
                 lamp_weight: 0.25,
                 patch: 1,
-                ..on(0)
+                ..Vertex::on(0)
             },
             Vertex {
                 patch: 0,
                 emission_weight: 0.5,
-                ..on(1)
+                ..Vertex::on(1)
             },
         ];
         let unknowns = Unknowns {

@@ -92,7 +92,8 @@ pub fn standard_errors(
 
 /// The same equations with the scatter that the clusters' scores have before the fit follows them: each over what it keeps
 /// of its residual, one less its leverage (MacKinnon and White 1985, HC3). Few clusters know a lamp or a small object, and
-/// the fit goes through them as if they had no noise. Matrices only: with as many unknowns as need rows, no cluster leads.
+/// the fit goes through them as if they had no noise. Matrices only: where unknowns are so many that rows take their place, the
+/// scatter stays what is left, and errors of what few clusters see are too small.
 pub fn jackknifed(
     mut equations: NormalEquations,
     clusters: &[Linearised],

@@ -194,18 +194,15 @@ impl Scratch {
 mod tests {
     use super::*;
     use crate::inverse::cache::clusters::Cluster;
-    use crate::inverse::cache::{NO_LAMP, NO_PATCH, NO_TEXEL};
+    use crate::inverse::cache::{NO_LAMP, NO_TEXEL};
 
     /// A path over a textured surface (0) and then a plain one (1) that meets a lamp (2), a path over the plain one alone.
     fn cached() -> CachedCluster {
         let vertex = |surface: u32, texel: u32, lamp: u32| Vertex {
-            surface,
             lamp,
             lamp_weight: 0.5,
-            patch: NO_PATCH,
-            emission_weight: 0.0,
             texel,
-            known: Vec3::ZERO,
+            ..Vertex::on(surface)
         };
         CachedCluster {
             cluster: Cluster {

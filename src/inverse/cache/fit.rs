@@ -183,7 +183,7 @@ mod tests {
     use super::*;
     use crate::inverse::cache::clusters::Cluster;
     use crate::inverse::cache::roles::{self, Role};
-    use crate::inverse::cache::{CachedCluster, NO_LAMP, NO_PATCH, NO_TEXEL, Vertex};
+    use crate::inverse::cache::{CachedCluster, Vertex};
     use glam::Vec3;
 
     /// Photographs without noise of a lamp and of a wall, of which one set of paths says too much light and the other too
@@ -192,13 +192,9 @@ mod tests {
         let lamp = index.is_multiple_of(2);
         let off = [0.03, -0.03][index / 2 % 2];
         let vertex = |set: usize| Vertex {
-            surface: u32::from(lamp),
-            lamp: NO_LAMP,
-            lamp_weight: 0.0,
-            patch: NO_PATCH,
             emission_weight: [1.0 + off, 1.0 - off][set],
-            texel: NO_TEXEL,
             known: Vec3::splat([1.0 + off, 1.0 - off][set]),
+            ..Vertex::on(u32::from(lamp))
         };
         let measured = if lamp { 17.3 } else { 0.37 };
         CachedCluster {

@@ -214,18 +214,14 @@ fn least_squares(parts: &[Part], regressor: impl Fn(&Part) -> [DVec3; 2]) -> DVe
 mod tests {
     use super::*;
     use crate::inverse::cache::clusters::Cluster;
-    use crate::inverse::cache::{CachedCluster, NO_LAMP, NO_PATCH, NO_TEXEL, Vertex};
+    use crate::inverse::cache::{CachedCluster, Vertex};
 
     /// A cluster of an object whose paths gather `light` with some noise and whose photograph shows `measured`.
     fn cluster(object: u32, index: usize, light: f32, measured: f32) -> CachedCluster {
         let path = |set: usize| Vertex {
-            surface: object,
-            lamp: NO_LAMP,
-            lamp_weight: 0.0,
-            patch: NO_PATCH,
             emission_weight: 1.0,
-            texel: NO_TEXEL,
             known: Vec3::splat(light * (1.0 + 0.02 * ((index * 7 + set * 3) % 5) as f32 - 0.04)),
+            ..Vertex::on(object)
         };
         CachedCluster {
             cluster: Cluster {

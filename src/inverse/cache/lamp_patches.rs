@@ -10,6 +10,7 @@ use crate::math::rng::Stream;
 use crate::math::warp;
 use crate::scene::Scene;
 use crate::scene::geometry::Hit;
+use crate::transport::arrival::Cast;
 use crate::transport::lit::Lit;
 use crate::transport::path::{PathOptions, white_radiance};
 use glam::{DVec3, Vec3};
@@ -23,41 +24,61 @@ const KEY: u64 = 0x7061_7463;
 /// The triangles of all lamps.
 #[derive(Debug, Default)]
 pub struct LampPatches {
+    /// Triangle of each patch.
+    triangles: Vec<u32>,
     /// For each triangle of the scene its patch, or [`NO_PATCH`]; empty where there are no lamps.
     patch_of: Vec<u32>,
-    /// Mean radiance (irradiance / π) that each patch would reflect from its front if it were white.
+    /// Mean radiance (irradiance / π) that each patch would reflect from its front if it were white, once it is lit.
     pub reflected: Vec<Vec3>,
-    /// Rays cast.
-    pub rays: u64,
-    /// Paths dropped because they were not finite.
-    pub rejected: u64,
 }
 
 impl LampPatches {
-    /// Traces about `paths` paths from the lamps, in proportion to area, through a scene as it is believed to be lit; those
-    /// of another `round` are independent.
-    pub fn new(
-        lit: &Lit,
-        roles: &[Role],
-        paths: u64,
-        options: &PathOptions,
-        [seed, round]: [u64; 2],
-    ) -> Self {
-        let scene = &*lit.scene;
+    /// Of the objects that are lamps.
+    pub fn new(scene: &Scene, roles: &[Role]) -> Self {
         let lamps = scene.objects.iter().zip(roles);
         let triangles: Vec<u32> = lamps
             .filter(|(_, role)| **role == Role::Emitter)
             .flat_map(|(object, _)| object.triangles.iter().copied())
             .collect();
-        let area: f64 = triangles.iter().map(|&t| area_of(scene, t)).sum();
-        let even = paths as f64 / triangles.len() as f64;
+        let mut patch_of = Vec::new();
+        if !triangles.is_empty() {
+            patch_of.resize(scene.triangles.len(), NO_PATCH);
+        }
+        for (patch, &triangle) in (0..).zip(&triangles) {
+            patch_of[triangle as usize] = patch;
+        }
+        Self {
+            triangles,
+            patch_of,
+            reflected: Vec::new(),
+        }
+    }
+
+    /// The patch of a triangle, or [`NO_PATCH`].
+    pub fn of(&self, triangle: u32) -> u32 {
+        let patch = self.patch_of.get(triangle as usize);
+        patch.copied().unwrap_or(NO_PATCH)
+    }
+
+    /// Finds what they reflect by about `paths` paths from them, in proportion to area, through a scene as it is believed to
+    /// be lit; those of another `round` are independent.
+    pub fn light(
+        &mut self,
+        lit: &Lit,
+        paths: u64,
+        options: &PathOptions,
+        [seed, round]: [u64; 2],
+    ) -> Cast {
+        let scene = &*lit.scene;
+        let area: f64 = self.triangles.iter().map(|&t| area_of(scene, t)).sum();
+        let even = paths as f64 / self.triangles.len() as f64;
         let least = even.clamp(1.0, PATHS[0]);
-        let traced: Vec<(Vec3, u64, u64)> = (triangles.par_iter())
+        let traced: Vec<(Vec3, Cast)> = (self.triangles.par_iter())
             .map(|&triangle| {
                 let share = paths as f64 * area_of(scene, triangle) / area;
                 // Lamps without any area have no share; the least is then the most.
                 let count = share.max(least).min(PATHS[1]) as u64;
-                let (mut sum, mut rays, mut rejected) = (DVec3::ZERO, 0, 0);
+                let (mut sum, mut cast) = (DVec3::ZERO, Cast::default());
                 for path in 0..count {
                     let mut stream = Stream::new(seed, KEY + round, u64::from(triangle), path);
                     let [b1, b2] = warp::uniform_triangle(stream.uniform2());
@@ -71,34 +92,17 @@ impl LampPatches {
                     let surface = lit.surface(&hit);
                     let sample = white_radiance(lit, &surface, normal, &mut stream, options);
                     sum += sample.radiance.as_dvec3();
-                    rays += u64::from(sample.rays);
-                    rejected += u64::from(sample.rejected);
+                    cast.rays += u64::from(sample.rays);
+                    cast.rejected += u64::from(sample.rejected);
                 }
-                ((sum / count as f64).as_vec3(), rays, rejected)
+                ((sum / count as f64).as_vec3(), cast)
             })
             .collect();
-
-        let mut patches = Self::default();
-        if !triangles.is_empty() {
-            patches.patch_of = vec![NO_PATCH; scene.triangles.len()];
-        }
-        for (patch, (triangle, (reflected, rays, rejected))) in
-            (0..).zip(triangles.iter().zip(traced))
-        {
-            patches.patch_of[*triangle as usize] = patch;
-            patches.reflected.push(reflected);
-            patches.rays += rays;
-            patches.rejected += rejected;
-        }
-        patches
-    }
-
-    /// The patch of a triangle, or [`NO_PATCH`].
-    pub fn of(&self, triangle: u32) -> u32 {
-        self.patch_of
-            .get(triangle as usize)
-            .copied()
-            .unwrap_or(NO_PATCH)
+        self.reflected = traced.iter().map(|t| t.0).collect();
+        traced.iter().fold(Cast::default(), |sum, (_, cast)| Cast {
+            rays: sum.rays + cast.rays,
+            rejected: sum.rejected + cast.rejected,
+        })
     }
 }
 

@@ -41,20 +41,11 @@ pub fn paths_that_fit(allowed: u64, pilot: &PathCache) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse::cache::{CachedCluster, NO_LAMP, NO_PATCH, NO_TEXEL, clusters::Cluster};
+    use crate::inverse::cache::{CachedCluster, clusters::Cluster};
     use glam::Vec3;
 
     #[test]
     fn as_many_paths_fit_as_are_as_long_as_those_of_the_pilot() {
-        let vertex = Vertex {
-            surface: 0,
-            lamp: NO_LAMP,
-            lamp_weight: 0.0,
-            patch: NO_PATCH,
-            emission_weight: 0.0,
-            texel: NO_TEXEL,
-            known: Vec3::ZERO,
-        };
         let cluster = Cluster {
             frame: 0,
             object: 0,
@@ -68,7 +59,7 @@ mod tests {
         let pilot = PathCache {
             clusters: vec![CachedCluster {
                 cluster,
-                vertices: vec![vertex; 12],
+                vertices: vec![Vertex::on(0); 12],
                 ends: vec![3, 6, 9, 12],
             }],
             ..PathCache::default()

@@ -63,6 +63,21 @@ pub struct Vertex {
     pub known: Vec3,
 }
 
+impl Vertex {
+    /// On a surface, with no light from anywhere and no texture.
+    pub fn on(surface: u32) -> Self {
+        Self {
+            surface,
+            lamp: NO_LAMP,
+            lamp_weight: 0.0,
+            patch: NO_PATCH,
+            emission_weight: 0.0,
+            texel: NO_TEXEL,
+            known: Vec3::ZERO,
+        }
+    }
+}
+
 /// The paths of one cluster of pixels: for each pixel those of set A, then those of set B.
 #[derive(Debug, Clone)]
 pub struct CachedCluster {

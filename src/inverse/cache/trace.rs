@@ -3,7 +3,7 @@
 use super::clusters::Cluster;
 use super::lamp_patches::LampPatches;
 use super::scatter::{Scattered, Scattering};
-use super::{CachedCluster, NO_LAMP, NO_PATCH, NO_TEXEL, PathCache, SPECULAR, Vertex};
+use super::{CachedCluster, NO_PATCH, NO_TEXEL, PathCache, SPECULAR, Vertex};
 use crate::inverse::estimate::TexelEstimate;
 use crate::inverse::measured::MeasuredRadiance;
 use crate::inverse::outside::MeasuredOutside;
@@ -91,13 +91,8 @@ impl OutsideGrid {
     /// The vertex at which a path ends that leaves in a unit direction.
     fn vertex(&self, direction: Vec3, weight: f32) -> Vertex {
         Vertex {
-            surface: self.surface(direction),
-            lamp: NO_LAMP,
-            lamp_weight: 0.0,
-            patch: NO_PATCH,
             emission_weight: weight,
-            texel: NO_TEXEL,
-            known: Vec3::ZERO,
+            ..Vertex::on(self.surface(direction))
         }
     }
 }
@@ -199,23 +194,15 @@ impl Tracer<'_> {
                 let [choice, ..] = numbers.four();
                 Scattering::new(lobe, surface.seen.normal, wo, albedo, choice)
             });
-            let mut vertex = Vertex {
-                surface: match &lobed {
-                    Some(scattering) if scattering.specular => SPECULAR,
-                    _ => surface.id,
-                },
-                lamp: NO_LAMP,
-                lamp_weight: 0.0,
-                patch: NO_PATCH,
-                emission_weight: if surface.front && lobed.is_none() {
-                    emission_weight * scale
-                } else {
-                    0.0
-                },
-                texel: self.texel(&hit),
-                known: Vec3::ZERO,
-            };
-            if bounce > 0 && surface.front {
+            let mut vertex = Vertex::on(match &lobed {
+                Some(scattering) if scattering.specular => SPECULAR,
+                _ => surface.id,
+            });
+            vertex.texel = self.texel(&hit);
+            if surface.front && lobed.is_none() {
+                vertex.emission_weight = emission_weight * scale;
+            }
+            if surface.front && bounce > 0 {
                 vertex.patch = self.patch(hit.triangle);
             }
             if bounce >= self.max_bounces || vertex.patch != NO_PATCH {

@@ -41,6 +41,7 @@ impl Ladder<'_, '_> {
         let started = self.monitor.seconds();
         self.monitor.phase("refining");
         let lights = self.lights();
+        self.patches = LampPatches::new(&self.problem.scene, &self.roles);
         self.weigh_by_prediction(&lights)?;
         share_paths(
             &mut self.clusters,
@@ -63,7 +64,7 @@ impl Ladder<'_, '_> {
                 break;
             }
             // What lamps reflect is not linearised but followed.
-            self.find_patches(round);
+            self.light_patches(round);
             // Path lengths are steered by what is believed at the start, the same in every round.
             sums.add(self.linearised(&lights, 2, round, &about, &places)?);
             let found = self.descend(mean(&sums, &self.roles), &about);
@@ -133,21 +134,20 @@ impl Ladder<'_, '_> {
     }
 
     /// Finds out what the patches of lamps reflect, as the room is known by now.
-    fn find_patches(&mut self, round: u32) {
+    fn light_patches(&mut self, round: u32) {
         let options = PathOptions {
             max_bounces: self.max_bounces,
             ..PathOptions::default()
         };
-        self.patches = LampPatches::new(
+        let cast = self.patches.light(
             &self.estimate.lit(&self.problem.scene),
-            &self.roles,
             self.budget.round_paths / LIGHTING_LAMPS,
             &options,
             [self.monitor.settings.seed, u64::from(round)],
         );
-        self.monitor.progress.rays += self.patches.rays;
+        self.monitor.progress.rays += cast.rays;
         self.monitor
-            .rejected("path weight not finite", self.patches.rejected);
+            .rejected("path weight not finite", cast.rejected);
     }
 
     /// Weighs the clusters by what a few paths of their own predict, of which those of the rounds are independent.
