@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 const CLUSTER_PIXELS: f64 = 48.0;
 /// Objects with fewer pixels than this away from their edges are fitted at their edges too.
 const ENOUGH: u64 = 48;
-/// Objects seen by fewer pixels than this keep all of theirs.
+/// Objects seen by fewer pixels than this keep all of theirs, at edges each by itself.
 const SMALL: u64 = 400;
 /// Pixels above this share of saturation may have been brighter than they show, and are left out.
 const BELOW_SATURATION: f32 = 0.97;
@@ -64,6 +64,10 @@ pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cl
         .collect();
     let nearest = nearest_to_edges(&usable, survey.seen.len());
     usable.retain(|p| Edge::of(p) <= nearest[p.object as usize]);
+    let mut counts = vec![0u64; survey.seen.len()];
+    for pixel in &usable {
+        counts[pixel.object as usize] += 1;
+    }
     let thinning = (usable.len() as f64 / most_pixels.max(1) as f64).max(1.0);
     let tile = (CLUSTER_PIXELS * thinning).sqrt().round().max(1.0) as u32;
 
@@ -71,6 +75,10 @@ pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cl
     let mut tiles: BTreeMap<(u32, u32, u32, u32), Vec<u32>> = BTreeMap::new();
     for pixel in usable {
         let width = problem.photographs[pixel.frame as usize].width;
+        let tile = match nearest[pixel.object as usize] {
+            Edge::Far => tile,
+            Edge::Near | Edge::On => tile_at_edges(counts[pixel.object as usize]).min(tile),
+        };
         let place = (pixel.pixel / width / tile, pixel.pixel % width / tile);
         tiles
             .entry((pixel.frame, place.0, place.1, pixel.object))
@@ -143,6 +151,12 @@ fn nearest_to_edges(pixels: &[&SurveyedPixel], objects: usize) -> Vec<Edge> {
         (false, false) => Edge::On,
     };
     counts.into_iter().map(nearest).collect()
+}
+
+/// Side of the tiles of an object that is fitted at its edges: near a lamp each pixel holds light of its own, or a share of
+/// the lamp of its own, and is known as well as those allow. Gathered with others it would weigh like them.
+fn tile_at_edges(pixels: u64) -> u32 {
+    (pixels as f64 / SMALL as f64).sqrt().floor().max(1.0) as u32
 }
 
 /// Median over photographed pixels that are in the fit, per channel; one where all are black.
@@ -238,5 +252,6 @@ mod tests {
         let pixels: Vec<&SurveyedPixel> = pixels.iter().collect();
         let nearest = nearest_to_edges(&pixels, 4);
         assert_eq!(nearest, [Edge::Far, Edge::Near, Edge::On, Edge::On]);
+        assert_eq!([1, SMALL, 4 * SMALL].map(tile_at_edges), [1, 1, 2]);
     }
 }
