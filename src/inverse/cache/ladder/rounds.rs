@@ -23,9 +23,9 @@ const NONLINEAR: f64 = 10.0;
 const NEGLIGIBLE: f64 = 1.0 / 3.0;
 /// Levels that clusters are weighed by take this part of the paths of a round.
 const PREDICTING: u64 = 4;
-/// So many of them go to each cluster at least: by a dozen paths a pixel beside a lamp may seem dark, and would then weigh
-/// more than all others.
-const LEAST_PREDICTING: u32 = 256;
+/// So many go to each cluster besides, or its part of those of a whole round: by a dozen paths a pixel beside a lamp may seem
+/// dark, and would then weigh more than all others.
+const LEAST_PREDICTING: u64 = 256;
 /// What arrives at lamps takes this part of them.
 const LIGHTING_LAMPS: u64 = 32;
 
@@ -157,9 +157,11 @@ impl Ladder<'_, '_> {
     fn weigh_by_prediction(&mut self, lights: &Emitters) -> Result<(), Termination> {
         let paths = self.budget.round_paths / PREDICTING;
         share_paths(&mut self.clusters, self.roles.len(), paths);
+        let least =
+            (self.budget.round_paths / self.clusters.len().max(1) as u64).min(LEAST_PREDICTING);
         for cluster in &mut self.clusters {
-            let least = LEAST_PREDICTING.div_ceil(2 * cluster.pixels.len() as u32);
-            cluster.paths = cluster.paths.max(least);
+            let a_pixel = least.div_ceil(2 * cluster.pixels.len() as u64);
+            cluster.paths = cluster.paths.max(a_pixel as u32);
         }
         let levels = self.levels(lights, 3)?;
         for (cluster, level) in self.clusters.iter_mut().zip(levels) {
