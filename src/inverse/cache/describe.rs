@@ -49,6 +49,9 @@ pub fn estimate(
             match roles[k] {
                 Role::Reflector | Role::Glowing => {
                     let unknown = errors.albedo[k].max_element() > UNKNOWN_ALBEDO;
+                    if unknown {
+                        object.albedo = drawn(unknowns.albedo[k], errors.albedo[k], typical);
+                    }
                     if unknown || sourceless {
                         object.albedo_identifiable = false;
                         object.identifiable = false;
@@ -111,6 +114,13 @@ pub fn estimate(
     }
 }
 
+/// What to take for an albedo that is hardly known: drawn to the room's typical one by what is believed of any albedo.
+fn drawn(albedo: Vec3, stderr: Vec3, typical: Vec3) -> Vec3 {
+    let known = stderr * stderr / (ALBEDO_DEVIATION * ALBEDO_DEVIATION);
+    let share = (known + Vec3::ONE).recip();
+    albedo * share + typical * (Vec3::ONE - share)
+}
+
 /// Area-weighted mean of the albedos that are known.
 fn typical_albedo(
     scene: &Scene,
@@ -137,4 +147,18 @@ fn typical_albedo(
 /// Infinite errors as the largest finite number, which every file format can hold.
 fn finite(error: Vec3) -> Vec3 {
     error.min(Vec3::splat(f32::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_albedo_that_is_hardly_known_is_drawn_to_the_typical_one() {
+        let typical = Vec3::splat(0.4);
+        let at = |stderr| drawn(Vec3::ZERO, Vec3::splat(stderr), typical).x;
+        assert!(at(UNKNOWN_ALBEDO) < 0.02);
+        assert!((at(ALBEDO_DEVIATION) - 0.2).abs() < 1e-6);
+        assert!((at(f32::INFINITY) - 0.4).abs() < 1e-6);
+    }
 }

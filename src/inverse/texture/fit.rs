@@ -26,6 +26,8 @@ const PATIENCE: u32 = 3;
 const LEAST_UNIT: f32 = 1e-4;
 /// Below this share of the object's median level, pixels weigh no more for being darker.
 const DARK: f32 = 0.5;
+/// Turns in which one colour and the lower bounds that it keeps are found.
+const BOUND_TURNS: u32 = 3;
 /// Squared residuals count up to so many times their median.
 const CLIP: f64 = 30.0;
 
@@ -36,8 +38,10 @@ pub struct Measurements {
     pub observations: Observations,
     /// Measured radiance over that of a white surface.
     pub albedo: Vec<Vec3>,
-    /// Weight of each: squared level over its variance, on average 1.
+    /// Weight of each: squared level over its variance, on average 1; zero of lower bounds that the fit lies above.
     pub weights: Vec<f32>,
+    /// Which are lower bounds, as their pixels are saturated.
+    bounds: Vec<bool>,
     /// The fold of each.
     folds: Vec<usize>,
     /// The weighted mean of `albedo`.
@@ -86,8 +90,25 @@ impl Measurements {
         };
         let first = weighted_mean(&albedo, &vec![1.0; albedo.len()]);
         let weights = weigh(weighted_mean(&albedo, &weigh(first)));
+        let bounds: Vec<bool> = pixels.iter().map(|p| p.saturated).collect();
+        // One colour, below no bound: bounds that it comes to lie above have no say.
+        let mut constant = weighted_mean(&albedo, &weights);
+        for _ in 0..BOUND_TURNS {
+            let rows = albedo.iter().zip(&weights).zip(&bounds);
+            let told: Vec<f32> = (rows)
+                .map(|((a, w), bound)| {
+                    if *bound && is_kept(constant, *a) {
+                        0.0
+                    } else {
+                        *w
+                    }
+                })
+                .collect();
+            constant = weighted_mean(&albedo, &told);
+        }
         Self {
-            constant: weighted_mean(&albedo, &weights),
+            constant,
+            bounds,
             folds: pixels.iter().map(|p| fold(p)).collect(),
             observations,
             albedo,
@@ -95,8 +116,9 @@ impl Measurements {
         }
     }
 
-    /// Fits the cells, with the smoothing that predicts pixels left out best.
-    pub fn fit(&self, links: &Links) -> Texture {
+    /// Fits the cells, with the smoothing that predicts pixels left out best; bounds that the fit lies above lose their
+    /// weight.
+    pub fn fit(&mut self, links: &Links) -> Texture {
         let unit = self.unit();
         let values: Vec<Vec3> = self.albedo.iter().map(|a| *a / unit).collect();
         let flat = vec![self.constant / unit; self.observations.cells()];
@@ -125,7 +147,11 @@ impl Measurements {
                 .par_iter_mut()
                 .enumerate()
                 .for_each(|(fold, colors)| {
-                    *colors = fitted(&self.weights_without(fold), strength, colors);
+                    *colors = fitted(
+                        &self.weights_at(colors, &values, Some(fold)),
+                        strength,
+                        colors,
+                    );
                 });
             let score = self.score(&values, &colors, clip);
             if score < best.0 {
@@ -140,9 +166,13 @@ impl Measurements {
         let (_, strength, without) = best;
         let noise = self.noise(&values, &without);
         let all = match strength {
-            Some(strength) => fitted(&self.weights, strength, &without[0]),
+            Some(strength) => {
+                let weights = self.weights_at(&without[0], &values, None);
+                fitted(&weights, strength, &without[0])
+            }
             None => flat,
         };
+        self.weights = self.weights_at(&all, &values, None);
         let albedo = |colors: Vec<Vec3>| -> Vec<Vec3> {
             let colors = colors
                 .iter()
@@ -162,21 +192,32 @@ impl Measurements {
         luminance(self.constant).max(LEAST_UNIT)
     }
 
-    /// Weights with those of one fold at zero.
-    fn weights_without(&self, fold: usize) -> Vec<f32> {
-        (self.weights.iter().zip(&self.folds))
-            .map(|(w, other)| if *other == fold { 0.0 } else { *w })
+    /// Weights with those of one fold at zero, and of the bounds that some colours lie above.
+    fn weights_at(&self, colors: &[Vec3], values: &[Vec3], without: Option<usize>) -> Vec<f32> {
+        (0..values.len())
+            .map(|row| {
+                let out = without == Some(self.folds[row]) || !self.tells(row, colors, values);
+                if out { 0.0 } else { self.weights[row] }
+            })
             .collect()
     }
 
-    /// Mean squared residual of the pixels left out, each by the colours that were fitted without it.
+    /// Whether a row says something of some colours: a bound does not to those above it.
+    fn tells(&self, row: usize, colors: &[Vec3], values: &[Vec3]) -> bool {
+        !self.bounds[row] || !is_kept(self.observations.of(row, colors), values[row])
+    }
+
+    /// Mean squared residual of the pixels left out, each by the colours that were fitted without it; none of bounds that
+    /// these lie above.
     fn score(&self, values: &[Vec3], colors: &[Vec<Vec3>], clip: f64) -> f64 {
         let (mut sum, mut count) = (0.0, 0u64);
         for (row, value) in values.iter().enumerate() {
             if let Some(colors) = colors.get(self.folds[row]) {
                 let residual = *value - self.observations.of(row, colors);
                 let square = f64::from(residual.length_squared() * self.weights[row]);
-                sum += square.min(clip);
+                if self.tells(row, colors, values) {
+                    sum += square.min(clip);
+                }
                 count += 1;
             }
         }
@@ -187,7 +228,8 @@ impl Measurements {
     fn noise(&self, values: &[Vec3], colors: &[Vec<Vec3>]) -> Vec3 {
         let (mut sum, mut count) = (DVec3::ZERO, 0u64);
         for (row, value) in values.iter().enumerate() {
-            if let Some(colors) = colors.get(self.folds[row]) {
+            let colors = colors.get(self.folds[row]);
+            if let Some(colors) = colors.filter(|c| self.tells(row, c, values)) {
                 let residual = (*value - self.observations.of(row, colors)).as_dvec3();
                 sum += residual * residual * f64::from(self.weights[row]);
                 count += 1;
@@ -205,6 +247,11 @@ impl Measurements {
             .collect();
         quantile(&mut squares, 0.5).unwrap_or(0.0) * CLIP
     }
+}
+
+/// Whether a value lies above a lower bound.
+fn is_kept(value: Vec3, bound: Vec3) -> bool {
+    luminance(value) >= luminance(bound)
 }
 
 /// The fold that a pixel in the fit belongs to.
@@ -237,6 +284,7 @@ mod tests {
             pixel: index,
             held_out: false,
             measured: Vec3::splat(0.3),
+            saturated: false,
             landings: Vec::new(),
         };
         let pixels: Vec<SeenPixel> = (0..20).map(pixel).collect();
@@ -253,5 +301,40 @@ mod tests {
         assert!(half_lit.albedo.iter().all(|a| a.is_finite()));
         let dark = Measurements::new(&seen, Observations::new(&rows(|_| 0), 1), &[Vec3::ZERO]);
         assert_eq!(dark.constant, Vec3::ZERO);
+    }
+
+    /// Half of a surface whose albedo is known is saturated in other photographs, which changes nothing; of another part all
+    /// but a few stray dark pixels are saturated, which keeps it bright.
+    #[test]
+    fn saturated_pixels_are_lower_bounds() {
+        let part = |cell: u32, count: u32, measured: f32, saturated: bool| {
+            (0..count).map(move |i| {
+                let pixel = SeenPixel {
+                    frame: cell,
+                    pixel: 2 * i + u32::from(saturated),
+                    held_out: false,
+                    measured: Vec3::splat(measured),
+                    saturated,
+                    landings: Vec::new(),
+                };
+                (pixel, vec![(cell, 1.0)])
+            })
+        };
+        let (pixels, rows): (Vec<SeenPixel>, Vec<Vec<(u32, f32)>>) = part(0, 40, 0.8, false)
+            .chain(part(0, 40, 0.5, true))
+            .chain(part(1, 6, 0.05, false))
+            .chain(part(1, 34, 0.6, true))
+            .unzip();
+        let seen: Vec<&SeenPixel> = pixels.iter().collect();
+        let links = Links {
+            ends: vec![0; 2],
+            ..Links::default()
+        };
+        let mut measurements =
+            Measurements::new(&seen, Observations::new(&rows, 2), &[Vec3::ONE; 2]);
+        let texture = measurements.fit(&links);
+        let [known, stray] = [0, 1].map(|cell: usize| texture.colors[cell].x);
+        assert!((known - 0.8).abs() < 1e-3, "{known}");
+        assert!((0.45..0.6).contains(&stray), "{stray}");
     }
 }

@@ -13,7 +13,7 @@ const SIDE: u32 = 4;
 pub const RAYS: u32 = SIDE * SIDE;
 /// First of the sample keys of these rays, far from those of paths.
 const KEY: u64 = 3 << 60;
-/// Pixels above this share of saturation may have been brighter than they show, and are left out.
+/// Pixels above this share of saturation may have been brighter than they show.
 const BELOW_SATURATION: f32 = 0.97;
 
 /// A pixel that sees one smooth surface of one object, through which rays were cast.
@@ -27,6 +27,8 @@ pub struct SeenPixel {
     pub held_out: bool,
     /// What the photograph holds.
     pub measured: Vec3,
+    /// Whether that is saturated: the surface sends so much at least.
+    pub saturated: bool,
     /// Where its rays land.
     pub landings: Vec<Landing>,
 }
@@ -65,9 +67,6 @@ fn look_through(
     let scene = &*problem.scene;
     let photograph = &problem.photographs[surveyed.frame as usize];
     let measured = photograph.pixels[surveyed.pixel as usize];
-    if measured.max_element() >= photograph.saturation * BELOW_SATURATION {
-        return None;
-    }
     let camera = &scene.cameras[surveyed.frame as usize];
     let corner = Vec2::new(
         (surveyed.pixel % photograph.width) as f32,
@@ -101,6 +100,7 @@ fn look_through(
         pixel: surveyed.pixel,
         held_out: surveyed.held_out,
         measured,
+        saturated: measured.max_element() >= photograph.saturation * BELOW_SATURATION,
         landings,
     })
 }

@@ -92,8 +92,10 @@ impl Refined {
         for &(object, mean) in &self.means {
             let object = &mut estimate.objects[object];
             object.albedo = mean;
-            "its albedo varies over it; this is the mean of what is seen"
-                .clone_into(&mut object.note);
+            if object.albedo_identifiable {
+                "its albedo varies over it; this is the mean of what is seen"
+                    .clone_into(&mut object.note);
+            }
         }
     }
 

@@ -77,7 +77,7 @@ impl Surface {
         // One side of a triangle receives the light that its texture is measured in.
         pixels
             .retain(|p| (p.landings.iter()).all(|l| cells.front(l.hit.triangle) == Some(l.front)));
-        if pixels.iter().all(|p| p.held_out) {
+        if pixels.iter().all(|p| p.held_out || p.saturated) {
             return None;
         }
         let links = Links::new(scene, &cells);
@@ -129,7 +129,7 @@ impl Surface {
         done(0, 0)?;
         let observations = Observations::new(&self.rows(), self.cells.count());
         let fitted: Vec<&SeenPixel> = self.pixels.iter().filter(|p| !p.held_out).collect();
-        let measurements = Measurements::new(&fitted, observations, &light.radiance);
+        let mut measurements = Measurements::new(&fitted, observations, &light.radiance);
         self.texture = measurements.fit(&self.links);
         self.constant = measurements.constant;
         done(0, 0)?;
@@ -157,11 +157,12 @@ impl Surface {
     ) -> Result<Trial, Termination> {
         // Held-out pixels; where they are few, also those that were left out in turn to choose the smoothing.
         let colors = self.texture.colors.as_slice();
-        let held_out = self.pixels.iter().filter(|p| p.held_out);
+        let told = || self.pixels.iter().filter(|p| !p.saturated);
+        let held_out = told().filter(|p| p.held_out);
         let mut pixels: Vec<Untouched> =
             held_out.map(|pixel| Untouched { pixel, colors }).collect();
         if pixels.len() < FEW_HELD_OUT {
-            let fitted = self.pixels.iter().filter(|p| !p.held_out);
+            let fitted = told().filter(|p| !p.held_out);
             pixels.extend(fitted.filter_map(|pixel| {
                 let colors = self.texture.without.get(fold(pixel))?;
                 Some(Untouched { pixel, colors })

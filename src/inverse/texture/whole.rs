@@ -12,8 +12,49 @@ use rstar::RTree;
 use rstar::primitives::GeomWithData;
 use std::sync::Arc;
 
-/// Seen cells whose mean an unseen triangle takes.
-const NEIGHBOURS: usize = 4;
+/// Seen cells that an unseen place takes its colour from, the nearer and the better seen the more.
+const NEIGHBOURS: usize = 32;
+/// Pixels beyond which a cell is not better seen for more of them.
+const WELL_SEEN: u32 = 8;
+
+/// The middle of a seen cell.
+type Place = GeomWithData<[f32; 3], usize>;
+
+/// The colour around a place: the mean over the seen cells nearest to it, by the inverse square of the distance and by how
+/// often each is seen. `None` where no cell is.
+fn surroundings(surface: &Surface, tree: &RTree<Place>, point: Vec3) -> Option<Vec3> {
+    let near = tree
+        .nearest_neighbor_iter(point.to_array())
+        .take(NEIGHBOURS);
+    let sights = near.map(|place| Sight {
+        distance: Vec3::from(*place.geom()).distance(point),
+        size: surface.cells.cells[place.data].size,
+        seen: surface.seen[place.data],
+        color: surface.texture.colors[place.data],
+    });
+    mean_color(sights)
+}
+
+/// A seen cell from an unseen place.
+struct Sight {
+    distance: f32,
+    size: f32,
+    /// Pixels that see it.
+    seen: u32,
+    color: Vec3,
+}
+
+fn mean_color(sights: impl Iterator<Item = Sight>) -> Option<Vec3> {
+    let (mut sum, mut total) = (Vec3::ZERO, 0.0);
+    for sight in sights {
+        // Nearer than its own size a cell gains little.
+        let relative = sight.distance / sight.size.max(f32::MIN_POSITIVE);
+        let weight = sight.seen.min(WELL_SEEN) as f32 / (relative * relative + 1.0);
+        sum += sight.color * weight;
+        total += weight;
+    }
+    (total > 0.0).then(|| sum / total)
+}
 
 /// The texels of an estimate with these surfaces textured.
 pub fn texels(scene: &Scene, estimate: &Estimate, surfaces: &[Surface]) -> TexelEstimate {
@@ -42,7 +83,7 @@ pub fn texels(scene: &Scene, estimate: &Estimate, surfaces: &[Surface]) -> Texel
     }
 
     for surface in surfaces {
-        let places: Vec<GeomWithData<[f32; 3], usize>> = (0..surface.cells.count())
+        let places: Vec<Place> = (0..surface.cells.count())
             .filter(|&cell| surface.seen[cell] > 0)
             .map(|cell| GeomWithData::new(surface.cells.cells[cell].center.to_array(), cell))
             .collect();
@@ -65,12 +106,7 @@ pub fn texels(scene: &Scene, estimate: &Estimate, surfaces: &[Surface]) -> Texel
                     seen[at] = surface.seen[cell as usize];
                     stderr[at] = surface.stderr.get(cell as usize).copied().unwrap_or(unseen);
                 } else {
-                    let point = scene.point(&hit).to_array();
-                    let near = tree.nearest_neighbor_iter(point).take(NEIGHBOURS);
-                    let (sum, count) = near.fold((Vec3::ZERO, 0.0f32), |(sum, n), g| {
-                        (sum + surface.texture.colors[g.data], n + 1.0)
-                    });
-                    colors[at] = sum / count.max(1.0);
+                    colors[at] = surroundings(surface, &tree, scene.point(&hit)).unwrap_or(mean);
                     stderr[at] = unseen;
                 }
             }
@@ -81,5 +117,29 @@ pub fn texels(scene: &Scene, estimate: &Estimate, surfaces: &[Surface]) -> Texel
         stderr,
         seen,
         textured,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unseen_place_goes_by_what_is_near_and_well_seen() {
+        let sight = |distance: f32, seen: u32, color: f32| Sight {
+            distance,
+            size: 0.01,
+            seen,
+            color: Vec3::splat(color),
+        };
+        // One stray pixel next to it against the floor around.
+        let stray = mean_color(
+            std::iter::once(sight(0.02, 1, 0.0)).chain((0..31).map(|_| sight(0.03, 40, 0.6))),
+        );
+        assert!(stray.is_some_and(|c| (c.x - 0.6).abs() < 0.01), "{stray:?}");
+        // Of two that are seen alike the nearer one counts.
+        let near = mean_color([sight(0.01, 9, 0.2), sight(0.1, 9, 0.8)].into_iter());
+        assert!(near.is_some_and(|c| (c.x - 0.2).abs() < 0.02), "{near:?}");
+        assert_eq!(mean_color(std::iter::empty()), None);
     }
 }

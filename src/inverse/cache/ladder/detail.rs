@@ -15,7 +15,6 @@ impl Ladder<'_, '_> {
             .filter(|&k| {
                 self.roles[k] == Role::Reflector
                     && self.lobes[k].is_none()
-                    && self.estimate.objects[k].albedo_identifiable
                     && self.monitor.known.of(k).albedo.is_none()
             })
             .collect();
