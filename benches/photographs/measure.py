@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 """How well photographs that no fit has seen are rendered again: PSNR and SSIM of every eighth one.
 
-    benches/photographs/measure.py CAPTURE [--time 300s] [--samples 32] [--relit target/release/relit] [--pictures DIR]
+    benches/photographs/measure.py CAPTURE [--time 300s] [--samples 32] [--relit target/release/relit] [--pictures DIR] [--free]
 
 Solves with `--hold-out 8`, renders frames 0, 8, 16, … and compares sRGB values from 0 to 1 at 270 × 180 pixels: one gain
 a channel is fitted on the left half of each picture, the right half is scored, every pixel whose ray hits the mesh counts.
+`--free` scores a free colour for each triangle beside it, the mean of what the other photographs show of it at the exposures that
+relit found: no light, no materials, nothing that an object could be put into.
 For captures with a mesh in PLY or OBJ and pinhole cameras. Needs `pip install mitsuba scipy pillow`; `DRJIT_LIBLLVM_PATH` as for
 benches/mitsuba.
 """
@@ -50,8 +52,8 @@ def ssim(a, b, mask):
     return values[mask].mean()
 
 
-def hits(scene, transforms, frame):
-    """Pixels whose central ray meets the mesh."""
+def triangles(scene, transforms, frame):
+    """The triangle that the central ray of each pixel meets; -1 where it meets none."""
     lens = {key: frame.get(key, transforms.get(key)) for key in ("fl_x", "fl_y", "cx", "cy", "w", "h")}
     pose = np.array(frame["transform_matrix"])
     y, x = np.mgrid[0:HEIGHT, 0:WIDTH] + 0.5
@@ -61,7 +63,32 @@ def hits(scene, transforms, frame):
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     origins = np.repeat(pose[:3, 3][None], len(directions), 0)
     ray = mi.Ray3f(mi.Point3f(origins.T.astype("f4")), mi.Vector3f(directions.T.astype("f4")))
-    return np.array(scene.ray_intersect(ray).is_valid()).reshape(HEIGHT, WIDTH)
+    met = scene.ray_intersect_preliminary(ray)
+    return np.where(np.array(met.is_valid()), np.array(met.prim_index).astype(np.int64), -1).reshape(HEIGHT, WIDTH)
+
+
+def linear(capture, frame):
+    """A photograph in linear light, reduced."""
+    pixels = np.array(Image.open(capture / frame["file_path"]).convert("RGB"))
+    return reduced(to_linear(pixels / 255.0))
+
+
+def free_colors(scene, transforms, capture, exposures):
+    """For each triangle the mean of what the photographs that are not held out show of it; the mean of all where none does."""
+    count = sum(shape.face_count() for shape in scene.shapes())
+    sums, seen = np.zeros((count, 3)), np.zeros(count)
+    for index, frame in enumerate(transforms["frames"]):
+        if index % 8:
+            met = triangles(scene, transforms, frame)
+            shown = (linear(capture, frame) / exposures[index])[met >= 0]
+            seen += np.bincount(met[met >= 0], minlength=count)
+            for c in range(3):
+                sums[:, c] += np.bincount(met[met >= 0], shown[:, c], count)
+    known = seen > 0
+    colors = np.empty((count, 3))
+    colors[known] = sums[known] / seen[known, None]
+    colors[~known] = colors[known].mean(0)
+    return colors
 
 
 def gains(rendered, photograph, mask):
@@ -76,6 +103,19 @@ def gains(rendered, photograph, mask):
     return found
 
 
+def score(rendered, photograph, mask):
+    """What is shown at the gains of the left half, with its squared error on the right half and the pixels that count there."""
+    left = np.arange(WIDTH)[None, :] < WIDTH // 2
+    shown = to_srgb(rendered * gains(rendered, photograph, mask & left))
+    scored = mask & ~left
+    return shown, ((shown[scored] - photograph[scored]) ** 2).mean(), scored
+
+
+def decibels(squares):
+    each = -10 * np.log10(np.array(squares))
+    return f"mean {each.mean():.2f} dB, of the pooled error {-10 * np.log10(np.mean(squares)):.2f} dB"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("capture", type=pathlib.Path)
@@ -83,40 +123,43 @@ def main():
     parser.add_argument("--time", default="300s")
     parser.add_argument("--samples", default="32", help="paths a pixel of the renderings")
     parser.add_argument("--pictures", type=pathlib.Path, help="writes photograph and rendering side by side")
+    parser.add_argument("--free", action="store_true", help="scores a free colour for each triangle too")
     options = parser.parse_args()
     transforms = json.loads((options.capture / "transforms.json").read_text())
     mesh = options.capture / transforms["mesh_path"]
     scene = mi.load_dict({"type": "scene", "mesh": {"type": mesh.suffix[1:], "filename": str(mesh)}})
-    squares, similar, covered = [], [], []
+    squares, free, similar, covered = [], [], [], []
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([options.relit, "solve", options.capture, "--hold-out", "8", "--time", options.time, "--views", "none",
                         "--out", folder], check=True, capture_output=True)
         report = json.loads((pathlib.Path(folder) / "report.json").read_text())
         print(f"solved in {report['seconds_solve']:.0f} s ({report['stopped_because']})", flush=True)
+        exposures = np.array(report.get("exposures") or np.ones((len(transforms["frames"]), 3)))
+        colors = free_colors(scene, transforms, options.capture, exposures) if options.free else None
         for index in range(0, len(transforms["frames"]), 8):
             frame = transforms["frames"][index]
             file = pathlib.Path(folder) / "rendered.exr"
             subprocess.run([options.relit, "render", folder, "--frame", str(index), "--spp", options.samples, "--out", file],
                            check=True, capture_output=True)
             rendered = mi.Bitmap(str(file)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32)
-            rendered = reduced(np.array(rendered))
-            bytes_ = np.array(Image.open(options.capture / frame["file_path"]).convert("RGB"))
-            photograph = to_srgb(reduced(to_linear(bytes_ / 255.0)))
-            mask = hits(scene, transforms, frame)
-            left = np.arange(WIDTH)[None, :] < WIDTH // 2
-            shown = to_srgb(rendered * gains(rendered, photograph, mask & left))
-            scored = mask & ~left
-            squares.append(((shown[scored] - photograph[scored]) ** 2).mean())
+            photograph = to_srgb(linear(options.capture, frame))
+            met = triangles(scene, transforms, frame)
+            shown, square, scored = score(reduced(np.array(rendered)), photograph, met >= 0)
+            squares.append(square)
             similar.append(ssim(shown, photograph, scored))
-            covered.append(mask.mean())
-            print(f"frame {index:3}: {-10 * np.log10(squares[-1]):5.2f} dB, SSIM {similar[-1]:.3f}", flush=True)
+            covered.append((met >= 0).mean())
+            line = f"frame {index:3}: {-10 * np.log10(square):5.2f} dB, SSIM {similar[-1]:.3f}"
+            if options.free:
+                free.append(score(np.where((met >= 0)[..., None], colors[met], 0), photograph, met >= 0)[1])
+                line += f", a free colour for each triangle {-10 * np.log10(free[-1]):5.2f} dB"
+            print(line, flush=True)
             if options.pictures:
                 options.pictures.mkdir(parents=True, exist_ok=True)
                 both = (np.concatenate([photograph, shown], 1) * 255).astype(np.uint8)
                 Image.fromarray(both).save(options.pictures / f"{index:03}.png")
-    decibel = -10 * np.log10(np.array(squares))
-    print(f"mean {decibel.mean():.2f} dB, of the pooled error {-10 * np.log10(np.mean(squares)):.2f} dB, SSIM "
-          f"{np.mean(similar):.3f}, rays that hit the mesh {np.mean(covered):.2f}")
+    print(f"{decibels(squares)}, SSIM {np.mean(similar):.3f}, rays that hit the mesh {np.mean(covered):.2f}")
+    if options.free:
+        print(f"a free colour for each triangle: {decibels(free)}")
 
 
 if __name__ == "__main__":

@@ -35,6 +35,16 @@ pub struct Photograph {
     pub saturation: f32,
 }
 
+/// Pixels above this share of saturation may have been brighter than they show.
+const BELOW_SATURATION: f32 = 0.97;
+
+impl Photograph {
+    /// Whether a pixel may have been brighter than it shows, in any channel.
+    pub fn is_saturated(&self, pixel: usize) -> bool {
+        self.pixels[pixel].max_element() >= self.saturation * BELOW_SATURATION
+    }
+}
+
 /// Where a photograph's pixels come from.
 #[derive(Debug, Clone)]
 pub enum PhotographSource {

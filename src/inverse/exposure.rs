@@ -28,8 +28,6 @@ const OPEN: f64 = 1e-9;
 const LEAST_CELLS: usize = 30;
 /// Share of the disagreement on cells left out of the fit that exposures must explain.
 const LEAST_GAIN: f64 = 0.05;
-/// Pixels above this share of saturation may have been brighter than they show.
-const BELOW_SATURATION: f32 = 0.97;
 /// Pixels darker than this share of the photographs' median level hold mostly noise.
 const ABOVE_NOISE: f64 = 0.1;
 
@@ -121,10 +119,9 @@ fn sights(problem: &Problem, survey: &Survey) -> Vec<Sight> {
     }
     let usable = |p: &&crate::inverse::survey::SurveyedPixel| {
         let photograph = &problem.photographs[p.frame as usize];
-        let value = photograph.pixels[p.pixel as usize];
         p.pure
             && p.held_out == held_out[p.frame as usize]
-            && value.max_element() < photograph.saturation * BELOW_SATURATION
+            && !photograph.is_saturated(p.pixel as usize)
     };
     let mut levels: Vec<f64> = (survey.pixels.iter().filter(usable))
         .map(|p| {

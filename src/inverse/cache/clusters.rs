@@ -14,8 +14,6 @@ const CLUSTER_PIXELS: f64 = 48.0;
 const ENOUGH: u64 = 48;
 /// Objects seen by fewer pixels than this keep all of theirs, at edges each by itself.
 const SMALL: u64 = 400;
-/// Pixels above this share of saturation may have been brighter than they show, and are left out.
-const BELOW_SATURATION: f32 = 0.97;
 /// Below this share of a typical photograph's level, pixels weigh no more for being darker.
 const DARK: f32 = 0.5;
 
@@ -56,11 +54,7 @@ pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cl
         .pixels
         .iter()
         .filter(|p| !p.held_out && p.object != u32::MAX)
-        .filter(|p| {
-            let photograph = &problem.photographs[p.frame as usize];
-            photograph.pixels[p.pixel as usize].max_element()
-                < photograph.saturation * BELOW_SATURATION
-        })
+        .filter(|p| !problem.photographs[p.frame as usize].is_saturated(p.pixel as usize))
         .collect();
     let nearest = nearest_to_edges(&usable, survey.seen.len());
     usable.retain(|p| Edge::of(p) <= nearest[p.object as usize]);

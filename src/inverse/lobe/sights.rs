@@ -11,8 +11,6 @@ use rayon::prelude::*;
 
 /// Width of a spot in pixel footprints.
 const SPOT_FOOTPRINTS: f32 = 3.0;
-/// Pixels above this share of saturation may have been brighter than they show, and are left out.
-const BELOW_SATURATION: f32 = 0.97;
 
 /// The pixels of one photograph that see one spot.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,10 +42,7 @@ pub fn spots(problem: &Problem, survey: &Survey) -> Vec<Vec<Spot>> {
     }
     let value = |frame: u32, pixel: u32| problem.photographs[frame as usize].pixels[pixel as usize];
     let mut seen: Vec<(u32, u64, bool, u32, u32)> = (survey.pixels.par_iter())
-        .filter(|p| {
-            let saturation = problem.photographs[p.frame as usize].saturation;
-            p.pure && value(p.frame, p.pixel).max_element() < saturation * BELOW_SATURATION
-        })
+        .filter(|p| p.pure && !problem.photographs[p.frame as usize].is_saturated(p.pixel as usize))
         .filter_map(|p| {
             let point = p.points.iter().flatten().next()?;
             let key = cell_key(size, point);

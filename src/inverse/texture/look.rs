@@ -13,8 +13,6 @@ const SIDE: u32 = 4;
 pub const RAYS: u32 = SIDE * SIDE;
 /// First of the sample keys of these rays, far from those of paths.
 const KEY: u64 = 3 << 60;
-/// Pixels above this share of saturation may have been brighter than they show.
-const BELOW_SATURATION: f32 = 0.97;
 
 /// A pixel that sees one smooth surface of one object, through which rays were cast.
 #[derive(Debug, Clone)]
@@ -100,7 +98,7 @@ fn look_through(
         pixel: surveyed.pixel,
         held_out: surveyed.held_out,
         measured,
-        saturated: measured.max_element() >= photograph.saturation * BELOW_SATURATION,
+        saturated: photograph.is_saturated(surveyed.pixel as usize),
         landings,
     })
 }
