@@ -245,10 +245,7 @@ impl Normal {
     ) -> Self {
         let mut matrix = DMatrix::zeros(rows, rows);
         let mut right = DVector::zeros(rows);
-        let mut start = 0;
-        for cell in sights.chunk_by(|a, b| a.cell == b.cell) {
-            let weights = &weights[start..start + cell.len()];
-            start += cell.len();
+        for (cell, weights) in cells(sights, weights) {
             let total: f64 = weights.iter().map(|w| w[channel]).sum();
             let level = |(sight, w): (&Sight, &DVec3)| sight.level[channel] * w[channel];
             let mean = cell.iter().zip(weights).map(level).sum::<f64>() / total;
@@ -271,11 +268,22 @@ impl Normal {
     }
 }
 
+/// The sights of one cell after the other, with their weights.
+fn cells<'a>(
+    sights: &'a [Sight],
+    mut weights: &'a [DVec3],
+) -> impl Iterator<Item = (&'a [Sight], &'a [DVec3])> {
+    sights.chunk_by(|a, b| a.cell == b.cell).map(move |cell| {
+        let (own, others) = weights.split_at(cell.len());
+        weights = others;
+        (cell, own)
+    })
+}
+
 /// What is left of each sight after its photograph's exposure and the weighted mean level of its cell.
 fn residuals(sights: &[Sight], weights: &[DVec3], exposures: &[DVec3]) -> Vec<DVec3> {
     let mut left = Vec::with_capacity(sights.len());
-    for cell in sights.chunk_by(|a, b| a.cell == b.cell) {
-        let weights = &weights[left.len()..left.len() + cell.len()];
+    for (cell, weights) in cells(sights, weights) {
         let (sum, total) = (cell.iter().zip(weights))
             .fold((DVec3::ZERO, DVec3::ZERO), |(sum, total), (s, w)| {
                 (sum + *w * (s.level - exposures[s.frame]), total + *w)

@@ -6,6 +6,7 @@ use crate::inverse::settings::Settings;
 use crate::inverse::solver::{
     Checkpoint, Control, LossPoint, Observer, Progress, Stage, Termination,
 };
+use crate::transport::arrival::Cast;
 use std::time::{Duration, Instant};
 
 /// Counts time without pauses, reports to the observer, and says when to stop.
@@ -120,6 +121,12 @@ impl<'a> Monitor<'a> {
     /// Records a finished stage.
     pub fn stage(&mut self, stage: Stage) {
         self.progress.stages.push(stage);
+    }
+
+    /// Counts rays, and paths dropped because their weights were not finite.
+    pub fn cast(&mut self, cast: Cast) {
+        self.progress.rays += cast.rays;
+        self.rejected("path weight not finite", cast.rejected);
     }
 
     /// Counts dropped samples.

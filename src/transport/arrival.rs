@@ -8,6 +8,8 @@ use crate::transport::microfacet::{Microfacet, reflect_on_visible_normal};
 use crate::transport::path::{Leg, PathOptions, draw_light, follow, power_heuristic};
 use crate::transport::world::{SurfacePoint, World};
 use glam::Vec3;
+use std::iter::Sum;
+use std::ops::AddAssign;
 
 /// Light from one drawn direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,13 +21,29 @@ pub struct Arrival {
     pub light: Vec3,
 }
 
-/// What drawing arrivals took.
+/// What tracing took.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Cast {
     /// Rays cast.
     pub rays: u64,
     /// Samples dropped because they were not finite.
     pub rejected: u64,
+}
+
+impl AddAssign for Cast {
+    fn add_assign(&mut self, other: Self) {
+        self.rays += other.rays;
+        self.rejected += other.rejected;
+    }
+}
+
+impl Sum for Cast {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self::default(), |mut sum, more| {
+            sum += more;
+            sum
+        })
+    }
 }
 
 /// Appends light that arrives at a surface: from one direction drawn with density cosθ/π, one reflected on a normal of

@@ -57,11 +57,7 @@ pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cl
         .filter(|p| !problem.photographs[p.frame as usize].is_saturated(p.pixel as usize))
         .collect();
     let nearest = nearest_to_edges(&usable, survey.seen.len());
-    usable.retain(|p| Edge::of(p) <= nearest[p.object as usize]);
-    let mut counts = vec![0u64; survey.seen.len()];
-    for pixel in &usable {
-        counts[pixel.object as usize] += 1;
-    }
+    usable.retain(|p| Edge::of(p) <= nearest[p.object as usize].0);
     let thinning = (usable.len() as f64 / most_pixels.max(1) as f64).max(1.0);
     let tile = (CLUSTER_PIXELS * thinning).sqrt().round().max(1.0) as u32;
 
@@ -70,8 +66,8 @@ pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cl
     for pixel in usable {
         let width = problem.photographs[pixel.frame as usize].width;
         let tile = match nearest[pixel.object as usize] {
-            Edge::Far => tile,
-            Edge::Near | Edge::On => tile_at_edges(counts[pixel.object as usize]).min(tile),
+            (Edge::Far, _) => tile,
+            (Edge::Near | Edge::On, pixels) => tile_at_edges(pixels).min(tile),
         };
         let place = (pixel.pixel / width / tile, pixel.pixel % width / tile);
         tiles
@@ -130,19 +126,21 @@ impl Edge {
     }
 }
 
-/// How near to its edges each object is fitted: as far as there are enough pixels. A sliver of a lamp in a pixel of the
-/// ceiling outshines it, and its share of the pixel is known no better than the photograph's noise and the camera's place.
-fn nearest_to_edges(pixels: &[&SurveyedPixel], objects: usize) -> Vec<Edge> {
-    let mut counts = vec![[0u64; 2]; objects];
+/// How near to its edges each object is fitted, and by how many pixels: as far as there are enough. A sliver of a lamp in
+/// a pixel of the ceiling outshines it, and its share of the pixel is known no better than the photograph's noise and the
+/// camera's place.
+fn nearest_to_edges(pixels: &[&SurveyedPixel], objects: usize) -> Vec<(Edge, u64)> {
+    let mut counts = vec![[0u64; 3]; objects];
     for pixel in pixels {
-        let [far, off] = &mut counts[pixel.object as usize];
+        let [far, off, all] = &mut counts[pixel.object as usize];
         *far += u64::from(Edge::of(pixel) == Edge::Far);
         *off += u64::from(Edge::of(pixel) != Edge::On);
+        *all += 1;
     }
-    let nearest = |[far, off]: [u64; 2]| match (far >= ENOUGH, off >= ENOUGH) {
-        (true, _) => Edge::Far,
-        (false, true) => Edge::Near,
-        (false, false) => Edge::On,
+    let nearest = |[far, off, all]: [u64; 3]| match (far >= ENOUGH, off >= ENOUGH) {
+        (true, _) => (Edge::Far, far),
+        (false, true) => (Edge::Near, off),
+        (false, false) => (Edge::On, all),
     };
     counts.into_iter().map(nearest).collect()
 }
@@ -245,7 +243,10 @@ mod tests {
             .collect();
         let pixels: Vec<&SurveyedPixel> = pixels.iter().collect();
         let nearest = nearest_to_edges(&pixels, 4);
-        assert_eq!(nearest, [Edge::Far, Edge::Near, Edge::On, Edge::On]);
+        let edges: Vec<Edge> = nearest.iter().map(|n| n.0).collect();
+        assert_eq!(edges, [Edge::Far, Edge::Near, Edge::On, Edge::On]);
+        let counts: Vec<u64> = nearest.iter().map(|n| n.1).collect();
+        assert_eq!(counts, [ENOUGH, ENOUGH, 35, 0]);
         assert_eq!([1, SMALL, 4 * SMALL].map(tile_at_edges), [1, 1, 2]);
     }
 }

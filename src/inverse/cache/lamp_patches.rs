@@ -99,10 +99,7 @@ impl LampPatches {
             })
             .collect();
         self.reflected = traced.iter().map(|t| t.0).collect();
-        traced.iter().fold(Cast::default(), |sum, (_, cast)| Cast {
-            rays: sum.rays + cast.rays,
-            rejected: sum.rejected + cast.rejected,
-        })
+        traced.iter().map(|t| t.1).sum()
     }
 }
 

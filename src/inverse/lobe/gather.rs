@@ -107,9 +107,7 @@ impl Gathering<'_> {
         let sets = [0, 1].map(|set| {
             let mut gathered = Gathered::default();
             for point in 0..self.points {
-                let more = self.point(camera, sight, set, point, &mut gathered);
-                cast.rays += more.rays;
-                cast.rejected += more.rejected;
+                cast += self.point(camera, sight, set, point, &mut gathered);
             }
             gathered
         });

@@ -51,8 +51,7 @@ pub fn evidence(
                 .map(|sight| {
                     let camera = &scene.cameras[sight.frame as usize];
                     let (sets, more) = gathering.sight(camera, sight);
-                    cast.rays += more.rays;
-                    cast.rejected += more.rejected;
+                    cast += more;
                     (sight, Gathered::joined(sets))
                 })
                 .filter(|(_, light)| !light.is_empty())
@@ -60,11 +59,7 @@ pub fn evidence(
             (own, cast)
         })
         .collect();
-    let mut cast = Cast::default();
-    for (_, more) in &gathered {
-        cast.rays += more.rays;
-        cast.rejected += more.rejected;
-    }
+    let cast = gathered.iter().map(|(_, cast)| *cast).sum();
     let strongest = (ROUGHNESSES.iter())
         .filter_map(|&alpha| {
             let of_spot =

@@ -58,11 +58,9 @@ impl<'a> Evidence<'a> {
         let gathered: Vec<([Gathered; 2], Cast)> = (chosen.par_iter())
             .map(|(_, sight)| gathering.sight(&scene.cameras[sight.frame as usize], sight))
             .collect();
-        let mut cast = Cast::default();
+        let cast = gathered.iter().map(|(_, cast)| *cast).sum();
         let mut sights = Vec::new();
-        for ((spot, sight), (light, more)) in chosen.into_iter().zip(gathered) {
-            cast.rays += more.rays;
-            cast.rejected += more.rejected;
+        for ((spot, sight), (light, _)) in chosen.into_iter().zip(gathered) {
             if !light.iter().any(Gathered::is_empty) {
                 sights.push((spot, sight, light));
             }

@@ -14,6 +14,7 @@ use crate::inverse::solver::{Checkpoint, Problem, Solution, Stage, Termination};
 use crate::inverse::survey::Survey;
 use crate::scene::Scene;
 use crate::scene::texels::TexelLayout;
+use crate::transport::arrival::Cast;
 use crate::transport::material::TexelColors;
 use descent::{Descent, Grain};
 use glam::{DVec3, Vec3};
@@ -147,9 +148,10 @@ impl Run<'_, '_> {
                 let outcome = (self.state.descent).step(self.problem, &settings, self.bounces);
                 (self.state.descent).hold(&self.problem.scene, &self.monitor.known);
                 self.state.schedule.traced(outcome.paths);
-                self.monitor.progress.rays += outcome.rays;
-                self.monitor
-                    .rejected("path weight not finite", outcome.rejected);
+                self.monitor.cast(Cast {
+                    rays: outcome.rays,
+                    rejected: outcome.rejected,
+                });
                 if !outcome.finite {
                     self.describe();
                     return Err(Termination::Diverged);

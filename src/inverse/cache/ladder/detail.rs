@@ -5,6 +5,7 @@ use crate::inverse::cache::roles::Role;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::solver::Termination;
 use crate::inverse::texture::{Task, refine};
+use crate::transport::arrival::Cast;
 
 impl Ladder<'_, '_> {
     /// Tries a texture on every object that reflects and gives no light; what has a lobe keeps one colour.
@@ -35,8 +36,7 @@ impl Ladder<'_, '_> {
             &objects,
             &judge,
             &mut |rays, rejected, share| {
-                monitor.progress.rays += rays;
-                monitor.rejected("path weight not finite", rejected);
+                monitor.cast(Cast { rays, rejected });
                 monitor.progress.fraction = Some(share as f32);
                 monitor.tick(estimate, &|_| checkpoint.clone())
             },

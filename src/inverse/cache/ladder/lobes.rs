@@ -143,9 +143,7 @@ impl<'a> Ladder<'a, '_> {
     }
 
     fn cast(&mut self, cast: Cast) -> Result<(), Termination> {
-        self.monitor.progress.rays += cast.rays;
-        self.monitor
-            .rejected("path weight not finite", cast.rejected);
+        self.monitor.cast(cast);
         self.monitor
             .tick(&self.estimate, &|_| self.checkpoint.clone())
     }

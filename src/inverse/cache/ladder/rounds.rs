@@ -148,9 +148,7 @@ impl Ladder<'_, '_> {
             &options,
             [self.monitor.settings.seed, u64::from(round)],
         );
-        self.monitor.progress.rays += cast.rays;
-        self.monitor
-            .rejected("path weight not finite", cast.rejected);
+        self.monitor.cast(cast);
     }
 
     /// Weighs the clusters by what a few paths of their own predict, of which those of the rounds are independent.

@@ -13,6 +13,7 @@ use crate::inverse::estimate::TexelEstimate;
 use crate::inverse::measured::MeasuredRadiance;
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::solver::Termination;
+use crate::transport::arrival::Cast;
 use crate::transport::emitters::Emitters;
 use glam::{DVec3, Vec3};
 use std::time::{Duration, Instant};
@@ -133,9 +134,10 @@ impl Ladder<'_, '_> {
             let traced = self
                 .tracer(lights, measured, &believed, stage, round)
                 .trace(&self.clusters[next..end], &self.widths);
-            self.monitor.progress.rays += traced.rays;
-            self.monitor
-                .rejected("path weight not finite", traced.rejected);
+            self.monitor.cast(Cast {
+                rays: traced.rays,
+                rejected: traced.rejected,
+            });
             take(traced);
             let elapsed = begun.elapsed();
             self.monitor
