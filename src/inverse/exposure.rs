@@ -8,7 +8,7 @@
 use crate::capture::photograph::Photograph;
 use crate::inverse::measured::cell_key;
 use crate::inverse::solver::Problem;
-use crate::inverse::survey::Survey;
+use crate::inverse::survey::{Survey, SurveyedPixel};
 use crate::math::stats::quantile;
 use glam::{DVec3, Vec3};
 use nalgebra::{DMatrix, DVector};
@@ -46,10 +46,17 @@ pub struct Exposures {
 #[derive(Debug, Clone, Copy)]
 struct Sight {
     frame: usize,
-    cell: usize,
+    /// The cell's key, which is a hash.
+    cell: u64,
     level: DVec3,
-    /// Whether the photograph is kept out of every fit: it is compared with the others, and they are not with it.
-    held_out: bool,
+}
+
+/// What the photographs show of the cells, in order of cells.
+#[derive(Debug, Default)]
+struct Sights {
+    fitted: Vec<Sight>,
+    /// Of photographs that are kept out of every fit: these are compared with the others, and the others not with them.
+    held_out: Vec<Sight>,
 }
 
 impl Exposures {
@@ -57,22 +64,24 @@ impl Exposures {
     /// shared to tell. A photograph that is held out whole is given the exposure at which it fits what the others found, so
     /// that it can test more than that.
     pub fn new(problem: &Problem, survey: &Survey) -> Option<Self> {
-        let frames = problem.photographs.len();
-        let (held_out, sights): (Vec<Sight>, Vec<Sight>) =
-            (sights(problem, survey).into_iter()).partition(|s| s.held_out);
+        Self::of(&Sights::new(problem, survey), problem.photographs.len())
+    }
+
+    fn of(sights: &Sights, photographs: usize) -> Option<Self> {
+        let shared = shared(&sights.fitted);
         // Exposures of one half of the cells are tried on the other.
         let (fitted, tested): (Vec<Sight>, Vec<Sight>) =
-            sights.iter().partition(|s| s.cell.is_multiple_of(2));
-        let half = fit(&fitted, frames);
-        let before = disagreement(&tested, &vec![DVec3::ZERO; frames])?;
+            shared.iter().partition(|s| s.cell.is_multiple_of(2));
+        let half = fit(&fitted, photographs);
+        let before = disagreement(&tested, &vec![DVec3::ZERO; photographs])?;
         let after = disagreement(&tested, &half)?;
         let gain = if before > 0.0 {
             1.0 - after / before
         } else {
             0.0
         };
-        let mut logarithms = fit(&sights, frames);
-        compare(&held_out, &sights, &mut logarithms);
+        let mut logarithms = fit(&shared, photographs);
+        compare(sights, &mut logarithms);
         Some(Self {
             factors: (logarithms.iter()).map(|l| l.exp().as_vec3()).collect(),
             gain,
@@ -107,59 +116,59 @@ impl Exposures {
     }
 }
 
-/// What each photograph shows of the cells that at least two see.
-fn sights(problem: &Problem, survey: &Survey) -> Vec<Sight> {
-    let size = survey.footprint * CELL_FOOTPRINTS;
-    if size <= 0.0 {
-        return Vec::new();
-    }
-    let mut held_out = vec![true; problem.photographs.len()];
-    for pixel in survey.pixels.iter().filter(|p| !p.held_out) {
-        held_out[pixel.frame as usize] = false;
-    }
-    let usable = |p: &&crate::inverse::survey::SurveyedPixel| {
-        let photograph = &problem.photographs[p.frame as usize];
-        p.pure
-            && p.held_out == held_out[p.frame as usize]
-            && !photograph.is_saturated(p.pixel as usize)
-    };
-    let mut levels: Vec<f64> = (survey.pixels.iter().filter(usable))
-        .map(|p| {
-            f64::from(problem.photographs[p.frame as usize].pixels[p.pixel as usize].max_element())
-        })
-        .collect();
-    let least = (quantile(&mut levels, 0.5).unwrap_or(0.0) * ABOVE_NOISE).max(f64::MIN_POSITIVE);
+impl Sights {
+    fn new(problem: &Problem, survey: &Survey) -> Self {
+        let size = survey.footprint * CELL_FOOTPRINTS;
+        if size <= 0.0 {
+            return Self::default();
+        }
+        let mut held_out = vec![true; problem.photographs.len()];
+        for pixel in survey.pixels.iter().filter(|p| !p.held_out) {
+            held_out[pixel.frame as usize] = false;
+        }
+        let value = |p: &SurveyedPixel| {
+            problem.photographs[p.frame as usize].pixels[p.pixel as usize].as_dvec3()
+        };
+        let usable = |p: &&SurveyedPixel| {
+            let photograph = &problem.photographs[p.frame as usize];
+            p.pure
+                && p.held_out == held_out[p.frame as usize]
+                && !photograph.is_saturated(p.pixel as usize)
+        };
+        let mut levels: Vec<f64> = (survey.pixels.iter().filter(usable))
+            .filter(|p| !p.held_out)
+            .map(|p| value(p).max_element())
+            .collect();
+        let least =
+            (quantile(&mut levels, 0.5).unwrap_or(0.0) * ABOVE_NOISE).max(f64::MIN_POSITIVE);
 
-    let mut sums: BTreeMap<(u64, u32), (DVec3, f64)> = BTreeMap::new();
-    for pixel in survey.pixels.iter().filter(usable) {
-        let value = problem.photographs[pixel.frame as usize].pixels[pixel.pixel as usize];
-        if f64::from(value.min_element()) < least {
-            continue;
+        let mut sums: BTreeMap<(u64, u32), (DVec3, f64)> = BTreeMap::new();
+        for pixel in survey.pixels.iter().filter(usable) {
+            let value = value(pixel);
+            if value.min_element() < least {
+                continue;
+            }
+            if let Some(point) = pixel.points.iter().flatten().next() {
+                let key = (cell_key(size, point), pixel.frame);
+                let sum = sums.entry(key).or_default();
+                sum.0 += value;
+                sum.1 += 1.0;
+            }
         }
-        if let Some(point) = pixel.points.iter().flatten().next() {
-            let sum = sums
-                .entry((cell_key(size, point), pixel.frame))
-                .or_default();
-            sum.0 += value.as_dvec3();
-            sum.1 += 1.0;
-        }
+        let sight = |((cell, frame), (sum, count)): ((u64, u32), (DVec3, f64))| Sight {
+            frame: frame as usize,
+            cell,
+            level: (sum / count).map(f64::ln),
+        };
+        let (held_out, fitted) = (sums.into_iter().map(sight)).partition(|s| held_out[s.frame]);
+        Self { fitted, held_out }
     }
-    let all: Vec<((u64, u32), (DVec3, f64))> = sums.into_iter().collect();
-    let shared = all
-        .chunk_by(|a, b| a.0.0 == b.0.0)
-        .filter(|cell| cell.len() > 1);
-    shared
-        .enumerate()
-        .flat_map(|(cell, of_cell)| {
-            let held_out = &held_out;
-            of_cell.iter().map(move |((_, frame), (sum, count))| Sight {
-                frame: *frame as usize,
-                cell,
-                level: (*sum / *count).map(f64::ln),
-                held_out: held_out[*frame as usize],
-            })
-        })
-        .collect()
+}
+
+/// The sights of cells that at least two photographs see.
+fn shared(sights: &[Sight]) -> Vec<Sight> {
+    let cells = sights.chunk_by(|a, b| a.cell == b.cell);
+    (cells.filter(|cell| cell.len() > 1).flatten().copied()).collect()
 }
 
 /// Logarithms of the exposures: those with the least sum of absolute differences from the cells' levels, by iteratively
@@ -211,11 +220,12 @@ fn fit(sights: &[Sight], frames: usize) -> Vec<DVec3> {
 }
 
 /// Sets the exposures of photographs that are held out to the median difference from the cells as the others show them.
-fn compare(held_out: &[Sight], sights: &[Sight], exposures: &mut [DVec3]) {
-    let levels = cell_levels(sights, exposures);
-    let level_of: BTreeMap<usize, DVec3> = sights.iter().map(|s| s.cell).zip(levels).collect();
+fn compare(sights: &Sights, exposures: &mut [DVec3]) {
+    let levels = cell_levels(&sights.fitted, exposures);
+    let cells = sights.fitted.iter().map(|s| s.cell);
+    let level_of: BTreeMap<u64, DVec3> = cells.zip(levels).collect();
     let mut differences: BTreeMap<usize, Vec<DVec3>> = BTreeMap::new();
-    for sight in held_out {
+    for sight in &sights.held_out {
         if let Some(level) = level_of.get(&sight.cell) {
             let of_frame = differences.entry(sight.frame).or_default();
             of_frame.push(sight.level - *level);
@@ -341,7 +351,6 @@ mod tests {
                             frame,
                             cell,
                             level: level + *exposure + DVec3::splat(error),
-                            held_out: false,
                         });
                     }
                 }
@@ -368,7 +377,6 @@ mod tests {
             frame: 2,
             cell: sights.last().map_or(0, |s| s.cell),
             level: DVec3::splat(9.0),
-            held_out: false,
         });
         let found = fit(&sights, 3);
         assert_eq!(found[2], DVec3::ZERO);
@@ -390,9 +398,8 @@ mod tests {
                 let error = f64::from(stream.uniform() - 0.5) * 0.05 + wrong;
                 sights.push(Sight {
                     frame,
-                    cell,
+                    cell: cell as u64,
                     level: DVec3::splat(level + truth(frame) + error),
-                    held_out: false,
                 });
             }
         }
@@ -402,23 +409,41 @@ mod tests {
         }
     }
 
+    /// Whatever is held out, the exposures of the others are the same bits: here it shares cells with them, and with one of
+    /// them cells that no other sees.
     #[test]
     fn a_photograph_held_out_is_compared_with_the_others_and_they_are_not_with_it() {
         let exposures = [0.4, -0.4, 1.3].map(DVec3::splat);
-        let mut all = seen(&exposures, 0.1);
-        let without: Vec<Sight> = all.iter().filter(|s| s.frame < 2).copied().collect();
-        all.iter_mut().for_each(|s| s.held_out = s.frame == 2);
-        let (held_out, fitted): (Vec<Sight>, Vec<Sight>) =
-            all.into_iter().partition(|s| s.held_out);
-        let mut found = fit(&fitted, 3);
-        assert_eq!(found, fit(&without, 3));
-        assert_eq!(found[2], DVec3::ZERO);
-        compare(&held_out, &fitted, &mut found);
-        assert!(
-            (found[2] - DVec3::splat(1.3)).length() < 0.05,
-            "{}",
-            found[2]
-        );
+        let (mut held_out, mut fitted): (Vec<Sight>, Vec<Sight>) = seen(&exposures, 0.1)
+            .into_iter()
+            .partition(|s| s.frame == 2);
+        for cell in 1000..1040 {
+            let [own, others] = [(3, 1.0), (2, 2.3)].map(|(frame, level)| Sight {
+                frame,
+                cell,
+                level: DVec3::splat(level),
+            });
+            fitted.push(own);
+            held_out.push(others);
+        }
+        let with = Sights { fitted, held_out };
+        let without = Sights {
+            fitted: (with.fitted.iter())
+                .filter(|s| s.frame < 2)
+                .copied()
+                .collect(),
+            held_out: Vec::new(),
+        };
+        let [with, without] =
+            [with, without].map(|s| Exposures::of(&s, 4).expect("cells are shared"));
+        let of_fitted = |e: &Exposures| [e.factors[0], e.factors[1], e.factors[3]];
+        assert_eq!(of_fitted(&with), of_fitted(&without));
+        assert_eq!((with.gain, with.needed), (without.gain, without.needed));
+        let [first, second, _] = of_fitted(&with).map(|f| f.x.ln());
+        assert!((first - second - 0.8).abs() < 0.03, "{first} {second}");
+        let held_out = with.factors[2].x.ln();
+        assert!((held_out - 1.3).abs() < 0.05, "{held_out}");
+        assert_eq!(without.factors[2], Vec3::ONE);
     }
 
     #[test]
