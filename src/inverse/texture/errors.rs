@@ -75,7 +75,7 @@ fn perturbation(system: &System, seed: u64, object: usize, draw: u64) -> Vec<Vec
         )
     };
     let measured: Vec<Vec3> = (system.row_weights.par_iter().enumerate())
-        .map(|(row, weight)| normal(0, row) / weight.sqrt().max(f32::MIN_POSITIVE.sqrt()))
+        .map(|(row, weight)| normal(0, row) / weight.max(Vec3::splat(f32::MIN_POSITIVE)).powf(0.5))
         .collect();
     let mut right = system.observations.gathered(system.row_weights, &measured);
     for cell in 0..right.len() {

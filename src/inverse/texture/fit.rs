@@ -1,6 +1,6 @@
 //! The albedo of an object's cells from its pixels, smoothed as far as pixels left out of the fit ask for.
 
-use super::fuse::{Problem, fuse, mean};
+use super::fuse::{Problem, fuse, mean, mean_channel};
 use super::links::Links;
 use super::look::SeenPixel;
 use super::observations::Observations;
@@ -26,6 +26,8 @@ const PATIENCE: u32 = 3;
 const LEAST_UNIT: f32 = 1e-4;
 /// Below this share of the object's median level, pixels weigh no more for being darker.
 const DARK: f32 = 0.5;
+/// Light that a channel must receive, in means over the object's pixels.
+const LEAST_LIGHT: f32 = 1e-6;
 /// Turns in which one colour and the lower bounds that it keeps are found.
 const BOUND_TURNS: u32 = 3;
 /// Squared residuals count up to so many times their median.
@@ -38,13 +40,14 @@ pub struct Measurements {
     pub observations: Observations,
     /// Measured radiance over that of a white surface.
     pub albedo: Vec<Vec3>,
-    /// Weight of each: squared level over its variance, on average 1; zero of lower bounds that the fit lies above.
-    pub weights: Vec<f32>,
+    /// Weight of each channel of each: the squared radiance of a white surface over the pixel's variance, on average 1; zero
+    /// of lower bounds that the fit lies above.
+    pub weights: Vec<Vec3>,
     /// Which are lower bounds, as their pixels are saturated.
     bounds: Vec<bool>,
     /// The fold of each.
     folds: Vec<usize>,
-    /// The weighted mean of `albedo`.
+    /// The weighted mean of `albedo`, at most 1.
     pub constant: Vec3,
 }
 
@@ -65,40 +68,46 @@ impl Measurements {
     /// Of pixels and what their cells would send if they were white.
     pub fn new(pixels: &[&SeenPixel], observations: Observations, white: &[Vec3]) -> Self {
         let received = observations.all_of(white);
-        // A pixel whose cells no light reached says nothing, and weighs nothing below.
+        // A channel whose light hardly reached a pixel's cells says nothing there, and weighs nothing.
+        let whites: Vec<f32> = received.iter().map(|r| luminance(*r)).collect();
+        let least = Vec3::splat((LEAST_LIGHT * mean(&whites)).max(f32::MIN_POSITIVE));
+        let received: Vec<Vec3> = (received.iter())
+            .map(|r| Vec3::select(r.cmpge(least), *r, Vec3::ZERO))
+            .collect();
         let albedo: Vec<Vec3> = (pixels.iter().zip(&received))
-            .map(|(pixel, r)| {
-                let lit = r.cmpge(Vec3::splat(f32::MIN_POSITIVE));
-                Vec3::select(lit, pixel.measured / *r, Vec3::ZERO)
-            })
+            .map(|(pixel, r)| Vec3::select(r.cmpgt(Vec3::ZERO), pixel.measured / *r, Vec3::ZERO))
             .collect();
-        // Noise grows with the level, down to a floor.
-        let mut levels: Vec<f64> = pixels
-            .iter()
-            .map(|p| f64::from(luminance(p.measured)))
-            .collect();
-        let floor = DARK * quantile(&mut levels, 0.5).unwrap_or(0.0) as f32;
-        let weigh = |constant: Vec3| -> Vec<f32> {
-            let raw: Vec<f32> = (received.iter())
+        // Noise grows with the level, down to a floor, in each channel as in its light.
+        let floor = Vec3::from_array([0, 1, 2].map(|channel| {
+            let mut levels: Vec<f64> = (pixels.iter())
+                .map(|p| f64::from(p.measured[channel]))
+                .collect();
+            DARK * quantile(&mut levels, 0.5).unwrap_or(0.0) as f32
+        }));
+        let weigh = |constant: Vec3| -> Vec<Vec3> {
+            let albedo = luminance(constant);
+            let raw: Vec<Vec3> = (received.iter())
                 .map(|r| {
-                    let (white, level) = (luminance(*r), luminance(*r * constant));
-                    white * white / (level * level + floor * floor).max(f32::MIN_POSITIVE)
+                    let level = *r * albedo;
+                    let variance = level * level + floor * floor;
+                    *r * *r / variance.max(Vec3::splat(f32::MIN_POSITIVE))
                 })
                 .collect();
-            let scale = 1.0 / mean(&raw).max(f32::MIN_POSITIVE);
-            raw.iter().map(|w| w * scale).collect()
+            let scale = 1.0 / mean_channel(&raw).max(f32::MIN_POSITIVE);
+            raw.iter().map(|w| *w * scale).collect()
         };
-        let first = weighted_mean(&albedo, &vec![1.0; albedo.len()]);
+        let squares: Vec<Vec3> = received.iter().map(|r| *r * *r).collect();
+        let first = weighted_mean(&albedo, &squares);
         let weights = weigh(weighted_mean(&albedo, &weigh(first)));
         let bounds: Vec<bool> = pixels.iter().map(|p| p.saturated).collect();
         // One colour, below no bound: bounds that it comes to lie above have no say.
         let mut constant = weighted_mean(&albedo, &weights);
         for _ in 0..BOUND_TURNS {
             let rows = albedo.iter().zip(&weights).zip(&bounds);
-            let told: Vec<f32> = (rows)
+            let told: Vec<Vec3> = (rows)
                 .map(|((a, w), bound)| {
-                    if *bound && is_kept(constant, *a) {
-                        0.0
+                    if *bound && is_kept(constant, *a, *w) {
+                        Vec3::ZERO
                     } else {
                         *w
                     }
@@ -123,9 +132,9 @@ impl Measurements {
         let values: Vec<Vec3> = self.albedo.iter().map(|a| *a / unit).collect();
         let flat = vec![self.constant / unit; self.observations.cells()];
         let levels = vec![1.0; flat.len()];
-        let density = mean(&self.observations.diagonal(&self.weights));
+        let density = mean_channel(&self.observations.diagonal(&self.weights));
         let folds = (ENOUGH * FOLDS / self.albedo.len().max(1)).clamp(1, FOLDS);
-        let fitted = |weights: &[f32], strength: f32, start: &[Vec3]| {
+        let fitted = |weights: &[Vec3], strength: f32, start: &[Vec3]| {
             let problem = Problem {
                 observations: &self.observations,
                 weights,
@@ -193,18 +202,23 @@ impl Measurements {
     }
 
     /// Weights with those of one fold at zero, and of the bounds that some colours lie above.
-    fn weights_at(&self, colors: &[Vec3], values: &[Vec3], without: Option<usize>) -> Vec<f32> {
+    fn weights_at(&self, colors: &[Vec3], values: &[Vec3], without: Option<usize>) -> Vec<Vec3> {
         (0..values.len())
             .map(|row| {
                 let out = without == Some(self.folds[row]) || !self.tells(row, colors, values);
-                if out { 0.0 } else { self.weights[row] }
+                if out { Vec3::ZERO } else { self.weights[row] }
             })
             .collect()
     }
 
     /// Whether a row says something of some colours: a bound does not to those above it.
     fn tells(&self, row: usize, colors: &[Vec3], values: &[Vec3]) -> bool {
-        !self.bounds[row] || !is_kept(self.observations.of(row, colors), values[row])
+        !self.bounds[row]
+            || !is_kept(
+                self.observations.of(row, colors),
+                values[row],
+                self.weights[row],
+            )
     }
 
     /// Mean squared residual of the pixels left out, each by the colours that were fitted without it; none of bounds that
@@ -214,7 +228,7 @@ impl Measurements {
         for (row, value) in values.iter().enumerate() {
             if let Some(colors) = colors.get(self.folds[row]) {
                 let residual = *value - self.observations.of(row, colors);
-                let square = f64::from(residual.length_squared() * self.weights[row]);
+                let square = f64::from((residual * residual).dot(self.weights[row]));
                 if self.tells(row, colors, values) {
                     sum += square.min(clip);
                 }
@@ -231,7 +245,7 @@ impl Measurements {
             let colors = colors.get(self.folds[row]);
             if let Some(colors) = colors.filter(|c| self.tells(row, c, values)) {
                 let residual = (*value - self.observations.of(row, colors)).as_dvec3();
-                sum += residual * residual * f64::from(self.weights[row]);
+                sum += residual * residual * self.weights[row].as_dvec3();
                 count += 1;
             }
         }
@@ -242,16 +256,17 @@ impl Measurements {
         let mut squares: Vec<f64> = (0..values.len())
             .map(|row| {
                 let residual = values[row] - self.observations.of(row, flat);
-                f64::from(residual.length_squared() * self.weights[row])
+                f64::from((residual * residual).dot(self.weights[row]))
             })
             .collect();
         quantile(&mut squares, 0.5).unwrap_or(0.0) * CLIP
     }
 }
 
-/// Whether a value lies above a lower bound.
-fn is_kept(value: Vec3, bound: Vec3) -> bool {
-    luminance(value) >= luminance(bound)
+/// Whether what a surface of some albedo sends lies above a lower bound, given as an albedo too.
+fn is_kept(albedo: Vec3, bound: Vec3, weight: Vec3) -> bool {
+    let received = weight.powf(0.5);
+    luminance(albedo * received) >= luminance(bound * received)
 }
 
 /// The fold that a pixel in the fit belongs to.
@@ -260,17 +275,16 @@ pub fn fold(pixel: &SeenPixel) -> usize {
     (key % FOLDS as u64) as usize
 }
 
-fn weighted_mean(values: &[Vec3], weights: &[f32]) -> Vec3 {
-    let (mut sum, mut total) = (DVec3::ZERO, 0.0);
+/// The mean of each channel, at most 1; zero where nothing weighs.
+fn weighted_mean(values: &[Vec3], weights: &[Vec3]) -> Vec3 {
+    let (mut sum, mut total) = (DVec3::ZERO, DVec3::ZERO);
     for (value, weight) in values.iter().zip(weights) {
-        sum += value.as_dvec3() * f64::from(*weight);
-        total += f64::from(*weight);
+        let weight = weight.as_dvec3();
+        sum += value.as_dvec3() * weight;
+        total += weight;
     }
-    if total > 0.0 {
-        (sum / total).as_vec3()
-    } else {
-        Vec3::ZERO
-    }
+    let mean = DVec3::select(total.cmpgt(DVec3::ZERO), sum / total, DVec3::ZERO);
+    mean.as_vec3().min(Vec3::ONE)
 }
 
 #[cfg(test)]
@@ -301,6 +315,36 @@ mod tests {
         assert!(half_lit.albedo.iter().all(|a| a.is_finite()));
         let dark = Measurements::new(&seen, Observations::new(&rows(|_| 0), 1), &[Vec3::ZERO]);
         assert_eq!(dark.constant, Vec3::ZERO);
+    }
+
+    /// The light of one channel reaches a few pixels only by the noise of paths: what it would make of the others says nothing.
+    #[test]
+    fn a_channel_without_light_does_not_spoil_the_colour() {
+        let truth = Vec3::new(0.2, 0.5, 0.3);
+        let white = |cell: usize| Vec3::new(1.0, 0.8, if cell < 90 { 0.4 } else { 1e-8 });
+        let pixel = |index: u32| SeenPixel {
+            frame: 0,
+            pixel: index,
+            held_out: false,
+            // Some light that no path found comes besides.
+            measured: truth * white(index as usize) + 1e-3,
+            saturated: index >= 95,
+            landings: Vec::new(),
+        };
+        let pixels: Vec<SeenPixel> = (0..100).map(pixel).collect();
+        let seen: Vec<&SeenPixel> = pixels.iter().collect();
+        let light: Vec<Vec3> = (0..100).map(white).collect();
+        let found = Measurements::new(&seen, Observations::of_each(100), &light);
+        assert!(
+            (found.constant - truth).length() < 0.01,
+            "{}",
+            found.constant
+        );
+        let weight = found.weights[0];
+        assert!(found.weights[95].z < 1e-10 && weight.z > 0.0 && weight.x > weight.z);
+        // What saturates lies above the bound, however little of one channel arrives.
+        let bound = (found.albedo[95], found.weights[95]);
+        assert!(is_kept(truth * 1.1, bound.0, bound.1));
     }
 
     /// Half of a surface whose albedo is known is saturated in other photographs, which changes nothing; of another part all

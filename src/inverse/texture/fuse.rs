@@ -28,8 +28,8 @@ const CHUNK: usize = 4096;
 pub struct Problem<'a> {
     /// Which cells each measurement sees.
     pub observations: &'a Observations,
-    /// ω of each measurement.
-    pub weights: &'a [f32],
+    /// ω of each measurement, per channel.
+    pub weights: &'a [Vec3],
     /// y of each measurement.
     pub values: &'a [Vec3],
     /// The neighbours.
@@ -48,7 +48,7 @@ pub fn fuse(problem: &Problem, strength: f32, start: &[Vec3]) -> Vec<Vec3> {
         levels,
     } = *problem;
     let data = observations.diagonal(row_weights);
-    let tether = TETHER * mean(&data).max(f32::MIN_POSITIVE);
+    let tether = TETHER * mean_channel(&data).max(f32::MIN_POSITIVE);
     let mut right = observations.gathered(row_weights, values);
     for (r, s) in right.iter_mut().zip(start) {
         *r += *s * tether;
@@ -94,8 +94,8 @@ pub fn penalties(links: &Links, levels: &[f32], strength: f32, colors: &[Vec3]) 
 pub struct System<'a> {
     /// What is measured.
     pub observations: &'a Observations,
-    /// ω of each row.
-    pub row_weights: &'a [f32],
+    /// ω of each row, per channel.
+    pub row_weights: &'a [Vec3],
     /// The neighbours.
     pub links: &'a Links,
     /// The weight of each link's squared difference.
@@ -106,12 +106,12 @@ pub struct System<'a> {
 
 impl System<'_> {
     /// Solves for the right-hand side by conjugate gradients, from `colors` on.
-    pub fn solve(&self, data: &[f32], right: &[Vec3], colors: &mut [Vec3]) {
-        let scale: Vec<f32> = (0..colors.len())
+    pub fn solve(&self, data: &[Vec3], right: &[Vec3], colors: &mut [Vec3]) {
+        let scale: Vec<Vec3> = (0..colors.len())
             .into_par_iter()
             .map(|cell| {
                 let penalty: f32 = self.penalties[self.links.row(cell)].iter().sum();
-                1.0 / (data[cell] + penalty + self.tether)
+                (data[cell] + penalty + self.tether).recip()
             })
             .collect();
         let mut residual: Vec<Vec3> = self.apply(colors);
@@ -157,7 +157,7 @@ impl System<'_> {
             .into_par_iter()
             .map(|cell| {
                 let data: Vec3 = (self.observations.column(cell))
-                    .map(|(row, w)| seen[row] * (w * self.row_weights[row]))
+                    .map(|(row, w)| seen[row] * self.row_weights[row] * w)
                     .sum();
                 let smooth: Vec3 = (self.links.of(cell))
                     .map(|(at, other)| (x[cell] - x[other]) * self.penalties[at])
@@ -180,6 +180,12 @@ fn sum(a: &[Vec3], b: &[Vec3], f: impl Fn(Vec3, Vec3) -> f64 + Sync) -> f64 {
         .map(|(a, b)| a.iter().zip(b).map(|(&a, &b)| f(a, b)).sum())
         .collect();
     parts.iter().sum()
+}
+
+/// The mean over all channels of some weights.
+pub fn mean_channel(weights: &[Vec3]) -> f32 {
+    let means: Vec<f32> = weights.iter().map(|w| w.element_sum() / 3.0).collect();
+    mean(&means)
 }
 
 /// The mean of some numbers, added up in f64.

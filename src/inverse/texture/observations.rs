@@ -99,25 +99,25 @@ impl Observations {
             .collect()
     }
 
-    /// For each cell, Σ w · ω · value over its rows, with one weight ω and one value a row.
-    pub fn gathered(&self, row_weights: &[f32], values: &[Vec3]) -> Vec<Vec3> {
+    /// For each cell, Σ w · ω · value over its rows, with one weight ω (a channel) and one value a row.
+    pub fn gathered(&self, row_weights: &[Vec3], values: &[Vec3]) -> Vec<Vec3> {
         (0..self.cells())
             .into_par_iter()
             .map(|cell| {
                 self.column(cell)
-                    .map(|(row, w)| values[row] * (w * row_weights[row]))
+                    .map(|(row, w)| values[row] * row_weights[row] * w)
                     .sum()
             })
             .collect()
     }
 
     /// For each cell, Σ w² ω over its rows: the diagonal of the normal equations.
-    pub fn diagonal(&self, row_weights: &[f32]) -> Vec<f32> {
+    pub fn diagonal(&self, row_weights: &[Vec3]) -> Vec<Vec3> {
         (0..self.cells())
             .into_par_iter()
             .map(|cell| {
                 self.column(cell)
-                    .map(|(row, w)| w * w * row_weights[row])
+                    .map(|(row, w)| row_weights[row] * (w * w))
                     .sum()
             })
             .collect()

@@ -138,7 +138,7 @@ impl Received {
             .collect();
         let levels = levels(&both, links);
         let each = Observations::of_each(count);
-        let weights: Vec<f32> = levels.iter().map(|l| 1.0 / (l * l)).collect();
+        let weights: Vec<Vec3> = levels.iter().map(|l| Vec3::splat(1.0 / (l * l))).collect();
         let problem = |values| Problem {
             observations: &each,
             weights: &weights,
@@ -149,7 +149,7 @@ impl Received {
         let squares = |a: &[Vec3], b: &[Vec3]| -> f64 {
             let pairs = a.iter().zip(b).zip(&weights);
             pairs
-                .map(|((a, b), w)| f64::from((*a - *b).length_squared() * w))
+                .map(|((a, b), w)| f64::from(((*a - *b) * (*a - *b)).dot(*w)))
                 .sum()
         };
 
