@@ -15,6 +15,9 @@ use nalgebra::DVector;
 pub const LEAST_DAMPING: f64 = 1e-10;
 /// A step below this many standard errors in every parameter ends the fit.
 pub const STEP_TOLERANCE: f64 = 0.1;
+/// A gradient within so many times its noise that keeps more than this share of itself over a step ends the fit as well.
+const WITHIN_NOISE: f64 = 2.0;
+const STALLED: f64 = 0.9;
 /// Values that differ by a few units in the last place of single precision, over [`STEP_TOLERANCE`].
 const ROUNDING: f64 = 4.0 * f32::EPSILON as f64 / STEP_TOLERANCE;
 
@@ -48,7 +51,12 @@ pub fn fit<E>(
     let mut equations = cache.normal_equations(&unknowns, free, trust, prior);
     let mut iterations = 0;
     let mut damping = LEAST_DAMPING;
+    let mut before = f64::INFINITY;
     while iterations < most_steps {
+        let pull = pull(&equations, free, &unknowns);
+        if is_stalled(before, pull) {
+            break;
+        }
         let (proposal, length) = propose(&equations, free, &unknowns, damping);
         let after = cache.normal_equations(&proposal, free, trust, prior);
         iterations += 1;
@@ -59,7 +67,7 @@ pub fn fit<E>(
             continue;
         }
         damping = (damping * 0.01).max(LEAST_DAMPING);
-        (unknowns, equations) = (proposal, after);
+        (unknowns, equations, before) = (proposal, after, pull);
         if length.step < STEP_TOLERANCE {
             break;
         }
@@ -76,6 +84,37 @@ fn worse(before: &NormalEquations, after: &NormalEquations) -> bool {
     let size = |o: DVec3| o.abs();
     let rise = after.objective - before.objective;
     !after.objective.is_finite() || rise.cmpgt(size(before.objective) * 0.5).any()
+}
+
+/// Whether nothing but noise is left to follow, given [`pull`] before a step and after it. Where many unknowns share few
+/// paths, further steps would follow the noise of the paths without end: across two sets it may say that the squared error
+/// falls the faster the farther one goes.
+pub fn is_stalled(before: f64, after: f64) -> bool {
+    after < WITHIN_NOISE && after > STALLED * before
+}
+
+/// The squared gradient over what its noise makes of it, both over the curvature and summed over parameters; of those at
+/// their bounds only where it leads inwards. One where nothing but noise is left.
+pub fn pull(equations: &NormalEquations, free: &[usize], at: &Unknowns) -> f64 {
+    let variance = noise(equations);
+    let surfaces = at.surfaces();
+    let (mut pull, mut expected) = (0.0, 0.0);
+    for (row, &i) in free.iter().enumerate() {
+        let x = at.value(i).as_dvec3();
+        let (mean, precision) = equations.prior.of(i, variance);
+        let gradient = equations.descent[row] + precision * (mean - x);
+        let curvature = equations.diagonal[row];
+        let upper = if i < surfaces { 1.0 } else { f64::INFINITY };
+        for channel in 0..3 {
+            let [x, g, h] = [x, gradient, curvature].map(|v| v[channel]);
+            let held = (x <= 0.0 && g < 0.0) || (x >= upper && g > 0.0);
+            if h > 0.0 && !held {
+                pull += g * g / h;
+                expected += equations.scatter[row][channel] / h;
+            }
+        }
+    }
+    if expected > 0.0 { pull / expected } else { 0.0 }
 }
 
 /// How far a step goes: its largest component, in standard errors of the parameters.
@@ -184,6 +223,7 @@ mod tests {
     use crate::inverse::cache::clusters::Cluster;
     use crate::inverse::cache::roles::{self, Role};
     use crate::inverse::cache::{CachedCluster, Vertex};
+    use crate::math::rng::Stream;
     use glam::Vec3;
 
     /// Photographs without noise of a lamp and of a wall, of which one set of paths says too much light and the other too
@@ -210,6 +250,49 @@ mod tests {
             vertices: vec![vertex(0), vertex(1)],
             ends: vec![1, 2],
         }
+    }
+
+    /// Three hundred lamps of radiance 1, each known by two clusters whose paths are so noisy that their product across the
+    /// sets is negative for some: these would grow with every step.
+    #[test]
+    fn unknowns_that_few_paths_know_do_not_run_away() {
+        const LAMPS: usize = 300;
+        let mut stream = Stream::new(73, 0, 0, 0);
+        let clusters = (0..2 * LAMPS).map(|index| {
+            let lamp = (index / 2) as u32;
+            let mut vertex = || Vertex {
+                emission_weight: 1.0 + 1.8 * (2.0 * stream.uniform() - 1.0),
+                ..Vertex::on(lamp)
+            };
+            let vertices = vec![vertex(), vertex()];
+            let mut cached = opposed(0);
+            cached.cluster.object = lamp;
+            cached.cluster.measured = Vec3::ONE;
+            cached.cluster.weight = Vec3::ONE;
+            CachedCluster { vertices, ..cached }
+        });
+        let cache = PathCache {
+            clusters: clusters.collect(),
+            ..PathCache::default()
+        };
+        let free = roles::free(&vec![Role::Emitter; LAMPS]);
+        let (even, prior) = (Trust::even(LAMPS), Prior::new(LAMPS, LAMPS, Vec3::ONE));
+        let start = Unknowns::new(LAMPS);
+        let fitted = fit(
+            &cache,
+            &start,
+            &free,
+            &even,
+            &prior,
+            30,
+            |_| Ok::<_, ()>(()),
+        )
+        .unwrap();
+        let mut found: Vec<f32> = fitted.unknowns.emission.iter().map(|e| e.x).collect();
+        found.sort_by(f32::total_cmp);
+        let [median, most] = [found[LAMPS / 2], found[LAMPS - 1]];
+        assert!((0.5..1.5).contains(&median), "{median}");
+        assert!(most < 10.0, "{most} after {} steps", fitted.iterations);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::equations::NormalEquations;
 use super::evaluate::Linearised;
-use super::fit::{LEAST_DAMPING, STEP_TOLERANCE, propose};
+use super::fit::{LEAST_DAMPING, STEP_TOLERANCE, is_stalled, propose, pull};
 use super::prior::Prior;
 use super::trust::Trust;
 use crate::inverse::parameters::Unknowns;
@@ -37,11 +37,13 @@ pub fn descend(
 ) -> Descended {
     let mut unknowns = about.clone();
     let mut steps = 0;
+    let mut before = f64::INFINITY;
     loop {
         let trust = Trust::from_residuals(&clusters, about.surfaces());
         let equations = NormalEquations::new(&clusters, free.len(), &trust, prior);
         let (next, length) = propose(&equations, free, &unknowns, LEAST_DAMPING);
-        if length.left < STEP_TOLERANCE || steps == MOST_STEPS {
+        let pull = pull(&equations, free, &unknowns);
+        if length.left < STEP_TOLERANCE || is_stalled(before, pull) || steps == MOST_STEPS {
             return Descended {
                 unknowns,
                 trust,
@@ -53,7 +55,7 @@ pub fn descend(
             .map(|&i| (next.value(i) - unknowns.value(i)).as_dvec3())
             .collect();
         clusters.par_iter_mut().for_each(|c| c.step(&moved));
-        unknowns = next;
+        (unknowns, before) = (next, pull);
         steps += 1;
     }
 }

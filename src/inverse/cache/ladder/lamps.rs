@@ -3,6 +3,7 @@
 use super::Ladder;
 use crate::inverse::cache::PathCache;
 use crate::inverse::cache::errors::{Released, release};
+use crate::inverse::cache::fit::Fit;
 use crate::inverse::cache::judge::judge;
 use crate::inverse::cache::roles::{self, Role};
 use crate::inverse::solver::Termination;
@@ -62,13 +63,18 @@ impl Ladder<'_, '_> {
                 self.unknowns.emission[k] = Vec3::ZERO;
             }
             let fitted = self.fit(cache)?;
-            self.take(fitted);
+            self.take(&fitted);
         }
     }
 
-    /// Lets objects change between reflecting and giving light until the photographs call for no more of it, refitting
-    /// in between; then drops the light of unseen objects that nothing speaks for.
-    pub(super) fn settle_roles(&mut self, cache: &PathCache) -> Result<(), Termination> {
+    /// From a fit under the present roles on, lets objects change between reflecting and giving light until the photographs
+    /// call for no more of it, refitting in between; then drops the light of unseen objects that nothing speaks for.
+    pub(super) fn settle_roles(
+        &mut self,
+        cache: &PathCache,
+        mut fitted: Fit,
+    ) -> Result<(), Termination> {
+        self.take_values(&fitted);
         let mut returned = vec![false; self.roles.len()];
         for _ in 0..MOST_CHANGES {
             let mut changed = false;
@@ -94,9 +100,10 @@ impl Ladder<'_, '_> {
                 break;
             }
             self.hold();
-            let fitted = self.fit(cache)?;
-            self.take(fitted);
+            fitted = self.fit(cache)?;
+            self.take_values(&fitted);
         }
+        self.take(&fitted);
         self.prune_unseen(cache)
     }
 
@@ -130,7 +137,7 @@ impl Ladder<'_, '_> {
                 Role::Glowing
             };
             let fitted = self.fit(cache)?;
-            self.take(fitted);
+            self.take(&fitted);
             let z = self.unknowns.emission[k]
                 / self.errors.emission[k].max(Vec3::splat(f32::MIN_POSITIVE));
             let faint = self.unknowns.emission[k].max_element() < FAINT * self.brightness[k];

@@ -105,8 +105,7 @@ impl Ladder<'_, '_> {
         self.hold();
         self.trust = Trust::even(self.roles.len());
         let fitted = self.fit(cache)?;
-        self.take(fitted);
-        self.settle_roles(cache)?;
+        self.settle_roles(cache, fitted)?;
         self.weigh(cache)?;
         self.test_dark(cache);
         Ok(())

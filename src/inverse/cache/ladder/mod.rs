@@ -267,8 +267,7 @@ impl Ladder<'_, '_> {
         // Tests of roles weigh all alike: whatever the residuals of a wrong role say is no measure of trust.
         self.trust = Trust::even(self.roles.len());
         let fitted = self.fit(&cache)?;
-        self.take(fitted);
-        self.settle_roles(&cache)?;
+        self.settle_roles(&cache, fitted)?;
         let added = self.test_glow(&cache)?;
         self.weigh(&cache)?;
         let why = match added.as_slice() {
@@ -306,16 +305,21 @@ impl Ladder<'_, '_> {
             cache.linearise(&self.unknowns, &vec![usize::MAX; 2 * self.roles.len()], &[]);
         self.trust = Trust::from_residuals(&residuals, self.roles.len());
         let fitted = self.fit(cache)?;
-        self.take(fitted);
+        self.take(&fitted);
         Ok(())
     }
 
     /// Takes over a fit under the present roles, with its errors.
-    fn take(&mut self, fitted: Fit) {
+    fn take(&mut self, fitted: &Fit) {
         let free = roles::free(&self.roles);
         let errors = standard_errors(&fitted.equations, &free, self.roles.len());
-        self.unknowns = fitted.unknowns;
         self.merge_errors(errors);
+        self.take_values(fitted);
+    }
+
+    /// Takes over the unknowns alone; errors take longer where unknowns are many.
+    fn take_values(&mut self, fitted: &Fit) {
+        self.unknowns = fitted.unknowns.clone();
         self.hold();
         self.describe();
     }
