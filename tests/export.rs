@@ -86,9 +86,8 @@ fn assert_texels_are_found(
     scene: &Scene,
     estimate: &Estimate,
     uvs: &[Vec2],
-    picture: &gltf::image::Data,
+    picture: &image::RgbImage,
 ) {
-    assert_eq!(picture.format, gltf::image::Format::R8G8B8);
     let texels = estimate.texels.as_ref().expect("texels");
     let layout = &texels.colors.layout;
     assert_eq!(uvs.len(), 3 * scene.objects[1].triangles.len());
@@ -97,11 +96,10 @@ fn assert_texels_are_found(
         for texel in 0..layout.first[triangle as usize + 1] - first {
             let [b1, b2] = layout.center(triangle as usize, texel);
             let uv = corners[0] * (1.0 - b1 - b2) + corners[1] * b1 + corners[2] * b2;
-            let x = (uv.x * picture.width as f32) as usize;
-            let y = (uv.y * picture.height as f32) as usize;
-            let at = 3 * (y * picture.width as usize + x);
+            let x = (uv.x * picture.width() as f32) as u32;
+            let y = (uv.y * picture.height() as f32) as u32;
             let expected = to_srgb8(texels.colors.colors[(first + texel) as usize], 1.0);
-            assert_eq!(picture.pixels[at..at + 3], expected, "{triangle} {texel}");
+            assert_eq!(picture.get_pixel(x, y).0, expected, "{triangle} {texel}");
         }
     }
 }
@@ -155,7 +153,11 @@ fn glb_holds_nodes_materials_strengths_colours_and_cameras() {
         assert_eq!(surface.base_color_factor(), [1.0; 4]);
         let texture = surface.base_color_texture().expect("a texture").texture();
         let uvs: Vec<Vec2> = uvs.into_f32().map(Vec2::from).collect();
-        assert_texels_are_found(&scene, &estimate, &uvs, &images[texture.source().index()]);
+        let picture = &images[texture.source().index()];
+        assert_eq!(picture.format, gltf::image::Format::R8G8B8);
+        let (width, height) = (picture.width, picture.height);
+        let picture = image::RgbImage::from_raw(width, height, picture.pixels.clone());
+        assert_texels_are_found(&scene, &estimate, &uvs, &picture.expect("all pixels"));
     }
 
     for (index, camera) in scene.cameras.iter().enumerate() {
@@ -186,6 +188,7 @@ fn obj_and_mtl_come_back_with_names_colours_and_exact_coordinates() {
     let (models, materials) = tobj::load_obj(&path, &tobj::LoadOptions::default()).expect("an OBJ");
     let materials = materials.expect("an MTL");
     assert_eq!(models.len(), scene.objects.len());
+    let mut textured = 0;
     for (index, model) in models.iter().enumerate() {
         let object = &scene.objects[index];
         assert_eq!(model.name, object.name);
@@ -198,20 +201,40 @@ fn obj_and_mtl_come_back_with_names_colours_and_exact_coordinates() {
         assert_same_surface(&scene, &object.name, &corners, 1e-9);
         let material = &materials[model.mesh.material_id.expect("a material")];
         let known = &estimate.objects[index];
-        let kd = material.diffuse.expect("Kd").map(|v| v as f32);
-        assert_eq!(Vec3::from(kd), known.albedo);
+        let kd = Vec3::from(material.diffuse.expect("Kd").map(|v| v as f32));
         let ke = material.emissive.expect("Ke").map(|v| v as f32);
         assert_eq!(Vec3::from(ke), known.emission);
-        let color = Vec3::from_array([0, 1, 2].map(|i| model.mesh.vertex_color[i] as f32));
-        let expected = match index {
-            1 => {
-                let texels = estimate.texels.as_ref().expect("texels");
-                let first = texels.colors.layout.first[object.triangles[0] as usize];
-                texels.colors.colors[first as usize]
-            }
-            _ => known.albedo,
+        let Some(image) = &material.diffuse_texture else {
+            assert_eq!(kd, known.albedo);
+            continue;
         };
-        assert_eq!(color, expected);
+        assert_eq!((index, kd), (1, Vec3::ONE));
+        let picture = image::open(folder.path().join(image))
+            .expect("a PNG")
+            .to_rgb8();
+        let uvs: Vec<Vec2> = (model.mesh.texcoord_indices.iter())
+            .map(|&i| model.mesh.texcoords[2 * i as usize..][..2].to_vec())
+            .map(|uv| Vec2::new(uv[0] as f32, 1.0 - uv[1] as f32))
+            .collect();
+        assert_texels_are_found(&scene, &estimate, &uvs, &picture);
+        textured += 1;
+    }
+    assert_eq!(textured, 1);
+    let text = std::fs::read_to_string(&path).expect("text");
+    let mapped = text
+        .lines()
+        .filter(|l| l.starts_with("f ") && l.contains('/'));
+    assert_eq!(mapped.count(), scene.objects[1].triangles.len());
+    // The linear picture beside it shows the same, exactly enough.
+    let linear = image::open(folder.path().join("scene.albedo.exr"))
+        .expect("an EXR")
+        .to_rgb32f();
+    let shown = image::open(folder.path().join("scene.albedo.png"))
+        .expect("a PNG")
+        .to_rgb8();
+    for (linear, shown) in linear.pixels().zip(shown.pixels()) {
+        let expected = to_srgb8(Vec3::from(linear.0), 1.0);
+        assert!((0..3).all(|c| expected[c].abs_diff(shown.0[c]) <= 1));
     }
 }
 

@@ -31,7 +31,7 @@ pub struct ExportArguments {
 enum Word {
     /// Scene with base colours and emissive strength
     Glb,
-    /// Scene as OBJ and MTL
+    /// Scene as OBJ and MTL, with textures as images
     Obj,
     /// Scene as PLY with vertex colours
     Ply,

@@ -1,26 +1,39 @@
-//! Wavefront OBJ with its MTL beside it.
+//! Wavefront OBJ with its MTL and the images of its textures beside it.
 
 use crate::error::Result;
 use crate::export::atomic::write_atomically;
+use crate::export::exr::{Precision, write_rgb};
+use crate::export::picture::write_png;
 use crate::export::scene::Part;
+use crate::math::picture::Picture;
 use std::io::Write;
 use std::path::Path;
 
 /// Writes parts as PATH and their materials beside it with the ending .mtl.
 ///
-/// One `o` an object. Kd and Ke are linear albedo and emission. Where the albedo of an object varies, Kd is its mean,
-/// and all vertices carry their linear albedo (readers want colours on all or none). A specular lobe is Ks with Pr, the physically based extension's roughness (√α).
+/// One `o` an object. Kd and Ke are linear albedo and emission. Where the albedo of an object varies, Kd is 1 and map_Kd names
+/// the atlas (8-bit sRGB, ending .albedo.png); the same with linear albedo is beside it (.albedo.exr). A specular lobe is Ks
+/// with Pr, the physically based extension's roughness (√α).
 ///
 /// # Errors
 /// A file cannot be written.
-pub fn write(path: &Path, parts: &[Part]) -> Result<()> {
+pub fn write(path: &Path, parts: &[Part], atlas: Option<&Picture>) -> Result<()> {
+    let image = path.with_extension("albedo.png");
+    if let Some(atlas) = atlas {
+        write_png(&image, atlas, 1.0)?;
+        write_rgb(&path.with_extension("albedo.exr"), atlas, Precision::Half)?;
+    }
     let library = path.with_extension("mtl");
     write_atomically(&library, |out| {
         for (index, part) in parts.iter().enumerate() {
             let estimate = &part.estimate;
             let [kd, ke] = [estimate.albedo, estimate.emission];
             writeln!(out, "newmtl {}", material_name(index, part))?;
-            writeln!(out, "Kd {} {} {}", kd.x, kd.y, kd.z)?;
+            if part.uvs.is_empty() {
+                writeln!(out, "Kd {} {} {}", kd.x, kd.y, kd.z)?;
+            } else {
+                writeln!(out, "Kd 1 1 1\nmap_Kd {}", file_name(&image))?;
+            }
             writeln!(out, "Ke {} {} {}", ke.x, ke.y, ke.z)?;
             match estimate.lobe() {
                 Some((alpha, specular)) => {
@@ -32,33 +45,38 @@ pub fn write(path: &Path, parts: &[Part]) -> Result<()> {
         }
         Ok(())
     })?;
-    let colored = parts.iter().any(|part| !part.colors.is_empty());
     write_atomically(path, |out| {
-        let name = library.file_name().unwrap_or_default().to_string_lossy();
-        writeln!(out, "mtllib {name}")?;
-        let mut first = 1;
+        writeln!(out, "mtllib {}", file_name(&library))?;
+        let (mut first, mut first_uv) = (1, 1);
         for (index, part) in parts.iter().enumerate() {
             let name: String = part.name.chars().filter(|c| !c.is_control()).collect();
             writeln!(out, "o {name}\nusemtl {}", material_name(index, part))?;
-            for (vertex, p) in part.positions.iter().enumerate() {
-                write!(out, "v {} {} {}", p.x, p.y, p.z)?;
-                if colored {
-                    let c = part.colors.get(vertex).unwrap_or(&part.estimate.albedo);
-                    write!(out, " {} {} {}", c.x, c.y, c.z)?;
+            for p in &part.positions {
+                writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;
+            }
+            // OBJ counts v from the bottom.
+            for uv in &part.uvs {
+                writeln!(out, "vt {} {}", uv.x, 1.0 - uv.y)?;
+            }
+            for triangle in &part.triangles {
+                write!(out, "f")?;
+                for corner in triangle.map(u64::from) {
+                    write!(out, " {}", first + corner)?;
+                    if !part.uvs.is_empty() {
+                        write!(out, "/{}", first_uv + corner)?;
+                    }
                 }
                 writeln!(out)?;
             }
-            for [a, b, c] in part
-                .triangles
-                .iter()
-                .map(|t| t.map(|i| u64::from(i) + first))
-            {
-                writeln!(out, "f {a} {b} {c}")?;
-            }
             first += part.positions.len() as u64;
+            first_uv += part.uvs.len() as u64;
         }
         Ok(())
     })
+}
+
+fn file_name(path: &Path) -> std::borrow::Cow<'_, str> {
+    path.file_name().unwrap_or_default().to_string_lossy()
 }
 
 /// A name without spaces, unique by its number.

@@ -15,7 +15,7 @@ use std::sync::Arc;
 pub enum Format {
     /// Scene with base colours and emissive strength.
     Glb,
-    /// Scene as OBJ and MTL.
+    /// Scene as OBJ and MTL, with textures as images.
     Obj,
     /// Scene as PLY with vertex colours.
     Ply,
@@ -54,14 +54,13 @@ pub struct Part {
 pub fn write(scene: &Arc<Scene>, estimate: &Estimate, format: Format, path: &Path) -> Result<()> {
     match format {
         Format::Glb => {
-            let atlas = (estimate.texels.as_deref()).and_then(|texels| Atlas::new(scene, texels));
-            let parts = match &atlas {
-                Some(atlas) => mapped_parts(scene, estimate, atlas),
-                None => parts(scene, estimate),
-            };
+            let (parts, atlas) = mapped_parts(scene, estimate);
             glb::write(path, scene, &parts, atlas.as_ref().map(|a| &a.picture))
         }
-        Format::Obj => obj::write(path, &parts(scene, estimate)),
+        Format::Obj => {
+            let (parts, atlas) = mapped_parts(scene, estimate);
+            obj::write(path, &parts, atlas.as_ref().map(|a| &a.picture))
+        }
         Format::Ply => ply::write_scene(path, &parts(scene, estimate)),
         Format::Mitsuba => mitsuba::write(path, scene, &parts(scene, estimate)),
         Format::Csv => objects::table(scene, estimate).write(path),
@@ -76,11 +75,16 @@ pub fn parts(scene: &Scene, estimate: &Estimate) -> Vec<Part> {
     })
 }
 
-/// The same with whole triangles and texture coordinates where albedo varies.
-fn mapped_parts(scene: &Scene, estimate: &Estimate, atlas: &Atlas) -> Vec<Part> {
-    cut(scene, estimate, |part, triangles, _| {
-        part.add_mapped(scene, triangles, atlas);
-    })
+/// The same with whole triangles and coordinates in an atlas where albedo varies.
+fn mapped_parts(scene: &Scene, estimate: &Estimate) -> (Vec<Part>, Option<Atlas>) {
+    let atlas = (estimate.texels.as_deref()).and_then(|texels| Atlas::new(scene, texels));
+    let parts = match &atlas {
+        Some(atlas) => cut(scene, estimate, |part, triangles, _| {
+            part.add_mapped(scene, triangles, atlas);
+        }),
+        None => parts(scene, estimate),
+    };
+    (parts, atlas)
 }
 
 fn cut(

@@ -64,7 +64,7 @@ const FORMATS: [Format; 6] = [
     },
     Format {
         name: "OBJ",
-        help: "With an MTL file beside it",
+        help: "With an MTL file and the images of its textures beside it",
         ending: "obj",
         format: ExportFormat::Obj,
     },
