@@ -252,6 +252,18 @@ mod tests {
         }
     }
 
+    /// A fit of at most thirty steps in which all clusters weigh alike.
+    fn fitted(clusters: Vec<CachedCluster>, roles: &[Role], start: &Unknowns) -> Fit {
+        let cache = PathCache {
+            clusters,
+            ..PathCache::default()
+        };
+        let (even, free) = (Trust::even(roles.len()), roles::free(roles));
+        let prior = Prior::new(roles.len(), roles.len(), Vec3::ONE);
+        let between = |_: &Unknowns| Ok::<_, ()>(());
+        fit(&cache, start, &free, &even, &prior, 30, between).expect("nothing ends it")
+    }
+
     /// Three hundred lamps of radiance 1, each known by two clusters whose paths are so noisy that their product across the
     /// sets is negative for some: these would grow with every step.
     #[test]
@@ -271,23 +283,11 @@ mod tests {
             cached.cluster.weight = Vec3::ONE;
             CachedCluster { vertices, ..cached }
         });
-        let cache = PathCache {
-            clusters: clusters.collect(),
-            ..PathCache::default()
-        };
-        let free = roles::free(&vec![Role::Emitter; LAMPS]);
-        let (even, prior) = (Trust::even(LAMPS), Prior::new(LAMPS, LAMPS, Vec3::ONE));
-        let start = Unknowns::new(LAMPS);
-        let fitted = fit(
-            &cache,
-            &start,
-            &free,
-            &even,
-            &prior,
-            30,
-            |_| Ok::<_, ()>(()),
-        )
-        .unwrap();
+        let fitted = fitted(
+            clusters.collect(),
+            &[Role::Emitter; LAMPS],
+            &Unknowns::new(LAMPS),
+        );
         let mut found: Vec<f32> = fitted.unknowns.emission.iter().map(|e| e.x).collect();
         found.sort_by(f32::total_cmp);
         let [median, most] = [found[LAMPS / 2], found[LAMPS - 1]];
@@ -297,26 +297,10 @@ mod tests {
 
     #[test]
     fn a_fit_ends_where_only_the_paths_are_noisy() {
-        let cache = PathCache {
-            clusters: (0..80).map(opposed).collect(),
-            ..PathCache::default()
-        };
-        let roles = [Role::Reflector, Role::Emitter];
         let mut start = Unknowns::new(2);
         start.albedo[1] = Vec3::ZERO;
-        let even = Trust::even(2);
-        let prior = Prior::new(2, 2, Vec3::ONE);
-        let free = roles::free(&roles);
-        let fitted = fit(
-            &cache,
-            &start,
-            &free,
-            &even,
-            &prior,
-            30,
-            |_| Ok::<_, ()>(()),
-        )
-        .unwrap();
+        let clusters = (0..80).map(opposed).collect();
+        let fitted = fitted(clusters, &[Role::Reflector, Role::Emitter], &start);
         assert!(fitted.equations.objective.max_element() < 0.0);
         assert!(fitted.iterations < 6, "{} steps", fitted.iterations);
         // Two sets whose noise is opposed are off by its square.
