@@ -46,7 +46,7 @@ fn cache() -> (PathCache, Vec<Cluster>, Vec<usize>) {
     };
     let widths: Vec<u32> = problem.photographs.iter().map(|p| p.width).collect();
     let cache = tracer.trace(&clusters, &widths);
-    assert_eq!(cache.rejected, 0);
+    assert_eq!(cache.cast.rejected, 0);
     let free = (0..SURFACES)
         .filter(|&k| k != LAMP)
         .chain([SURFACES + LAMP]);

@@ -96,15 +96,11 @@ pub fn is_stalled(before: f64, after: f64) -> bool {
 /// The squared gradient over what its noise makes of it, both over the curvature and summed over parameters; of those at
 /// their bounds only where it leads inwards. One where nothing but noise is left.
 pub fn pull(equations: &NormalEquations, free: &[usize], at: &Unknowns) -> f64 {
-    let variance = noise(equations);
-    let surfaces = at.surfaces();
     let (mut pull, mut expected) = (0.0, 0.0);
-    for (row, &i) in free.iter().enumerate() {
-        let x = at.value(i).as_dvec3();
-        let (mean, precision) = equations.prior.of(i, variance);
-        let gradient = equations.descent[row] + precision * (mean - x);
+    let gradients = gradients(equations, free, at).into_iter();
+    for (row, (gradient, &i)) in gradients.zip(free).enumerate() {
+        let (x, upper) = (at.value(i).as_dvec3(), upper(i, at));
         let curvature = equations.diagonal[row];
-        let upper = if i < surfaces { 1.0 } else { f64::INFINITY };
         for channel in 0..3 {
             let [x, g, h] = [x, gradient, curvature].map(|v| v[channel]);
             let held = (x <= 0.0 && g < 0.0) || (x >= upper && g > 0.0);
@@ -115,6 +111,25 @@ pub fn pull(equations: &NormalEquations, free: &[usize], at: &Unknowns) -> f64 {
         }
     }
     if expected > 0.0 { pull / expected } else { 0.0 }
+}
+
+/// The direction of descent of each free parameter, what is believed besides pulling like measurements.
+fn gradients(equations: &NormalEquations, free: &[usize], at: &Unknowns) -> Vec<DVec3> {
+    let variance = noise(equations);
+    let pulled = |(descent, &i): (&DVec3, &usize)| {
+        let (mean, precision) = equations.prior.of(i, variance);
+        *descent + precision * (mean - at.value(i).as_dvec3())
+    };
+    equations.descent.iter().zip(free).map(pulled).collect()
+}
+
+/// The largest value of a parameter: no albedo exceeds one.
+fn upper(index: usize, unknowns: &Unknowns) -> f64 {
+    if index < unknowns.surfaces() {
+        1.0
+    } else {
+        f64::INFINITY
+    }
 }
 
 /// How far a step goes: its largest component, in standard errors of the parameters.
@@ -134,10 +149,10 @@ pub fn propose(
     from: &Unknowns,
     damping: f64,
 ) -> (Unknowns, Length) {
-    // What is believed besides pulls like measurements; what no path touches stays where it is.
     let x: Vec<DVec3> = free.iter().map(|&i| from.value(i).as_dvec3()).collect();
     let variance = noise(equations);
-    let mut descent = equations.descent.clone();
+    let descent = gradients(equations, free, from);
+    // What no path touches stays where it is.
     let added = |damping: f64| -> Vec<DVec3> {
         let diagonals = free.iter().zip(&equations.diagonal);
         (diagonals.map(|(&i, diagonal)| {
@@ -146,14 +161,7 @@ pub fn propose(
         }))
         .collect()
     };
-    for ((g, &i), x) in descent.iter_mut().zip(free).zip(&x) {
-        let (mean, precision) = equations.prior.of(i, variance);
-        *g += precision * (mean - *x);
-    }
-    let surfaces = from.surfaces();
-    let upper: Vec<f64> = (free.iter())
-        .map(|&i| if i < surfaces { 1.0 } else { f64::INFINITY })
-        .collect();
+    let upper: Vec<f64> = free.iter().map(|&i| upper(i, from)).collect();
     let step = match &equations.coupling {
         Coupling::Dense(matrices) => dense_step(matrices, &x, &descent, &upper, damping, &added),
         Coupling::Sparse(rows) => rows.bounded_step(&Bounded {

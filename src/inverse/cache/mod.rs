@@ -29,6 +29,7 @@ pub mod step;
 pub mod trace;
 pub mod trust;
 
+use crate::transport::arrival::Cast;
 use clusters::Cluster;
 use glam::Vec3;
 
@@ -94,10 +95,8 @@ pub struct CachedCluster {
 pub struct PathCache {
     /// In the order in which they were given.
     pub clusters: Vec<CachedCluster>,
-    /// Rays that were cast.
-    pub rays: u64,
-    /// Paths dropped because a weight was not finite.
-    pub rejected: u64,
+    /// Rays that were cast, and paths dropped because a weight was not finite.
+    pub cast: Cast,
 }
 
 impl PathCache {
@@ -130,7 +129,6 @@ impl PathCache {
     /// Adds another cache's clusters.
     pub fn append(&mut self, mut other: Self) {
         self.clusters.append(&mut other.clusters);
-        self.rays += other.rays;
-        self.rejected += other.rejected;
+        self.cast += other.cast;
     }
 }

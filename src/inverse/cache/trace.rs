@@ -15,6 +15,7 @@ use crate::math::warp;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::geometry::{Hit, Ray, offset_origin};
+use crate::transport::arrival::Cast;
 use crate::transport::emitters::Emitters;
 use crate::transport::environment::{direction_of, pixel_of};
 use crate::transport::material::Lobe;
@@ -100,22 +101,21 @@ impl OutsideGrid {
 impl Tracer<'_> {
     /// Traces the paths of every cluster, two independent sets of them.
     pub fn trace(&self, clusters: &[Cluster], widths: &[u32]) -> PathCache {
-        let traced: Vec<(CachedCluster, u64, u64)> = clusters
+        let traced: Vec<(CachedCluster, Cast)> = clusters
             .par_iter()
             .map(|cluster| self.cluster(cluster, widths[cluster.frame as usize]))
             .collect();
         let mut cache = PathCache::default();
-        for (cluster, rays, rejected) in traced {
+        for (cluster, cast) in traced {
             cache.clusters.push(cluster);
-            cache.rays += rays;
-            cache.rejected += rejected;
+            cache.cast += cast;
         }
         cache
     }
 
-    fn cluster(&self, cluster: &Cluster, width: u32) -> (CachedCluster, u64, u64) {
+    fn cluster(&self, cluster: &Cluster, width: u32) -> (CachedCluster, Cast) {
         let (mut vertices, mut ends) = (Vec::new(), Vec::new());
-        let (mut rays, mut rejected) = (0, 0);
+        let mut cast = Cast::default();
         let (paths, count) = (u64::from(cluster.paths), cluster.pixels.len() as u64);
         let first = cluster.pixels.first().copied().map_or(0, u64::from);
         for (place, &pixel) in cluster.pixels.iter().enumerate() {
@@ -128,8 +128,8 @@ impl Tracer<'_> {
                 let mut numbers = SequencePoint::new(self.seed, key, index);
                 let camera = &self.scene.cameras[cluster.frame as usize];
                 let traced = self.pixel_path(camera, corner, &mut numbers, &mut vertices);
-                rays += traced.0;
-                rejected += u64::from(!traced.1);
+                cast.rays += traced.0;
+                cast.rejected += u64::from(!traced.1);
                 ends.push(vertices.len() as u32);
             }
         }
@@ -139,8 +139,7 @@ impl Tracer<'_> {
                 vertices,
                 ends,
             },
-            rays,
-            rejected,
+            cast,
         )
     }
 

@@ -162,7 +162,7 @@ impl Gathering<'_> {
             return cast;
         }
         let mut found = Vec::new();
-        let more = arrivals(
+        cast += arrivals(
             self.lit,
             &surface,
             &frame,
@@ -172,8 +172,6 @@ impl Gathering<'_> {
             &self.options,
             &mut found,
         );
-        cast.rays += more.rays;
-        cast.rejected += more.rejected;
         gathered.points += 1;
         gathered.arrivals.extend(found.into_iter().map(|a| (wo, a)));
         cast

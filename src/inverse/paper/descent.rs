@@ -11,6 +11,7 @@ use crate::inverse::solver::Problem;
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::scene::Scene;
+use crate::transport::arrival::Cast;
 use crate::transport::emitters::Emitters;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -54,12 +55,10 @@ pub struct Descent {
 /// What one step did.
 #[derive(Debug, Clone, Copy)]
 pub struct StepOutcome {
-    /// Rays cast.
-    pub rays: u64,
+    /// Rays cast, and paths dropped because a weight was not finite.
+    pub cast: Cast,
     /// Paths traced.
     pub paths: u64,
-    /// Paths dropped because a weight was not finite.
-    pub rejected: u64,
     /// Whether the gradient was finite.
     pub finite: bool,
 }
@@ -81,8 +80,7 @@ pub type Draw<'a> = &'a (dyn Fn(&mut Stream) -> Option<Drawn> + Sync);
 /// Gradient of the data term of one pixel, per parameter.
 struct PixelGradient {
     entries: Vec<(u32, Vec3)>,
-    rays: u64,
-    rejected: u64,
+    cast: Cast,
 }
 
 impl Descent {
@@ -248,9 +246,8 @@ impl Descent {
         }
 
         let outcome = StepOutcome {
-            rays: pixels.iter().map(|p| p.rays).sum(),
+            cast: pixels.iter().map(|p| p.cast).sum(),
             paths: 2 * batch * samples,
-            rejected: pixels.iter().map(|p| p.rejected).sum(),
             finite: gradient.iter().all(|g| g.is_finite()),
         };
         if !outcome.finite {
@@ -300,8 +297,7 @@ fn pixel_gradient(
 ) -> PixelGradient {
     let mut result = PixelGradient {
         entries: Vec::new(),
-        rays: 0,
-        rejected: 0,
+        cast: Cast::default(),
     };
     let (frame, pixel) = (drawn.frame, drawn.pixel);
     let photograph = &problem.photographs[frame as usize];
@@ -322,8 +318,8 @@ fn pixel_gradient(
         for _ in 0..samples {
             vertices.clear();
             let (rays, finite) = tracer.pixel_path(camera, corner, &mut stream, &mut vertices);
-            result.rays += rays;
-            result.rejected += u64::from(!finite);
+            result.cast.rays += rays;
+            result.cast.rejected += u64::from(!finite);
             sum += differentiate(&vertices, unknowns, &[], &mut gathered, gradient);
         }
         if set == 0 {

@@ -14,7 +14,6 @@ use crate::inverse::solver::{Checkpoint, Problem, Solution, Stage, Termination};
 use crate::inverse::survey::Survey;
 use crate::scene::Scene;
 use crate::scene::texels::TexelLayout;
-use crate::transport::arrival::Cast;
 use crate::transport::material::TexelColors;
 use descent::{Descent, Grain};
 use glam::{DVec3, Vec3};
@@ -148,10 +147,7 @@ impl Run<'_, '_> {
                 let outcome = (self.state.descent).step(self.problem, &settings, self.bounces);
                 (self.state.descent).hold(&self.problem.scene, &self.monitor.known);
                 self.state.schedule.traced(outcome.paths);
-                self.monitor.cast(Cast {
-                    rays: outcome.rays,
-                    rejected: outcome.rejected,
-                });
+                self.monitor.cast(outcome.cast);
                 if !outcome.finite {
                     self.describe();
                     return Err(Termination::Diverged);

@@ -126,10 +126,10 @@ pub fn descend_by(
         let mut over = false;
         while rays < goal && !over {
             let outcome = step(&mut descent);
-            rays += outcome.rays;
+            rays += outcome.cast.rays;
             steps += 1;
             let late = seconds + begun.elapsed().as_secs_f64() >= limits.seconds;
-            over = late || !outcome.finite || outcome.rays == 0 || (bench.stopped)();
+            over = late || !outcome.finite || outcome.cast.rays == 0 || (bench.stopped)();
         }
         seconds += begun.elapsed().as_secs_f64();
 

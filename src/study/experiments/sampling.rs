@@ -129,7 +129,7 @@ fn descent(
         steps += 1;
         let mut outcome =
             descent.step_on(problem, settings, bounces, &|stream| groups.draw(stream));
-        outcome.rays += rays;
+        outcome.cast.rays += rays;
         outcome
     };
     descend_by(bench, gauge, limits, &mut step)

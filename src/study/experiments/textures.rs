@@ -156,8 +156,8 @@ fn descents(
         let (begun, goal) = (Instant::now(), rays + limits.rays.min(u64::MAX / 8));
         while rays < goal && begun.elapsed().as_secs_f64() < limits.seconds {
             let outcome = descent.step(&problem, &settings, settings.max_bounces());
-            rays += outcome.rays;
-            if !outcome.finite || outcome.rays == 0 || (bench.stopped)() {
+            rays += outcome.cast.rays;
+            if !outcome.finite || outcome.cast.rays == 0 || (bench.stopped)() {
                 break;
             }
         }

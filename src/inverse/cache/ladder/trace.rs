@@ -13,7 +13,6 @@ use crate::inverse::estimate::TexelEstimate;
 use crate::inverse::measured::MeasuredRadiance;
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::solver::Termination;
-use crate::transport::arrival::Cast;
 use crate::transport::emitters::Emitters;
 use glam::{DVec3, Vec3};
 use std::time::{Duration, Instant};
@@ -43,7 +42,7 @@ impl Ladder<'_, '_> {
             let pilot = self
                 .tracer(lights, measured, &believed, stage, 0)
                 .trace(&pilot, &self.widths);
-            self.monitor.progress.rays += pilot.rays;
+            self.monitor.cast(pilot.cast);
             fits = paths.min(memory::paths_that_fit(allowed, &pilot));
         }
         let pixels: usize = self.clusters.iter().map(|c| c.pixels.len()).sum();
@@ -134,10 +133,7 @@ impl Ladder<'_, '_> {
             let traced = self
                 .tracer(lights, measured, &believed, stage, round)
                 .trace(&self.clusters[next..end], &self.widths);
-            self.monitor.cast(Cast {
-                rays: traced.rays,
-                rejected: traced.rejected,
-            });
+            self.monitor.cast(traced.cast);
             take(traced);
             let elapsed = begun.elapsed();
             self.monitor
