@@ -55,6 +55,8 @@ pub fn preset(preset: Preset) -> Settings {
     Settings {
         preset,
         target_error: if preset == Preset::Balanced { 4.0 } else { 0.0 },
+        // Several run at once.
+        memory: 1.0,
         ..Settings::default()
     }
 }

@@ -18,6 +18,9 @@ const UNKNOWN_ALBEDO: f32 = 0.2 * ALBEDO_DEVIATION;
 /// An emitting object that fewer pixels see is known only through its light.
 const FEW_PIXELS: u64 = 19;
 
+/// Relative difference in radiance, and of an albedo from one, below which a wall and a lamp may be taken for each other.
+const WHITE: f32 = 0.01;
+
 /// The estimate of some unknowns and of the objects' lobes.
 #[expect(clippy::too_many_arguments, reason = "all that a solve has found out")]
 pub fn estimate(
@@ -114,6 +117,34 @@ pub fn estimate(
     }
 }
 
+/// Between white surfaces all radiance nears that of the lamp, as in a furnace, and which of them gives the light cannot be
+/// told: a reflector of nearly all light that shows the radiance of one that is taken for a lamp. `brightness` holds the mean of each object's
+/// brightest channel over its pixels.
+pub fn doubt_white(estimate: &mut Estimate, brightness: &[f32]) {
+    let objects = &mut estimate.objects;
+    let lamps: Vec<usize> = (0..objects.len())
+        .filter(|&k| objects[k].emission.max_element() > 0.0 && objects[k].seen_pixels > 0)
+        .collect();
+    let mut doubtful: Vec<usize> = Vec::new();
+    for k in 0..objects.len() {
+        let white = (objects[k].albedo + objects[k].albedo_stderr).max_element() > 1.0 - WHITE;
+        let like = |lamp: usize| (brightness[k] / brightness[lamp] - 1.0).abs() < WHITE;
+        let alike: Vec<usize> = (lamps.iter().copied())
+            .filter(|&lamp| lamp != k && like(lamp))
+            .collect();
+        if white && !alike.is_empty() {
+            doubtful.push(k);
+            doubtful.extend(alike);
+        }
+    }
+    for k in doubtful {
+        objects[k].identifiable = false;
+        objects[k].albedo_identifiable = false;
+        "white surfaces show as much light as a lamp does: which of them gives it cannot be told"
+            .clone_into(&mut objects[k].note);
+    }
+}
+
 /// What to take for an albedo that is hardly known: drawn to the room's typical one by what is believed of any albedo.
 fn drawn(albedo: Vec3, stderr: Vec3, typical: Vec3) -> Vec3 {
     let known = stderr * stderr / (ALBEDO_DEVIATION * ALBEDO_DEVIATION);
@@ -160,5 +191,27 @@ mod tests {
         assert!(at(UNKNOWN_ALBEDO) < 0.02);
         assert!((at(ALBEDO_DEVIATION) - 0.2).abs() < 1e-6);
         assert!((at(f32::INFINITY) - 0.4).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_white_wall_as_bright_as_the_lamp_is_doubted_with_it_and_a_grey_or_darker_one_is_not() {
+        let object = |albedo: f32, emission: f32| ObjectEstimate {
+            albedo: Vec3::splat(albedo),
+            emission: Vec3::splat(emission),
+            seen_pixels: 100,
+            ..Default::default()
+        };
+        let identifiable = |albedo: f32, brightness: f32| {
+            let mut estimate = Estimate {
+                objects: vec![object(0.0, 2.0), object(albedo, 0.0), object(0.5, 0.0)],
+                ..Default::default()
+            };
+            doubt_white(&mut estimate, &[2.0, brightness, 1.0]);
+            assert!(estimate.objects[2].identifiable);
+            [0, 1].map(|k| estimate.objects[k].identifiable)
+        };
+        assert_eq!(identifiable(0.999, 1.995), [false; 2]);
+        assert_eq!(identifiable(0.999, 1.9), [true; 2]);
+        assert_eq!(identifiable(0.9, 1.995), [true; 2]);
     }
 }

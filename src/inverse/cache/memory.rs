@@ -9,8 +9,6 @@ pub const PILOT_CLUSTERS: usize = 64;
 const SHARE: u64 = 4;
 /// Memory where the machine's is not known, in bytes.
 const UNKNOWN: u64 = 8 << 30;
-/// No path is expected to be longer; more vertices than this are measured before they are believed.
-const LONG: u64 = 64;
 
 /// Bytes that stored paths may take: so many GiB, or a quarter of the machine's memory for zero.
 pub fn allowed(gibibytes: f64) -> u64 {
@@ -26,9 +24,9 @@ pub fn allowed(gibibytes: f64) -> u64 {
     known.filter(|&bytes| bytes > 0).unwrap_or(UNKNOWN) / SHARE
 }
 
-/// Whether so many paths fit however long they are.
-pub fn suffices(allowed: u64, paths: u64) -> bool {
-    paths.saturating_mul(LONG * size_of::<Vertex>() as u64) <= allowed
+/// Whether so many paths of at most so many vertices each, in the mean, fit beyond doubt.
+pub fn suffices(allowed: u64, paths: u64, vertices: f32) -> bool {
+    paths as f64 * f64::from(vertices) * size_of::<Vertex>() as f64 <= allowed as f64
 }
 
 /// How many paths fit, if they are like those of a pilot.
@@ -74,6 +72,7 @@ mod tests {
         assert_eq!(allowed(2.0), 2 << 30);
         let part = allowed(0.0);
         assert!((1 << 20..1 << 46).contains(&part), "{part}");
-        assert!(suffices(part, 1000) && !suffices(part, u64::MAX));
+        assert!(suffices(part, 100, 64.0) && !suffices(part, u64::MAX, 1.0));
+        assert!(!suffices(1 << 20, 1000, 1000.0));
     }
 }

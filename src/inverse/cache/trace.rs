@@ -32,6 +32,13 @@ const LEAST_SURVIVAL: f32 = 0.1;
 /// below it.
 const MOST_SURVIVAL: f32 = 0.999;
 
+/// At most so many vertices has a path in the mean where no surface is believed to reflect more than `albedo`.
+pub fn longest_mean_path(albedo: f32) -> f32 {
+    // The camera's vertex, one outside, and a geometric number of bounces once the roulette may end it.
+    let survival = albedo.clamp(LEAST_SURVIVAL, MOST_SURVIVAL);
+    2.0 + ROULETTE_AFTER as f32 + 1.0 / (1.0 - survival)
+}
+
 /// Everything that a path needs and that stays the same while a cache is traced.
 pub struct Tracer<'a> {
     /// Geometry.
@@ -133,6 +140,8 @@ impl Tracer<'_> {
                 ends.push(vertices.len() as u32);
             }
         }
+        // Memory is counted by what is used.
+        vertices.shrink_to_fit();
         (
             CachedCluster {
                 cluster: cluster.clone(),

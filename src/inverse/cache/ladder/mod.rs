@@ -351,6 +351,7 @@ impl Ladder<'_, '_> {
         if let Some(detail) = &self.detail {
             detail.apply(&mut self.estimate);
         }
+        describe::doubt_white(&mut self.estimate, &self.brightness);
         self.describe_known();
     }
 

@@ -8,7 +8,7 @@ use crate::inverse::cache::memory::{self, PILOT_CLUSTERS};
 use crate::inverse::cache::path_noise::share_paths;
 use crate::inverse::cache::prior::ALBEDO_MEAN;
 use crate::inverse::cache::roles::Role;
-use crate::inverse::cache::trace::Tracer;
+use crate::inverse::cache::trace::{Tracer, longest_mean_path};
 use crate::inverse::estimate::TexelEstimate;
 use crate::inverse::measured::MeasuredRadiance;
 use crate::inverse::parameters::Unknowns;
@@ -33,12 +33,17 @@ impl Ladder<'_, '_> {
         let allowed = memory::allowed(self.monitor.settings.memory);
         let surfaces = self.roles.len();
         let mut fits = paths;
-        if !memory::suffices(allowed, paths) {
+        let believed = self.believed();
+        // What has a lobe may reflect all light at a grazing angle.
+        let brightest = match self.lobes.iter().any(Option::is_some) {
+            true => 1.0,
+            false => believed.iter().copied().fold(0.0, f32::max),
+        };
+        if !memory::suffices(allowed, paths, longest_mean_path(brightest)) {
             // A few paths of the same kind tell how long they are.
             share_paths(&mut self.clusters, surfaces, 0);
             let step = self.clusters.len().div_ceil(PILOT_CLUSTERS).max(1);
             let pilot: Vec<_> = self.clusters.iter().step_by(step).cloned().collect();
-            let believed = self.believed();
             let pilot = self
                 .tracer(lights, measured, &believed, stage, 0)
                 .trace(&pilot, &self.widths);
