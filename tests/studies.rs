@@ -127,8 +127,8 @@ fn both_samplings_together_have_no_more_gradient_variance_than_the_worse_of_them
     let findings = quick("mis");
     let courses = rows("mis", &findings, "");
     let kinds: BTreeSet<String> = column(&courses, "sampling").into_iter().collect();
-    // Two rooms by three samplings, and the transport cache.
-    assert_eq!(kinds.len(), 7, "{kinds:?}");
+    // Three rooms by three samplings, and the transport cache.
+    assert_eq!(kinds.len(), 10, "{kinds:?}");
     let rows = rows("mis", &findings, "-variance");
     let (scenes, samplings) = (column(&rows, "scene"), column(&rows, "sampling"));
     let variances = numbers(&rows, "variance");
@@ -137,7 +137,7 @@ fn both_samplings_together_have_no_more_gradient_variance_than_the_worse_of_them
         let place = all.find(|&i| scenes[i] == scene && samplings[i] == sampling);
         variances[place.expect("a row")]
     };
-    for scene in ["small lamp", "large lamp"] {
+    for scene in ["small lamp", "large lamp", "rough board near a lamp"] {
         let [both, light, bsdf] = ["mis", "emitter", "bsdf"].map(|s| of(scene, s));
         assert!(
             both > 0.0 && both < light.max(bsdf),
@@ -146,6 +146,9 @@ fn both_samplings_together_have_no_more_gradient_variance_than_the_worse_of_them
     }
     // A small lamp is hardly met by chance.
     assert!(of("small lamp", "bsdf") > 2.0 * of("small lamp", "emitter"));
+    // What a narrow lobe reflects is hardly met by points on a lamp.
+    let [both, light] = ["mis", "emitter"].map(|s| of("rough board near a lamp", s));
+    assert!(both < 0.8 * light, "{both} {light}");
 }
 
 #[test]

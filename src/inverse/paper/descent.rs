@@ -13,6 +13,7 @@ use crate::math::rng::Stream;
 use crate::scene::Scene;
 use crate::transport::arrival::Cast;
 use crate::transport::emitters::Emitters;
+use crate::transport::material::Lobe;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -48,6 +49,9 @@ pub struct Descent {
     pub halvings: u32,
     adam: Adam,
     steps: u64,
+    /// For each object its rough specular lobe, where it has one that is known; empty where none has.
+    #[serde(skip)]
+    lobes: Vec<Option<Lobe>>,
     #[serde(skip)]
     emitters: Option<Emitters>,
 }
@@ -101,8 +105,20 @@ impl Descent {
             halvings: 0,
             adam: Adam::new(2 * surfaces),
             steps: 0,
+            lobes: Vec::new(),
             emitters: None,
         }
+    }
+
+    /// The same with lobes that are known, one entry an object: what has one reflects by it, and gives no light.
+    pub fn with_lobes(mut self, lobes: Vec<Option<Lobe>>) -> Self {
+        self.lobes = lobes;
+        self
+    }
+
+    /// The lobe of an object, where it is known to have one.
+    pub fn lobe(&self, object: usize) -> Option<Lobe> {
+        self.lobes.get(object).copied().flatten()
     }
 
     /// Whether the state is one of this scene's.
@@ -139,6 +155,7 @@ impl Descent {
             halvings: self.halvings.saturating_sub(REFINED),
             adam: Adam::new(2 * parents.len()),
             steps: self.steps,
+            lobes: self.lobes.clone(),
             emitters: None,
         }
     }
@@ -213,7 +230,7 @@ impl Descent {
             surface_of,
             believed_albedo: &believed,
             texels: None,
-            lobes: &[],
+            lobes: &self.lobes,
             patches: None,
             sky: None,
             outside: None,

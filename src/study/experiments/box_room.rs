@@ -7,7 +7,7 @@ use crate::room::photographs::Rendering;
 use crate::room::shape::Modeller;
 use crate::scene::geometry::Hit;
 use crate::study::experiments::subject::Subject;
-use crate::transport::material::Material;
+use crate::transport::material::{Lobe, Material};
 use glam::{DVec3, Vec3};
 
 /// Key of the photographs' noise, far from those of solvers.
@@ -26,6 +26,14 @@ const VIEWS: [[[f64; 3]; 2]; 6] = [
     [[-0.8, 0.9, 0.5], [0.9, 0.5, 0.3]],
     [[0.6, 0.4, 0.6], [-0.1, 1.9, -0.2]],
     [[0.85, 1.5, 0.0], [-0.9, 0.4, 0.0]],
+];
+
+/// The rough object of [`board_room`].
+const BOARD: &str = "board";
+/// Eyes and targets of the photographs in which the lamp is reflected by it.
+const BOARD_VIEWS: [[[f64; 3]; 2]; 2] = [
+    [[0.8, 1.5, -0.8], [0.1, 1.0, -0.1]],
+    [[-0.7, 1.7, 0.5], [0.2, 1.0, -0.2]],
 ];
 
 /// A box of 2 m with six coloured sides, a block and a square lamp of half side `lamp` below the ceiling. The mean
@@ -88,6 +96,22 @@ pub fn furnished(
     }
 }
 
+/// The same with a rough board below the lamp in the place of the block, and two photographs more that look at it.
+pub fn board_room(name: &str, albedo: f64, lamp: f64, lobe: Lobe) -> Room {
+    let board = |modeller: &mut Modeller| {
+        let (middle, half) = (DVec3::new(0.1, 0.95, -0.1), DVec3::new(0.5, 0.05, 0.5));
+        modeller.rounded_box(middle, half, 0.0, 0);
+    };
+    let mut room = furnished(name, albedo, lamp, BOARD, board);
+    let objects = room.mesh.objects.iter().zip(&mut room.materials);
+    for (_, material) in objects.filter(|(object, _)| *object == BOARD) {
+        material.lobe = Some(lobe);
+    }
+    let views = BOARD_VIEWS.iter().map(|view| view.map(DVec3::from));
+    room.views.extend(views);
+    room
+}
+
 /// A room's true values; its materials have one colour each.
 pub fn truth(room: &Room) -> Unknowns {
     let anywhere = Hit {
@@ -103,11 +127,19 @@ pub fn truth(room: &Room) -> Unknowns {
     }
 }
 
-/// The room, photographed with all bounces: small and coarse where `quick`.
+/// The box room, photographed as by [`photograph`].
 ///
 /// # Errors
 /// Never for a lamp that fits below the ceiling.
 pub fn photographed(name: &str, albedo: f64, lamp: f64, quick: bool) -> Result<Subject> {
+    photograph(&box_room(name, albedo, lamp), quick)
+}
+
+/// A room, photographed with all bounces: small and coarse where `quick`.
+///
+/// # Errors
+/// The room's mesh holds nothing to see.
+pub fn photograph(room: &Room, quick: bool) -> Result<Subject> {
     let (size, samples) = if quick {
         ([32, 24], 32)
     } else {
@@ -118,7 +150,7 @@ pub fn photographed(name: &str, albedo: f64, lamp: f64, quick: bool) -> Result<S
         samples,
         size,
     };
-    Subject::of_room(&box_room(name, albedo, lamp), &rendering)
+    Subject::of_room(room, &rendering)
 }
 
 #[cfg(test)]

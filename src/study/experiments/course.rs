@@ -10,6 +10,7 @@ use crate::inverse::solver::{Problem, Solution};
 use crate::study::experiments::{Bench, Limits, Subject};
 use crate::study::trade::plan::Run;
 use crate::study::trade::watch;
+use crate::transport::material::Lobe;
 use std::time::{Duration, Instant};
 
 /// Rays at the first mark, and the factor from mark to mark.
@@ -54,6 +55,7 @@ pub struct Gauge<'a> {
     subject: &'a Subject,
     probe: LossProbe,
     watched: Option<&'a str>,
+    lobes: Vec<Option<Lobe>>,
 }
 
 impl<'a> Gauge<'a> {
@@ -65,7 +67,14 @@ impl<'a> Gauge<'a> {
             subject,
             probe,
             watched: None,
+            lobes: Vec::new(),
         }
+    }
+
+    /// The same for descents that know the objects' lobes.
+    pub fn knowing(mut self, lobes: Vec<Option<Lobe>>) -> Self {
+        self.lobes = lobes;
+        self
     }
 
     /// The same, watching an object.
@@ -105,18 +114,19 @@ impl<'a> Gauge<'a> {
 pub fn descend(bench: &Bench, gauge: &Gauge, settings: &Settings, limits: Limits) -> Vec<Mark> {
     let problem = &gauge.subject.problem;
     let mut step = |descent: &mut Descent| descent.step(problem, settings, settings.max_bounces());
-    descend_by(bench, gauge, limits, &mut step)
+    let start = Descent::new(problem, Grain::Objects).with_lobes(gauge.lobes.clone());
+    descend_by(bench, gauge, start, limits, &mut step)
 }
 
-/// The same with steps of one's own.
+/// The same from a start and with steps of one's own.
 pub fn descend_by(
     bench: &Bench,
     gauge: &Gauge,
+    start: Descent,
     limits: Limits,
     step: &mut dyn FnMut(&mut Descent) -> StepOutcome,
 ) -> Vec<Mark> {
-    let problem = &gauge.subject.problem;
-    let mut descent = Descent::new(problem, Grain::Objects);
+    let mut descent = start;
     let (mut rays, mut steps, mut seconds) = (0, 0, 0.0);
     let mut marks = Vec::new();
     loop {
@@ -161,10 +171,12 @@ fn mark_at(rays: u64) -> Option<u32> {
 pub fn estimate(descent: &Descent) -> Estimate {
     let values = descent.unknowns.albedo.iter().zip(&descent.lights);
     Estimate {
-        objects: values
-            .map(|(&albedo, &emission)| ObjectEstimate {
+        objects: (values.enumerate())
+            .map(|(object, (&albedo, &emission))| ObjectEstimate {
                 albedo,
                 emission,
+                roughness: descent.lobe(object).map(|lobe| lobe.roughness),
+                specular: descent.lobe(object).map(|lobe| lobe.specular.x),
                 ..ObjectEstimate::default()
             })
             .collect(),

@@ -10,6 +10,7 @@ use crate::math::rng::Stream;
 use crate::math::stats::Moments;
 use crate::scene::Scene;
 use crate::transport::emitters::Emitters;
+use crate::transport::material::Lobe;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -30,11 +31,12 @@ pub struct Noise {
     pub rays: f64,
 }
 
-/// Measures the noise at given unknowns, one a object, on `pixels` pixels spread over all photographs with `paths` paths
-/// each.
+/// Measures the noise at given unknowns and lobes, one an object, on `pixels` pixels spread over all photographs with
+/// `paths` paths each. Lobes are held.
 pub fn noise(
     problem: &Problem,
     unknowns: &Unknowns,
+    lobes: &[Option<Lobe>],
     sampling: LightSampling,
     pixels: usize,
     paths: u64,
@@ -42,7 +44,10 @@ pub fn noise(
     let scene = &*problem.scene;
     let lights = lamps(scene, &unknowns.emission);
     let believed = vec![1.0; unknowns.surfaces()];
-    let tracer = tracer(scene, &lights, &believed, sampling, BOUNCES);
+    let tracer = Tracer {
+        lobes,
+        ..tracer(scene, &lights, &believed, sampling, BOUNCES)
+    };
     let all: Vec<(usize, usize)> = (problem.photographs.iter().enumerate())
         .flat_map(|(frame, photograph)| {
             (0..photograph.pixels.len()).map(move |pixel| (frame, pixel))

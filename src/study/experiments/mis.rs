@@ -4,6 +4,7 @@ use crate::error::Result;
 use crate::export::plot::Plot;
 use crate::export::table::Table;
 use crate::inverse::settings::{LightSampling, Settings};
+use crate::room::Room;
 use crate::study::experiments::course::{
     Errors, Gauge, Mark, cache_settings, cached, descend, paper_settings,
 };
@@ -11,19 +12,43 @@ use crate::study::experiments::courses::{self, Kind, Spread, common_mark, plot, 
 use crate::study::experiments::findings::brief;
 use crate::study::experiments::gradient::{Noise, noise};
 use crate::study::experiments::{Bench, Findings, Study, Summary, box_room};
+use crate::transport::material::Lobe;
+use glam::Vec3;
 
 /// The study.
 pub const STUDY: Study = Study {
     name: "mis",
     question: "The paper: multiple importance sampling speeds convergence markedly. Against light sampling alone and BSDF \
-        sampling alone, under a small lamp and a large one.",
+        sampling alone, under a small lamp and a large one, and with a rough surface near a lamp.",
     takes_capture: false,
     seeds: 5,
     run,
 };
 
-/// Rooms by their lamp's half side in metres.
-const LAMPS: [(&str, f64); 2] = [("small lamp", 0.1), ("large lamp", 0.85)];
+/// The rooms.
+const ROOMS: [Lighting; 3] = [
+    Lighting {
+        name: "small lamp",
+        files: ["", "-seconds"],
+        lamp: 0.1,
+        board: None,
+    },
+    Lighting {
+        name: "large lamp",
+        files: ["-large", "-large-seconds"],
+        lamp: 0.85,
+        board: None,
+    },
+    Lighting {
+        name: "rough board near a lamp",
+        files: ["-rough", "-rough-seconds"],
+        lamp: 0.4,
+        board: Some(Lobe {
+            roughness: 0.1,
+            specular: Vec3::splat(0.3),
+        }),
+    },
+];
 /// Mean albedo of the rooms.
 const ALBEDO: f64 = 0.5;
 const SAMPLINGS: [LightSampling; 3] = [
@@ -34,23 +59,48 @@ const SAMPLINGS: [LightSampling; 3] = [
 /// A mean apart from another by less than this factor is as good.
 const AS_GOOD: f64 = 1.05;
 
-/// One room under one lamp.
+/// How one of the rooms is lit.
+struct Lighting {
+    name: &'static str,
+    /// What the names of its plots over rays and over seconds end with.
+    files: [&'static str; 2],
+    /// Half side of the lamp in metres.
+    lamp: f64,
+    /// Lobe of a board below the lamp; `None` where all is diffuse.
+    board: Option<Lobe>,
+}
+
+impl Lighting {
+    fn room(&self) -> Room {
+        match self.board {
+            Some(lobe) => box_room::board_room(self.name, ALBEDO, self.lamp, lobe),
+            None => box_room::box_room(self.name, ALBEDO, self.lamp),
+        }
+    }
+}
+
+/// What was measured in one room.
 struct Scene {
     name: &'static str,
+    files: [&'static str; 2],
     kinds: Vec<Kind>,
     noises: Vec<Noise>,
     cache: Vec<Mark>,
 }
 
 fn run(bench: &Bench) -> Result<Findings> {
-    let limits = bench.limits(LAMPS.len() * SAMPLINGS.len() * bench.seeds as usize);
+    let limits = bench.limits(ROOMS.len() * SAMPLINGS.len() * bench.seeds as usize);
     let (pixels, paths) = if bench.quick { (300, 128) } else { (1000, 512) };
     let mut scenes = Vec::new();
-    for (name, lamp) in LAMPS {
+    for lighting in &ROOMS {
+        let name = lighting.name;
         bench.begin(name)?;
-        let subject = box_room::photographed(name, ALBEDO, lamp, bench.quick)?;
-        let truth = box_room::truth(&box_room::box_room(name, ALBEDO, lamp));
-        let gauge = Gauge::new(&subject, paper_settings(1).max_bounces());
+        let room = lighting.room();
+        let subject = box_room::photograph(&room, bench.quick)?;
+        let truth = box_room::truth(&room);
+        let lobes: Vec<Option<Lobe>> = room.materials.iter().map(|m| m.lobe).collect();
+        let bounces = paper_settings(1).max_bounces();
+        let gauge = Gauge::new(&subject, bounces).knowing(lobes.clone());
         let deep = Gauge::new(&subject, u32::MAX);
         let course = |index: usize, seed| {
             let settings = Settings {
@@ -63,14 +113,20 @@ fn run(bench: &Bench) -> Result<Findings> {
         let over_rays = |kinds: &[Kind]| drawn(name, "rays", |mark| mark.rays as f64, kinds, &[]);
         let kinds = courses::run(bench, names, course, over_rays)?;
         bench.begin(&format!("{name}, variance of gradients"))?;
-        let of =
-            |sampling: &LightSampling| noise(&subject.problem, &truth, *sampling, pixels, paths);
+        let of = |sampling: &LightSampling| {
+            noise(&subject.problem, &truth, &lobes, *sampling, pixels, paths)
+        };
+        let cache = |seed| Settings {
+            lobes: lighting.board.is_some(),
+            ..cache_settings(seed, bench.quick)
+        };
         scenes.push(Scene {
             name,
+            files: lighting.files,
             kinds,
             noises: SAMPLINGS.iter().map(of).collect(),
             cache: (bench.seeds())
-                .map(|seed| cached(bench, &deep, &cache_settings(seed, bench.quick)))
+                .map(|seed| cached(bench, &deep, &cache(seed)))
                 .collect::<Result<_>>()?,
         });
     }
@@ -83,21 +139,29 @@ fn run(bench: &Bench) -> Result<Findings> {
         .flat_map(|scene| scene.cache.clone())
         .collect();
     let mut plots = Vec::new();
-    for (scene, (over_rays, over_seconds)) in scenes
-        .iter()
-        .zip([("", "-seconds"), ("-large", "-large-seconds")])
-    {
+    for scene in &scenes {
         let draw = |label, x| drawn(scene.name, label, x, &scene.kinds, &scene.cache);
+        let [over_rays, over_seconds] = scene.files;
         plots.push((over_rays, draw("rays", |mark| mark.rays as f64)));
         plots.push((over_seconds, draw("seconds", |mark| mark.seconds)));
     }
     Ok(Findings {
         how: format!(
             "The paper's descent (batches of 8, two bounces, nothing annealed) in a box room of mean albedo {ALBEDO} under \
-             a lamp of half side {} m and one of {} m with the same power, {} seeds. The variance is that of one path's \
-             derivative of a pixel's radiance at the true values, summed over unknowns. All surfaces are diffuse. \
+             a lamp of half side {} m and one of {} m with the same power, and in one whose lamp of {} m hangs above a rough \
+             board (GGX, {}) whose lobe the descent knows and the transport cache has to find, {} seeds. The variance is \
+             that of one path's derivative of a pixel's radiance at the true values, summed over unknowns, lobes held. \
              Seconds are those of this machine and whatever else ran on it; rays are the fairer axis.",
-            LAMPS[0].1, LAMPS[1].1, bench.seeds,
+            ROOMS[0].lamp,
+            ROOMS[1].lamp,
+            ROOMS[2].lamp,
+            ROOMS[2].board.map_or_else(String::new, |lobe| {
+                format!(
+                    "roughness {}, specular reflectance {}",
+                    lobe.roughness, lobe.specular.x
+                )
+            }),
+            bench.seeds,
         ),
         tables: vec![
             ("", table("sampling", &kinds, &cache)),

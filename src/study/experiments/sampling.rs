@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::export::plot::{Axis, Plot, Series};
 use crate::export::table::Table;
-use crate::inverse::paper::descent::Descent;
+use crate::inverse::paper::descent::{Descent, Grain};
 use crate::inverse::settings::Settings;
 use crate::study::experiments::course::{
     Gauge, Mark, descend, descend_by, estimate, paper_settings, rays_at,
@@ -132,7 +132,8 @@ fn descent(
         outcome.cast.rays += rays;
         outcome
     };
-    descend_by(bench, gauge, limits, &mut step)
+    let start = Descent::new(problem, Grain::Objects);
+    descend_by(bench, gauge, start, limits, &mut step)
 }
 
 fn of_paths(evenness: &[Evenness]) -> Table {
