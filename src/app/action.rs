@@ -125,6 +125,9 @@ actions! {
     SolveOn, Solve, "Solve on with pinned values", "Holds the pinned values and solves the rest on from the last stage", ctrl_shift(Key::R);
     ResetMaterial, Edit, "Reset material", "Puts the selected object back to what was found", None;
     ResetEdits, Edit, "Reset all materials", "Puts all objects and the light from outside back to what was found", None;
+    JoinObjects, Edit, "Join objects", "Makes one object of those that are chosen; Ctrl and a click choose more than one", ctrl(Key::J);
+    CutOut, Edit, "Cut out by lasso…", "A line drawn around faces in the 3D view makes them an object of their own, of the chosen objects alone where any are", ctrl_shift(Key::X);
+    RenameObject, Edit, "Rename object", "Puts the name of the selected object up for change, in the table of objects", key(Key::F2);
     Deselect, Edit, "Deselect", "Selects nothing and ends placing", key(Key::Escape);
 
     RunPause, Solve, "Run / Pause", "Starts, holds or goes on with the solve", key(Key::Space);

@@ -4,6 +4,7 @@ use crate::app::insertion::Inserted;
 use crate::app::mixer::Mix;
 use crate::app::state::App;
 use crate::app::undo::History;
+use crate::capture::regroup::Regroup;
 use crate::session::command::Command;
 use crate::session::edits::{Edits, ObjectEdit};
 use crate::session::snapshot::LightSource;
@@ -15,6 +16,7 @@ use glam::Vec3;
 pub struct Document {
     inserted: Vec<Inserted>,
     mix: Mix,
+    objects: Vec<Regroup>,
     edits: Edits,
 }
 
@@ -23,6 +25,7 @@ impl App {
         Document {
             inserted: self.insertions.objects.clone(),
             mix: self.mixer.mix.clone(),
+            objects: self.grouping.changes.clone(),
             edits: self.edits.clone(),
         }
     }
@@ -30,6 +33,7 @@ impl App {
     fn restore(&mut self, document: Document) {
         self.insertions.replace(document.inserted);
         self.mixer.mix = document.mix;
+        self.grouping.changes = document.objects;
         self.edits = document.edits;
     }
 

@@ -4,6 +4,7 @@ pub mod action;
 pub mod batch;
 pub mod connection;
 pub mod document;
+pub mod grouping;
 pub mod insertion;
 pub mod layout;
 pub mod mixer;

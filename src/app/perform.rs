@@ -26,6 +26,9 @@ impl App {
             Action::SwitchLamp => self.can_switch_lamp(),
             Action::ResetMaterial => self.can_reset_material(),
             Action::TakeUp => self.snapshot.earlier.is_some(),
+            Action::JoinObjects => self.can_regroup() && self.chosen_objects().len() > 1,
+            Action::RenameObject => self.can_regroup() && self.selected.is_some(),
+            Action::CutOut => self.can_regroup(),
             Action::SolveOn => !self.edits.known().is_empty(),
             Action::ResetEdits => !self.edits.is_empty(),
             Action::KeepMix | Action::ResetMix => !self.mixer.mix.is_neutral(),
@@ -112,13 +115,22 @@ impl App {
             Action::Material => self.bring_forward = Some(Pane::Material),
             Action::SwitchLamp => self.switch_lamp(),
             Action::ResetMaterial => self.reset_material(),
+            Action::JoinObjects => self.join_objects(),
+            Action::CutOut => {
+                self.bring_forward = Some(Pane::Model);
+                self.pick(Pick::Lasso);
+            }
+            Action::RenameObject => {
+                self.bring_forward = Some(Pane::Objects);
+                self.grouping.naming = true;
+            }
             Action::ResetEdits => self.edits = Edits::default(),
             Action::ResetMix => self.mixer.mix = Mix::default(),
             Action::Deselect => {
                 // What covers the panes goes first.
                 let open = !matches!(self.sheet, Sheet::Closed);
                 if !(open || self.keys || self.palette.is_some() || self.start_page) {
-                    self.selected = None;
+                    self.choose(None, false);
                     self.insertions.placing = false;
                     self.picking = None;
                 }

@@ -17,6 +17,8 @@ pub enum Pick {
     Length(Option<DVec3>),
     /// A surface that is the ground.
     Ground,
+    /// Faces that become an object of their own, by a line around them.
+    Lasso,
 }
 
 impl Pick {
@@ -27,6 +29,7 @@ impl Pick {
             Self::Length(None) => "Click one end of a length that you know",
             Self::Length(Some(_)) => "Click its other end",
             Self::Ground => "Click the ground",
+            Self::Lasso => "Draw around faces in the 3D view to cut them out",
         }
     }
 }
@@ -73,10 +76,10 @@ impl App {
         Clicked::new(scene, &ray, &scene.intersect(&ray)?)
     }
 
-    /// Does what a click on a surface, or past all of them, is for.
-    pub fn clicked(&mut self, clicked: Option<Clicked>) {
+    /// Does what a click on a surface, or past all of them, is for; `more` chooses objects besides those chosen before.
+    pub fn clicked(&mut self, clicked: Option<Clicked>, more: bool) {
         let Some(clicked) = clicked else {
-            self.selected = None;
+            self.choose(None, more);
             return;
         };
         if let Some(pick) = self.picking.take() {
@@ -84,7 +87,7 @@ impl App {
         } else if self.insertions.placing && self.insertions.place(clicked.point) {
             self.insertions.placing = false;
         } else {
-            self.select(Some(clicked.object));
+            self.select(Some(clicked.object), more);
         }
     }
 
@@ -99,6 +102,8 @@ impl App {
             return;
         };
         match pick {
+            // A click encloses nothing.
+            Pick::Lasso => self.pick(Pick::Lasso),
             Pick::Probe => {
                 let off = f64::from(capture.scene.diameter) * OFF_SURFACE;
                 self.sheet = Sheet::probe(&capture.name, clicked.point + clicked.normal * off);

@@ -3,6 +3,7 @@
 use crate::app::batch::Batch;
 use crate::app::connection::Connection;
 use crate::app::document::Document;
+use crate::app::grouping::Grouping;
 use crate::app::insertion::Insertions;
 use crate::app::layout::Pane;
 use crate::app::mixer::Mixer;
@@ -64,6 +65,8 @@ pub struct App {
     pub insertions: Insertions,
     /// The light mixer.
     pub mixer: Mixer,
+    /// Which faces are one object.
+    pub grouping: Grouping,
     /// Changes made by hand to what was found.
     pub edits: Edits,
     /// The estimate with those changes.
@@ -145,6 +148,7 @@ impl App {
             selected: None,
             insertions: Insertions::default(),
             mixer: Mixer::default(),
+            grouping: Grouping::default(),
             edits: Edits::default(),
             estimate: Arc::default(),
             history: History::default(),
@@ -273,6 +277,7 @@ impl App {
         self.take_batch();
         self.take_models(ctx);
         self.request();
+        self.send_grouping();
         self.send_edits();
         self.flush();
         if !self.pending.is_empty() {
@@ -294,9 +299,22 @@ impl App {
         if self.snapshot.phase == Phase::Failed {
             self.opening = None;
         }
-        if other_capture {
+        let (old, new) = (before.capture.as_deref(), self.snapshot.capture.as_deref());
+        if other_capture && self.grouping.made(old, new) {
+            self.objects_changed();
+        } else if other_capture {
             self.capture_changed();
         }
+    }
+
+    /// Takes in the capture that was open with other objects: what is looked at and all steps of editing stay.
+    fn objects_changed(&mut self) {
+        self.selected = None;
+        self.grouping.also.clear();
+        self.picking = None;
+        self.sent_view = None;
+        self.model.remake();
+        self.trade_of_capture();
     }
 
     fn capture_changed(&mut self) {
@@ -308,6 +326,7 @@ impl App {
         self.photograph = None;
         self.insertions.take_up(&self.snapshot.inserted);
         self.mixer = Mixer::default();
+        self.grouping = Grouping::of(self.capture().map(Arc::as_ref));
         self.take_edits();
         self.sent_insertions = self.insertions.placements();
         self.model = ModelView::default();

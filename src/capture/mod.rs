@@ -9,6 +9,7 @@ pub mod mesh;
 pub mod photograph;
 pub mod place;
 pub mod read;
+pub mod regroup;
 pub mod segment;
 pub mod truth;
 pub mod working;

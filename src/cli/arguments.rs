@@ -133,14 +133,20 @@ impl SolveOptions {
 impl ReadOptions {
     /// The same for the session.
     pub fn open(&self) -> OpenOptions {
+        self.over(OpenOptions::default())
+    }
+
+    /// The same, with what is not said here as it was before.
+    pub fn over(&self, before: OpenOptions) -> OpenOptions {
         OpenOptions {
-            up: self.up,
+            up: self.up.or(before.up),
             coordinates: Coordinates {
-                scale: self.scale,
-                ground: None,
+                scale: self.scale.or(before.coordinates.scale),
+                ..before.coordinates
             },
-            segments: self.segments,
+            segments: self.segments.or(before.segments),
             allow_outside: self.allow_outside,
+            ..before
         }
     }
 }

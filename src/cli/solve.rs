@@ -39,7 +39,9 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
     let settings = options.parameters.over(&base.unwrap_or_default());
 
     // Read the capture.
-    let capture = Arc::new(open(source, &options.read.open())?);
+    let before = earlier.as_ref().map(|earlier| earlier.options.clone());
+    let read = options.read.over(before.unwrap_or_default());
+    let capture = Arc::new(open(source, &read)?);
     let seconds_load = started.elapsed().as_secs_f64();
     eprintln!("{}: {}", capture.name, capture.summary.join(", "));
     for warning in &capture.warnings {

@@ -1,6 +1,7 @@
 //! What the window or the command line asks of the worker.
 
 use crate::capture::place::Coordinates;
+use crate::capture::regroup::Regroup;
 pub use crate::compose::placement::Placement;
 pub use crate::export::scene::Format as ExportFormat;
 use crate::inverse::settings::Settings;
@@ -70,6 +71,9 @@ pub enum Command {
     Resume(PathBuf),
     /// Reads the open capture again with other options, keeping what was found and changed.
     Reframe(Box<OpenOptions>),
+    /// Changes the objects of the open capture: all changes since it was read, in place of those before. What was found
+    /// of other objects is forgotten, and the solve starts over.
+    Regroup(Vec<Regroup>),
     /// Ends the worker.
     Quit,
 }
@@ -116,6 +120,9 @@ pub struct OpenOptions {
     pub coordinates: Coordinates,
     /// Number of segments that a mesh without objects is cut into; `None` chooses.
     pub segments: Option<u64>,
+    /// How its objects were changed by hand.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub objects: Vec<Regroup>,
     /// Whether paths in the capture may lead out of its folder. Never kept in files, which may be someone else's.
     #[serde(skip)]
     pub allow_outside: bool,

@@ -108,6 +108,19 @@ impl Edits {
         }
     }
 
+    /// The same changes where the objects have other places; those of objects that are no more are left out.
+    pub fn moved(&self, places: &[Option<u32>]) -> Self {
+        let objects = self.objects.iter();
+        Self {
+            objects: objects
+                .filter_map(|(&object, edit)| {
+                    Some((*places.get(object)?.as_ref()? as usize, *edit))
+                })
+                .collect(),
+            outside: self.outside,
+        }
+    }
+
     /// What is known of the scene, and held while the rest is solved.
     pub fn known(&self) -> Known {
         let mut known = Known::default();

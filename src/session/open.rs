@@ -3,6 +3,7 @@
 use crate::capture::Capture;
 use crate::capture::photograph::PhotographSource;
 use crate::capture::read::{ReadOptions, read};
+use crate::capture::regroup::regroup;
 use crate::capture::working::load_working;
 use crate::error::{Error, Result};
 use crate::room;
@@ -42,7 +43,8 @@ impl OpenCapture {
     pub fn new(source: Source, options: OpenOptions, capture: Capture) -> Result<Self> {
         // Results belong to a capture in whatever coordinates.
         let hash = hash(&capture)?;
-        let capture = capture.placed(options.up, &options.coordinates)?;
+        let mut capture = capture.placed(options.up, &options.coordinates)?;
+        regroup(&mut capture.mesh, &options.objects)?;
         let working = load_working(&capture, WORKING_PIXELS)?;
         let prepared = prepare(&capture, &working)?;
         Ok(Self {

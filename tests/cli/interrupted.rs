@@ -38,6 +38,24 @@ fn a_resumed_solve_ends_like_one_that_was_never_interrupted() {
     assert_eq!(iterations, ["0", "20", "40"]);
 }
 
+#[test]
+fn a_resumed_solve_reads_the_capture_as_it_was_read_before() {
+    let place = Place::new();
+    let arguments = [
+        "solve", "room", "--preset", "paper", "--views", "none", "--out", "out",
+    ];
+    let scale = || {
+        let file = fs::read(place.path("out/estimate.json")).expect("reads");
+        let file: Value = serde_json::from_slice(&file).expect("JSON");
+        file["capture"]["options"]["scale"].as_f64()
+    };
+    done(&place.relit(&[&arguments[..], &["--steps", "5", "--scale", "2"]].concat()));
+    done(&place.relit(&[&arguments[..], &["--steps", "10", "--resume"]].concat()));
+    assert_eq!(scale(), Some(2.0));
+    done(&place.relit(&[&arguments[..], &["--steps", "5"]].concat()));
+    assert_eq!(scale(), None);
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupt_ends_the_solve_cleanly_with_its_results() {

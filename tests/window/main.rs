@@ -3,6 +3,7 @@
 
 mod connection;
 mod flows;
+mod grouping;
 mod input;
 mod light;
 mod names;

@@ -2,6 +2,7 @@
 
 pub mod coloring;
 pub mod gpu;
+pub mod lasso;
 pub mod orbit;
 pub mod overlay;
 pub mod pane;

@@ -13,13 +13,13 @@ use glam::{Mat4, Vec2, Vec3};
 const CAMERAS: usize = 200;
 
 /// Scene points to points of the screen.
-struct Projection {
+pub(super) struct Projection {
     clip_from_scene: Mat4,
     rect: Rect,
 }
 
 impl Projection {
-    fn new(app: &App, scene: &Scene, rect: Rect) -> Self {
+    pub fn new(app: &App, scene: &Scene, rect: Rect) -> Self {
         Self {
             clip_from_scene: app.model.orbit.clip_from_scene(scene),
             rect,
@@ -27,7 +27,7 @@ impl Projection {
     }
 
     /// `None` behind the eye.
-    fn at(&self, point: Vec3) -> Option<Pos2> {
+    pub fn at(&self, point: Vec3) -> Option<Pos2> {
         let clip = self.clip_from_scene * point.extend(1.0);
         (clip.w > 0.0 && clip.z < clip.w).then(|| {
             pos2(
@@ -78,6 +78,11 @@ pub fn draw(ui: &Ui, app: &App, capture: &OpenCapture, rect: Rect) {
     }
     app.insertions
         .draw_handles(&painter, scene, tokens, true, |p| projection.at(p));
+    let line = &app.model.lasso.line;
+    if line.len() > 1 {
+        let closed = line.iter().chain(line.first()).copied().collect();
+        painter.line(closed, Stroke::new(2.0, tokens.accent));
+    }
 }
 
 /// Takes the handle of an inserted object under the pointer.

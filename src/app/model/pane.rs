@@ -3,8 +3,9 @@
 use crate::app::insertion::handles::Along;
 use crate::app::model::coloring::Coloring;
 use crate::app::model::gpu::{MeshPaint, SceneUniform};
-use crate::app::model::overlay;
-use crate::app::pick::Clicked;
+use crate::app::model::lasso::Lasso;
+use crate::app::model::overlay::{self, Projection};
+use crate::app::pick::{Clicked, Pick};
 use crate::app::picture::gpu::rgba;
 use crate::app::picture::look::ToneCurve;
 use crate::app::state::{App, Shown};
@@ -123,13 +124,18 @@ fn under(app: &App, scene: &Scene, pixel: Vec2) -> Option<Hit> {
 /// Orbit, pan, zoom and fly.
 fn steer(ui: &Ui, app: &mut App, scene: &Scene, response: &Response) {
     let per_point = ui.pixels_per_point();
+    if app.picking == Some(Pick::Lasso) && response.drag_stopped_by(PointerButton::Primary) {
+        cut_out(ui, app, scene, response.rect);
+    }
     let drag = response.drag_delta() * per_point;
     let drag = Vec2::new(drag.x, drag.y);
     let shift = ui.input(|input| input.modifiers.shift);
     if move_object(ui, app, scene, response) {
         return;
     }
-    if response.dragged_by(PointerButton::Primary) && !shift {
+    if app.picking == Some(Pick::Lasso) && response.dragged_by(PointerButton::Primary) {
+        draw_lasso(ui, app, response);
+    } else if response.dragged_by(PointerButton::Primary) && !shift {
         app.model.orbit.turn(drag);
     } else if response.dragged() {
         app.model.orbit.pan(drag);
@@ -169,6 +175,32 @@ fn steer(ui: &Ui, app: &mut App, scene: &Scene, response: &Response) {
         app.model.orbit.fly(steps * speed * dt);
         ui.ctx().request_repaint();
     }
+}
+
+/// Goes on with the line to where the pointer is.
+fn draw_lasso(ui: &Ui, app: &mut App, response: &Response) {
+    if response.drag_started() {
+        app.model.lasso = Lasso::default();
+        let press = ui.input(|input| input.pointer.press_origin());
+        press.into_iter().for_each(|at| app.model.lasso.draw(at));
+    }
+    if let Some(pointer) = response.interact_pointer_pos() {
+        app.model.lasso.draw(pointer);
+    }
+}
+
+/// Makes what the line encloses an object of its own: of the chosen objects alone, where any are.
+fn cut_out(ui: &Ui, app: &mut App, scene: &Scene, rect: Rect) {
+    let lasso = std::mem::take(&mut app.model.lasso);
+    let chosen = app.chosen_objects();
+    let object_of = |face: u32| scene.object_of[face as usize];
+    let faces = (0..scene.triangles.len() as u32)
+        .filter(|&face| chosen.is_empty() || chosen.contains(&object_of(face)));
+    let projection = Projection::new(app, scene, rect);
+    let seen = |at| under(app, scene, pixel(ui, rect, at));
+    let enclosed = lasso.enclosed(scene, faces, |point| projection.at(point), seen);
+    app.picking = None;
+    app.cut_out(enclosed);
 }
 
 /// Drags a handle of an inserted object; false while none is held.
@@ -217,5 +249,6 @@ fn click(ui: &Ui, app: &mut App, scene: &Scene, response: &Response) {
         orbit.target = orbit.eye() + orbit.forward() * scene.point(hit).distance(orbit.eye());
     }
     let ray = app.model.orbit.camera(scene).ray(at);
-    app.clicked(hit.and_then(|hit| Clicked::new(scene, &ray, &hit)));
+    let more = ui.input(|input| input.modifiers.command);
+    app.clicked(hit.and_then(|hit| Clicked::new(scene, &ray, &hit)), more);
 }

@@ -1,6 +1,7 @@
 //! The state of the 3D view, and the faces and colours that are made for it on a thread of their own.
 
 use crate::app::model::coloring::Coloring;
+use crate::app::model::lasso::Lasso;
 use crate::app::model::orbit::Orbit;
 use crate::app::model::surface::Surface;
 use crate::inverse::estimate::Estimate;
@@ -28,6 +29,8 @@ pub struct ModelView {
     pub cull: bool,
     /// Whether the photographs' cameras are drawn.
     pub cameras: bool,
+    /// The line that is being drawn.
+    pub lasso: Lasso,
     surface: Option<Arc<Surface>>,
     photographed: Vec<Option<Vec3>>,
     making: Option<Receiver<Made>>,
@@ -41,6 +44,7 @@ impl Default for ModelView {
             coloring: Coloring::Photograph,
             cull: true,
             cameras: true,
+            lasso: Lasso::default(),
             surface: None,
             photographed: Vec::new(),
             making: None,
@@ -50,6 +54,12 @@ impl Default for ModelView {
 }
 
 impl ModelView {
+    /// Makes faces and colours anew, for a mesh whose objects are others.
+    pub fn remake(&mut self) {
+        (self.surface, self.making, self.colors) = (None, None, None);
+        self.photographed.clear();
+    }
+
     /// The faces and their present colours, once they are made.
     pub fn faces(
         &mut self,

@@ -109,7 +109,7 @@ fn row(ui: &mut Ui, app: &mut App, source: LightSource, name: &str) {
         .selectable_label(selected, name)
         .on_hover_text("Selects this lamp");
     if label.clicked() && lamp.is_some() {
-        app.select(lamp);
+        app.select(lamp, false);
     }
     if gain != before {
         app.mixer.mix.set(source, gain);

@@ -1,10 +1,11 @@
 //! The table of objects: swatches, errors, pixels seen; sortable, with a filter, linked to the views.
 
+use crate::app::action::Action;
 use crate::app::picture::inspect::{number, triple};
 use crate::app::state::App;
 use crate::app::theme;
 use crate::inverse::estimate::ObjectEstimate;
-use egui::{Align, Color32, Sense, TextEdit, Ui, vec2};
+use egui::{Align, Button, Color32, Key, Sense, TextEdit, Ui, vec2};
 use egui_extras::{Column, TableBuilder};
 use glam::Vec3;
 
@@ -116,6 +117,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
             .labelled_by(label.id);
         ui.weak(format!("{} objects", names.len()));
     });
+    changes(ui, app, &names);
     let rows = app.objects.rows(&names, &estimate.objects);
     let selected_row = app
         .selected
@@ -146,7 +148,9 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         .body(|body| {
             body.rows(theme::ROW, rows.len(), |mut row| {
                 let object = rows[row.index()];
-                row.set_selected(app.selected == Some(object as u32));
+                let chosen = app.selected == Some(object as u32)
+                    || app.grouping.also.contains(&(object as u32));
+                row.set_selected(chosen);
                 let none = ObjectEstimate::default();
                 let found = estimate.objects.get(object).unwrap_or(&none);
                 cells(&mut row, names[object], found);
@@ -155,7 +159,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
                     egui::WidgetInfo::selected(
                         egui::Role::Button,
                         true,
-                        app.selected == Some(object as u32),
+                        chosen,
                         format!("Select {}", names[object]),
                     )
                 });
@@ -166,7 +170,50 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
             });
         });
     if let Some(object) = clicked {
-        app.selected = (app.selected != Some(object)).then_some(object);
+        let more = ui.input(|input| input.modifiers.command);
+        let again = !more && app.selected == Some(object);
+        app.choose((!again).then_some(object), more);
+    }
+}
+
+/// Buttons and a field that change which faces are one object, and its name.
+fn changes(ui: &mut Ui, app: &mut App, names: &[&str]) {
+    let ctx = ui.ctx().clone();
+    ui.horizontal_wrapped(|ui| {
+        for action in [Action::JoinObjects, Action::CutOut] {
+            let button = ui.add_enabled(app.can(action), Button::new(action.text()));
+            let help = format!("{}. The solve then starts over.", action.help());
+            if button.on_hover_text(help).clicked() {
+                app.perform(action, &ctx);
+            }
+        }
+        if !app.can_regroup() {
+            ui.weak("Reading the mesh again…");
+        } else if let Some((object, name)) =
+            (app.selected).and_then(|object| Some((object, *names.get(object as usize)?)))
+        {
+            rename(ui, app, object, name);
+        }
+    });
+}
+
+/// The name of an object, to be typed over.
+fn rename(ui: &mut Ui, app: &mut App, object: u32, name: &str) {
+    if app.grouping.name.0 != Some(object) {
+        app.grouping.name = (Some(object), name.to_owned());
+    }
+    let label = ui.label("Name");
+    let field = TextEdit::singleline(&mut app.grouping.name.1).desired_width(110.0);
+    let response = ui.add(field).labelled_by(label.id);
+    if std::mem::take(&mut app.grouping.naming) {
+        response.request_focus();
+    }
+    if response.lost_focus() {
+        // Enter takes the name; anything else leaves it.
+        let typed = std::mem::take(&mut app.grouping.name).1;
+        if ui.input(|input| input.key_pressed(Key::Enter)) {
+            app.rename_object(object, &typed);
+        }
     }
 }
 

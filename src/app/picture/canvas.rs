@@ -160,7 +160,8 @@ pub fn interact(ui: &mut Ui, app: &mut App, rect: Rect, drawn: &Drawn, name: &st
         && let Some(pointer) = response.interact_pointer_pos()
     {
         let at = fraction(app.look.placement(rect, size), pointer);
-        app.clicked(app.surface_at(at));
+        let more = ui.input(|input| input.modifiers.command);
+        app.clicked(app.surface_at(at), more);
     }
     if app.aims() {
         response.on_hover_cursor(egui::CursorIcon::Crosshair);
@@ -212,9 +213,9 @@ impl App {
         self.irradiance_needed |= quantity == Quantity::Irradiance;
     }
 
-    /// Selects an object of the scene and shows it in the table.
-    pub fn select(&mut self, object: Option<u32>) {
-        self.selected = object;
+    /// Selects an object of the scene, or where `more` chooses it too, and shows it in the table.
+    pub fn select(&mut self, object: Option<u32>, more: bool) {
+        self.choose(object, more);
         self.objects.reveal = object.is_some();
     }
 }

@@ -35,6 +35,12 @@ impl Worker {
                     .is_some()
                     .then_some(Next::Reframe(options, go_on));
             }
+            Command::Regroup(changes) => {
+                let go_on = self.solving && !self.paused;
+                let open = self.capture.as_ref();
+                let other = open.is_some_and(|capture| capture.options.objects != changes);
+                return other.then_some(Next::Regroup(changes, go_on));
+            }
             Command::Quit => return Some(Next::Quit),
             Command::Run => return self.go_on(false),
             Command::Step => return self.go_on(true),

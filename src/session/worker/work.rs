@@ -1,5 +1,6 @@
 //! The worker's main loop: waiting, opening, resuming, solving, and what happens when one of them panics.
 
+use crate::capture::regroup::Regroup;
 use crate::error::Error;
 use crate::inverse::solver::{Checkpoint, Problem};
 use crate::session::command::{OpenOptions, Source};
@@ -28,6 +29,8 @@ pub(super) enum Next {
     Solve(Option<Checkpoint>),
     /// Read what is open again with other options, and solve on if so.
     Reframe(Box<OpenOptions>, bool),
+    /// Read what is open again with other objects, and solve it from the start; where that fails, solve on if so.
+    Regroup(Vec<Regroup>, bool),
     /// End.
     Quit,
 }
@@ -56,6 +59,7 @@ impl Worker {
             Next::Resume(folder) => self.resume(&folder),
             Next::Solve(checkpoint) => self.solve(checkpoint.as_ref()),
             Next::Reframe(options, go_on) => self.reframe(&options, go_on),
+            Next::Regroup(changes, go_on) => self.regroup(changes, go_on),
             Next::Quit => Next::Quit,
         }
     }
@@ -143,36 +147,66 @@ impl Worker {
 
     /// Reads the open capture with other options; what was found and changed by hand stays.
     fn reframe(&mut self, options: &OpenOptions, go_on: bool) -> Next {
-        let Some(old) = self.capture.clone() else {
-            return Next::Wait;
-        };
         let before = std::mem::replace(&mut self.phase, Phase::Loading);
         self.publish(true);
-        match (self.backend.open)(&old.source, options) {
-            Ok(capture) => {
-                let (from, to) = (old.options.coordinates, options.coordinates);
-                let (up, new_up) = (old.capture.up, capture.capture.up);
-                let mut inserted = self.inserting.placements().to_vec();
-                for placement in &mut inserted {
-                    let files = placement.at.map(|at| from.undo(at, up));
-                    placement.at = files.map(|at| to.apply(at, new_up));
-                }
-                let kept = (self.estimate.clone(), self.progress.clone());
-                let (checkpoint, edits) = (self.checkpoint.take(), self.edits.clone());
-                self.adopt(capture);
-                (self.estimate, self.progress) = kept;
-                (self.checkpoint, self.edits) = (checkpoint, edits);
-                self.inserting.place(inserted.clone());
-                self.inserted = Arc::new(inserted);
-                self.keeper.touch();
-            }
-            Err(error) => self.fail(&error),
+        let kept = (self.estimate.clone(), self.progress.clone());
+        let (checkpoint, edits) = (self.checkpoint.clone(), self.edits.clone());
+        if self.reopen(options) {
+            (self.estimate, self.progress) = kept;
+            (self.checkpoint, self.edits) = (checkpoint, edits);
         }
         self.phase = before;
         match go_on {
             true => Next::Solve(self.checkpoint.clone()),
             false => Next::Wait,
         }
+    }
+
+    /// Reads the open capture with other objects, and starts over.
+    fn regroup(&mut self, changes: Vec<Regroup>, go_on: bool) -> Next {
+        let Some(old) = self.capture.clone() else {
+            return Next::Wait;
+        };
+        let before = std::mem::replace(&mut self.phase, Phase::Loading);
+        self.publish(true);
+        let options = OpenOptions {
+            objects: changes,
+            ..old.options.clone()
+        };
+        if self.reopen(&options) {
+            return Next::Solve(None);
+        }
+        self.phase = before;
+        match go_on {
+            true => Next::Solve(self.checkpoint.clone()),
+            false => Next::Wait,
+        }
+    }
+
+    /// Reads the open capture with other options; what was inserted stays where it is. False where that failed.
+    fn reopen(&mut self, options: &OpenOptions) -> bool {
+        let Some(old) = self.capture.clone() else {
+            return false;
+        };
+        let capture = match (self.backend.open)(&old.source, options) {
+            Ok(capture) => capture,
+            Err(error) => {
+                self.fail(&error);
+                return false;
+            }
+        };
+        let (from, to) = (old.options.coordinates, options.coordinates);
+        let (up, new_up) = (old.capture.up, capture.capture.up);
+        let mut inserted = self.inserting.placements().to_vec();
+        for placement in &mut inserted {
+            let files = placement.at.map(|at| from.undo(at, up));
+            placement.at = files.map(|at| to.apply(at, new_up));
+        }
+        self.adopt(capture);
+        self.inserting.place(inserted.clone());
+        self.inserted = Arc::new(inserted);
+        self.keeper.touch();
+        true
     }
 
     fn resume(&mut self, folder: &Path) -> Next {

@@ -1,0 +1,149 @@
+//! Which faces are one object, changed by hand: objects joined, named anew, and cut out.
+
+use crate::app::mixer::Mix;
+use crate::app::state::App;
+use crate::capture::mesh::Mesh;
+use crate::capture::regroup::{Regroup, regroup, same_objects};
+use crate::session::command::Command;
+use crate::session::edits::Edits;
+use crate::session::snapshot::{Level, OpenCapture};
+use std::collections::BTreeSet;
+
+/// The changes of the capture's objects, and what more of them is made with.
+#[derive(Debug, Default)]
+pub struct Grouping {
+    /// All changes since the capture was read.
+    pub changes: Vec<Regroup>,
+    /// Objects chosen besides the selected one.
+    pub also: BTreeSet<u32>,
+    /// The selected object and its name as typed.
+    pub name: (Option<u32>, String),
+    /// Whether the field of the name is to be typed into.
+    pub naming: bool,
+    sent: Vec<Regroup>,
+}
+
+impl Grouping {
+    /// With the changes that a capture was read with.
+    pub fn of(capture: Option<&OpenCapture>) -> Self {
+        let changes = capture.map_or_else(Vec::new, |capture| capture.options.objects.clone());
+        Self {
+            sent: changes.clone(),
+            changes,
+            ..Self::default()
+        }
+    }
+
+    /// Whether a capture is one that was open before, with the objects that were asked for.
+    pub fn made(&self, before: Option<&OpenCapture>, now: Option<&OpenCapture>) -> bool {
+        before.zip(now).is_some_and(|(before, now)| {
+            before.hash == now.hash
+                && before.options.objects != now.options.objects
+                && now.options.objects == self.sent
+        })
+    }
+}
+
+impl App {
+    /// Whether objects can be changed: the mesh that is shown has all changes so far.
+    pub fn can_regroup(&self) -> bool {
+        let capture = self.capture();
+        capture.is_some_and(|capture| capture.options.objects == self.grouping.changes)
+    }
+
+    /// The selected object and those chosen besides, the selected one first.
+    pub fn chosen_objects(&self) -> Vec<u32> {
+        let also = self.grouping.also.iter().copied();
+        let also = also.filter(|&object| Some(object) != self.selected);
+        self.selected.into_iter().chain(also).collect()
+    }
+
+    /// Selects an object alone, or where `more`, chooses it besides those chosen before, or no longer.
+    pub fn choose(&mut self, object: Option<u32>, more: bool) {
+        match (object, self.selected) {
+            (Some(object), Some(selected)) if more && object != selected => {
+                if !self.grouping.also.remove(&object) {
+                    self.grouping.also.insert(object);
+                }
+            }
+            _ if more && object.is_none() => {}
+            _ => {
+                self.grouping.also.clear();
+                self.selected = object;
+            }
+        }
+    }
+
+    /// Makes one object of those that are chosen.
+    pub fn join_objects(&mut self) {
+        let objects = self.names(&self.chosen_objects());
+        self.change_objects(Regroup::Join { objects });
+    }
+
+    /// Gives an object another name.
+    pub fn rename_object(&mut self, object: u32, name: &str) {
+        let name = name.trim().to_owned();
+        for object in self.names(&[object]) {
+            if object != name {
+                let name = name.clone();
+                self.change_objects(Regroup::Rename { object, name });
+            }
+        }
+    }
+
+    /// Makes faces, in ascending order, an object of their own.
+    pub fn cut_out(&mut self, faces: Vec<u32>) {
+        let Some(capture) = self.capture().filter(|_| !faces.is_empty()) else {
+            let message = "no face that is seen lies inside the line; nothing was cut out";
+            self.notices.say(Level::Info, message);
+            return;
+        };
+        let taken = &capture.capture.mesh.objects;
+        let name = (1..)
+            .map(|number| format!("cut {number}"))
+            .find(|name| !taken.contains(name))
+            .unwrap_or_default();
+        self.change_objects(Regroup::cut(faces, name));
+    }
+
+    fn names(&self, objects: &[u32]) -> Vec<String> {
+        let Some(capture) = self.capture() else {
+            return Vec::new();
+        };
+        let all = &capture.capture.mesh.objects;
+        let names = objects.iter().filter_map(|&k| all.get(k as usize));
+        names.cloned().collect()
+    }
+
+    /// Adds a change, where it can be made; what was changed of other objects stays with them.
+    fn change_objects(&mut self, change: Regroup) {
+        let Some(capture) = self.capture().filter(|_| self.can_regroup()) else {
+            return;
+        };
+        let before = &capture.capture.mesh;
+        let mut after = Mesh {
+            objects: before.objects.clone(),
+            object_of: before.object_of.clone(),
+            ..Mesh::default()
+        };
+        match regroup(&mut after, std::slice::from_ref(&change)) {
+            Err(error) => self.notices.say(Level::Warning, error.to_string()),
+            Ok(()) => {
+                let same = same_objects(&before.object_of, &after.object_of, before.objects.len());
+                self.edits = self.edits.moved(&same);
+                self.mixer.mix = Mix::default();
+                self.grouping.changes.push(change);
+            }
+        }
+    }
+
+    /// Hands the worker the changes of objects where they differ from those it has.
+    pub(super) fn send_grouping(&mut self) {
+        let changes = &self.grouping.changes;
+        if *changes != self.grouping.sent && self.connect(Command::Regroup(changes.clone())) {
+            self.grouping.sent.clone_from(&self.grouping.changes);
+            // The worker begins without any.
+            self.sent_edits = Edits::default();
+        }
+    }
+}
