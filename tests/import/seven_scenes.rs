@@ -43,6 +43,26 @@ fn the_room_comes_back() {
 }
 
 #[test]
+fn depth_may_be_pgm() {
+    let folder = TempDir::new().unwrap();
+    let cameras = cameras();
+    sample(folder.path(), &cameras);
+    write(folder.path(), "intrinsics.txt", intrinsics(&cameras[0]));
+    for index in 0..cameras.len() {
+        let stem = format!("seq-{:02}/frame-{:06}", index / 12 + 1, index % 12);
+        let png = folder.path().join(format!("{stem}.depth.png"));
+        let depth = image::open(&png).unwrap().into_luma16();
+        std::fs::remove_file(&png).unwrap();
+        // Numbers of more than eight bits have the high byte first.
+        let mut pgm = format!("P5\n{} {}\n65535\n", depth.width(), depth.height()).into_bytes();
+        pgm.extend(depth.iter().flat_map(|v| v.to_be_bytes()));
+        std::fs::write(folder.path().join(format!("{stem}.depth.pgm")), pgm).unwrap();
+    }
+    let scan = import(folder.path()).unwrap();
+    check_room(&scan.mesh, 0.05, |p| p);
+}
+
+#[test]
 fn the_data_sets_own_focal_length_is_taken_and_said() {
     let folder = TempDir::new().unwrap();
     let lens = [585.0 / 8.0, 585.0 / 8.0, 39.5, 29.5];

@@ -64,6 +64,7 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
         None => geometry::find(folder, &[""], &mut scan.said)?,
     };
     let back = undoing(&shared, options, &mut scan)?;
+    scan.up = scan.up.map(|up| back.transform_vector3(up));
     let mut lost = 0;
     for (index, entry) in list.iter().enumerate() {
         let fields = Fields::new(format!("{place}: frames[{index}]."), entry)?;

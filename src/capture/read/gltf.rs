@@ -46,6 +46,12 @@ fn add_node(
     let Some(mesh) = node.mesh() else {
         return Ok(());
     };
+    if node.skin().is_some() {
+        raw.warnings.push(format!(
+            "nodes[{}] has a skin, which is not applied: it is taken as its mesh was modelled",
+            node.index()
+        ));
+    }
     let object = raw.mesh.objects.len() as u32;
     let before = raw.mesh.triangles.len();
     for primitive in mesh.primitives() {
@@ -85,6 +91,16 @@ fn add_primitive(
         mesh.positions.push(to_world.transform_point3(p));
     }
     let count = mesh.positions.len() as u32 - first;
+
+    // The format demands as many of each attribute as there are positions.
+    for semantic in [Semantic::Colors(0), Semantic::TexCoords(0)] {
+        if let Some(other) = primitive.get(&semantic)
+            && other.count() != accessor.count()
+        {
+            let [found, wanted] = [other.count(), accessor.count()];
+            return Err(format!("{found} of {semantic:?} for {wanted} positions"));
+        }
+    }
 
     // Colours and texture coordinates, where this or an earlier primitive has them.
     let colors = match primitive.get(&Semantic::Colors(0)) {

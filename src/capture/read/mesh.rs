@@ -43,6 +43,7 @@ pub fn read(path: &Path, confine: &Confine, warnings: &mut Vec<String>) -> Resul
         }
     };
     check(path, &raw.mesh)?;
+    drop_unused(&mut raw.mesh);
     for warning in raw.warnings.drain(..) {
         warnings.push(format!("{}: {warning}", path.display()));
     }
@@ -85,6 +86,29 @@ fn check(path: &Path, mesh: &Mesh) -> Result<()> {
         ));
     }
     Ok(())
+}
+
+/// Leaves out vertices that no triangle uses: they would move the scene's origin and size.
+fn drop_unused(mesh: &mut Mesh) {
+    let mut used = vec![false; mesh.positions.len()];
+    for &corner in mesh.triangles.iter().flatten() {
+        used[corner as usize] = true;
+    }
+    if used.iter().all(|&used| used) {
+        return;
+    }
+    let mut places = vec![0u32; used.len()];
+    let kept = places.iter_mut().zip(&used).filter(|(_, used)| **used);
+    for (next, (place, _)) in (0..).zip(kept) {
+        *place = next;
+    }
+    let mut flags = used.iter();
+    mesh.positions.retain(|_| flags.next() == Some(&true));
+    let mut flags = used.iter();
+    mesh.vertex_colors.retain(|_| flags.next() == Some(&true));
+    for corner in mesh.triangles.iter_mut().flatten() {
+        *corner = places[*corner as usize];
+    }
 }
 
 /// Gives repeated names a number and empty ones a name.
@@ -168,4 +192,27 @@ fn duplicates(mesh: &Mesh) -> usize {
         .collect();
     keys.par_sort_unstable();
     keys.windows(2).filter(|pair| pair[0] == pair[1]).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    #[test]
+    fn vertices_that_no_triangle_uses_are_left_out() {
+        let at = |x: f64| DVec3::new(x, x * x, 0.0);
+        let mut mesh = Mesh {
+            positions: [1e6, 0.0, 1.0, -1e9, 2.0].map(at).to_vec(),
+            vertex_colors: [0.0, 0.1, 0.2, 0.3, 0.4].map(Vec3::splat).to_vec(),
+            triangles: vec![[1, 4, 2], [2, 1, 4]],
+            object_of: vec![0; 2],
+            objects: vec!["mesh".into()],
+            ..Mesh::default()
+        };
+        drop_unused(&mut mesh);
+        assert_eq!(mesh.positions, [0.0, 1.0, 2.0].map(at));
+        assert_eq!(mesh.vertex_colors, [0.1, 0.2, 0.4].map(Vec3::splat));
+        assert_eq!(mesh.triangles, [[0, 2, 1], [1, 0, 2]]);
+    }
 }

@@ -5,7 +5,7 @@
 
 use crate::capture::mesh::Mesh;
 use crate::capture::read::mesh::RawMesh;
-use crate::capture::read::ply_elements::{Face, Vertex};
+use crate::capture::read::ply_elements::{Face, Passed, Vertex};
 use crate::error::{Error, Result};
 use glam::Vec2;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
@@ -16,7 +16,7 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 /// Longest header that is read, in bytes.
-const MAX_HEADER: u64 = 1 << 20;
+const MAX_HEADER: u64 = 1 << 26;
 
 /// Reads a PLY file; polygons become fans of triangles.
 ///
@@ -55,14 +55,15 @@ fn parse(path: &Path, source: impl BufRead, length: u64) -> Result<RawMesh> {
             vertices = Parser::new()
                 .read_payload_for_element(&mut reader, element, &header)
                 .map_err(broken)?;
-        } else {
-            let elements = Parser::<Face>::new()
+        } else if element.name == "face" {
+            faces = Parser::new()
                 .read_payload_for_element(&mut reader, element, &header)
                 .map_err(broken)?;
-            if element.name == "face" {
-                faces = elements;
-                break;
-            }
+            break;
+        } else {
+            Parser::<Passed>::new()
+                .read_payload_for_element(&mut reader, element, &header)
+                .map_err(broken)?;
         }
     }
     assemble(path, &header, &vertices, &faces)
@@ -82,7 +83,12 @@ fn check_count(path: &Path, element: &ElementDef, encoding: Encoding, left: u64)
         Encoding::Ascii => 2 * types.count() as u64,
         _ => types
             .map(|t| match t {
-                PropertyType::Scalar(scalar) | PropertyType::List(scalar, _) => size(scalar),
+                PropertyType::Scalar(scalar) => size(scalar),
+                // Few faces are without corners.
+                PropertyType::List(length, item) if element.name == "face" => {
+                    size(length) + size(item)
+                }
+                PropertyType::List(length, _) => size(length),
             })
             .sum(),
     };

@@ -14,7 +14,17 @@ pub struct Vertex {
     pub uv: Vec2,
 }
 
-/// A polygon; also stands in for elements of other kinds, which are read past.
+/// An element of another kind, which is read past and takes no memory.
+#[derive(Debug, Clone, Copy)]
+pub struct Passed;
+
+impl PropertyAccess for Passed {
+    fn new() -> Self {
+        Self
+    }
+}
+
+/// A polygon.
 #[derive(Debug, Clone, Default)]
 pub struct Face {
     /// vertex_indices; `u32::MAX` for a negative one.

@@ -3,6 +3,8 @@
 use crate::capture::segment::graph::FaceGraph;
 use crate::capture::segment::sets::Sets;
 use glam::DVec3;
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
 
@@ -11,6 +13,10 @@ use std::collections::{BTreeSet, BinaryHeap};
 const MERGE_LIMIT: f64 = 1e-3;
 /// Without a number wanted, at most so many segments, however complex the mesh.
 const MAX_SEGMENTS: usize = 400;
+
+/// Merges that wait are looked through for outdated ones when they are twice as many as after the last look, and more than
+/// twice this.
+const LEAST_CANDIDATES: usize = 4096;
 
 /// Area, and area-weighted sums of normal, colour and position.
 #[derive(Debug, Clone, Copy, Default)]
@@ -72,6 +78,7 @@ pub fn merge(graph: &FaceGraph, fine: &[u32], wanted: Option<usize>) -> (Vec<u32
     for (a, around) in (0..).zip(&neighbors) {
         heap.extend(around.range(a + 1..).map(|&b| candidate(&regions, a, b)));
     }
+    let mut fresh = heap.len().max(LEAST_CANDIDATES);
     let total: f64 = regions.iter().map(|region| region.area).sum();
     let mut sets = Sets::new(regions.len());
     let mut count = regions.len();
@@ -103,6 +110,14 @@ pub fn merge(graph: &FaceGraph, fine: &[u32], wanted: Option<usize>) -> (Vec<u32
         }
         let around = &neighbors[root as usize];
         heap.extend(around.iter().map(|&b| candidate(&regions, root, b)));
+        // A region that takes up one speck after the other leaves outdated candidates behind.
+        if heap.len() > 2 * fresh {
+            heap.retain(|Reverse((_, a, b, version_a, version_b))| {
+                let current = |x: u32, version: u32| regions[x as usize].version == version;
+                current(*a, *version_a) && current(*b, *version_b)
+            });
+            fresh = heap.len().max(LEAST_CANDIDATES);
+        }
     }
     number_by_area(&region_of, &regions, &mut sets)
 }
@@ -152,24 +167,24 @@ fn link_islands(regions: &[Region], neighbors: &mut [BTreeSet<u32>]) {
     let area = |piece: &[u32]| -> f64 { piece.iter().map(|&a| regions[a as usize].area).sum() };
     members.sort_by(|a, b| area(b).total_cmp(&area(a)).then(a[0].cmp(&b[0])));
 
-    let mut larger: Vec<u32> = Vec::new();
+    let mut larger: RTree<GeomWithData<[f64; 3], u32>> = RTree::new();
+    let place = |x: u32| regions[x as usize].centroid().to_array();
     for piece in members {
         let by_area = |a: &u32, b: &u32| {
             let area = |x: u32| regions[x as usize].area;
             area(*a).total_cmp(&area(*b)).then(b.cmp(a))
         };
         if let Some(&largest) = piece.iter().max_by(|a, b| by_area(a, b)) {
-            let center = regions[largest as usize].centroid();
-            let distance = |x: u32| regions[x as usize].centroid().distance_squared(center);
-            let nearest = larger
-                .iter()
-                .min_by(|&&a, &&b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
-            if let Some(&nearest) = nearest {
+            // Of equally near ones the first.
+            let nearest = larger.nearest_neighbors(&place(largest));
+            if let Some(nearest) = nearest.iter().map(|region| region.data).min() {
                 neighbors[largest as usize].insert(nearest);
                 neighbors[nearest as usize].insert(largest);
             }
         }
-        larger.extend(piece);
+        for x in piece {
+            larger.insert(GeomWithData::new(place(x), x));
+        }
     }
 }
 
