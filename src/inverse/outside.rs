@@ -23,6 +23,8 @@ pub struct MeasuredOutside {
     height: usize,
     known: Vec<bool>,
     map: Environment,
+    /// Unit up vector.
+    up: Vec3,
 }
 
 impl MeasuredOutside {
@@ -83,6 +85,7 @@ impl MeasuredOutside {
             height,
             known,
             map,
+            up: scene.up,
         })
     }
 
@@ -101,7 +104,7 @@ impl MeasuredOutside {
     /// What to expect from a direction that no photograph looks in: the mean of what was seen at its height above the
     /// horizon, within a band as high as `band` radians, or of all that was seen.
     pub fn expected(&self, direction: Vec3, band: f64) -> Vec3 {
-        let height_of = |d: Vec3| f64::from(d.y.clamp(-1.0, 1.0)).asin();
+        let height_of = |d: Vec3| f64::from(d.dot(self.up).clamp(-1.0, 1.0)).asin();
         let height = height_of(direction);
         let (mut near, mut all) = ((DVec3::ZERO, 0.0), (DVec3::ZERO, 0.0));
         for cell in (0..self.known.len()).filter(|&cell| self.known[cell]) {
@@ -160,6 +163,7 @@ mod tests {
             height,
             known: (0..128).map(|c| c == above || c == below).collect(),
             map: Environment::new(width, height, pixels).expect("sizes fit"),
+            up: Vec3::Y,
         };
         let at = |row: usize| {
             let direction = direction_of(width, height, row * 16 + 12);
@@ -169,6 +173,16 @@ mod tests {
         assert!((at(5) - Vec3::ONE).length() < 1e-5);
         // Both cells span the same solid angle.
         assert!((at(0) - Vec3::splat(2.5)).length() < 1e-4);
+        // Heights are along the capture's own up axis: seen from there both cells are level with neither.
+        let sideways = MeasuredOutside {
+            up: direction_of(width, height, above),
+            ..measured
+        };
+        let at_zenith = sideways.expected(sideways.up, PI / 8.0);
+        assert!(
+            (at_zenith - Vec3::splat(4.0)).length() < 1e-5,
+            "{at_zenith}"
+        );
     }
 
     #[test]

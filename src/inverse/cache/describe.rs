@@ -77,7 +77,7 @@ pub fn estimate(
                     }
                 }
                 Role::Unseen => {
-                    object.albedo = Vec3::ZERO;
+                    object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION);
                     object.identifiable = false;
                     object.albedo_identifiable = false;
                     object.note =
@@ -85,11 +85,11 @@ pub fn estimate(
                             .into();
                 }
                 Role::Dark => {
-                    object.albedo = typical;
                     object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION);
                     object.identifiable = false;
                     object.albedo_identifiable = false;
-                    object.note = "no photograph sees it; its albedo is the room's mean".into();
+                    object.note =
+                        "no photograph sees it; its albedo is taken to be middling".into();
                 }
             }
             object

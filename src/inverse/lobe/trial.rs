@@ -88,24 +88,27 @@ impl<'a> Evidence<'a> {
     }
 }
 
-/// Of each sight, the mean radiance of its spot's sights, raised where it is dark.
+/// Of each sight, the mean radiance of its spot's sights in the fit, raised where it is dark; the median of all spots where
+/// all its sights are left out of it.
 fn levels(sights: &[(usize, &Sight, [Gathered; 2])]) -> Vec<DVec3> {
-    let spots: Vec<(usize, DVec3)> = (sights.chunk_by(|a, b| a.0 == b.0))
+    let spots: Vec<(usize, Option<DVec3>)> = (sights.chunk_by(|a, b| a.0 == b.0))
         .map(|spot| {
-            let weight: f64 = spot.iter().map(|s| s.1.pixels.len() as f64).sum();
-            let sum: DVec3 = (spot.iter())
-                .map(|s| s.1.measured * s.1.pixels.len() as f64)
-                .sum();
-            (spot.len(), sum / weight)
+            let fitted = || spot.iter().map(|s| s.1).filter(|s| !s.held_out);
+            let weight: f64 = fitted().map(|s| s.pixels.len() as f64).sum();
+            let sum: DVec3 = fitted().map(|s| s.measured * s.pixels.len() as f64).sum();
+            (spot.len(), (weight > 0.0).then(|| sum / weight))
         })
         .collect();
     let median = DVec3::from_array(std::array::from_fn(|c| {
-        let mut values: Vec<f64> = spots.iter().map(|s| s.1[c]).collect();
+        let mut values: Vec<f64> = spots.iter().filter_map(|s| Some(s.1?[c])).collect();
         quantile(&mut values, 0.5).unwrap_or(0.0)
     }));
     let dark = (median * DARK).max(DVec3::splat(f64::MIN_POSITIVE.sqrt()));
     (spots.into_iter())
-        .flat_map(|(count, mean)| std::iter::repeat_n((mean * mean + dark * dark).powf(0.5), count))
+        .flat_map(|(count, mean)| {
+            let mean = mean.unwrap_or(median);
+            std::iter::repeat_n((mean * mean + dark * dark).powf(0.5), count)
+        })
         .collect()
 }
 
@@ -120,7 +123,8 @@ struct Tried {
 /// light. `None` where nothing tells.
 pub fn find(evidence: &Evidence, emits: bool, [from, to]: [f64; 2]) -> Option<Found> {
     let diffuse = Model::Diffuse { emits };
-    let (from, to) = (from.max(LEAST_ROUGHNESS), to.min(1.0));
+    let from = from.clamp(LEAST_ROUGHNESS, 1.0);
+    let to = to.clamp(from, 1.0);
     let ratio = (to / from).powf(1.0 / (TRIED - 1) as f64);
     let tried: Vec<Tried> = (0..TRIED)
         .map(|i| {

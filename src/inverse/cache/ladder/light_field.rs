@@ -61,11 +61,6 @@ impl Ladder<'_, '_> {
         if escaping > ESCAPING && self.monitor.settings.outside_light {
             self.light_from_outside(&cache, &lights, &measured, escaping, closed)?;
         }
-        for (error, albedo) in self.errors.albedo.iter_mut().zip(&self.unknowns.albedo) {
-            *error = (*error * *error + *albedo * *albedo * (LIGHT_FIELD_BIAS * LIGHT_FIELD_BIAS))
-                .powf(0.5);
-        }
-        self.describe();
         self.expect_of_albedo();
         self.monitor
             .report(&self.estimate, &|_| self.checkpoint.clone())
@@ -107,6 +102,10 @@ impl Ladder<'_, '_> {
         let fitted = self.fit(cache)?;
         self.settle_roles(cache, fitted)?;
         self.weigh(cache)?;
+        for (error, albedo) in self.errors.albedo.iter_mut().zip(&self.unknowns.albedo) {
+            *error = (*error * *error + *albedo * *albedo * (LIGHT_FIELD_BIAS * LIGHT_FIELD_BIAS))
+                .powf(0.5);
+        }
         self.test_dark(cache);
         Ok(())
     }

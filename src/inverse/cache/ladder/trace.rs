@@ -2,7 +2,7 @@
 
 use super::Ladder;
 use crate::inverse::cache::PathCache;
-use crate::inverse::cache::clusters::cluster;
+use crate::inverse::cache::clusters::{Cluster, cluster};
 use crate::inverse::cache::evaluate::Linearised;
 use crate::inverse::cache::memory::{self, PILOT_CLUSTERS};
 use crate::inverse::cache::path_noise::share_paths;
@@ -19,6 +19,14 @@ use std::time::{Duration, Instant};
 
 /// Work between two reports to the observer.
 const SLICE: Duration = Duration::from_millis(25);
+/// The paths of one slice take at most this part of the memory that stored ones may.
+const SLICE_SHARE: u64 = 8;
+
+/// Paths of some clusters, both sets.
+fn paths(clusters: &[Cluster]) -> u64 {
+    let of = |c: &Cluster| 2 * u64::from(c.paths) * c.pixels.len() as u64;
+    clusters.iter().map(of).sum()
+}
 
 impl Ladder<'_, '_> {
     /// The clusters' paths, kept so that any unknowns can be tried on them: about as many as asked for, fewer where they
@@ -34,12 +42,7 @@ impl Ladder<'_, '_> {
         let surfaces = self.roles.len();
         let mut fits = paths;
         let believed = self.believed();
-        // What has a lobe may reflect all light at a grazing angle.
-        let brightest = match self.lobes.iter().any(Option::is_some) {
-            true => 1.0,
-            false => believed.iter().copied().fold(0.0, f32::max),
-        };
-        if !memory::suffices(allowed, paths, longest_mean_path(brightest)) {
+        if !memory::suffices(allowed, paths, longest_mean_path(self.brightest(&believed))) {
             // A few paths of the same kind tell how long they are.
             share_paths(&mut self.clusters, surfaces, 0);
             let step = self.clusters.len().div_ceil(PILOT_CLUSTERS).max(1);
@@ -53,7 +56,8 @@ impl Ladder<'_, '_> {
         let pixels: usize = self.clusters.iter().map(|c| c.pixels.len()).sum();
         if fits < 2 * pixels as u64 {
             // A pixel has a path in each set; there is no room for that.
-            self.clusters = cluster(self.problem, &self.survey, (fits / 2) as usize);
+            let pixels = (fits / 2).min(self.budget.pixels as u64);
+            self.clusters = cluster(self.problem, &self.survey, pixels as usize);
         }
         share_paths(&mut self.clusters, surfaces, fits);
         let mut cache = PathCache::default();
@@ -130,10 +134,17 @@ impl Ladder<'_, '_> {
         mut take: impl FnMut(PathCache),
     ) -> Result<(), Termination> {
         let believed = self.believed();
+        let most = memory::allowed(self.monitor.settings.memory) / SLICE_SHARE;
+        let longest = longest_mean_path(self.brightest(&believed));
         let mut next = 0;
         let mut slice = 16;
         while next < self.clusters.len() {
-            let end = (next + slice).min(self.clusters.len());
+            let mut end = (next + slice).min(self.clusters.len());
+            while end > next + 1
+                && !memory::suffices(most, paths(&self.clusters[next..end]), longest)
+            {
+                end = next + (end - next) / 2;
+            }
             let begun = Instant::now();
             let traced = self
                 .tracer(lights, measured, &believed, stage, round)
@@ -162,6 +173,14 @@ impl Ladder<'_, '_> {
                 _ => albedo.max_element(),
             })
             .collect()
+    }
+
+    /// The largest albedo of any surface as believed; what has a lobe may reflect all light at a grazing angle.
+    fn brightest(&self, believed: &[f32]) -> f32 {
+        match self.lobes.iter().any(Option::is_some) {
+            true => 1.0,
+            false => believed.iter().copied().fold(0.0, f32::max),
+        }
     }
 
     fn tracer<'t>(
