@@ -10,7 +10,9 @@ use relit::inverse::solver::{
     Checkpoint, Control, LossPoint, Observer, Problem, Solution, Termination,
 };
 use relit::session::Session;
-use relit::session::command::{Command, OpenOptions, Placement, Source, ViewCamera, ViewRequest};
+use relit::session::command::{
+    Command, OpenOptions, Placement, Regrouping, Source, ViewCamera, ViewRequest,
+};
 use relit::session::edits::{Edits, ObjectEdit};
 use relit::session::snapshot::{Level, OpenCapture, Phase, Picture, Snapshot};
 use relit::session::worker::Backend;
@@ -87,7 +89,7 @@ impl Rig {
             }),
         };
         let session = Session::spawn_with(
-            Some(Source::BuiltInRoom),
+            Some((Source::BuiltInRoom, OpenOptions::default())),
             Settings::default(),
             Arc::new(|| {}),
             backend,
@@ -394,18 +396,43 @@ fn changed_objects_start_the_solve_over_and_are_saved_and_read_back() {
             name: "all of the room".into(),
         },
     ];
-    assert!(rig.session.send(Command::Regroup(changes.clone())));
+    let hash = first.capture.as_ref().expect("open").hash.clone();
+    let mut edits = Edits::default();
+    let pinned = ObjectEdit {
+        albedo: Some(glam::Vec3::splat(0.3)),
+        albedo_known: true,
+        ..ObjectEdit::default()
+    };
+    edits.set(1, pinned);
+    let ask = |hash: &str, changes: &[Regroup]| {
+        let wanted = Regrouping {
+            hash: hash.to_owned(),
+            changes: changes.to_vec(),
+            edits: edits.clone(),
+        };
+        assert!(rig.session.send(Command::Regroup(Box::new(wanted))));
+    };
+    // Objects of another capture are none of this one's.
+    ask("another", &changes);
+    let ignored = rig.until("an answer", |s| s.regroupings == 1);
+    assert_eq!(names(&ignored), before);
+    ask(&hash, &changes);
     let changed = rig.until("other objects", |s| {
         s.phase == Phase::Solving && names(s).len() + 1 == before.len() && iterations(s) > 0
     });
     assert_eq!(names(&changed)[0], "all of the room");
     assert_eq!(names(&changed)[1..], before[2..]);
+    assert_eq!((changed.regroupings, &changed.edits), (2, &edits));
+    // The solver of these tests says what it was told by the roughness of the second object.
+    rig.until("the pinned value", |s| {
+        s.estimate.objects.get(1).and_then(|o| o.roughness) == Some(0.3)
+    });
 
     // What cannot be done is said, and leaves what is open.
     let wrong = vec![Regroup::Join {
         objects: vec!["no such object".into()],
     }];
-    assert!(rig.session.send(Command::Regroup(wrong)));
+    ask(&hash, &wrong);
     rig.until("the error", |s| {
         s.events
             .iter()

@@ -4,9 +4,8 @@ use crate::app::mixer::Mix;
 use crate::app::state::App;
 use crate::capture::mesh::Mesh;
 use crate::capture::regroup::{Regroup, regroup, same_objects};
-use crate::session::command::Command;
-use crate::session::edits::Edits;
-use crate::session::snapshot::{Level, OpenCapture};
+use crate::session::command::{Command, Regrouping};
+use crate::session::snapshot::{Level, OpenCapture, Snapshot};
 use std::collections::BTreeSet;
 
 /// The changes of the capture's objects, and what more of them is made with.
@@ -33,22 +32,40 @@ impl Grouping {
             ..Self::default()
         }
     }
-
-    /// Whether a capture is one that was open before, with the objects that were asked for.
-    pub fn made(&self, before: Option<&OpenCapture>, now: Option<&OpenCapture>) -> bool {
-        before.zip(now).is_some_and(|(before, now)| {
-            before.hash == now.hash
-                && before.options.objects != now.options.objects
-                && now.options.objects == self.sent
-        })
-    }
 }
 
 impl App {
-    /// Whether objects can be changed: the mesh that is shown has all changes so far.
-    pub fn can_regroup(&self) -> bool {
+    /// Whether the objects that are shown are those that were asked for; until then nothing can be changed that goes by an
+    /// object's place.
+    pub fn is_steady(&self) -> bool {
         let capture = self.capture();
-        capture.is_some_and(|capture| capture.options.objects == self.grouping.changes)
+        capture.is_none_or(|capture| capture.options.objects == self.grouping.changes)
+    }
+
+    /// Whether objects can be changed.
+    pub fn can_regroup(&self) -> bool {
+        self.capture().is_some() && self.is_steady()
+    }
+
+    /// Takes in what a snapshot says of objects asked for; whether it brings the open capture with them.
+    pub(super) fn take_grouping(&mut self, before: &Snapshot) -> bool {
+        let Some(now) = self.snapshot.capture.clone() else {
+            return false;
+        };
+        if self.snapshot.regroupings == before.regroupings {
+            return false;
+        }
+        let changed = before.capture.as_ref().is_some_and(|before| {
+            before.hash == now.hash && before.options.objects != now.options.objects
+        });
+        let wanted = &self.grouping.changes;
+        if !changed && *wanted == self.grouping.sent && *wanted != now.options.objects {
+            // The capture could not be read again: what is open stays as it is.
+            self.grouping = Grouping::of(Some(&now));
+            self.edits = self.snapshot.edits.clone();
+            self.sent_edits = self.edits.clone();
+        }
+        changed
     }
 
     /// The selected object and those chosen besides, the selected one first.
@@ -139,11 +156,19 @@ impl App {
 
     /// Hands the worker the changes of objects where they differ from those it has.
     pub(super) fn send_grouping(&mut self) {
-        let changes = &self.grouping.changes;
-        if *changes != self.grouping.sent && self.connect(Command::Regroup(changes.clone())) {
+        let Some(capture) = self.capture() else {
+            return;
+        };
+        let wanted = Regrouping {
+            hash: capture.hash.clone(),
+            changes: self.grouping.changes.clone(),
+            edits: self.edits.clone(),
+        };
+        if self.grouping.changes != self.grouping.sent
+            && self.connect(Command::Regroup(Box::new(wanted)))
+        {
             self.grouping.sent.clone_from(&self.grouping.changes);
-            // The worker begins without any.
-            self.sent_edits = Edits::default();
+            self.sent_edits = self.edits.clone();
         }
     }
 }

@@ -3,6 +3,7 @@
 use crate::app::action::Action;
 use crate::app::layout::Pane;
 use crate::app::mixer::Mix;
+use crate::app::model::lasso::Lasso;
 use crate::app::pick::Pick;
 use crate::app::picture::compare::Mode;
 use crate::app::picture::quantity::Quantity;
@@ -16,10 +17,34 @@ use crate::session::snapshot::{Level, Phase};
 use egui::ViewportCommand;
 use glam::DVec3;
 
+/// Whether an action changes or writes what goes by an object's place.
+fn goes_by_object(action: Action) -> bool {
+    matches!(
+        action,
+        Action::Undo
+            | Action::Redo
+            | Action::SwitchLamp
+            | Action::ResetMaterial
+            | Action::ResetEdits
+            | Action::KeepMix
+            | Action::ResetMix
+            | Action::SolveOn
+            | Action::Save
+            | Action::Export
+            | Action::SaveLayers
+            | Action::SavePhotographs
+            | Action::SetScale
+            | Action::SetGround
+    )
+}
+
 impl App {
     /// Whether an action makes sense now.
     pub fn can(&self, action: Action) -> bool {
         let open = self.capture().is_some();
+        if !self.is_steady() && goes_by_object(action) {
+            return false;
+        }
         match action {
             Action::Undo => self.history.can_undo(),
             Action::Redo => self.history.can_redo(),
@@ -131,6 +156,7 @@ impl App {
                 let open = !matches!(self.sheet, Sheet::Closed);
                 if !(open || self.keys || self.palette.is_some() || self.start_page) {
                     self.choose(None, false);
+                    self.model.lasso = Lasso::default();
                     self.insertions.placing = false;
                     self.picking = None;
                 }

@@ -7,7 +7,7 @@ use crate::app::window::Window;
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
 use crate::session::Session;
-use crate::session::command::{Command, Source};
+use crate::session::command::{Command, OpenOptions, Source};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,7 +19,7 @@ pub const WINDOW: [f32; 2] = [1280.0, 800.0];
 ///
 /// # Errors
 /// There is no display, no library for it, or no graphics adapter.
-pub fn run(source: Option<Source>, settings: Settings) -> Result<()> {
+pub fn run(source: Option<(Source, OpenOptions)>, settings: Settings) -> Result<()> {
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("relit")
@@ -80,7 +80,7 @@ pub fn run(source: Option<Source>, settings: Settings) -> Result<()> {
 /// The window on a worker that wakes it.
 fn window(
     cc: &eframe::CreationContext<'_>,
-    source: Option<Source>,
+    source: Option<(Source, OpenOptions)>,
     settings: Settings,
 ) -> Result<Window> {
     let software = cc.wgpu_render_state.as_ref().is_none_or(|render_state| {
@@ -101,7 +101,7 @@ fn window(
     }
     let mut app = App::new(Box::new(session), preferences_of_user);
     app.settings = settings;
-    app.opened_with(source);
+    app.opened_with(source.map(|(source, _)| source));
     Ok(Window::new(cc, app, kept).paced(pace))
 }
 

@@ -299,8 +299,7 @@ impl App {
         if self.snapshot.phase == Phase::Failed {
             self.opening = None;
         }
-        let (old, new) = (before.capture.as_deref(), self.snapshot.capture.as_deref());
-        if other_capture && self.grouping.made(old, new) {
+        if self.take_grouping(&before) {
             self.objects_changed();
         } else if other_capture {
             self.capture_changed();
@@ -311,8 +310,12 @@ impl App {
     fn objects_changed(&mut self) {
         self.selected = None;
         self.grouping.also.clear();
+        self.grouping.name = (None, String::new());
+        self.grouping.naming = false;
         self.picking = None;
         self.sent_view = None;
+        self.sent_edits = self.snapshot.edits.clone();
+        self.sent_insertions = self.snapshot.inserted.to_vec();
         self.model.remake();
         self.trade_of_capture();
     }

@@ -56,9 +56,10 @@ pub fn edit(arguments: &EditArguments) -> Result<()> {
     let Loaded {
         saved,
         capture,
-        estimate,
+        found,
+        mut edits,
+        ..
     } = arguments.saved.load()?;
-    let mut edits = Edits::default();
     let values = ObjectValues {
         emission: arguments.emission.clone(),
         albedo: arguments.albedo.clone(),
@@ -66,11 +67,11 @@ pub fn edit(arguments: &EditArguments) -> Result<()> {
         specular: arguments.specular.clone(),
     };
     values.change(&capture.scene, &mut edits)?;
-    let edited = Arc::new(edits.apply(&estimate));
+    let edited = Arc::new(edits.apply(&found));
     let photographs = arguments.photographs.then(|| Photographs {
         frames: (0..capture.scene.cameras.len()).collect(),
         capture: capture.clone(),
-        found: Arc::new(estimate),
+        found,
         edited: edited.clone(),
         settings: saved.settings.clone(),
         placements: Vec::new(),

@@ -82,6 +82,9 @@ pub fn export(arguments: &ExportArguments) -> Result<()> {
         capture, estimate, ..
     } = arguments.saved.load()?;
     scene::write(&capture.scene, &estimate, format, &arguments.out)?;
+    if let Some(lost) = scene::lost(&estimate, format) {
+        eprintln!("warning: {lost}");
+    }
     println!("{}", arguments.out.display());
     Ok(())
 }

@@ -12,7 +12,6 @@ use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use glam::{DVec3, Vec3};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// `relit insert`.
 #[derive(Debug, Args)]
@@ -43,9 +42,10 @@ pub fn insert(arguments: &InsertArguments) -> Result<()> {
     let Loaded {
         saved,
         capture,
+        found,
+        edits,
         estimate,
     } = arguments.saved.load()?;
-    let estimate = Arc::new(estimate);
     let (placements, materials): (_, Vec<_>) = arguments.objects.0.iter().cloned().unzip();
     let work = Photographs {
         frames: match arguments.frame {
@@ -53,11 +53,11 @@ pub fn insert(arguments: &InsertArguments) -> Result<()> {
             Which::All => (0..capture.scene.cameras.len()).collect(),
         },
         capture,
-        found: estimate.clone(),
+        found,
         edited: estimate,
         settings: saved.settings,
         placements,
-        relight: false,
+        relight: !edits.is_empty(),
         samples: arguments.spp,
         denoise: arguments.denoise,
     };

@@ -20,14 +20,14 @@ mod trade;
 
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
-use crate::session::command::Source;
+use crate::session::command::{OpenOptions, Source};
 use arguments::{Action, Arguments};
 use clap::Parser;
 use clap::error::ErrorKind;
 use object_values::ObjectValues;
 
-/// Opens the window on a source and returns when it is closed.
-pub type Window = fn(Option<Source>, Settings) -> Result<()>;
+/// Opens the window on a source, read with some options, and returns when it is closed.
+pub type Window = fn(Option<(Source, OpenOptions)>, Settings) -> Result<()>;
 
 /// Runs the program with the process's arguments; the exit code: 0 done, 1 an error, 2 wrong usage.
 ///
@@ -86,10 +86,14 @@ fn open(arguments: &Arguments, window: Option<Window>) -> Result<()> {
     let reason = match window {
         None => "this build has no window".to_owned(),
         Some(_) if !display() => "no display".to_owned(),
-        Some(window) => match window(Some(source.clone()), arguments.solve.settings()) {
-            Ok(()) => return Ok(()),
-            Err(error) => error.to_string(),
-        },
+        Some(window) => {
+            solve::use_threads(arguments.solve.threads)?;
+            let opened = (source.clone(), arguments.solve.read.open());
+            match window(Some(opened), arguments.solve.settings()) {
+                Ok(()) => return Ok(()),
+                Err(error) => error.to_string(),
+            }
+        }
     };
     eprintln!("relit: {reason}; solving without a window");
     solve::solve(&source, &arguments.solve, &ObjectValues::default())

@@ -81,6 +81,7 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
         saved,
         capture,
         estimate,
+        ..
     } = arguments.saved.load()?;
     let (camera, frame) = match (arguments.frame, &arguments.camera) {
         (_, Some(path)) => (read_camera(path, capture.scene.origin)?, 0),

@@ -3,6 +3,7 @@
 use crate::error::Result;
 use crate::inverse::estimate::Estimate;
 use crate::session::command::{OpenOptions, Source};
+use crate::session::edits::Edits;
 use crate::session::open::open;
 use crate::session::save::{self, Saved};
 use crate::session::snapshot::OpenCapture;
@@ -32,8 +33,12 @@ pub struct Loaded {
     pub saved: Saved,
     /// The capture, read again.
     pub capture: Arc<OpenCapture>,
-    /// The estimate of its objects, with what was changed of it by hand.
-    pub estimate: Estimate,
+    /// The estimate of its objects, as it was found.
+    pub found: Arc<Estimate>,
+    /// What was changed of it by hand.
+    pub edits: Edits,
+    /// The estimate with that.
+    pub estimate: Arc<Estimate>,
 }
 
 impl SavedOptions {
@@ -51,11 +56,13 @@ impl SavedOptions {
         };
         let capture = open(moved.as_ref().unwrap_or(&saved.source), &options)?;
         let found = saved.estimate_for(&capture)?;
-        let estimate = saved.edits_for(&capture)?.apply(&found);
+        let edits = saved.edits_for(&capture)?;
         Ok(Loaded {
             saved,
             capture: Arc::new(capture),
-            estimate,
+            estimate: Arc::new(edits.apply(&found)),
+            found: Arc::new(found),
+            edits,
         })
     }
 }

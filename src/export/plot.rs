@@ -9,6 +9,8 @@ use plotters::prelude::{
     BLACK, BitMapBackend, ChartBuilder, Circle, Color, IntoDrawingArea, IntoFont, LineSeries,
     PathElement, Polygon, RGBColor, Rectangle, SeriesLabelPosition, Text, WHITE,
 };
+use plotters::style::TextStyle;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::path::Path;
 
 /// Colours that stay apart for most eyes (Okabe and Ito 2008).
@@ -24,6 +26,8 @@ const COLORS: [RGBColor; 7] = [
 
 /// Width and height of a plot in pixels.
 const SIZE: (u32, u32) = (960, 600);
+/// Room that the name of a point needs, in pixels.
+const LABEL: i32 = 100;
 
 /// What an axis shows and how.
 #[derive(Debug, Clone, Default)]
@@ -174,8 +178,15 @@ impl Plot {
         for (point, name) in self.labels.iter().filter(|(point, _)| shown(point)) {
             let at = (point[0], point[1]);
             chart.draw_series([Circle::new(at, 6, BLACK.stroke_width(2))])?;
-            let style = (FONT, 17).into_font().color(&BLACK);
-            chart.draw_series([Text::new(format!("   {name}"), at, style)])?;
+            // A name has no room to the right of what is near the right edge.
+            let near_edge = chart.backend_coord(&at).0 > SIZE.0 as i32 - LABEL;
+            let (text, side) = match near_edge {
+                true => (format!("{name}   "), HPos::Right),
+                false => (format!("   {name}"), HPos::Left),
+            };
+            let style = TextStyle::from((FONT, 17).into_font()).color(&BLACK);
+            let style = style.pos(Pos::new(side, VPos::Top));
+            chart.draw_series([Text::new(text, at, style)])?;
         }
         if !self.series.is_empty() {
             chart

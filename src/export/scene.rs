@@ -47,6 +47,14 @@ pub struct Part {
     pub uvs: Vec<Vec2>,
 }
 
+/// What a file of a format cannot hold of an estimate, in a sentence; `None` where nothing is lost.
+pub fn lost(estimate: &Estimate, format: Format) -> Option<&'static str> {
+    let holds_light = matches!(format, Format::Glb | Format::Obj | Format::Mitsuba);
+    (holds_light && estimate.outside.is_some()).then_some(
+        "light from outside the mesh is not in the file; write it as a panorama (a light probe) beside it",
+    )
+}
+
 /// Writes a scene and its estimate for another program.
 ///
 /// # Errors

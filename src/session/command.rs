@@ -71,11 +71,21 @@ pub enum Command {
     Resume(PathBuf),
     /// Reads the open capture again with other options, keeping what was found and changed.
     Reframe(Box<OpenOptions>),
-    /// Changes the objects of the open capture: all changes since it was read, in place of those before. What was found
-    /// of other objects is forgotten, and the solve starts over.
-    Regroup(Vec<Regroup>),
+    /// Changes the objects of the open capture. What was found is forgotten, and the solve starts over.
+    Regroup(Box<Regrouping>),
     /// Ends the worker.
     Quit,
+}
+
+/// Other objects of a capture.
+#[derive(Debug, Clone)]
+pub struct Regrouping {
+    /// Which capture, by its hash; nothing happens where another one is open by now.
+    pub hash: String,
+    /// All changes since the capture was read, in place of those before.
+    pub changes: Vec<Regroup>,
+    /// The changes made by hand to what is found, by the new objects' places.
+    pub edits: Edits,
 }
 
 /// What to look at.

@@ -2,9 +2,10 @@
 
 use crate::session::command::{Command, Placement, ViewRequest};
 use crate::session::edits::Edits;
-use crossbeam_channel::{Receiver, Sender, TryRecvError, TrySendError, bounded};
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, TryRecvError, TrySendError, bounded};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 /// Commands that may wait at a time. Views, insertions and edits do not count: of each only the newest waits.
 pub const CAPACITY: usize = 256;
@@ -132,19 +133,34 @@ impl Inbox {
         }
     }
 
-    /// The next command; sleeps until there is one.
-    pub fn wait(&mut self) -> Mail {
+    /// The next command; sleeps until there is one, or so long.
+    pub fn wait(&mut self, most: Option<Duration>) -> Mail {
+        let end = most.map(|most| Instant::now() + most);
         loop {
             match self.poll() {
                 Mail::Nothing => {}
                 mail => return mail,
             }
-            match self.queue.recv() {
+            let message = match end {
+                Some(end) => self.queue.recv_deadline(end),
+                None => self.queue.recv().map_err(RecvTimeoutError::from),
+            };
+            match message {
                 Ok(Message::Command(command)) => return Mail::Command(command),
                 Ok(Message::Look) => {}
-                Err(_) => return Mail::Closed,
+                Err(RecvTimeoutError::Timeout) => return Mail::Nothing,
+                Err(RecvTimeoutError::Disconnected) => return Mail::Closed,
             }
         }
+    }
+
+    /// Forgets edits and insertions that wait: they are of a capture that is no longer open.
+    pub fn forget_changes(&mut self) {
+        let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+        (latest.edit, latest.insert) = (None, None);
+        let is_change =
+            |mail: &Mail| matches!(mail, Mail::Command(Command::Edit(_) | Command::Insert(_)));
+        self.ahead.retain(|mail| !is_change(mail));
     }
 
     /// Whether nothing waits.
@@ -202,7 +218,7 @@ mod tests {
         drop(outbox);
         assert_eq!(inbox.look_ahead().len(), 1);
         assert!(matches!(inbox.poll(), Mail::Closed));
-        assert!(matches!(inbox.wait(), Mail::Closed));
+        assert!(matches!(inbox.wait(None), Mail::Closed));
     }
 
     #[test]
@@ -217,6 +233,6 @@ mod tests {
         }
         assert!(matches!(inbox.poll(), Mail::Nothing));
         drop(outbox);
-        assert!(matches!(inbox.wait(), Mail::Closed));
+        assert!(matches!(inbox.wait(None), Mail::Closed));
     }
 }

@@ -66,8 +66,13 @@ impl Keeper {
 
     /// Whether it is time to save: something has changed, and the last save is a while ago or `now` is the time.
     pub fn is_due(&self, now: bool) -> bool {
-        let rested = self.written.is_none_or(|at| at.elapsed() >= EVERY);
-        self.base.is_some() && self.due && (now || rested)
+        (self.rest()).is_some_and(|rest| now || rest.is_zero())
+    }
+
+    /// How long until it is time to save; `None` where nothing is to be saved.
+    pub fn rest(&self) -> Option<Duration> {
+        let written = self.written.map_or(Duration::MAX, |at| at.elapsed());
+        (self.base.is_some() && self.due).then(|| EVERY.saturating_sub(written))
     }
 
     /// Saves the state of the open capture. After a failure nothing more is kept.

@@ -40,6 +40,8 @@ pub struct Snapshot {
     pub estimate: Arc<Estimate>,
     /// The changes made by hand to the estimate, which all pictures and exports show.
     pub edits: Edits,
+    /// How many requests for other objects were answered, whether or not they could be met.
+    pub regroupings: u64,
     /// The inserted objects that the open capture came with, as a session that was taken up.
     pub inserted: Arc<Vec<Placement>>,
     /// The folder of the capture's last session, where it was kept and not taken up.

@@ -17,13 +17,14 @@ use std::sync::Arc;
 fn sent(recorder: &Recorder) -> Option<Vec<Regroup>> {
     let sent = recorder.sent();
     sent.iter().rev().find_map(|command| match command {
-        Command::Regroup(changes) => Some(changes.clone()),
+        Command::Regroup(wanted) => Some(wanted.changes.clone()),
         _ => None,
     })
 }
 
 /// Answers as the worker does: the capture with objects changed.
 fn answer(harness: &mut Harness<'_, Window>, recorder: &Recorder, changes: &[Regroup]) {
+    let edits = harness.state().app.edits.clone();
     recorder.show(|snapshot| {
         let open = crate::connection::room();
         let mut capture = relit::capture::Capture::clone(&open.capture);
@@ -31,6 +32,8 @@ fn answer(harness: &mut Harness<'_, Window>, recorder: &Recorder, changes: &[Reg
         let mut options = open.options.clone();
         options.objects = changes.to_vec();
         snapshot.view = None;
+        snapshot.regroupings += 1;
+        snapshot.edits = edits;
         snapshot.capture = Some(Arc::new(OpenCapture {
             options,
             scene: Arc::new(Scene::new(&capture).expect("a scene")),
@@ -74,6 +77,10 @@ fn chosen_objects_are_joined_and_come_apart_again_with_what_was_changed_of_them(
     }];
     assert_eq!(sent(&recorder), Some(joined.clone()));
     harness.get_by_label("Reading the mesh again…");
+    // Until then nothing is changed or taken back that goes by an object's place.
+    press(&mut harness, Modifiers::COMMAND, Key::Z);
+    press(&mut harness, Modifiers::NONE, Key::K);
+    assert_eq!(sent(&recorder), None);
     answer(&mut harness, &recorder, &joined);
     assert!(harness.query_by_label("Select floor").is_none());
 
@@ -96,6 +103,19 @@ fn chosen_objects_are_joined_and_come_apart_again_with_what_was_changed_of_them(
     );
     press(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
     assert_eq!(sent(&recorder), Some(joined));
+}
+
+#[test]
+fn objects_that_cannot_be_read_again_stay_as_they_are() {
+    let (mut harness, recorder) = solving(Harness::builder());
+    click(&mut harness, "Select floor");
+    add(&mut harness, "Select wall");
+    click(&mut harness, "Join objects");
+    assert!(sent(&recorder).is_some() && !harness.state().app.is_steady());
+    recorder.show(|snapshot| snapshot.regroupings += 1);
+    harness.run_steps(3);
+    let app = &harness.state().app;
+    assert!(app.is_steady() && app.grouping.changes.is_empty());
 }
 
 #[test]

@@ -205,6 +205,9 @@ fn cut_out(ui: &Ui, app: &mut App, scene: &Scene, rect: Rect) {
 
 /// Drags a handle of an inserted object; false while none is held.
 fn move_object(ui: &Ui, app: &mut App, scene: &Scene, response: &Response) -> bool {
+    if app.picking == Some(Pick::Lasso) {
+        return false;
+    }
     if response.drag_started_by(PointerButton::Primary)
         && let Some(press) = ui.input(|input| input.pointer.press_origin())
     {

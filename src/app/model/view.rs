@@ -57,6 +57,7 @@ impl ModelView {
     /// Makes faces and colours anew, for a mesh whose objects are others.
     pub fn remake(&mut self) {
         (self.surface, self.making, self.colors) = (None, None, None);
+        self.lasso = Lasso::default();
         self.photographed.clear();
     }
 

@@ -14,6 +14,10 @@ const MOST: f32 = 4.0;
 
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, app: &mut App) {
+    if !app.is_steady() {
+        ui.weak("Reading the mesh again…");
+        return;
+    }
     let Some(capture) = app.capture().cloned() else {
         ui.weak("No capture is open");
         return;

@@ -16,6 +16,10 @@ const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, app: &mut App) {
+    if !app.is_steady() {
+        ui.weak("Reading the mesh again…");
+        return;
+    }
     let Some(capture) = app.capture().cloned() else {
         ui.weak("No capture is open");
         return;

@@ -91,7 +91,15 @@ pub fn write_checkpoint(folder: &Path, results: &Results) -> Result<()> {
         checkpoint: results.checkpoint.clone(),
     };
     staging.write(CHECKPOINT, &json(CHECKPOINT, &checkpoint)?)?;
-    staging.commit(|_| Vec::new())
+    // Maps of the checkpoint before, unless they are those of finished results.
+    staging.commit(|folder| {
+        let finished = fs::read(folder.join(ESTIMATE)).unwrap_or_default();
+        let finished: Option<EstimateFile> = serde_json::from_slice(&finished).ok();
+        let kept = finished.and_then(|file| file.maps).map(PathBuf::from);
+        let mut stale = earlier_maps(folder);
+        stale.retain(|name| Some(name) != kept.as_ref());
+        stale
+    })
 }
 
 impl Results {
@@ -126,13 +134,16 @@ fn losses(points: &[LossPoint]) -> Table {
 fn earlier(folder: &Path) -> Vec<PathBuf> {
     let mut names = pictures::earlier(folder);
     names.push(PathBuf::from(CHECKPOINT));
-    let list = |path: &Path| {
-        let entries = fs::read_dir(path).into_iter().flatten().flatten();
-        entries.filter_map(|entry| entry.file_name().into_string().ok())
-    };
-    let is_maps = |n: &String| n.starts_with("maps-") && n.ends_with(".safetensors");
-    names.extend(list(folder).filter(is_maps).map(PathBuf::from));
+    names.extend(earlier_maps(folder));
     names
+}
+
+/// All maps in a folder.
+fn earlier_maps(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    let is_maps = |n: &String| n.starts_with("maps-") && n.ends_with(".safetensors");
+    names.filter(is_maps).map(PathBuf::from).collect()
 }
 
 fn json(name: &str, value: &impl Serialize) -> Result<Vec<u8>> {

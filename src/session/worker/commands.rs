@@ -1,7 +1,7 @@
 //! What each command does.
 
 use crate::export::{light_layers, scene};
-use crate::session::command::{Command, ExportRequest, ViewCamera};
+use crate::session::command::{Command, ExportRequest, OpenOptions, ViewCamera};
 use crate::session::save::pictures::Frames;
 use crate::session::save::{self, Results};
 use crate::session::snapshot::{Level, Phase};
@@ -21,25 +21,31 @@ impl Worker {
     pub(super) fn handle(&mut self, command: Command) -> Option<Next> {
         self.touch();
         match command {
-            Command::Open(source) => return Some(Next::Open(source)),
+            Command::Open(source) => {
+                return Some(Next::Open(source, OpenOptions::default()));
+            }
             Command::Resume(folder) => return Some(Next::Resume(folder)),
             Command::Reset => {
                 self.paused = false;
                 self.step = false;
                 return self.capture.is_some().then_some(Next::Solve(None));
             }
-            Command::Reframe(options) => {
+            Command::Reframe(mut options) => {
                 let go_on = self.solving && !self.paused;
-                return self
-                    .capture
-                    .is_some()
-                    .then_some(Next::Reframe(options, go_on));
+                let capture = self.capture.as_ref()?;
+                // Whoever asked may not have seen the newest objects.
+                options.objects.clone_from(&capture.options.objects);
+                return Some(Next::Reframe(options, go_on));
             }
-            Command::Regroup(changes) => {
+            Command::Regroup(wanted) => {
                 let go_on = self.solving && !self.paused;
                 let open = self.capture.as_ref();
-                let other = open.is_some_and(|capture| capture.options.objects != changes);
-                return other.then_some(Next::Regroup(changes, go_on));
+                if open
+                    .is_some_and(|c| c.hash == wanted.hash && c.options.objects != wanted.changes)
+                {
+                    return Some(Next::Regroup(wanted, go_on));
+                }
+                self.regroupings += 1;
             }
             Command::Quit => return Some(Next::Quit),
             Command::Run => return self.go_on(false),
@@ -175,7 +181,12 @@ impl Worker {
             None => self.edited(),
         };
         match scene::write(&capture.scene, &estimate, request.format, path) {
-            Ok(()) => self.say(Level::Info, format!("exported to {}", path.display())),
+            Ok(()) => {
+                self.say(Level::Info, format!("exported to {}", path.display()));
+                if let Some(lost) = scene::lost(&estimate, request.format) {
+                    self.say(Level::Warning, lost);
+                }
+            }
             Err(error) => self.fail(&error),
         }
     }

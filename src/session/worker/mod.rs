@@ -56,7 +56,11 @@ impl Session {
     ///
     /// # Errors
     /// The system grants no thread.
-    pub fn spawn(source: Option<Source>, settings: Settings, wake: Wake) -> Result<Self> {
+    pub fn spawn(
+        source: Option<(Source, OpenOptions)>,
+        settings: Settings,
+        wake: Wake,
+    ) -> Result<Self> {
         Self::spawn_with(source, settings, wake, Backend::default())
     }
 
@@ -65,7 +69,7 @@ impl Session {
     /// # Errors
     /// The system grants no thread.
     pub fn spawn_with(
-        source: Option<Source>,
+        source: Option<(Source, OpenOptions)>,
         settings: Settings,
         wake: Wake,
         backend: Backend,
@@ -73,7 +77,7 @@ impl Session {
         let (outbox, inbox) = inbox::queue();
         let slot = Arc::new(Slot::default());
         let shared = slot.clone();
-        let first = source.map_or(Next::Wait, Next::Open);
+        let first = source.map_or(Next::Wait, |(source, options)| Next::Open(source, options));
         let thread = std::thread::Builder::new()
             .name("relit-worker".to_owned())
             .spawn(move || Worker::new(inbox, shared, settings, wake, backend).run(first))

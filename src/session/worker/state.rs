@@ -51,6 +51,8 @@ pub(super) struct Worker {
     pub inserted: Arc<Vec<Placement>>,
     /// Until when what was asked for has a larger share of the time.
     pub answer_until: Option<Instant>,
+    /// Answers to requests for other objects.
+    pub regroupings: u64,
     edited: Edited,
     sequence: u64,
     changed: bool,
@@ -89,6 +91,7 @@ impl Worker {
             keeper: Keeper::default(),
             inserted: Arc::default(),
             answer_until: None,
+            regroupings: 0,
             edited: Edited::default(),
             sequence: 0,
             changed: true,
@@ -184,6 +187,7 @@ impl Worker {
                 .flatten(),
             estimate: self.estimate.clone(),
             edits: self.edits.clone(),
+            regroupings: self.regroupings,
             inserted: self.inserted.clone(),
             earlier: self.keeper.earlier.clone(),
             view: self.views.shown(),

@@ -113,8 +113,9 @@ impl Observer for Steering<'_> {
             // Held: draw what was asked for, then sleep until a command comes.
             let busy = self.worker.draw(1.0);
             self.worker.publish(!busy);
+            self.worker.keep(false);
             if !busy {
-                let mail = self.worker.inbox.wait();
+                let mail = self.worker.inbox.wait(self.worker.keeper.rest());
                 if self.take(mail) {
                     return Control::Stop;
                 }

@@ -1,9 +1,8 @@
 //! The worker's main loop: waiting, opening, resuming, solving, and what happens when one of them panics.
 
-use crate::capture::regroup::Regroup;
 use crate::error::Error;
 use crate::inverse::solver::{Checkpoint, Problem};
-use crate::session::command::{OpenOptions, Source};
+use crate::session::command::{OpenOptions, Regrouping, Source};
 use crate::session::edits::Edits;
 use crate::session::inbox::Mail;
 use crate::session::keep;
@@ -22,7 +21,7 @@ pub(super) enum Next {
     /// Serve commands.
     Wait,
     /// Read a capture, then solve it.
-    Open(Source),
+    Open(Source, OpenOptions),
     /// Read what an earlier run wrote, then go on from it.
     Resume(PathBuf),
     /// Solve what is open, from the start or from a checkpoint.
@@ -30,7 +29,7 @@ pub(super) enum Next {
     /// Read what is open again with other options, and solve on if so.
     Reframe(Box<OpenOptions>, bool),
     /// Read what is open again with other objects, and solve it from the start; where that fails, solve on if so.
-    Regroup(Vec<Regroup>, bool),
+    Regroup(Box<Regrouping>, bool),
     /// End.
     Quit,
 }
@@ -55,11 +54,11 @@ impl Worker {
     fn take(&mut self, next: Next) -> Next {
         match next {
             Next::Wait => self.wait(),
-            Next::Open(source) => self.open(&source, &OpenOptions::default()),
+            Next::Open(source, options) => self.open(&source, &options),
             Next::Resume(folder) => self.resume(&folder),
             Next::Solve(checkpoint) => self.solve(checkpoint.as_ref()),
             Next::Reframe(options, go_on) => self.reframe(&options, go_on),
-            Next::Regroup(changes, go_on) => self.regroup(changes, go_on),
+            Next::Regroup(wanted, go_on) => self.regroup(*wanted, go_on),
             Next::Quit => Next::Quit,
         }
     }
@@ -89,13 +88,11 @@ impl Worker {
         loop {
             let busy = self.draw(1.0);
             self.publish(!busy);
-            if !busy {
-                self.keep(false);
-            }
+            self.keep(false);
             let mail = if busy {
                 self.inbox.poll()
             } else {
-                self.inbox.wait()
+                self.inbox.wait(self.keeper.rest())
             };
             match mail {
                 Mail::Nothing => {}
@@ -116,6 +113,7 @@ impl Worker {
         match (self.backend.open)(source, options) {
             Ok(capture) => {
                 self.seconds_load = self.started.elapsed().as_secs_f64();
+                self.keep(true);
                 self.adopt(capture);
                 self.set_aside();
                 Next::Solve(None)
@@ -139,6 +137,7 @@ impl Worker {
         }
         self.capture = Some(Arc::new(capture));
         self.inserted = Arc::default();
+        self.inbox.forget_changes();
         self.forget();
         self.edits = Edits::default();
         self.views.reset();
@@ -163,20 +162,23 @@ impl Worker {
     }
 
     /// Reads the open capture with other objects, and starts over.
-    fn regroup(&mut self, changes: Vec<Regroup>, go_on: bool) -> Next {
+    fn regroup(&mut self, wanted: Regrouping, go_on: bool) -> Next {
         let Some(old) = self.capture.clone() else {
             return Next::Wait;
         };
         let before = std::mem::replace(&mut self.phase, Phase::Loading);
         self.publish(true);
         let options = OpenOptions {
-            objects: changes,
+            objects: wanted.changes,
             ..old.options.clone()
         };
+        self.regroupings += 1;
         if self.reopen(&options) {
+            self.edits = wanted.edits;
             return Next::Solve(None);
         }
         self.phase = before;
+        self.touch();
         match go_on {
             true => Next::Solve(self.checkpoint.clone()),
             false => Next::Wait,
@@ -221,6 +223,7 @@ impl Worker {
         });
         match loaded {
             Ok((capture, estimate, edits, inserted, saved)) => {
+                self.keep(true);
                 self.keeper.resumed(&capture.hash);
                 self.adopt(capture);
                 self.inserting.place(inserted.clone());
