@@ -47,7 +47,7 @@ impl App {
         self.capture().is_some() && self.is_steady()
     }
 
-    /// Takes in what a snapshot says of objects asked for; whether it brings the open capture with them.
+    /// Takes in what a snapshot says of objects asked for; whether it brought the open capture with them.
     pub(super) fn take_grouping(&mut self, before: &Snapshot) -> bool {
         let Some(now) = self.snapshot.capture.clone() else {
             return false;
@@ -65,7 +65,24 @@ impl App {
             self.edits = self.snapshot.edits.clone();
             self.sent_edits = self.edits.clone();
         }
+        if changed {
+            self.objects_changed();
+        }
         changed
+    }
+
+    /// Takes in the capture that was open with other objects: what is looked at and all steps of editing stay.
+    fn objects_changed(&mut self) {
+        self.selected = None;
+        self.grouping.also.clear();
+        self.grouping.name = (None, String::new());
+        self.grouping.naming = false;
+        self.picking = None;
+        self.sent_view = None;
+        self.sent_edits = self.snapshot.edits.clone();
+        self.sent_insertions = self.snapshot.inserted.to_vec();
+        self.model.remake();
+        self.trade_of_capture();
     }
 
     /// The selected object and those chosen besides, the selected one first.
@@ -100,11 +117,8 @@ impl App {
     /// Gives an object another name.
     pub fn rename_object(&mut self, object: u32, name: &str) {
         let name = name.trim().to_owned();
-        for object in self.names(&[object]) {
-            if object != name {
-                let name = name.clone();
-                self.change_objects(Regroup::Rename { object, name });
-            }
+        if let Some(object) = self.names(&[object]).pop().filter(|old| *old != name) {
+            self.change_objects(Regroup::Rename { object, name });
         }
     }
 
@@ -156,17 +170,16 @@ impl App {
 
     /// Hands the worker the changes of objects where they differ from those it has.
     pub(super) fn send_grouping(&mut self) {
-        let Some(capture) = self.capture() else {
+        let changes = &self.grouping.changes;
+        let Some(capture) = self.capture().filter(|_| *changes != self.grouping.sent) else {
             return;
         };
         let wanted = Regrouping {
             hash: capture.hash.clone(),
-            changes: self.grouping.changes.clone(),
+            changes: changes.clone(),
             edits: self.edits.clone(),
         };
-        if self.grouping.changes != self.grouping.sent
-            && self.connect(Command::Regroup(Box::new(wanted)))
-        {
+        if self.connect(Command::Regroup(Box::new(wanted))) {
             self.grouping.sent.clone_from(&self.grouping.changes);
             self.sent_edits = self.edits.clone();
         }

@@ -42,7 +42,7 @@ impl App {
     /// Whether an action makes sense now.
     pub fn can(&self, action: Action) -> bool {
         let open = self.capture().is_some();
-        if !self.is_steady() && goes_by_object(action) {
+        if goes_by_object(action) && !self.is_steady() {
             return false;
         }
         match action {

@@ -124,8 +124,8 @@ pub struct App {
     photograph: Option<(usize, Arc<Picture>)>,
     pending: VecDeque<Command>,
     opening: Option<Source>,
-    sent_view: Option<(Option<usize>, u64, u32, bool)>,
-    sent_insertions: Vec<Placement>,
+    pub(super) sent_view: Option<(Option<usize>, u64, u32, bool)>,
+    pub(super) sent_insertions: Vec<Placement>,
     pub(super) sent_edits: Edits,
     pub(super) edited: Edited,
 }
@@ -299,25 +299,9 @@ impl App {
         if self.snapshot.phase == Phase::Failed {
             self.opening = None;
         }
-        if self.take_grouping(&before) {
-            self.objects_changed();
-        } else if other_capture {
+        if !self.take_grouping(&before) && other_capture {
             self.capture_changed();
         }
-    }
-
-    /// Takes in the capture that was open with other objects: what is looked at and all steps of editing stay.
-    fn objects_changed(&mut self) {
-        self.selected = None;
-        self.grouping.also.clear();
-        self.grouping.name = (None, String::new());
-        self.grouping.naming = false;
-        self.picking = None;
-        self.sent_view = None;
-        self.sent_edits = self.snapshot.edits.clone();
-        self.sent_insertions = self.snapshot.inserted.to_vec();
-        self.model.remake();
-        self.trade_of_capture();
     }
 
     fn capture_changed(&mut self) {

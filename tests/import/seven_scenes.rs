@@ -8,10 +8,15 @@ use relit::capture::import::ImportOptions;
 use std::path::Path;
 use tempfile::TempDir;
 
+/// What the names of a frame's files begin with.
+fn stem(index: usize) -> String {
+    format!("seq-{:02}/frame-{:06}", index / 12 + 1, index % 12)
+}
+
 /// The sample in a folder, in sequences of 12 frames.
 pub fn sample(folder: &Path, cameras: &[Camera]) {
     for (index, camera) in cameras.iter().enumerate() {
-        let stem = format!("seq-{:02}/frame-{:06}", index / 12 + 1, index % 12);
+        let stem = stem(index);
         let names = [format!("{stem}.color.png"), format!("{stem}.depth.png")];
         write_images(folder, camera, &names[0], &names[1], 1000.0);
         write(folder, &format!("{stem}.pose.txt"), camera.matrix_text());
@@ -49,7 +54,7 @@ fn depth_may_be_pgm() {
     sample(folder.path(), &cameras);
     write(folder.path(), "intrinsics.txt", intrinsics(&cameras[0]));
     for index in 0..cameras.len() {
-        let stem = format!("seq-{:02}/frame-{:06}", index / 12 + 1, index % 12);
+        let stem = stem(index);
         let png = folder.path().join(format!("{stem}.depth.png"));
         let depth = image::open(&png).unwrap().into_luma16();
         std::fs::remove_file(&png).unwrap();

@@ -72,7 +72,7 @@ mod tests {
         assert_eq!(allowed(2.0), 2 << 30);
         let part = allowed(0.0);
         assert!((1 << 20..1 << 46).contains(&part), "{part}");
-        assert!(suffices(part, 100, 64.0) && !suffices(part, u64::MAX, 1.0));
+        assert!(suffices(part, 1000, 64.0) && !suffices(part, u64::MAX, 1.0));
         assert!(!suffices(1 << 20, 1000, 1000.0));
     }
 }

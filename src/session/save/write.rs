@@ -86,6 +86,7 @@ pub fn write_checkpoint(folder: &Path, results: &Results) -> Result<()> {
     if let (Some(name), Some(bytes)) = (&estimate.maps, &maps) {
         staging.write(name, bytes)?;
     }
+    let own = estimate.maps.clone().map(PathBuf::from);
     let checkpoint = CheckpointFile {
         estimate,
         checkpoint: results.checkpoint.clone(),
@@ -93,11 +94,14 @@ pub fn write_checkpoint(folder: &Path, results: &Results) -> Result<()> {
     staging.write(CHECKPOINT, &json(CHECKPOINT, &checkpoint)?)?;
     // Maps of the checkpoint before, unless they are those of finished results.
     staging.commit(|folder| {
-        let finished = fs::read(folder.join(ESTIMATE)).unwrap_or_default();
-        let finished: Option<EstimateFile> = serde_json::from_slice(&finished).ok();
-        let kept = finished.and_then(|file| file.maps).map(PathBuf::from);
         let mut stale = earlier_maps(folder);
-        stale.retain(|name| Some(name) != kept.as_ref());
+        stale.retain(|name| Some(name) != own.as_ref());
+        if !stale.is_empty() {
+            let finished = fs::read(folder.join(ESTIMATE)).unwrap_or_default();
+            let finished: Option<EstimateFile> = serde_json::from_slice(&finished).ok();
+            let kept = finished.and_then(|file| file.maps).map(PathBuf::from);
+            stale.retain(|name| Some(name) != kept.as_ref());
+        }
         stale
     })
 }
