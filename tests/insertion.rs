@@ -71,7 +71,7 @@ fn capture(groups: &[(&str, Vec<[DVec3; 3]>)]) -> Capture {
             .collect(),
         usable: Vec::new(),
         encoding: Encoding::Linear,
-        saturation: f32::INFINITY,
+        saturation: Vec3::INFINITY,
     });
     Capture {
         name: "test".to_owned(),
@@ -348,7 +348,7 @@ fn passes_give_the_same_bits_however_they_are_split_and_on_any_number_of_threads
 fn a_saturating_photograph_gives_a_composite_that_saturates_like_it() {
     let (capture, lit) = lamp_room();
     let mut backdrop = backdrop(&capture, &lit);
-    backdrop.saturation = 1.0;
+    backdrop.saturation = Vec3::ONE;
     backdrop.exposure = Vec3::splat(2.0);
     backdrop.photograph = Arc::new(Picture::from_fn(SIDE, SIDE, |x, _| {
         Vec3::splat(if x == 0 { 1.0 } else { 0.5 })

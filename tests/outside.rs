@@ -4,9 +4,13 @@ mod scenes;
 
 use glam::{DVec3, Vec3};
 use relit::capture::mesh::Mesh;
+use relit::capture::photograph::Photograph;
 use relit::inverse::estimate::Estimate;
+use relit::inverse::outside::MeasuredOutside;
 use relit::inverse::settings::{Preset, Settings};
 use relit::inverse::solver::{Control, Observer, Problem, Progress, Solution, solve};
+use relit::inverse::survey::Survey;
+use relit::scene::Scene;
 use relit::transport::environment::Environment;
 use relit::transport::material::{Albedo, Material};
 use scenes::View;
@@ -115,6 +119,48 @@ fn a_room_lit_through_its_window_keeps_its_walls_dark() {
         .collect();
     errors.sort_by(f32::total_cmp);
     assert!(errors[errors.len() / 2] < 0.05, "{errors:?}");
+}
+
+/// The same views twice, the second time overexposed: where the first measured the sky, its bound counts for nothing.
+#[test]
+fn a_saturated_sky_is_a_bound_only_where_nothing_measured_it() {
+    let (mesh, materials) = room_with_a_window();
+    let once = scenes::capture(mesh.clone(), &views(), SIZE);
+    let once = scenes::photographed_under(Some(sky()), &once, &materials, 16, 73);
+    let twice = scenes::capture(mesh, &[views(), views()].concat(), SIZE);
+    let overexposed = once.photographs.iter().map(|photograph| {
+        let mut clipped = Photograph::clone(photograph);
+        clipped.saturation = Vec3::ONE;
+        clipped
+            .pixels
+            .iter_mut()
+            .for_each(|p| *p = p.min(Vec3::ONE));
+        Arc::new(clipped)
+    });
+    let both = Problem {
+        scene: Arc::new(Scene::new(&twice).expect("the room is sound")),
+        photographs: (once.photographs.iter().cloned())
+            .chain(overexposed.clone())
+            .collect(),
+    };
+    let bounds = Problem {
+        scene: once.scene.clone(),
+        photographs: overexposed.collect(),
+    };
+    let settings = Settings {
+        hold_out: 0,
+        ..Settings::default()
+    };
+    let [once, both, bounds] = [once, both, bounds].map(|problem| {
+        let survey = Survey::new(&problem, &settings, usize::MAX);
+        MeasuredOutside::new(&problem, &survey).expect("the sky is seen")
+    });
+    let upwards = Vec3::new(0.1, 0.3, 1.0).normalize();
+    let [measured, of_both, bound] = [&once, &both, &bounds].map(|m| m.at(upwards));
+    let measured = measured.expect("seen through the window");
+    assert!(measured.min_element() > 1.0, "{measured}");
+    assert_eq!(of_both, Some(measured));
+    assert_eq!(bound, Some(Vec3::ONE));
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 mod scenes;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{BVec3, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use relit::inverse::cache::PathCache;
 use relit::inverse::cache::clusters::Cluster;
@@ -86,6 +86,7 @@ fn rows() -> Vec<Cluster> {
         pixels: (y * width..(y + 1) * width).collect(),
         paths: 2,
         measured: Vec3::ZERO,
+        at_least: BVec3::FALSE,
         weight: Vec3::ONE,
         dark: Vec3::ONE,
     };
@@ -327,6 +328,7 @@ fn paths_that_end_in_photographed_radiance_hold_one_bounce_and_that_radiance() {
         pixels: (0..576).collect(),
         paths: 4,
         measured: Vec3::ZERO,
+        at_least: BVec3::FALSE,
         weight: Vec3::ONE,
         dark: Vec3::ONE,
     }];

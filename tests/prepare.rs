@@ -37,7 +37,7 @@ fn frame(left: f32, right: f32) -> Frame {
             pixels: (0..SIZE * SIZE).map(pixel).collect(),
             usable: Vec::new(),
             encoding: Encoding::Linear,
-            saturation: f32::INFINITY,
+            saturation: Vec3::INFINITY,
         })),
         depth: None,
     }

@@ -306,7 +306,7 @@ fn losses_are_mean_absolute_differences_apart_for_fitted_and_held_out_pixels() {
         losses.held_out.is_some_and(|l| (l - 0.3).abs() < 1e-5),
         "{losses:?}"
     );
-    assert!(losses.rays >= 400);
+    assert!(losses.cast.rays >= 400);
     // Nothing is held out: there is nothing to measure.
     let settings = Settings {
         held_out: 0.0,

@@ -3,7 +3,7 @@
 use crate::capture::camera::Intrinsics;
 use crate::capture::read;
 use crate::error::Result;
-use glam::Vec3;
+use glam::{BVec3, Vec3};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -31,17 +31,22 @@ pub struct Photograph {
     pub usable: Vec<bool>,
     /// How the file stored the values.
     pub encoding: Encoding,
-    /// The value at which a channel saturates, in the units of `pixels`; infinite for linear files.
-    pub saturation: f32,
+    /// The value at which each channel saturates, in the units of `pixels`; infinite for linear files.
+    pub saturation: Vec3,
 }
 
 /// Pixels above this share of saturation may have been brighter than they show.
 const BELOW_SATURATION: f32 = 0.97;
 
 impl Photograph {
+    /// The channels in which a pixel may have been brighter than it shows: its value there is a lower bound.
+    pub fn saturated(&self, pixel: usize) -> BVec3 {
+        self.pixels[pixel].cmpge(self.saturation * BELOW_SATURATION)
+    }
+
     /// Whether a pixel may have been brighter than it shows, in any channel.
     pub fn is_saturated(&self, pixel: usize) -> bool {
-        self.pixels[pixel].max_element() >= self.saturation * BELOW_SATURATION
+        self.saturated(pixel).any()
     }
 }
 

@@ -4,7 +4,7 @@ use crate::capture::camera::Intrinsics;
 use crate::capture::photograph::{Photograph, PhotographSource};
 use crate::capture::{Capture, Frame};
 use crate::error::Result;
-use glam::DVec3;
+use glam::{DVec3, UVec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -136,18 +136,14 @@ fn reduce(photograph: &Photograph, factor: u32) -> Photograph {
         .flat_map(|y| (0..width).map(move |x| (x, y)))
         .map(|(x, y)| {
             let mut sum = DVec3::ZERO;
-            let mut saturated = glam::UVec3::ZERO;
+            let mut saturated = UVec3::ZERO;
             let mut usable = true;
             for j in y * factor..(y + 1) * factor {
                 for i in x * factor..(x + 1) * factor {
                     let index = j as usize * photograph.width as usize + i as usize;
                     let pixel = photograph.pixels[index];
                     sum += pixel.as_dvec3();
-                    saturated += glam::UVec3::from(
-                        pixel
-                            .to_array()
-                            .map(|v| u32::from(v >= photograph.saturation)),
-                    );
+                    saturated += UVec3::from(pixel.cmpge(photograph.saturation));
                     usable &= photograph.usable.get(index).copied().unwrap_or(true);
                 }
             }
@@ -185,7 +181,7 @@ mod tests {
             pixels: (0..width * height).map(|i| Vec3::splat(i as f32)).collect(),
             usable: Vec::new(),
             encoding: Encoding::Linear,
-            saturation: f32::INFINITY,
+            saturation: Vec3::INFINITY,
         }
     }
 
@@ -202,7 +198,7 @@ mod tests {
         let mut p = photograph(4, 4);
         p.usable = vec![true; 16];
         p.usable[0] = false;
-        p.saturation = 7.0;
+        p.saturation = Vec3::splat(7.0);
         p.pixels
             .iter_mut()
             .for_each(|v| *v = v.min(Vec3::splat(7.0)));

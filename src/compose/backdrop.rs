@@ -19,8 +19,8 @@ pub struct Backdrop {
     pub photograph: Arc<Picture>,
     /// Factor from the estimate's radiance to the photograph's values, per channel.
     pub exposure: Vec3,
-    /// The value at which the photograph saturates; infinite for linear files.
-    pub saturation: f32,
+    /// The value at which each channel of the photograph saturates; infinite for linear files.
+    pub saturation: Vec3,
     /// The exposure at which it is shown as 8-bit sRGB: its own, or the 99th percentile of the photograph as taken at 1.
     pub shown_at: f32,
 }
@@ -53,7 +53,7 @@ impl Backdrop {
             ));
         }
         let shown_at = if photograph.saturation.is_finite() {
-            photograph.saturation.recip()
+            photograph.saturation.max_element().recip()
         } else {
             percentile_exposure(&picture.pixels)
         };
@@ -75,12 +75,11 @@ impl Backdrop {
     pub fn blend(&self, pixel: usize, alpha: f32, over: Vec3, under: Vec3) -> Vec3 {
         let photograph = self.photograph.pixels[pixel];
         let (over, under) = (over * self.exposure, under * self.exposure);
-        if self.saturation.is_infinite() {
+        if !self.saturation.is_finite() {
             return over * alpha + (photograph + over - under) * (1.0 - alpha);
         }
-        let saturated = photograph.cmpge(Vec3::splat(self.saturation));
+        let saturated = photograph.cmpge(self.saturation);
         let behind = Vec3::select(saturated, photograph.max(under), photograph);
-        (over * alpha + (behind + over - under) * (1.0 - alpha))
-            .clamp(Vec3::ZERO, Vec3::splat(self.saturation))
+        (over * alpha + (behind + over - under) * (1.0 - alpha)).clamp(Vec3::ZERO, self.saturation)
     }
 }

@@ -115,7 +115,7 @@ pub fn harmonics_of_estimate(
 pub struct Pasted {
     /// Pixels with an object in them, its light in the photograph's values, and how much of the pixel it covers.
     covered: Vec<(usize, Vec3, f32)>,
-    saturation: f32,
+    saturation: Vec3,
 }
 
 impl Pasted {
@@ -177,7 +177,7 @@ impl Pasted {
         let mut picture = photograph.clone();
         for &(pixel, light, alpha) in &self.covered {
             let pasted = light + photograph.pixels[pixel] * (1.0 - alpha);
-            picture.pixels[pixel] = pasted.min(Vec3::splat(self.saturation));
+            picture.pixels[pixel] = pasted.min(self.saturation);
         }
         picture
     }

@@ -30,7 +30,7 @@ pub fn relit(backdrop: &Backdrop, before: &[Vec3], after: &[Vec3]) -> Picture {
             .map(|((photograph, before), after)| {
                 let (before, after) = (*before * backdrop.exposure, *after * backdrop.exposure);
                 let channel =
-                    |c: usize| changed(photograph[c], before[c], after[c], backdrop.saturation);
+                    |c: usize| changed(photograph[c], before[c], after[c], backdrop.saturation[c]);
                 Vec3::new(channel(0), channel(1), channel(2))
             })
             .collect(),

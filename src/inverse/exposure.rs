@@ -103,8 +103,7 @@ impl Exposures {
             .map(|(photograph, factor)| {
                 Arc::new(Photograph {
                     pixels: photograph.pixels.iter().map(|p| *p / *factor).collect(),
-                    // A channel that was saturated stays above this.
-                    saturation: photograph.saturation / factor.max_element(),
+                    saturation: photograph.saturation / *factor,
                     ..(**photograph).clone()
                 })
             })

@@ -1,4 +1,5 @@
-//! The loss that is shown: mean absolute difference between photographs and re-renders on fixed sets of pixels.
+//! The loss that is shown: mean absolute difference between photographs and re-renders on fixed sets of pixels. Where a
+//! photograph is saturated only a darker re-render differs.
 
 use crate::inverse::estimate::Estimate;
 use crate::inverse::held_out::is_held_out;
@@ -6,6 +7,7 @@ use crate::inverse::settings::Settings;
 use crate::inverse::solver::Problem;
 use crate::math::rng::{Stream, splitmix64};
 use crate::scene::visibility::NOTHING;
+use crate::transport::arrival::Cast;
 use crate::transport::lit::Lit;
 use crate::transport::path::{PathOptions, radiance};
 use glam::{DVec3, Vec2};
@@ -31,8 +33,8 @@ pub struct Losses {
     pub train: Option<f64>,
     /// On held-out pixels; `None` where there are none.
     pub held_out: Option<f64>,
-    /// Rays cast.
-    pub rays: u64,
+    /// What measuring them took; dropped samples count as black.
+    pub cast: Cast,
 }
 
 impl LossProbe {
@@ -83,32 +85,35 @@ impl LossProbe {
     /// Renders both sets with an estimate.
     pub fn measure(&self, problem: &Problem, estimate: &Estimate) -> Losses {
         let lit = estimate.lit(&problem.scene);
-        let (train, train_rays) = self.differences(problem, &lit, &self.train);
-        let (held_out, held_out_rays) = self.differences(problem, &lit, &self.held_out);
+        let (train, mut cast) = self.differences(problem, &lit, &self.train);
+        let (held_out, cast_held_out) = self.differences(problem, &lit, &self.held_out);
+        cast += cast_held_out;
         Losses {
             train: mean(&train),
             held_out: mean(&held_out),
-            rays: train_rays + held_out_rays,
+            cast,
         }
     }
 
-    /// Mean absolute difference on the held-out pixels alone; `None` where there are none.
-    pub fn held_out(&self, problem: &Problem, estimate: &Estimate) -> Option<f64> {
-        mean(&self.held_out_each(problem, estimate))
+    /// Mean absolute difference on the held-out pixels alone, `None` where there are none, and what it took.
+    pub fn held_out(&self, problem: &Problem, estimate: &Estimate) -> (Option<f64>, Cast) {
+        let (each, cast) = self.held_out_each(problem, estimate);
+        (mean(&each), cast)
     }
 
-    /// Mean absolute difference over the channels of each held-out pixel, the same ones in the same order for any estimate.
-    pub fn held_out_each(&self, problem: &Problem, estimate: &Estimate) -> Vec<f64> {
+    /// Mean absolute difference over the channels of each held-out pixel, the same ones in the same order for any estimate, and what it
+    /// took.
+    pub fn held_out_each(&self, problem: &Problem, estimate: &Estimate) -> (Vec<f64>, Cast) {
         let lit = estimate.lit(&problem.scene);
-        self.differences(problem, &lit, &self.held_out).0
+        self.differences(problem, &lit, &self.held_out)
     }
 
-    fn differences(&self, problem: &Problem, lit: &Lit, pixels: &[(u32, u32)]) -> (Vec<f64>, u64) {
+    fn differences(&self, problem: &Problem, lit: &Lit, pixels: &[(u32, u32)]) -> (Vec<f64>, Cast) {
         let options = PathOptions {
             max_bounces: self.max_bounces,
             ..Default::default()
         };
-        let each: Vec<(f64, u64)> = pixels
+        let each: Vec<(f64, Cast)> = pixels
             .par_iter()
             .map(|&(frame, pixel)| {
                 let camera = &problem.scene.cameras[frame as usize];
@@ -118,7 +123,7 @@ impl LossProbe {
                     (pixel / photograph.width) as f32,
                 );
                 let mut sum = DVec3::ZERO;
-                let mut rays = 0;
+                let mut cast = Cast::default();
                 for sample in 0..self.samples {
                     let mut stream =
                         Stream::new(self.seed, u64::from(frame), u64::from(pixel), KEY + sample);
@@ -130,17 +135,18 @@ impl LossProbe {
                         &options,
                     );
                     sum += path.radiance.as_dvec3();
-                    rays += u64::from(path.rays);
+                    cast.rays += u64::from(path.rays);
+                    cast.rejected += u64::from(path.rejected);
                 }
                 let measured = photograph.pixels[pixel as usize].as_dvec3();
-                (
-                    (sum / self.samples as f64 - measured).abs().element_sum() / 3.0,
-                    rays,
-                )
+                let missing = measured - sum / self.samples as f64;
+                let at_least = photograph.saturated(pixel as usize);
+                let wrong = DVec3::select(at_least, missing.max(DVec3::ZERO), missing.abs());
+                (wrong.element_sum() / 3.0, cast)
             })
             .collect();
-        let rays = each.iter().map(|e| e.1).sum();
-        (each.into_iter().map(|e| e.0).collect(), rays)
+        let cast = each.iter().map(|e| e.1).sum();
+        (each.into_iter().map(|e| e.0).collect(), cast)
     }
 }
 

@@ -18,7 +18,8 @@ const CELL_FOOTPRINTS: f32 = 1.5;
 pub struct MeasuredRadiance {
     cell: f32,
     levels: Vec<Table>,
-    /// Mean measured radiance of each object over pure pixels; `None` where there are none.
+    /// Mean photographed radiance of each object over pixels that see nothing else, saturated ones at what they show; `None`
+    /// where there are none.
     pub object_means: Vec<Option<Vec3>>,
 }
 
@@ -27,8 +28,8 @@ pub struct MeasuredRadiance {
 struct Cell {
     key: u64,
     sum: DVec3,
-    /// Samples of pixels that see one smooth surface.
-    pure: u32,
+    /// Samples of pixels that see one smooth surface and are not saturated.
+    telling: u32,
     /// All samples.
     total: u32,
 }
@@ -85,15 +86,17 @@ impl MeasuredRadiance {
         };
         let mut means = vec![(DVec3::ZERO, 0u64); problem.scene.objects.len()];
         for pixel in survey.pixels.iter().filter(|p| !p.held_out) {
-            let radiance =
-                problem.photographs[pixel.frame as usize].pixels[pixel.pixel as usize].as_dvec3();
+            let photograph = &problem.photographs[pixel.frame as usize];
+            let radiance = photograph.pixels[pixel.pixel as usize].as_dvec3();
+            // Where pixels are saturated they measured nothing: paths go on to what they see.
+            let tells = pixel.pure && !photograph.is_saturated(pixel.pixel as usize);
             for point in pixel.points.iter().flatten() {
                 for level in 0..LEVELS {
                     let key = measured.key(level, point);
                     let cell = measured.levels[level].entry(key);
                     cell.total += 1;
-                    if pixel.pure {
-                        cell.pure += 1;
+                    if tells {
+                        cell.telling += 1;
                         cell.sum += radiance;
                     }
                 }
@@ -122,8 +125,8 @@ impl MeasuredRadiance {
             let key = self.key(level, point);
             let cell = &table.cells[table.slot(key)];
             // Cells at the edges of objects hold mostly mixed pixels, which say nothing of either.
-            if cell.pure > 0 && 2 * cell.pure >= cell.total {
-                return Some((cell.sum / f64::from(cell.pure)).as_vec3());
+            if cell.telling > 0 && 2 * cell.telling >= cell.total {
+                return Some((cell.sum / f64::from(cell.telling)).as_vec3());
             }
             if cell.total > 0 {
                 return None;

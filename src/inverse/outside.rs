@@ -38,8 +38,8 @@ impl MeasuredOutside {
         let height = height.next_multiple_of(1 << (LEVELS - 1));
         let width = 2 * height;
 
-        // Add up what the pixels show, in the finest cells.
-        let mut sums = vec![(DVec3::ZERO, 0u32); width * height];
+        // Add up what the pixels show, in the finest cells; saturated ones, which are lower bounds, apart.
+        let mut sums = vec![[(DVec3::ZERO, 0u32); 2]; width * height];
         let past_the_mesh = (survey.pixels.iter()).filter(|p| {
             !p.held_out && p.object == u32::MAX && p.points.iter().all(Option::is_none)
         });
@@ -51,10 +51,15 @@ impl MeasuredOutside {
             ];
             let at = Vec2::from(place.map(|x| x as f32 + 0.5));
             let direction = scene.cameras[pixel.frame as usize].ray(at).direction;
-            let sum = &mut sums[pixel_of(width, height, direction.normalize_or_zero())];
+            let bound = usize::from(photograph.is_saturated(pixel.pixel as usize));
+            let sum = &mut sums[pixel_of(width, height, direction.normalize_or_zero())][bound];
             sum.0 += photograph.pixels[pixel.pixel as usize].as_dvec3();
             sum.1 += 1;
         }
+        // A bound counts only where nothing is measured.
+        let sums: Vec<(DVec3, u32)> = (sums.into_iter())
+            .map(|[measured, bound]| if measured.1 > 0 { measured } else { bound })
+            .collect();
         if sums.iter().all(|s| s.1 == 0) {
             return None;
         }

@@ -133,6 +133,6 @@ pub fn linear([width, height]: [u32; 2], pixels: Vec<Vec3>) -> Photograph {
         pixels,
         usable: Vec::new(),
         encoding: Encoding::Linear,
-        saturation: f32::INFINITY,
+        saturation: Vec3::INFINITY,
     }
 }

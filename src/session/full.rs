@@ -54,7 +54,7 @@ impl OpenCapture {
         let k = &camera.intrinsics;
         let picture = box_filter(&whole, k.width, k.height);
         let shown_at = if photograph.saturation.is_finite() {
-            photograph.saturation.recip()
+            photograph.saturation.max_element().recip()
         } else {
             percentile_exposure(&picture.pixels)
         };

@@ -87,7 +87,7 @@ pub fn room() -> Capture {
         pixels: vec![Vec3::ZERO; (SIDE * SIDE) as usize],
         usable: Vec::new(),
         encoding: Encoding::Linear,
-        saturation: f32::INFINITY,
+        saturation: Vec3::INFINITY,
     });
     let frames = [0.5, -0.5].map(|turn| Frame {
         intrinsics,

@@ -25,7 +25,7 @@ fn with_photographs(problem: &Problem, value: Vec3, saturation: f32) -> Problem 
     let photographs = problem.photographs.iter().map(|photograph| {
         let mut photograph = (**photograph).clone();
         photograph.pixels.fill(value);
-        photograph.saturation = saturation;
+        photograph.saturation = Vec3::splat(saturation);
         Arc::new(photograph)
     });
     Problem {

@@ -34,6 +34,41 @@ fn decode(image: &DynamicImage, format: ImageFormat, exposure: Option<f64>) -> (
     .unwrap()
 }
 
+/// A Radiance file of one row of one colour, (r, g, b) · 2^(e − 136), with lines in its header.
+fn radiance(lines: &str, pixel: [u8; 4]) -> Vec<u8> {
+    let mut bytes =
+        format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n{lines}\n-Y 1 +X 3\n").into_bytes();
+    bytes.extend([pixel; 3].as_flattened());
+    bytes
+}
+
+#[test]
+fn exposures_in_radiance_files_are_divided_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path().join("image");
+    let read_with = |lines: &str| {
+        write(folder.path(), "image", &radiance(lines, [128, 64, 32, 129]));
+        read(&at, &lens(3, 1), None)
+    };
+    let (plain, _) = read_with("").unwrap();
+    assert!(
+        (plain.pixels[0] - Vec3::new(1.0, 0.5, 0.25))
+            .abs()
+            .max_element()
+            < 0.01
+    );
+    // All exposures count, as those of tools that ran one after the other do.
+    let (exposed, _) = read_with("EXPOSURE=4\nEXPOSURE=0.5\n").unwrap();
+    assert!((exposed.pixels[0] * 2.0 - plain.pixels[0]).length() < 1e-6);
+    let (corrected, _) = read_with("EXPOSURE=2\nCOLORCORR=1 2 4\n").unwrap();
+    let multiplied = corrected.pixels[0] * Vec3::new(2.0, 4.0, 8.0);
+    assert!((multiplied - plain.pixels[0]).length() < 1e-6);
+    for impossible in ["EXPOSURE=0\n", "EXPOSURE=-1\n", "EXPOSURE=NaN\n"] {
+        let error = read_with(impossible).unwrap_err().to_string();
+        assert!(error.contains("EXPOSURE"), "{error}");
+    }
+}
+
 #[test]
 fn every_format_is_decoded_to_linear_light() {
     let png8 = DynamicImage::ImageRgb8(ImageBuffer::from_pixel(3, 2, Rgb([0, 128, 255])));
@@ -84,7 +119,11 @@ fn every_format_is_decoded_to_linear_light() {
         let linear = encoding == Encoding::Linear;
         assert_eq!(
             photograph.saturation,
-            if linear { f32::INFINITY } else { 2.0 }
+            if linear {
+                Vec3::INFINITY
+            } else {
+                Vec3::splat(2.0)
+            }
         );
         for pixel in &photograph.pixels {
             let error = (*pixel * 0.5 - Vec3::from(want)).abs().max_element();

@@ -37,7 +37,7 @@ fn capture() -> Capture {
                 .collect(),
             usable: Vec::new(),
             encoding: Encoding::Linear,
-            saturation: f32::INFINITY,
+            saturation: Vec3::INFINITY,
         })),
         depth: None,
     };

@@ -52,6 +52,12 @@ fn every_flaw_is_an_error_that_names_the_field() {
         ("PINHOLE", "OPENCV_FISHEYE", "camera_model", "not supported"),
         (
             r#""cx": 2,"#,
+            r#""cx": 2, "is_fisheye": true,"#,
+            "is_fisheye",
+            "no fisheye",
+        ),
+        (
+            r#""cx": 2,"#,
             r#""cx": 2, "k3": 0.1,"#,
             "k3",
             "not supported",

@@ -156,7 +156,7 @@ pub fn photograph([width, height]: [u32; 2], pixels: Vec<Vec3>) -> Photograph {
         pixels,
         usable: Vec::new(),
         encoding: Encoding::Linear,
-        saturation: f32::INFINITY,
+        saturation: Vec3::INFINITY,
     }
 }
 

@@ -177,7 +177,7 @@ fn photograph(index: u32) -> Photograph {
         pixels: picture.pixels,
         usable: Vec::new(),
         encoding: Encoding::Linear,
-        saturation: f32::INFINITY,
+        saturation: Vec3::INFINITY,
     }
 }
 

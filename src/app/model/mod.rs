@@ -27,7 +27,7 @@ pub mod tests {
             pixels: vec![Vec3::splat(0.5); 48],
             usable: Vec::new(),
             encoding: Encoding::Linear,
-            saturation: f32::INFINITY,
+            saturation: Vec3::INFINITY,
         };
         let corner = |x, y, z| DVec3::new(x, y, z);
         let capture = Capture {

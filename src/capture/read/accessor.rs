@@ -1,5 +1,6 @@
 //! glTF accessors read with every bound checked.
 
+use crate::capture::read::gltf_file::Buffer;
 use gltf::Accessor;
 use gltf::accessor::{DataType, Dimensions};
 
@@ -11,7 +12,7 @@ use gltf::accessor::{DataType, Dimensions};
 /// What is wrong, as a phrase: sparse values, a component type or count that is not expected, a range past the buffer's end.
 pub fn numbers(
     accessor: &Accessor,
-    buffers: &[Vec<u8>],
+    buffers: &[Buffer],
     allowed: &[Dimensions],
 ) -> Result<(Vec<f64>, usize), String> {
     let index = accessor.index();

@@ -2,8 +2,9 @@
 
 use crate::capture::read::accessor::numbers;
 use crate::capture::read::confine::Confine;
+use crate::capture::read::gltf_file::{self, Buffer};
+use crate::capture::read::gltf_scene;
 use crate::capture::read::mesh::RawMesh;
-use crate::capture::read::{gltf_file, gltf_scene};
 use crate::error::{Error, Result};
 use ::gltf::accessor::Dimensions::{Scalar, Vec2 as Two, Vec3 as Three, Vec4 as Four};
 use ::gltf::{Node, Primitive, Semantic};
@@ -41,7 +42,7 @@ fn add_node(
     raw: &mut RawMesh,
     node: &Node,
     to_world: &DMat4,
-    buffers: &[Vec<u8>],
+    buffers: &[Buffer],
 ) -> std::result::Result<(), String> {
     let Some(mesh) = node.mesh() else {
         return Ok(());
@@ -76,7 +77,7 @@ fn add_primitive(
     raw: &mut RawMesh,
     primitive: &Primitive,
     to_world: &DMat4,
-    buffers: &[Vec<u8>],
+    buffers: &[Buffer],
 ) -> std::result::Result<(), String> {
     let mesh = &mut raw.mesh;
     let Some(accessor) = primitive.get(&Semantic::Positions) else {

@@ -4,7 +4,9 @@ use crate::error::{Error, Result};
 use gltf::buffer::{Data, Source};
 use gltf::json::Root;
 use gltf::{Document, Glb, Gltf};
+use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Bytes of a GLB file's header.
 const GLB_HEADER: usize = 12;
@@ -54,20 +56,32 @@ fn declared_length(bytes: &[u8]) -> Option<usize> {
 /// Reads the file of a name that a glTF file holds; the first argument is the field, for messages.
 pub type ReadFile<'a> = &'a dyn Fn(&str, &str) -> Result<Vec<u8>>;
 
+/// The bytes of a buffer; buffers of one name share them, so that they take no more memory than the files.
+pub type Buffer = Arc<Vec<u8>>;
+
 /// The bytes of all buffers: the GLB's own, data URIs, and what `file` reads.
 ///
 /// # Errors
 /// A buffer is missing or shorter than promised, or `file` fails.
-pub fn buffers(gltf: &Gltf, path: &Path, file: ReadFile<'_>) -> Result<Vec<Vec<u8>>> {
+pub fn buffers(gltf: &Gltf, path: &Path, file: ReadFile<'_>) -> Result<Vec<Buffer>> {
     let mut blob = gltf.blob.clone();
+    let mut named: BTreeMap<&str, Buffer> = BTreeMap::new();
     gltf.buffers()
         .map(|buffer| {
             let place = format!("{}: buffers[{}]", path.display(), buffer.index());
             let bytes = match buffer.source() {
-                Source::Bin => blob
-                    .take()
-                    .ok_or_else(|| Error::new(&place, "has no data", "export the mesh again"))?,
-                Source::Uri(uri) => resource(&place, uri, file)?,
+                Source::Bin => {
+                    let blob = blob.take().map(Arc::new);
+                    blob.ok_or_else(|| Error::new(&place, "has no data", "export the mesh again"))?
+                }
+                Source::Uri(uri) => match named.get(uri) {
+                    Some(bytes) => bytes.clone(),
+                    None => {
+                        let bytes = Arc::new(resource(&place, uri, file)?);
+                        named.insert(uri, bytes.clone());
+                        bytes
+                    }
+                },
             };
             if bytes.len() < buffer.length() {
                 return Err(Error::new(

@@ -1,9 +1,11 @@
 //! The nodes of a glTF scene where they stand in the world, and the triangles of its primitives.
 
+use crate::capture::read::gltf_file::Buffer;
 use glam::{DMat4, DQuat, DVec3};
 use gltf::mesh::Mode;
 use gltf::scene::Transform;
 use gltf::{Accessor, Gltf, Mesh, Node, Semantic};
+use std::collections::BTreeMap;
 
 /// Vertices that a scene may have however small its file, since nodes may share a mesh.
 const ALWAYS_ALLOWED: usize = 1 << 25;
@@ -14,8 +16,11 @@ const ALWAYS_ALLOWED: usize = 1 << 25;
 /// # Errors
 /// As a phrase: the nodes form no tree, or they use meshes over and over, to more vertices than `buffers` have bytes and than
 /// [`ALWAYS_ALLOWED`].
-pub fn nodes<'a>(gltf: &'a Gltf, buffers: &[Vec<u8>]) -> Result<Vec<(Node<'a>, DMat4)>, String> {
-    let bytes: usize = buffers.iter().map(Vec::len).sum();
+pub fn nodes<'a>(gltf: &'a Gltf, buffers: &[Buffer]) -> Result<Vec<(Node<'a>, DMat4)>, String> {
+    // Shared buffers count once.
+    let distinct: BTreeMap<*const u8, usize> =
+        buffers.iter().map(|b| (b.as_ptr(), b.len())).collect();
+    let bytes: usize = distinct.values().sum();
     let most = bytes.max(ALWAYS_ALLOWED);
     let mut vertices = 0_usize;
     let mut visited = vec![false; gltf.nodes().len()];

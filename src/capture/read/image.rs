@@ -6,6 +6,7 @@ use crate::capture::read::exposure;
 use crate::error::{Error, Result};
 use crate::math::color::srgb_to_linear;
 use glam::Vec3;
+use image::codecs::hdr::HdrDecoder;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::fs::File;
 use std::io::BufReader;
@@ -69,6 +70,10 @@ pub fn read(
     let encoding = encoding(path, decoder.color_type())?;
     let decoded = DynamicImage::from_decoder(decoder).map_err(|e| broken(path, &e))?;
     let scale = (1.0 / exposure.unwrap_or(1.0)) as f32;
+    let multiplied = match encoding {
+        Encoding::Linear => multiplied(path)?,
+        Encoding::Srgb8 | Encoding::Srgb16 => Vec3::ONE,
+    };
     let values = linear_values(decoded, encoding);
 
     let mut usable = Vec::with_capacity(values.len());
@@ -76,7 +81,7 @@ pub fn read(
     let pixels: Vec<Vec3> = values
         .iter()
         .map(|&[r, g, b, alpha]| {
-            let rgb = Vec3::new(r, g, b) * scale;
+            let rgb = Vec3::new(r, g, b) / multiplied * scale;
             let valid = rgb.is_finite() && rgb.min_element() >= 0.0;
             invalid += usize::from(!valid);
             let good = valid && alpha >= 0.5;
@@ -94,8 +99,8 @@ pub fn read(
         usable,
         encoding,
         saturation: match encoding {
-            Encoding::Linear => f32::INFINITY,
-            Encoding::Srgb8 | Encoding::Srgb16 => scale,
+            Encoding::Linear => Vec3::INFINITY,
+            Encoding::Srgb8 | Encoding::Srgb16 => Vec3::splat(scale),
         },
     };
     Ok((photograph, invalid))
@@ -160,6 +165,26 @@ fn check_size(path: &Path, width: u64, height: u64) -> Result<()> {
         ));
     }
     Ok(())
+}
+
+/// What the values of a Radiance file were multiplied by, as its EXPOSURE and COLORCORR lines say; one for other files.
+fn multiplied(path: &Path) -> Result<Vec3> {
+    let file = File::open(path).map_err(|e| Error::io(path, &e))?;
+    let Ok(decoder) = HdrDecoder::new(BufReader::new(file)) else {
+        return Ok(Vec3::ONE);
+    };
+    let header = decoder.metadata();
+    let correction = header.color_correction.map_or(Vec3::ONE, Vec3::from);
+    let factor = correction * header.exposure.unwrap_or(1.0);
+    if factor.is_finite() && factor.min_element() > 0.0 {
+        Ok(factor)
+    } else {
+        Err(Error::file(
+            path,
+            format!("says that its values were multiplied by {factor}"),
+            "correct its EXPOSURE and COLORCORR lines, or take them out",
+        ))
+    }
 }
 
 fn encoding(path: &Path, color: ColorType) -> Result<Encoding> {

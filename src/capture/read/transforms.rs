@@ -128,6 +128,17 @@ fn read_frame(
         .ok_or_else(|| Error::new(&place, "is absent", "name the photograph"))?;
     let photograph = confine.file(&place, name)?;
     let header = image::header(&photograph)?;
+    let flag = match fields.get("is_fisheye") {
+        Some(_) => fields,
+        None => shared,
+    };
+    if flag.get("is_fisheye").and_then(Value::as_bool) == Some(true) {
+        return Err(Error::new(
+            flag.place("is_fisheye"),
+            "captures have no fisheye lenses",
+            "run `relit import` on the folder, which resamples its photographs to a pinhole",
+        ));
+    }
     let (intrinsics, said) = lens::read(shared, fields, [header.width, header.height])?;
     let mut remarks: Vec<String> = said.into_iter().map(str::to_owned).collect();
 

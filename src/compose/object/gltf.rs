@@ -4,7 +4,7 @@ use super::files::{self, Meaning};
 use super::surface::{Surface, mean};
 use super::{Corners, Parts};
 use crate::capture::read::accessor::numbers;
-use crate::capture::read::gltf_file::{self, ReadFile};
+use crate::capture::read::gltf_file::{self, Buffer, ReadFile};
 use crate::capture::read::gltf_scene;
 use crate::error::{Error, Result};
 use crate::math::picture::Picture;
@@ -77,7 +77,7 @@ fn push_primitive(
     parts: &mut Parts,
     primitive: &Primitive<'_>,
     transform: DMat4,
-    buffers: &[Vec<u8>],
+    buffers: &[Buffer],
     plain: u32,
 ) -> std::result::Result<(), String> {
     let Some(accessor) = primitive.get(&Semantic::Positions) else {
@@ -152,7 +152,7 @@ fn gather<T: Copy>(values: &[T], order: [u32; 3]) -> Option<[T; 3]> {
 fn surface(
     material: &::gltf::Material<'_>,
     (path, file): (&Path, ReadFile<'_>),
-    buffers: &[Vec<u8>],
+    buffers: &[Buffer],
     images: &mut HashMap<(usize, Meaning), Arc<Picture>>,
     warnings: &mut Vec<String>,
 ) -> Result<Surface> {

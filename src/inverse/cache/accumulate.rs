@@ -53,6 +53,7 @@ impl Accumulated {
                 weight: c.weight,
                 pixels: c.pixels,
                 residuals: c.residuals.map(|r: DVec3| r * scale),
+                at_least: c.at_least,
                 own: c.own * scale,
                 rows: c
                     .rows
@@ -74,7 +75,7 @@ mod tests {
     use crate::inverse::cache::{CachedCluster, NO_LAMP, PathCache, Vertex};
     use crate::inverse::parameters::Unknowns;
     use crate::math::rng::Stream;
-    use glam::Vec3;
+    use glam::{BVec3, Vec3};
 
     const SURFACES: usize = 3;
     const PIXELS: usize = 2;
@@ -112,6 +113,7 @@ mod tests {
             pixels: (0..PIXELS as u32).collect(),
             paths: count,
             measured: Vec3::new(0.5, 0.6, 0.7),
+            at_least: BVec3::FALSE,
             weight: Vec3::new(1.0, 2.0, 3.0),
             dark: Vec3::ONE,
         };

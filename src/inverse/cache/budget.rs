@@ -15,6 +15,8 @@ pub struct Budget {
     pub round_paths: u64,
     /// Rounds at most.
     pub rounds: u32,
+    /// Textures are looked for after so many rounds at the latest.
+    pub texture_rounds: u32,
     /// Stops when the median relative standard error of the seen albedos is below this.
     pub median_error: f64,
     /// And when 95 % of them are below this.
@@ -54,6 +56,7 @@ impl Budget {
                 light_field_paths: 400_000,
                 round_paths: 0,
                 rounds: 0,
+                texture_rounds: 0,
                 median_error: 0.02,
                 tail_error: 0.2,
             },
@@ -63,6 +66,7 @@ impl Budget {
                 light_field_paths: 1_000_000,
                 round_paths: 1_500_000,
                 rounds: 16,
+                texture_rounds: 16,
                 median_error: 5e-3,
                 tail_error: 0.05,
             },
@@ -72,6 +76,7 @@ impl Budget {
                 light_field_paths: 2_000_000,
                 round_paths: 3_000_000,
                 rounds: 100,
+                texture_rounds: 8,
                 median_error: 4e-4,
                 tail_error: 0.01,
             },

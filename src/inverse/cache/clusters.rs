@@ -5,7 +5,7 @@
 
 use crate::inverse::solver::Problem;
 use crate::inverse::survey::{Survey, SurveyedPixel};
-use glam::{DVec3, Vec3};
+use glam::{BVec3, DVec3, Vec3};
 use std::collections::BTreeMap;
 
 /// Pixels of a cluster aimed at.
@@ -30,6 +30,8 @@ pub struct Cluster {
     pub paths: u32,
     /// Mean radiance of the pixels in the photograph.
     pub measured: Vec3,
+    /// Channels in which a pixel is saturated, so that `measured` is a lower bound.
+    pub at_least: BVec3,
     /// Weight of the squared difference of the means, per channel: pixels / level².
     pub weight: Vec3,
     /// Level below which pixels weigh no more for being darker.
@@ -54,15 +56,20 @@ pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cl
         .pixels
         .iter()
         .filter(|p| !p.held_out && p.object != u32::MAX)
-        .filter(|p| !problem.photographs[p.frame as usize].is_saturated(p.pixel as usize))
         .collect();
-    let nearest = nearest_to_edges(&usable, survey.seen.len());
+    let saturated = |frame: u32, pixel: u32| {
+        let photograph = &problem.photographs[frame as usize];
+        photograph.saturated(pixel as usize)
+    };
+    let nearest = nearest_to_edges(&usable, survey.seen.len(), |p| {
+        saturated(p.frame, p.pixel).any()
+    });
     usable.retain(|p| Edge::of(p) <= nearest[p.object as usize].0);
     let thinning = (usable.len() as f64 / most_pixels.max(1) as f64).max(1.0);
     let tile = (CLUSTER_PIXELS * thinning).sqrt().round().max(1.0) as u32;
 
-    // Tiles of each photograph, apart for each object.
-    let mut tiles: BTreeMap<(u32, u32, u32, u32), Vec<u32>> = BTreeMap::new();
+    // Tiles of each photograph, apart for each object, and for what is saturated.
+    let mut tiles: BTreeMap<(u32, u32, u32, u32, bool), Vec<u32>> = BTreeMap::new();
     for pixel in usable {
         let width = problem.photographs[pixel.frame as usize].width;
         let tile = match nearest[pixel.object as usize] {
@@ -70,8 +77,9 @@ pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cl
             (Edge::Near | Edge::On, pixels) => tile_at_edges(pixels).min(tile),
         };
         let place = (pixel.pixel / width / tile, pixel.pixel % width / tile);
+        let bound = saturated(pixel.frame, pixel.pixel).any();
         tiles
-            .entry((pixel.frame, place.0, place.1, pixel.object))
+            .entry((pixel.frame, place.0, place.1, pixel.object, bound))
             .or_default()
             .push(pixel.pixel);
     }
@@ -80,7 +88,7 @@ pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cl
     let dark = typical_level(problem, survey) * DARK;
     tiles
         .into_iter()
-        .map(|((frame, _, _, object), all)| {
+        .map(|((frame, _, _, object, _), all)| {
             let keep = if seen(object) < SMALL { 1.0 } else { thinning };
             let count = ((all.len() as f64 / keep).round() as usize).clamp(1, all.len());
             let pixels: Vec<u32> = (0..count).map(|i| all[i * all.len() / count]).collect();
@@ -90,12 +98,15 @@ pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cl
                 .map(|&p| photograph.pixels[p as usize].as_dvec3())
                 .sum();
             let measured = (sum / pixels.len() as f64).as_vec3();
+            let bounds = pixels.iter().map(|&p| saturated(frame, p));
+            let at_least = bounds.fold(BVec3::FALSE, |all, bound| all | bound);
             let mut cluster = Cluster {
                 frame,
                 object,
                 pixels,
                 paths: 1,
                 measured,
+                at_least,
                 weight: Vec3::ONE,
                 dark,
             };
@@ -128,10 +139,14 @@ impl Edge {
 
 /// How near to its edges each object is fitted, and by how many pixels: as far as there are enough. A sliver of a lamp in
 /// a pixel of the ceiling outshines it, and its share of the pixel is known no better than the photograph's noise and the
-/// camera's place.
-fn nearest_to_edges(pixels: &[&SurveyedPixel], objects: usize) -> Vec<(Edge, u64)> {
+/// camera's place. Lower bounds do not count.
+fn nearest_to_edges(
+    pixels: &[&SurveyedPixel],
+    objects: usize,
+    is_bound: impl Fn(&SurveyedPixel) -> bool,
+) -> Vec<(Edge, u64)> {
     let mut counts = vec![[0u64; 3]; objects];
-    for pixel in pixels {
+    for pixel in pixels.iter().filter(|p| !is_bound(p)) {
         let [far, off, all] = &mut counts[pixel.object as usize];
         *far += u64::from(Edge::of(pixel) == Edge::Far);
         *off += u64::from(Edge::of(pixel) != Edge::On);
@@ -200,6 +215,7 @@ mod tests {
             pixels: vec![0; 10],
             paths: 1,
             measured: Vec3::splat(measured),
+            at_least: BVec3::FALSE,
             weight: Vec3::ONE,
             dark: Vec3::splat(0.1),
         };
@@ -242,11 +258,14 @@ mod tests {
             .chain(of(2, [10, 20, 5]))
             .collect();
         let pixels: Vec<&SurveyedPixel> = pixels.iter().collect();
-        let nearest = nearest_to_edges(&pixels, 4);
+        let nearest = nearest_to_edges(&pixels, 4, |_| false);
         let edges: Vec<Edge> = nearest.iter().map(|n| n.0).collect();
         assert_eq!(edges, [Edge::Far, Edge::Near, Edge::On, Edge::On]);
         let counts: Vec<u64> = nearest.iter().map(|n| n.1).collect();
         assert_eq!(counts, [ENOUGH, ENOUGH, 35, 0]);
+        // Lower bounds alone are none.
+        let bounds = nearest_to_edges(&pixels[..ENOUGH as usize], 1, |_| true);
+        assert_eq!(bounds, [(Edge::On, 0)]);
         assert_eq!([1, SMALL, 4 * SMALL].map(tile_at_edges), [1, 1, 2]);
     }
 }

@@ -365,6 +365,7 @@ impl Tested {
 mod tests {
     use super::*;
     use crate::inverse::cache::prior::Prior;
+    use glam::BVec3;
 
     /// The mean of `count` values of deviation one: with its residuals over what each keeps, one less 1/n, its variance is
     /// the textbook's Σ r² / (n (n - 1)) times n / (n - 1), and not the Σ r² / n² that the scores alone would say.
@@ -377,6 +378,7 @@ mod tests {
                     weight: DVec3::ONE,
                     pixels: 1.0,
                     residuals: [DVec3::splat([1.0, -1.0][i % 2]); 2],
+                    at_least: BVec3::FALSE,
                     own: DVec3::ONE,
                     rows: vec![(0, DVec3::ONE, DVec3::ONE)],
                 })

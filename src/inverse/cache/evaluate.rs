@@ -3,7 +3,7 @@
 use super::derivative::{Gradient, differentiate, radiance, textured_radiance};
 use super::{CachedCluster, PathCache, SPECULAR, Vertex};
 use crate::inverse::parameters::Unknowns;
-use glam::{DVec3, Vec3, Vec3A};
+use glam::{BVec3, DVec3, Vec3, Vec3A};
 use rayon::prelude::*;
 
 /// One cluster's residual and derivative from both sets.
@@ -17,6 +17,8 @@ pub struct Linearised {
     pub pixels: f64,
     /// Photograph minus model, from set A and from set B.
     pub residuals: [DVec3; 2],
+    /// Channels in which the photograph is saturated, so that only a model that is darker is wrong.
+    pub at_least: BVec3,
     /// Derivative with respect to the object's own emission if that is all its light, else to its own albedo; mean of
     /// both sets.
     pub own: DVec3,
@@ -32,6 +34,21 @@ impl Linearised {
             *a -= of_a * steps[row];
             *b -= of_b * steps[row];
         }
+    }
+
+    /// Photograph minus model, the mean of both sets.
+    pub fn residual(&self) -> DVec3 {
+        (self.residuals[0] + self.residuals[1]) * 0.5
+    }
+
+    /// Channels that say nothing now: the photograph is saturated there, and the model at least as bright.
+    pub fn silent(&self) -> BVec3 {
+        self.at_least & self.residual().cmple(DVec3::ZERO)
+    }
+
+    /// The weight of the squared residual, none in silent channels.
+    pub fn weight_now(&self) -> DVec3 {
+        DVec3::select(self.silent(), DVec3::ZERO, self.weight)
     }
 
     /// What each row adds to the direction of descent, for a weight per channel: ½ w (J_A r_B + J_B r_A).
@@ -171,6 +188,7 @@ fn linearise(
         weight: cached.cluster.weight.as_dvec3(),
         pixels: cached.cluster.pixels.len() as f64,
         residuals,
+        at_least: cached.cluster.at_least,
         rows,
     }
 }
@@ -211,6 +229,7 @@ mod tests {
                 pixels: vec![0],
                 paths: 1,
                 measured: Vec3::ONE,
+                at_least: BVec3::FALSE,
                 weight: Vec3::ONE,
                 dark: Vec3::ONE,
             },
@@ -243,6 +262,28 @@ mod tests {
         // (texel - 0.4) * 0.8 * 10 * 0.5 in one of two paths.
         let expected = (texels[1].as_dvec3() - DVec3::splat(0.4)) * 0.8 * 10.0 * 0.5 * 0.5;
         assert!((offset - expected).length() < 1e-6, "{offset}");
+    }
+
+    /// Green is saturated: what is darker there is wrong, what is brighter is not.
+    #[test]
+    fn a_lower_bound_is_silent_where_the_model_exceeds_it() {
+        let mut bound = cached();
+        bound.cluster.at_least = BVec3::new(false, true, false);
+        let mut linearise = |measured: f32| {
+            bound.cluster.measured = Vec3::splat(measured);
+            let cache = PathCache {
+                clusters: vec![bound.clone()],
+                ..PathCache::default()
+            };
+            cache
+                .linearise(&unknowns(), &[usize::MAX; 6], &[])
+                .remove(0)
+        };
+        let (darker, brighter) = (linearise(9.0), linearise(0.1));
+        assert!(darker.residual().min_element() > 0.0);
+        assert!(brighter.residual().max_element() < 0.0);
+        assert_eq!(darker.weight_now(), DVec3::ONE);
+        assert_eq!(brighter.weight_now(), DVec3::new(1.0, 0.0, 1.0));
     }
 
     #[test]

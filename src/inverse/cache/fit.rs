@@ -232,7 +232,7 @@ mod tests {
     use crate::inverse::cache::roles::{self, Role};
     use crate::inverse::cache::{CachedCluster, Vertex};
     use crate::math::rng::Stream;
-    use glam::Vec3;
+    use glam::{BVec3, Vec3};
 
     /// Photographs without noise of a lamp and of a wall, of which one set of paths says too much light and the other too
     /// little, so that the product of their residuals is negative.
@@ -252,6 +252,7 @@ mod tests {
                 pixels: vec![0],
                 paths: 1,
                 measured: Vec3::splat(measured),
+                at_least: BVec3::FALSE,
                 weight: Vec3::splat(measured.powi(-2)),
                 dark: Vec3::ONE,
             },

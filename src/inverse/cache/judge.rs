@@ -4,7 +4,7 @@ use super::PathCache;
 use super::roles::Role;
 use crate::inverse::parameters::Unknowns;
 use crate::math::stats::quantile;
-use glam::{DVec3, Vec3};
+use glam::{BVec3, DVec3, Vec3};
 
 /// An advantage of so many typical squared errors decides.
 const DECISIVE: f64 = 10.0;
@@ -33,6 +33,8 @@ pub struct Change {
 /// A cluster seen as what its own object adds to it: `target` = albedo × `received`, or emission × `shown`.
 struct Part {
     weight: DVec3,
+    /// Channels in which the target is a lower bound.
+    at_least: BVec3,
     target: [DVec3; 2],
     received: [DVec3; 2],
     shown: [DVec3; 2],
@@ -91,6 +93,7 @@ fn parts(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<Vec<Part
         );
         parts[k].push(Part {
             weight: cluster.weight,
+            at_least: cluster.at_least,
             target: std::array::from_fn(|set| {
                 cluster.residuals[set] + albedo * received[set] + emission * shown[set]
             }),
@@ -124,7 +127,13 @@ impl Verdict {
         let albedo = least_squares(parts, |p| p.received).clamp(DVec3::ZERO, DVec3::ONE);
         let emission = least_squares(parts, |p| p.shown).max(DVec3::ZERO);
         let errors = |left: &dyn Fn(&Part, usize) -> DVec3| -> Vec<[DVec3; 2]> {
-            parts.iter().map(|p| [left(p, 0), left(p, 1)]).collect()
+            let wrong = |p: &Part| {
+                let [a, b] = [left(p, 0), left(p, 1)];
+                // What exceeds a lower bound is right.
+                let silent = p.at_least & (a + b).cmple(DVec3::ZERO);
+                [a, b].map(|r| DVec3::select(silent, DVec3::ZERO, r))
+            };
+            parts.iter().map(wrong).collect()
         };
         let reflecting = errors(&|p, set| p.target[set] - albedo * p.received[set]);
         let emitting = errors(&|p, set| p.target[set] - emission * p.shown[set]);
@@ -230,6 +239,7 @@ mod tests {
                 pixels: vec![0],
                 paths: 1,
                 measured: Vec3::splat(measured),
+                at_least: BVec3::FALSE,
                 weight: Vec3::splat(1.0 / (measured * measured + 0.25)),
                 dark: Vec3::ONE,
             },

@@ -85,6 +85,7 @@ mod tests {
     use super::*;
     use crate::inverse::cache::linear::descend;
     use crate::inverse::cache::roles;
+    use glam::BVec3;
 
     /// A lamp (0) of emission 10 that reflects `albedo` of the light on it, 1 below and 3 above, seen from below; a floor (1)
     /// under it and a ceiling (2) over it, each photographed, with noise that cancels, and lit by its side of the lamp.
@@ -95,6 +96,7 @@ mod tests {
             weight: DVec3::ONE,
             pixels: 1.0,
             residuals: [DVec3::splat(measured - model); 2],
+            at_least: BVec3::FALSE,
             own: DVec3::splat(rows[0].1),
             rows: (rows.iter())
                 .map(|&(row, d)| (row, DVec3::splat(d), DVec3::splat(d)))

@@ -64,7 +64,7 @@ pub fn descend(
 mod tests {
     use super::*;
     use crate::math::rng::Stream;
-    use glam::Vec3;
+    use glam::{BVec3, Vec3};
 
     /// A thousand clusters that know one albedo through derivatives whose noise is as large as they are: it is found, where
     /// one step would go half the way. The tolerance is four standard errors of its own.
@@ -81,6 +81,7 @@ mod tests {
                     weight: DVec3::ONE,
                     pixels: 1.0,
                     residuals: [a, b].map(|j| DVec3::splat(truth) - j * begun),
+                    at_least: BVec3::FALSE,
                     own: (a + b) * 0.5,
                     rows: vec![(0, a, b)],
                 }

@@ -40,7 +40,7 @@ pub fn paths_that_fit(allowed: u64, pilot: &PathCache) -> u64 {
 mod tests {
     use super::*;
     use crate::inverse::cache::{CachedCluster, clusters::Cluster};
-    use glam::Vec3;
+    use glam::{BVec3, Vec3};
 
     #[test]
     fn as_many_paths_fit_as_are_as_long_as_those_of_the_pilot() {
@@ -50,6 +50,7 @@ mod tests {
             pixels: vec![0, 1],
             paths: 1,
             measured: Vec3::ONE,
+            at_least: BVec3::FALSE,
             weight: Vec3::ONE,
             dark: Vec3::ONE,
         };

@@ -12,7 +12,7 @@ pub fn shares(clusters: &[Linearised], objects: usize) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0, 0.0); objects];
     for cluster in clusters {
         let [a, b] = cluster.residuals;
-        let square = |r: glam::DVec3| (cluster.weight * r * r).element_sum();
+        let square = |r: glam::DVec3| (cluster.weight_now() * r * r).element_sum();
         let sum = &mut sums[cluster.object as usize];
         sum.0 += square((a - b) * 0.5);
         sum.1 += square((a + b) * 0.5);
@@ -50,7 +50,7 @@ pub fn share_paths(clusters: &mut [Cluster], objects: usize, total: u64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{DVec3, Vec3};
+    use glam::{BVec3, DVec3, Vec3};
 
     fn pixels(object: u32, count: u32) -> Cluster {
         Cluster {
@@ -59,6 +59,7 @@ mod tests {
             pixels: (0..count).collect(),
             paths: 1,
             measured: Vec3::ZERO,
+            at_least: BVec3::FALSE,
             weight: Vec3::ONE,
             dark: Vec3::ONE,
         }
@@ -94,6 +95,7 @@ mod tests {
             weight: DVec3::ONE,
             pixels: 1.0,
             residuals: [DVec3::splat(a), DVec3::splat(b)],
+            at_least: BVec3::FALSE,
             own: DVec3::ZERO,
             rows: Vec::new(),
         }

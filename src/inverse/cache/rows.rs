@@ -252,6 +252,7 @@ mod tests {
     use crate::inverse::cache::prior::Prior;
     use crate::inverse::parameters::Unknowns;
     use crate::math::rng::Stream;
+    use glam::BVec3;
 
     const SURFACES: usize = 40;
     /// All albedos and the first ten emissions.
@@ -281,6 +282,7 @@ mod tests {
                     weight: DVec3::ONE + color(1.0),
                     pixels: 1.0,
                     residuals: [residual, residual + color(0.05)],
+                    at_least: BVec3::FALSE,
                     own: DVec3::ZERO,
                     rows,
                 }

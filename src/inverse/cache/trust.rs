@@ -57,9 +57,11 @@ impl Trust {
     /// From the residuals that a fit has left.
     pub fn from_residuals(clusters: &[Linearised], objects: usize) -> Self {
         let steps = own_steps(clusters, objects);
-        let squares: Vec<DVec3> = (clusters.iter())
-            .map(|cluster| square(cluster, steps[cluster.object as usize]))
-            .collect();
+        // Bounds that the model keeps tell nothing of how well it describes the rest.
+        let (clusters, squares): (Vec<&Linearised>, Vec<DVec3>) = (clusters.iter())
+            .filter(|cluster| !cluster.silent().any())
+            .map(|cluster| (cluster, square(cluster, steps[cluster.object as usize])))
+            .unzip();
         // The typical variance is a median, which no badly described object can raise.
         let typical = typical_variance(squares.iter().copied());
         let mut of_object: Vec<Vec<DVec3>> = vec![Vec::new(); objects];
@@ -97,7 +99,7 @@ impl Trust {
         let most = trust.variance * (FAR_OUT * FAR_OUT);
         let square = square(cluster, trust.step);
         let bounded = DVec3::select(square.cmpgt(most), (most / square).powf(0.5), DVec3::ONE);
-        cluster.weight * trust.factor * bounded
+        cluster.weight_now() * trust.factor * bounded
     }
 
     /// The factor of one object.
@@ -114,14 +116,9 @@ fn typical_variance(squares: impl Iterator<Item = DVec3> + Clone) -> DVec3 {
     }))
 }
 
-/// Mean residual of both sets.
-fn residual(cluster: &Linearised) -> DVec3 {
-    (cluster.residuals[0] + cluster.residuals[1]) * 0.5
-}
-
 /// Weighted square of a cluster's residual after a step of its object's own parameter.
 fn square(cluster: &Linearised, step: DVec3) -> DVec3 {
-    let left = residual(cluster) - cluster.own * step;
+    let left = cluster.residual() - cluster.own * step;
     cluster.weight * left * left
 }
 
@@ -130,8 +127,9 @@ fn own_steps(clusters: &[Linearised], objects: usize) -> Vec<DVec3> {
     let mut sums = vec![(DVec3::ZERO, DVec3::ZERO); objects];
     for cluster in clusters {
         let (top, bottom) = &mut sums[cluster.object as usize];
-        *top += cluster.weight * cluster.own * residual(cluster);
-        *bottom += cluster.weight * cluster.own * cluster.own;
+        let weighted = cluster.weight_now() * cluster.own;
+        *top += weighted * cluster.residual();
+        *bottom += weighted * cluster.own;
     }
     (sums.into_iter())
         .map(|(top, bottom)| DVec3::select(bottom.cmpgt(DVec3::ZERO), top / bottom, DVec3::ZERO))
@@ -141,6 +139,7 @@ fn own_steps(clusters: &[Linearised], objects: usize) -> Vec<DVec3> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::BVec3;
 
     fn clusters(
         object: u32,
@@ -151,6 +150,7 @@ mod tests {
             weight: DVec3::ONE,
             pixels: 1.0,
             residuals: [DVec3::splat(r); 2],
+            at_least: BVec3::FALSE,
             own: DVec3::ZERO,
             rows: Vec::new(),
         })

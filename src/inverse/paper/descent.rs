@@ -345,6 +345,9 @@ fn pixel_gradient(
     }
 
     let residual = colour - photograph.pixels[pixel as usize];
+    // What exceeds a saturated value is right.
+    let right = photograph.saturated(pixel as usize) & residual.cmpgt(Vec3::ZERO);
+    let residual = Vec3::select(right, Vec3::ZERO, residual);
     let slope = match settings.loss {
         Loss::L1 => {
             residual.signum() * Vec3::from_array(residual.to_array().map(|r| f32::from(r != 0.0)))

@@ -185,7 +185,7 @@ impl Run<'_, '_> {
     fn measure(&mut self) -> Option<f64> {
         self.describe();
         let loss = self.losses.measure(self.problem, &self.estimate);
-        self.monitor.progress.rays += loss.rays;
+        self.monitor.cast(loss.cast);
         self.monitor.loss(loss.train, loss.held_out);
         loss.train
     }
@@ -214,10 +214,10 @@ fn untold(problem: &Problem, survey: &Survey) -> Vec<&'static str> {
     let mut measured = vec![false; problem.scene.objects.len()];
     for pixel in survey.pixels.iter().filter(|p| !p.held_out) {
         let photograph = &problem.photographs[pixel.frame as usize];
-        let brightest = photograph.pixels[pixel.pixel as usize].max_element();
-        lit |= brightest > 0.0;
+        let radiance = photograph.pixels[pixel.pixel as usize];
+        lit |= radiance.max_element() > 0.0;
         if let Some(measured) = measured.get_mut(pixel.object as usize) {
-            *measured |= brightest < photograph.saturation;
+            *measured |= radiance.cmplt(photograph.saturation).any();
         }
     }
     (survey.seen.iter().zip(measured))

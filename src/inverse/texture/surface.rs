@@ -169,7 +169,7 @@ impl Surface {
             }));
         }
         let trial = try_out(lit, &self.cells, &pixels, self.constant, options, self.seed);
-        done(trial.rays, 0)?;
+        done(trial.cast.rays, trial.cast.rejected)?;
         Ok(trial)
     }
 

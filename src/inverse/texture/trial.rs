@@ -6,6 +6,7 @@ use super::look::SeenPixel;
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::math::stats::{Moments, quantile};
+use crate::transport::arrival::Cast;
 use crate::transport::lit::Lit;
 use crate::transport::path::{PathOptions, white_radiance};
 use glam::Vec3;
@@ -39,8 +40,8 @@ pub struct Trial {
     pub noise: f64,
     /// Pixels.
     pub pixels: usize,
-    /// Rays cast.
-    pub rays: u64,
+    /// What tracing took; dropped samples count as black, for both alike.
+    pub cast: Cast,
 }
 
 /// A pixel, and the texture that was fitted without it.
@@ -119,11 +120,11 @@ struct Comparison<'a> {
     floor: f32,
 }
 
-/// Squared relative errors of one pixel, and the rays that it took.
+/// Squared relative errors of one pixel, and what tracing it took.
 struct Compared {
     flat: f64,
     textured: f64,
-    rays: u64,
+    cast: Cast,
 }
 
 impl Comparison<'_> {
@@ -136,7 +137,7 @@ impl Comparison<'_> {
             let cell = self.cells.locate(hit);
             cell.map_or(self.constant, |c| colors[c as usize])
         };
-        let mut rays = 0;
+        let mut cast = Cast::default();
         let sets = [0u64, 1].map(|set| {
             let (mut flat, mut textured) = (Vec3::ZERO, Vec3::ZERO);
             for path in 0..self.paths {
@@ -151,7 +152,8 @@ impl Comparison<'_> {
                     -surface.normal
                 };
                 let path = white_radiance(self.lit, &surface, normal, &mut stream, self.options);
-                rays += u64::from(path.rays);
+                cast.rays += u64::from(path.rays);
+                cast.rejected += u64::from(path.rejected);
                 flat += path.radiance * self.constant;
                 textured += path.radiance * texture(&landing.hit);
             }
@@ -172,7 +174,7 @@ impl Comparison<'_> {
         Compared {
             flat: error(flat),
             textured: error(sets.map(|set| set[1])),
-            rays,
+            cast,
         }
     }
 }
@@ -196,7 +198,7 @@ impl Trial {
             gain: gain.mean,
             noise: gain.standard_error(),
             pixels: pixels.len(),
-            rays: pixels.iter().map(|p| p.rays).sum(),
+            cast: pixels.iter().map(|p| p.cast).sum(),
         }
     }
 }

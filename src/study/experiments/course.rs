@@ -93,7 +93,7 @@ impl<'a> Gauge<'a> {
         let known =
             (self.subject.truth()).map(|truth| truth.errors(&self.subject.problem.scene, estimate));
         Errors {
-            loss: self.probe.held_out(&self.subject.problem, estimate),
+            loss: self.probe.held_out(&self.subject.problem, estimate).0,
             albedo: known.as_ref().and_then(|known| known.albedo_mae),
             object: known.as_ref().and_then(|known| {
                 let mut objects = known.per_object.iter();

@@ -241,7 +241,7 @@ impl Measure {
             name: name.to_owned(),
             unknowns,
             psnr,
-            loss: self.probe.held_out(problem, estimate),
+            loss: self.probe.held_out(problem, estimate).0,
             seconds,
             rays,
             picture: albedo_picture(&lit, &cameras[SHOWN]),

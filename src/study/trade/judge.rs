@@ -61,7 +61,7 @@ impl Bench<'_> {
     pub fn error(&self, problem: &Problem, estimate: &Estimate) -> Option<f64> {
         match self {
             Self::Truth(reference) => reference.errors(&problem.scene, estimate).albedo_mae,
-            Self::HeldOut(probe) => probe.held_out(problem, estimate),
+            Self::HeldOut(probe) => probe.held_out(problem, estimate).0,
         }
     }
 }

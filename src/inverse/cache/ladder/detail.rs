@@ -1,13 +1,35 @@
-//! The last stage: albedo that varies over an object, where its pixels show more than one colour.
+//! Albedo that varies over an object, where its pixels show more than one colour.
 
 use super::Ladder;
+use crate::inverse::cache::evaluate::Linearised;
 use crate::inverse::cache::roles::Role;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::solver::Termination;
-use crate::inverse::texture::{Task, refine};
+use crate::inverse::texture::{Refined, Task, refine};
 use crate::transport::arrival::Cast;
+use glam::{DVec3, Vec3};
+use std::cell::Cell;
+
+/// Textures, and what they stand for in the fit of single colours.
+#[derive(Debug, Clone)]
+pub(super) struct Detail {
+    /// What was found.
+    pub refined: Refined,
+    /// The single colours that the textures are scaled to, one an object.
+    pub albedo: Vec<Vec3>,
+    /// By how much the textures change the radiance of each cluster; empty until that was traced.
+    pub offsets: Vec<DVec3>,
+}
 
 impl Ladder<'_, '_> {
+    /// Takes what the textures add out of the residuals, where that is known.
+    pub(super) fn leave_textures_out(&self, clusters: &mut [Linearised]) {
+        let offsets = self.detail.iter().flat_map(|detail| &detail.offsets);
+        for (cluster, &offset) in clusters.iter_mut().zip(offsets) {
+            cluster.residuals = cluster.residuals.map(|r| r - offset);
+        }
+    }
+
     /// Tries a texture on every object that reflects and gives no light; what has a lobe keeps one colour.
     pub(super) fn detail(&mut self) -> Result<(), Termination> {
         let started = self.monitor.seconds();
@@ -28,7 +50,14 @@ impl Ladder<'_, '_> {
             max_bounces: self.max_bounces,
         };
         let (losses, problem) = (&self.losses, self.problem);
-        let judge = |estimate: &Estimate| losses.held_out(problem, estimate);
+        let judged = Cell::new(Cast::default());
+        let judge = |estimate: &Estimate| {
+            let (loss, cast) = losses.held_out(problem, estimate);
+            let mut all = judged.get();
+            all += cast;
+            judged.set(all);
+            loss
+        };
         let (monitor, estimate, checkpoint) = (&mut self.monitor, &self.estimate, &self.checkpoint);
         let (refined, ended) = refine(
             &task,
@@ -41,12 +70,17 @@ impl Ladder<'_, '_> {
                 monitor.tick(estimate, &|_| checkpoint.clone())
             },
         );
+        self.monitor.cast(judged.get());
         let mut why = refined.summary(|k| self.problem.scene.objects[k].name.clone());
         if ended.is_err() {
             why.push_str("; ended before all were looked at as often as they should be");
         }
         let kept = refined.texels.is_some();
-        self.detail = Some(refined);
+        self.detail = Some(Detail {
+            refined,
+            albedo: self.unknowns.albedo.clone(),
+            offsets: Vec::new(),
+        });
         self.describe();
         // Where time is up, the stage is still recorded.
         let recorded = self.record("textures", started, kept, why);

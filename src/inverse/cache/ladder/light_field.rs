@@ -3,6 +3,7 @@
 use super::Ladder;
 use crate::inverse::cache::PathCache;
 use crate::inverse::cache::equations::NormalEquations;
+use crate::inverse::cache::evaluate::Linearised;
 use crate::inverse::cache::fit::{LEAST_DAMPING, propose};
 use crate::inverse::cache::prior::{ALBEDO_DEVIATION, ALBEDO_MEAN, ExpectedAlbedo};
 use crate::inverse::cache::roles::{self, Role};
@@ -194,12 +195,15 @@ impl Ladder<'_, '_> {
             .collect();
         let (mut fall, mut all) = (0.0, 0.0);
         for mut cluster in linearised {
-            let weight = cluster.weight;
-            let weigh = |r: DVec3, s: DVec3| (weight * r * s).element_sum();
-            let [a, b] = cluster.residuals;
-            all += weigh((a + b) * 0.5, (a + b) * 0.5);
+            let square = |c: &Linearised| {
+                let [a, b] = c.residuals;
+                (c.weight_now() * a * b).element_sum()
+            };
+            let residual = cluster.residual();
+            all += (cluster.weight_now() * residual * residual).element_sum();
+            fall += square(&cluster);
             cluster.step(&steps);
-            fall += weigh(a, b) - weigh(cluster.residuals[0], cluster.residuals[1]);
+            fall -= square(&cluster);
         }
         if all > 0.0 { fall / all } else { 0.0 }
     }

@@ -30,8 +30,8 @@ use crate::inverse::parameters::Unknowns;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Problem, Solution, Stage, Termination};
 use crate::inverse::survey::Survey;
-use crate::inverse::texture::Refined;
 use crate::transport::material::Lobe;
+use detail::Detail;
 use glam::Vec3;
 use rounds::Summed;
 
@@ -75,7 +75,7 @@ pub struct Ladder<'a, 'o> {
     /// What the rounds know, once they are done.
     summed: Option<Summed>,
     /// Spatial detail, once it was looked for.
-    detail: Option<Refined>,
+    detail: Option<Detail>,
     /// Mean of each surface's brightest channel in the photographs; zero where none sees it.
     brightness: Vec<f32>,
     /// Stages finished.
@@ -195,7 +195,6 @@ impl Ladder<'_, '_> {
             self.reached(2);
             self.tell()?;
         }
-        let mut ended = Termination::Converged;
         if self.stages < 3 {
             if self.monitor.settings.lobes {
                 self.lobes()?;
@@ -203,13 +202,7 @@ impl Ladder<'_, '_> {
             self.reached(3);
             self.tell()?;
         }
-        if self.stages < STAGES {
-            ended = self.rounds()?;
-        }
-        if self.monitor.settings.textures {
-            self.detail()?;
-            self.refit()?;
-        }
+        let ended = self.refine()?;
         self.settle_lobes()?;
         self.reached(STAGES);
         Ok(ended)
@@ -349,7 +342,7 @@ impl Ladder<'_, '_> {
         );
         self.estimate.exposures.clone_from(&self.exposures);
         if let Some(detail) = &self.detail {
-            detail.apply(&mut self.estimate);
+            detail.refined.apply(&mut self.estimate);
         }
         describe::doubt_white(&mut self.estimate, &self.brightness);
         self.describe_known();
@@ -357,7 +350,7 @@ impl Ladder<'_, '_> {
 
     fn measure(&mut self) -> Losses {
         let losses = self.losses.measure(self.problem, &self.estimate);
-        self.monitor.progress.rays += losses.rays;
+        self.monitor.cast(losses.cast);
         losses
     }
 

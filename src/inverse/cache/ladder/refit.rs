@@ -27,7 +27,7 @@ impl Ladder<'_, '_> {
             self.unknowns.clone(),
             self.errors.clone(),
             self.detail.clone(),
-            self.losses.held_out_each(self.problem, &self.estimate),
+            self.held_out_each(),
         );
         let lights = self.lights();
         share_paths(
@@ -36,22 +36,25 @@ impl Ladder<'_, '_> {
             self.budget.round_paths,
         );
         let offsets = self.texture_offsets(&lights, 4, &texels)?;
-        let mut clusters = summed.clusters;
-        for (cluster, offset) in clusters.iter_mut().zip(offsets) {
-            cluster.residuals = cluster.residuals.map(|r| r - offset);
-        }
-        self.descend(clusters, &summed.about);
-        let factor = |object: usize| {
-            let (new, old) = (self.unknowns.albedo[object], before.0.albedo[object]);
-            let grown = new / old.max(Vec3::splat(f32::MIN_POSITIVE));
-            grown.clamp(Vec3::splat(1.0 / MOST), Vec3::splat(MOST))
-        };
         if let Some(detail) = &mut self.detail {
-            detail.scale(factor, &self.problem.scene.object_of);
+            detail.offsets = offsets;
+        }
+        let mut clusters = summed.clusters;
+        self.leave_textures_out(&mut clusters);
+        self.descend(clusters, &summed.about);
+        if let Some(detail) = &mut self.detail {
+            let factors: Vec<Vec3> = (self.unknowns.albedo.iter().zip(&detail.albedo))
+                .map(|(new, old)| {
+                    let grown = *new / old.max(Vec3::splat(f32::MIN_POSITIVE));
+                    grown.clamp(Vec3::splat(1.0 / MOST), Vec3::splat(MOST))
+                })
+                .collect();
+            (detail.refined).scale(|k| factors[k], &self.problem.scene.object_of);
+            (detail.albedo.iter_mut().zip(factors)).for_each(|(albedo, factor)| *albedo *= factor);
         }
         self.describe();
 
-        let after = self.losses.held_out_each(self.problem, &self.estimate);
+        let after = self.held_out_each();
         let mut rise = Moments::default();
         for (before, after) in before.3.iter().zip(&after) {
             rise.push(after - before);
@@ -80,5 +83,12 @@ impl Ladder<'_, '_> {
         };
         self.record("refit", started, kept, why)?;
         Ok(())
+    }
+
+    /// The loss of each held-out pixel.
+    fn held_out_each(&mut self) -> Vec<f64> {
+        let (each, cast) = self.losses.held_out_each(self.problem, &self.estimate);
+        self.monitor.cast(cast);
+        each
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Ladder;
 use crate::inverse::cache::accumulate::Accumulated;
-use crate::inverse::cache::errors::{jackknifed, standard_errors};
+use crate::inverse::cache::errors::{StandardErrors, jackknifed, standard_errors};
 use crate::inverse::cache::evaluate::Linearised;
 use crate::inverse::cache::lamp_albedo;
 use crate::inverse::cache::lamp_patches::LampPatches;
@@ -15,10 +15,10 @@ use crate::inverse::solver::Termination;
 use crate::math::stats::quantile;
 use crate::transport::emitters::Emitters;
 use crate::transport::path::PathOptions;
+use glam::Vec3;
 
-/// A step (in albedo, or relative in emission) asks for linearising anew when it is larger than so many times the
-/// median error aimed at.
-const NONLINEAR: f64 = 10.0;
+/// A step asks for linearising anew where its square is more than this share of a standard error.
+const NONLINEAR: f32 = 0.3;
 /// What the paths add to an error is negligible below this share of it: without them it would be 6 % less.
 const NEGLIGIBLE: f64 = 1.0 / 3.0;
 /// Levels that clusters are weighed by take this part of the paths of a round.
@@ -28,6 +28,12 @@ const PREDICTING: u64 = 4;
 const LEAST_PREDICTING: u64 = 256;
 /// What arrives at lamps takes this part of them.
 const LIGHTING_LAMPS: u64 = 32;
+/// Textures are no worse for light that is no better known than this: a single pixel knows them to some per cent. Small objects
+/// that are known less well are not worth waiting for.
+const ENOUGH_FOR_TEXTURES: Aim = Aim {
+    median: 5e-3,
+    tail: f64::INFINITY,
+};
 
 /// What all rounds know of the parameters that are free.
 #[derive(Debug)]
@@ -38,10 +44,59 @@ pub struct Summed {
     pub about: Unknowns,
 }
 
+/// Rounds of the paths of one set of clusters, added up.
+pub(super) struct Rounds {
+    lights: Emitters,
+    /// Places of the free parameters.
+    places: Vec<usize>,
+    /// What the sums are linearised about.
+    about: Unknowns,
+    sums: Accumulated,
+    next: u32,
+}
+
+impl Rounds {
+    fn mean(&self, roles: &[Role]) -> Vec<Linearised> {
+        let mut clusters = self.sums.mean();
+        lamp_albedo::hold_exitance(&mut clusters, roles, &self.places);
+        clusters
+    }
+}
+
+/// Relative standard errors of albedo that rounds aim at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Aim {
+    /// Median over objects.
+    pub median: f64,
+    /// What 95 of 100 objects stay below.
+    pub tail: f64,
+}
+
 impl Ladder<'_, '_> {
-    /// Third stage: rounds of independent paths, added up until the reported errors are small enough.
-    pub(super) fn rounds(&mut self) -> Result<Termination, Termination> {
-        let started = self.monitor.seconds();
+    /// Third stage: rounds of independent paths, added up until the reported errors are small enough; textures as soon as
+    /// errors are small enough for them, or after some rounds, however many more are to come.
+    pub(super) fn refine(&mut self) -> Result<Termination, Termination> {
+        let mut rounds = self.begin_rounds()?;
+        let (most, aim) = self.aim();
+        let textures = self.monitor.settings.textures;
+        if textures && aim.median < ENOUGH_FOR_TEXTURES.median {
+            let before = self.budget.texture_rounds.min(most);
+            self.add_rounds(&mut rounds, before, ENOUGH_FOR_TEXTURES)?;
+            self.detail()?;
+            self.refit()?;
+        }
+        let ended = self.add_rounds(&mut rounds, most, aim)?;
+        if textures {
+            if self.detail.is_none() {
+                self.detail()?;
+            }
+            self.refit()?;
+        }
+        Ok(ended)
+    }
+
+    /// Clusters weighed, and nothing added up yet.
+    fn begin_rounds(&mut self) -> Result<Rounds, Termination> {
         self.monitor.phase("refining");
         let lights = self.lights();
         self.patches = LampPatches::new(&self.problem.scene, &self.roles);
@@ -52,46 +107,63 @@ impl Ladder<'_, '_> {
             self.budget.round_paths,
         );
         let free = lamp_albedo::free(&self.roles);
-        let places = roles::places(&free, self.roles.len());
-        let mean = |sums: &Accumulated, roles: &[Role]| {
-            let mut clusters = sums.mean();
-            lamp_albedo::hold_exitance(&mut clusters, roles, &places);
-            clusters
-        };
-        let mut about = self.unknowns.clone();
-        let mut sums = Accumulated::default();
+        Ok(Rounds {
+            lights,
+            places: roles::places(&free, self.roles.len()),
+            about: self.unknowns.clone(),
+            sums: Accumulated::default(),
+            next: 0,
+        })
+    }
+
+    /// Adds rounds until the reported errors are small enough, or there are `most` in all.
+    fn add_rounds(
+        &mut self,
+        rounds: &mut Rounds,
+        most: u32,
+        aim: Aim,
+    ) -> Result<Termination, Termination> {
+        if rounds.next > 0 && rounds.next >= most {
+            return Ok(Termination::Steps);
+        }
+        let started = self.monitor.seconds();
+        self.monitor.phase("refining");
         let mut outcome = Termination::Steps;
-        for round in 0.. {
-            let (most, aim) = self.aim();
-            if round >= most {
-                break;
-            }
+        while rounds.next < most {
+            let round = rounds.next;
+            rounds.next += 1;
             // What lamps reflect is not linearised but followed.
             self.light_patches(round);
             // Path lengths are steered by what is believed at the start, the same in every round.
-            sums.add(self.linearised(&lights, 2, round, &about, &places)?);
-            let found = self.descend(mean(&sums, &self.roles), &about);
+            let linearised =
+                self.linearised(&rounds.lights, 2, round, &rounds.about, &rounds.places)?;
+            rounds.sums.add(linearised);
+            let mut clusters = rounds.mean(&self.roles);
+            self.leave_textures_out(&mut clusters);
+            let found = self.descend(clusters, &rounds.about);
             self.trust = found.trust;
             self.path_noise = path_noise::shares(&found.clusters, self.roles.len());
-            let step = largest_step(&about, &self.unknowns);
+            let far = is_nonlinear(&rounds.about, &self.unknowns, &self.errors);
             self.describe();
             self.monitor
                 .report(&self.estimate, &|_| self.checkpoint.clone())?;
-            if f64::from(step) > NONLINEAR * aim && round < self.budget.rounds / 4 {
-                about = self.unknowns.clone();
-                sums = Accumulated::default();
+            if far && round < most / 4 {
+                rounds.about = self.unknowns.clone();
+                rounds.sums = Accumulated::default();
                 continue;
             }
             let reported = self.reported();
-            let share = (aim / reported.all[0]).powi(2);
+            let share = (aim.median / reported.all[0]).powi(2);
             self.monitor.progress.fraction = Some(share.min(1.0) as f32);
-            if reported.is_enough([aim, self.budget.tail_error]) {
+            if reported.is_enough([aim.median, aim.tail]) {
                 outcome = Termination::Converged;
                 break;
             }
         }
-        let clusters = mean(&sums, &self.roles);
-        self.summed = Some(Summed { clusters, about });
+        self.summed = Some(Summed {
+            clusters: rounds.mean(&self.roles),
+            about: rounds.about.clone(),
+        });
         let reported = self.reported();
         let [median, tail] = reported.all.map(|e| e * 100.0);
         let [median_of_paths, tail_of_paths] = reported.of_paths.map(|e| e * 100.0);
@@ -99,7 +171,7 @@ impl Ladder<'_, '_> {
             "{} rounds of independent paths: relative standard error of albedo {median:.2} % (median), {tail:.2} % (95 of 100 \
              objects); of that from the paths {median_of_paths:.2} % and {tail_of_paths:.2} %, the rest from the photographs \
              and the model",
-            sums.rounds(),
+            rounds.sums.rounds(),
         );
         self.record("refine", started, true, why)?;
         Ok(outcome)
@@ -125,15 +197,16 @@ impl Ladder<'_, '_> {
         found
     }
 
-    /// Rounds at most, and the median relative standard error aimed at: the preset's, or without end a smaller one that
-    /// was asked for.
-    fn aim(&self) -> (u32, f64) {
+    /// Rounds at most, and the errors aimed at: the preset's, or without end a smaller median that was asked for.
+    fn aim(&self) -> (u32, Aim) {
         let asked = self.monitor.settings.target_error * 0.01;
-        if asked > 0.0 && asked < self.budget.median_error {
+        let (most, median) = if asked > 0.0 && asked < self.budget.median_error {
             (u32::MAX, asked)
         } else {
             (self.budget.rounds, self.budget.median_error)
-        }
+        };
+        let tail = self.budget.tail_error;
+        (most, Aim { median, tail })
     }
 
     /// Finds out what the patches of lamps reflect, as the room is known by now.
@@ -201,20 +274,44 @@ impl Reported {
     }
 }
 
-/// Largest change of an albedo, or relative change of an emission.
-fn largest_step(from: &Unknowns, to: &Unknowns) -> f32 {
-    let albedo = from
-        .albedo
-        .iter()
-        .zip(&to.albedo)
-        .map(|(a, b)| (*a - *b).abs().max_element());
-    let emission = from.emission.iter().zip(&to.emission).map(|(a, b)| {
-        let size = a.max_element();
-        if size > 0.0 {
-            (*a - *b).abs().max_element() / size
-        } else {
-            0.0
-        }
-    });
-    albedo.chain(emission).fold(0.0, f32::max)
+/// Whether a step is so long that what is left of it to second order, about its square, is no longer small against the standard
+/// errors: albedos count in full, emissions relative to themselves.
+fn is_nonlinear(from: &Unknowns, to: &Unknowns, errors: &StandardErrors) -> bool {
+    let exceeds = |step: Vec3, size: Vec3, error: Vec3| {
+        let known = error.cmpgt(Vec3::ZERO) & error.cmplt(Vec3::INFINITY);
+        (known & (step * step).cmpgt(size * error * NONLINEAR)).any()
+    };
+    let albedo = (from.albedo.iter().zip(&to.albedo).zip(&errors.albedo))
+        .any(|((a, b), error)| exceeds(*b - *a, Vec3::ONE, *error));
+    let emission = (from.emission.iter().zip(&to.emission).zip(&errors.emission))
+        .any(|((a, b), error)| exceeds(*b - *a, *b, *error));
+    albedo || emission
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_is_nonlinear_by_its_square_against_its_own_error() {
+        let unknowns = |albedo: f32, emission: f32| {
+            let mut unknowns = Unknowns::new(2);
+            unknowns.albedo[0] = Vec3::splat(albedo);
+            unknowns.emission[1] = Vec3::splat(emission);
+            unknowns
+        };
+        let mut errors = StandardErrors {
+            albedo: vec![Vec3::splat(0.06), Vec3::splat(0.5)],
+            emission: vec![Vec3::INFINITY, Vec3::splat(0.01)],
+        };
+        let from = unknowns(0.5, 10.0);
+        // What is hardly known may move far, what is well known may not.
+        assert!(!is_nonlinear(&from, &unknowns(0.6, 10.0), &errors));
+        errors.albedo[0] = Vec3::splat(0.003);
+        assert!(is_nonlinear(&from, &unknowns(0.6, 10.0), &errors));
+        assert!(!is_nonlinear(&from, &unknowns(0.51, 10.0), &errors));
+        // Lamps relative to themselves, in any unit.
+        assert!(!is_nonlinear(&from, &unknowns(0.5, 10.1), &errors));
+        assert!(is_nonlinear(&from, &unknowns(0.5, 10.3), &errors));
+    }
 }

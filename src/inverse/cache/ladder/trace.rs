@@ -203,7 +203,7 @@ impl Ladder<'_, '_> {
             sky: self.sky.as_ref(),
             outside: Some(self.outside),
             sampling: self.monitor.settings.light_sampling,
-            max_bounces: self.max_bounces,
+            max_bounces: self.monitor.settings.max_bounces(),
             seed: self.monitor.settings.seed,
             stage,
             round,
