@@ -6,7 +6,7 @@ use glam::{DVec3, Vec2, Vec3};
 use relit::capture::mesh::Mesh;
 use relit::inverse::estimate::{Estimate, ObjectEstimate};
 use relit::inverse::settings::Settings;
-use relit::inverse::solver::{Problem, Termination};
+use relit::inverse::solver::{Control, Observer, Problem, Progress, Termination, solve};
 use relit::inverse::survey::Survey;
 use relit::inverse::texture::{Refined, Task, refine};
 use relit::scene::geometry::Hit;
@@ -176,6 +176,56 @@ fn its_albedo_is_right_within_the_reported_errors() {
 }
 
 /// Only the right half of the wall is seen.
+/// Stops a solve some rounds after textures were found.
+struct Onwards {
+    found_at: Option<u64>,
+}
+
+impl Observer for Onwards {
+    fn observe(&mut self, progress: &Progress, _: &Estimate) -> Control {
+        if self.found_at.is_none() && progress.stages.iter().any(|s| s.name == "refit") {
+            self.found_at = Some(progress.iterations);
+        }
+        match self.found_at {
+            Some(found) if progress.iterations >= found + 4 => Control::Stop,
+            _ => Control::Continue,
+        }
+    }
+}
+
+/// Errors far below those of one pixel are asked for: textures do not wait for them, and stay in step with the rounds after.
+#[test]
+fn rounds_go_on_after_textures_and_take_them_along() {
+    let settings = Settings {
+        paths: 100_000,
+        target_error: 0.01,
+        ..Settings::default()
+    };
+    let mut onwards = Onwards { found_at: None };
+    let solution = solve(&ROOM.problem, &settings, None, &mut onwards).expect("nothing to resume");
+    assert_eq!(solution.termination, Termination::Cancelled);
+    let stages: Vec<&str> = (solution.progress.stages.iter())
+        .map(|s| s.name.as_str())
+        .collect();
+    assert_eq!(stages[stages.len() - 3..], ["refine", "textures", "refit"]);
+    let estimate = &solution.estimate;
+    let texels = estimate.texels.as_ref().expect("the poster was found");
+    assert_eq!(texels.textured.iter().filter(|t| **t).count(), 1);
+    let lamp = estimate.objects[LAMP].emission / Vec3::new(12.0, 11.0, 10.0);
+    assert!((lamp - Vec3::ONE).abs().max_element() < 0.02, "{lamp}");
+    let back = &estimate.objects[BACK].albedo;
+    let truth = REFINED
+        .means
+        .iter()
+        .find(|(k, _)| *k == BACK)
+        .expect("found")
+        .1;
+    assert!(
+        (*back / truth - Vec3::ONE).abs().max_element() < 0.03,
+        "{back} {truth}"
+    );
+}
+
 #[test]
 fn what_no_pixel_sees_is_marked_and_takes_its_neighbours_colour() {
     let mut mesh = scenes::closed_box(1.0, DVec3::ZERO);

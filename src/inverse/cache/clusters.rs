@@ -72,12 +72,12 @@ pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cl
     let mut tiles: BTreeMap<(u32, u32, u32, u32, bool), Vec<u32>> = BTreeMap::new();
     for pixel in usable {
         let width = problem.photographs[pixel.frame as usize].width;
+        let bound = saturated(pixel.frame, pixel.pixel).any();
         let tile = match nearest[pixel.object as usize] {
-            (Edge::Far, _) => tile,
-            (Edge::Near | Edge::On, pixels) => tile_at_edges(pixels).min(tile),
+            (Edge::Near | Edge::On, pixels) if !bound => tile_at_edges(pixels).min(tile),
+            _ => tile,
         };
         let place = (pixel.pixel / width / tile, pixel.pixel % width / tile);
-        let bound = saturated(pixel.frame, pixel.pixel).any();
         tiles
             .entry((pixel.frame, place.0, place.1, pixel.object, bound))
             .or_default()

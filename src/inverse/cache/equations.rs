@@ -30,7 +30,7 @@ pub struct NormalEquations {
     pub scatter: Vec<DVec3>,
     /// Σ w r_A r_B, an unbiased measure of the squared error.
     pub objective: DVec3,
-    /// Clusters in the sums.
+    /// Clusters in the sums that say anything.
     pub clusters: usize,
     /// What is believed besides.
     pub prior: Prior,
@@ -100,7 +100,7 @@ impl NormalEquations {
             across: vec![DVec3::ZERO; n],
             scatter: vec![DVec3::ZERO; n],
             objective: DVec3::ZERO,
-            clusters: linearised.len(),
+            clusters: linearised.iter().filter(|c| !c.silent().all()).count(),
             prior: prior.clone(),
             coupling,
         };

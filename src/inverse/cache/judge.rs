@@ -14,6 +14,8 @@ const SURE: [f64; 2] = [5.0, 2.0];
 const MOST: f64 = 400.0;
 /// The noise of a cluster's paths counts in full up to so many times the usual one; beyond it the cluster counts for less.
 const STRAYED: f64 = 4.0;
+/// Turns of finding which lower bounds are exceeded.
+const MOST_TURNS: usize = 8;
 /// An emitter must leave at most this share of the squared error that a reflector leaves.
 const EXPLAINED: f64 = 0.25;
 /// What was taken for an emitter stays one down to this share of the advantage that it took to become one.
@@ -45,9 +47,13 @@ pub fn judge(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<Chan
     let mut parts = parts(cache, unknowns, roles);
     let verdicts: Vec<Option<Verdict>> = parts.iter().map(|p| Verdict::new(p)).collect();
 
-    // The typical error of a cluster, under whichever role explains it better.
-    let mut errors: Vec<f64> = (verdicts.iter().flatten())
-        .flat_map(|v| v.errors.iter().copied())
+    // The typical error of a cluster, under whichever role explains it better; bounds that are kept have none.
+    let measured = |part: &Part| !part.at_least.any();
+    let mut errors: Vec<f64> = (verdicts.iter().zip(&parts))
+        .filter_map(|(verdict, parts)| Some(verdict.as_ref()?.errors.iter().zip(parts)))
+        .flatten()
+        .filter(|(_, part)| measured(part))
+        .map(|(error, _)| *error)
         .collect();
     let typical = quantile(&mut errors, 0.5).unwrap_or(0.0);
     (parts.iter_mut().zip(verdicts).enumerate())
@@ -208,15 +214,29 @@ impl Verdict {
     }
 }
 
-/// Weighted least squares of the targets on one regressor, unbiased by the noise of the paths.
+/// Weighted least squares of the targets on one regressor, unbiased by the noise of the paths. Targets that are lower bounds
+/// count while what is found stays below them.
 fn least_squares(parts: &[Part], regressor: impl Fn(&Part) -> [DVec3; 2]) -> DVec3 {
-    let (mut top, mut bottom) = (DVec3::ZERO, DVec3::ZERO);
-    for part in parts {
-        let [a, b] = regressor(part);
-        top += part.weight * (a * part.target[1] + b * part.target[0]) * 0.5;
-        bottom += part.weight * a * b;
+    let mut found = DVec3::ZERO;
+    for turn in 0..MOST_TURNS {
+        let (mut top, mut bottom) = (DVec3::ZERO, DVec3::ZERO);
+        for part in parts {
+            let [a, b] = regressor(part);
+            let exceeded = (part.target[0] + part.target[1]).cmple(found * (a + b));
+            // What was measured begins.
+            let silent = part.at_least & if turn == 0 { BVec3::TRUE } else { exceeded };
+            let weight = DVec3::select(silent, DVec3::ZERO, part.weight);
+            top += weight * (a * part.target[1] + b * part.target[0]) * 0.5;
+            bottom += weight * a * b;
+        }
+        // Where all bounds are exceeded there is nothing left to change.
+        let next = DVec3::select(bottom.cmpgt(DVec3::ZERO), top / bottom, found);
+        if turn > 0 && next == found {
+            break;
+        }
+        found = next;
     }
-    DVec3::select(bottom.cmpgt(DVec3::ZERO), top / bottom, DVec3::ZERO)
+    found
 }
 
 #[cfg(test)]
@@ -337,6 +357,34 @@ mod tests {
         let mut unknowns = Unknowns::new(1);
         unknowns.albedo[0] = Vec3::splat(0.5);
         assert_eq!(judge(&cache, &unknowns, &[Role::Reflector]), []);
+    }
+
+    /// Highlights saturate at 1: forty times the light of elsewhere falls on a wall that reflects 0.6.
+    #[test]
+    fn a_wall_with_saturated_highlights_stays_a_reflector_and_a_saturated_lamp_becomes_an_emitter()
+    {
+        let bound = |mut cached: CachedCluster| {
+            cached.cluster.at_least = BVec3::TRUE;
+            cached
+        };
+        let wall = (0..40).map(|index| {
+            let light = 0.5 + 0.02 * index as f32;
+            cluster(0, index, light, 0.6 * light)
+        });
+        let highlights = (0..60).map(|index| bound(cluster(0, index, 40.0, 1.0)));
+        let lamp = (0..60).map(|index| bound(cluster(1, index, 0.3, 1.0)));
+        let mut unknowns = Unknowns::new(2);
+        unknowns.albedo = vec![Vec3::splat(0.6), Vec3::ONE];
+        let cache = cache(wall.chain(highlights).chain(lamp));
+        let changes = judge(&cache, &unknowns, &[Role::Reflector; 2]);
+        assert_eq!(changes.len(), 1, "{changes:?}");
+        assert_eq!((changes[0].object, changes[0].role), (1, Role::Emitter));
+        assert!((changes[0].value - Vec3::ONE).length() < 1e-5);
+        // Brighter than its photographs, as its light asks for, it stays one.
+        unknowns.albedo[1] = Vec3::ZERO;
+        unknowns.emission[1] = Vec3::splat(8.0);
+        let settled = judge(&cache, &unknowns, &[Role::Reflector, Role::Emitter]);
+        assert_eq!(settled, []);
     }
 
     #[test]

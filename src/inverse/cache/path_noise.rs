@@ -10,7 +10,7 @@ const PRIOR_CLUSTERS: f64 = 2.0;
 /// For each object the share of its squared residuals that the paths' noise explains, from 0 to 1.
 pub fn shares(clusters: &[Linearised], objects: usize) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0, 0.0); objects];
-    for cluster in clusters {
+    for cluster in clusters.iter().filter(|c| !c.silent().all()) {
         let [a, b] = cluster.residuals;
         let square = |r: glam::DVec3| (cluster.weight_now() * r * r).element_sum();
         let sum = &mut sums[cluster.object as usize];

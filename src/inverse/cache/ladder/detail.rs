@@ -21,6 +21,27 @@ pub(super) struct Detail {
     pub offsets: Vec<DVec3>,
 }
 
+/// No texture grows brighter or darker by more than this factor.
+const MOST: f32 = 1.5;
+
+impl Detail {
+    /// The same, the textures scaled as the single colours of their objects changed.
+    pub fn scaled_to(&self, albedo: &[Vec3], object_of: &[u32]) -> Self {
+        let factors: Vec<Vec3> = (albedo.iter().zip(&self.albedo))
+            .map(|(new, old)| {
+                let known = old.cmpgt(Vec3::ZERO);
+                let grown = *new / Vec3::select(known, *old, Vec3::ONE);
+                let within = grown.clamp(Vec3::splat(1.0 / MOST), Vec3::splat(MOST));
+                Vec3::select(known, within, Vec3::ONE)
+            })
+            .collect();
+        let mut scaled = self.clone();
+        scaled.refined.scale(|k| factors[k], object_of);
+        (scaled.albedo.iter_mut().zip(factors)).for_each(|(albedo, factor)| *albedo *= factor);
+        scaled
+    }
+}
+
 impl Ladder<'_, '_> {
     /// Takes what the textures add out of the residuals, where that is known.
     pub(super) fn leave_textures_out(&self, clusters: &mut [Linearised]) {

@@ -342,6 +342,7 @@ impl Ladder<'_, '_> {
         );
         self.estimate.exposures.clone_from(&self.exposures);
         if let Some(detail) = &self.detail {
+            let detail = detail.scaled_to(&self.unknowns.albedo, &self.problem.scene.object_of);
             detail.refined.apply(&mut self.estimate);
         }
         describe::doubt_white(&mut self.estimate, &self.brightness);

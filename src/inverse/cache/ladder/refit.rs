@@ -4,12 +4,9 @@ use super::Ladder;
 use crate::inverse::cache::path_noise::share_paths;
 use crate::inverse::solver::Termination;
 use crate::math::stats::Moments;
-use glam::Vec3;
 
 /// Held-out loss may rise by so many standard errors of the rise before what was found is taken back.
 const SIGNIFICANT: f64 = 2.0;
-/// No texture grows brighter or darker by more than this factor.
-const MOST: f32 = 1.5;
 
 impl Ladder<'_, '_> {
     /// Fits all rounds again to the photographs less what the textures change in them, which one set of paths tells; the
@@ -18,7 +15,8 @@ impl Ladder<'_, '_> {
     /// The light that a printed poster sends to a wall, and what its border adds to the pixels of its frame, are otherwise
     /// those of one mean colour.
     pub(super) fn refit(&mut self) -> Result<(), Termination> {
-        let Some((texels, summed)) = self.estimate.texels.clone().zip(self.summed.take()) else {
+        let found = (self.detail.as_ref()).and_then(|detail| detail.refined.texels.clone());
+        let Some((texels, summed)) = found.zip(self.summed.take()) else {
             return Ok(());
         };
         let started = self.monitor.seconds();
@@ -35,7 +33,15 @@ impl Ladder<'_, '_> {
             self.roles.len(),
             self.budget.round_paths,
         );
-        let offsets = self.texture_offsets(&lights, 4, &texels)?;
+        // What textures change is told against the single colours that they are scaled to.
+        let mut flat = self.unknowns.clone();
+        if let Some(detail) = &self.detail {
+            let textured = detail.albedo.iter().zip(&texels.textured).enumerate();
+            for (k, (albedo, _)) in textured.filter(|(_, (_, textured))| **textured) {
+                flat.albedo[k] = *albedo;
+            }
+        }
+        let offsets = self.texture_offsets(&lights, 4, &texels, &flat)?;
         if let Some(detail) = &mut self.detail {
             detail.offsets = offsets;
         }
@@ -43,14 +49,7 @@ impl Ladder<'_, '_> {
         self.leave_textures_out(&mut clusters);
         self.descend(clusters, &summed.about);
         if let Some(detail) = &mut self.detail {
-            let factors: Vec<Vec3> = (self.unknowns.albedo.iter().zip(&detail.albedo))
-                .map(|(new, old)| {
-                    let grown = *new / old.max(Vec3::splat(f32::MIN_POSITIVE));
-                    grown.clamp(Vec3::splat(1.0 / MOST), Vec3::splat(MOST))
-                })
-                .collect();
-            (detail.refined).scale(|k| factors[k], &self.problem.scene.object_of);
-            (detail.albedo.iter_mut().zip(factors)).for_each(|(albedo, factor)| *albedo *= factor);
+            *detail = detail.scaled_to(&self.unknowns.albedo, &self.problem.scene.object_of);
         }
         self.describe();
 

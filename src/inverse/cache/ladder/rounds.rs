@@ -19,6 +19,8 @@ use glam::Vec3;
 
 /// A step asks for linearising anew where its square is more than this share of a standard error.
 const NONLINEAR: f32 = 0.3;
+/// Emissions whose standard error is below this share of them are well known.
+const WELL_KNOWN: f32 = 0.3;
 /// What the paths add to an error is negligible below this share of it: without them it would be 6 % less.
 const NEGLIGIBLE: f64 = 1.0 / 3.0;
 /// Levels that clusters are weighed by take this part of the paths of a round.
@@ -63,6 +65,15 @@ impl Rounds {
     }
 }
 
+/// A part of the rounds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Leg {
+    /// As far as it takes to look for textures.
+    UntilTextures,
+    /// All of them.
+    UntilDone,
+}
+
 /// Relative standard errors of albedo that rounds aim at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Aim {
@@ -77,15 +88,13 @@ impl Ladder<'_, '_> {
     /// errors are small enough for them, or after some rounds, however many more are to come.
     pub(super) fn refine(&mut self) -> Result<Termination, Termination> {
         let mut rounds = self.begin_rounds()?;
-        let (most, aim) = self.aim();
         let textures = self.monitor.settings.textures;
-        if textures && aim.median < ENOUGH_FOR_TEXTURES.median {
-            let before = self.budget.texture_rounds.min(most);
-            self.add_rounds(&mut rounds, before, ENOUGH_FOR_TEXTURES)?;
+        if textures && self.aim().1.median < ENOUGH_FOR_TEXTURES.median {
+            self.add_rounds(&mut rounds, Leg::UntilTextures)?;
             self.detail()?;
             self.refit()?;
         }
-        let ended = self.add_rounds(&mut rounds, most, aim)?;
+        let ended = self.add_rounds(&mut rounds, Leg::UntilDone)?;
         if textures {
             if self.detail.is_none() {
                 self.detail()?;
@@ -116,25 +125,24 @@ impl Ladder<'_, '_> {
         })
     }
 
-    /// Adds rounds until the reported errors are small enough, or there are `most` in all.
-    fn add_rounds(
-        &mut self,
-        rounds: &mut Rounds,
-        most: u32,
-        aim: Aim,
-    ) -> Result<Termination, Termination> {
-        if rounds.next > 0 && rounds.next >= most {
+    /// Adds rounds until the reported errors are small enough, or there are as many as there may be.
+    fn add_rounds(&mut self, rounds: &mut Rounds, leg: Leg) -> Result<Termination, Termination> {
+        if rounds.next > 0 && rounds.next >= self.aim_of(leg).0 {
             return Ok(Termination::Steps);
         }
         let started = self.monitor.seconds();
         self.monitor.phase("refining");
         let mut outcome = Termination::Steps;
-        while rounds.next < most {
+        loop {
+            // What is asked for may change while a solve runs.
+            let (most, aim) = self.aim_of(leg);
+            if rounds.next >= most {
+                break;
+            }
             let round = rounds.next;
             rounds.next += 1;
             // What lamps reflect is not linearised but followed.
             self.light_patches(round);
-            // Path lengths are steered by what is believed at the start, the same in every round.
             let linearised =
                 self.linearised(&rounds.lights, 2, round, &rounds.about, &rounds.places)?;
             rounds.sums.add(linearised);
@@ -143,11 +151,13 @@ impl Ladder<'_, '_> {
             let found = self.descend(clusters, &rounds.about);
             self.trust = found.trust;
             self.path_noise = path_noise::shares(&found.clusters, self.roles.len());
-            let far = is_nonlinear(&rounds.about, &self.unknowns, &self.errors);
+            // Textures stand for what was found about the first point.
+            let may_restart = self.detail.is_none() && round < most.min(self.budget.rounds) / 4;
+            let far = may_restart && is_nonlinear(&rounds.about, &self.unknowns, &self.errors);
             self.describe();
             self.monitor
                 .report(&self.estimate, &|_| self.checkpoint.clone())?;
-            if far && round < most / 4 {
+            if far {
                 rounds.about = self.unknowns.clone();
                 rounds.sums = Accumulated::default();
                 continue;
@@ -195,6 +205,15 @@ impl Ladder<'_, '_> {
         self.merge_errors(errors);
         self.hold();
         found
+    }
+
+    /// Rounds at most up to the end of a leg, and the errors aimed at.
+    fn aim_of(&self, leg: Leg) -> (u32, Aim) {
+        let (most, aim) = self.aim();
+        match leg {
+            Leg::UntilTextures => (self.budget.texture_rounds.min(most), ENOUGH_FOR_TEXTURES),
+            Leg::UntilDone => (most, aim),
+        }
     }
 
     /// Rounds at most, and the errors aimed at: the preset's, or without end a smaller median that was asked for.
@@ -275,7 +294,8 @@ impl Reported {
 }
 
 /// Whether a step is so long that what is left of it to second order, about its square, is no longer small against the standard
-/// errors: albedos count in full, emissions relative to themselves.
+/// errors: albedos count in full, emissions relative to themselves. Lamps that are hardly known count not at all: light is linear
+/// in them, and what they multiply moves little with them.
 fn is_nonlinear(from: &Unknowns, to: &Unknowns, errors: &StandardErrors) -> bool {
     let exceeds = |step: Vec3, size: Vec3, error: Vec3| {
         let known = error.cmpgt(Vec3::ZERO) & error.cmplt(Vec3::INFINITY);
@@ -283,8 +303,12 @@ fn is_nonlinear(from: &Unknowns, to: &Unknowns, errors: &StandardErrors) -> bool
     };
     let albedo = (from.albedo.iter().zip(&to.albedo).zip(&errors.albedo))
         .any(|((a, b), error)| exceeds(*b - *a, Vec3::ONE, *error));
-    let emission = (from.emission.iter().zip(&to.emission).zip(&errors.emission))
-        .any(|((a, b), error)| exceeds(*b - *a, *b, *error));
+    let emission =
+        (from.emission.iter().zip(&to.emission).zip(&errors.emission)).any(|((a, b), error)| {
+            let size = a.max(*b);
+            let known = error.cmple(size * WELL_KNOWN);
+            exceeds(*b - *a, size, Vec3::select(known, *error, Vec3::INFINITY))
+        });
     albedo || emission
 }
 
@@ -313,5 +337,8 @@ mod tests {
         // Lamps relative to themselves, in any unit.
         assert!(!is_nonlinear(&from, &unknowns(0.5, 10.1), &errors));
         assert!(is_nonlinear(&from, &unknowns(0.5, 10.3), &errors));
+        // One that is hardly known may vanish.
+        errors.emission[1] = Vec3::splat(4.0);
+        assert!(!is_nonlinear(&from, &unknowns(0.5, 0.0), &errors));
     }
 }

@@ -92,17 +92,17 @@ impl Ladder<'_, '_> {
         Ok(all)
     }
 
-    /// By how much the textures found change the radiance of each cluster at the present unknowns.
+    /// By how much the textures found change the radiance of each cluster from that of some unknowns.
     pub(super) fn texture_offsets(
         &mut self,
         lights: &Emitters,
         stage: u64,
         texels: &TexelEstimate,
+        unknowns: &Unknowns,
     ) -> Result<Vec<DVec3>, Termination> {
-        let unknowns = self.unknowns.clone();
         let mut all = Vec::with_capacity(self.clusters.len());
         self.slices(lights, None, stage, 0, |slice| {
-            all.extend(slice.texture_offsets(&unknowns, &texels.colors.colors));
+            all.extend(slice.texture_offsets(unknowns, &texels.colors.colors));
         })?;
         Ok(all)
     }
