@@ -3,9 +3,9 @@
 mod scenes;
 
 use glam::{DVec3, Vec3};
-use relit::inverse::estimate::{Estimate, relative_to_albedo};
+use relit::inverse::estimate::relative_to_albedo;
 use relit::inverse::settings::Settings;
-use relit::inverse::solver::{Control, Observer, Problem, Progress, Solution, solve};
+use relit::inverse::solver::{Problem, Solution};
 use relit::transport::material::{Albedo, Lobe, Material};
 use std::sync::LazyLock;
 
@@ -16,14 +16,6 @@ const ROUGH: [(&str, [f32; 3], f32, f32); 3] = [
     ("brushed", [0.30, 0.26, 0.20], 0.50, 0.60),
 ];
 const FIRST: usize = 8;
-
-struct Silent;
-
-impl Observer for Silent {
-    fn observe(&mut self, _: &Progress, _: &Estimate) -> Control {
-        Control::Continue
-    }
-}
 
 /// The lamp room with three more blocks, photographed from twelve sides.
 fn room(lobes: bool) -> (Problem, Vec<Material>) {
@@ -63,7 +55,7 @@ fn solved(problem: &Problem) -> Solution {
         textures: false,
         ..Settings::default()
     };
-    solve(problem, &settings, None, &mut Silent).expect("nothing to resume")
+    scenes::solved(problem, &settings)
 }
 
 static ROUGH_ROOM: LazyLock<(Solution, Vec<Material>)> = LazyLock::new(|| {

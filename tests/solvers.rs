@@ -6,7 +6,8 @@ use glam::{DVec3, Vec3};
 use relit::inverse::estimate::Estimate;
 use relit::inverse::settings::{Preset, Settings};
 use relit::inverse::solver::{Control, Observer, Problem, Progress, Solution, Termination, solve};
-use relit::transport::material::{Albedo, Material};
+use relit::transport::material::Material;
+use scenes::albedo;
 use std::sync::{Arc, LazyLock};
 
 const SIZE: [u32; 2] = [48, 36];
@@ -59,13 +60,6 @@ static ROOM: LazyLock<(Problem, Vec<Material>)> = LazyLock::new(|| {
 
 /// What `preview` makes of the room.
 static PREVIEW: LazyLock<Solution> = LazyLock::new(|| run(&ROOM.0, &preset(Preset::Preview)));
-
-fn albedo(material: &Material) -> Vec3 {
-    match material.albedo {
-        Albedo::Constant(color) => color,
-        _ => panic!("the room has constant materials"),
-    }
-}
 
 /// Mean absolute error of the albedos over the objects that reflect and the channels.
 fn mean_absolute_error(estimate: &Estimate, materials: &[Material]) -> f32 {

@@ -6,12 +6,14 @@ use relit::capture::camera::{Intrinsics, Pose};
 use relit::capture::mesh::Mesh;
 use relit::capture::photograph::{Encoding, Photograph, PhotographSource};
 use relit::capture::{Capture, Frame};
-use relit::inverse::solver::Problem;
+use relit::inverse::estimate::Estimate;
+use relit::inverse::settings::Settings;
+use relit::inverse::solver::{Control, Observer, Problem, Progress, Solution, solve};
 use relit::scene::Scene;
 use relit::transport::environment::Environment;
 use relit::transport::film::Film;
 use relit::transport::lit::Lit;
-use relit::transport::material::Material;
+use relit::transport::material::{Albedo, Material};
 use relit::transport::path::PathOptions;
 use std::sync::Arc;
 
@@ -145,6 +147,28 @@ pub fn capture(mesh: Mesh, views: &[View], [width, height]: [u32; 2]) -> Capture
         mesh,
         up: DVec3::Y,
         warnings: Vec::new(),
+    }
+}
+
+/// Listens without a word.
+struct Silent;
+
+impl Observer for Silent {
+    fn observe(&mut self, _: &Progress, _: &Estimate) -> Control {
+        Control::Continue
+    }
+}
+
+/// Solves without steering.
+pub fn solved(problem: &Problem, settings: &Settings) -> Solution {
+    solve(problem, settings, None, &mut Silent).expect("nothing to resume")
+}
+
+/// The one albedo of a material.
+pub fn albedo(material: &Material) -> Vec3 {
+    match material.albedo {
+        Albedo::Constant(color) => color,
+        _ => panic!("the room has constant materials"),
     }
 }
 

@@ -125,6 +125,18 @@ impl Rig {
     }
 }
 
+/// The albedo of the second object held at a value.
+fn pinned(albedo: f32) -> Edits {
+    let mut edits = Edits::default();
+    let held = ObjectEdit {
+        albedo: Some(glam::Vec3::splat(albedo)),
+        albedo_known: true,
+        ..ObjectEdit::default()
+    };
+    edits.set(1, held);
+    edits
+}
+
 fn iterations(snapshot: &Snapshot) -> u64 {
     snapshot.progress.iterations
 }
@@ -322,14 +334,7 @@ fn a_session_saves_by_itself_and_is_taken_up_with_its_changes_and_objects() {
 fn pinned_values_are_handed_to_the_solver_which_goes_on_from_its_checkpoint() {
     let rig = Rig::new(None);
     rig.until("some steps", |s| iterations(s) > 100);
-    let mut edits = Edits::default();
-    let pinned = ObjectEdit {
-        albedo: Some(glam::Vec3::splat(0.4)),
-        albedo_known: true,
-        ..ObjectEdit::default()
-    };
-    edits.set(1, pinned);
-    assert!(rig.session.send(Command::Edit(edits)));
+    assert!(rig.session.send(Command::Edit(pinned(0.4))));
     assert!(rig.session.send(Command::SolveOn));
     // The solver of these tests says what it was told by the roughness of the floor.
     let on = rig.until("the pinned value", |s| {

@@ -1,9 +1,8 @@
 //! Objects joined and renamed while a solve runs.
 
-use crate::{Rig, iterations};
+use crate::{Rig, iterations, pinned};
 use relit::capture::regroup::Regroup;
 use relit::session::command::{Command, Regrouping};
-use relit::session::edits::{Edits, ObjectEdit};
 use relit::session::snapshot::{Level, Phase, Snapshot};
 
 #[test]
@@ -25,13 +24,7 @@ fn changed_objects_start_the_solve_over_and_are_saved_and_read_back() {
         },
     ];
     let hash = first.capture.as_ref().expect("open").hash.clone();
-    let mut edits = Edits::default();
-    let pinned = ObjectEdit {
-        albedo: Some(glam::Vec3::splat(0.3)),
-        albedo_known: true,
-        ..ObjectEdit::default()
-    };
-    edits.set(1, pinned);
+    let edits = pinned(0.3);
     let ask = |hash: &str, changes: &[Regroup]| {
         let wanted = Regrouping {
             hash: hash.to_owned(),

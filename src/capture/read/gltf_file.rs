@@ -129,3 +129,26 @@ fn percent_decoded(uri: &str) -> String {
     }
     String::from_utf8_lossy(&decoded).into_owned()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    #[test]
+    fn buffers_of_one_name_are_read_once_and_share_their_bytes() {
+        let json = r#"{"asset": {"version": "2.0"}, "buffers": [
+            {"uri": "a.bin", "byteLength": 4}, {"uri": "a.bin", "byteLength": 3}, {"uri": "b.bin", "byteLength": 4}]}"#;
+        let path = Path::new("scan.gltf");
+        let gltf = parse(path, json.as_bytes()).expect("valid");
+        let reads = Cell::new(0);
+        let file = |_: &str, name: &str| {
+            reads.set(reads.get() + 1);
+            Ok(vec![name.as_bytes()[0]; 4])
+        };
+        let buffers = buffers(&gltf, path, &file).expect("reads");
+        assert_eq!(reads.get(), 2);
+        assert!(Arc::ptr_eq(&buffers[0], &buffers[1]));
+        assert_eq!([buffers[0][0], buffers[2][0]], [b'a', b'b']);
+    }
+}

@@ -217,7 +217,7 @@ fn untold(problem: &Problem, survey: &Survey) -> Vec<&'static str> {
         let radiance = photograph.pixels[pixel.pixel as usize];
         lit |= radiance.max_element() > 0.0;
         if let Some(measured) = measured.get_mut(pixel.object as usize) {
-            *measured |= radiance.cmplt(photograph.saturation).any();
+            *measured |= !photograph.is_saturated(pixel.pixel as usize);
         }
     }
     (survey.seen.iter().zip(measured))

@@ -15,7 +15,7 @@ use std::cell::Cell;
 pub(super) struct Detail {
     /// What was found.
     pub refined: Refined,
-    /// The single colours that the textures are scaled to, one an object.
+    /// The single colours that it was found with, one an object.
     pub albedo: Vec<Vec3>,
     /// By how much the textures change the radiance of each cluster; empty until that was traced.
     pub offsets: Vec<DVec3>,
@@ -25,8 +25,8 @@ pub(super) struct Detail {
 const MOST: f32 = 1.5;
 
 impl Detail {
-    /// The same, the textures scaled as the single colours of their objects changed.
-    pub fn scaled_to(&self, albedo: &[Vec3], object_of: &[u32]) -> Self {
+    /// What was found, the textures scaled as the single colours of their objects have changed since.
+    pub fn scaled_to(&self, albedo: &[Vec3], object_of: &[u32]) -> Refined {
         let factors: Vec<Vec3> = (albedo.iter().zip(&self.albedo))
             .map(|(new, old)| {
                 let known = old.cmpgt(Vec3::ZERO);
@@ -35,9 +35,8 @@ impl Detail {
                 Vec3::select(known, within, Vec3::ONE)
             })
             .collect();
-        let mut scaled = self.clone();
-        scaled.refined.scale(|k| factors[k], object_of);
-        (scaled.albedo.iter_mut().zip(factors)).for_each(|(albedo, factor)| *albedo *= factor);
+        let mut scaled = self.refined.clone();
+        scaled.scale(|k| factors[k], object_of);
         scaled
     }
 }

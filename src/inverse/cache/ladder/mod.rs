@@ -40,6 +40,8 @@ const MOST_STEPS: u64 = 30;
 /// Columns and rows of the map of light from outside.
 const OUTSIDE_WIDTH: usize = 12;
 const OUTSIDE_HEIGHT: usize = 6;
+/// Longest path in bounces of losses, textures, lobes and of what lamps reflect; those of the fits end by chance alone.
+const MOST_BOUNCES: u32 = 1000;
 /// Stages of a solve that goes all the way.
 const STAGES: u32 = 4;
 
@@ -107,11 +109,7 @@ pub fn solve(
     let needed = exposures.as_ref().filter(|e| e.needed);
     let undone = needed.map(|exposures| exposures.undone(problem));
     let problem = undone.as_ref().unwrap_or(problem);
-    let max_bounces = if settings.bounces == 0 {
-        1000
-    } else {
-        settings.bounces as u32
-    };
+    let max_bounces = settings.max_bounces().min(MOST_BOUNCES);
     let start = match resume {
         Some(checkpoint) => checkpoint.state(|reached: &Reached| reached.fits(surfaces))?,
         None => Reached::new(
@@ -342,8 +340,9 @@ impl Ladder<'_, '_> {
         );
         self.estimate.exposures.clone_from(&self.exposures);
         if let Some(detail) = &self.detail {
-            let detail = detail.scaled_to(&self.unknowns.albedo, &self.problem.scene.object_of);
-            detail.refined.apply(&mut self.estimate);
+            let object_of = &self.problem.scene.object_of;
+            let refined = detail.scaled_to(&self.unknowns.albedo, object_of);
+            refined.apply(&mut self.estimate);
         }
         describe::doubt_white(&mut self.estimate, &self.brightness);
         self.describe_known();

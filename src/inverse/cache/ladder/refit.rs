@@ -1,6 +1,7 @@
 //! After textures were found: all colours and lamps once more, in the light as the textures send it on.
 
 use super::Ladder;
+use super::detail::Detail;
 use crate::inverse::cache::path_noise::share_paths;
 use crate::inverse::solver::Termination;
 use crate::math::stats::Moments;
@@ -10,13 +11,15 @@ const SIGNIFICANT: f64 = 2.0;
 
 impl Ladder<'_, '_> {
     /// Fits all rounds again to the photographs less what the textures change in them, which one set of paths tells; the
-    /// textures are scaled with their objects.
+    /// textures are shown scaled with their objects.
     ///
     /// The light that a printed poster sends to a wall, and what its border adds to the pixels of its frame, are otherwise
     /// those of one mean colour.
     pub(super) fn refit(&mut self) -> Result<(), Termination> {
-        let found = (self.detail.as_ref()).and_then(|detail| detail.refined.texels.clone());
-        let Some((texels, summed)) = found.zip(self.summed.take()) else {
+        let detail = self.detail.clone();
+        let texels = detail.as_ref().and_then(|d| d.refined.texels.clone());
+        let (Some(detail), Some(texels), Some(summed)) = (detail, texels, self.summed.take())
+        else {
             return Ok(());
         };
         let started = self.monitor.seconds();
@@ -24,7 +27,6 @@ impl Ladder<'_, '_> {
         let before = (
             self.unknowns.clone(),
             self.errors.clone(),
-            self.detail.clone(),
             self.held_out_each(),
         );
         let lights = self.lights();
@@ -33,34 +35,31 @@ impl Ladder<'_, '_> {
             self.roles.len(),
             self.budget.round_paths,
         );
-        // What textures change is told against the single colours that they are scaled to.
+        // What textures change is told against the single colours that they were found with.
         let mut flat = self.unknowns.clone();
-        if let Some(detail) = &self.detail {
-            let textured = detail.albedo.iter().zip(&texels.textured).enumerate();
-            for (k, (albedo, _)) in textured.filter(|(_, (_, textured))| **textured) {
+        for (k, albedo) in detail.albedo.iter().enumerate() {
+            if texels.textured.get(k) == Some(&true) {
                 flat.albedo[k] = *albedo;
             }
         }
         let offsets = self.texture_offsets(&lights, 4, &texels, &flat)?;
-        if let Some(detail) = &mut self.detail {
-            detail.offsets = offsets;
-        }
+        self.detail = Some(Detail {
+            offsets,
+            ..detail.clone()
+        });
         let mut clusters = summed.clusters;
         self.leave_textures_out(&mut clusters);
         self.descend(clusters, &summed.about);
-        if let Some(detail) = &mut self.detail {
-            *detail = detail.scaled_to(&self.unknowns.albedo, &self.problem.scene.object_of);
-        }
         self.describe();
 
         let after = self.held_out_each();
         let mut rise = Moments::default();
-        for (before, after) in before.3.iter().zip(&after) {
+        for (before, after) in before.2.iter().zip(&after) {
             rise.push(after - before);
         }
         let kept = after.is_empty() || rise.mean <= SIGNIFICANT * rise.standard_error();
         if !kept {
-            (self.unknowns, self.errors, self.detail) = (before.0.clone(), before.1, before.2);
+            (self.unknowns, self.errors, self.detail) = (before.0.clone(), before.1, Some(detail));
             self.describe();
         }
         let moved = (0..self.problem.scene.objects.len())
