@@ -93,6 +93,37 @@ fn an_obj_has_its_colors_texture_gloss_and_normals() {
     assert!((first(0.75, 0.75) - Vec3::new(red, 0.0, 0.0)).length() < 1e-6);
 }
 
+#[test]
+fn a_color_of_one_number_is_gray_and_a_texture_alone_is_the_base_color() {
+    let image = png(1, 1, |_, _| [255, 0, 0]);
+    let obj = format!("mtllib m.mtl\n{SQUARE}{FACE}");
+    let model = |mtl: &str| {
+        let files: [(&str, &[u8]); 3] = [
+            ("o.obj", obj.as_bytes()),
+            ("m.mtl", mtl.as_bytes()),
+            ("t.png", &image),
+        ];
+        let folder = folder(&files);
+        ObjectModel::read(&folder.path().join("o.obj"))
+    };
+    let color = |mtl: &str| {
+        let model = model(mtl).expect("a sound file");
+        let material = &model.materials[model.material_of[0] as usize];
+        material.albedo_at(&Hit {
+            t: 1.0,
+            triangle: 0,
+            b1: 0.3,
+            b2: 0.3,
+        })
+    };
+    assert_eq!(color("newmtl paint\nKd 0.25\n"), Vec3::splat(0.25));
+    assert_eq!(color("newmtl paint\nmap_Kd t.png\n"), Vec3::X);
+    for broken in ["Kd", "Kd 0.5 0.5", "Kd x", "Ks"] {
+        let error = model(&format!("newmtl paint\n{broken}\n")).expect_err("no color");
+        assert!(error.place.contains("m.mtl"), "{error}");
+    }
+}
+
 /// One triangle as glTF with its buffer inline; `nodes` and `material` are JSON.
 fn gltf(nodes: &str, material: &str) -> String {
     let mut bytes = Vec::new();

@@ -1,8 +1,10 @@
-//! Wavefront OBJ: every `o` or `g` is an object. Parsed by tobj; materials are not needed here and not opened.
+//! Wavefront OBJ: every `o` or `g` is an object, taken up again where its name comes again. Parsed by tobj; materials are not
+//! needed here and not opened.
 
 use crate::capture::read::mesh::RawMesh;
 use crate::error::{Error, Result};
 use glam::{DVec3, Vec2, Vec3};
+use std::collections::HashMap;
 use std::io::{BufRead, Read};
 use std::path::Path;
 
@@ -45,13 +47,17 @@ fn parse(path: &Path, reader: impl BufRead) -> Result<RawMesh> {
     let mesh = &mut raw.mesh;
     let colored = models.iter().any(|m| !m.mesh.vertex_color.is_empty());
     let textured = models.iter().any(|m| !m.mesh.texcoords.is_empty());
+    let mut objects = HashMap::new();
     for model in models {
         let part = model.mesh;
         if part.indices.is_empty() {
             continue;
         }
         let first = u32::try_from(mesh.positions.len()).map_err(|_| too_large(path))?;
-        let object = mesh.objects.len() as u32;
+        let object = *(objects.entry(model.name.clone())).or_insert_with(|| {
+            mesh.objects.push(model.name);
+            mesh.objects.len() as u32 - 1
+        });
         mesh.positions
             .extend(part.positions.chunks_exact(3).map(DVec3::from_slice));
         if u32::try_from(mesh.positions.len()).is_err() {
@@ -80,7 +86,6 @@ fn parse(path: &Path, reader: impl BufRead) -> Result<RawMesh> {
             mesh.corner_uvs
                 .resize(mesh.triangles.len(), [Vec2::ZERO; 3]);
         }
-        mesh.objects.push(model.name);
     }
     raw.has_objects = mesh.objects.iter().any(|name| name != UNNAMED);
     Ok(raw)

@@ -40,8 +40,11 @@ pub(super) fn read(path: &Path) -> Result<Parts> {
                 Err(tobj::LoadError::OpenFileFailed)
             },
             |(found, bytes)| {
+                let bytes = with_whole_colors(&bytes);
                 *library_path.borrow_mut() = found;
-                tobj::load_mtl_buf(&mut Cursor::new(bytes))
+                tobj::load_mtl_buf(&mut Cursor::new(
+                    bytes.ok_or(tobj::LoadError::MaterialParseError)?,
+                ))
             },
         )
     });
@@ -96,6 +99,28 @@ fn open_library(referrer: &Path, name: &Path) -> Result<(PathBuf, Vec<u8>)> {
     Ok((found, bytes))
 }
 
+/// An MTL file in which every colour has three numbers, which tobj takes for granted: a single one stands for all three.
+/// `None` where there are two or none.
+fn with_whole_colors(bytes: &[u8]) -> Option<String> {
+    let text = String::from_utf8_lossy(bytes);
+    let mut whole = String::with_capacity(text.len());
+    for line in text.lines() {
+        let mut words = line.split_whitespace();
+        let is_color = words
+            .next()
+            .is_some_and(|key| ["Ka", "Kd", "Ks", "Ke"].contains(&key));
+        let values: Vec<&str> = words.take(3).collect();
+        whole.push_str(line);
+        match (is_color, &values[..]) {
+            (false, _) | (true, [_, _, _]) => {}
+            (true, [gray]) => whole.push_str(&format!(" {gray} {gray}")),
+            (true, _) => return None,
+        }
+        whole.push('\n');
+    }
+    Some(whole)
+}
+
 /// Adds a mesh's triangles; `None` where an index is out of range.
 fn push_mesh(parts: &mut Parts, mesh: &tobj::Mesh, material: u32) -> Option<()> {
     let vector = |values: &[f64], index: u32| {
@@ -148,9 +173,14 @@ fn surface(
     let place = || format!("{}: material `{}`", library.display(), material.name);
     let number =
         |key: &str| -> Option<f32> { material.unknown_param.get(key)?.trim().parse().ok() };
+    // A texture alone is the base colour.
+    let missing = match material.diffuse_texture {
+        Some(_) => Vec3::ONE,
+        None => Vec3::splat(0.8),
+    };
     let kd = material
         .diffuse
-        .map_or(Vec3::splat(0.8), |c| Vec3::from(c.map(|v| v as f32)));
+        .map_or(missing, |c| Vec3::from(c.map(|v| v as f32)));
     let ks = material
         .specular
         .map_or(0.0, |c| (c.iter().sum::<f64>() / 3.0) as f32);
