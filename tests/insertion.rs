@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec3, Vec2, Vec3};
 use relit::capture::camera::{Intrinsics, Pose};
+use relit::capture::exposure::{Exposure, Vignetting};
 use relit::capture::mesh::Mesh;
 use relit::capture::photograph::{Encoding, Photograph, PhotographSource};
 use relit::capture::{Capture, Frame};
@@ -72,6 +73,7 @@ fn capture(groups: &[(&str, Vec<[DVec3; 3]>)]) -> Capture {
         usable: Vec::new(),
         encoding: Encoding::Linear,
         saturation: Vec3::INFINITY,
+        limits: Vec::new(),
     });
     Capture {
         name: "test".to_owned(),
@@ -149,7 +151,7 @@ fn block() -> Vec<[DVec3; 3]> {
 
 fn backdrop(capture: &Capture, lit: &Lit) -> Backdrop {
     let photograph = capture.frames[0].load().expect("in memory");
-    Backdrop::new(0, &lit.scene.cameras[0], &photograph, None).expect("one size")
+    Backdrop::new(0, &lit.scene.cameras[0], &photograph, Exposure::default()).expect("one size")
 }
 
 fn insertion(capture: &Capture, lit: &Arc<Lit>, objects: Vec<Arc<PlacedObject>>) -> Insertion {
@@ -349,7 +351,7 @@ fn a_saturating_photograph_gives_a_composite_that_saturates_like_it() {
     let (capture, lit) = lamp_room();
     let mut backdrop = backdrop(&capture, &lit);
     backdrop.saturation = Vec3::ONE;
-    backdrop.exposure = Vec3::splat(2.0);
+    backdrop.exposure.factor = Vec3::splat(2.0);
     backdrop.photograph = Arc::new(Picture::from_fn(SIDE, SIDE, |x, _| {
         Vec3::splat(if x == 0 { 1.0 } else { 0.5 })
     }));
@@ -371,6 +373,25 @@ fn a_saturating_photograph_gives_a_composite_that_saturates_like_it() {
 }
 
 #[test]
+fn an_object_in_the_corner_is_dimmed_as_the_photograph_is() {
+    let (capture, lit) = lamp_room();
+    let mut backdrop = backdrop(&capture, &lit);
+    backdrop.exposure.vignetting = Some(Vignetting {
+        power: Vec3::splat(2.0),
+    });
+    // Nothing behind, fully covered: the squared cosine of the corner's angle.
+    let lens = &backdrop.camera.intrinsics;
+    let [x, y] = [(0.5 - lens.cx) / lens.fx, (0.5 - lens.cy) / lens.fy];
+    let want = 1.0 / (1.0 + x * x + y * y);
+    let corner = backdrop.blend(0, 1.0, Vec3::ONE, Vec3::ZERO);
+    assert!((corner - want as f32).abs().max_element() < 1e-5);
+    assert!(want < 0.9);
+    let middle = (SIDE * SIDE / 2 + SIDE / 2) as usize;
+    let middle = backdrop.blend(middle, 1.0, Vec3::ONE, Vec3::ZERO);
+    assert!((middle - 1.0).abs().max_element() < 1e-2, "{middle}");
+}
+
+#[test]
 fn naive_pasting_is_lit_by_harmonics_and_hidden_behind_the_scene() {
     let (capture, lit) = lit(&[("walls", walls())], vec![gray(0.5, 0.5)]);
     let backdrop = backdrop(&capture, &lit);
@@ -386,14 +407,20 @@ fn naive_pasting_is_lit_by_harmonics_and_hidden_behind_the_scene() {
         let error = harmonics.irradiance(Vec3::Y) / std::f32::consts::PI - 1.0;
         assert!(error.abs().max_element() < tolerance, "{error}");
         let object = placed(&lit, block(), gray(0.25, 0.0), DVec3::new(0.0, -0.5, 0.0));
-        let pasted = naive::Pasted::new(&backdrop, &lit, &[object], &[harmonics], Vec3::ONE);
+        let pasted = naive::Pasted::new(
+            &backdrop,
+            &lit,
+            &[object],
+            &[harmonics],
+            Exposure::default(),
+        );
         let picture = pasted.over(&backdrop.photograph);
         let middle = picture.pixels[(SIDE / 2 * SIDE + SIDE / 2) as usize];
         assert!((middle - 0.25).abs().max_element() < 0.25 * tolerance);
         assert_eq!(picture.pixels[0], backdrop.photograph.pixels[0]);
     }
     let object = placed(&lit, block(), gray(0.25, 0.0), DVec3::new(0.0, -0.5, -3.6));
-    let pasted = naive::Pasted::new(&backdrop, &lit, &[object], &[seen], Vec3::ONE);
+    let pasted = naive::Pasted::new(&backdrop, &lit, &[object], &[seen], Exposure::default());
     let picture = pasted.over(&backdrop.photograph);
     assert!(picture == *backdrop.photograph);
 }

@@ -16,6 +16,8 @@ use scenes::View;
 use std::sync::Arc;
 
 const SIZE: [u32; 2] = [64, 48];
+/// Where photographs saturate: a half to a fifth of the sky above the horizon.
+const CLIPPED: f32 = 1.0;
 
 fn run(problem: &Problem) -> Solution {
     let settings = Settings {
@@ -150,6 +152,32 @@ fn a_saturated_sky_is_a_bound_only_where_nothing_measured_it() {
     assert!(measured.min_element() > 1.0, "{measured}");
     assert_eq!(of_both, Some(measured));
     assert_eq!(bound, Some(Vec3::ONE));
+}
+
+/// The sky is brighter than the photographs can show: by how much is found by what it does to the walls.
+#[test]
+fn a_sky_that_all_photographs_show_as_white_is_found_by_its_light() {
+    let (mesh, materials) = room_with_a_window();
+    let capture = scenes::capture(mesh, &views(), SIZE);
+    let mut problem = scenes::photographed_under(Some(sky()), &capture, &materials, 512, 74);
+    for photograph in &mut problem.photographs {
+        let photograph = Arc::make_mut(photograph);
+        photograph.saturation = Vec3::splat(CLIPPED);
+        for pixel in &mut photograph.pixels {
+            *pixel = pixel.min(photograph.saturation);
+        }
+    }
+    let estimate = run(&problem).estimate;
+    let mut errors: Vec<f32> = (estimate.objects.iter().zip(&materials))
+        .map(|(object, material)| {
+            assert_eq!(object.emission, Vec3::ZERO);
+            let truth = scenes::albedo(material);
+            (object.albedo - truth).length() / truth.length()
+        })
+        .collect();
+    errors.sort_by(f32::total_cmp);
+    println!("{errors:?}");
+    assert!(errors[errors.len() / 2] < 0.1, "{errors:?}");
 }
 
 #[test]

@@ -38,6 +38,7 @@ fn frame(left: f32, right: f32) -> Frame {
             usable: Vec::new(),
             encoding: Encoding::Linear,
             saturation: Vec3::INFINITY,
+            limits: Vec::new(),
         })),
         depth: None,
     }

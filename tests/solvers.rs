@@ -3,6 +3,7 @@
 mod scenes;
 
 use glam::{DVec3, Vec3};
+use relit::capture::exposure::{Exposure, Vignetting};
 use relit::inverse::estimate::Estimate;
 use relit::inverse::settings::{Preset, Settings};
 use relit::inverse::solver::{Control, Observer, Problem, Progress, Solution, Termination, solve};
@@ -437,9 +438,47 @@ fn exposures_that_differ_are_found_and_cost_no_accuracy() {
     );
 }
 
+/// One lens that dims its corners, twice as much as an ideal one.
+#[test]
+fn a_lens_that_dims_its_corners_is_found_and_costs_no_accuracy() {
+    let (problem, materials) = &*ROOM;
+    let lens = Vignetting {
+        power: Vec3::splat(8.0),
+    };
+    let views = problem.photographs.iter().zip(&problem.scene.cameras);
+    let photographs = views.map(|(photograph, camera)| {
+        let exposure = Exposure {
+            factor: Vec3::ONE,
+            vignetting: Some(lens),
+        };
+        let pixels = (photograph.pixels.iter().enumerate())
+            .map(|(pixel, p)| *p * exposure.at(&camera.intrinsics, SIZE, pixel));
+        Arc::new(scenes::photograph(SIZE, pixels.collect()))
+    });
+    let dimmed = Problem {
+        scene: problem.scene.clone(),
+        photographs: photographs.collect(),
+    };
+    let solution = run(&dimmed, &preset(Preset::Preview));
+    let found = solution.estimate.vignetting.expect("a lens that dims");
+    let off = (found.power - lens.power).abs().max_element();
+    assert!(off < 0.8, "{found:?}");
+
+    let with = mean_absolute_error(&solution.estimate, materials);
+    let mut settings = preset(Preset::Preview);
+    settings.exposures = false;
+    let without = mean_absolute_error(&run(&dimmed, &settings).estimate, materials);
+    let fixed = mean_absolute_error(&PREVIEW.estimate, materials);
+    assert!(
+        with < fixed + 0.01 && without > 2.0 * with,
+        "{fixed} {with} {without}"
+    );
+}
+
 #[test]
 fn photographs_that_agree_keep_their_exposure() {
     assert_eq!(PREVIEW.estimate.exposures, None);
+    assert_eq!(PREVIEW.estimate.vignetting, None);
     let stage = PREVIEW
         .progress
         .stages

@@ -3,6 +3,7 @@
 //! Everything here is f64 and in the capture's own coordinates; [`crate::scene::Scene`] recentres and rounds.
 
 pub mod camera;
+pub mod exposure;
 pub mod fuse;
 pub mod import;
 pub mod mesh;

@@ -33,6 +33,9 @@ pub struct Photograph {
     pub encoding: Encoding,
     /// The value at which each channel saturates, in the units of `pixels`; infinite for linear files.
     pub saturation: Vec3,
+    /// The same for each pixel, where it is not one value for all of them; else empty. The mean of pixels of which some are
+    /// saturated is at its own limit.
+    pub limits: Vec<Vec3>,
 }
 
 /// Pixels above this share of saturation may have been brighter than they show.
@@ -41,7 +44,12 @@ const BELOW_SATURATION: f32 = 0.97;
 impl Photograph {
     /// The channels in which a pixel may have been brighter than it shows: its value there is a lower bound.
     pub fn saturated(&self, pixel: usize) -> BVec3 {
-        self.pixels[pixel].cmpge(self.saturation * BELOW_SATURATION)
+        self.pixels[pixel].cmpge(self.limit(pixel) * BELOW_SATURATION)
+    }
+
+    /// The value at which each channel of a pixel saturates.
+    pub fn limit(&self, pixel: usize) -> Vec3 {
+        *self.limits.get(pixel).unwrap_or(&self.saturation)
     }
 
     /// Whether a pixel may have been brighter than it shows, in any channel.

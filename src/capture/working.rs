@@ -4,7 +4,7 @@ use crate::capture::camera::Intrinsics;
 use crate::capture::photograph::{Photograph, PhotographSource};
 use crate::capture::{Capture, Frame};
 use crate::error::Result;
-use glam::{DVec3, UVec3};
+use glam::{BVec3, DVec3, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -127,52 +127,69 @@ fn reduction(frames: &[Frame], max_pixels: u64) -> u32 {
     low
 }
 
-/// The mean of every block of pixels. A block with an unusable pixel is unusable, and so is one of which only a part
-/// is saturated: its mean is unknown. Blocks saturated all over stay saturated.
+/// The mean of every block of pixels. A block with an unusable pixel is unusable; one of which a part is saturated is a lower
+/// bound.
 fn reduce(photograph: &Photograph, factor: u32) -> Photograph {
     let (width, height) = (photograph.width / factor, photograph.height / factor);
     let count = f64::from(factor) * f64::from(factor);
-    let blocks: Vec<(glam::Vec3, bool)> = (0..height)
+    let blocks: Vec<Block> = (0..height)
         .flat_map(|y| (0..width).map(move |x| (x, y)))
         .map(|(x, y)| {
             let mut sum = DVec3::ZERO;
-            let mut saturated = UVec3::ZERO;
+            let mut saturated = BVec3::FALSE;
             let mut usable = true;
             for j in y * factor..(y + 1) * factor {
                 for i in x * factor..(x + 1) * factor {
                     let index = j as usize * photograph.width as usize + i as usize;
                     let pixel = photograph.pixels[index];
                     sum += pixel.as_dvec3();
-                    saturated += UVec3::from(pixel.cmpge(photograph.saturation));
+                    saturated |= photograph.saturated(index);
                     usable &= photograph.usable.get(index).copied().unwrap_or(true);
                 }
             }
-            let partly = saturated
-                .to_array()
-                .iter()
-                .any(|&n| n > 0 && n < factor * factor);
-            ((sum / count).as_vec3(), usable && !partly)
+            let mean = (sum / count).as_vec3();
+            Block {
+                mean,
+                usable,
+                limit: Vec3::select(
+                    saturated,
+                    mean.min(photograph.saturation),
+                    photograph.saturation,
+                ),
+            }
         })
         .collect();
-    let (pixels, mut usable): (Vec<_>, Vec<_>) = blocks.into_iter().unzip();
+    let mut usable: Vec<bool> = blocks.iter().map(|b| b.usable).collect();
     if usable.iter().all(|&good| good) {
         usable.clear();
+    }
+    let mut limits: Vec<Vec3> = blocks.iter().map(|b| b.limit).collect();
+    if limits.iter().all(|&limit| limit == photograph.saturation) {
+        limits.clear();
     }
     Photograph {
         width,
         height,
-        pixels,
+        pixels: blocks.iter().map(|b| b.mean).collect(),
         usable,
         encoding: photograph.encoding,
         saturation: photograph.saturation,
+        limits,
     }
+}
+
+/// A block of pixels as one.
+struct Block {
+    mean: Vec3,
+    usable: bool,
+    limit: Vec3,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::capture::photograph::Encoding;
-    use glam::{DVec2, Vec3};
+    use glam::DVec2;
 
     fn photograph(width: u32, height: u32) -> Photograph {
         Photograph {
@@ -182,6 +199,7 @@ mod tests {
             usable: Vec::new(),
             encoding: Encoding::Linear,
             saturation: Vec3::INFINITY,
+            limits: Vec::new(),
         }
     }
 
@@ -194,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn unusable_and_partly_saturated_blocks_are_unusable() {
+    fn unusable_blocks_are_unusable_and_partly_saturated_ones_lower_bounds() {
         let mut p = photograph(4, 4);
         p.usable = vec![true; 16];
         p.usable[0] = false;
@@ -203,8 +221,15 @@ mod tests {
             .iter_mut()
             .for_each(|v| *v = v.min(Vec3::splat(7.0)));
         let reduced = reduce(&p, 2);
-        assert_eq!(reduced.usable, [false, false, true, true]);
+        assert_eq!(reduced.usable, [false, true, true, true]);
+        // Of the second block, 2, 3, 6 and 7, one pixel is saturated, of the others all.
+        assert_eq!(reduced.pixels[1], Vec3::splat(4.5));
         assert_eq!(reduced.pixels[3], Vec3::splat(7.0));
+        let saturated = [1, 2, 3].map(|pixel| reduced.is_saturated(pixel));
+        assert_eq!(saturated, [true, true, true]);
+        // With none saturated there is one limit for all.
+        let linear = reduce(&photograph(4, 4), 2);
+        assert!(linear.limits.is_empty() && !linear.is_saturated(3));
     }
 
     #[test]

@@ -108,7 +108,7 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
             pixels: film.mean(),
         }
     };
-    let picture = if arguments.denoise {
+    let mut picture = if arguments.denoise {
         // Two independent halves tell the noise.
         let half = spp.div_ceil(2);
         let [a, b] = [seed, seed.wrapping_add(1)].map(|seed| rendered(seed, half));
@@ -118,11 +118,22 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
     };
     match format {
         Format::Exr => write_rgb(&arguments.out, &picture, Precision::Float),
-        Format::Png => write_png(
-            &arguments.out,
-            &picture,
-            percentile_exposure(&picture.pixels),
-        ),
+        Format::Png => {
+            // As the photograph is shown, where it saturates.
+            let photographed = match arguments.camera {
+                None => Some(capture.full_photograph(frame as usize)?),
+                Some(_) => None,
+            };
+            let saturation = photographed.map_or(f32::INFINITY, |p| p.saturation.max_element());
+            let shown_at = if saturation.is_finite() {
+                let exposure = estimate.exposure(frame as usize);
+                exposure.apply(&camera.intrinsics, &mut picture);
+                saturation.recip()
+            } else {
+                percentile_exposure(&picture.pixels)
+            };
+            write_png(&arguments.out, &picture, shown_at)
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! The photograph that objects are put into, and how light becomes its values.
 
+use crate::capture::exposure::Exposure;
 use crate::capture::photograph::Photograph;
 use crate::error::{Error, Result};
 use crate::export::picture::percentile_exposure;
@@ -17,8 +18,8 @@ pub struct Backdrop {
     pub camera: Camera,
     /// The photograph's values, linear.
     pub photograph: Arc<Picture>,
-    /// Factor from the estimate's radiance to the photograph's values, per channel.
-    pub exposure: Vec3,
+    /// From the estimate's radiance to the photograph's values.
+    pub exposure: Exposure,
     /// The value at which each channel of the photograph saturates; infinite for linear files.
     pub saturation: Vec3,
     /// The exposure at which it is shown as 8-bit sRGB: its own, or the 99th percentile of the photograph as taken at 1.
@@ -26,7 +27,7 @@ pub struct Backdrop {
 }
 
 impl Backdrop {
-    /// The backdrop of a frame; `exposure` is the estimate's for it, where it has one.
+    /// The backdrop of a frame; `exposure` is the estimate's for it.
     ///
     /// # Errors
     /// Camera and photograph differ in size.
@@ -34,7 +35,7 @@ impl Backdrop {
         frame: usize,
         camera: &Camera,
         photograph: &Photograph,
-        exposure: Option<Vec3>,
+        exposure: Exposure,
     ) -> Result<Self> {
         let picture = Picture {
             width: photograph.width,
@@ -61,10 +62,16 @@ impl Backdrop {
             frame: frame as u64,
             camera: camera.clone(),
             photograph: Arc::new(picture),
-            exposure: exposure.unwrap_or(Vec3::ONE),
+            exposure,
             saturation: photograph.saturation,
             shown_at,
         })
+    }
+
+    /// The factor from radiance to the photograph's value at a pixel.
+    pub fn exposure_at(&self, pixel: usize) -> Vec3 {
+        let size = [self.photograph.width, self.photograph.height];
+        self.exposure.at(&self.camera.intrinsics, size, pixel)
     }
 
     /// The pixel with a surface over `alpha` of it: α · over + (1 − α) · (photograph + over − under), where `over` and
@@ -74,7 +81,8 @@ impl Backdrop {
     /// photograph's composite saturates with it.
     pub fn blend(&self, pixel: usize, alpha: f32, over: Vec3, under: Vec3) -> Vec3 {
         let photograph = self.photograph.pixels[pixel];
-        let (over, under) = (over * self.exposure, under * self.exposure);
+        let exposure = self.exposure_at(pixel);
+        let (over, under) = (over * exposure, under * exposure);
         if !self.saturation.is_finite() {
             return over * alpha + (photograph + over - under) * (1.0 - alpha);
         }

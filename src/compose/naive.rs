@@ -1,6 +1,7 @@
 //! What augmented reality does without knowing the room: an object lit by nine harmonics and pasted over the
 //! photograph with a depth test. It casts no shadow and takes no part in the light of the room.
 
+use crate::capture::exposure::Exposure;
 use crate::compose::backdrop::Backdrop;
 use crate::compose::placement::PlacedObject;
 use crate::compose::world::FurnishedScene;
@@ -126,7 +127,7 @@ impl Pasted {
         lit: &Lit,
         objects: &[Arc<PlacedObject>],
         harmonics: &[Harmonics],
-        exposure: Vec3,
+        exposure: Exposure,
     ) -> Self {
         let width = backdrop.photograph.width as usize;
         let world = FurnishedScene::new(lit, objects);
@@ -156,12 +157,16 @@ impl Pasted {
                     // Gloss is beyond nine harmonics: what a lobe reflects is spread as if diffuse.
                     let specular = surface.lobe.map_or(Vec3::ZERO, |lobe| lobe.specular);
                     let reflectance = specular + surface.albedo * (Vec3::ONE - specular);
-                    sum += reflectance * harmonics.irradiance(normal) * FRAC_1_PI * exposure;
+                    sum += reflectance * harmonics.irradiance(normal) * FRAC_1_PI;
                     covered += 1;
                 }
             }
             let cells = (GRID * GRID) as f32;
-            (covered > 0).then(|| (pixel, sum / cells, covered as f32 / cells))
+            let size = [backdrop.photograph.width, backdrop.photograph.height];
+            (covered > 0).then(|| {
+                let light = sum * exposure.at(lens, size, pixel);
+                (pixel, light / cells, covered as f32 / cells)
+            })
         };
         Self {
             covered: (0..backdrop.photograph.pixels.len())

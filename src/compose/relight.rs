@@ -24,11 +24,12 @@ const COARSE_SAMPLES: u32 = 4;
 /// `before` says, and what saturates stays saturated.
 pub fn relit(backdrop: &Backdrop, before: &[Vec3], after: &[Vec3]) -> Picture {
     let photograph = &backdrop.photograph;
-    let pixels = photograph.pixels.iter().zip(before).zip(after);
+    let pixels = photograph.pixels.iter().zip(before).zip(after).enumerate();
     Picture {
         pixels: pixels
-            .map(|((photograph, before), after)| {
-                let (before, after) = (*before * backdrop.exposure, *after * backdrop.exposure);
+            .map(|(pixel, ((photograph, before), after))| {
+                let exposure = backdrop.exposure_at(pixel);
+                let (before, after) = (*before * exposure, *after * exposure);
                 let channel =
                     |c: usize| changed(photograph[c], before[c], after[c], backdrop.saturation[c]);
                 Vec3::new(channel(0), channel(1), channel(2))

@@ -57,6 +57,7 @@ pub fn photograph(source: &Photograph, lens: &Lens) -> Photograph {
         usable: sampled.iter().map(Option::is_some).collect(),
         encoding: source.encoding,
         saturation: source.saturation,
+        limits: Vec::new(),
     }
 }
 

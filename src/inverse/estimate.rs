@@ -1,5 +1,6 @@
 //! What comes out: emission, materials, outside light, exposures, each with a confidence.
 
+use crate::capture::exposure::{Exposure, Vignetting};
 use crate::math::nullable;
 use crate::math::stats::quantile;
 use crate::scene::Scene;
@@ -24,8 +25,10 @@ pub struct Estimate {
     pub texels: Option<Arc<TexelEstimate>>,
     /// Light from outside the mesh, where a stage added it.
     pub outside: Option<Outside>,
-    /// Each frame's linear exposure and white balance relative to the median frame, where they were estimated.
+    /// Each frame's linear exposure and white balance, their median 1 in each channel, where they were estimated.
     pub exposures: Option<Vec<Vec3>>,
+    /// How the lens dims the corners of all frames, where that was found.
+    pub vignetting: Option<Vignetting>,
 }
 
 /// What is known of one object; also its entry in `estimate.json` and `report.json`, where what is no number is `null`.
@@ -160,9 +163,13 @@ impl Estimate {
         quantile(&mut relative, 0.5)
     }
 
-    /// A frame's linear exposure and white balance, where they were estimated.
-    pub fn exposure(&self, frame: usize) -> Option<Vec3> {
-        self.exposures.as_ref()?.get(frame).copied()
+    /// What turns radiance into a frame's values: what was estimated of exposure, white balance and vignetting.
+    pub fn exposure(&self, frame: usize) -> Exposure {
+        let factor = self.exposures.as_ref().and_then(|e| e.get(frame));
+        Exposure {
+            factor: factor.copied().unwrap_or(Vec3::ONE),
+            vignetting: self.vignetting,
+        }
     }
 
     /// The scene in the light and the materials of this estimate.

@@ -22,6 +22,8 @@ pub struct MeasuredOutside {
     width: usize,
     height: usize,
     known: Vec<bool>,
+    /// Where all that is known is a lower bound.
+    at_least: Vec<bool>,
     map: Environment,
     /// Unit up vector.
     up: Vec3,
@@ -56,30 +58,34 @@ impl MeasuredOutside {
             sum.0 += photograph.pixels[pixel.pixel as usize].as_dvec3();
             sum.1 += 1;
         }
-        // A bound counts only where nothing is measured.
-        let sums: Vec<(DVec3, u32)> = (sums.into_iter())
-            .map(|[measured, bound]| if measured.1 > 0 { measured } else { bound })
-            .collect();
-        if sums.iter().all(|s| s.1 == 0) {
+        if sums.iter().flatten().all(|s| s.1 == 0) {
             return None;
         }
 
-        // Fill gaps from coarser blocks.
+        // Fill gaps from coarser blocks; in each a bound counts only where nothing is measured.
         let mut known = vec![false; width * height];
+        let mut at_least = vec![false; width * height];
         let mut pixels = vec![Vec3::ZERO; width * height];
         for level in 0..LEVELS {
             let block = 1 << level;
             for (row, column) in blocks(width, height, block) {
                 let cells = || cells(width, row, column, block);
-                let (sum, count) = cells().fold((DVec3::ZERO, 0), |all, cell| {
-                    (all.0 + sums[cell].0, all.1 + sums[cell].1)
-                });
+                let of_kind = |kind: usize| {
+                    cells().fold((DVec3::ZERO, 0), |all, cell| {
+                        let (sum, count) = sums[cell][kind];
+                        (all.0 + sum, all.1 + count)
+                    })
+                };
+                let [measured, bound] = [of_kind(0), of_kind(1)];
+                let is_bound = measured.1 == 0;
+                let (sum, count) = if is_bound { bound } else { measured };
                 if count == 0 {
                     continue;
                 }
                 let mean = (sum / f64::from(count)).as_vec3();
                 for cell in cells().filter(|&cell| !known[cell]).collect::<Vec<_>>() {
                     known[cell] = true;
+                    at_least[cell] = is_bound;
                     pixels[cell] = mean;
                 }
             }
@@ -89,16 +95,23 @@ impl MeasuredOutside {
             width,
             height,
             known,
+            at_least,
             map,
             up: scene.up,
         })
     }
 
-    /// Radiance that arrives from a unit direction; `None` where no photograph tells.
+    /// Radiance that arrives from a unit direction, or a bound that it exceeds; `None` where no photograph tells.
     #[inline]
     pub fn at(&self, direction: Vec3) -> Option<Vec3> {
         self.known[pixel_of(self.width, self.height, direction)]
             .then(|| self.map.radiance(direction))
+    }
+
+    /// Whether no photograph tells more of a unit direction than that it is at least so bright: all are saturated there.
+    #[inline]
+    pub fn is_bound(&self, direction: Vec3) -> bool {
+        self.at_least[pixel_of(self.width, self.height, direction)]
     }
 
     /// The map, for drawing directions from.
@@ -130,12 +143,16 @@ impl MeasuredOutside {
         [self.width, self.height]
     }
 
-    /// The whole map: what was measured, and `elsewhere` by direction where nothing was.
-    pub fn filled(&self, elsewhere: impl Fn(Vec3) -> Vec3) -> Vec<Vec3> {
+    /// The whole map: what was measured, `excess` more where that is a bound, and `elsewhere` by direction where nothing was.
+    pub fn filled(&self, excess: Vec3, elsewhere: impl Fn(Vec3) -> Vec3) -> Vec<Vec3> {
         (0..self.width * self.height)
             .map(|cell| {
                 let direction = direction_of(self.width, self.height, cell);
-                self.at(direction).unwrap_or_else(|| elsewhere(direction))
+                match self.at(direction) {
+                    Some(bound) if self.is_bound(direction) => bound + excess,
+                    Some(radiance) => radiance,
+                    None => elsewhere(direction),
+                }
             })
             .collect()
     }
@@ -167,6 +184,7 @@ mod tests {
             width,
             height,
             known: (0..128).map(|c| c == above || c == below).collect(),
+            at_least: vec![false; 128],
             map: Environment::new(width, height, pixels).expect("sizes fit"),
             up: Vec3::Y,
         };

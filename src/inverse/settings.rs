@@ -218,7 +218,7 @@ parameters! {
     outside_light: bool = true, Kind::Flag, "", false,
         "Try light from outside the mesh, where rays leave it";
     exposures: bool = true, Kind::Flag, "", false,
-        "Estimate the exposure and white balance of each photograph, where they disagree about surfaces that they share";
+        "Estimate the exposure and white balance of each photograph, and how the lens dims the corners, where the photographs disagree about surfaces that they share";
     lobes: bool = true, Kind::Flag, "", false,
         "Try a rough specular lobe on objects that look different from different sides";
     textures: bool = true, Kind::Flag, "", false,

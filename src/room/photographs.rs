@@ -134,5 +134,6 @@ pub fn linear([width, height]: [u32; 2], pixels: Vec<Vec3>) -> Photograph {
         usable: Vec::new(),
         encoding: Encoding::Linear,
         saturation: Vec3::INFINITY,
+        limits: Vec::new(),
     }
 }

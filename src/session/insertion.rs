@@ -1,6 +1,7 @@
 //! Composites of the shown photograph: inserted objects in it, in the light as it was changed, coarse at once and refined
 //! a slice at a time.
 
+use crate::capture::exposure::Exposure;
 use crate::compose::backdrop::Backdrop;
 use crate::compose::insert::Insertion as Composite;
 use crate::compose::naive::{Pasted, harmonics_of_estimate, harmonics_of_photographs};
@@ -14,7 +15,6 @@ use crate::scene::camera::Camera;
 use crate::session::light::Light;
 use crate::session::snapshot::{Insertion, OpenCapture, Picture};
 use crate::transport::path::PathOptions;
-use glam::Vec3;
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -77,7 +77,7 @@ impl Library {
                 .get_or_insert_with(|| light_of_photographs(capture)),
         };
         let same = vec![photographed; objects.len()];
-        let naive = Pasted::new(&backdrop, &lit, &objects, &same, Vec3::ONE);
+        let naive = Pasted::new(&backdrop, &lit, &objects, &same, Exposure::default());
         let estimated: Vec<Harmonics> = objects
             .iter()
             .map(|object| harmonics_of_estimate(&lit, object.center, options, seed))

@@ -88,6 +88,7 @@ pub fn room() -> Capture {
         usable: Vec::new(),
         encoding: Encoding::Linear,
         saturation: Vec3::INFINITY,
+        limits: Vec::new(),
     });
     let frames = [0.5, -0.5].map(|turn| Frame {
         intrinsics,

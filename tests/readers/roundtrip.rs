@@ -38,6 +38,7 @@ fn capture() -> Capture {
             usable: Vec::new(),
             encoding: Encoding::Linear,
             saturation: Vec3::INFINITY,
+            limits: Vec::new(),
         })),
         depth: None,
     };

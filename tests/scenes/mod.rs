@@ -181,6 +181,7 @@ pub fn photograph([width, height]: [u32; 2], pixels: Vec<Vec3>) -> Photograph {
         usable: Vec::new(),
         encoding: Encoding::Linear,
         saturation: Vec3::INFINITY,
+        limits: Vec::new(),
     }
 }
 

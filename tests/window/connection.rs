@@ -178,6 +178,7 @@ fn photograph(index: u32) -> Photograph {
         usable: Vec::new(),
         encoding: Encoding::Linear,
         saturation: Vec3::INFINITY,
+        limits: Vec::new(),
     }
 }
 

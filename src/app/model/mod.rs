@@ -28,6 +28,7 @@ pub mod tests {
             usable: Vec::new(),
             encoding: Encoding::Linear,
             saturation: Vec3::INFINITY,
+            limits: Vec::new(),
         };
         let corner = |x, y, z| DVec3::new(x, y, z);
         let capture = Capture {

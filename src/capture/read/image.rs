@@ -102,6 +102,7 @@ pub fn read(
             Encoding::Linear => Vec3::INFINITY,
             Encoding::Srgb8 | Encoding::Srgb16 => Vec3::splat(scale),
         },
+        limits: Vec::new(),
     };
     Ok((photograph, invalid))
 }

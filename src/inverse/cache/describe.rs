@@ -98,11 +98,12 @@ pub fn estimate(
     let (size, pixels) = match sky {
         Some(sky) => {
             let elsewhere = |direction| unknowns.emission[outside.surface(direction) as usize];
-            (sky.size(), sky.filled(elsewhere))
+            let excess = unknowns.emission[outside.excess() as usize];
+            (sky.size(), sky.filled(excess, elsewhere))
         }
         None => (
             [outside.width, outside.height],
-            unknowns.emission[scene.objects.len()..].to_vec(),
+            unknowns.emission[outside.first as usize..outside.excess() as usize].to_vec(),
         ),
     };
     let outside = pixels.iter().any(|&p| p != Vec3::ZERO).then_some(Outside {

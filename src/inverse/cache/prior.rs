@@ -85,7 +85,7 @@ impl Prior {
         self.albedo.as_ref()
     }
 
-    /// The same with what to expect of each direction outside, from what was seen of others.
+    /// The same with what to expect of each of those surfaces, from what was seen outside.
     pub fn with_sky(mut self, expected: impl Fn(u32) -> Vec3) -> Self {
         for (surface, mean) in (self.outside as u32..).zip(&mut self.means) {
             *mean = expected(surface);

@@ -74,7 +74,8 @@ pub struct Tracer<'a> {
     pub round: u32,
 }
 
-/// Directions out of the mesh, cut into the pixels of a map; each is a surface with an emission.
+/// Directions out of the mesh, cut into the pixels of a map; each is a surface with an emission. One more stands for what
+/// directions in which all photographs are saturated exceed their bounds by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OutsideGrid {
     /// Index of the first pixel's surface.
@@ -86,6 +87,16 @@ pub struct OutsideGrid {
 }
 
 impl OutsideGrid {
+    /// Surfaces in all.
+    pub fn surfaces(&self) -> usize {
+        self.width * self.height + 1
+    }
+
+    /// The surface that stands for light above the bounds.
+    pub fn excess(&self) -> u32 {
+        self.first + (self.width * self.height) as u32
+    }
+
     /// The unit direction in the middle of a surface.
     pub fn direction(&self, surface: u32) -> Vec3 {
         direction_of(self.width, self.height, (surface - self.first) as usize)
@@ -262,6 +273,11 @@ impl Tracer<'_> {
                     let weight = self.met_weight(bsdf_pdf, sky_pdf);
                     vertex.known += radiance * (weight * scale);
                     vertices.push(vertex);
+                    let excess = self.outside.filter(|_| sky.is_bound(wi));
+                    vertices.extend(excess.map(|grid| Vertex {
+                        emission_weight: weight * scale,
+                        ..Vertex::on(grid.excess())
+                    }));
                 } else {
                     vertices.push(vertex);
                     // Where nothing is known no light samples go, so what is met has the whole weight.
@@ -366,6 +382,9 @@ impl Tracer<'_> {
         }
         let weight = self.drawn_weight(pdf * self.sky_share(), surface.value(lobed, wi)) * scale;
         vertex.known += sky.map().radiance(wi) * weight;
+        if let Some(grid) = self.outside.filter(|_| sky.is_bound(wi)) {
+            (vertex.lamp, vertex.lamp_weight) = (grid.excess(), weight);
+        }
         1
     }
 

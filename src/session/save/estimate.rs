@@ -1,5 +1,6 @@
 //! `estimate.json`: everything that later commands need, with the maps beside it.
 
+use crate::capture::exposure::Vignetting;
 use crate::error::{Error, Result};
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::inverse::settings::{PARAMETERS, Settings};
@@ -18,6 +19,9 @@ use std::path::{Path, PathBuf};
 /// Version of the format; a reader refuses newer ones.
 pub const VERSION: u32 = 1;
 
+/// No lens dims by a greater power of the cosine.
+const MOST_POWER: f32 = 100.0;
+
 /// The contents of `estimate.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EstimateFile {
@@ -35,8 +39,11 @@ pub struct EstimateFile {
     pub objects: Named<ObjectEstimate>,
     /// The file with the maps (see [`maps::encode`]), beside this one.
     pub maps: Option<String>,
-    /// Each frame's linear exposure and white balance relative to the median frame.
+    /// Each frame's linear exposure and white balance, their median 1 in each channel.
     pub exposures: Option<Vec<Rgb>>,
+    /// The power of all frames' [`Vignetting`].
+    #[serde(default)]
+    pub vignetting: Option<Rgb>,
     /// What was changed by hand; `objects` and maps hold what was found.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edits: Option<EditsRecord>,
@@ -90,6 +97,7 @@ impl EstimateFile {
                 .exposures
                 .as_ref()
                 .map(|exposures| exposures.iter().map(|&e| rgb(e)).collect()),
+            vignetting: estimate.vignetting.map(|v| rgb(v.power)),
             edits: edits.record(&capture.scene),
         };
         Ok((file, bytes))
@@ -175,6 +183,12 @@ impl EstimateFile {
         {
             return Err(misfit("exposures"));
         }
+        let vignetting = self.vignetting.map(|power| Vignetting {
+            power: Vec3::from_array(power.map(|v| v.unwrap_or(f32::NAN))),
+        });
+        if vignetting.is_some_and(|v| !v.power.abs().cmple(Vec3::splat(MOST_POWER)).all()) {
+            return Err(misfit("vignetting"));
+        }
         Ok(Estimate {
             objects,
             texels: maps.texels.clone(),
@@ -185,6 +199,7 @@ impl EstimateFile {
                     .map(|e| Vec3::from_array(e.map(|v| v.unwrap_or(1.0))))
                     .collect()
             }),
+            vignetting,
         })
     }
 }

@@ -13,7 +13,6 @@ use crate::session::save::staging::Staging;
 use crate::session::view::hits::Hits;
 use crate::transport::film::Film;
 use crate::transport::lit::Lit;
-use glam::Vec3;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -120,12 +119,12 @@ fn frame(
         index as u64,
         samples,
     );
-    let exposure = estimate.exposure(index).unwrap_or(Vec3::ONE);
-    let radiance = film.mean();
-    let render = Picture {
-        pixels: radiance.iter().map(|&r| r * exposure).collect(),
+    let mut render = Picture {
+        pixels: film.mean(),
         ..photograph.clone()
     };
+    let exposure = estimate.exposure(index);
+    exposure.apply(&camera.intrinsics, &mut render);
     let error = Picture {
         pixels: (render.pixels.iter().zip(&photograph.pixels))
             .map(|(r, p)| *r - *p)

@@ -48,8 +48,10 @@ pub struct Report {
     pub objects: Named<ObjectEstimate>,
     /// Light from outside the mesh.
     pub outside_light: Option<OutsideSummary>,
-    /// Each frame's exposure relative to the median frame.
+    /// Each frame's linear exposure and white balance, their median 1 in each channel.
     pub exposures: Option<Vec<Rgb>>,
+    /// The power of the cosine of the angle off the axis by which the lens dims all frames.
+    pub vignetting: Option<Rgb>,
     /// Samples dropped, by cause.
     pub rejected_samples: BTreeMap<String, u64>,
     /// What a person should know.
@@ -157,6 +159,7 @@ impl Report {
                 .exposures
                 .as_ref()
                 .map(|exposures| exposures.iter().map(|&e| rgb(e)).collect()),
+            vignetting: estimate.vignetting.map(|v| rgb(v.power)),
             rejected_samples: progress.rejected.clone(),
             warnings,
         }

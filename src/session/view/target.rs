@@ -189,8 +189,9 @@ impl Target {
     /// Radiance in the values of the frame's photograph.
     fn exposed(&self, mut radiance: Picture) -> Picture {
         let frame = self.frame;
-        if let Some(exposure) = frame.and_then(|frame| self.estimate.exposure(frame)) {
-            radiance.pixels.iter_mut().for_each(|p| *p *= exposure);
+        if let Some(frame) = frame {
+            let exposure = self.estimate.exposure(frame);
+            exposure.apply(&self.camera.intrinsics, &mut radiance);
         }
         radiance
     }

@@ -1,5 +1,6 @@
 //! How right inserted objects look.
 
+use crate::capture::exposure::Exposure;
 use crate::compose::backdrop::Backdrop;
 use crate::compose::insert::Insertion;
 use crate::compose::naive::{Pasted, harmonics_of_estimate, harmonics_of_photographs};
@@ -19,7 +20,6 @@ use crate::study::experiments::{Bench, Findings, Study, Summary};
 use crate::transport::film::Film;
 use crate::transport::lit::Lit;
 use crate::transport::path::PathOptions;
-use glam::Vec3;
 use std::sync::Arc;
 
 /// The study.
@@ -128,7 +128,12 @@ fn scene(room: &Furnished, cache: &Estimate, paper: &Estimate, quick: bool) -> R
     };
     for frame in FRAMES {
         let camera = &scene.cameras[frame];
-        let backdrop = Backdrop::new(frame, camera, &problem.photographs[frame], None)?;
+        let backdrop = Backdrop::new(
+            frame,
+            camera,
+            &problem.photographs[frame],
+            Exposure::default(),
+        )?;
         let composite = |lit: &Arc<Lit>, options: PathOptions| {
             let (backdrop, lit) = (backdrop.clone(), lit.clone());
             let mut insertion = Insertion::new(backdrop, lit, objects.clone(), options, 1);
@@ -147,7 +152,7 @@ fn scene(room: &Furnished, cache: &Estimate, paper: &Estimate, quick: bool) -> R
             ..full
         };
         let pasted = |harmonics: &[_]| {
-            let pasted = Pasted::new(&backdrop, &lit, &objects, harmonics, Vec3::ONE);
+            let pasted = Pasted::new(&backdrop, &lit, &objects, harmonics, Exposure::default());
             pasted.over(&backdrop.photograph)
         };
         let with_truth = composite(&Arc::new(room.lit.clone()), full);

@@ -17,7 +17,8 @@ const SIGNIFICANT: f64 = 25.0;
 const MOST_CHANGES: usize = 8;
 /// A glow below this share of an object's photographed radiance is no light but a shortcoming of the model.
 const FAINT: f32 = 0.1;
-/// Share of the area-weighted light samples that go to objects with no light found yet but none excluded either.
+/// Share of the light samples that go to all objects, whatever is known of their light: half by area, half by number, or a bulb
+/// that no photograph sees would get none.
 const EXPLORATION: f64 = 0.05;
 
 impl Ladder<'_, '_> {
@@ -51,14 +52,17 @@ impl Ladder<'_, '_> {
                     / self.errors.emission[k].max(Vec3::splat(f32::MIN_POSITIVE));
                 f64::from(z.length_squared())
             };
-            let doubtful: Vec<usize> = (0..self.roles.len())
-                .filter(|&k| self.roles[k] == Role::Unseen && significance(k) < SIGNIFICANT)
-                .filter(|&k| k < self.problem.scene.objects.len() && !self.emission_is_known(k))
+            let mut doubtful: Vec<(f64, usize)> = (0..self.problem.scene.objects.len())
+                .filter(|&k| self.roles[k] == Role::Unseen && !self.emission_is_known(k))
+                .map(|k| (significance(k), k))
+                .filter(|(significance, _)| *significance < SIGNIFICANT)
                 .collect();
             if doubtful.is_empty() {
                 return Ok(());
             }
-            for k in doubtful {
+            // Lamps that cannot be told from each other are all doubtful: without some of them others may be certain.
+            doubtful.sort_by(|a, b| a.0.total_cmp(&b.0));
+            for &(_, k) in &doubtful[..doubtful.len().div_ceil(2)] {
                 self.roles[k] = Role::Dark;
                 self.unknowns.emission[k] = Vec3::ZERO;
             }
@@ -109,11 +113,13 @@ impl Ladder<'_, '_> {
 
     /// Tests whether any reflector or dark object gives light after all: the one that the paths call for most is set
     /// free, refitted, and kept if it stays significant. Returns their names.
+    ///
+    /// One that is refused ends the search: next in line is what a texture or a highlight makes look like light.
     pub(super) fn test_glow(&mut self, cache: &PathCache) -> Result<Vec<String>, Termination> {
         let objects = self.roles.len();
         let in_mesh = self.problem.scene.objects.len();
         let mut added = Vec::new();
-        while added.len() < 8 {
+        while added.len() < MOST_CHANGES {
             let tested = self.test_dark(cache);
             let open = |test: &Released| {
                 let k = test.index - objects;
@@ -159,22 +165,22 @@ impl Ladder<'_, '_> {
         Emitters::new(scene, &weights)
     }
 
-    /// Weights with a share spread over all objects by area.
+    /// Weights with a share spread over all objects that have an area.
     pub(super) fn explore(&self, weights: &[f64]) -> Vec<f64> {
-        let scene = &self.problem.scene;
-        let (total, area) = (
-            weights.iter().sum::<f64>(),
-            scene.objects.iter().map(|o| o.area).sum::<f64>(),
-        );
-        let base = if total > 0.0 {
-            total * EXPLORATION / area
+        let objects = &self.problem.scene.objects;
+        let total: f64 = weights.iter().sum();
+        let area: f64 = objects.iter().map(|o| o.area).sum();
+        let extended = objects.iter().filter(|o| o.area > 0.0).count();
+        let share = if total > 0.0 {
+            total * EXPLORATION
         } else {
             1.0
         };
-        weights
-            .iter()
-            .zip(&scene.objects)
-            .map(|(w, o)| w + base * o.area)
+        (weights.iter().zip(objects))
+            .map(|(weight, object)| match object.area > 0.0 {
+                true => weight + share * 0.5 * (object.area / area + 1.0 / extended as f64),
+                false => *weight,
+            })
             .collect()
     }
 }

@@ -32,8 +32,9 @@ use crate::inverse::solver::{Checkpoint, Problem, Solution, Stage, Termination};
 use crate::inverse::survey::Survey;
 use crate::transport::material::Lobe;
 use detail::Detail;
-use glam::Vec3;
+use glam::{DVec2, Vec3};
 use rounds::Summed;
+use std::fmt::Write;
 
 /// Gauss–Newton steps at most in one fit.
 const MOST_STEPS: u64 = 30;
@@ -71,8 +72,8 @@ pub struct Ladder<'a, 'o> {
     errors: StandardErrors,
     /// The rough specular lobe of each object that has one.
     lobes: Vec<Option<Lobe>>,
-    /// Of each photograph, where they disagree.
-    exposures: Option<Vec<Vec3>>,
+    /// Where the photographs disagree.
+    exposures: Option<Exposures>,
     estimate: Estimate,
     /// What the rounds know, once they are done.
     summed: Option<Summed>,
@@ -98,7 +99,12 @@ pub fn solve(
 ) -> error::Result<Solution> {
     let budget = Budget::of(settings);
     let objects = problem.scene.objects.len();
-    let surfaces = objects + OUTSIDE_WIDTH * OUTSIDE_HEIGHT;
+    let outside = OutsideGrid {
+        first: objects as u32,
+        width: OUTSIDE_WIDTH,
+        height: OUTSIDE_HEIGHT,
+    };
+    let surfaces = objects + outside.surfaces();
     monitor.phase("looking through the pixels");
     let started = monitor.seconds();
     let survey = Survey::new(problem, settings, budget.survey_pixels);
@@ -106,7 +112,7 @@ pub fn solve(
     let exposures = (settings.exposures)
         .then(|| Exposures::new(problem, &survey))
         .flatten();
-    let needed = exposures.as_ref().filter(|e| e.needed);
+    let needed = exposures.as_ref().filter(|e| e.needed());
     let undone = needed.map(|exposures| exposures.undone(problem));
     let problem = undone.as_ref().unwrap_or(problem);
     let max_bounces = settings.max_bounces().min(MOST_BOUNCES);
@@ -147,11 +153,7 @@ pub fn solve(
         survey,
         widths: problem.photographs.iter().map(|p| p.width).collect(),
         max_bounces,
-        outside: OutsideGrid {
-            first: objects as u32,
-            width: OUTSIDE_WIDTH,
-            height: OUTSIDE_HEIGHT,
-        },
+        outside,
         errors: start.errors(),
         roles: start.roles,
         trust: Trust::even(surfaces),
@@ -160,7 +162,7 @@ pub fn solve(
         path_noise: vec![1.0; surfaces],
         unknowns: start.unknowns,
         lobes,
-        exposures: needed.map(|e| e.factors.clone()),
+        exposures: needed.cloned(),
         estimate: Estimate::default(),
         summed: None,
         detail: None,
@@ -216,23 +218,35 @@ impl Ladder<'_, '_> {
     fn tell_exposures(&mut self, exposures: &Exposures, started: f64) {
         let (least, most) = exposures.range();
         let share = exposures.gain * 100.0;
+        let mut why = if exposures.differ {
+            format!(
+                "exposure and white balance of each photograph, {least:.2} to {most:.2} times their median, explain {share:.0} % of \
+                 how they disagree about surfaces that they share"
+            )
+        } else {
+            format!(
+                "exposures would explain {share:.0} % of how the photographs disagree: they agree"
+            )
+        };
+        if let Some((vignetting, camera)) =
+            exposures.vignetting.zip(self.problem.scene.cameras.first())
+        {
+            let corner = vignetting.factor(&camera.intrinsics, DVec2::ZERO);
+            let _ = write!(
+                why,
+                "; a lens that lets {:.0} % through in the corners explains {:.0} % of the rest",
+                corner.element_sum() / 3.0 * 100.0,
+                exposures.vignetting_gain * 100.0
+            );
+        }
         let stage = Stage {
             name: "exposures".to_owned(),
             seconds: self.monitor.seconds() - started,
             iterations: 0,
             train_loss: None,
             held_out_loss: None,
-            kept: exposures.needed,
-            why: if exposures.needed {
-                format!(
-                    "exposure and white balance of each photograph, {least:.2} to {most:.2} times their mean, explain {share:.0} % of \
-                     how they disagree about surfaces that they share"
-                )
-            } else {
-                format!(
-                    "exposures would explain {share:.0} % of how the photographs disagree: they agree"
-                )
-            },
+            kept: exposures.needed(),
+            why,
         };
         self.monitor.stage(stage);
     }
@@ -242,7 +256,10 @@ impl Ladder<'_, '_> {
         if let Some(sky) = &self.sky {
             let grid = self.outside;
             let band = std::f64::consts::PI / grid.height as f64;
-            let expected = |surface| sky.expected(grid.direction(surface), band);
+            let expected = |surface| match surface == grid.excess() {
+                true => Vec3::ZERO,
+                false => sky.expected(grid.direction(surface), band),
+            };
             self.prior = self.prior.clone().with_sky(expected);
         }
     }
@@ -338,7 +355,9 @@ impl Ladder<'_, '_> {
             self.sky.as_ref(),
             &self.lobes,
         );
-        self.estimate.exposures.clone_from(&self.exposures);
+        let exposures = self.exposures.as_ref();
+        self.estimate.exposures = (exposures.filter(|e| e.differ)).map(|e| e.factors.clone());
+        self.estimate.vignetting = exposures.and_then(|e| e.vignetting);
         if let Some(detail) = &self.detail {
             let object_of = &self.problem.scene.object_of;
             let refined = detail.scaled_to(&self.unknowns.albedo, object_of);

@@ -1,0 +1,116 @@
+//! How radiance becomes the values of a photograph: exposure, white balance, and a lens that dims towards the corners.
+
+use crate::capture::camera::Intrinsics;
+use crate::math::picture::Picture;
+use glam::{DVec2, Vec3};
+
+/// How a lens dims what lies off its axis: by a power of the angle's cosine.
+///
+/// The fourth power is the law of an ideal lens; sensors and cameras' own corrections make it more or less.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Vignetting {
+    /// The power, per channel.
+    pub power: Vec3,
+}
+
+impl Vignetting {
+    /// Logarithm of the cosine of the angle between the axis and what is seen at a point of the picture, in pixels from the
+    /// top-left corner; lens distortion is left out.
+    pub fn off_axis(lens: &Intrinsics, point: DVec2) -> f64 {
+        let tangent = (point - DVec2::new(lens.cx, lens.cy)) / DVec2::new(lens.fx, lens.fy);
+        -0.5 * tangent.length_squared().ln_1p()
+    }
+
+    /// The factor at a point of the picture, in pixels from the top-left corner.
+    pub fn factor(&self, lens: &Intrinsics, point: DVec2) -> Vec3 {
+        let off_axis = Self::off_axis(lens, point);
+        (self.power.as_dvec3() * off_axis).map(f64::exp).as_vec3()
+    }
+}
+
+/// What radiance is multiplied by to become the values of one photograph.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Exposure {
+    /// Exposure and white balance: the factor on the lens's axis, per channel.
+    pub factor: Vec3,
+    /// How it falls off from there; `None` where it does not.
+    pub vignetting: Option<Vignetting>,
+}
+
+impl Default for Exposure {
+    /// Values are radiance.
+    fn default() -> Self {
+        Self {
+            factor: Vec3::ONE,
+            vignetting: None,
+        }
+    }
+}
+
+impl Exposure {
+    /// The factor in the middle of a pixel, counted row by row from the top left, of a picture through the lens, which may be
+    /// larger or smaller than the lens says.
+    pub fn at(&self, lens: &Intrinsics, [width, height]: [u32; 2], pixel: usize) -> Vec3 {
+        let Some(vignetting) = &self.vignetting else {
+            return self.factor;
+        };
+        let columns = width.max(1) as usize;
+        let middle = DVec2::new((pixel % columns) as f64, (pixel / columns) as f64) + 0.5;
+        let [across, down] = [(lens.width, width), (lens.height, height)]
+            .map(|(lens, picture)| f64::from(lens) / f64::from(picture.max(1)));
+        self.factor * vignetting.factor(lens, middle * DVec2::new(across, down))
+    }
+
+    /// Turns radiance into values, in place.
+    pub fn apply(&self, lens: &Intrinsics, picture: &mut Picture) {
+        let size = [picture.width, picture.height];
+        for (pixel, value) in picture.pixels.iter_mut().enumerate() {
+            *value *= self.at(lens, size, pixel);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LENS: Intrinsics = Intrinsics {
+        width: 80,
+        height: 60,
+        fx: 50.0,
+        fy: 50.0,
+        cx: 40.0,
+        cy: 30.0,
+        distortion: [0.0; 4],
+    };
+
+    #[test]
+    fn the_lens_dims_by_the_angle_from_its_axis_alone() {
+        let vignetting = Vignetting {
+            power: Vec3::new(0.0, 1.0, 4.0),
+        };
+        let at = |x, y| vignetting.factor(&LENS, DVec2::new(x, y));
+        assert_eq!(at(40.0, 30.0), Vec3::ONE);
+        // The corners lie 45° off the axis.
+        for (x, y) in [(0.0, 0.0), (80.0, 60.0), (0.0, 60.0)] {
+            let off = at(x, y) - Vec3::new(1.0, 0.5f32.sqrt(), 0.25);
+            assert!(off.abs().max_element() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_smaller_picture_through_the_lens_is_dimmed_alike() {
+        let exposure = Exposure {
+            factor: Vec3::new(2.0, 1.0, 0.5),
+            vignetting: Some(Vignetting {
+                power: Vec3::splat(4.0),
+            }),
+        };
+        // Four pixels of the large picture around the middle of one of the small.
+        let large = |x: usize, y: usize| exposure.at(&LENS, [80, 60], y * 80 + x);
+        let around = (large(8, 4) + large(9, 4) + large(8, 5) + large(9, 5)) / 4.0;
+        let small = exposure.at(&LENS, [40, 30], 2 * 40 + 4);
+        assert!((small - around).abs().max_element() < 1e-3);
+        assert_eq!(Exposure::default().at(&LENS, [40, 30], 7), Vec3::ONE);
+    }
+}

@@ -1,0 +1,364 @@
+//! Exposure and white balance of each photograph, and vignetting of all of them, where the photographs disagree about surfaces
+//! that they share.
+//!
+//! What a pixel shows is its surface's radiance times its photograph's exposure, one factor a channel, times what the lens lets
+//! through at its distance from the axis. On surface cells that several photographs see, the logarithms are fitted by least
+//! absolute differences, so that highlights, mis-registration and people decide nothing. One common factor stays open; by
+//! convention the exposures' median is 1 in each channel, and the lens dims nothing on its axis.
+
+mod fit;
+mod sights;
+
+use crate::capture::exposure::{Exposure, Vignetting};
+use crate::capture::photograph::Photograph;
+use crate::inverse::solver::Problem;
+use crate::inverse::survey::Survey;
+use crate::math::stats::Moments;
+use crate::scene::camera::Camera;
+use fit::{Parts, compare, disagreements, fit};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use sights::{Sight, Sights, shared};
+use std::sync::Arc;
+
+/// Share of the disagreement on cells left out of the fit that exposures must explain, next to vignetting where that is found.
+const LEAST_GAIN: f64 = 0.05;
+/// Share of what they leave that vignetting must explain, and by how many standard errors.
+const LEAST_VIGNETTING: f64 = 0.01;
+const SIGNIFICANT: f64 = 4.0;
+/// Photographs whose focal lengths, in widths of their pictures, differ by more were not taken through one lens.
+const ONE_LENS: f64 = 0.05;
+
+/// What was found out about exposures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Exposures {
+    /// For each photograph and channel, its pixels over the radiance on the lens's axis; all one where they do not differ.
+    pub factors: Vec<Vec3>,
+    /// Whether they explain enough of the disagreement.
+    pub differ: bool,
+    /// How all photographs dim towards their corners, where that explains enough of the rest.
+    pub vignetting: Option<Vignetting>,
+    /// Share of the disagreement, on surfaces left out of the fit, that exposures explain.
+    pub gain: f64,
+    /// Share of what exposures leave of it that vignetting explains.
+    pub vignetting_gain: f64,
+}
+
+impl Exposures {
+    /// Compares the photographs on the surfaces that they share, held-out pixels left out; `None` where too few are
+    /// shared to tell. A photograph that is held out whole is given the exposure at which it fits what the others found, so
+    /// that it can test more than that.
+    pub fn new(problem: &Problem, survey: &Survey) -> Option<Self> {
+        let sights = Sights::new(problem, survey);
+        Self::of(
+            &sights,
+            problem.photographs.len(),
+            one_lens(&problem.scene.cameras),
+        )
+    }
+
+    fn of(sights: &Sights, photographs: usize, one_lens: bool) -> Option<Self> {
+        let shared = shared(&sights.fitted);
+        // What is found on one half of the cells is tried on the other.
+        let (fitted, tested): (Vec<Sight>, Vec<Sight>) =
+            shared.iter().partition(|s| s.cell.is_multiple_of(2));
+        if tested.is_empty() {
+            return None;
+        }
+        let with = |exposures, vignetting| {
+            let parts = Parts {
+                exposures,
+                vignetting,
+            };
+            let found = fit(&fitted, photographs, parts);
+            (disagreements(&tested, &found), found)
+        };
+        let [(exposed, _), (both, found)] = [with(true, false), with(true, true)];
+        let vignetting_gain = explained(&exposed, &both);
+        let dims = one_lens
+            && found.power.min_element() > 0.0
+            && vignetting_gain > LEAST_VIGNETTING
+            && is_significant(&exposed, &both);
+        let gain = if dims {
+            explained(&with(false, true).0, &both)
+        } else {
+            explained(&with(false, false).0, &exposed)
+        };
+        let parts = Parts {
+            exposures: gain > LEAST_GAIN,
+            vignetting: dims,
+        };
+
+        let mut found = fit(&shared, photographs, parts);
+        if parts.exposures {
+            compare(sights, &mut found);
+        }
+        let factor = |logarithm: &DVec3| logarithm.map(f64::exp).as_vec3();
+        Some(Self {
+            factors: found.exposures.iter().map(factor).collect(),
+            differ: parts.exposures,
+            vignetting: dims.then(|| Vignetting {
+                power: found.power.as_vec3(),
+            }),
+            gain,
+            vignetting_gain,
+        })
+    }
+
+    /// Whether there is anything to undo.
+    pub fn needed(&self) -> bool {
+        self.differ || self.vignetting.is_some()
+    }
+
+    /// The largest and the least factor, of the mean over channels.
+    pub fn range(&self) -> (f32, f32) {
+        let means = self.factors.iter().map(|f| f.element_sum() / 3.0);
+        means.fold((f32::INFINITY, 0.0), |(low, high), m| {
+            (low.min(m), high.max(m))
+        })
+    }
+
+    /// The problem as photographs of equal exposure, taken by a lens that dims nothing, show it.
+    pub fn undone(&self, problem: &Problem) -> Problem {
+        let cameras = &problem.scene.cameras;
+        let photographs = (problem.photographs.par_iter().zip(cameras))
+            .zip(&self.factors)
+            .map(|((photograph, camera), factor)| {
+                let exposure = Exposure {
+                    factor: *factor,
+                    vignetting: self.vignetting,
+                };
+                let size = [photograph.width, photograph.height];
+                let at = |pixel| exposure.at(&camera.intrinsics, size, pixel);
+                let pixels = photograph.pixels.iter().enumerate();
+                let varies = self.vignetting.is_some() && photograph.saturation.is_finite();
+                let limits = match varies || !photograph.limits.is_empty() {
+                    true => (0..photograph.pixels.len())
+                        .map(|pixel| photograph.limit(pixel) / at(pixel))
+                        .collect(),
+                    false => Vec::new(),
+                };
+                Arc::new(Photograph {
+                    pixels: pixels.map(|(pixel, value)| *value / at(pixel)).collect(),
+                    saturation: photograph.saturation / *factor,
+                    limits,
+                    usable: photograph.usable.clone(),
+                    ..**photograph
+                })
+            })
+            .collect();
+        Problem {
+            photographs,
+            ..problem.clone()
+        }
+    }
+}
+
+/// Whether all photographs may have been taken through one lens.
+fn one_lens(cameras: &[Camera]) -> bool {
+    let lengths = cameras.iter().map(|camera| {
+        let k = &camera.intrinsics;
+        (k.fx / f64::from(k.width)).abs()
+    });
+    let (least, most) = lengths.fold((f64::INFINITY, 0.0f64), |(least, most), l| {
+        (least.min(l), most.max(l))
+    });
+    most <= least * (1.0 + ONE_LENS)
+}
+
+/// The share of a disagreement that goes where another takes its place.
+fn explained(before: &[f64], after: &[f64]) -> f64 {
+    let [before, after] = [before, after].map(|d| d.iter().sum::<f64>());
+    if before > 0.0 {
+        1.0 - after / before
+    } else {
+        0.0
+    }
+}
+
+/// Whether cells disagree less by more than chance.
+fn is_significant(before: &[f64], after: &[f64]) -> bool {
+    let mut gains = Moments::default();
+    for (before, after) in before.iter().zip(after) {
+        gains.push(before - after);
+    }
+    gains.mean > SIGNIFICANT * gains.standard_error()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::rng::Stream;
+
+    const EXPOSURES: Parts = Parts {
+        exposures: true,
+        vignetting: false,
+    };
+
+    fn sight(frame: usize, cell: usize, level: f64) -> Sight {
+        Sight {
+            frame,
+            cell: cell as u64,
+            level: DVec3::splat(level),
+            off_axis: 0.0,
+        }
+    }
+
+    /// Cells of random levels seen by random photographs of given exposures, anywhere in them, with some noise and some outliers.
+    fn seen(exposures: &[DVec3], noise: f64) -> Vec<Sight> {
+        let mut stream = Stream::new(71, 0, 0, 0);
+        (0..400)
+            .flat_map(|cell| {
+                let level = DVec3::splat(f64::from(stream.uniform()) * 3.0);
+                let mut own = Vec::new();
+                for (frame, exposure) in exposures.iter().enumerate() {
+                    if stream.uniform() < 0.5 {
+                        let wrong = if stream.uniform() < 0.1 { 1.5 } else { 0.0 };
+                        let error = f64::from(stream.uniform() - 0.5) * noise + wrong;
+                        own.push(Sight {
+                            frame,
+                            cell,
+                            level: level + *exposure + DVec3::splat(error),
+                            off_axis: -0.3 * f64::from(stream.uniform()),
+                        });
+                    }
+                }
+                if own.len() > 1 { own } else { Vec::new() }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn exposures_are_found_up_to_their_median_in_spite_of_outliers() {
+        let truth: Vec<DVec3> = (0..6)
+            .map(|f| DVec3::new(0.1, -0.05, 0.2) * f64::from(f) - DVec3::new(0.25, -0.125, 0.5))
+            .collect();
+        let found = fit(&seen(&truth, 0.1), 6, EXPOSURES).exposures;
+        for (found, truth) in found.iter().zip(&truth) {
+            assert!((*found - *truth).length() < 0.03, "{found} {truth}");
+        }
+    }
+
+    #[test]
+    fn a_photograph_that_shares_too_little_keeps_its_exposure() {
+        let mut sights = seen(&[DVec3::splat(0.3), DVec3::splat(-0.3)], 0.0);
+        let cell = sights.last().map_or(0, |s| s.cell as usize);
+        sights.push(sight(2, cell, 9.0));
+        let found = fit(&sights, 3, EXPOSURES).exposures;
+        assert_eq!(found[2], DVec3::ZERO);
+        assert!((found[0] - found[1] - DVec3::splat(0.6)).length() < 0.01);
+    }
+
+    /// A walk of two hundred photographs, each of which shares cells with the next alone: exposures that rise and fall along
+    /// it by a factor of twenty are found, outliers among the cells notwithstanding.
+    #[test]
+    fn exposures_that_drift_along_a_walk_are_found() {
+        let frames = 200;
+        let truth = |f: usize| (f as f64 / frames as f64 * std::f64::consts::TAU).sin() * 1.5;
+        let mut stream = Stream::new(72, 0, 0, 0);
+        let mut sights = Vec::new();
+        for cell in 0..40 * (frames - 1) {
+            let level = f64::from(stream.uniform());
+            for frame in [cell / 40, cell / 40 + 1] {
+                let wrong = if stream.uniform() < 0.05 { 1.0 } else { 0.0 };
+                let error = f64::from(stream.uniform() - 0.5) * 0.05 + wrong;
+                sights.push(sight(frame, cell, level + truth(frame) + error));
+            }
+        }
+        let found = fit(&sights, frames, EXPOSURES).exposures;
+        for (frame, found) in found.iter().enumerate() {
+            assert!((found.x - truth(frame)).abs() < 0.1, "{frame}: {found}");
+        }
+    }
+
+    /// Whatever is held out, the exposures of the others are the same bits: here it shares cells with them, and with one of
+    /// them cells that no other sees.
+    #[test]
+    fn a_photograph_held_out_is_compared_with_the_others_and_they_are_not_with_it() {
+        let exposures = [0.4, -0.4, 1.3].map(DVec3::splat);
+        let (mut held_out, mut fitted): (Vec<Sight>, Vec<Sight>) = seen(&exposures, 0.1)
+            .into_iter()
+            .partition(|s| s.frame == 2);
+        for cell in 1000..1040 {
+            let [own, others] =
+                [(3, 1.0), (2, 2.3)].map(|(frame, level)| sight(frame, cell, level));
+            fitted.push(own);
+            held_out.push(others);
+        }
+        let with = Sights { fitted, held_out };
+        let without = Sights {
+            fitted: (with.fitted.iter())
+                .filter(|s| s.frame < 2)
+                .copied()
+                .collect(),
+            held_out: Vec::new(),
+        };
+        let [with, without] =
+            [with, without].map(|s| Exposures::of(&s, 4, true).expect("cells are shared"));
+        let of_fitted = |e: &Exposures| [e.factors[0], e.factors[1], e.factors[3]];
+        assert_eq!(of_fitted(&with), of_fitted(&without));
+        assert_eq!((with.gain, with.differ), (without.gain, without.differ));
+        let [first, second, _] = of_fitted(&with).map(|f| f.x.ln());
+        assert!((first - second - 0.8).abs() < 0.03, "{first} {second}");
+        let held_out = with.factors[2].x.ln();
+        assert!((held_out - 1.3).abs() < 0.05, "{held_out}");
+        assert_eq!(without.factors[2], Vec3::ONE);
+    }
+
+    /// The sights of a lens that dims, those of the last photograph kept out of the fit.
+    fn dimmed(exposures: &[DVec3], power: DVec3) -> Sights {
+        let mut all = seen(exposures, 0.1);
+        for sight in &mut all {
+            sight.level += power * sight.off_axis;
+        }
+        let (held_out, fitted) =
+            (all.into_iter()).partition(|sight| sight.frame == exposures.len() - 1);
+        Sights { fitted, held_out }
+    }
+
+    #[test]
+    fn a_lens_that_dims_its_corners_is_told_from_exposures() {
+        let exposures = [0.5, 0.0, -0.4, 0.9].map(DVec3::splat);
+        let power = DVec3::new(1.0, 2.0, 4.0);
+        let sights = dimmed(&exposures, power);
+        let found = Exposures::of(&sights, 4, true).expect("cells are shared");
+        assert!(found.differ);
+        let vignetting = found.vignetting.expect("a lens that dims");
+        let off = vignetting.power.as_dvec3() - power;
+        assert!(off.abs().max_element() < 0.1, "{off}");
+        // The one held out too, whose sights are dimmed alike.
+        for (found, truth) in found.factors.iter().zip(&exposures) {
+            let off = found.as_dvec3().map(f64::ln) - *truth;
+            assert!(off.abs().max_element() < 0.03, "{off}");
+        }
+        let other_lenses = Exposures::of(&sights, 4, false).expect("cells are shared");
+        assert_eq!(other_lenses.vignetting, None);
+    }
+
+    #[test]
+    fn a_lens_that_dims_needs_no_exposures() {
+        let sights = dimmed(&[DVec3::ZERO; 4], DVec3::splat(4.0));
+        let found = Exposures::of(&sights, 4, true).expect("cells are shared");
+        assert!(found.vignetting.is_some() && !found.differ && found.needed());
+        assert_eq!(found.factors, [Vec3::ONE; 4]);
+    }
+
+    #[test]
+    fn a_lens_that_brightens_its_corners_is_not_believed() {
+        let sights = dimmed(&[DVec3::ZERO; 4], DVec3::splat(-2.0));
+        let found = Exposures::of(&sights, 4, true).expect("cells are shared");
+        assert_eq!(found.vignetting, None);
+    }
+
+    #[test]
+    fn equal_exposures_explain_nothing() {
+        let sights = Sights {
+            fitted: seen(&[DVec3::ZERO; 5], 0.2),
+            held_out: Vec::new(),
+        };
+        let found = Exposures::of(&sights, 5, true).expect("cells are shared");
+        assert!(found.gain.abs() < 0.02, "{}", found.gain);
+        assert!(!found.needed());
+        assert_eq!(Exposures::of(&Sights::default(), 5, true), None);
+    }
+}

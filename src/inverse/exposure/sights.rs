@@ -1,0 +1,103 @@
+//! What the photographs show of the surfaces that they share.
+
+use crate::capture::exposure::Vignetting;
+use crate::inverse::measured::cell_key;
+use crate::inverse::solver::Problem;
+use crate::inverse::survey::{Survey, SurveyedPixel};
+use crate::math::stats::quantile;
+use glam::{DVec2, DVec3};
+use std::collections::BTreeMap;
+
+/// Width of a surface cell in pixel footprints.
+const CELL_FOOTPRINTS: f32 = 4.0;
+/// Pixels darker than this share of the photographs' median level hold mostly noise.
+const ABOVE_NOISE: f64 = 0.1;
+
+/// The mean logarithm of what one photograph shows of one surface cell.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sight {
+    pub frame: usize,
+    /// The cell's key, which is a hash.
+    pub cell: u64,
+    pub level: DVec3,
+    /// Where in the photograph, as [`Vignetting::off_axis`].
+    pub off_axis: f64,
+}
+
+/// What the photographs show of the cells, in order of cells.
+#[derive(Debug, Default)]
+pub(super) struct Sights {
+    pub fitted: Vec<Sight>,
+    /// Of photographs that are kept out of every fit: these are compared with the others, and the others not with them.
+    pub held_out: Vec<Sight>,
+}
+
+/// Sums over the pixels of a photograph that see a cell.
+#[derive(Default)]
+struct Sums {
+    value: DVec3,
+    off_axis: f64,
+    count: f64,
+}
+
+impl Sights {
+    /// Compares pixels of one surface, neither saturated nor dark, held-out ones of whole photographs alone.
+    pub fn new(problem: &Problem, survey: &Survey) -> Self {
+        let size = survey.footprint * CELL_FOOTPRINTS;
+        if size <= 0.0 {
+            return Self::default();
+        }
+        let mut held_out = vec![true; problem.photographs.len()];
+        for pixel in survey.pixels.iter().filter(|p| !p.held_out) {
+            held_out[pixel.frame as usize] = false;
+        }
+        let value = |p: &SurveyedPixel| {
+            problem.photographs[p.frame as usize].pixels[p.pixel as usize].as_dvec3()
+        };
+        let usable = |p: &&SurveyedPixel| {
+            let photograph = &problem.photographs[p.frame as usize];
+            p.pure
+                && p.held_out == held_out[p.frame as usize]
+                && !photograph.is_saturated(p.pixel as usize)
+        };
+        let mut levels: Vec<f64> = (survey.pixels.iter().filter(usable))
+            .filter(|p| !p.held_out)
+            .map(|p| value(p).max_element())
+            .collect();
+        let least =
+            (quantile(&mut levels, 0.5).unwrap_or(0.0) * ABOVE_NOISE).max(f64::MIN_POSITIVE);
+
+        let mut sums: BTreeMap<(u64, u32), Sums> = BTreeMap::new();
+        for pixel in survey.pixels.iter().filter(usable) {
+            let value = value(pixel);
+            if value.min_element() < least {
+                continue;
+            }
+            if let Some(point) = pixel.points.iter().flatten().next() {
+                let key = (cell_key(size, point), pixel.frame);
+                let sum = sums.entry(key).or_default();
+                let frame = pixel.frame as usize;
+                let columns = problem.photographs[frame].width.max(1);
+                let [x, y] = [pixel.pixel % columns, pixel.pixel / columns].map(f64::from);
+                let lens = &problem.scene.cameras[frame].intrinsics;
+                sum.value += value;
+                sum.off_axis += Vignetting::off_axis(lens, DVec2::new(x, y) + 0.5);
+                sum.count += 1.0;
+            }
+        }
+        let sight = |((cell, frame), sum): ((u64, u32), Sums)| Sight {
+            frame: frame as usize,
+            cell,
+            level: (sum.value / sum.count).map(f64::ln),
+            off_axis: sum.off_axis / sum.count,
+        };
+        let (held_out, fitted) = (sums.into_iter().map(sight)).partition(|s| held_out[s.frame]);
+        Self { fitted, held_out }
+    }
+}
+
+/// The sights of cells that at least two photographs see.
+pub(super) fn shared(sights: &[Sight]) -> Vec<Sight> {
+    let cells = sights.chunk_by(|a, b| a.cell == b.cell);
+    (cells.filter(|cell| cell.len() > 1).flatten().copied()).collect()
+}
