@@ -20,7 +20,6 @@ from scipy.ndimage import gaussian_filter
 from measure import HEIGHT, WIDTH, decibels, linear, score, to_srgb
 
 ROUNDS = 6
-SATURATED = 0.97
 JUMP = 0.03
 
 
@@ -32,7 +31,6 @@ class Scan:
         self.scene = mi.load_dict({"type": "scene", "mesh": {"type": mesh.suffix[1:], "filename": str(mesh)}})
         self.count = sum(shape.face_count() for shape in self.scene.shapes())
         self.taken = [linear(capture, frame).reshape(-1, 3) for frame in frames]
-        self.valid = [(photograph < SATURATED).all(1) for photograph in self.taken]
         lens = {key: self.transforms[key] for key in ("fl_x", "fl_y", "cx", "cy", "w", "h")}
         self.fx, self.fy = lens["fl_x"] * WIDTH / lens["w"], lens["fl_y"] * HEIGHT / lens["h"]
         y, x = np.mgrid[0:HEIGHT, 0:WIDTH] + 0.5
@@ -56,7 +54,7 @@ class Scan:
         sums, seen = np.zeros((self.count, 3)), np.zeros(self.count)
         for index in frames:
             met = self.hits[index][0]
-            good = (met >= 0) & self.valid[index]
+            good = met >= 0
             shown = (self.taken[index] / factors[index])[good]
             seen += np.bincount(met[good], minlength=self.count)
             for c in range(3):

@@ -31,6 +31,7 @@ pub const READERS: &[(&str, Reader)] = &[
     ("gltf", gltf),
     ("photograph", photograph),
     ("object_obj", object_obj),
+    ("object_mtl", object_mtl),
     ("object_gltf", object_gltf),
     ("estimate", estimate),
     ("checkpoint", checkpoint),
@@ -132,6 +133,21 @@ fn object(name: &str, bytes: &[u8]) {
 /// An object to be inserted, as OBJ.
 pub fn object_obj(bytes: &[u8]) {
     object("a.obj", bytes);
+}
+
+/// The materials of an object to be inserted.
+pub fn object_mtl(bytes: &[u8]) {
+    let Ok(folder) = tempdir() else { return };
+    let obj = format!("mtllib a.mtl\nusemtl paint\n{MESH}");
+    let at = |name: &str| folder.path().join(name);
+    if fs::write(at("a.obj"), obj).is_ok()
+        && fs::write(at("t.png"), PHOTOGRAPH).is_ok()
+        && fs::write(at("a.mtl"), bytes).is_ok()
+        && let Ok(object) = ObjectModel::read(&at("a.obj"))
+    {
+        let (low, high) = object.bounds();
+        assert!(low.is_finite() && high.is_finite());
+    }
 }
 
 /// An object to be inserted, as GLB.
