@@ -3,6 +3,8 @@
 mod scenes;
 
 use glam::Vec3;
+use relit::capture::photograph::{Photograph, PhotographSource};
+use relit::capture::working::load_working;
 use relit::inverse::estimate::Estimate;
 use relit::inverse::loss::LossProbe;
 use relit::inverse::paper::descent::{Descent, Grain};
@@ -34,9 +36,7 @@ fn clipped(at: f32) -> (Problem, Vec<Material>) {
 #[test]
 fn a_saturated_lamp_is_found_by_its_light() {
     let (problem, materials) = clipped(CLIPPED);
-    let saturated = |p: &Arc<_>| {
-        (0..48 * 36).any(|i| relit::capture::photograph::Photograph::is_saturated(p, i))
-    };
+    let saturated = |p: &Arc<Photograph>| (0..48 * 36).any(|i| p.is_saturated(i));
     assert!(problem.photographs.iter().any(saturated));
     for (preset, albedo_error, lamp_error) in
         [(Preset::Preview, 0.02, 0.1), (Preset::Balanced, 0.01, 0.03)]
@@ -61,6 +61,53 @@ fn a_saturated_lamp_is_found_by_its_light() {
 }
 
 /// Every pixel is a lower bound, far below what the true room shows: nothing is wrong with it.
+/// Each pixel mixed with those around it, as by a lens slightly out of focus, a resampling, or JPEG.
+fn blurred(photograph: &Photograph) -> Vec<Vec3> {
+    let [width, height] = [photograph.width, photograph.height].map(|size| size as i32);
+    let mixed = |pixel: i32| {
+        let (x, y) = (pixel % width, pixel / width);
+        let around = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy)));
+        let weighed = around.map(|(dx, dy): (i32, i32)| {
+            let (x, y) = ((x + dx).clamp(0, width - 1), (y + dy).clamp(0, height - 1));
+            let weight = f32::from((2 - dx.unsigned_abs() as u8) * (2 - dy.unsigned_abs() as u8));
+            photograph.pixels[(y * width + x) as usize] * weight / 16.0
+        });
+        weighed.sum()
+    };
+    (0..width * height).map(mixed).collect()
+}
+
+/// Around a lamp that is clipped before it is mixed with the wall every pixel tells of less light than there is.
+#[test]
+fn a_lamp_whose_clipped_light_is_blurred_is_found_too() {
+    let (mesh, materials) = scenes::lamp_room();
+    let mut capture = scenes::capture(mesh, &scenes::room_views(), [96, 72]);
+    let mut problem = scenes::photographed(&capture, &materials, 192, 44);
+    for (frame, photograph) in capture.frames.iter_mut().zip(&mut problem.photographs) {
+        let photograph = Arc::make_mut(photograph);
+        photograph.saturation = Vec3::splat(CLIPPED);
+        for pixel in &mut photograph.pixels {
+            *pixel = pixel.min(photograph.saturation);
+        }
+        photograph.pixels = blurred(photograph);
+        frame.photograph = PhotographSource::Memory(Arc::new(photograph.clone()));
+    }
+    let read = load_working(&capture, u64::MAX).expect("all in memory");
+    problem.photographs = read.photographs;
+    let settings = Settings {
+        preset: Preset::Preview,
+        ..Settings::default()
+    };
+    let solution = scenes::solved(&problem, &settings);
+    let objects = &solution.estimate.objects;
+    let off = (objects[LAMP].emission / materials[LAMP].emission - Vec3::ONE).abs();
+    assert!(off.max_element() < 0.1, "{:?}", objects[LAMP]);
+    for (k, material) in materials.iter().enumerate().filter(|(k, _)| *k != LAMP) {
+        let off = (objects[k].albedo - albedo(material)).abs().element_sum() / 3.0;
+        assert!(off < 0.03, "{k}: {:?}", objects[k]);
+    }
+}
+
 #[test]
 fn what_exceeds_lower_bounds_has_no_loss_and_no_slope() {
     let (problem, materials) = clipped(1e-4);

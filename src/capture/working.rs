@@ -8,6 +8,9 @@ use glam::{BVec3, DVec3, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
+/// Pixels so near to a saturated one hold clipped light.
+const BESIDE: usize = 2;
+
 /// All photographs of a capture in memory at the working resolution.
 #[derive(Debug, Clone)]
 pub struct Working {
@@ -21,7 +24,8 @@ pub struct Working {
     pub warnings: Vec<String>,
 }
 
-/// Loads all photographs, reduced by the smallest whole factor with which they have at most `max_pixels` together.
+/// Loads all photographs, reduced by the smallest whole factor with which they have at most `max_pixels` together. Pixels
+/// beside saturated ones are lower bounds.
 ///
 /// Frames are read in parallel; no more full-size photographs are held at once than there are threads.
 ///
@@ -40,7 +44,7 @@ pub fn load_working(capture: &Capture, max_pixels: u64) -> Result<Working> {
                 1 => photograph,
                 _ => Arc::new(reduce(&photograph, factor)),
             };
-            Ok((reduced, invalid))
+            Ok((with_clipped_surroundings(reduced), invalid))
         })
         .collect();
 
@@ -178,6 +182,35 @@ fn reduce(photograph: &Photograph, factor: u32) -> Photograph {
     }
 }
 
+/// The photograph, what lies beside saturated pixels counted as saturated at what it shows: blur, resampling and compression have
+/// mixed clipped light into it, of which a part is missing.
+fn with_clipped_surroundings(photograph: Arc<Photograph>) -> Arc<Photograph> {
+    let [width, height] = [photograph.width, photograph.height].map(|size| size as usize);
+    let clipped: Vec<bool> = (0..photograph.pixels.len())
+        .map(|pixel| photograph.is_saturated(pixel))
+        .collect();
+    if !clipped.contains(&true) {
+        return photograph;
+    }
+    let is_beside = |pixel: usize| {
+        let (x, y) = (pixel % width, pixel / width);
+        let columns = x.saturating_sub(BESIDE)..(x + BESIDE + 1).min(width);
+        (y.saturating_sub(BESIDE)..(y + BESIDE + 1).min(height)).any(|row| {
+            clipped[row * width + columns.start..row * width + columns.end].contains(&true)
+        })
+    };
+    let limits = (0..clipped.len())
+        .map(|pixel| match is_beside(pixel) {
+            true => photograph.limit(pixel).min(photograph.pixels[pixel]),
+            false => photograph.limit(pixel),
+        })
+        .collect();
+    Arc::new(Photograph {
+        limits,
+        ..(*photograph).clone()
+    })
+}
+
 /// A block of pixels as one.
 struct Block {
     mean: Vec3,
@@ -230,6 +263,23 @@ mod tests {
         // With none saturated there is one limit for all.
         let linear = reduce(&photograph(4, 4), 2);
         assert!(linear.limits.is_empty() && !linear.is_saturated(3));
+    }
+
+    #[test]
+    fn what_lies_beside_a_saturated_pixel_is_a_lower_bound() {
+        let mut clipped = photograph(8, 5);
+        clipped.saturation = Vec3::splat(100.0);
+        clipped.pixels[2 * 8 + 3].y = 100.0;
+        let bounded = with_clipped_surroundings(Arc::new(clipped));
+        for pixel in 0..40 {
+            let (x, y) = (pixel as i32 % 8, pixel as i32 / 8);
+            let beside = (x - 3).abs() <= 2 && (y - 2).abs() <= 2;
+            assert_eq!(bounded.saturated(pixel).all(), beside, "{pixel}");
+            assert_eq!(bounded.is_saturated(pixel), beside, "{pixel}");
+        }
+        // Nothing saturates: nothing changes.
+        let linear = with_clipped_surroundings(Arc::new(photograph(6, 5)));
+        assert!(linear.limits.is_empty());
     }
 
     #[test]

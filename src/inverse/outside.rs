@@ -138,6 +138,18 @@ impl MeasuredOutside {
         (sum / f64::max(weight, f64::MIN_POSITIVE)).as_vec3()
     }
 
+    /// The mean of the bounds where there is nothing else; black where there are none.
+    pub fn mean_bound(&self) -> Vec3 {
+        let cells = || (0..self.known.len()).filter(|&cell| self.at_least[cell]);
+        let sum: DVec3 = cells()
+            .map(|cell| {
+                let direction = direction_of(self.width, self.height, cell);
+                self.map.radiance(direction).as_dvec3()
+            })
+            .sum();
+        (sum / cells().count().max(1) as f64).as_vec3()
+    }
+
     /// Columns and rows.
     pub fn size(&self) -> [usize; 2] {
         [self.width, self.height]

@@ -14,6 +14,10 @@ pub const ALBEDO_MEAN: f32 = 0.5;
 /// photographs show.
 const OUTSIDE_DEVIATION: f32 = 4.0;
 
+/// Standard deviation of each channel of light from outside about the colour that is expected of it, once its brightness is found,
+/// relative to that brightness.
+const OUTSIDE_TINT: f32 = 0.3;
+
 /// Standard deviation of a value that is known, relative to its size: so little that nothing moves it.
 const KNOWN: f64 = 1e-12;
 
@@ -33,8 +37,9 @@ pub struct Prior {
     albedo: Option<ExpectedAlbedo>,
     /// First of the surfaces that stand for directions outside.
     outside: usize,
-    /// One for each of those.
-    means: Vec<Vec3>,
+    /// Mean and standard deviation of each of those.
+    directions: Vec<(Vec3, Vec3)>,
+    /// What light from a direction of which nothing was found yet is expected to deviate by.
     deviation: Vec3,
     /// Parameters that are known, with their values.
     known: BTreeMap<usize, Vec3>,
@@ -48,7 +53,7 @@ impl Prior {
             surfaces,
             albedo: None,
             outside,
-            means: vec![Vec3::ZERO; surfaces - outside],
+            directions: vec![(Vec3::ZERO, photographed * OUTSIDE_DEVIATION); surfaces - outside],
             deviation: photographed * OUTSIDE_DEVIATION,
             known: BTreeMap::new(),
         }
@@ -87,9 +92,42 @@ impl Prior {
 
     /// The same with what to expect of each of those surfaces, from what was seen outside.
     pub fn with_sky(mut self, expected: impl Fn(u32) -> Vec3) -> Self {
-        for (surface, mean) in (self.outside as u32..).zip(&mut self.means) {
+        for (surface, (mean, _)) in (self.outside as u32..).zip(&mut self.directions) {
             *mean = expected(surface);
             self.deviation = self.deviation.max(*mean);
+        }
+        for (_, deviation) in &mut self.directions {
+            *deviation = self.deviation;
+        }
+        self
+    }
+
+    /// The same with means and standard deviations for each of those surfaces.
+    pub fn with_directions(mut self, directions: Vec<(Vec3, Vec3)>) -> Self {
+        self.directions = directions;
+        self
+    }
+
+    /// Mean and standard deviation of light from each direction outside.
+    pub fn directions(&self) -> &[(Vec3, Vec3)] {
+        &self.directions
+    }
+
+    /// The same, each of those surfaces expected to send what was found of it, in a colour that is expected of it.
+    ///
+    /// What a direction does to the room may tell little more than how bright it is; its channels, each fitted by itself, would come
+    /// out in any colour that the noise likes.
+    pub fn with_outside_found(
+        mut self,
+        found: impl Fn(usize) -> (Vec3, Vec3),
+        color: impl Fn(u32) -> Vec3,
+    ) -> Self {
+        for (surface, (mean, deviation)) in (self.outside..).zip(&mut self.directions) {
+            let (color, (radiance, error)) = (color(surface as u32), found(surface));
+            let brightness = brightness(color, radiance, error);
+            *mean = color * brightness;
+            let least = self.deviation * OUTSIDE_TINT / OUTSIDE_DEVIATION;
+            *deviation = (*mean * OUTSIDE_TINT).max(least);
         }
         self
     }
@@ -112,15 +150,26 @@ impl Prior {
                 Some(expected) => (expected.mean[parameter], expected.deviation[parameter]),
                 None => (Vec3::splat(ALBEDO_MEAN), Vec3::splat(ALBEDO_DEVIATION)),
             },
-            Some(emitter) if emitter >= self.outside => {
-                (self.means[emitter - self.outside], self.deviation)
-            }
+            Some(emitter) if emitter >= self.outside => self.directions[emitter - self.outside],
             Some(_) => return (DVec3::ZERO, DVec3::ZERO),
         };
         let (mean, deviation) = (mean.as_dvec3(), deviation.as_dvec3());
         let known = deviation.cmpgt(DVec3::ZERO);
         let or_zero = |v| DVec3::select(known, v, DVec3::ZERO);
         (or_zero(mean), or_zero(noise / (deviation * deviation)))
+    }
+}
+
+/// The multiple of a colour that is nearest to a radiance, in the radiance's standard errors.
+fn brightness(color: Vec3, radiance: Vec3, error: Vec3) -> f32 {
+    let weight = (error * error).recip();
+    let known = weight.is_finite_mask() & color.cmpgt(Vec3::ZERO);
+    let weight = Vec3::select(known, weight, Vec3::ZERO);
+    let (top, bottom) = ((weight * color).dot(radiance), (weight * color).dot(color));
+    if bottom > 0.0 {
+        (top / bottom).max(0.0)
+    } else {
+        0.0
     }
 }
 
@@ -144,6 +193,29 @@ mod tests {
         );
         let nothing = prior.with_albedo(None).of(0, DVec3::ONE);
         assert_eq!(nothing, (DVec3::splat(0.5), DVec3::splat(4.0)));
+    }
+
+    #[test]
+    fn light_found_outside_is_held_near_the_colour_expected_of_it() {
+        let color = Vec3::new(1.0, 2.0, 4.0);
+        // Three times the colour, but for a channel that hardly counts.
+        let found = (Vec3::new(3.0, 6.0, 40.0), Vec3::new(0.1, 0.1, 30.0));
+        let prior = Prior::new(2, 1, Vec3::splat(0.1)).with_outside_found(|_| found, |_| color);
+        let (mean, precision) = prior.of(3, DVec3::ONE);
+        assert!(
+            (mean / color.as_dvec3() - DVec3::splat(3.0))
+                .abs()
+                .max_element()
+                < 1e-2
+        );
+        let deviation = precision.powf(-0.5) / mean;
+        assert!((deviation - f64::from(OUTSIDE_TINT)).abs().max_element() < 1e-6);
+        // Dark ones may still be something.
+        let dark =
+            Prior::new(2, 1, Vec3::ONE).with_outside_found(|_| (Vec3::ZERO, Vec3::ONE), |_| color);
+        let (mean, precision) = dark.of(3, DVec3::ONE);
+        assert!(mean == DVec3::ZERO && precision.is_finite() && precision.x > 0.0);
+        assert_eq!(brightness(color, Vec3::ONE, Vec3::INFINITY), 0.0);
     }
 
     #[test]

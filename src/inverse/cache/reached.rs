@@ -1,7 +1,7 @@
 //! What the stages so far have found: all that the next stage starts from, and what a checkpoint holds.
 
 use super::errors::StandardErrors;
-use super::prior::ExpectedAlbedo;
+use super::prior::{ExpectedAlbedo, Prior};
 use super::roles::Role;
 use crate::inverse::parameters::Unknowns;
 use crate::transport::material::Lobe;
@@ -18,6 +18,9 @@ pub struct Reached {
     /// What the light field said of the albedos, where that still counts.
     #[serde(default)]
     pub expected: Option<ExpectedAlbedo>,
+    /// What is expected of light from outside, where something was found of it: mean and standard deviation by direction.
+    #[serde(default)]
+    pub directions: Option<Vec<(Vec3, Vec3)>>,
     /// What each object is taken for.
     pub roles: Vec<Role>,
     /// Values of all unknowns.
@@ -34,7 +37,7 @@ impl Reached {
     pub fn new(
         stages: u32,
         open: bool,
-        expected: Option<&ExpectedAlbedo>,
+        prior: Option<&Prior>,
         roles: &[Role],
         unknowns: &Unknowns,
         errors: &StandardErrors,
@@ -47,7 +50,8 @@ impl Reached {
         Self {
             stages,
             open,
-            expected: expected.cloned(),
+            expected: prior.and_then(|p| p.albedo().cloned()),
+            directions: prior.map(|p| p.directions().to_vec()),
             roles: roles.to_vec(),
             unknowns: unknowns.clone(),
             albedo_errors: finite(&errors.albedo),
@@ -58,9 +62,10 @@ impl Reached {
         }
     }
 
-    /// Whether it speaks of as many objects as there are.
-    pub fn fits(&self, objects: usize) -> bool {
+    /// Whether it speaks of as many surfaces as there are, of which so many are directions outside.
+    pub fn fits(&self, objects: usize, outside: usize) -> bool {
         self.roles.len() == objects
+            && self.directions.iter().all(|d| d.len() == outside)
             && (self.expected.iter())
                 .all(|e| e.mean.len() == objects && e.deviation.len() == objects)
             && self.unknowns.albedo.len() == objects

@@ -2,6 +2,7 @@
 
 use super::Ladder;
 use crate::inverse::cache::PathCache;
+use crate::inverse::cache::clusters::mean_radiance;
 use crate::inverse::cache::equations::NormalEquations;
 use crate::inverse::cache::evaluate::Linearised;
 use crate::inverse::cache::fit::{LEAST_DAMPING, propose};
@@ -143,14 +144,15 @@ impl Ladder<'_, '_> {
         self.open = true;
         self.sky = MeasuredOutside::new(self.problem, &self.survey);
         self.expect_of_outside();
-        match self.sky {
-            Some(_) => {
-                let paths = self.budget.light_field_paths;
-                let (cache, _) = self.stored(lights, Some(measured), 0, paths)?;
-                self.tell_lamps(&cache, Role::Unseen)?;
-            }
-            None => self.tell_lamps(cache, Role::Unseen)?,
-        }
+        let paths = self.budget.light_field_paths;
+        let towards_it = match self.sky {
+            Some(_) => Some(self.stored(lights, Some(measured), 0, paths)?.0),
+            None => None,
+        };
+        let cache = towards_it.as_ref().unwrap_or(cache);
+        self.tell_lamps(cache, Role::Unseen)?;
+        self.expect_colors_of_outside();
+        self.weigh(cache)?;
         let open = self.measure();
         // Held-out pixels decide; where there are none, those of the fit must do.
         let gain = match (
@@ -178,6 +180,19 @@ impl Ladder<'_, '_> {
         );
         self.record("outside light", started, kept, why)?;
         Ok(())
+    }
+
+    /// From now on light from outside is held near the colours that are expected of it, at the brightness found.
+    fn expect_colors_of_outside(&mut self) {
+        let photographed = mean_radiance(&self.clusters);
+        let (grid, band) = (self.outside, self.band());
+        let color = |surface: u32| match &self.sky {
+            Some(sky) if surface == grid.excess() => sky.mean_bound(),
+            Some(sky) => sky.expected(grid.direction(surface), band),
+            None => photographed,
+        };
+        let found = |k: usize| (self.unknowns.emission[k], self.errors.emission[k]);
+        self.prior = self.prior.clone().with_outside_found(found, color);
     }
 
     /// The share of the clusters' squared residuals that one linear step takes away once light from every direction

@@ -117,7 +117,9 @@ pub fn solve(
     let problem = undone.as_ref().unwrap_or(problem);
     let max_bounces = settings.max_bounces().min(MOST_BOUNCES);
     let start = match resume {
-        Some(checkpoint) => checkpoint.state(|reached: &Reached| reached.fits(surfaces))?,
+        Some(checkpoint) => {
+            checkpoint.state(|reached: &Reached| reached.fits(surfaces, outside.surfaces()))?
+        }
         None => Reached::new(
             0,
             false,
@@ -168,7 +170,9 @@ pub fn solve(
         detail: None,
         stages: start.stages,
     };
-    ladder.expect_of_outside();
+    if let Some(directions) = start.directions {
+        ladder.prior = ladder.prior.clone().with_directions(directions);
+    }
     ladder.hold();
     ladder.describe();
     if let Some(exposures) = exposures.filter(|_| resume.is_none()) {
@@ -254,14 +258,18 @@ impl Ladder<'_, '_> {
     /// Takes what was seen of the outside for what to expect of the rest of it.
     fn expect_of_outside(&mut self) {
         if let Some(sky) = &self.sky {
-            let grid = self.outside;
-            let band = std::f64::consts::PI / grid.height as f64;
+            let (grid, band) = (self.outside, self.band());
             let expected = |surface| match surface == grid.excess() {
                 true => Vec3::ZERO,
                 false => sky.expected(grid.direction(surface), band),
             };
             self.prior = self.prior.clone().with_sky(expected);
         }
+    }
+
+    /// Height of a row of the map of light from outside, in radians.
+    fn band(&self) -> f64 {
+        std::f64::consts::PI / self.outside.height as f64
     }
 
     /// Second stage: full paths to the lamps found. Lights that the first stage missed or imagined are tested here,
@@ -405,7 +413,7 @@ impl Ladder<'_, '_> {
         let reached = Reached::new(
             stages,
             self.open,
-            self.prior.albedo(),
+            Some(&self.prior),
             &self.roles,
             &self.unknowns,
             &self.errors,
