@@ -53,6 +53,15 @@ pub struct EditArguments {
 /// # Errors
 /// An object is not there, or files cannot be read or written.
 pub fn edit(arguments: &EditArguments) -> Result<()> {
+    // What was found would be lost, with the pictures of it.
+    let place = |path: &PathBuf| path.canonicalize().ok();
+    if place(&arguments.out).is_some_and(|out| place(&arguments.saved.dir) == Some(out)) {
+        return Err(Error::usage(
+            "--out",
+            "is the folder of the results that are to be changed",
+            "choose another folder",
+        ));
+    }
     let Loaded {
         saved,
         capture,

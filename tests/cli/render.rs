@@ -118,6 +118,8 @@ fn results_are_rendered_edited_and_moved() {
     ];
     edit.extend(dark);
     done(&place.relit(&edit));
+    let in_place = ["edit", "out", "--albedo", "floor=0,0,0", "--out", "./out"];
+    refused(&place.relit(&in_place), 2, &["--out", "another folder"]);
     let render = image::open(place.path("dark/views/000.render.exr"))
         .expect("an image")
         .to_rgb32f();

@@ -62,7 +62,7 @@ fn every_flaw_is_an_error_that_names_the_field() {
             "k3",
             "not supported",
         ),
-        (r#""w": 4"#, r#""w": 8"#, ": w", "4×2"),
+        (r#""w": 4"#, r#""w": 8"#, ": w", "images/000.png is 4×2"),
         (r#""w": 4"#, r#""w": -4"#, ": w", "whole"),
         (r#""fl_x": 3"#, r#""fl_x": 0"#, "fl_x", "impossible"),
         (r#""fl_x": 3"#, r#""fl_x": "3""#, "fl_x", "number"),

@@ -60,9 +60,10 @@ pub fn read(
         if let Some(stated) = of(name).count(name)?
             && stated != actual
         {
+            let photograph = frame.text("file_path")?.unwrap_or("the photograph");
             return Err(Error::new(
                 of(name).place(name),
-                format!("is {stated}, but the photograph is {width}×{height} pixels"),
+                format!("is {stated}, but {photograph} is {width}×{height} pixels"),
                 "correct the intrinsics or use photographs of the camera's size",
             ));
         }
