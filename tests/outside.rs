@@ -5,9 +5,10 @@ mod scenes;
 use glam::{DVec3, Vec3};
 use relit::capture::mesh::Mesh;
 use relit::capture::photograph::Photograph;
+use relit::inverse::estimate::Estimate;
 use relit::inverse::outside::MeasuredOutside;
 use relit::inverse::settings::{Preset, Settings};
-use relit::inverse::solver::{Problem, Solution};
+use relit::inverse::solver::{Checkpoint, Control, Observer, Problem, Progress, Solution, solve};
 use relit::inverse::survey::Survey;
 use relit::scene::Scene;
 use relit::transport::environment::Environment;
@@ -154,9 +155,8 @@ fn a_saturated_sky_is_a_bound_only_where_nothing_measured_it() {
     assert_eq!(bound, Some(Vec3::ONE));
 }
 
-/// The sky is brighter than the photographs can show: by how much is found by what it does to the walls.
-#[test]
-fn a_sky_that_all_photographs_show_as_white_is_found_by_its_light() {
+/// The room with its window in photographs that show the sky as white, and its materials.
+fn overexposed() -> (Problem, Vec<Material>) {
     let (mesh, materials) = room_with_a_window();
     let capture = scenes::capture(mesh, &views(), SIZE);
     let mut problem = scenes::photographed_under(Some(sky()), &capture, &materials, 512, 74);
@@ -167,6 +167,13 @@ fn a_sky_that_all_photographs_show_as_white_is_found_by_its_light() {
             *pixel = pixel.min(photograph.saturation);
         }
     }
+    (problem, materials)
+}
+
+/// The sky is brighter than the photographs can show: by how much is found by what it does to the walls.
+#[test]
+fn a_sky_that_all_photographs_show_as_white_is_found_by_its_light() {
+    let (problem, materials) = overexposed();
     let estimate = run(&problem).estimate;
     let mut errors: Vec<f32> = (estimate.objects.iter().zip(&materials))
         .map(|(object, material)| {
@@ -176,8 +183,44 @@ fn a_sky_that_all_photographs_show_as_white_is_found_by_its_light() {
         })
         .collect();
     errors.sort_by(f32::total_cmp);
-    println!("{errors:?}");
     assert!(errors[errors.len() / 2] < 0.1, "{errors:?}");
+}
+
+/// Keeps every checkpoint.
+#[derive(Default)]
+struct Keeper(Vec<Checkpoint>);
+
+impl Observer for Keeper {
+    fn observe(&mut self, _: &Progress, _: &Estimate) -> Control {
+        Control::Continue
+    }
+
+    fn offer(&mut self, make: &dyn Fn() -> Checkpoint) {
+        self.0.push(make());
+    }
+}
+
+/// What the light field found of the sky is in its checkpoint: a solve that is taken up there ends as if it had gone on.
+#[test]
+fn a_solve_goes_on_with_what_it_found_of_an_overexposed_sky() {
+    let (problem, _) = overexposed();
+    let settings = Settings {
+        textures: false,
+        lobes: false,
+        paths: 100_000,
+        target_error: 5.0,
+        ..Settings::default()
+    };
+    let mut keeper = Keeper::default();
+    let whole = solve(&problem, &settings, None, &mut keeper).expect("solves");
+    let stages = |c: &&Checkpoint| c.state["stages"].as_u64();
+    let first = keeper.0.iter().find(|c| stages(c) == Some(1));
+    let text = serde_json::to_string(first.expect("the light field's")).expect("is JSON");
+    let first: Checkpoint = serde_json::from_str(&text).expect("reads back");
+    let resumed = solve(&problem, &settings, Some(&first), &mut Keeper::default());
+    let [whole, resumed] = [whole, resumed.expect("goes on")].map(|s| s.estimate);
+    assert_eq!(whole.objects, resumed.objects);
+    assert!(whole.outside.is_some() && whole.outside == resumed.outside);
 }
 
 #[test]

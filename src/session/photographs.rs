@@ -101,6 +101,7 @@ impl Photographs {
         let lights =
             (self.relight).then(|| [&self.found, &self.edited].map(|e| Arc::new(e.lit(scene))));
         let parts = u8::from(lights.is_some()) + u8::from(!objects.is_empty());
+        let mut unseen = !objects.is_empty() && !self.frames.is_empty();
         for (index, &frame) in self.frames.iter().enumerate() {
             let share = |part: u8, share: f32| {
                 let part = (f32::from(part) + share) / f32::from(parts.max(1));
@@ -119,14 +120,19 @@ impl Photographs {
                 if !go_on(0.0) {
                     return Ok(written);
                 }
-                let Some(files) =
+                let Some((files, is_seen)) =
                     self.composite(&mut library, backdrop, &objects, &prefix, &go_on)?
                 else {
                     return Ok(written);
                 };
                 written.files.extend(files);
+                unseen &= !is_seen;
             }
             written.photographs += 1;
+        }
+        if unseen {
+            let none = "no inserted object is seen in any photograph written; check their places and scales".to_owned();
+            written.warnings.push(none);
         }
         Ok(written)
     }
@@ -164,7 +170,7 @@ impl Photographs {
         self.samples.next_multiple_of(1 + u32::from(self.denoise))
     }
 
-    /// Puts the objects in and writes the composites; `None` if that was ended.
+    /// Puts the objects in and writes the composites; returns the files and whether any object is seen, or `None` if that was ended.
     fn composite(
         &self,
         library: &mut Library,
@@ -172,7 +178,7 @@ impl Photographs {
         objects: &[Arc<PlacedObject>],
         prefix: &Path,
         go_on: &dyn Fn(f32) -> bool,
-    ) -> Result<Option<Vec<PathBuf>>> {
+    ) -> Result<Option<(Vec<PathBuf>, bool)>> {
         // What is to be smoothed is made in two independent halves, which tell the noise.
         let parts = if self.denoise { 2 } else { 1 };
         let samples = self.in_parts() / parts;
@@ -202,7 +208,9 @@ impl Photographs {
         let behind = &backdrop.photograph;
         let naive = made[0].naive.over(behind);
         let naive_estimate = made[0].naive_estimate.over(behind);
+        let is_seen = layers.alpha.iter().any(|&alpha| alpha > 0.0);
         let results = (&composite, layers);
-        write_insertion(prefix, &backdrop, results, &naive, &naive_estimate).map(Some)
+        let files = write_insertion(prefix, &backdrop, results, &naive, &naive_estimate)?;
+        Ok(Some((files, is_seen)))
     }
 }

@@ -37,6 +37,11 @@ fn an_object_is_put_into_a_photograph() {
         assert!(place.path(&format!("with.{ending}")).is_file(), "{ending}");
     }
     refused(&insert(&place, &["--out", "x"]), 2, &["block.obj", "--at"]);
+    // Far behind the wall: written, but not without a word.
+    let far = insert(&place, &["--at", "0,0,-50", "--out", "far"]);
+    done(&far);
+    let said = String::from_utf8_lossy(&far.stderr);
+    assert!(said.contains("no inserted object is seen"), "{said}");
 }
 
 #[test]
