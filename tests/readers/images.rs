@@ -177,19 +177,24 @@ fn an_exr_that_claims_huge_windows_is_refused_before_anything_is_allocated() {
     let mut bytes = Cursor::new(Vec::new());
     let picture = DynamicImage::ImageRgb32F(ImageBuffer::from_pixel(4, 2, Rgb([1.0; 3])));
     picture.write_to(&mut bytes, ImageFormat::OpenExr).unwrap();
-    for window in ["dataWindow\0box2i\0", "displayWindow\0box2i\0"] {
+    // Width and height of both windows, and windows whose rows alone would take a gigabyte.
+    for (window, corner, problem) in [
+        ("data", [999_999_999, 999_999_999], "claims 1000000000"),
+        ("display", [999_999_999, 999_999_999], "claims 1000000000"),
+        (
+            "data",
+            [0x0400_0003, 1],
+            "stores 67108868×2 pixels for a picture of 4×2",
+        ),
+    ] {
         let mut bytes = bytes.get_ref().clone();
-        let name = window.as_bytes();
+        let name = format!("{window}Window\0box2i\0").into_bytes();
         let found = bytes.windows(name.len()).position(|w| w == name).unwrap();
-        let corner = found + name.len() + 4 + 8;
-        bytes[corner..corner + 4].copy_from_slice(&999_999_999i32.to_le_bytes());
-        bytes[corner + 4..corner + 8].copy_from_slice(&999_999_999i32.to_le_bytes());
+        let at = found + name.len() + 4 + 8;
+        bytes[at..at + 8].copy_from_slice(&corner.map(i32::to_le_bytes).concat());
         write(folder.path(), "images/000.png", &bytes);
         let error = open(folder.path()).unwrap_err();
-        assert!(
-            error.problem.contains("claims 1000000000"),
-            "{window}: {error}"
-        );
+        assert!(error.problem.contains(problem), "{window}: {error}");
     }
 }
 
