@@ -94,6 +94,19 @@ fn views() -> Vec<View> {
     views
 }
 
+/// Relative errors of the albedos of walls of which none may give light, from the least to the largest.
+fn relative_errors(estimate: &Estimate, materials: &[Material]) -> Vec<f32> {
+    let mut errors: Vec<f32> = (estimate.objects.iter().zip(materials))
+        .map(|(object, material)| {
+            assert_eq!(object.emission, Vec3::ZERO);
+            let truth = scenes::albedo(material);
+            (object.albedo - truth).length() / truth.length()
+        })
+        .collect();
+    errors.sort_by(f32::total_cmp);
+    errors
+}
+
 #[test]
 fn a_room_lit_through_its_window_keeps_its_walls_dark() {
     let (mesh, materials) = room_with_a_window();
@@ -102,14 +115,7 @@ fn a_room_lit_through_its_window_keeps_its_walls_dark() {
     let estimate = run(&problem).estimate;
     let outside = estimate.outside.as_ref().expect("the sky is seen");
     assert!(outside.pixels.iter().all(|p| p.is_finite()));
-    let mut errors: Vec<f32> = (estimate.objects.iter().zip(&materials))
-        .map(|(object, material)| {
-            assert_eq!(object.emission, Vec3::ZERO);
-            let truth = scenes::albedo(material);
-            (object.albedo - truth).length() / truth.length()
-        })
-        .collect();
-    errors.sort_by(f32::total_cmp);
+    let errors = relative_errors(&estimate, &materials);
     assert!(errors[errors.len() / 2] < 0.05, "{errors:?}");
 }
 
@@ -122,11 +128,7 @@ fn a_saturated_sky_is_a_bound_only_where_nothing_measured_it() {
     let twice = scenes::capture(mesh, &[views(), views()].concat(), SIZE);
     let overexposed = once.photographs.iter().map(|photograph| {
         let mut clipped = Photograph::clone(photograph);
-        clipped.saturation = Vec3::ONE;
-        clipped
-            .pixels
-            .iter_mut()
-            .for_each(|p| *p = p.min(Vec3::ONE));
+        scenes::clip(&mut clipped, CLIPPED);
         Arc::new(clipped)
     });
     let both = Problem {
@@ -161,11 +163,7 @@ fn overexposed() -> (Problem, Vec<Material>) {
     let capture = scenes::capture(mesh, &views(), SIZE);
     let mut problem = scenes::photographed_under(Some(sky()), &capture, &materials, 512, 74);
     for photograph in &mut problem.photographs {
-        let photograph = Arc::make_mut(photograph);
-        photograph.saturation = Vec3::splat(CLIPPED);
-        for pixel in &mut photograph.pixels {
-            *pixel = pixel.min(photograph.saturation);
-        }
+        scenes::clip(Arc::make_mut(photograph), CLIPPED);
     }
     (problem, materials)
 }
@@ -175,14 +173,7 @@ fn overexposed() -> (Problem, Vec<Material>) {
 fn a_sky_that_all_photographs_show_as_white_is_found_by_its_light() {
     let (problem, materials) = overexposed();
     let estimate = run(&problem).estimate;
-    let mut errors: Vec<f32> = (estimate.objects.iter().zip(&materials))
-        .map(|(object, material)| {
-            assert_eq!(object.emission, Vec3::ZERO);
-            let truth = scenes::albedo(material);
-            (object.albedo - truth).length() / truth.length()
-        })
-        .collect();
-    errors.sort_by(f32::total_cmp);
+    let errors = relative_errors(&estimate, &materials);
     assert!(errors[errors.len() / 2] < 0.1, "{errors:?}");
 }
 

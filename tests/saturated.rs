@@ -24,11 +24,7 @@ fn clipped(at: f32) -> (Problem, Vec<Material>) {
     let capture = scenes::capture(mesh, &scenes::room_views(), [48, 36]);
     let mut problem = scenes::photographed(&capture, &materials, 192, 43);
     for photograph in &mut problem.photographs {
-        let photograph = Arc::make_mut(photograph);
-        photograph.saturation = Vec3::splat(at);
-        for pixel in &mut photograph.pixels {
-            *pixel = pixel.min(photograph.saturation);
-        }
+        scenes::clip(Arc::make_mut(photograph), at);
     }
     (problem, materials)
 }
@@ -60,7 +56,6 @@ fn a_saturated_lamp_is_found_by_its_light() {
     }
 }
 
-/// Every pixel is a lower bound, far below what the true room shows: nothing is wrong with it.
 /// Each pixel mixed with those around it, as by a lens slightly out of focus, a resampling, or JPEG.
 fn blurred(photograph: &Photograph) -> Vec<Vec3> {
     let [width, height] = [photograph.width, photograph.height].map(|size| size as i32);
@@ -85,10 +80,7 @@ fn a_lamp_whose_clipped_light_is_blurred_is_found_too() {
     let mut problem = scenes::photographed(&capture, &materials, 192, 44);
     for (frame, photograph) in capture.frames.iter_mut().zip(&mut problem.photographs) {
         let photograph = Arc::make_mut(photograph);
-        photograph.saturation = Vec3::splat(CLIPPED);
-        for pixel in &mut photograph.pixels {
-            *pixel = pixel.min(photograph.saturation);
-        }
+        scenes::clip(photograph, CLIPPED);
         photograph.pixels = blurred(photograph);
         frame.photograph = PhotographSource::Memory(Arc::new(photograph.clone()));
     }
@@ -108,6 +100,7 @@ fn a_lamp_whose_clipped_light_is_blurred_is_found_too() {
     }
 }
 
+/// Every pixel is a lower bound, far below what the true room shows: nothing is wrong with it.
 #[test]
 fn what_exceeds_lower_bounds_has_no_loss_and_no_slope() {
     let (problem, materials) = clipped(1e-4);

@@ -396,22 +396,42 @@ fn the_papers_descent_lowers_the_held_out_loss_to_a_third() {
     assert!(last < first / 3.0, "{first} to {last}");
 }
 
+/// The room as photographs show it that were taken at other exposures, one a frame.
+fn exposed(exposure: impl Fn(usize) -> Exposure) -> Problem {
+    let problem = &ROOM.0;
+    let views = problem.photographs.iter().zip(&problem.scene.cameras);
+    let photographs = views.enumerate().map(|(frame, (photograph, camera))| {
+        let exposure = exposure(frame);
+        let pixels = photograph.pixels.iter().enumerate();
+        let values = pixels.map(|(k, p)| *p * exposure.at(&camera.intrinsics, SIZE, k));
+        Arc::new(scenes::photograph(SIZE, values.collect()))
+    });
+    Problem {
+        scene: problem.scene.clone(),
+        photographs: photographs.collect(),
+    }
+}
+
+/// Errors of albedo of the room as it is, of an estimate, and of what is found where exposures are left out.
+fn errors_without_exposures(problem: &Problem, estimate: &Estimate) -> [f32; 3] {
+    let materials = &ROOM.1;
+    let mut settings = preset(Preset::Preview);
+    settings.exposures = false;
+    let without = run(problem, &settings).estimate;
+    [&PREVIEW.estimate, estimate, &without].map(|e| mean_absolute_error(e, materials))
+}
+
 /// An automatic camera: each photograph has its own exposure and white balance.
 #[test]
 fn exposures_that_differ_are_found_and_cost_no_accuracy() {
-    let (problem, materials) = &*ROOM;
     let factor = |frame: usize| {
         let f = frame as f32;
         Vec3::new(1.0 + 0.3 * f, 1.6 - 0.2 * f, 0.7 + 0.1 * f * f)
     };
-    let photographs = (problem.photographs.iter().enumerate()).map(|(frame, photograph)| {
-        let pixels = photograph.pixels.iter().map(|p| *p * factor(frame));
-        Arc::new(scenes::photograph(SIZE, pixels.collect()))
+    let automatic = exposed(|frame| Exposure {
+        factor: factor(frame),
+        vignetting: None,
     });
-    let automatic = Problem {
-        scene: problem.scene.clone(),
-        photographs: photographs.collect(),
-    };
     let solution = run(&automatic, &preset(Preset::Preview));
     let stage = solution.progress.stages.first().expect("stages");
     assert_eq!(stage.name, "exposures");
@@ -427,11 +447,7 @@ fn exposures_that_differ_are_found_and_cost_no_accuracy() {
             "{frame}: {relative}"
         );
     }
-    let with = mean_absolute_error(&solution.estimate, materials);
-    let mut without = preset(Preset::Preview);
-    without.exposures = false;
-    let without = mean_absolute_error(&run(&automatic, &without).estimate, materials);
-    let fixed = mean_absolute_error(&PREVIEW.estimate, materials);
+    let [fixed, with, without] = errors_without_exposures(&automatic, &solution.estimate);
     assert!(
         with < fixed + 0.01 && without > 3.0 * with,
         "{fixed} {with} {without}"
@@ -441,34 +457,19 @@ fn exposures_that_differ_are_found_and_cost_no_accuracy() {
 /// One lens that dims its corners, twice as much as an ideal one.
 #[test]
 fn a_lens_that_dims_its_corners_is_found_and_costs_no_accuracy() {
-    let (problem, materials) = &*ROOM;
     let lens = Vignetting {
         power: Vec3::splat(8.0),
     };
-    let views = problem.photographs.iter().zip(&problem.scene.cameras);
-    let photographs = views.map(|(photograph, camera)| {
-        let exposure = Exposure {
-            factor: Vec3::ONE,
-            vignetting: Some(lens),
-        };
-        let pixels = (photograph.pixels.iter().enumerate())
-            .map(|(pixel, p)| *p * exposure.at(&camera.intrinsics, SIZE, pixel));
-        Arc::new(scenes::photograph(SIZE, pixels.collect()))
+    let dimmed = exposed(|_| Exposure {
+        factor: Vec3::ONE,
+        vignetting: Some(lens),
     });
-    let dimmed = Problem {
-        scene: problem.scene.clone(),
-        photographs: photographs.collect(),
-    };
     let solution = run(&dimmed, &preset(Preset::Preview));
     let found = solution.estimate.vignetting.expect("a lens that dims");
     let off = (found.power - lens.power).abs().max_element();
     assert!(off < 0.8, "{found:?}");
 
-    let with = mean_absolute_error(&solution.estimate, materials);
-    let mut settings = preset(Preset::Preview);
-    settings.exposures = false;
-    let without = mean_absolute_error(&run(&dimmed, &settings).estimate, materials);
-    let fixed = mean_absolute_error(&PREVIEW.estimate, materials);
+    let [fixed, with, without] = errors_without_exposures(&dimmed, &solution.estimate);
     assert!(
         with < fixed + 0.01 && without > 2.0 * with,
         "{fixed} {with} {without}"

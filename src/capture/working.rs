@@ -205,10 +205,9 @@ fn with_clipped_surroundings(photograph: Arc<Photograph>) -> Arc<Photograph> {
             false => photograph.limit(pixel),
         })
         .collect();
-    Arc::new(Photograph {
-        limits,
-        ..(*photograph).clone()
-    })
+    let mut bounded = Arc::unwrap_or_clone(photograph);
+    bounded.limits = limits;
+    Arc::new(bounded)
 }
 
 /// A block of pixels as one.

@@ -5,7 +5,7 @@ use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
 use crate::export::exr::{Precision, write_rgb};
 use crate::export::light_layers;
-use crate::export::picture::{percentile_exposure, write_png};
+use crate::export::picture::{shown_at, write_png};
 use crate::math::picture::Picture;
 use crate::scene::camera::Camera;
 use crate::session::light::path_options;
@@ -13,7 +13,7 @@ use crate::transport::denoise::{denoise, guides};
 use crate::transport::film::Film;
 use crate::transport::layers::Split;
 use clap::Args;
-use glam::{DMat3, DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec3, Vec3};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -120,19 +120,19 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
         Format::Exr => write_rgb(&arguments.out, &picture, Precision::Float),
         Format::Png => {
             // As the photograph is shown, where it saturates.
-            let photographed = match arguments.camera {
-                None => Some(capture.full_photograph(frame as usize)?),
-                Some(_) => None,
+            let saturation = match arguments.camera {
+                None => capture.frame(frame as usize)?.1.saturation,
+                Some(_) => Vec3::INFINITY,
             };
-            let saturation = photographed.map_or(f32::INFINITY, |p| p.saturation.max_element());
-            let shown_at = if saturation.is_finite() {
+            if saturation.is_finite() {
                 let exposure = estimate.exposure(frame as usize);
                 exposure.apply(&camera.intrinsics, &mut picture);
-                saturation.recip()
-            } else {
-                percentile_exposure(&picture.pixels)
-            };
-            write_png(&arguments.out, &picture, shown_at)
+            }
+            write_png(
+                &arguments.out,
+                &picture,
+                shown_at(saturation, &picture.pixels),
+            )
         }
     }
 }

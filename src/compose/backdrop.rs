@@ -3,7 +3,7 @@
 use crate::capture::exposure::Exposure;
 use crate::capture::photograph::Photograph;
 use crate::error::{Error, Result};
-use crate::export::picture::percentile_exposure;
+use crate::export::picture::shown_at;
 use crate::math::picture::Picture;
 use crate::scene::camera::Camera;
 use glam::Vec3;
@@ -53,18 +53,13 @@ impl Backdrop {
                 "give both one size",
             ));
         }
-        let shown_at = if photograph.saturation.is_finite() {
-            photograph.saturation.max_element().recip()
-        } else {
-            percentile_exposure(&picture.pixels)
-        };
         Ok(Self {
             frame: frame as u64,
             camera: camera.clone(),
+            shown_at: shown_at(photograph.saturation, &picture.pixels),
             photograph: Arc::new(picture),
             exposure,
             saturation: photograph.saturation,
-            shown_at,
         })
     }
 

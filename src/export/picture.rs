@@ -32,6 +32,15 @@ pub fn percentile_exposure(pixels: &[glam::Vec3]) -> f32 {
     if white > 0.0 { white.recip() } else { 1.0 }
 }
 
+/// The exposure at which a photograph is shown: its own where it saturates, else the [`percentile_exposure`] of `pixels`.
+pub fn shown_at(saturation: glam::Vec3, pixels: &[glam::Vec3]) -> f32 {
+    if saturation.is_finite() {
+        saturation.max_element().recip()
+    } else {
+        percentile_exposure(pixels)
+    }
+}
+
 /// 8-bit sRGB bytes of a linear picture times an exposure.
 pub fn to_srgb_bytes(picture: &Picture, exposure: f32) -> Vec<u8> {
     picture

@@ -3,7 +3,7 @@
 use crate::capture::Frame;
 use crate::capture::photograph::Photograph;
 use crate::error::{Error, Result};
-use crate::export::picture::percentile_exposure;
+use crate::export::picture::shown_at;
 use crate::math::picture::Picture;
 use crate::scene::camera::Camera;
 use crate::session::snapshot::OpenCapture;
@@ -53,11 +53,7 @@ impl OpenCapture {
         };
         let k = &camera.intrinsics;
         let picture = box_filter(&whole, k.width, k.height);
-        let shown_at = if photograph.saturation.is_finite() {
-            photograph.saturation.max_element().recip()
-        } else {
-            percentile_exposure(&picture.pixels)
-        };
+        let shown_at = shown_at(photograph.saturation, &picture.pixels);
         Ok((picture, shown_at))
     }
 

@@ -172,6 +172,14 @@ pub fn albedo(material: &Material) -> Vec3 {
     }
 }
 
+/// Lets a photograph saturate at a value.
+pub fn clip(photograph: &mut Photograph, at: f32) {
+    photograph.saturation = Vec3::splat(at);
+    for pixel in &mut photograph.pixels {
+        *pixel = pixel.min(photograph.saturation);
+    }
+}
+
 /// A linear photograph that may be used everywhere.
 pub fn photograph([width, height]: [u32; 2], pixels: Vec<Vec3>) -> Photograph {
     Photograph {

@@ -116,14 +116,14 @@ impl Prior {
     /// The same, each of those surfaces expected to send what was found of it, in a colour that is expected of it.
     ///
     /// What a direction does to the room may tell little more than how bright it is; its channels, each fitted by itself, would come
-    /// out in any colour that the noise likes.
+    /// out in any colour that the noise likes. `color` is given the surface and the mean that was expected of it before.
     pub fn with_outside_found(
         mut self,
         found: impl Fn(usize) -> (Vec3, Vec3),
-        color: impl Fn(u32) -> Vec3,
+        color: impl Fn(u32, Vec3) -> Vec3,
     ) -> Self {
         for (surface, (mean, deviation)) in (self.outside..).zip(&mut self.directions) {
-            let (color, (radiance, error)) = (color(surface as u32), found(surface));
+            let (color, (radiance, error)) = (color(surface as u32, *mean), found(surface));
             let brightness = brightness(color, radiance, error);
             *mean = color * brightness;
             let least = self.deviation * OUTSIDE_TINT / OUTSIDE_DEVIATION;
@@ -200,7 +200,7 @@ mod tests {
         let color = Vec3::new(1.0, 2.0, 4.0);
         // Three times the colour, but for a channel that hardly counts.
         let found = (Vec3::new(3.0, 6.0, 40.0), Vec3::new(0.1, 0.1, 30.0));
-        let prior = Prior::new(2, 1, Vec3::splat(0.1)).with_outside_found(|_| found, |_| color);
+        let prior = Prior::new(2, 1, Vec3::splat(0.1)).with_outside_found(|_| found, |_, _| color);
         let (mean, precision) = prior.of(3, DVec3::ONE);
         assert!(
             (mean / color.as_dvec3() - DVec3::splat(3.0))
@@ -211,8 +211,8 @@ mod tests {
         let deviation = precision.powf(-0.5) / mean;
         assert!((deviation - f64::from(OUTSIDE_TINT)).abs().max_element() < 1e-6);
         // Dark ones may still be something.
-        let dark =
-            Prior::new(2, 1, Vec3::ONE).with_outside_found(|_| (Vec3::ZERO, Vec3::ONE), |_| color);
+        let dark = Prior::new(2, 1, Vec3::ONE)
+            .with_outside_found(|_| (Vec3::ZERO, Vec3::ONE), |_, _| color);
         let (mean, precision) = dark.of(3, DVec3::ONE);
         assert!(mean == DVec3::ZERO && precision.is_finite() && precision.x > 0.0);
         assert_eq!(brightness(color, Vec3::ONE, Vec3::INFINITY), 0.0);

@@ -18,9 +18,8 @@ pub struct Reached {
     /// What the light field said of the albedos, where that still counts.
     #[serde(default)]
     pub expected: Option<ExpectedAlbedo>,
-    /// What is expected of light from outside, where something was found of it: mean and standard deviation by direction.
-    #[serde(default)]
-    pub directions: Option<Vec<(Vec3, Vec3)>>,
+    /// What is expected of light from outside: mean and standard deviation by direction.
+    pub directions: Vec<(Vec3, Vec3)>,
     /// What each object is taken for.
     pub roles: Vec<Role>,
     /// Values of all unknowns.
@@ -37,7 +36,7 @@ impl Reached {
     pub fn new(
         stages: u32,
         open: bool,
-        prior: Option<&Prior>,
+        prior: &Prior,
         roles: &[Role],
         unknowns: &Unknowns,
         errors: &StandardErrors,
@@ -50,8 +49,8 @@ impl Reached {
         Self {
             stages,
             open,
-            expected: prior.and_then(|p| p.albedo().cloned()),
-            directions: prior.map(|p| p.directions().to_vec()),
+            expected: prior.albedo().cloned(),
+            directions: prior.directions().to_vec(),
             roles: roles.to_vec(),
             unknowns: unknowns.clone(),
             albedo_errors: finite(&errors.albedo),
@@ -65,7 +64,7 @@ impl Reached {
     /// Whether it speaks of as many surfaces as there are, of which so many are directions outside.
     pub fn fits(&self, objects: usize, outside: usize) -> bool {
         self.roles.len() == objects
-            && self.directions.iter().all(|d| d.len() == outside)
+            && self.directions.len() == outside
             && (self.expected.iter())
                 .all(|e| e.mean.len() == objects && e.deviation.len() == objects)
             && self.unknowns.albedo.len() == objects

@@ -14,7 +14,7 @@ const NEAR: f64 = 0.03;
 /// Relative weight that keeps what is open near zero.
 const OPEN: f64 = 1e-9;
 /// Cells that a photograph must share with others, for its exposure to be told.
-pub(super) const LEAST_CELLS: usize = 30;
+const LEAST_CELLS: usize = 30;
 
 /// What of it may differ from one.
 #[derive(Debug, Clone, Copy)]

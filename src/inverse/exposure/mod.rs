@@ -129,17 +129,19 @@ impl Exposures {
                     vignetting: self.vignetting,
                 };
                 let size = [photograph.width, photograph.height];
-                let at = |pixel| exposure.at(&camera.intrinsics, size, pixel);
-                let pixels = photograph.pixels.iter().enumerate();
+                let factors: Vec<Vec3> = (0..photograph.pixels.len())
+                    .map(|pixel| exposure.at(&camera.intrinsics, size, pixel))
+                    .collect();
                 let varies = self.vignetting.is_some() && photograph.saturation.is_finite();
                 let limits = match varies || !photograph.limits.is_empty() {
-                    true => (0..photograph.pixels.len())
-                        .map(|pixel| photograph.limit(pixel) / at(pixel))
+                    true => (factors.iter().enumerate())
+                        .map(|(pixel, factor)| photograph.limit(pixel) / *factor)
                         .collect(),
                     false => Vec::new(),
                 };
+                let pixels = photograph.pixels.iter().zip(&factors);
                 Arc::new(Photograph {
-                    pixels: pixels.map(|(pixel, value)| *value / at(pixel)).collect(),
+                    pixels: pixels.map(|(value, factor)| *value / *factor).collect(),
                     saturation: photograph.saturation / *factor,
                     limits,
                     usable: photograph.usable.clone(),

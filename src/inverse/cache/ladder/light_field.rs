@@ -185,10 +185,11 @@ impl Ladder<'_, '_> {
     /// From now on light from outside is held near the colours that are expected of it, at the brightness found.
     fn expect_colors_of_outside(&mut self) {
         let photographed = mean_radiance(&self.clusters);
-        let (grid, band) = (self.outside, self.band());
-        let color = |surface: u32| match &self.sky {
-            Some(sky) if surface == grid.excess() => sky.mean_bound(),
-            Some(sky) => sky.expected(grid.direction(surface), band),
+        let bound = self.sky.as_ref().map(|sky| sky.mean_bound());
+        let excess = self.outside.excess();
+        let color = |surface: u32, expected: Vec3| match bound {
+            Some(bound) if surface == excess => bound,
+            Some(_) => expected,
             None => photographed,
         };
         let found = |k: usize| (self.unknowns.emission[k], self.errors.emission[k]);

@@ -34,7 +34,6 @@ use crate::transport::material::Lobe;
 use detail::Detail;
 use glam::{DVec2, Vec3};
 use rounds::Summed;
-use std::fmt::Write;
 
 /// Gauss–Newton steps at most in one fit.
 const MOST_STEPS: u64 = 30;
@@ -116,6 +115,8 @@ pub fn solve(
     let undone = needed.map(|exposures| exposures.undone(problem));
     let problem = undone.as_ref().unwrap_or(problem);
     let max_bounces = settings.max_bounces().min(MOST_BOUNCES);
+    let clusters = cluster(problem, &survey, budget.pixels);
+    let prior = Prior::new(surfaces, objects, mean_radiance(&clusters)).with_known(&monitor.known);
     let start = match resume {
         Some(checkpoint) => {
             checkpoint.state(|reached: &Reached| reached.fits(surfaces, outside.surfaces()))?
@@ -123,7 +124,7 @@ pub fn solve(
         None => Reached::new(
             0,
             false,
-            None,
+            &prior,
             &vec![Role::Reflector; surfaces],
             &Unknowns::new(surfaces),
             &StandardErrors {
@@ -135,13 +136,11 @@ pub fn solve(
     };
     let mut lobes = start.lobes();
     lobes.resize(objects, None);
-    let clusters = cluster(problem, &survey, budget.pixels);
     let sky = (start.open)
         .then(|| MeasuredOutside::new(problem, &survey))
         .flatten();
-    let prior = (Prior::new(surfaces, objects, mean_radiance(&clusters))
-        .with_albedo(start.expected.clone()))
-    .with_known(&monitor.known);
+    let prior =
+        (prior.with_albedo(start.expected.clone())).with_directions(start.directions.clone());
     let mut ladder = Ladder {
         problem,
         budget,
@@ -170,9 +169,6 @@ pub fn solve(
         detail: None,
         stages: start.stages,
     };
-    if let Some(directions) = start.directions {
-        ladder.prior = ladder.prior.clone().with_directions(directions);
-    }
     ladder.hold();
     ladder.describe();
     if let Some(exposures) = exposures.filter(|_| resume.is_none()) {
@@ -236,12 +232,11 @@ impl Ladder<'_, '_> {
             exposures.vignetting.zip(self.problem.scene.cameras.first())
         {
             let corner = vignetting.factor(&camera.intrinsics, DVec2::ZERO);
-            let _ = write!(
-                why,
+            why.push_str(&format!(
                 "; a lens that lets {:.0} % through in the corners explains {:.0} % of the rest",
                 corner.element_sum() / 3.0 * 100.0,
                 exposures.vignetting_gain * 100.0
-            );
+            ));
         }
         let stage = Stage {
             name: "exposures".to_owned(),
@@ -258,18 +253,14 @@ impl Ladder<'_, '_> {
     /// Takes what was seen of the outside for what to expect of the rest of it.
     fn expect_of_outside(&mut self) {
         if let Some(sky) = &self.sky {
-            let (grid, band) = (self.outside, self.band());
+            let grid = self.outside;
+            let band = std::f64::consts::PI / grid.height as f64;
             let expected = |surface| match surface == grid.excess() {
                 true => Vec3::ZERO,
                 false => sky.expected(grid.direction(surface), band),
             };
             self.prior = self.prior.clone().with_sky(expected);
         }
-    }
-
-    /// Height of a row of the map of light from outside, in radians.
-    fn band(&self) -> f64 {
-        std::f64::consts::PI / self.outside.height as f64
     }
 
     /// Second stage: full paths to the lamps found. Lights that the first stage missed or imagined are tested here,
@@ -413,7 +404,7 @@ impl Ladder<'_, '_> {
         let reached = Reached::new(
             stages,
             self.open,
-            Some(&self.prior),
+            &self.prior,
             &self.roles,
             &self.unknowns,
             &self.errors,
