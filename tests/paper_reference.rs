@@ -55,7 +55,10 @@ fn the_cornell_box_is_reproduced_from_its_truth_within_its_noise() {
     let scene = Arc::new(Scene::new(&capture).expect("the mesh is sound"));
     let materials = scene.objects.iter().map(|object| {
         let truth = &truth.objects[&object.name];
-        Material::diffuse(truth.albedo.as_vec3(), truth.emission.as_vec3())
+        Material::diffuse(
+            truth.albedo.expect("known").as_vec3(),
+            truth.emission.as_vec3(),
+        )
     });
     let lit = Lit::new(scene.clone(), materials.collect(), None);
     for (frame, camera) in scene.cameras.iter().enumerate() {

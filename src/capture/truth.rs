@@ -23,8 +23,9 @@ pub struct Truth {
 /// The truth about an object.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ObjectTruth {
-    /// Diffuse reflectance; where `textured`, its mean.
-    pub albedo: DVec3,
+    /// Diffuse reflectance; where `textured`, its mean. `None` where it is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub albedo: Option<DVec3>,
     /// Emitted radiance.
     #[serde(default)]
     pub emission: DVec3,
@@ -69,7 +70,7 @@ impl Truth {
         for (name, object) in &truth.objects {
             let possible = |v: DVec3| v.is_finite() && v.min_element() >= 0.0;
             let fields = [
-                ("albedo", object.albedo),
+                ("albedo", object.albedo.unwrap_or_default()),
                 ("emission", object.emission),
                 ("exitance", object.exitance.unwrap_or_default()),
             ];

@@ -1,7 +1,7 @@
 //! `relit evaluate`: the errors of an estimate against the truth.
 
 use crate::error::{Error, Result};
-use crate::session::command::Source;
+use crate::session::command::{OpenOptions, Source};
 use crate::session::open::open;
 use crate::session::save;
 use crate::study::evaluate::{Evaluation, evaluate as compare};
@@ -16,6 +16,9 @@ pub struct EvaluateArguments {
     /// Capture with truth.json, and truth/albedo_NNN.exr where there are such
     #[arg(long, value_name = "CAPTURE")]
     truth: PathBuf,
+    /// Let paths in the capture lead out of its folder; only for captures that you trust
+    #[arg(long)]
+    allow_outside: bool,
     /// Write JSON instead of a table
     #[arg(long)]
     json: bool,
@@ -31,7 +34,11 @@ pub struct EvaluateArguments {
 pub fn evaluate(arguments: &EvaluateArguments) -> Result<()> {
     crate::cli::solve::use_threads(arguments.threads)?;
     let saved = save::load(&arguments.dir)?;
-    let capture = open(&Source::Folder(arguments.truth.clone()), &saved.options)?;
+    let options = OpenOptions {
+        allow_outside: arguments.allow_outside,
+        ..saved.options.clone()
+    };
+    let capture = open(&Source::Folder(arguments.truth.clone()), &options)?;
     let estimate = saved.estimate_by_name(&capture)?;
     let evaluation = compare(
         &arguments.truth,

@@ -96,6 +96,27 @@ impl ObjectEstimate {
     pub fn lobe(&self) -> Option<(f32, f32)> {
         self.roughness.zip(self.specular)
     }
+
+    /// The first field that holds what no surface has.
+    pub fn impossible(&self) -> Option<&'static str> {
+        let reflects = |share: Vec3| share.cmpge(Vec3::ZERO).all() && share.cmple(Vec3::ONE).all();
+        let share = |value: Option<f32>| reflects(Vec3::splat(value.unwrap_or(0.0)));
+        let fields = [
+            ("albedo", reflects(self.albedo)),
+            (
+                "emission",
+                self.emission.is_finite() && self.emission.min_element() >= 0.0,
+            ),
+            (
+                "roughness",
+                share(self.roughness) && self.roughness != Some(0.0),
+            ),
+            ("specular", share(self.specular)),
+        ];
+        fields
+            .into_iter()
+            .find_map(|(name, possible)| (!possible).then_some(name))
+    }
 }
 
 /// Albedo texels with their confidence.

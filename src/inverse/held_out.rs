@@ -1,5 +1,6 @@
 //! Which pixels are kept out of every fit, to test it.
 
+use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
 use crate::math::rng::splitmix64;
 
@@ -12,6 +13,24 @@ pub fn is_held_out(settings: &Settings, frame: u32, pixel: u32) -> bool {
     }
     let hash = splitmix64(splitmix64(u64::from(frame)) ^ u64::from(pixel));
     ((hash >> 11) as f64) < settings.held_out * (1u64 << 53) as f64
+}
+
+/// Refuses to hold out all of `frames` photographs.
+///
+/// # Errors
+/// No photograph is left to fit.
+pub fn leaves_some(settings: &Settings, frames: usize) -> Result<()> {
+    if settings.hold_out == 0 || frames > 1 && settings.hold_out > 1 {
+        return Ok(());
+    }
+    Err(Error::usage(
+        "hold_out",
+        match frames {
+            1 => "the only photograph would be held out, which leaves none to fit".to_owned(),
+            _ => format!("all {frames} photographs would be held out, which leaves none to fit"),
+        },
+        "hold out every second at most, of two or more, or none with 0",
+    ))
 }
 
 #[cfg(test)]
@@ -33,5 +52,11 @@ mod tests {
         settings.hold_out = 4;
         let held: Vec<u32> = (0..10).filter(|&f| is_held_out(&settings, f, 17)).collect();
         assert_eq!(held, [0, 4, 8]);
+        assert!(leaves_some(&settings, 2).is_ok());
+        assert!(leaves_some(&settings, 1).is_err());
+        settings.hold_out = 1;
+        assert!(leaves_some(&settings, 9).is_err());
+        settings.hold_out = 0;
+        assert!(leaves_some(&settings, 1).is_ok());
     }
 }

@@ -4,6 +4,7 @@ use crate::capture::photograph::Photograph;
 use crate::error::{Error, Result};
 use crate::inverse::cache::ladder;
 use crate::inverse::estimate::Estimate;
+use crate::inverse::held_out::leaves_some;
 use crate::inverse::known::Known;
 use crate::inverse::monitor::Monitor;
 use crate::inverse::paper;
@@ -192,13 +193,14 @@ pub struct Solution {
 /// Runs the solver that the settings' preset names.
 ///
 /// # Errors
-/// The checkpoint belongs to another capture or preset.
+/// The checkpoint belongs to another capture or preset, or all photographs are to be held out.
 pub fn solve(
     problem: &Problem,
     settings: &Settings,
     resume: Option<&Checkpoint>,
     observer: &mut dyn Observer,
 ) -> Result<Solution> {
+    leaves_some(settings, problem.photographs.len())?;
     let progress = resume.map(|c| c.progress.clone()).unwrap_or_default();
     let monitor = Monitor::new(settings, observer, progress);
     match settings.preset {

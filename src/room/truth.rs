@@ -62,7 +62,7 @@ impl From<ObjectTruth> for crate::capture::truth::ObjectTruth {
     fn from(truth: ObjectTruth) -> Self {
         let wide = |color: [f32; 3]| Vec3::from(color).as_dvec3();
         Self {
-            albedo: wide(truth.albedo),
+            albedo: Some(wide(truth.albedo)),
             emission: wide(truth.emission),
             exitance: truth.exitance.map(wide),
             roughness: truth.roughness.map(f64::from),

@@ -216,7 +216,7 @@ impl EditsRecord {
                 Error::new(
                     format!("{}: edits.objects.{name}", path.display()),
                     "the capture has no object of this name",
-                    "name the capture it was made from with --capture",
+                    "name the capture it was made from",
                 )
             });
             Ok((object?, *edit))

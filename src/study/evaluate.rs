@@ -17,7 +17,7 @@ use std::sync::Arc;
 /// The errors of an estimate; `null` where nothing could be compared.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Evaluation {
-    /// Objects scored for their albedo: no emitter in the truth, seen by 50 or more pixels, not textured.
+    /// Objects scored for their albedo: known and no emitter in the truth, seen by 50 or more pixels, not textured.
     pub objects: usize,
     /// Mean absolute error of albedo over scored objects and RGB.
     pub albedo_mae: Option<f64>,
@@ -55,8 +55,8 @@ pub struct ObjectErrors {
     pub scored: bool,
     /// Estimated albedo.
     pub albedo: [f32; 3],
-    /// True albedo, the mean where textured.
-    pub albedo_true: [f64; 3],
+    /// True albedo, the mean where textured; `None` where the truth does not say.
+    pub albedo_true: Option<[f64; 3]>,
     /// Relative error of albedo over RGB.
     pub albedo_rel: Option<f64>,
     /// Estimated emission, or exitance where that is all that is determined, times the scale.
@@ -129,7 +129,12 @@ impl Reference {
             .collect();
         let absolute: Vec<f64> = scored
             .iter()
-            .flat_map(|o| (0..3).map(|c| (f64::from(o.albedo[c]) - o.albedo_true[c]).abs()))
+            .flat_map(|o| {
+                o.albedo
+                    .into_iter()
+                    .zip(o.albedo_true.into_iter().flatten())
+            })
+            .map(|(found, known)| (f64::from(found) - known).abs())
             .collect();
         let mut relative: Vec<f64> = scored.iter().filter_map(|o| o.albedo_rel).collect();
         let mut lamps: Vec<f64> = (per_object.iter())
@@ -200,10 +205,10 @@ fn of_object(
         pixels,
         emitter,
         textured: known.textured,
-        scored: !emitter && !known.textured && pixels >= ENOUGH_PIXELS,
+        scored: known.albedo.is_some() && !emitter && !known.textured && pixels >= ENOUGH_PIXELS,
         albedo: estimated.albedo.to_array(),
-        albedo_true: known.albedo.to_array(),
-        albedo_rel: relative(estimated.albedo.as_dvec3(), known.albedo),
+        albedo_true: known.albedo.map(|albedo| albedo.to_array()),
+        albedo_rel: (known.albedo).and_then(|albedo| relative(estimated.albedo.as_dvec3(), albedo)),
         emission: light.to_array(),
         emission_true: light_true.to_array(),
         emission_rel: relative(light, light_true).filter(|_| emitter),
@@ -248,13 +253,15 @@ mod tests {
         assert!(!errors.scored && errors.emitter);
         assert!((errors.emission_rel.expect("an emitter") - 1.0 / 26f64.sqrt()).abs() < 1e-6);
         let wall = ObjectTruth {
-            albedo: DVec3::new(0.3, 0.0, 0.0),
+            albedo: Some(DVec3::new(0.3, 0.0, 0.0)),
             ..ObjectTruth::default()
         };
         let errors = of_object(&estimated, &wall, 50, 1.0);
         assert!(errors.scored && errors.emission_rel.is_none());
         assert!((errors.albedo_rel.expect("not black") - 0.4 / 0.3).abs() < 1e-6);
         assert!(!of_object(&estimated, &wall, 49, 1.0).scored);
+        let unknown = of_object(&estimated, &ObjectTruth::default(), 50, 1.0);
+        assert!(!unknown.scored && unknown.albedo_true.is_none());
         let textured = ObjectTruth {
             textured: true,
             ..wall

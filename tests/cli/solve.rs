@@ -75,6 +75,11 @@ fn errors_are_one_line_with_the_file_the_field_and_the_remedy() {
         2,
         &["a.gif", ".png"],
     );
+    refused(
+        &place.relit(&solve(&["--hold-out", "1"])),
+        2,
+        &["hold_out", "2 photographs"],
+    );
     refused(&place.relit(&["solve"]), 2, &["CAPTURE"]);
     refused(&place.relit(&["--frobnicate"]), 2, &["--frobnicate"]);
     refused(

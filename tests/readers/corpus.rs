@@ -234,9 +234,9 @@ fn brazen_claims_are_refused_at_once() {
     assert!(started.elapsed() < HANG);
 }
 
-/// Results from someone else may not name maps elsewhere, nor parameters that no person could set.
+/// Results from someone else may not name maps elsewhere, nor parameters that no person could set, nor what no surface is.
 #[test]
-fn results_name_no_files_elsewhere_and_no_impossible_parameters() {
+fn results_name_no_files_elsewhere_and_nothing_impossible() {
     let text = String::from_utf8(seed("estimate/solved.json")).unwrap();
     let sound: serde_json::Value = serde_json::from_str(&text).unwrap();
     for maps in ["../../etc/passwd", "/etc/passwd", "..", "a/b"] {
@@ -252,6 +252,19 @@ fn results_name_no_files_elsewhere_and_no_impossible_parameters() {
         let folder = targets::results_with("estimate.json", file.to_string().as_bytes()).unwrap();
         let error = relit::session::save::load(folder.path()).unwrap_err();
         assert!(error.place.contains(name), "{name}: {error}");
+    }
+    let name = sound["objects"].as_object().unwrap().keys().next().unwrap();
+    for (field, value) in [
+        ("albedo", serde_json::json!([0.5, 1.5, 0.5])),
+        ("emission", serde_json::json!([0.0, -1.0, 0.0])),
+        ("roughness", 0.0.into()),
+        ("specular", 2.0.into()),
+    ] {
+        let mut file = sound.clone();
+        file["objects"][name][field] = value;
+        let folder = targets::results_with("estimate.json", file.to_string().as_bytes()).unwrap();
+        let error = relit::session::save::load(folder.path()).unwrap_err();
+        assert!(error.place.ends_with(field), "{field}: {error}");
     }
 }
 

@@ -97,7 +97,7 @@ fn a_written_capture_reads_back() {
 fn truth_reads_back_and_flaws_in_it_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let lamp = ObjectTruth {
-        albedo: DVec3::splat(0.1),
+        albedo: Some(DVec3::splat(0.1)),
         emission: DVec3::new(18.387, 13.9873, 6.75357),
         exitance: Some(DVec3::splat(20.0)),
         roughness: Some(0.2),

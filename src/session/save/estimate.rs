@@ -103,10 +103,10 @@ impl EstimateFile {
         Ok((file, bytes))
     }
 
-    /// Refuses files of a later version, and parameters out of their ranges.
+    /// Refuses files of a later version, and parameters, surfaces and exposures out of their ranges.
     ///
     /// # Errors
-    /// The version is not known, or a parameter is out of range.
+    /// The version is not known, or a value is out of range.
     pub fn check(&self, path: &Path) -> Result<()> {
         if self.version > VERSION {
             return Err(Error::new(
@@ -122,6 +122,22 @@ impl EstimateFile {
                 let place = format!("{}: settings.{}", path.display(), parameter.name);
                 Error::new(place, allowed, "correct it, or solve again")
             })?;
+        }
+        let impossible = |field: &str| {
+            Err(Error::new(
+                format!("{}: {field}", path.display()),
+                "holds an impossible value",
+                "correct it, or solve again",
+            ))
+        };
+        for (name, object) in &self.objects.0 {
+            if let Some(field) = object.impossible() {
+                return impossible(&format!("objects.{name}.{field}"));
+            }
+        }
+        let exposures = self.exposures.iter().flatten().flatten().flatten();
+        if !exposures.into_iter().all(|&e| e.is_finite() && e > 0.0) {
+            return impossible("exposures");
         }
         Ok(())
     }
@@ -160,7 +176,7 @@ impl EstimateFile {
                     Error::new(
                         place("objects"),
                         format!("no entry for object \"{}\" of the capture", object.name),
-                        "name the capture it was made from with --capture, or solve again",
+                        "name the capture it was made from, or solve again",
                     )
                 })
             })
@@ -169,7 +185,7 @@ impl EstimateFile {
             Error::new(
                 place(field),
                 "does not fit the capture's mesh",
-                "name the capture it was made from with --capture, or solve again",
+                "name the capture it was made from, or solve again",
             )
         };
         if let Some(texels) = &maps.texels

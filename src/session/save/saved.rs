@@ -98,7 +98,7 @@ impl Saved {
                     "the mesh, the cameras or the photographs of {} are not those it was made from",
                     capture.name
                 ),
-                "name that capture with --capture, or solve again",
+                "name that capture, or solve again",
             ));
         }
         self.estimate_by_name(capture)
