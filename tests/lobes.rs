@@ -2,12 +2,14 @@
 
 mod scenes;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
+use relit::capture::mesh::Mesh;
 use relit::inverse::estimate::relative_to_albedo;
 use relit::inverse::settings::Settings;
 use relit::inverse::solver::{Problem, Solution};
-use relit::transport::material::{Albedo, Lobe, Material};
-use std::sync::LazyLock;
+use relit::scene::geometry::Hit;
+use relit::transport::material::{Albedo, Lobe, Material, Texture};
+use std::sync::{Arc, LazyLock};
 
 /// The rough objects, after the walls, the lamp and a diffuse block: name, albedo, roughness, specular.
 const ROUGH: [(&str, [f32; 3], f32, f32); 3] = [
@@ -35,6 +37,12 @@ fn room(lobes: bool) -> (Problem, Vec<Material>) {
         });
         materials.push(material);
     }
+    let problem = photographed(mesh, &materials);
+    (problem, materials)
+}
+
+/// Twelve photographs, six of them of the blocks.
+fn photographed(mesh: Mesh, materials: &[Material]) -> Problem {
     let closer = [
         ([0.8, 0.2, 0.9], [0.0, -0.7, -0.2]),
         ([-0.8, 0.3, 0.9], [0.2, -0.7, -0.2]),
@@ -46,16 +54,11 @@ fn room(lobes: bool) -> (Problem, Vec<Material>) {
     .map(|(center, target)| (DVec3::from_array(center), DVec3::from_array(target)));
     let views: Vec<_> = closer.into_iter().chain(scenes::room_views()).collect();
     let capture = scenes::capture(mesh, &views, [64, 48]);
-    let problem = scenes::photographed(&capture, &materials, 160, 43);
-    (problem, materials)
+    scenes::photographed(&capture, materials, 160, 43)
 }
 
 fn solved(problem: &Problem) -> Solution {
-    let settings = Settings {
-        textures: false,
-        ..Settings::default()
-    };
-    scenes::solved(problem, &settings)
+    scenes::solved(problem, &Settings::default())
 }
 
 static ROUGH_ROOM: LazyLock<(Solution, Vec<Material>)> = LazyLock::new(|| {
@@ -84,6 +87,14 @@ fn lobes_are_found_where_they_are_and_nowhere_else() {
 }
 
 #[test]
+fn no_highlight_becomes_a_texture() {
+    let (solution, _) = &*ROUGH_ROOM;
+    assert!(solution.estimate.texels.is_none());
+    let looked = |name: &str| solution.progress.stages.iter().any(|s| s.name == name);
+    assert!(looked("textures"));
+}
+
+#[test]
 fn albedos_are_those_of_the_base() {
     let (solution, materials) = &*ROUGH_ROOM;
     for (k, (object, material)) in solution.estimate.objects.iter().zip(materials).enumerate() {
@@ -109,4 +120,79 @@ fn the_diffuse_twin_keeps_no_lobe() {
     );
     let stage = solution.progress.stages.iter().find(|s| s.name == "lobes");
     assert!(!stage.expect("it was looked for").kept);
+}
+
+const FLOOR: usize = 2;
+const CHECKS: u32 = 4;
+
+/// A checkerboard over the floor's two triangles.
+fn tiles(triangles: usize) -> Arc<Texture> {
+    let size = CHECKS * 16;
+    let color = |i: u32| {
+        let odd = (i % size / 16 + i / size / 16) % 2 == 1;
+        if odd {
+            Vec3::new(0.60, 0.50, 0.35)
+        } else {
+            Vec3::new(0.20, 0.22, 0.30)
+        }
+    };
+    let mut corner_uvs = vec![[Vec2::ZERO; 3]; triangles];
+    corner_uvs[2 * FLOOR] = [Vec2::ZERO, Vec2::X, Vec2::ONE];
+    corner_uvs[2 * FLOOR + 1] = [Vec2::ZERO, Vec2::ONE, Vec2::Y];
+    Arc::new(Texture {
+        width: size,
+        height: size,
+        pixels: (0..size * size).map(color).collect(),
+        corner_uvs: Arc::new(corner_uvs),
+    })
+}
+
+/// Polished tiles: colour and gloss are told apart, and neither takes the other's place.
+#[test]
+fn a_texture_below_a_lobe_is_found() {
+    let (mesh, mut materials) = scenes::lamp_room();
+    let tiles = tiles(mesh.triangles.len());
+    materials[FLOOR].albedo = Albedo::Image(tiles.clone(), Vec3::ONE);
+    materials[FLOOR].lobe = Some(Lobe {
+        roughness: 0.2,
+        specular: Vec3::splat(0.12),
+    });
+    let solution = solved(&photographed(mesh, &materials));
+    told(&solution);
+    let estimate = &solution.estimate;
+    for (k, object) in estimate.objects.iter().enumerate() {
+        assert_eq!(object.roughness.is_some(), k == FLOOR, "object {k}");
+    }
+    let (roughness, specular) = estimate.objects[FLOOR].lobe().expect("it has a lobe");
+    assert!((roughness - 0.2).abs() < 0.05, "{roughness}");
+    assert!((specular - 0.12).abs() < 0.04, "{specular}");
+
+    let texels = estimate.texels.as_ref().expect("the tiles were found");
+    let layout = &texels.colors.layout;
+    let (mut sum, mut count) = (Vec3::ZERO, 0);
+    let mut squares = 0.0;
+    for triangle in [2 * FLOOR, 2 * FLOOR + 1] {
+        let first = layout.first[triangle];
+        for texel in 0..layout.first[triangle + 1] - first {
+            let at = (first + texel) as usize;
+            let [b1, b2] = layout.center(triangle, texel);
+            let hit = Hit {
+                t: 0.0,
+                triangle: triangle as u32,
+                b1,
+                b2,
+            };
+            if texels.seen[at] > 0 {
+                let error = texels.colors.colors[at] - tiles.at(&hit);
+                sum += error;
+                squares += error.length_squared() / 3.0;
+                count += 1;
+            }
+        }
+    }
+    let (mean, rms) = (sum / count as f32, (squares / count as f32).sqrt());
+    println!("{count} texels seen: mean error {mean}, rms {rms}");
+    assert!(count > 500);
+    assert!(mean.abs().max_element() < 0.015, "mean error {mean}");
+    assert!(rms < 0.06, "rms error {rms}");
 }

@@ -181,6 +181,13 @@ pub fn coupling(wo: Vec3, wi: Vec3) -> f64 {
     FRAC_1_PI * cos_i * (1.0 - reflected(cos_o)) * (1.0 - reflected(cos_i)) / (1.0 - mean)
 }
 
+/// What the base below any lobe sends at an angle of this cosine to the normal, over what it sends along the normal: the same
+/// whatever light arrives.
+#[inline]
+pub fn base_by_view(cos_theta: f32) -> f32 {
+    ((1.0 - reflected(f64::from(cos_theta))) / (1.0 - reflected(1.0))) as f32
+}
+
 #[inline]
 fn alpha(lobe: &Lobe) -> f64 {
     f64::from(lobe.roughness.clamp(MIN_ROUGHNESS, 1.0))

@@ -2,18 +2,13 @@
 
 use super::fuse::{Problem, fuse, mean, mean_channel};
 use super::links::Links;
-use super::look::SeenPixel;
+use super::look::{FOLDS, SeenPixel};
 use super::observations::Observations;
 use crate::math::color::luminance;
-use crate::math::rng::splitmix64;
 use crate::math::stats::quantile;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Of the pixels in the fit, one in so many is left out in turn to choose the smoothing.
-const FOLDS: usize = 5;
-/// Key of the choice.
-const FOLD_KEY: u64 = 0x51f0_1d5e;
 /// So many pixels left out are enough to choose by.
 const ENOUGH: usize = 4_000;
 /// The strongest smoothing tried, for one pixel a cell, and the factor to the next.
@@ -38,7 +33,7 @@ const CLIP: f64 = 30.0;
 pub struct Measurements {
     /// Which cells each pixel sees.
     pub observations: Observations,
-    /// Measured radiance over that of a white surface.
+    /// Measured radiance, less that of a lobe, over that of a white surface.
     pub albedo: Vec<Vec3>,
     /// Weight of each channel of each: the squared radiance of a white surface over the pixel's variance, on average 1; zero
     /// of lower bounds that the fit lies above.
@@ -67,7 +62,9 @@ pub struct Texture {
 impl Measurements {
     /// Of pixels and what their cells would send if they were white.
     pub fn new(pixels: &[&SeenPixel], observations: Observations, white: &[Vec3]) -> Self {
-        let received = observations.all_of(white);
+        let received: Vec<Vec3> = (observations.all_of(white).iter().zip(pixels))
+            .map(|(r, pixel)| *r * pixel.base)
+            .collect();
         // A channel whose light hardly reached a pixel's cells says nothing there, and weighs nothing.
         let whites: Vec<f32> = received.iter().map(|r| luminance(*r)).collect();
         let least = Vec3::splat((LEAST_LIGHT * mean(&whites)).max(f32::MIN_POSITIVE));
@@ -75,7 +72,10 @@ impl Measurements {
             .map(|r| Vec3::select(r.cmpge(least), *r, Vec3::ZERO))
             .collect();
         let albedo: Vec<Vec3> = (pixels.iter().zip(&received))
-            .map(|(pixel, r)| Vec3::select(r.cmpgt(Vec3::ZERO), pixel.measured / *r, Vec3::ZERO))
+            .map(|(pixel, r)| {
+                let known = r.cmpgt(Vec3::ZERO);
+                Vec3::select(known, (pixel.measured - pixel.gloss) / *r, Vec3::ZERO)
+            })
             .collect();
         // Noise grows with the level, down to a floor, in each channel as in its light.
         let floor = Vec3::from_array([0, 1, 2].map(|channel| {
@@ -86,9 +86,9 @@ impl Measurements {
         }));
         let weigh = |constant: Vec3| -> Vec<Vec3> {
             let albedo = luminance(constant);
-            let raw: Vec<Vec3> = (received.iter())
-                .map(|r| {
-                    let level = *r * albedo;
+            let raw: Vec<Vec3> = (received.iter().zip(pixels))
+                .map(|(r, pixel)| {
+                    let level = *r * albedo + pixel.gloss;
                     let variance = level * level + floor * floor;
                     *r * *r / variance.max(Vec3::splat(f32::MIN_POSITIVE))
                 })
@@ -118,22 +118,22 @@ impl Measurements {
         Self {
             constant,
             bounds,
-            folds: pixels.iter().map(|p| fold(p)).collect(),
+            folds: pixels.iter().map(|p| p.fold).collect(),
             observations,
             albedo,
             weights,
         }
     }
 
-    /// Fits the cells, with the smoothing that predicts pixels left out best; bounds that the fit lies above lose their
-    /// weight.
-    pub fn fit(&mut self, links: &Links) -> Texture {
+    /// Fits the cells, with the smoothing that predicts pixels left out best, in so many folds at least; bounds that the fit
+    /// lies above lose their weight.
+    pub fn fit(&mut self, links: &Links, least_folds: usize) -> Texture {
         let unit = self.unit();
         let values: Vec<Vec3> = self.albedo.iter().map(|a| *a / unit).collect();
         let flat = vec![self.constant / unit; self.observations.cells()];
         let levels = vec![1.0; flat.len()];
         let density = mean_channel(&self.observations.diagonal(&self.weights));
-        let folds = (ENOUGH * FOLDS / self.albedo.len().max(1)).clamp(1, FOLDS);
+        let folds = (ENOUGH * FOLDS / self.albedo.len().max(1)).clamp(least_folds, FOLDS);
         let fitted = |weights: &[Vec3], strength: f32, start: &[Vec3]| {
             let problem = Problem {
                 observations: &self.observations,
@@ -269,13 +269,7 @@ fn is_kept(albedo: Vec3, bound: Vec3, weight: Vec3) -> bool {
     luminance(albedo * received) >= luminance(bound * received)
 }
 
-/// The fold that a pixel in the fit belongs to.
-pub fn fold(pixel: &SeenPixel) -> usize {
-    let key = splitmix64(splitmix64(u64::from(pixel.frame) ^ FOLD_KEY) ^ u64::from(pixel.pixel));
-    (key % FOLDS as u64) as usize
-}
-
-/// The mean of each channel, at most 1; zero where nothing weighs.
+/// The mean of each channel, within 0 and 1; zero where nothing weighs.
 fn weighted_mean(values: &[Vec3], weights: &[Vec3]) -> Vec3 {
     let (mut sum, mut total) = (DVec3::ZERO, DVec3::ZERO);
     for (value, weight) in values.iter().zip(weights) {
@@ -284,7 +278,7 @@ fn weighted_mean(values: &[Vec3], weights: &[Vec3]) -> Vec3 {
         total += weight;
     }
     let mean = DVec3::select(total.cmpgt(DVec3::ZERO), sum / total, DVec3::ZERO);
-    mean.as_vec3().min(Vec3::ONE)
+    mean.as_vec3().clamp(Vec3::ZERO, Vec3::ONE)
 }
 
 #[cfg(test)]
@@ -299,6 +293,9 @@ mod tests {
             held_out: false,
             measured: Vec3::splat(0.3),
             saturated: false,
+            fold: index as usize % FOLDS,
+            base: 1.0,
+            gloss: Vec3::ZERO,
             landings: Vec::new(),
         };
         let pixels: Vec<SeenPixel> = (0..20).map(pixel).collect();
@@ -329,6 +326,9 @@ mod tests {
             // Some light that no path found comes besides.
             measured: truth * white(index as usize) + 1e-3,
             saturated: index >= 95,
+            fold: index as usize % FOLDS,
+            base: 1.0,
+            gloss: Vec3::ZERO,
             landings: Vec::new(),
         };
         let pixels: Vec<SeenPixel> = (0..100).map(pixel).collect();
@@ -359,6 +359,9 @@ mod tests {
                     held_out: false,
                     measured: Vec3::splat(measured),
                     saturated,
+                    fold: i as usize % FOLDS,
+                    base: 1.0,
+                    gloss: Vec3::ZERO,
                     landings: Vec::new(),
                 };
                 (pixel, vec![(cell, 1.0)])
@@ -376,7 +379,7 @@ mod tests {
         };
         let mut measurements =
             Measurements::new(&seen, Observations::new(&rows, 2), &[Vec3::ONE; 2]);
-        let texture = measurements.fit(&links);
+        let texture = measurements.fit(&links, 1);
         let [known, stray] = [0, 1].map(|cell: usize| texture.colors[cell].x);
         assert!((known - 0.8).abs() < 1e-3, "{known}");
         assert!((0.45..0.6).contains(&stray), "{stray}");

@@ -2,8 +2,10 @@
 
 use crate::inverse::solver::Problem;
 use crate::inverse::survey::SurveyedPixel;
-use crate::math::rng::Stream;
+use crate::math::rng::{Stream, splitmix64};
 use crate::scene::geometry::Hit;
+use crate::transport::bsdf::base_by_view;
+use crate::transport::lit::Lit;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -13,6 +15,10 @@ const SIDE: u32 = 4;
 pub const RAYS: u32 = SIDE * SIDE;
 /// First of the sample keys of these rays, far from those of paths.
 const KEY: u64 = 3 << 60;
+/// Of the pixels in the fit, one in so many is left out in turn.
+pub const FOLDS: usize = 5;
+/// Key of the choice.
+const FOLD_KEY: u64 = 0x51f0_1d5e;
 
 /// A pixel that sees one smooth surface of one object, through which rays were cast.
 #[derive(Debug, Clone)]
@@ -27,6 +33,12 @@ pub struct SeenPixel {
     pub measured: Vec3,
     /// Whether that is saturated: the surface sends so much at least.
     pub saturated: bool,
+    /// Which of the [`FOLDS`] it belongs to.
+    pub fold: usize,
+    /// What the base of the surface sends in this direction over what it sends along its normal; 1 without a lobe.
+    pub base: f32,
+    /// Radiance that its lobe sends here, as far as that is known.
+    pub gloss: Vec3,
     /// Where its rays land.
     pub landings: Vec<Landing>,
 }
@@ -40,20 +52,48 @@ pub struct Landing {
     pub front: bool,
     /// Width of the pixel's footprint there: the root of its area, in metres.
     pub footprint: f32,
+    /// Cosine of the angle between the normal on that side and the ray.
+    pub cosine: f32,
+}
+
+impl Landing {
+    /// The normal on the side that is met.
+    pub fn normal(&self, lit: &Lit) -> Vec3 {
+        let normal = lit.scene.normals[self.hit.triangle as usize];
+        if self.front { normal } else { -normal }
+    }
 }
 
 /// Looks through the given pixels, all of which see `object`; those that also see something else are left out.
+///
+/// Where it is `glossy`, folds are whole photographs, those next to each other together: a highlight that was taken for
+/// texture is elsewhere in the photographs left out.
 pub fn look(
     problem: &Problem,
     object: u32,
     pixels: &[&SurveyedPixel],
+    glossy: bool,
     seed: u64,
 ) -> Vec<SeenPixel> {
     let seen: Vec<Option<SeenPixel>> = pixels
         .par_iter()
         .map(|pixel| look_through(problem, object, pixel, seed))
         .collect();
-    seen.into_iter().flatten().collect()
+    let mut seen: Vec<SeenPixel> = seen.into_iter().flatten().collect();
+    if glossy {
+        let mut frames: Vec<u32> = seen.iter().map(|p| p.frame).collect();
+        frames.sort_unstable();
+        frames.dedup();
+        for pixel in &mut seen {
+            let before = frames.partition_point(|&frame| frame < pixel.frame);
+            pixel.fold = before * FOLDS / frames.len();
+            let sum: f32 = (pixel.landings.iter())
+                .map(|l| base_by_view(l.cosine))
+                .sum();
+            pixel.base = sum / pixel.landings.len() as f32;
+        }
+    }
+    seen
 }
 
 fn look_through(
@@ -91,6 +131,7 @@ fn look_through(
             hit,
             front: cosine >= 0.0,
             footprint: (to_camera.length_squared() / (focal2 * cosine.abs().max(0.05))).sqrt(),
+            cosine: cosine.abs(),
         });
     }
     Some(SeenPixel {
@@ -99,6 +140,15 @@ fn look_through(
         held_out: surveyed.held_out,
         measured,
         saturated: photograph.is_saturated(surveyed.pixel as usize),
+        fold: fold(surveyed.frame, surveyed.pixel),
+        base: 1.0,
+        gloss: Vec3::ZERO,
         landings,
     })
+}
+
+/// The fold that a pixel belongs to by chance.
+fn fold(frame: u32, pixel: u32) -> usize {
+    let key = splitmix64(splitmix64(u64::from(frame) ^ FOLD_KEY) ^ u64::from(pixel));
+    (key % FOLDS as u64) as usize
 }

@@ -1,7 +1,8 @@
 //! Spatial detail: the albedo of an object's cells, where pixels held out of the fit ask for it.
 //!
 //! For a diffuse point, albedo = radiance in the photograph / radiance of a white surface there. The second is traced
-//! by full paths with the lights and albedos found so far and smoothed where it varies slowly ([`received`]); the
+//! by full paths with the lights and albedos found so far and smoothed where it varies slowly ([`received`]). Where there is
+//! a lobe, what it reflects to each pixel is traced and taken out, and the rest is that of the base below it ([`gloss`]). The
 //! first is noisy, so neighbouring cells are pooled as far as pixels left out of the fit ask for ([`fit`]). A texture
 //! is kept where it predicts held-out pixels better than one colour does, by more than their noise ([`trial`]).
 
@@ -9,6 +10,7 @@ mod cells;
 mod errors;
 mod fit;
 mod fuse;
+mod gloss;
 mod links;
 mod look;
 mod observations;
@@ -125,8 +127,11 @@ impl Refined {
             .collect();
         let (tried, cells) = (self.attempts.len(), self.unknowns());
         if self.worse {
+            let refused = (self.attempts.iter()).filter(|a| a.trial.is_some_and(|t| t.is_gain()));
+            let refused: Vec<String> = refused.map(|a| name(a.object)).collect();
             return format!(
-                "textures of some of {tried} objects tried make held-out pixels worse all together, so none is kept"
+                "textures of {}, of {tried} objects tried, make held-out pixels worse all together, so none is kept",
+                refused.join(", ")
             );
         }
         if kept.is_empty() {
@@ -242,7 +247,8 @@ impl Refinement<'_> {
             let share = index as f64 / candidates.len() as f64 * 0.6;
             let mut done = |rays, rejected| tell(rays, rejected, share);
             done(0, 0)?;
-            let Some(mut coarse) = Surface::new(self.task, *object, pixels, COARSE) else {
+            let glossy = self.estimate.objects[*object].lobe().is_some();
+            let Some(mut coarse) = Surface::new(self.task, *object, glossy, pixels, COARSE) else {
                 continue;
             };
             coarse.find(&lit, &self.options, paths as u64, 0, None, &mut done)?;
@@ -251,7 +257,7 @@ impl Refinement<'_> {
             } else {
                 None
             };
-            let keep = trial.is_some_and(|trial| trial.gain > SIGNIFICANT * trial.noise);
+            let keep = trial.is_some_and(|trial| trial.is_gain());
             self.attempts.push(Attempt {
                 object: *object,
                 cells: coarse.cell_count(),

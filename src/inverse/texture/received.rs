@@ -2,6 +2,7 @@
 
 use super::cells::Cells;
 use super::fuse::{Problem, fuse, mean};
+use super::gloss::white_base;
 use super::links::Links;
 use super::observations::Observations;
 use crate::math::color::luminance;
@@ -9,7 +10,7 @@ use crate::math::rng::Stream;
 use crate::math::warp;
 use crate::scene::geometry::Hit;
 use crate::transport::lit::Lit;
-use crate::transport::path::{PathOptions, white_radiance};
+use crate::transport::path::PathOptions;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -25,7 +26,8 @@ const STRENGTHS: [f32; 9] = [8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.12, 0.06, 0.03];
 /// Worse strengths in a row that end the search.
 const PATIENCE: u32 = 2;
 
-/// What cells would send if they were white (irradiance / π), as two independent sets of paths found it.
+/// What cells would send along their normals if they were white, below their lobe where they have one, as two independent
+/// sets of paths found it.
 #[derive(Debug, Clone, Default)]
 pub struct Received {
     /// One value a cell in each set.
@@ -65,11 +67,11 @@ pub fn trace(
                     let index = KEY + 2 * u64::from(sample) + set;
                     let mut stream = Stream::new(seed, key, cell as u64, index);
                     let (hit, normal) = point_on(lit, cells, cell, &mut stream);
-                    let path =
-                        white_radiance(lit, &lit.surface(&hit), normal, &mut stream, options);
-                    sum += path.radiance.as_dvec3();
-                    rays += u64::from(path.rays);
-                    rejected += u64::from(path.rejected);
+                    let surface = lit.surface(&hit);
+                    let (light, cast) = white_base(lit, &surface, normal, &mut stream, options);
+                    sum += light.as_dvec3();
+                    rays += cast.rays;
+                    rejected += cast.rejected;
                 }
                 (sum / f64::from(samples.max(1))).as_vec3()
             });

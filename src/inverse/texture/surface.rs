@@ -3,9 +3,10 @@
 use super::Task;
 use super::cells::Cells;
 use super::errors::{standard_errors, with_light};
-use super::fit::{Measurements, Texture, fold};
+use super::fit::{Measurements, Texture};
+use super::gloss::gloss_of_each;
 use super::links::Links;
-use super::look::{SeenPixel, look};
+use super::look::{FOLDS, SeenPixel, look};
 use super::observations::Observations;
 use super::received::{Received, trace};
 use super::trial::{Trial, Untouched, try_out};
@@ -21,6 +22,10 @@ const SLICE: usize = 2048;
 /// Paths a cell at most, in each of two sets.
 const MOST_SAMPLES: u64 = 256;
 
+/// Rays of a path from a pixel to what its lobe reflects, for one from a cell; and such paths a pixel at least.
+const GLOSS_PATHS: u64 = 3;
+const LEAST_GLOSS: u64 = 8;
+
 /// Fewer held-out pixels than this are joined by others.
 const FEW_HELD_OUT: usize = 1_000;
 
@@ -28,6 +33,8 @@ const FEW_HELD_OUT: usize = 1_000;
 pub struct Surface {
     /// Object index.
     pub object: usize,
+    /// Whether it has a lobe.
+    glossy: bool,
     seed: u64,
     pixels: Vec<SeenPixel>,
     /// Its cells.
@@ -50,25 +57,28 @@ type Done<'d> = dyn FnMut(u64, u64) -> Result<(), Termination> + 'd;
 impl Surface {
     /// Cuts the object into cells, `width` times as wide as the finest that its pixels resolve; `None` where none of the
     /// pixels sees it alone.
-    pub fn new(task: &Task, object: usize, pixels: &[&SurveyedPixel], width: f32) -> Option<Self> {
-        let pixels = look(task.problem, object as u32, pixels, task.settings.seed);
-        Self::cut(
-            &task.problem.scene,
-            object,
-            pixels,
-            task.settings.seed,
-            width,
-        )
+    pub fn new(
+        task: &Task,
+        object: usize,
+        glossy: bool,
+        pixels: &[&SurveyedPixel],
+        width: f32,
+    ) -> Option<Self> {
+        let seed = task.settings.seed;
+        let pixels = look(task.problem, object as u32, pixels, glossy, seed);
+        Self::cut(&task.problem.scene, object, glossy, pixels, seed, width)
     }
 
     /// The same object in cells of another width.
     pub fn recut(&self, scene: &Scene, width: f32) -> Option<Self> {
-        Self::cut(scene, self.object, self.pixels.clone(), self.seed, width)
+        let pixels = self.pixels.clone();
+        Self::cut(scene, self.object, self.glossy, pixels, self.seed, width)
     }
 
     fn cut(
         scene: &Scene,
         object: usize,
+        glossy: bool,
         mut pixels: Vec<SeenPixel>,
         seed: u64,
         width: f32,
@@ -83,6 +93,7 @@ impl Surface {
         let links = Links::new(scene, &cells);
         let mut surface = Self {
             object,
+            glossy,
             seed,
             seen: vec![0; cells.count()],
             texture: Texture {
@@ -127,10 +138,24 @@ impl Surface {
         }
         let light = received.smoothed(&self.links);
         done(0, 0)?;
+        if self.glossy {
+            let samples = paths / (GLOSS_PATHS * self.pixels.len() as u64);
+            let samples = samples.clamp(LEAST_GLOSS, MOST_SAMPLES) as u32;
+            let mut all = Vec::with_capacity(self.pixels.len());
+            for pixels in self.pixels.chunks(SLICE) {
+                let (part, cast) = gloss_of_each(lit, pixels, samples, options, self.seed, key);
+                done(cast.rays, cast.rejected)?;
+                all.extend(part);
+            }
+            for (pixel, gloss) in self.pixels.iter_mut().zip(all) {
+                pixel.gloss = gloss;
+            }
+        }
         let observations = Observations::new(&self.rows(), self.cells.count());
         let fitted: Vec<&SeenPixel> = self.pixels.iter().filter(|p| !p.held_out).collect();
         let mut measurements = Measurements::new(&fitted, observations, &light.radiance);
-        self.texture = measurements.fit(&self.links);
+        let least_folds = if self.glossy { FOLDS } else { 1 };
+        self.texture = measurements.fit(&self.links, least_folds);
         self.constant = measurements.constant;
         done(0, 0)?;
         if let Some(scale_error) = errors {
@@ -155,20 +180,29 @@ impl Surface {
         options: &PathOptions,
         done: &mut Done,
     ) -> Result<Trial, Termination> {
-        // Held-out pixels; where they are few, also those that were left out in turn to choose the smoothing.
+        // Held-out pixels; where they are few, also those that were left out in turn to choose the smoothing. Under a lobe
+        // these alone, held-out ones included: their photographs were left out whole.
         let colors = self.texture.colors.as_slice();
         let told = || self.pixels.iter().filter(|p| !p.saturated);
-        let held_out = told().filter(|p| p.held_out);
+        let held_out = told().filter(|p| p.held_out && !self.glossy);
         let mut pixels: Vec<Untouched> =
             held_out.map(|pixel| Untouched { pixel, colors }).collect();
         if pixels.len() < FEW_HELD_OUT {
-            let fitted = told().filter(|p| !p.held_out);
-            pixels.extend(fitted.filter_map(|pixel| {
-                let colors = self.texture.without.get(fold(pixel))?;
+            let left_out = told().filter(|p| self.glossy || !p.held_out);
+            pixels.extend(left_out.filter_map(|pixel| {
+                let colors = self.texture.without.get(pixel.fold)?;
                 Some(Untouched { pixel, colors })
             }));
         }
-        let trial = try_out(lit, &self.cells, &pixels, self.constant, options, self.seed);
+        let trial = try_out(
+            lit,
+            &self.cells,
+            &pixels,
+            self.constant,
+            self.glossy,
+            options,
+            self.seed,
+        );
         done(trial.cast.rays, trial.cast.rejected)?;
         Ok(trial)
     }

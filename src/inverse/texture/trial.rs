@@ -2,13 +2,14 @@
 
 use super::SIGNIFICANT;
 use super::cells::Cells;
+use super::gloss::{gloss, white_base};
 use super::look::SeenPixel;
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::math::stats::{Moments, quantile};
 use crate::transport::arrival::Cast;
 use crate::transport::lit::Lit;
-use crate::transport::path::{PathOptions, white_radiance};
+use crate::transport::path::PathOptions;
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -57,12 +58,14 @@ pub struct Untouched<'a> {
 ///
 /// Both see the same light: full paths from the pixel's own points, in two independent sets whose errors are
 /// multiplied, so that the noise of the paths favours neither. Where a first part of the pixels speaks plainly for the
-/// texture, or leaves no hope that all of them together would, the rest are not traced.
+/// texture, or leaves no hope that all of them together would, the rest are not traced. Where the surface is `glossy`, what
+/// the pixels of one photograph share counts once.
 pub fn try_out(
     lit: &Lit,
     cells: &Cells,
     pixels: &[Untouched],
     constant: Vec3,
+    glossy: bool,
     options: &PathOptions,
     seed: u64,
 ) -> Trial {
@@ -89,11 +92,11 @@ pub fn try_out(
         comparison.compare(&pixels)
     };
     let mut compared = part(true);
-    let first = Trial::of(&compared);
+    let first = Trial::of(&compared, glossy);
     if !is_plain(&first) && !is_hopeless(&first, count) {
         compared.extend(part(false));
     }
-    Trial::of(&compared)
+    Trial::of(&compared, glossy)
 }
 
 /// Whether the pixels compared so far decide for the texture already.
@@ -122,6 +125,7 @@ struct Comparison<'a> {
 
 /// Squared relative errors of one pixel, and what tracing it took.
 struct Compared {
+    frame: u32,
     flat: f64,
     textured: f64,
     cast: Cast,
@@ -146,16 +150,14 @@ impl Comparison<'_> {
                 let key = (u64::from(pixel.frame), u64::from(pixel.pixel));
                 let mut stream = Stream::new(self.seed, key.0, key.1, sample);
                 let surface = self.lit.surface(&landing.hit);
-                let normal = if landing.front {
-                    surface.normal
-                } else {
-                    -surface.normal
-                };
-                let path = white_radiance(self.lit, &surface, normal, &mut stream, self.options);
-                cast.rays += u64::from(path.rays);
-                cast.rejected += u64::from(path.rejected);
-                flat += path.radiance * self.constant;
-                textured += path.radiance * texture(&landing.hit);
+                let normal = landing.normal(self.lit);
+                let (white, took) =
+                    white_base(self.lit, &surface, normal, &mut stream, self.options);
+                let (lobe, more) = gloss(self.lit, pixel, path, &mut stream, self.options);
+                cast += took;
+                cast += more;
+                flat += white * pixel.base * self.constant + lobe;
+                textured += white * pixel.base * texture(&landing.hit) + lobe;
             }
             [flat, textured].map(|sum| sum / self.paths as f32)
         });
@@ -172,6 +174,7 @@ impl Comparison<'_> {
             }
         };
         Compared {
+            frame: pixel.frame,
             flat: error(flat),
             textured: error(sets.map(|set| set[1])),
             cast,
@@ -180,32 +183,68 @@ impl Comparison<'_> {
 }
 
 impl Trial {
-    fn of(pixels: &[Compared]) -> Self {
+    /// Whether the gain is no accident.
+    pub fn is_gain(&self) -> bool {
+        self.gain > SIGNIFICANT * self.noise
+    }
+
+    fn of(pixels: &[Compared], glossy: bool) -> Self {
         let mut sizes: Vec<f64> = (pixels.iter())
             .map(|p| (p.flat - p.textured).abs())
             .collect();
         let clip = CLIP * quantile(&mut sizes, 0.68).unwrap_or(0.0);
         let (mut before, mut after) = (Moments::default(), Moments::default());
         let mut gain = Moments::default();
-        for pixel in pixels {
+        let gains: Vec<(u32, f64)> = (pixels.iter())
+            .map(|p| (p.frame, (p.flat - p.textured).clamp(-clip, clip)))
+            .collect();
+        for (pixel, &(_, gained)) in pixels.iter().zip(&gains) {
             before.push(pixel.flat);
             after.push(pixel.textured);
-            gain.push((pixel.flat - pixel.textured).clamp(-clip, clip));
+            gain.push(gained);
         }
         Self {
             before: before.mean,
             after: after.mean,
             gain: gain.mean,
-            noise: gain.standard_error(),
+            noise: if glossy {
+                error_by_frame(gains, gain.mean)
+            } else {
+                gain.standard_error()
+            },
             pixels: pixels.len(),
             cast: pixels.iter().map(|p| p.cast).sum(),
         }
     }
 }
 
+/// Standard error of the mean of gains where those of a photograph depend on each other, as they share what is wrong with a
+/// highlight; infinite where there is one photograph alone.
+fn error_by_frame(mut gains: Vec<(u32, f64)>, mean: f64) -> f64 {
+    gains.sort_by_key(|&(frame, _)| frame);
+    let sums = (gains.chunk_by(|a, b| a.0 == b.0))
+        .map(|frame| frame.iter().map(|(_, gain)| gain - mean).sum::<f64>());
+    let (frames, squares) = sums.fold((0.0, 0.0), |(n, s), sum| (n + 1.0, s + sum * sum));
+    if frames < 2.0 {
+        return f64::INFINITY;
+    }
+    (squares * frames / (frames - 1.0)).sqrt() / gains.len() as f64
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Ten photographs of fifty pixels each, whose gains differ by photograph alone: as good as ten measurements.
+    #[test]
+    fn what_pixels_of_a_photograph_share_counts_once() {
+        let of_frame = |frame: u32| f64::from(frame % 5) - 2.0;
+        let gains: Vec<(u32, f64)> = (0..500).map(|i| (i % 10, of_frame(i % 10))).collect();
+        let error = error_by_frame(gains, 0.0);
+        // Variance 2 of each, unbiased 20/9, over ten.
+        assert!((error - (20.0f64 / 90.0).sqrt()).abs() < 1e-12, "{error}");
+        assert_eq!(error_by_frame(vec![(3, 1.0), (3, 2.0)], 1.5), f64::INFINITY);
+    }
 
     #[test]
     fn a_loss_or_a_plain_gain_ends_a_trial_early_and_a_promising_gain_does_not() {

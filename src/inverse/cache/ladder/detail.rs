@@ -50,15 +50,14 @@ impl Ladder<'_, '_> {
         }
     }
 
-    /// Tries a texture on every object that reflects and gives no light; what has a lobe keeps one colour.
+    /// Tries a texture on every object that reflects and gives no light.
     pub(super) fn detail(&mut self) -> Result<(), Termination> {
+        self.settle_lobes_below_textures()?;
         let started = self.monitor.seconds();
         self.monitor.phase("looking for textures");
         let objects: Vec<usize> = (0..self.problem.scene.objects.len())
             .filter(|&k| {
-                self.roles[k] == Role::Reflector
-                    && self.lobes[k].is_none()
-                    && self.monitor.known.of(k).albedo.is_none()
+                self.roles[k] == Role::Reflector && self.monitor.known.of(k).albedo.is_none()
             })
             .collect();
         let settings = self.monitor.settings.clone();

@@ -1,0 +1,102 @@
+//! What a surface sends whose albedo is looked for: its base, and the lobe above it where there is one.
+
+use super::look::SeenPixel;
+use crate::math::frame::Frame;
+use crate::math::rng::Stream;
+use crate::transport::arrival::{Cast, arrivals};
+use crate::transport::lit::Lit;
+use crate::transport::path::{PathOptions, white_radiance};
+use crate::transport::world::SurfacePoint;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// First of the sample keys of these paths, far from those of other stages.
+const KEY: u64 = 11 << 59;
+
+/// Radiance that the base would send along `normal` if its albedo were one, estimated by one path or two: irradiance / π
+/// where there is no lobe.
+pub fn white_base(
+    lit: &Lit,
+    surface: &SurfacePoint,
+    normal: Vec3,
+    stream: &mut Stream,
+    options: &PathOptions,
+) -> (Vec3, Cast) {
+    let Some(lobe) = surface.lobe else {
+        let path = white_radiance(lit, surface, normal, stream, options);
+        let cast = Cast {
+            rays: u64::from(path.rays),
+            rejected: u64::from(path.rejected),
+        };
+        return (path.radiance, cast);
+    };
+    let frame = Frame::around(normal);
+    let mut found = Vec::new();
+    let cast = arrivals(
+        lit,
+        surface,
+        &frame,
+        Vec3::Z,
+        &[],
+        stream,
+        options,
+        &mut found,
+    );
+    let light = (found.iter()).map(|a| a.light.as_dvec3() * lobe.base(Vec3::Z, a.wi));
+    (light.sum::<DVec3>().as_vec3(), cast)
+}
+
+/// Radiance that the lobe of the `landing`th place where a pixel's rays land sends to the camera, estimated by a few paths;
+/// none where there is no lobe.
+pub fn gloss(
+    lit: &Lit,
+    pixel: &SeenPixel,
+    landing: usize,
+    stream: &mut Stream,
+    options: &PathOptions,
+) -> (Vec3, Cast) {
+    let landing = &pixel.landings[landing % pixel.landings.len()];
+    let surface = lit.surface(&landing.hit);
+    let Some(lobe) = surface.lobe else {
+        return (Vec3::ZERO, Cast::default());
+    };
+    let camera = &lit.scene.cameras[pixel.frame as usize];
+    let frame = Frame::around(landing.normal(lit));
+    let wo = frame.to_local((camera.center - surface.point).normalize_or_zero());
+    if wo.z <= 0.0 {
+        return (Vec3::ZERO, Cast::default());
+    }
+    let mut found = Vec::new();
+    let drawn = [f64::from(lobe.roughness)];
+    let cast = arrivals(
+        lit, &surface, &frame, wo, &drawn, stream, options, &mut found,
+    );
+    let light = (found.iter()).map(|a| a.light.as_dvec3() * lobe.reflected(wo, a.wi));
+    (light.sum::<DVec3>().as_vec3(), cast)
+}
+
+/// The mean of [`gloss`] over so many paths of each pixel.
+pub fn gloss_of_each(
+    lit: &Lit,
+    pixels: &[SeenPixel],
+    samples: u32,
+    options: &PathOptions,
+    seed: u64,
+    key: u64,
+) -> (Vec<Vec3>, Cast) {
+    let traced: Vec<(Vec3, Cast)> = (pixels.par_iter())
+        .map(|pixel| {
+            let (mut sum, mut cast) = (DVec3::ZERO, Cast::default());
+            for sample in 0..samples {
+                let place = (u64::from(pixel.frame) << 32) + u64::from(pixel.pixel);
+                let mut stream = Stream::new(seed, key, place, KEY + u64::from(sample));
+                let (light, took) = gloss(lit, pixel, sample as usize, &mut stream, options);
+                sum += light.as_dvec3();
+                cast += took;
+            }
+            ((sum / f64::from(samples.max(1))).as_vec3(), cast)
+        })
+        .collect();
+    let cast = traced.iter().map(|(_, cast)| *cast).sum();
+    (traced.into_iter().map(|(light, _)| light).collect(), cast)
+}
