@@ -116,6 +116,9 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
         ..watch.results
     };
     save::write(&folder, &results)?;
+    for warning in &results.progress.warnings {
+        eprintln!("warning: {warning}");
+    }
     println!("{}", report::objects(&capture.scene, &results.estimate));
     println!(
         "{}",

@@ -20,7 +20,7 @@ pub fn is_held_out(settings: &Settings, frame: u32, pixel: u32) -> bool {
 /// # Errors
 /// No photograph is left to fit.
 pub fn leaves_some(settings: &Settings, frames: usize) -> Result<()> {
-    if settings.hold_out == 0 || frames > 1 && settings.hold_out > 1 {
+    if settings.hold_out == 0 || frames == 0 || frames > 1 && settings.hold_out > 1 {
         return Ok(());
     }
     Err(Error::usage(

@@ -219,6 +219,8 @@ parameters! {
         "Try light from outside the mesh, where rays leave it";
     exposures: bool = true, Kind::Flag, "", false,
         "Estimate the exposure and white balance of each photograph, and how the lens dims the corners, where the photographs disagree about surfaces that they share";
+    leave_out: bool = true, Kind::Flag, "", false,
+        "Leave out photographs that do not show what all others show of the surfaces that they share, as from a wrong pose (not in the paper's descent)";
     lobes: bool = true, Kind::Flag, "", false,
         "Try a rough specular lobe on objects that look different from different sides";
     textures: bool = true, Kind::Flag, "", false,

@@ -14,7 +14,7 @@ const NEAR: f64 = 0.03;
 /// Relative weight that keeps what is open near zero.
 const OPEN: f64 = 1e-9;
 /// Cells that a photograph must share with others, for its exposure to be told.
-const LEAST_CELLS: usize = 30;
+pub(super) const LEAST_CELLS: usize = 30;
 
 /// What of it may differ from one.
 #[derive(Debug, Clone, Copy)]
@@ -106,8 +106,9 @@ pub(super) fn fit(sights: &[Sight], frames: usize, parts: Parts) -> Logarithms {
     found
 }
 
-/// Sets the exposures of photographs that are held out to the median difference from the cells as the others show them.
-pub(super) fn compare(sights: &Sights, found: &mut Logarithms) {
+/// Sets the exposures of photographs that are held out to the median difference from the cells as the others show them, and
+/// gives the differences of each that are left.
+pub(super) fn compare(sights: &Sights, found: &mut Logarithms) -> BTreeMap<usize, Vec<DVec3>> {
     let levels = cell_levels(&sights.fitted, found);
     let cells = sights.fitted.iter().map(|s| s.cell);
     let level_of: BTreeMap<u64, DVec3> = cells.zip(levels).collect();
@@ -118,11 +119,13 @@ pub(super) fn compare(sights: &Sights, found: &mut Logarithms) {
             of_frame.push(sight.level - found.power * sight.off_axis - *level);
         }
     }
-    for (frame, of_frame) in differences {
-        if of_frame.len() >= LEAST_CELLS {
-            found.exposures[frame] = median(of_frame.into_iter());
-        }
+    differences.retain(|_, of_frame| of_frame.len() >= LEAST_CELLS);
+    for (&frame, of_frame) in &mut differences {
+        let exposure = median(of_frame.iter().copied());
+        found.exposures[frame] = exposure;
+        of_frame.iter_mut().for_each(|d| *d -= exposure);
     }
+    differences
 }
 
 /// Where the unknowns stand: the row of each photograph that has one, then vignetting's power.

@@ -6,19 +6,21 @@
 //! absolute differences, so that highlights, mis-registration and people decide nothing. One common factor stays open; by
 //! convention the exposures' median is 1 in each channel, and the lens dims nothing on its axis.
 
+mod agreement;
 mod fit;
 mod sights;
 
 use crate::capture::exposure::{Exposure, Vignetting};
 use crate::capture::photograph::Photograph;
 use crate::inverse::solver::Problem;
-use crate::inverse::survey::Survey;
 use crate::math::stats::Moments;
 use crate::scene::camera::Camera;
+pub use agreement::Agreement;
 use fit::{Parts, compare, disagreements, fit};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use sights::{Sight, Sights, shared};
+pub use sights::Sights;
+use sights::{Sight, shared};
 use std::sync::Arc;
 
 /// Share of the disagreement on cells left out of the fit that exposures must explain, next to vignetting where that is found.
@@ -48,13 +50,9 @@ impl Exposures {
     /// Compares the photographs on the surfaces that they share, held-out pixels left out; `None` where too few are
     /// shared to tell. A photograph that is held out whole is given the exposure at which it fits what the others found, so
     /// that it can test more than that.
-    pub fn new(problem: &Problem, survey: &Survey) -> Option<Self> {
-        let sights = Sights::new(problem, survey);
-        Self::of(
-            &sights,
-            problem.photographs.len(),
-            one_lens(&problem.scene.cameras),
-        )
+    pub fn new(problem: &Problem, sights: &Sights) -> Option<Self> {
+        let one_lens = one_lens(&problem.scene.cameras);
+        Self::of(sights, problem.photographs.len(), one_lens)
     }
 
     fn of(sights: &Sights, photographs: usize, one_lens: bool) -> Option<Self> {

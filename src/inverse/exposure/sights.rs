@@ -26,10 +26,10 @@ pub(super) struct Sight {
 
 /// What the photographs show of the cells, in order of cells.
 #[derive(Debug, Default)]
-pub(super) struct Sights {
-    pub fitted: Vec<Sight>,
+pub struct Sights {
+    pub(super) fitted: Vec<Sight>,
     /// Of photographs that are kept out of every fit: these are compared with the others, and the others not with them.
-    pub held_out: Vec<Sight>,
+    pub(super) held_out: Vec<Sight>,
 }
 
 /// Sums over the pixels of a photograph that see a cell.
@@ -93,6 +93,12 @@ impl Sights {
         };
         let (held_out, fitted) = (sums.into_iter().map(sight)).partition(|s| held_out[s.frame]);
         Self { fitted, held_out }
+    }
+
+    /// Forgets what a photograph shows.
+    pub(super) fn forget(&mut self, frame: usize) {
+        self.fitted.retain(|sight| sight.frame != frame);
+        self.held_out.retain(|sight| sight.frame != frame);
     }
 }
 

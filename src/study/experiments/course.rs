@@ -235,6 +235,7 @@ pub fn cache_settings(seed: u64, quick: bool) -> Settings {
         textures: false,
         lobes: false,
         outside_light: false,
+        leave_out: false,
         ..Settings::default()
     }
 }

@@ -22,7 +22,7 @@ use super::trust::Trust;
 use super::{PathCache, describe};
 use crate::error;
 use crate::inverse::estimate::Estimate;
-use crate::inverse::exposure::Exposures;
+use crate::inverse::exposure::{Agreement, Exposures, Sights};
 use crate::inverse::loss::{LossProbe, Losses};
 use crate::inverse::monitor::Monitor;
 use crate::inverse::outside::MeasuredOutside;
@@ -106,10 +106,22 @@ pub fn solve(
     let surfaces = objects + outside.surfaces();
     monitor.phase("looking through the pixels");
     let started = monitor.seconds();
-    let survey = Survey::new(problem, settings, budget.survey_pixels);
+    let mut survey = Survey::new(problem, settings, budget.survey_pixels);
     monitor.progress.rays += survey.rays;
+    let mut shared = Sights::new(problem, &survey);
+    let poor = (settings.leave_out)
+        .then(|| Agreement::new(&mut shared, problem.photographs.len()))
+        .flatten()
+        .filter(|agreement| !agreement.poor.is_empty());
+    let agreeing = poor.as_ref().map(|poor| poor.without_poor(problem));
+    let problem = agreeing.as_ref().unwrap_or(problem);
+    if let Some(poor) = poor {
+        survey = Survey::new(problem, settings, budget.survey_pixels);
+        monitor.progress.rays += survey.rays;
+        monitor.progress.warnings = poor.remarks();
+    }
     let exposures = (settings.exposures)
-        .then(|| Exposures::new(problem, &survey))
+        .then(|| Exposures::new(problem, &shared))
         .flatten();
     let needed = exposures.as_ref().filter(|e| e.needed());
     let undone = needed.map(|exposures| exposures.undone(problem));

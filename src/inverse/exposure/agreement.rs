@@ -1,0 +1,234 @@
+//! Photographs that do not show what all others show: taken from elsewhere than their pose says, or of another room.
+
+use super::fit::{LEAST_CELLS, Logarithms, Parts, compare, fit};
+use super::sights::{Sight, Sights, shared};
+use crate::capture::photograph::Photograph;
+use crate::inverse::solver::Problem;
+use crate::math::stats::quantile;
+use glam::DVec3;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Photographs that must be compared, for the usual difference to say something.
+const LEAST_PHOTOGRAPHS: usize = 4;
+/// A photograph is poor whose difference is so many times that of most, ...
+const PLAINLY: f64 = 4.0;
+/// ... and a factor of e to this at least: noise, gloss and a blurred picture make less.
+const LEAST_DIFFERENCE: f64 = 0.3;
+
+/// How well photographs agree about the surfaces that they share.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Agreement {
+    /// Half of the photographs differ by at most so much, as the logarithm of a factor, from what the others show of half of the
+    /// surfaces that they share, each at the exposure that suits it best.
+    pub usual: f64,
+    /// Photographs that differ plainly more than that, and by how much, in order.
+    pub poor: BTreeMap<usize, f64>,
+}
+
+impl Agreement {
+    /// Compares the photographs, and takes what poor ones show out of what is compared; `None` where too few share enough to
+    /// tell. The poorest is taken out first, since its neighbours may only differ from it; photographs that are held out are
+    /// compared with the others, and the others not with them.
+    pub fn new(sights: &mut Sights, photographs: usize) -> Option<Self> {
+        let mut poor = BTreeMap::new();
+        let mut now = Differences::new(&shared(&sights.fitted), photographs);
+        let compared = now.of_frame.len();
+        let mut usual = now.usual()?;
+        loop {
+            let worst = now.of_frame.iter().max_by(|a, b| a.1.total_cmp(b.1));
+            let most = compared.div_ceil(2) - 1;
+            let Some((&frame, &difference)) =
+                worst.filter(|(_, d)| is_poor(**d, usual) && poor.len() < most)
+            else {
+                break;
+            };
+            poor.insert(frame, difference);
+            sights.forget(frame);
+            now = Differences::new(&shared(&sights.fitted), photographs);
+            usual = now.usual().unwrap_or(usual);
+        }
+        for (frame, left) in compare(sights, &mut now.found) {
+            let mut sizes: Vec<f64> = left.iter().map(|d| d.abs().element_sum() / 3.0).collect();
+            if let Some(difference) = quantile(&mut sizes, 0.5).filter(|&d| is_poor(d, usual)) {
+                poor.insert(frame, difference);
+                sights.forget(frame);
+            }
+        }
+        Some(Self { usual, poor })
+    }
+
+    /// The problem with none of the poor photographs' pixels in it.
+    pub fn without_poor(&self, problem: &Problem) -> Problem {
+        let mut problem = problem.clone();
+        for &frame in self.poor.keys() {
+            let photograph = &problem.photographs[frame];
+            problem.photographs[frame] = Arc::new(Photograph {
+                usable: vec![false; photograph.pixels.len()],
+                ..(**photograph).clone()
+            });
+        }
+        problem
+    }
+
+    /// Which photographs are poor and why, in a sentence for each.
+    pub fn remarks(&self) -> Vec<String> {
+        let share = |difference: f64| (difference.exp() - 1.0) * 100.0;
+        let remark = |(frame, difference): (&usize, &f64)| {
+            format!(
+                "frame {frame} (counted from 0) is left out: half of what it shares with others differs by {:.0} % or more, where \
+                 {:.0} % is usual; its pose may be wrong",
+                share(*difference),
+                share(self.usual)
+            )
+        };
+        self.poor.iter().map(remark).collect()
+    }
+}
+
+/// Whether a difference is plainly more than the usual one.
+fn is_poor(difference: f64, usual: f64) -> bool {
+    difference > (usual * PLAINLY).max(LEAST_DIFFERENCE)
+}
+
+/// Of each photograph that shares enough, the median difference from what the others show of the same cells.
+struct Differences {
+    of_frame: BTreeMap<usize, f64>,
+    found: Logarithms,
+}
+
+impl Differences {
+    fn new(shared: &[Sight], photographs: usize) -> Self {
+        let parts = Parts {
+            exposures: true,
+            vignetting: false,
+        };
+        let found = fit(shared, photographs, parts);
+        let mut all = vec![Vec::new(); photographs];
+        for cell in shared.chunk_by(|a, b| a.cell == b.cell) {
+            let levels: Vec<DVec3> = (cell.iter())
+                .map(|sight| sight.level - found.exposures[sight.frame])
+                .collect();
+            for (sight, difference) in cell.iter().zip(from_others(&levels)) {
+                all[sight.frame].push(difference);
+            }
+        }
+        let of_frame = (all.iter_mut().enumerate())
+            .filter(|(_, all)| all.len() >= LEAST_CELLS)
+            .filter_map(|(frame, all)| Some((frame, quantile(all, 0.5)?)))
+            .collect();
+        Self { of_frame, found }
+    }
+
+    /// The median over photographs; `None` where they are too few.
+    fn usual(&self) -> Option<f64> {
+        let mut all: Vec<f64> = self.of_frame.values().copied().collect();
+        let enough = all.len() >= LEAST_PHOTOGRAPHS;
+        enough.then(|| quantile(&mut all, 0.5))?
+    }
+}
+
+/// How far each of a cell's levels is from the median of the others, mean over the channels.
+fn from_others(levels: &[DVec3]) -> Vec<f64> {
+    let mut sum = vec![0.0; levels.len()];
+    for channel in 0..3 {
+        let mut order: Vec<usize> = (0..levels.len()).collect();
+        order.sort_by(|&a, &b| levels[a][channel].total_cmp(&levels[b][channel]));
+        for (place, &own) in order.iter().enumerate() {
+            // The middle of the order without `place`.
+            let rest = |i: usize| levels[order[i + usize::from(i >= place)]][channel];
+            let count = levels.len() - 1;
+            let median = 0.5 * (rest((count - 1) / 2) + rest(count / 2));
+            sum[own] += (levels[own][channel] - median).abs() / 3.0;
+        }
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::rng::Stream;
+
+    /// Random numbers from −1 to 1.
+    fn numbers() -> impl FnMut() -> f64 {
+        let mut stream = Stream::new(73, 0, 0, 0);
+        move || f64::from(stream.uniform()) * 2.0 - 1.0
+    }
+
+    /// Cells of random levels, each seen by the photographs that `sees` takes for it, of random exposures, with a tenth of
+    /// noise; what those in `wrong` show has nothing to do with it.
+    fn seen(
+        cells: usize,
+        frames: usize,
+        wrong: &[usize],
+        sees: impl Fn(usize, usize) -> bool,
+    ) -> Vec<Sight> {
+        let mut draw = numbers();
+        let exposures: Vec<f64> = (0..frames).map(|_| draw()).collect();
+        let mut sights = Vec::new();
+        for cell in 0..cells {
+            let level = draw();
+            for (frame, exposure) in exposures.iter().enumerate().filter(|f| sees(cell, f.0)) {
+                let shown = match wrong.contains(&frame) {
+                    true => draw(),
+                    false => level + 0.1 * draw(),
+                };
+                sights.push(Sight {
+                    frame,
+                    cell: cell as u64,
+                    level: DVec3::splat(shown + exposure),
+                    off_axis: 0.0,
+                });
+            }
+        }
+        sights
+    }
+
+    fn poor(fitted: Vec<Sight>, held_out: Vec<Sight>, frames: usize) -> Option<Vec<usize>> {
+        let mut sights = Sights { fitted, held_out };
+        let found = Agreement::new(&mut sights, frames)?;
+        assert_eq!(found.remarks().len(), found.poor.len());
+        let left = sights.fitted.iter().chain(&sights.held_out);
+        assert!(left.map(|s| s.frame).all(|f| !found.poor.contains_key(&f)));
+        Some(found.poor.into_keys().collect())
+    }
+
+    #[test]
+    fn photographs_of_something_else_are_found_whatever_the_exposures() {
+        for wrong in [&[][..], &[3], &[0, 5]] {
+            let sights = seen(400, 8, wrong, |cell, frame| (cell >> frame) % 2 == 0);
+            assert_eq!(poor(sights, Vec::new(), 8).as_deref(), Some(wrong));
+        }
+    }
+
+    /// A walk on which each photograph shares cells with the next alone: those beside the wrong one differ from nothing else.
+    #[test]
+    fn neighbours_of_a_wrong_photograph_stay() {
+        let sights = seen(40 * 11, 12, &[5], |cell, frame| {
+            (cell / 40..cell / 40 + 2).contains(&frame)
+        });
+        assert_eq!(poor(sights, Vec::new(), 12), Some(vec![5]));
+    }
+
+    #[test]
+    fn photographs_held_out_are_judged_by_the_others() {
+        let sights = seen(400, 8, &[2], |_, _| true);
+        let held_out = |frame: usize| frame == 2 || frame == 6;
+        let (held_out, fitted) = sights.into_iter().partition(|s| held_out(s.frame));
+        assert_eq!(poor(fitted, held_out, 8), Some(vec![2]));
+    }
+
+    #[test]
+    fn three_photographs_are_too_few_to_tell_which_is_wrong() {
+        assert_eq!(poor(seen(400, 3, &[1], |_, _| true), Vec::new(), 3), None);
+    }
+
+    #[test]
+    fn a_level_is_compared_with_the_median_of_the_others() {
+        let levels = [5.0, 1.0, 2.0, 4.0].map(DVec3::splat);
+        // Medians of 1 2 4, of 2 4 5, of 1 4 5 and of 1 2 5.
+        assert_eq!(from_others(&levels), [3.0, 3.0, 2.0, 2.0]);
+        assert_eq!(from_others(&levels[..2]), [4.0, 4.0]);
+    }
+}
