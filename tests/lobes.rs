@@ -87,11 +87,12 @@ fn lobes_are_found_where_they_are_and_nowhere_else() {
 }
 
 #[test]
-fn no_highlight_becomes_a_texture() {
+fn no_highlight_becomes_a_texture_or_speaks_against_a_photograph() {
     let (solution, _) = &*ROUGH_ROOM;
     assert!(solution.estimate.texels.is_none());
     let looked = |name: &str| solution.progress.stages.iter().any(|s| s.name == name);
     assert!(looked("textures"));
+    assert!(solution.progress.warnings.is_empty());
 }
 
 #[test]
@@ -104,6 +105,31 @@ fn albedos_are_those_of_the_base() {
         let off = relative_to_albedo(object.albedo - albedo, albedo);
         println!("object {k}: {off:.4} off, {:?}", object.specular);
         assert!(off < 0.03 || albedo == Vec3::ZERO, "object {k}: {off}");
+    }
+}
+
+/// The paper's failure: without a lobe the highlights go into the albedo.
+#[test]
+fn without_lobes_highlights_raise_albedos() {
+    let (problem, materials) = room(true);
+    let settings = Settings {
+        lobes: false,
+        textures: false,
+        ..Settings::default()
+    };
+    let flat = scenes::solved(&problem, &settings).estimate;
+    let (solution, _) = &*ROUGH_ROOM;
+    for (k, material) in materials.iter().enumerate().skip(FIRST) {
+        let truth = scenes::albedo(material);
+        let off = |found: Vec3| relative_to_albedo(found - truth, truth);
+        let [with, without] = [&solution.estimate, &flat].map(|e| e.objects[k].albedo);
+        println!(
+            "object {k}: {} off, without lobes {}",
+            off(with),
+            off(without)
+        );
+        assert!(off(without) > 5.0 * off(with));
+        assert!((without - truth).min_element() > 0.0);
     }
 }
 

@@ -270,6 +270,19 @@ mod tests {
 
     /// 15 tests at significance 1e-4 each; a narrow lobe at the horizon is too thin for the cells' midpoint rule.
     #[test]
+    fn the_base_looks_the_same_from_everywhere_but_for_a_factor() {
+        let lobe = Lobe {
+            roughness: 0.3,
+            specular: Vec3::splat(0.2),
+        };
+        for (cos_o, cos_i) in [(0.05, 0.7), (0.4, 0.1), (0.9, 0.95), (1.0, 0.5)] {
+            let (wo, wi) = (direction(cos_o, 0.3), direction(cos_i, 2.0));
+            let along_normal = lobe.base(Vec3::Z, wi) * f64::from(base_by_view(wo.z));
+            assert!((lobe.base(wo, wi) - along_normal).abs().max_element() < 1e-7);
+        }
+    }
+
+    #[test]
     fn samples_follow_the_density() {
         let mut seed = 0;
         for cos_theta in [1.0, 0.7, 0.2, 1e-3] {

@@ -36,9 +36,10 @@ const SCREENED_BOUNCES: u32 = 2;
 const MOST_SIGHTS: usize = 1200;
 /// Directions at a point in a first fit are drawn by these roughnesses.
 const FIRST_DRAWN: [f64; 2] = [0.08, 0.3];
-/// Points of a sight in each of two sets, at least and at most: in the first fit, and in the last.
+/// Points of a sight in each of two sets, at least and at most: in the first fit, in the second, and where a lobe is found anew.
 const FIRST_POINTS: (u64, u64) = (8, 48);
-const LAST_POINTS: (u64, u64) = (12, 96);
+const SECOND_POINTS: (u64, u64) = (12, 96);
+const POINTS_ANEW: (u64, u64) = (12, 384);
 
 /// A last fit looks no further than so many times the roughness that directions were drawn by.
 const NEAR: f64 = 2.0;
@@ -173,19 +174,20 @@ impl<'a> Lobes<'a> {
         evidence.is_some_and(|t| t > CALLING)
     }
 
-    /// Finds an object's lobe, from nothing or from what was found before; `None` where nothing tells.
+    /// Finds an object's lobe, from nothing or from what was found before; `None` where nothing tells. What is found from
+    /// before is by paths of its `turn`, independent of those of other turns.
     pub fn find(
         &self,
         lit: &Lit,
         object: usize,
         emits: bool,
-        known: Option<Lobe>,
+        known: Option<(Lobe, u64)>,
         tell: &mut Tell,
     ) -> Result<Option<Found>, Termination> {
         let scene = &self.task.problem.scene;
         let spots = &self.spots[object];
-        let (roughness, pass) = match known {
-            Some(lobe) => (f64::from(lobe.roughness), 3),
+        let (roughness, pass, points) = match known {
+            Some((lobe, turn)) => (f64::from(lobe.roughness), 3 + turn, POINTS_ANEW),
             None => {
                 let mut gathering = self.gathering(lit, object, &FIRST_DRAWN);
                 gathering.points = self.points(object, FIRST_DRAWN.len(), FIRST_POINTS);
@@ -193,14 +195,14 @@ impl<'a> Lobes<'a> {
                 let (evidence, cast) = Evidence::new(&gathering, scene, spots, MOST_SIGHTS);
                 tell(cast)?;
                 match find(&evidence, emits, [0.0, 1.0]) {
-                    Some(first) => (first.roughness, 2),
+                    Some(first) => (first.roughness, 2, SECOND_POINTS),
                     None => return Ok(None),
                 }
             }
         };
         let drawn = [roughness];
         let mut gathering = self.gathering(lit, object, &drawn);
-        gathering.points = self.points(object, drawn.len(), LAST_POINTS);
+        gathering.points = self.points(object, drawn.len(), points);
         gathering.pass = pass;
         let (evidence, cast) = Evidence::new(&gathering, scene, spots, MOST_SIGHTS);
         tell(cast)?;

@@ -42,7 +42,7 @@ pub struct Measurements {
     bounds: Vec<bool>,
     /// The fold of each.
     folds: Vec<usize>,
-    /// The weighted mean of `albedo`, at most 1.
+    /// The weighted mean of `albedo`, from 0 to 1.
     pub constant: Vec3,
 }
 

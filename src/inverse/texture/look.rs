@@ -15,7 +15,7 @@ const SIDE: u32 = 4;
 pub const RAYS: u32 = SIDE * SIDE;
 /// First of the sample keys of these rays, far from those of paths.
 const KEY: u64 = 3 << 60;
-/// Of the pixels in the fit, one in so many is left out in turn.
+/// Of the pixels in the fit, or of the photographs under a lobe, one in so many is left out in turn.
 pub const FOLDS: usize = 5;
 /// Key of the choice.
 const FOLD_KEY: u64 = 0x51f0_1d5e;

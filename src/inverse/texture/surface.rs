@@ -6,7 +6,7 @@ use super::errors::{standard_errors, with_light};
 use super::fit::{Measurements, Texture};
 use super::gloss::gloss_of_each;
 use super::links::Links;
-use super::look::{FOLDS, SeenPixel, look};
+use super::look::{FOLDS, RAYS, SeenPixel, look};
 use super::observations::Observations;
 use super::received::{Received, trace};
 use super::trial::{Trial, Untouched, try_out};
@@ -22,9 +22,10 @@ const SLICE: usize = 2048;
 /// Paths a cell at most, in each of two sets.
 const MOST_SAMPLES: u64 = 256;
 
-/// Rays of a path from a pixel to what its lobe reflects, for one from a cell; and such paths a pixel at least.
-const GLOSS_PATHS: u64 = 3;
-const LEAST_GLOSS: u64 = 8;
+/// What a path from a pixel to what its lobe reflects costs, in paths from a cell; and such paths a pixel at least: one for each
+/// of its rays.
+const GLOSS_COST: u64 = 3;
+const LEAST_GLOSS: u64 = RAYS as u64;
 
 /// Fewer held-out pixels than this are joined by others.
 const FEW_HELD_OUT: usize = 1_000;
@@ -139,7 +140,7 @@ impl Surface {
         let light = received.smoothed(&self.links);
         done(0, 0)?;
         if self.glossy {
-            let samples = paths / (GLOSS_PATHS * self.pixels.len() as u64);
+            let samples = paths / (GLOSS_COST * self.pixels.len() as u64);
             let samples = samples.clamp(LEAST_GLOSS, MOST_SAMPLES) as u32;
             let mut all = Vec::with_capacity(self.pixels.len());
             for pixels in self.pixels.chunks(SLICE) {

@@ -24,6 +24,8 @@ const MOST_PIXELS: usize = 2_000;
 const FIRST_PIXELS: usize = 250;
 /// A gain of so many standard errors on the first pixels needs no more of them.
 const PLAIN: f64 = 2.0 * SIGNIFICANT;
+/// Photographs that a standard error over photographs takes.
+const LEAST_PHOTOGRAPHS: f64 = 5.0;
 /// One pixel's gain counts up to so many times what two of three stay below.
 const CLIP: f64 = 5.0;
 
@@ -219,13 +221,13 @@ impl Trial {
 }
 
 /// Standard error of the mean of gains where those of a photograph depend on each other, as they share what is wrong with a
-/// highlight; infinite where there is one photograph alone.
+/// highlight; infinite where photographs are too few to tell.
 fn error_by_frame(mut gains: Vec<(u32, f64)>, mean: f64) -> f64 {
     gains.sort_by_key(|&(frame, _)| frame);
     let sums = (gains.chunk_by(|a, b| a.0 == b.0))
         .map(|frame| frame.iter().map(|(_, gain)| gain - mean).sum::<f64>());
     let (frames, squares) = sums.fold((0.0, 0.0), |(n, s), sum| (n + 1.0, s + sum * sum));
-    if frames < 2.0 {
+    if frames < LEAST_PHOTOGRAPHS {
         return f64::INFINITY;
     }
     (squares * frames / (frames - 1.0)).sqrt() / gains.len() as f64

@@ -52,7 +52,6 @@ impl Ladder<'_, '_> {
 
     /// Tries a texture on every object that reflects and gives no light.
     pub(super) fn detail(&mut self) -> Result<(), Termination> {
-        self.settle_lobes_below_textures()?;
         let started = self.monitor.seconds();
         self.monitor.phase("looking for textures");
         let objects: Vec<usize> = (0..self.problem.scene.objects.len())

@@ -8,7 +8,7 @@ use crate::inverse::solver::{Stage, Termination};
 use crate::transport::arrival::Cast;
 use glam::Vec3;
 
-/// Share of a round's paths that the last fit of one lobe takes.
+/// Share of a round's paths that a trial of a lobe takes; finding one anew, whose roughness is about known, takes all of them.
 const PATHS_SHARE: u64 = 4;
 /// More objects than this share what so many take.
 const FULL_SHARES: u64 = 4;
@@ -97,54 +97,30 @@ impl<'a> Ladder<'a, '_> {
         Ok(())
     }
 
-    /// Finds the lobes that were kept anew, in the light as it is known now. Where there is a texture it stays, and the lobe
-    /// that it was found under.
-    pub(super) fn settle_lobes(&mut self) -> Result<(), Termination> {
+    /// Finds the lobes that were kept anew for the `turn`th time, in the light as it is known now. Where there is a texture it
+    /// stays, and the lobe that it was found under.
+    pub(super) fn settle_lobes(&mut self, turn: u64) -> Result<(), Termination> {
         let texels = self.estimate.texels.clone();
         let textured =
             |k: usize| (texels.as_ref()).is_some_and(|t| t.textured.get(k) == Some(&true));
-        let objects: Vec<usize> = self.glossy().filter(|&k| !textured(k)).collect();
-        self.refine_lobes(&objects, Self::take_lobe)
-    }
-
-    /// The same before textures are looked for. The colours of the bases stay those that the fit of paths found, which later
-    /// fits compare theirs with, but for what a changed specular reflectance leaves them.
-    pub(super) fn settle_lobes_below_textures(&mut self) -> Result<(), Termination> {
-        let objects: Vec<usize> = self.glossy().collect();
-        self.refine_lobes(&objects, |ladder, k, found| {
-            let lobe = found.lobe();
-            if let Some(before) = ladder.lobes[k].replace(lobe) {
-                let kept = (Vec3::ONE - before.specular) / (Vec3::ONE - lobe.specular);
-                let albedo = &mut ladder.unknowns.albedo[k];
-                *albedo = (*albedo * kept).clamp(Vec3::ZERO, Vec3::ONE);
-            }
-        })
-    }
-
-    /// The objects that have a lobe.
-    fn glossy(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.lobes.len()).filter(|&k| self.lobes[k].is_some())
-    }
-
-    /// Finds the lobes of some objects anew, and hands each to `take`.
-    fn refine_lobes(
-        &mut self,
-        objects: &[usize],
-        take: impl Fn(&mut Self, usize, &Found),
-    ) -> Result<(), Termination> {
-        if objects.is_empty() {
+        let glossy: Vec<usize> = (0..self.lobes.len())
+            .filter(|&k| self.lobes[k].is_some() && !textured(k))
+            .collect();
+        if glossy.is_empty() {
             return Ok(());
         }
         let started = self.monitor.seconds();
         self.monitor.phase("refining lobes");
-        let lobes = Lobes::new(self.lobe_task(objects.len()), &self.survey);
+        let mut task = self.lobe_task(glossy.len());
+        task.paths *= PATHS_SHARE;
+        let lobes = Lobes::new(task, &self.survey);
         let lit = self.estimate.lit(&self.problem.scene);
         let mut names = Vec::new();
-        for &k in objects {
-            let known = self.lobes[k];
+        for k in glossy {
+            let known = self.lobes[k].map(|lobe| (lobe, turn));
             let found = lobes.find(&lit, k, false, known, &mut |cast| self.cast(cast))?;
             if let Some(found) = found {
-                take(self, k, &found);
+                self.take_lobe(k, &found);
                 names.push(self.words(k, &found, false));
             }
         }

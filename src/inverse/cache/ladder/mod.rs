@@ -210,12 +210,14 @@ impl Ladder<'_, '_> {
         if self.stages < 3 {
             if self.monitor.settings.lobes {
                 self.lobes()?;
+                // Paths and textures are found under them.
+                self.settle_lobes(0)?;
             }
             self.reached(3);
             self.tell()?;
         }
         let ended = self.refine()?;
-        self.settle_lobes()?;
+        self.settle_lobes(1)?;
         self.reached(STAGES);
         Ok(ended)
     }
