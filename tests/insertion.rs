@@ -141,6 +141,7 @@ fn placed(
         at: Some(at),
         scale: 1.0,
         rotate: 0.0,
+        hidden: false,
     };
     Arc::new(PlacedObject::new(Arc::new(model), &placement, &lit.scene).expect("a sound place"))
 }

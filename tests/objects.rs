@@ -184,6 +184,7 @@ fn an_object_stands_on_its_base_turned_and_scaled_about_the_up_axis() {
         at: Some(DVec3::new(10.0, 20.0, 30.0)),
         scale: 0.5,
         rotate: 90.0,
+        hidden: false,
     };
     let near = |a: DVec3, b: DVec3| assert!((a - b).length() < 1e-12, "{a} {b}");
     // Counter-clockwise from above, +x turns towards −z where y is up.

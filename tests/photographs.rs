@@ -55,6 +55,7 @@ fn block(folder: &Path) -> Placement {
         at: Some(DVec3::new(0.0, 0.0, -0.4)),
         scale: 1.0,
         rotate: 0.0,
+        hidden: false,
     }
 }
 

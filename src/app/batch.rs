@@ -110,7 +110,7 @@ impl App {
     /// Whether there is anything to make of photographs: an object to put in, or light to change.
     pub fn can_write_photographs(&self) -> bool {
         let relit = !self.edits.is_empty() || !self.mixer.mix.is_neutral();
-        let changed = relit || !self.insertions.placements().is_empty();
+        let changed = relit || !self.insertions.visible().is_empty();
         self.capture().is_some() && self.batch.is_none() && changed
     }
 
@@ -132,7 +132,7 @@ impl App {
             found: self.snapshot.estimate.clone(),
             edited: Arc::new(edits.apply(&self.snapshot.estimate)),
             settings: self.snapshot.settings.clone(),
-            placements: self.insertions.placements(),
+            placements: self.insertions.visible(),
             relight: !edits.is_empty(),
             samples,
             denoise,

@@ -183,6 +183,7 @@ fn unplaced(file: &Path) -> Placement {
         at: None,
         scale: 1.0,
         rotate: 0.0,
+        hidden: false,
     }
 }
 

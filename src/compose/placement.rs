@@ -22,6 +22,9 @@ pub struct Placement {
     pub scale: f64,
     /// Degrees about the up axis, counter-clockwise from above.
     pub rotate: f64,
+    /// Whether it is in no picture for now.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub hidden: bool,
 }
 
 impl Placement {

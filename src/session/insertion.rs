@@ -8,7 +8,7 @@ use crate::compose::naive::{Pasted, harmonics_of_estimate, harmonics_of_photogra
 use crate::compose::object::ObjectModel;
 use crate::compose::placement::{PlacedObject, Placement};
 use crate::compose::relight::Relighting;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::inverse::estimate::Estimate;
 use crate::math::sh::Harmonics;
 use crate::scene::camera::Camera;
@@ -192,7 +192,7 @@ impl Inserting {
         let inserted = self
             .inserted
             .as_ref()
-            .filter(|_| !self.placements.is_empty());
+            .filter(|_| self.placements.iter().any(|p| !p.hidden));
         let inserted = inserted.map(|inserted| inserted.composite.samples());
         relit.into_iter().chain(inserted).min()
     }
@@ -200,19 +200,21 @@ impl Inserting {
     /// Draws for a moment, refining for at most about `share` of the time; whether the pictures changed.
     ///
     /// # Errors
-    /// An object cannot be read or placed; the objects are then taken away.
+    /// An object cannot be read or placed, and is taken away; or the frame does not exist, and all are.
     pub fn draw(&mut self, capture: &OpenCapture, light: &Light, share: f32) -> Result<bool> {
         let started = Instant::now();
         if let Some(asked) = self.stale.take() {
             self.begun = Some(asked);
             self.inserted = None;
-            let begun = self.begin(capture, light);
-            if begun.is_err() {
-                self.placements.clear();
-                self.relit = None;
-                self.shown = None;
-            }
-            return begun.map(|()| true);
+            return match self.begin(capture, light) {
+                Ok(unplaced) => unplaced.map_or(Ok(true), Err),
+                Err(error) => {
+                    self.placements.clear();
+                    self.relit = None;
+                    self.shown = None;
+                    Err(error)
+                }
+            };
         }
         let rested = self.slice.is_none_or(|(end, took)| {
             end.elapsed().as_secs_f32() * share >= took.as_secs_f32() * (1.0 - share)
@@ -251,20 +253,28 @@ impl Inserting {
         }
     }
 
-    fn begin(&mut self, capture: &OpenCapture, light: &Light) -> Result<()> {
-        if self.placements.is_empty() && !light.is_changed() {
+    /// Begins to composite all that can be; what was wrong with the first object that cannot be read or placed.
+    fn begin(&mut self, capture: &OpenCapture, light: &Light) -> Result<Option<Error>> {
+        let (mut objects, mut unplaced) = (Vec::new(), None);
+        let library = &mut self.library;
+        self.placements.retain(|placement| {
+            let placed = (!placement.hidden).then(|| {
+                let model = library.model(&placement.file)?;
+                PlacedObject::new(model, placement, &capture.scene)
+            });
+            let kept = !matches!(placed, Some(Err(_)));
+            match placed {
+                Some(Ok(object)) => objects.push(Arc::new(object)),
+                Some(Err(error)) => unplaced = unplaced.take().or(Some(error)),
+                None => {}
+            }
+            kept
+        });
+        if objects.is_empty() && !light.is_changed() {
             self.relit = None;
             self.shown = None;
-            return Ok(());
+            return Ok(unplaced);
         }
-        let objects = self
-            .placements
-            .iter()
-            .map(|placement| {
-                let model = self.library.model(&placement.file)?;
-                PlacedObject::new(model, placement, &capture.scene).map(Arc::new)
-            })
-            .collect::<Result<Vec<_>>>()?;
         let mut backdrop = backdrop(capture, &light.found, self.frame)?;
         self.relight(capture, light, &backdrop);
         if let Some(relit) = &self.relit {
@@ -279,7 +289,7 @@ impl Inserting {
             light.seed,
         ));
         self.picture();
-        Ok(())
+        Ok(unplaced)
     }
 
     /// Begins to bring the photograph into the changed light, unless that is under way.

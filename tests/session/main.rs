@@ -289,7 +289,13 @@ fn a_session_saves_by_itself_and_is_taken_up_with_its_changes_and_objects() {
         at: Some(glam::DVec3::new(0.1, 0.0, -0.3)),
         scale: 1.5,
         rotate: 30.0,
+        hidden: false,
     };
+    let hidden = Placement {
+        hidden: true,
+        ..block.clone()
+    };
+    let inserted = vec![block, hidden];
     let mut edits = Edits::default();
     let off = ObjectEdit {
         off: true,
@@ -301,7 +307,7 @@ fn a_session_saves_by_itself_and_is_taken_up_with_its_changes_and_objects() {
     assert!(rig.session.send(keep()));
     rig.until("some steps", |s| iterations(s) > 50);
     assert!(rig.session.send(Command::Edit(edits.clone())));
-    assert!(rig.session.send(Command::Insert(vec![block.clone()])));
+    assert!(rig.session.send(Command::Insert(inserted.clone())));
     rig.until("the edit", |s| s.edits == edits);
     assert!(rig.session.send(Command::Pause));
     let paused = rig.until("the pause", |s| s.phase == Phase::Paused);
@@ -315,7 +321,7 @@ fn a_session_saves_by_itself_and_is_taken_up_with_its_changes_and_objects() {
     let folder = found.earlier.clone().expect("a folder");
     assert!(other.session.send(Command::Resume(folder)));
     let resumed = other.until("the changes", |s| s.edits == edits);
-    assert_eq!(*resumed.inserted, [block]);
+    assert_eq!(*resumed.inserted, inserted);
     other.until("going on", |s| iterations(s) >= iterations(&paused));
     assert_eq!(resumed.earlier, None);
     other.session.join();

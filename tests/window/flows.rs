@@ -14,10 +14,11 @@ use relit::session::snapshot::{Event, Level, Phase};
 use std::path::PathBuf;
 use std::sync::Arc;
 
+/// Objects to be shown, as the worker was told last.
 fn placements(recorder: &Recorder) -> Option<usize> {
     let sent = recorder.sent();
     sent.iter().rev().find_map(|command| match command {
-        Command::Insert(placements) => Some(placements.len()),
+        Command::Insert(placements) => Some(placements.iter().filter(|p| !p.hidden).count()),
         _ => None,
     })
 }

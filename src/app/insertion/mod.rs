@@ -64,6 +64,7 @@ impl Insertions {
                 at,
                 scale: 1.0,
                 rotate: 0.0,
+                hidden: false,
             },
             visible: true,
         });
@@ -112,7 +113,7 @@ impl Insertions {
     pub fn take_up(&mut self, placements: &[Placement]) {
         let inserted = |placement: &Placement| Inserted {
             placement: placement.clone(),
-            visible: true,
+            visible: !placement.hidden,
         };
         self.objects = placements.iter().map(inserted).collect();
         self.chosen = self.objects.len().checked_sub(1);
@@ -120,13 +121,20 @@ impl Insertions {
         self.dragged = None;
     }
 
-    /// What the worker is to show.
+    /// All objects, as the worker is told them.
     pub fn placements(&self) -> Vec<Placement> {
-        self.objects
-            .iter()
-            .filter(|object| object.visible)
-            .map(|object| object.placement.clone())
-            .collect()
+        let placement = |object: &Inserted| Placement {
+            hidden: !object.visible,
+            ..object.placement.clone()
+        };
+        self.objects.iter().map(placement).collect()
+    }
+
+    /// Those that are shown.
+    pub fn visible(&self) -> Vec<Placement> {
+        let mut visible = self.placements();
+        visible.retain(|placement| !placement.hidden);
+        visible
     }
 
     /// Replaces all objects, as undo does.
@@ -148,21 +156,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_visible_objects_reach_the_worker_and_replacing_keeps_a_choice() {
+    fn hidden_objects_are_told_as_such_and_replacing_keeps_a_choice() {
         let mut insertions = Insertions::default();
         insertions.add("chair.glb".into(), Some(DVec3::ZERO));
         insertions.duplicate(DVec3::X);
         assert_eq!(insertions.placements().len(), 2);
         assert_eq!(insertions.placements()[1].at, Some(DVec3::X));
         insertions.objects[0].visible = false;
-        assert_eq!(insertions.placements().len(), 1);
+        let hidden: Vec<bool> = (insertions.placements().iter())
+            .map(|placement| placement.hidden)
+            .collect();
+        assert_eq!((hidden, insertions.visible().len()), (vec![true, false], 1));
+        let mut taken_up = Insertions::default();
+        taken_up.take_up(&insertions.placements());
+        assert!(!taken_up.objects[0].visible && taken_up.objects[1].visible);
         let before = insertions.objects.clone();
         insertions.delete();
         insertions.delete();
         assert!(insertions.objects.is_empty() && insertions.chosen.is_none());
         insertions.replace(before);
         assert_eq!(
-            (insertions.objects.len(), insertions.placements().len()),
+            (insertions.objects.len(), insertions.visible().len()),
             (2, 1)
         );
         assert_eq!(insertions.chosen, Some(1));

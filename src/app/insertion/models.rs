@@ -155,6 +155,7 @@ mod tests {
             at: Some(DVec3::new(0.5, 0.0, -0.2)),
             scale: 2.0,
             rotate: 0.0,
+            hidden: false,
         };
         let corners = models(0.1).corners(&placement, &scene).expect("known");
         let points = corners.map(|p| p.as_dvec3() + scene.origin);

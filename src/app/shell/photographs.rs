@@ -38,7 +38,7 @@ impl Wanted {
 /// Draws the sheet; true when it is to close.
 pub fn sheet(ui: &mut Ui, app: &mut App, wanted: &mut Wanted) -> bool {
     ui.heading("Save photographs");
-    let objects = app.insertions.placements().len();
+    let objects = app.insertions.visible().len();
     let edits = match wanted.mixed {
         true => app.mixed_edits(),
         false => app.edits.clone(),

@@ -91,6 +91,7 @@ pub fn built_in(textured: bool, quick: bool) -> Result<Furnished> {
             at: None,
             scale: 1.0,
             rotate: 0.0,
+            hidden: false,
         },
     })
 }
