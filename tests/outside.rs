@@ -30,25 +30,8 @@ fn run(problem: &Problem) -> Solution {
 
 /// The walls of [`scenes::lamp_room`] with a square hole in the front one, and no lamp.
 fn room_with_a_window() -> (Mesh, Vec<Material>) {
-    let (whole, materials) = scenes::lamp_room();
-    let mut mesh = Mesh::default();
-    let mut kept = Vec::new();
-    for (triangle, &object) in whole.triangles.iter().zip(&whole.object_of) {
-        let name = &whole.objects[object as usize];
-        if name == "lamp" || name == "front" {
-            continue;
-        }
-        if !mesh.objects.contains(name) {
-            mesh.objects.push(name.clone());
-            kept.push(materials[object as usize].clone());
-        }
-        let first = mesh.positions.len() as u32;
-        mesh.positions
-            .extend(triangle.map(|corner| whole.positions[corner as usize]));
-        mesh.triangles.push([first, first + 1, first + 2]);
-        mesh.object_of
-            .push(mesh.objects.iter().position(|o| o == name).unwrap_or(0) as u32);
-    }
+    let materials = scenes::lamp_room().1;
+    let (mut mesh, mut kept) = scenes::without(scenes::lamp_room(), &["lamp", "front"]);
     // Four strips around the window, looking inwards (to −z).
     for [left, right, bottom, top] in [
         [-1.0, -0.6, -1.0, 1.0],

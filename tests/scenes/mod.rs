@@ -94,6 +94,29 @@ pub fn lamp_room() -> (Mesh, Vec<Material>) {
     (mesh, materials.to_vec())
 }
 
+/// A room without the objects of the given names.
+pub fn without((whole, materials): (Mesh, Vec<Material>), names: &[&str]) -> (Mesh, Vec<Material>) {
+    let mut mesh = Mesh::default();
+    let mut kept = Vec::new();
+    for (triangle, &object) in whole.triangles.iter().zip(&whole.object_of) {
+        let name = &whole.objects[object as usize];
+        if names.contains(&name.as_str()) {
+            continue;
+        }
+        if !mesh.objects.contains(name) {
+            mesh.objects.push(name.clone());
+            kept.push(materials[object as usize].clone());
+        }
+        let first = mesh.positions.len() as u32;
+        mesh.positions
+            .extend(triangle.map(|corner| whole.positions[corner as usize]));
+        mesh.triangles.push([first, first + 1, first + 2]);
+        mesh.object_of
+            .push(mesh.objects.iter().position(|o| o == name).unwrap_or(0) as u32);
+    }
+    (mesh, kept)
+}
+
 /// A camera's place and the point in the middle of its picture.
 pub type View = (DVec3, DVec3);
 
