@@ -2,14 +2,14 @@
 
 mod scenes;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec3};
 use relit::capture::mesh::Mesh;
 use relit::inverse::estimate::relative_to_albedo;
 use relit::inverse::settings::Settings;
 use relit::inverse::solver::{Problem, Solution};
 use relit::scene::geometry::Hit;
-use relit::transport::material::{Albedo, Lobe, Material, Texture};
-use std::sync::{Arc, LazyLock};
+use relit::transport::material::{Albedo, Lobe, Material};
+use std::sync::LazyLock;
 
 /// The rough objects, after the walls, the lamp and a diffuse block: name, albedo, roughness, specular.
 const ROUGH: [(&str, [f32; 3], f32, f32); 3] = [
@@ -151,33 +151,12 @@ fn the_diffuse_twin_keeps_no_lobe() {
 const FLOOR: usize = 2;
 const CHECKS: u32 = 4;
 
-/// A checkerboard over the floor's two triangles.
-fn tiles(triangles: usize) -> Arc<Texture> {
-    let size = CHECKS * 16;
-    let color = |i: u32| {
-        let odd = (i % size / 16 + i / size / 16) % 2 == 1;
-        if odd {
-            Vec3::new(0.60, 0.50, 0.35)
-        } else {
-            Vec3::new(0.20, 0.22, 0.30)
-        }
-    };
-    let mut corner_uvs = vec![[Vec2::ZERO; 3]; triangles];
-    corner_uvs[2 * FLOOR] = [Vec2::ZERO, Vec2::X, Vec2::ONE];
-    corner_uvs[2 * FLOOR + 1] = [Vec2::ZERO, Vec2::ONE, Vec2::Y];
-    Arc::new(Texture {
-        width: size,
-        height: size,
-        pixels: (0..size * size).map(color).collect(),
-        corner_uvs: Arc::new(corner_uvs),
-    })
-}
-
 /// Polished tiles: colour and gloss are told apart, and neither takes the other's place.
 #[test]
 fn a_texture_below_a_lobe_is_found() {
     let (mesh, mut materials) = scenes::lamp_room();
-    let tiles = tiles(mesh.triangles.len());
+    let colors = [Vec3::new(0.20, 0.22, 0.30), Vec3::new(0.60, 0.50, 0.35)];
+    let tiles = scenes::checkerboard(mesh.triangles.len(), 2 * FLOOR, CHECKS, colors);
     materials[FLOOR].albedo = Albedo::Image(tiles.clone(), Vec3::ONE);
     materials[FLOOR].lobe = Some(Lobe {
         roughness: 0.2,

@@ -2,7 +2,7 @@
 
 mod scenes;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec3};
 use relit::capture::mesh::Mesh;
 use relit::inverse::estimate::{Estimate, ObjectEstimate};
 use relit::inverse::settings::Settings;
@@ -17,29 +17,6 @@ const BACK: usize = 4;
 const LAMP: usize = 6;
 const CHECKS: u32 = 6;
 
-/// A checkerboard over the back wall's two triangles, which are the ninth and the tenth.
-fn checkerboard(triangles: usize) -> Arc<Texture> {
-    let size = CHECKS * 16;
-    let color = |i: u32| {
-        let odd = (i % size / 16 + i / size / 16) % 2 == 1;
-        if odd {
-            Vec3::new(0.75, 0.60, 0.30)
-        } else {
-            Vec3::new(0.25, 0.30, 0.40)
-        }
-    };
-    let corner = |u: f32, v: f32| Vec2::new(u, v);
-    let mut corner_uvs = vec![[Vec2::ZERO; 3]; triangles];
-    corner_uvs[2 * BACK] = [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0)];
-    corner_uvs[2 * BACK + 1] = [corner(0.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)];
-    Arc::new(Texture {
-        width: size,
-        height: size,
-        pixels: (0..size * size).map(color).collect(),
-        corner_uvs: Arc::new(corner_uvs),
-    })
-}
-
 /// The room with a checkerboard on its back wall, its photographs, and what one colour an object makes of it.
 struct Room {
     problem: Problem,
@@ -50,7 +27,8 @@ struct Room {
 fn room(size: [u32; 2], samples: u32) -> Room {
     let mut mesh = scenes::closed_box(1.0, DVec3::ZERO);
     scenes::lamp(&mut mesh, 0.4, DVec3::new(0.1, 0.9, 0.2));
-    let poster = checkerboard(mesh.triangles.len());
+    let colors = [Vec3::new(0.25, 0.30, 0.40), Vec3::new(0.75, 0.60, 0.30)];
+    let poster = scenes::checkerboard(mesh.triangles.len(), 2 * BACK, CHECKS, colors);
     let mut materials: Vec<Material> = [0.6, 0.5, 0.4, 0.7, 0.5, 0.6, 0.0]
         .map(|a| Material::diffuse(Vec3::splat(a), Vec3::ZERO))
         .to_vec();

@@ -1,7 +1,7 @@
 //! Rooms made by code, and photographs of them rendered in memory, for tests of light transport and of solvers.
 #![allow(dead_code, reason = "each test uses its own part")]
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec2, Vec3};
 use relit::capture::camera::{Intrinsics, Pose};
 use relit::capture::mesh::Mesh;
 use relit::capture::photograph::{Encoding, Photograph, PhotographSource};
@@ -13,7 +13,7 @@ use relit::scene::Scene;
 use relit::transport::environment::Environment;
 use relit::transport::film::Film;
 use relit::transport::lit::Lit;
-use relit::transport::material::{Albedo, Material};
+use relit::transport::material::{Albedo, Material, Texture};
 use relit::transport::path::PathOptions;
 use std::sync::Arc;
 
@@ -92,6 +92,26 @@ pub fn lamp_room() -> (Mesh, Vec<Material>) {
     ]
     .map(|(albedo, emission)| Material::diffuse(albedo.into(), emission.into()));
     (mesh, materials.to_vec())
+}
+
+/// A checkerboard of so many squares a side and two colours over the quad whose first triangle is given, in a mesh of so many.
+pub fn checkerboard(
+    triangles: usize,
+    first: usize,
+    checks: u32,
+    colors: [Vec3; 2],
+) -> Arc<Texture> {
+    let size = checks * 16;
+    let color = |i: u32| colors[((i % size / 16 + i / size / 16) % 2) as usize];
+    let mut corner_uvs = vec![[Vec2::ZERO; 3]; triangles];
+    corner_uvs[first] = [Vec2::ZERO, Vec2::X, Vec2::ONE];
+    corner_uvs[first + 1] = [Vec2::ZERO, Vec2::ONE, Vec2::Y];
+    Arc::new(Texture {
+        width: size,
+        height: size,
+        pixels: (0..size * size).map(color).collect(),
+        corner_uvs: Arc::new(corner_uvs),
+    })
 }
 
 /// A room without the objects of the given names.
