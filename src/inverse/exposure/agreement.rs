@@ -32,12 +32,13 @@ impl Agreement {
     /// compared with the others, and the others not with them.
     pub fn new(sights: &mut Sights, photographs: usize) -> Option<Self> {
         let mut poor = BTreeMap::new();
-        let mut now = Differences::new(&shared(&sights.fitted), photographs);
-        let compared = now.of_frame.len();
-        let mut usual = now.usual()?;
+        let cells = shared(&sights.fitted);
+        let mut found = exposures(&cells, photographs);
+        let mut now = differences(&cells, &found);
+        let most = now.len().div_ceil(2).saturating_sub(1);
+        let mut usual = middle(&now)?;
         loop {
-            let worst = now.of_frame.iter().max_by(|a, b| a.1.total_cmp(b.1));
-            let most = compared.div_ceil(2) - 1;
+            let worst = now.iter().max_by(|a, b| a.1.total_cmp(b.1));
             let Some((&frame, &difference)) =
                 worst.filter(|(_, d)| is_poor(**d, usual) && poor.len() < most)
             else {
@@ -45,10 +46,14 @@ impl Agreement {
             };
             poor.insert(frame, difference);
             sights.forget(frame);
-            now = Differences::new(&shared(&sights.fitted), photographs);
-            usual = now.usual().unwrap_or(usual);
+            // What poor photographs do to the exposures of others is little, as these are robust.
+            now = differences(&shared(&sights.fitted), &found);
+            usual = middle(&now).unwrap_or(usual);
         }
-        for (frame, left) in compare(sights, &mut now.found) {
+        if !poor.is_empty() {
+            found = exposures(&shared(&sights.fitted), photographs);
+        }
+        for (frame, left) in compare(sights, &mut found) {
             let mut sizes: Vec<f64> = left.iter().map(|d| d.abs().element_sum() / 3.0).collect();
             if let Some(difference) = quantile(&mut sizes, 0.5).filter(|&d| is_poor(d, usual)) {
                 poor.insert(frame, difference);
@@ -91,41 +96,37 @@ fn is_poor(difference: f64, usual: f64) -> bool {
     difference > (usual * PLAINLY).max(LEAST_DIFFERENCE)
 }
 
-/// Of each photograph that shares enough, the median difference from what the others show of the same cells.
-struct Differences {
-    of_frame: BTreeMap<usize, f64>,
-    found: Logarithms,
+/// The exposures that suit the photographs best.
+fn exposures(shared: &[Sight], photographs: usize) -> Logarithms {
+    let parts = Parts {
+        exposures: true,
+        vignetting: false,
+    };
+    fit(shared, photographs, parts)
 }
 
-impl Differences {
-    fn new(shared: &[Sight], photographs: usize) -> Self {
-        let parts = Parts {
-            exposures: true,
-            vignetting: false,
-        };
-        let found = fit(shared, photographs, parts);
-        let mut all = vec![Vec::new(); photographs];
-        for cell in shared.chunk_by(|a, b| a.cell == b.cell) {
-            let levels: Vec<DVec3> = (cell.iter())
-                .map(|sight| sight.level - found.exposures[sight.frame])
-                .collect();
-            for (sight, difference) in cell.iter().zip(from_others(&levels)) {
-                all[sight.frame].push(difference);
-            }
-        }
-        let of_frame = (all.iter_mut().enumerate())
-            .filter(|(_, all)| all.len() >= LEAST_CELLS)
-            .filter_map(|(frame, all)| Some((frame, quantile(all, 0.5)?)))
+/// Of each photograph that shares enough, the median difference from what the others show of the same cells.
+fn differences(shared: &[Sight], found: &Logarithms) -> BTreeMap<usize, f64> {
+    let mut all: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    for cell in shared.chunk_by(|a, b| a.cell == b.cell) {
+        let levels: Vec<DVec3> = (cell.iter())
+            .map(|sight| sight.level - found.exposures[sight.frame])
             .collect();
-        Self { of_frame, found }
+        for (sight, difference) in cell.iter().zip(from_others(&levels)) {
+            all.entry(sight.frame).or_default().push(difference);
+        }
     }
+    (all.into_iter())
+        .filter(|(_, all)| all.len() >= LEAST_CELLS)
+        .filter_map(|(frame, mut all)| Some((frame, quantile(&mut all, 0.5)?)))
+        .collect()
+}
 
-    /// The median over photographs; `None` where they are too few.
-    fn usual(&self) -> Option<f64> {
-        let mut all: Vec<f64> = self.of_frame.values().copied().collect();
-        let enough = all.len() >= LEAST_PHOTOGRAPHS;
-        enough.then(|| quantile(&mut all, 0.5))?
-    }
+/// The median over photographs; `None` where they are too few.
+fn middle(differences: &BTreeMap<usize, f64>) -> Option<f64> {
+    let mut all: Vec<f64> = differences.values().copied().collect();
+    let enough = all.len() >= LEAST_PHOTOGRAPHS;
+    enough.then(|| quantile(&mut all, 0.5))?
 }
 
 /// How far each of a cell's levels is from the median of the others, mean over the channels.
