@@ -7,7 +7,6 @@ use relit::capture::mesh::Mesh;
 use relit::inverse::estimate::relative_to_albedo;
 use relit::inverse::settings::Settings;
 use relit::inverse::solver::{Problem, Solution};
-use relit::scene::geometry::Hit;
 use relit::transport::material::{Albedo, Lobe, Material};
 use std::sync::LazyLock;
 
@@ -173,29 +172,14 @@ fn a_texture_below_a_lobe_is_found() {
     assert!((specular - 0.12).abs() < 0.04, "{specular}");
 
     let texels = estimate.texels.as_ref().expect("the tiles were found");
-    let layout = &texels.colors.layout;
-    let (mut sum, mut count) = (Vec3::ZERO, 0);
-    let mut squares = 0.0;
-    for triangle in [2 * FLOOR, 2 * FLOOR + 1] {
-        let first = layout.first[triangle];
-        for texel in 0..layout.first[triangle + 1] - first {
-            let at = (first + texel) as usize;
-            let [b1, b2] = layout.center(triangle, texel);
-            let hit = Hit {
-                t: 0.0,
-                triangle: triangle as u32,
-                b1,
-                b2,
-            };
-            if texels.seen[at] > 0 {
-                let error = texels.colors.colors[at] - tiles.at(&hit);
-                sum += error;
-                squares += error.length_squared() / 3.0;
-                count += 1;
-            }
-        }
-    }
-    let (mean, rms) = (sum / count as f32, (squares / count as f32).sqrt());
+    let texels = scenes::texel_errors(texels, &tiles, 2 * FLOOR);
+    let seen: Vec<Vec3> = (texels.iter().filter(|texel| texel.seen > 0))
+        .map(|texel| texel.error)
+        .collect();
+    let count = seen.len();
+    let mean = seen.iter().sum::<Vec3>() / count as f32;
+    let squares: f32 = seen.iter().map(|error| error.length_squared() / 3.0).sum();
+    let rms = (squares / count as f32).sqrt();
     println!("{count} texels seen: mean error {mean}, rms {rms}");
     assert!(count > 500);
     assert!(mean.abs().max_element() < 0.015, "mean error {mean}");

@@ -9,7 +9,6 @@ use relit::inverse::settings::Settings;
 use relit::inverse::solver::{Control, Observer, Problem, Progress, Termination, solve};
 use relit::inverse::survey::Survey;
 use relit::inverse::texture::{Refined, Task, refine};
-use relit::scene::geometry::Hit;
 use relit::transport::material::{Albedo, Material, Texture};
 use std::sync::{Arc, LazyLock};
 
@@ -91,30 +90,10 @@ static REFINED: LazyLock<Refined> =
 /// For each texel of the back wall: pixels that saw it, and its error and standard error in each channel.
 fn errors() -> Vec<(u32, Vec3, Vec3)> {
     let texels = REFINED.texels.as_ref().expect("the poster was found");
-    let layout = &texels.colors.layout;
-    let mut errors = Vec::new();
-    for triangle in [2 * BACK, 2 * BACK + 1] {
-        let first = layout.first[triangle];
-        for texel in 0..layout.first[triangle + 1] - first {
-            let truth = |[b1, b2]: [f32; 2]| {
-                ROOM.poster.at(&Hit {
-                    t: 0.0,
-                    triangle: triangle as u32,
-                    b1,
-                    b2,
-                })
-            };
-            let center = truth(layout.center(triangle, texel));
-            let inside = (layout.corners(triangle, texel).iter())
-                .all(|&corner| truth(corner).distance(center) < 1e-3);
-            if inside {
-                let at = (first + texel) as usize;
-                let error = texels.colors.colors[at] - center;
-                errors.push((texels.seen[at], error, texels.stderr[at]));
-            }
-        }
-    }
-    errors
+    (scenes::texel_errors(texels, &ROOM.poster, 2 * BACK).into_iter())
+        .filter(|texel| texel.is_even)
+        .map(|texel| (texel.seen, texel.error, texel.stderr))
+        .collect()
 }
 
 #[test]

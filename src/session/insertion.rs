@@ -258,15 +258,15 @@ impl Inserting {
         let (mut objects, mut unplaced) = (Vec::new(), None);
         let library = &mut self.library;
         self.placements.retain(|placement| {
-            let placed = (!placement.hidden).then(|| {
-                let model = library.model(&placement.file)?;
-                PlacedObject::new(model, placement, &capture.scene)
-            });
-            let kept = !matches!(placed, Some(Err(_)));
+            if placement.hidden {
+                return true;
+            }
+            let placed = (library.model(&placement.file))
+                .and_then(|model| PlacedObject::new(model, placement, &capture.scene));
+            let kept = placed.is_ok();
             match placed {
-                Some(Ok(object)) => objects.push(Arc::new(object)),
-                Some(Err(error)) => unplaced = unplaced.take().or(Some(error)),
-                None => {}
+                Ok(object) => objects.push(Arc::new(object)),
+                Err(error) => drop(unplaced.get_or_insert(error)),
             }
             kept
         });

@@ -268,7 +268,6 @@ mod tests {
         ChiSquared::new(f64::from(cells - 1)).map_or(0.0, |d| 1.0 - d.cdf(chi2))
     }
 
-    /// 15 tests at significance 1e-4 each; a narrow lobe at the horizon is too thin for the cells' midpoint rule.
     #[test]
     fn the_base_looks_the_same_from_everywhere_but_for_a_factor() {
         let lobe = Lobe {
@@ -282,6 +281,7 @@ mod tests {
         }
     }
 
+    /// 15 tests at significance 1e-4 each; a narrow lobe at the horizon is too thin for the cells' midpoint rule.
     #[test]
     fn samples_follow_the_density() {
         let mut seed = 0;

@@ -6,10 +6,11 @@ use relit::capture::camera::{Intrinsics, Pose};
 use relit::capture::mesh::Mesh;
 use relit::capture::photograph::{Encoding, Photograph, PhotographSource};
 use relit::capture::{Capture, Frame};
-use relit::inverse::estimate::Estimate;
+use relit::inverse::estimate::{Estimate, TexelEstimate};
 use relit::inverse::settings::Settings;
 use relit::inverse::solver::{Control, Observer, Problem, Progress, Solution, solve};
 use relit::scene::Scene;
+use relit::scene::geometry::Hit;
 use relit::transport::environment::Environment;
 use relit::transport::film::Film;
 use relit::transport::lit::Lit;
@@ -112,6 +113,47 @@ pub fn checkerboard(
         pixels: (0..size * size).map(color).collect(),
         corner_uvs: Arc::new(corner_uvs),
     })
+}
+
+/// How a texel of a quad compares with the texture that is there.
+pub struct TexelError {
+    /// Pixels that saw it.
+    pub seen: u32,
+    /// What was found less the truth at its middle.
+    pub error: Vec3,
+    /// The reported standard error.
+    pub stderr: Vec3,
+    /// Whether the truth is one colour over it.
+    pub is_even: bool,
+}
+
+/// All texels of the quad whose first triangle is given.
+pub fn texel_errors(texels: &TexelEstimate, texture: &Texture, first: usize) -> Vec<TexelError> {
+    let layout = &texels.colors.layout;
+    let mut errors = Vec::new();
+    for triangle in [first, first + 1] {
+        let truth = |[b1, b2]: [f32; 2]| {
+            texture.at(&Hit {
+                t: 0.0,
+                triangle: triangle as u32,
+                b1,
+                b2,
+            })
+        };
+        let start = layout.first[triangle];
+        for texel in 0..layout.first[triangle + 1] - start {
+            let at = (start + texel) as usize;
+            let center = truth(layout.center(triangle, texel));
+            errors.push(TexelError {
+                seen: texels.seen[at],
+                error: texels.colors.colors[at] - center,
+                stderr: texels.stderr[at],
+                is_even: (layout.corners(triangle, texel).iter())
+                    .all(|&corner| truth(corner).distance(center) < 1e-3),
+            });
+        }
+    }
+    errors
 }
 
 /// A room without the objects of the given names.

@@ -65,7 +65,12 @@ impl Insertions {
         project: impl Fn(Vec3) -> Option<Pos2>,
     ) -> Vec<(Handle, Pos2)> {
         let mut handles = Vec::new();
-        for (index, object) in self.objects.iter().enumerate().filter(|(_, o)| o.visible) {
+        for (index, object) in self
+            .objects
+            .iter()
+            .enumerate()
+            .filter(|(_, o)| !o.placement.hidden)
+        {
             if self.chosen == Some(index) {
                 let knob = self.knob(index, scene).and_then(&project);
                 let top = self.top(index, scene).and_then(&project);
@@ -210,7 +215,7 @@ impl Insertions {
     ) {
         if boxed
             && let Some(object) = self.chosen.and_then(|index| self.objects.get(index))
-            && object.visible
+            && !object.placement.hidden
             && let Some(corners) = self.models.corners(&object.placement, scene)
         {
             draw_box(painter, &corners, &project, tokens.inserted, 1.5);

@@ -14,8 +14,6 @@ use std::path::{Path, PathBuf};
 pub struct Inserted {
     /// What the worker is told.
     pub placement: Placement,
-    /// Whether it is shown.
-    pub visible: bool,
 }
 
 impl Inserted {
@@ -66,7 +64,6 @@ impl Insertions {
                 rotate: 0.0,
                 hidden: false,
             },
-            visible: true,
         });
         self.chosen = Some(self.objects.len() - 1);
         self.placing = true;
@@ -113,7 +110,6 @@ impl Insertions {
     pub fn take_up(&mut self, placements: &[Placement]) {
         let inserted = |placement: &Placement| Inserted {
             placement: placement.clone(),
-            visible: !placement.hidden,
         };
         self.objects = placements.iter().map(inserted).collect();
         self.chosen = self.objects.len().checked_sub(1);
@@ -123,11 +119,9 @@ impl Insertions {
 
     /// All objects, as the worker is told them.
     pub fn placements(&self) -> Vec<Placement> {
-        let placement = |object: &Inserted| Placement {
-            hidden: !object.visible,
-            ..object.placement.clone()
-        };
-        self.objects.iter().map(placement).collect()
+        (self.objects.iter())
+            .map(|object| object.placement.clone())
+            .collect()
     }
 
     /// Those that are shown.
@@ -162,14 +156,14 @@ mod tests {
         insertions.duplicate(DVec3::X);
         assert_eq!(insertions.placements().len(), 2);
         assert_eq!(insertions.placements()[1].at, Some(DVec3::X));
-        insertions.objects[0].visible = false;
+        insertions.objects[0].placement.hidden = true;
         let hidden: Vec<bool> = (insertions.placements().iter())
             .map(|placement| placement.hidden)
             .collect();
         assert_eq!((hidden, insertions.visible().len()), (vec![true, false], 1));
         let mut taken_up = Insertions::default();
         taken_up.take_up(&insertions.placements());
-        assert!(!taken_up.objects[0].visible && taken_up.objects[1].visible);
+        assert_eq!(taken_up.objects, insertions.objects);
         let before = insertions.objects.clone();
         insertions.delete();
         insertions.delete();

@@ -70,7 +70,12 @@ pub fn draw(ui: &Ui, app: &App, capture: &OpenCapture, rect: Rect) {
             }
         }
     }
-    for object in app.insertions.objects.iter().filter(|o| o.visible) {
+    for object in app
+        .insertions
+        .objects
+        .iter()
+        .filter(|o| !o.placement.hidden)
+    {
         if let Some(corners) = app.insertions.models.corners(&object.placement, scene) {
             let project = |p| projection.at(p);
             draw_box(&painter, &corners, project, tokens.inserted, 1.0);

@@ -64,17 +64,19 @@ fn list(ui: &mut Ui, app: &mut App) {
         ui.horizontal(|ui| {
             let object = &mut app.insertions.objects[index];
             let name = object.name();
+            let mut visible = !object.placement.hidden;
             let shown = ui
-                .add(Checkbox::without_text(&mut object.visible))
+                .add(Checkbox::without_text(&mut visible))
                 .on_hover_text("Shows or hides the object");
             shown.widget_info(|| {
                 egui::WidgetInfo::selected(
                     egui::Role::CheckBox,
                     true,
-                    object.visible,
+                    visible,
                     format!("Show {name} {}", index + 1),
                 )
             });
+            object.placement.hidden = !visible;
             let chosen = app.insertions.chosen == Some(index);
             let text = format!("{}  {name}", index + 1);
             if ui.selectable_label(chosen, text).clicked() {

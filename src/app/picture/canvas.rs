@@ -116,7 +116,7 @@ pub fn missing(ui: &mut Ui, app: &App, quantity: Quantity) {
         Quantity::Naive | Quantity::NaiveEstimate | Quantity::Composite => {
             if !matches!(app.shown, Shown::Frame) {
                 "No photograph was taken from here"
-            } else if app.insertions.objects.is_empty() && app.edits.is_empty() {
+            } else if app.insertions.visible().is_empty() && app.edits.is_empty() {
                 "Insert an object, or change a lamp or a material, to see the composite"
             } else {
                 "Compositing…"

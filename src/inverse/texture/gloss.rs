@@ -75,16 +75,16 @@ pub fn gloss(
     (light.sum::<DVec3>().as_vec3(), cast)
 }
 
-/// The mean of [`gloss`] over so many paths of each pixel.
-pub fn gloss_of_each(
+/// Finds the gloss of each pixel in the fit by so many paths.
+pub fn find_gloss(
     lit: &Lit,
-    pixels: &[SeenPixel],
+    pixels: &mut [SeenPixel],
     samples: u32,
     options: &PathOptions,
     seed: u64,
     key: u64,
-) -> (Vec<Vec3>, Cast) {
-    let traced: Vec<(Vec3, Cast)> = (pixels.par_iter())
+) -> Cast {
+    (pixels.par_iter_mut().filter(|pixel| !pixel.held_out))
         .map(|pixel| {
             let (mut sum, mut cast) = (DVec3::ZERO, Cast::default());
             for sample in 0..samples {
@@ -94,9 +94,8 @@ pub fn gloss_of_each(
                 sum += light.as_dvec3();
                 cast += took;
             }
-            ((sum / f64::from(samples.max(1))).as_vec3(), cast)
+            pixel.gloss = (sum / f64::from(samples.max(1))).as_vec3();
+            cast
         })
-        .collect();
-    let cast = traced.iter().map(|(_, cast)| *cast).sum();
-    (traced.into_iter().map(|(light, _)| light).collect(), cast)
+        .sum()
 }

@@ -37,7 +37,7 @@ pub struct SeenPixel {
     pub fold: usize,
     /// What the base of the surface sends in this direction over what it sends along its normal; 1 without a lobe.
     pub base: f32,
-    /// Radiance that its lobe sends here, as far as that is known.
+    /// Radiance that its lobe sends here, where that was found.
     pub gloss: Vec3,
     /// Where its rays land.
     pub landings: Vec<Landing>,

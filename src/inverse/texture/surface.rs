@@ -4,7 +4,7 @@ use super::Task;
 use super::cells::Cells;
 use super::errors::{standard_errors, with_light};
 use super::fit::{Measurements, Texture};
-use super::gloss::gloss_of_each;
+use super::gloss::find_gloss;
 use super::links::Links;
 use super::look::{FOLDS, RAYS, SeenPixel, look};
 use super::observations::Observations;
@@ -142,14 +142,9 @@ impl Surface {
         if self.glossy {
             let samples = paths / (GLOSS_COST * self.pixels.len() as u64);
             let samples = samples.clamp(LEAST_GLOSS, MOST_SAMPLES) as u32;
-            let mut all = Vec::with_capacity(self.pixels.len());
-            for pixels in self.pixels.chunks(SLICE) {
-                let (part, cast) = gloss_of_each(lit, pixels, samples, options, self.seed, key);
+            for pixels in self.pixels.chunks_mut(SLICE) {
+                let cast = find_gloss(lit, pixels, samples, options, self.seed, key);
                 done(cast.rays, cast.rejected)?;
-                all.extend(part);
-            }
-            for (pixel, gloss) in self.pixels.iter_mut().zip(all) {
-                pixel.gloss = gloss;
             }
         }
         let observations = Observations::new(&self.rows(), self.cells.count());

@@ -108,10 +108,11 @@ pub fn solve(
     let started = monitor.seconds();
     let mut survey = Survey::new(problem, settings, budget.survey_pixels);
     monitor.progress.rays += survey.rays;
-    let mut shared = Sights::new(problem, &survey);
-    let poor = (settings.leave_out)
-        .then(|| Agreement::new(&mut shared, problem.photographs.len()))
-        .flatten()
+    let mut sights =
+        (settings.leave_out || settings.exposures).then(|| Sights::new(problem, &survey));
+    let poor = (sights.as_mut())
+        .filter(|_| settings.leave_out)
+        .and_then(|sights| Agreement::new(sights, problem.photographs.len()))
         .filter(|agreement| !agreement.poor.is_empty());
     let agreeing = poor.as_ref().map(|poor| poor.without_poor(problem));
     let problem = agreeing.as_ref().unwrap_or(problem);
@@ -120,9 +121,9 @@ pub fn solve(
         monitor.progress.rays += survey.rays;
         monitor.progress.warnings = poor.remarks();
     }
-    let exposures = (settings.exposures)
-        .then(|| Exposures::new(problem, &shared))
-        .flatten();
+    let exposures = (sights.as_ref())
+        .filter(|_| settings.exposures)
+        .and_then(|sights| Exposures::new(problem, sights));
     let needed = exposures.as_ref().filter(|e| e.needed());
     let undone = needed.map(|exposures| exposures.undone(problem));
     let problem = undone.as_ref().unwrap_or(problem);
