@@ -1,4 +1,4 @@
-//! The paper's experiments, run from the window: on the open capture where they take one, else on rooms of their own.
+//! The paper's experiments, run from the window: on the open capture, or on rooms of their own.
 
 use crate::app::shell::files::file_name;
 use crate::app::state::App;
@@ -19,6 +19,8 @@ pub struct Plan {
     pub seconds: f64,
     /// Seeds that each solve is repeated with.
     pub seeds: u64,
+    /// Whether to run on rooms of the study's own, also where a capture is open.
+    pub own_rooms: bool,
     /// Whether only to try it.
     pub quick: bool,
     /// The folder that its files go into, as typed; those on a capture go into a folder of its name there.
@@ -31,6 +33,7 @@ impl Default for Plan {
             study: 0,
             seconds: 120.0,
             seeds: 2,
+            own_rooms: false,
             quick: false,
             folder: "relit-out/studies".to_owned(),
         }
@@ -110,7 +113,7 @@ impl App {
         }
         let plan = self.studies.plan.clone();
         let study = plan.study();
-        let capture = self.capture().filter(|_| study.takes_capture).cloned();
+        let capture = self.capture().filter(|_| !plan.own_rooms).cloned();
         let folder = PathBuf::from(plan.folder.trim());
         let (on, folder) = match &capture {
             Some(capture) => (capture.name.clone(), folder.join(file_name(&capture.name))),
@@ -174,7 +177,7 @@ impl App {
     }
 }
 
-/// What studies run on that take no capture.
+/// What studies run on without a capture.
 pub const OWN_ROOMS: &str = "rooms of its own";
 
 fn run(

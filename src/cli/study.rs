@@ -3,7 +3,7 @@
 use crate::cli::arguments::ReadOptions;
 use crate::cli::solve::use_threads;
 use crate::cli::trade::time;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::session::command::Source;
 use crate::session::open::open;
 use crate::study::experiments::{Bench, STUDIES, Study};
@@ -35,7 +35,8 @@ pub struct StudyArguments {
     /// Only try it, in seconds: fewer values, smaller scenes, solves cut short
     #[arg(long)]
     quick: bool,
-    /// A capture to run on, for studies that have no rooms of their own to vary
+    /// A capture to run on instead of rooms of the study's own: batch and textures on its photographs, the others on its
+    /// twin, a room with its mesh, its views and the colours and lamps found in it, whose truth is known
     #[arg(long, value_name = "CAPTURE")]
     capture: Option<PathBuf>,
     /// Threads to work with [default: one a core]
@@ -55,20 +56,13 @@ fn names() -> PossibleValuesParser {
 /// Runs the studies and writes what they found, each as soon as it is done.
 ///
 /// # Errors
-/// The capture cannot be read, the study takes none, a solve cannot start, or a file cannot be written.
+/// The capture cannot be read, a solve cannot start, or a file cannot be written.
 pub fn study(arguments: &StudyArguments) -> Result<()> {
     use_threads(arguments.threads)?;
     let wanted: Vec<&Study> = STUDIES
         .iter()
         .filter(|study| arguments.name == ALL || study.name == arguments.name)
         .collect();
-    if arguments.capture.is_some() && !wanted.iter().any(|study| study.takes_capture) {
-        return Err(Error::usage(
-            "--capture",
-            format!("{} varies rooms of its own", arguments.name),
-            "leave the capture out",
-        ));
-    }
     let subject = arguments
         .capture
         .clone()
@@ -84,7 +78,7 @@ pub fn study(arguments: &StudyArguments) -> Result<()> {
             quick: arguments.quick,
             time: arguments.time,
             seeds: arguments.seeds.unwrap_or(seeds),
-            subject: subject.as_ref().filter(|_| study.takes_capture),
+            subject: subject.as_ref(),
             say: &|what| eprintln!("{}: {what} …", study.name),
             show: &|_| {},
             stopped: &|| false,

@@ -6,11 +6,33 @@ use glam::{DMat3, DVec3};
 /// Width and height of the embedded photographs in pixels.
 pub const SIZE: [u32; 2] = [160, 120];
 
-/// Half the horizontal field of view, as a tangent.
+/// Half the horizontal field of view of rooms of our own, as a tangent.
 const HALF_FIELD: f64 = 0.82;
 
-/// Eye and target of a photograph, in room coordinates.
-pub type View = [DVec3; 2];
+/// From where a photograph is taken, and how wide.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// The camera in room coordinates.
+    pub pose: Pose,
+    /// Half the horizontal field of view, as a tangent.
+    pub half_field: f64,
+}
+
+impl View {
+    /// From `eye` towards `target` with a level camera, as wide as the photographs of the built-in room.
+    pub fn towards(eye: DVec3, target: DVec3) -> Self {
+        Self {
+            pose: look_at(eye, target),
+            half_field: HALF_FIELD,
+        }
+    }
+
+    /// The same for eyes and targets in a table.
+    pub fn all(table: &[[[f64; 3]; 2]]) -> Vec<Self> {
+        let view = |&[eye, target]: &[[f64; 3]; 2]| Self::towards(eye.into(), target.into());
+        table.iter().map(view).collect()
+    }
+}
 
 /// The views of the built-in room.
 const VIEWS: [[[f64; 3]; 2]; 16] = [
@@ -38,24 +60,25 @@ const VIEWS: [[[f64; 3]; 2]; 16] = [
 
 /// The views of the built-in room.
 pub fn built_in() -> Vec<View> {
-    VIEWS.iter().map(|view| view.map(DVec3::from)).collect()
+    View::all(&VIEWS)
 }
 
-/// Lens and pose of each view's photograph at a size in pixels.
+/// Lens and pose of each view's photograph at a size in pixels: square pixels, and nothing bent or off its middle.
 pub fn cameras(views: &[View], [width, height]: [u32; 2]) -> Vec<(Intrinsics, Pose)> {
-    let focal = f64::from(width) * 0.5 / HALF_FIELD;
-    let intrinsics = Intrinsics {
-        width,
-        height,
-        fx: focal,
-        fy: focal,
-        cx: f64::from(width) * 0.5,
-        cy: f64::from(height) * 0.5,
-        distortion: [0.0; 4],
+    let lens = |half_field: f64| {
+        let focal = f64::from(width) * 0.5 / half_field;
+        Intrinsics {
+            width,
+            height,
+            fx: focal,
+            fy: focal,
+            cx: f64::from(width) * 0.5,
+            cy: f64::from(height) * 0.5,
+            distortion: [0.0; 4],
+        }
     };
-    views
-        .iter()
-        .map(|&[eye, target]| (intrinsics, look_at(eye, target)))
+    (views.iter())
+        .map(|view| (lens(view.half_field), view.pose))
         .collect()
 }
 

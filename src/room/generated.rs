@@ -208,7 +208,7 @@ impl Furnisher {
                 let target = share * self.size + DVec3::Y * self.size.y * 0.5;
                 // Never straight up or down, where a level camera is not defined.
                 let ahead = (eye - target).with_y(0.0).length() > 0.2;
-                [eye, if ahead { target } else { target + DVec3::X }]
+                View::towards(eye, if ahead { target } else { target + DVec3::X })
             })
             .collect()
     }

@@ -86,7 +86,7 @@ fn studies_on_rooms_of_their_own_say_so_wait_for_the_solve_and_can_be_cancelled(
     let running = |harness: &Harness<'_, Window>| harness.state().app.studies.doing().is_some();
     click(&mut harness, "Study");
     click(&mut harness, "sampling");
-    harness.get_by_label("on rooms of its own");
+    click(&mut harness, "on rooms of its own");
     let question = STUDIES.iter().find(|study| study.name == "sampling");
     harness.get_by_label(question.expect("a study").question);
 
@@ -98,6 +98,11 @@ fn studies_on_rooms_of_their_own_say_so_wait_for_the_solve_and_can_be_cancelled(
     harness.run_steps(2);
     click(&mut harness, "Start study");
     assert!(running(&harness));
+    let on = |harness: &Harness<'_, Window>| {
+        let shown = harness.state().app.studies.shown.as_ref();
+        shown.map(|shown| shown.on.clone())
+    };
+    assert_eq!(on(&harness).as_deref(), Some("rooms of its own"));
     click(&mut harness, "Cancel study");
     until(&mut harness, "its end", |h| !running(h));
     assert!(said(&harness, "study sampling was ended"));

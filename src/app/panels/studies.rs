@@ -5,11 +5,15 @@ use crate::app::panels::plot;
 use crate::app::state::App;
 use crate::app::studies::{OWN_ROOMS, Plan};
 use crate::app::theme;
-use crate::study::experiments::{STUDIES, Study};
+use crate::study::experiments::STUDIES;
 use egui::{Button, ComboBox, DragValue, ScrollArea, TextEdit, Ui};
 
 /// Least height of the plot, in points of the screen.
 const PLOT: f32 = 190.0;
+
+/// How studies run on a capture.
+const ON_CAPTURE: &str = "batch and textures on its photographs; the others on its twin, a room with its mesh, its views and \
+    the colours and lamps found in it, whose truth is known";
 
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, app: &mut App) {
@@ -51,10 +55,11 @@ fn choice(ui: &mut Ui, app: &mut App) {
         study,
         seconds,
         seeds,
+        own_rooms,
         quick,
         folder,
     } = &mut app.studies.plan;
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let label = ui.label("Study");
         ComboBox::from_id_salt("study")
             .selected_text(STUDIES[*study].name)
@@ -67,8 +72,17 @@ fn choice(ui: &mut Ui, app: &mut App) {
             })
             .response
             .labelled_by(label.id);
-        let on = subject(&STUDIES[*study], open.as_deref());
-        ui.weak(format!("on {on}"));
+        match &open {
+            Some(name) => {
+                ui.radio_value(own_rooms, false, format!("on the open capture, {name}"))
+                    .on_hover_text(ON_CAPTURE);
+                ui.radio_value(own_rooms, true, format!("on {OWN_ROOMS}"))
+                    .on_hover_text("Rooms whose truth is known, each made for what the study asks");
+            }
+            None => {
+                ui.weak(format!("on {OWN_ROOMS}"));
+            }
+        }
     });
     ui.label(STUDIES[*study].question);
     ui.horizontal(|ui| {
@@ -90,14 +104,6 @@ fn choice(ui: &mut Ui, app: &mut App) {
             .labelled_by(label.id)
             .on_hover_text("Folder for NAME.csv, NAME.png and NAME.md; those on a capture go into one of its name there");
     });
-}
-
-/// What a study would run on.
-fn subject(study: &Study, open: Option<&str>) -> String {
-    match open.filter(|_| study.takes_capture) {
-        Some(name) => format!("the open capture, {name}"),
-        None => OWN_ROOMS.to_owned(),
-    }
 }
 
 /// The button that starts and ends, and what it is at.

@@ -14,7 +14,6 @@ use crate::study::experiments::{Bench, Findings, Study, Summary, box_room};
 pub const STUDY: Study = Study {
     name: "batch",
     question: "The paper: at equal time too small a batch is noisy, too large a one wastes rays; 8 pixels are a good start.",
-    takes_capture: true,
     seeds: 5,
     run,
 };

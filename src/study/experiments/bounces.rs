@@ -3,18 +3,20 @@
 use crate::error::Result;
 use crate::export::plot::{Axis, Plot, Series};
 use crate::inverse::settings::Settings;
+use crate::room::Room;
+use crate::room::photographs::Rendering;
 use crate::study::experiments::course::{
     Gauge, Mark, cache_settings, cached, descend, paper_settings, rays_at,
 };
 use crate::study::experiments::courses::{Kind, Quantity, Spread, common_mark, plot, table, words};
-use crate::study::experiments::{Bench, Findings, Study, Summary, box_room};
+use crate::study::experiments::twin::{Sizes, twin};
+use crate::study::experiments::{Bench, Findings, Study, Subject, Summary, box_room};
 
 /// The study.
 pub const STUDY: Study = Study {
     name: "bounces",
     question: "The paper, fitting photographs of many bounces: one bounce is fast but stays wrong, two are the balance, \
         three are noisy and slow. Where do two stop being enough?",
-    takes_capture: false,
     seeds: 5,
     run,
 };
@@ -40,7 +42,10 @@ const FACTOR: f64 = 2.0;
 
 /// One room, with a kind of solve for each depth.
 struct Scene {
-    albedo: f64,
+    /// "mean albedo 0.5", or the twin of a capture.
+    name: String,
+    /// What the name of the descent's plot ends with.
+    file: &'static str,
     /// The transport cache's ends.
     cache: Vec<(u64, Kind)>,
     /// The descent's courses.
@@ -52,15 +57,29 @@ fn run(bench: &Bench) -> Result<Findings> {
         true => (QUICK_ALBEDOS, QUICK_DEPTHS),
         false => (ALBEDOS, DEPTHS),
     };
-    let limits = bench.limits(2 * albedos.len() * depths.len() * bench.seeds as usize);
+    let twin = twin(bench, Sizes::small(bench.quick))?;
+    let how = match &twin {
+        Some(twin) => twin.words.clone(),
+        None => "A box room of 2 m with seven reflectors of the mean albedo named, photographed with all bounces".to_owned(),
+    };
+    let rooms: Vec<(&str, Room, Rendering)> = match twin {
+        Some(twin) => vec![("-paper", twin.room, twin.rendering)],
+        None => (albedos.iter())
+            .map(|&(albedo, file)| {
+                let room = box_room::box_room(&format!("mean albedo {albedo}"), albedo, LAMP);
+                (file, room, box_room::rendering(bench.quick))
+            })
+            .collect(),
+    };
+    let limits = bench.limits(2 * rooms.len() * depths.len() * bench.seeds as usize);
     let mut scenes: Vec<Scene> = Vec::new();
-    for &(albedo, _) in albedos {
-        let subject =
-            box_room::photographed(&format!("mean albedo {albedo}"), albedo, LAMP, bench.quick)?;
+    for (file, room, rendering) in &rooms {
+        let subject = Subject::of_room(room, rendering)?;
         // The loss is measured with all bounces, whatever the fit had.
         let gauge = Gauge::new(&subject, u32::MAX);
         scenes.push(Scene {
-            albedo,
+            name: room.name.clone(),
+            file,
             cache: Vec::new(),
             paper: Vec::new(),
         });
@@ -73,7 +92,7 @@ fn run(bench: &Bench) -> Result<Findings> {
             };
             let course = |seed| descend(bench, &gauge, &with(paper_settings(seed)), limits);
             let kind = |solver: &str, courses| Kind {
-                name: format!("{albedo}, {solver}, {}", word(bounces)),
+                name: format!("{}, {solver}, {}", room.name, word(bounces)),
                 courses,
             };
             let ends = bench.seeds().map(end).collect::<Result<_>>()?;
@@ -102,13 +121,13 @@ fn run(bench: &Bench) -> Result<Findings> {
             over_depth(&scenes, "relative error of emission", |e| e.emission),
         ),
     ];
-    for (scene, (albedo, suffix)) in scenes.iter().zip(albedos) {
-        let title = format!("Bounces of the paper's descent, mean albedo {albedo}");
+    for scene in &scenes {
+        let title = format!("Bounces of the paper's descent, {}", scene.name);
         let drawn: Vec<Kind> = scene.paper.iter().map(|(_, kind)| kind.clone()).collect();
         let rays = |mark: &Mark| mark.rays as f64;
         let label = "mean absolute error of albedo";
         plots.push((
-            *suffix,
+            scene.file,
             plot(&title, "rays", label, rays, |e| e.albedo, &drawn, &[]),
         ));
     }
@@ -119,12 +138,11 @@ fn run(bench: &Bench) -> Result<Findings> {
     };
     Ok(Findings {
         how: format!(
-            "A box room of 2 m with seven reflectors of the mean albedo named, photographed with all bounces, {} seeds. The \
-             paper's descent ({at_most}) is compared at equal rays, where its errors are the same on every machine; the \
+            "{how}; {} seeds. The paper's descent ({at_most}) is compared at equal rays, where its errors are the same on every machine; the \
              transport cache goes to where it ends by itself. The loss is measured with all bounces.",
             bench.seeds,
         ),
-        tables: vec![("", table("albedo, solver, bounces", &kinds, &[]))],
+        tables: vec![("", table("room, solver, bounces", &kinds, &[]))],
         plots,
         summary: summary(&scenes),
         seen: seen(&scenes),
@@ -147,7 +165,7 @@ fn of_albedo(scenes: &[Scene]) -> Plot {
 fn over_depth(scenes: &[Scene], label: &str, quantity: Quantity) -> Plot {
     let of = |scene: &Scene| {
         let mut series = Series {
-            name: format!("mean albedo {}", scene.albedo),
+            name: scene.name.clone(),
             ..Series::default()
         };
         for (depth, kind) in &scene.cache {
@@ -199,7 +217,7 @@ fn summary(scenes: &[Scene]) -> Summary {
                 )
             };
             rows.push(vec![
-                scene.albedo.to_string(),
+                scene.name.clone(),
                 word(*depth),
                 words(kind.at_end(|e| e.albedo)),
                 words(kind.at_end(|e| e.emission)),
@@ -216,7 +234,7 @@ fn summary(scenes: &[Scene]) -> Summary {
     }
     Summary {
         columns: vec![
-            "mean albedo",
+            "room",
             "bounces",
             "cache: albedo error",
             "emission error",
@@ -241,11 +259,11 @@ fn seen(scenes: &[Scene]) -> Vec<String> {
         };
         if let (Some(one), Some(two), Some(deep)) = (at(1), at(2), at(0)) {
             let enough = two.mean <= TOLERABLE.max(FACTOR * deep.mean);
-            first = first.or((!enough).then_some(scene.albedo));
+            first = first.or((!enough).then_some(&scene.name));
             seen.push(format!(
-                "Mean albedo {}, transport cache: albedo is off by {} with one bounce, {} with two, {} with adaptive \
+                "{}, transport cache: albedo is off by {} with one bounce, {} with two, {} with adaptive \
                  depth. Two are {}.",
-                scene.albedo,
+                scene.name,
                 one.words(),
                 two.words(),
                 deep.words(),
@@ -255,11 +273,11 @@ fn seen(scenes: &[Scene]) -> Vec<String> {
         seen.extend(balance(scene));
     }
     seen.push(match first {
-        Some(albedo) => format!(
+        Some(name) => format!(
             "By the transport cache, two bounces stop being enough (off by more than {TOLERABLE} and by more than {FACTOR} \
-             times what adaptive depth reaches) from a mean albedo of {albedo} on, of those tried.",
+             times what adaptive depth reaches) with {name}, of what was tried in this order.",
         ),
-        None => "Two bounces were enough at every mean albedo tried.".to_owned(),
+        None => "Two bounces were enough everywhere they were tried.".to_owned(),
     });
     seen
 }
@@ -278,9 +296,9 @@ fn balance(scene: &Scene) -> Option<String> {
         "the paper's two are not the balance here"
     };
     Some(format!(
-        "Mean albedo {}, the paper's descent at {:.2} million rays: least error of albedo with {best} bounces, {}; two give \
+        "{}, the paper's descent at {:.2} million rays: least error of albedo with {best} bounces, {}; two give \
          {}; {verdict}.",
-        scene.albedo,
+        scene.name,
         rays_at(mark?) as f64 * 1e-6,
         least.words(),
         two.words(),

@@ -3,6 +3,7 @@
 use crate::error::Result;
 use crate::inverse::parameters::Unknowns;
 use crate::room::Room;
+use crate::room::cameras::View;
 use crate::room::photographs::Rendering;
 use crate::room::shape::Modeller;
 use crate::scene::geometry::Hit;
@@ -92,7 +93,7 @@ pub fn furnished(
         name: name.to_owned(),
         mesh: modeller.mesh,
         materials,
-        views: VIEWS.iter().map(|view| view.map(DVec3::from)).collect(),
+        views: View::all(&VIEWS),
     }
 }
 
@@ -107,8 +108,7 @@ pub fn board_room(name: &str, albedo: f64, lamp: f64, lobe: Lobe) -> Room {
     for (_, material) in objects.filter(|(object, _)| *object == BOARD) {
         material.lobe = Some(lobe);
     }
-    let views = BOARD_VIEWS.iter().map(|view| view.map(DVec3::from));
-    room.views.extend(views);
+    room.views.extend(View::all(&BOARD_VIEWS));
     room
 }
 
@@ -135,22 +135,26 @@ pub fn photographed(name: &str, albedo: f64, lamp: f64, quick: bool) -> Result<S
     photograph(&box_room(name, albedo, lamp), quick)
 }
 
-/// A room, photographed with all bounces: small and coarse where `quick`.
+/// A room, photographed with all bounces as by [`rendering`].
 ///
 /// # Errors
 /// The room's mesh holds nothing to see.
 pub fn photograph(room: &Room, quick: bool) -> Result<Subject> {
+    Subject::of_room(room, &rendering(quick))
+}
+
+/// How these rooms are photographed: small and coarse where `quick`.
+pub fn rendering(quick: bool) -> Rendering {
     let (size, samples) = if quick {
         ([32, 24], 32)
     } else {
         ([64, 48], 128)
     };
-    let rendering = Rendering {
+    Rendering {
         seed: NOISE,
         samples,
         size,
-    };
-    Subject::of_room(room, &rendering)
+    }
 }
 
 #[cfg(test)]

@@ -1,17 +1,22 @@
-//! The built-in room, and the same with two chairs in it.
+//! A room, and the same with two chairs in it: the built-in room, or the twin of a capture.
 
 use crate::capture::mesh::Mesh;
+use crate::capture::photograph::Photograph;
 use crate::compose::object::ObjectModel;
 use crate::compose::placement::Placement;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::room::Room;
 use crate::room::photographs::{KEPT, Rendering, kept, render};
 use crate::room::shape::Modeller;
+use crate::scene::visibility::NOTHING;
 use crate::study::experiments::chair::chair;
+use crate::study::experiments::standing::{Cylinder, places, up};
 use crate::study::experiments::subject::Subject;
+use crate::study::experiments::twin::Studied;
 use crate::transport::lit::Lit;
 use crate::transport::material::{Albedo, Material};
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, DQuat, DVec3, Vec3};
+use std::cmp::Reverse;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -25,6 +30,17 @@ const CHAIRS: [(&str, [f32; 3], [f64; 3], f64); 2] = [
     ),
     ("blue chair", [0.10, 0.22, 0.55], [-1.75, 0.001, 0.62], 2.0),
 ];
+/// The photographs of the built-in room that see both.
+const FRAMES: [usize; 2] = [5, 14];
+/// The chairs' height as modelled, and the radius of a cylinder around one, in metres.
+const HEIGHT: f64 = 0.85;
+const RADIUS: f64 = 0.31;
+/// Height of the chairs in a twin, in shares of the scene's own: the largest of these that finds places for both.
+const SHARES: [f64; 5] = [0.32, 0.24, 0.16, 0.08, 0.04];
+/// Share of a photograph that they may cover.
+const MOST_COVERED: f64 = 0.4;
+/// How far above the ground they stand, in shares of their height, as on a floor that is not quite flat.
+const LIFT: f64 = 2e-3;
 /// How the room without textures is photographed; the one with them has photographs in the program.
 const PLAIN: Rendering = Rendering {
     samples: 64,
@@ -39,7 +55,9 @@ const QUICK: Rendering = Rendering {
 /// A room with and without objects.
 pub struct Furnished {
     /// In words.
-    pub name: &'static str,
+    pub name: String,
+    /// What it is, a sentence about the room and where the chairs stand.
+    pub how: String,
     /// The room without them, photographed.
     pub subject: Subject,
     /// Its true light.
@@ -50,6 +68,8 @@ pub struct Furnished {
     pub models: Vec<Arc<ObjectModel>>,
     /// Where they stand: as modelled.
     pub placement: Placement,
+    /// The photographs that they are put into.
+    pub frames: Vec<usize>,
 }
 
 /// The built-in room with two chairs, with its textures or with their mean colours.
@@ -66,10 +86,97 @@ pub fn built_in(textured: bool, quick: bool) -> Result<Furnished> {
         (false, true) => kept()?,
         (false, false) => render(&room, &PLAIN)?,
     };
+    let stands = CHAIRS.map(|(_, _, place, turn)| {
+        DAffine3::from_translation(DVec3::from(place)) * DAffine3::from_rotation_y(turn)
+    });
+    let name = if textured { "textured" } else { "plain" };
+    let how = format!(
+        "The {}, {name}, with two chairs of known colour beside its red wall.",
+        room.name
+    );
+    Ok(Furnished {
+        name: name.to_owned(),
+        how,
+        frames: FRAMES.to_vec(),
+        ..furnish(room, photographs, stands)?
+    })
+}
+
+/// The twin of a capture with two chairs on its ground, as large as they fit, in the photographs that see most of them.
+///
+/// # Errors
+/// They fit nowhere.
+pub fn of_twin(twin: Studied) -> Result<Furnished> {
+    let scene = twin.room.lit(twin.rendering.size)?.scene;
+    let up = up(&scene);
+    let levels = || scene.positions.iter().map(|p| p.dot(up));
+    let tall = f64::from(levels().fold(f32::MIN, f32::max) - levels().fold(f32::MAX, f32::min));
+    let found = SHARES.iter().find_map(|share| {
+        let height = share * tall;
+        let cylinder = Cylinder {
+            radius: (height * RADIUS / HEIGHT) as f32,
+            height: height as f32,
+        };
+        let [a, b] = places(&scene, up, cylinder, CHAIRS.len())[..] else {
+            return None;
+        };
+        Some(([a, b], height))
+    });
+    let (places, height) = found.ok_or_else(|| {
+        Error::new(
+            &twin.room.name,
+            "no level ground that is seen and free holds two chairs",
+            "run the study on rooms of its own",
+        )
+    })?;
+    let up = up.as_dvec3().normalize_or(DVec3::Y);
+    let upright = DAffine3::from_quat(DQuat::from_rotation_arc(DVec3::Y, up));
+    let stand = |index: usize| {
+        let at = places[index].as_dvec3() + scene.origin + up * (LIFT * height);
+        DAffine3::from_translation(at)
+            * upright
+            * DAffine3::from_rotation_y(CHAIRS[index].3)
+            * DAffine3::from_scale(DVec3::splat(height / HEIGHT))
+    };
+    let photographs = render(&twin.room, &twin.rendering)?;
+    let mut furnished = furnish(twin.room, photographs, [stand(0), stand(1)])?;
+    furnished.frames = most_seen(&furnished);
+    furnished.how = format!(
+        "{}. Two chairs of known colour, {height:.2} high, stand where its ground is level, free and seen.",
+        twin.words
+    );
+    Ok(furnished)
+}
+
+/// The photographs that see most of the chairs, two at most; not those that see little else.
+fn most_seen(furnished: &Furnished) -> Vec<usize> {
+    let scene = &furnished.furnished.scene;
+    let first = scene.objects.len() - CHAIRS.len();
+    let seen = |frame: &Vec<u32>| {
+        let triangles = frame.iter().filter(|&&triangle| triangle != NOTHING);
+        let of_chairs = triangles.filter(|&&t| scene.object_of[t as usize] as usize >= first);
+        of_chairs.count()
+    };
+    let mut frames: Vec<(usize, usize)> = (scene.ids().triangles.iter().map(seen))
+        .enumerate()
+        .collect();
+    let pixels = scene.ids().triangles.first().map_or(0, Vec::len) as f64;
+    frames.retain(|(_, count)| *count > 0 && *count as f64 <= MOST_COVERED * pixels);
+    frames.sort_by_key(|&(frame, count)| (Reverse(count), frame));
+    let most = frames.into_iter().take(FRAMES.len());
+    most.map(|(frame, _)| frame).collect()
+}
+
+/// A photographed room with chairs, as modelled, where they are told to stand.
+fn furnish(
+    mut room: Room,
+    photographs: Vec<Photograph>,
+    stands: [DAffine3; 2],
+) -> Result<Furnished> {
+    let size = photographs.first().map_or([0; 2], |p| [p.width, p.height]);
     let subject = Subject::of_photographs(&room, photographs)?;
-    let size = if quick { QUICK.size } else { KEPT.size };
     let lit = room.lit(size)?;
-    let chairs = chairs();
+    let chairs = chairs(stands);
     let material = |color: [f32; 3]| Material::diffuse(color.into(), Vec3::ZERO);
     let models = (CHAIRS.iter().enumerate())
         .map(|(index, (name, color, ..))| {
@@ -81,7 +188,9 @@ pub fn built_in(textured: bool, quick: bool) -> Result<Furnished> {
     room.materials.extend(colors);
     append(&mut room.mesh, chairs);
     Ok(Furnished {
-        name: if textured { "textured" } else { "plain" },
+        name: room.name.clone(),
+        how: String::new(),
+        frames: Vec::new(),
         subject,
         lit,
         furnished: room.lit(size)?,
@@ -105,12 +214,11 @@ fn flatten(material: &mut Material) {
     }
 }
 
-fn chairs() -> Mesh {
+fn chairs(stands: [DAffine3; 2]) -> Mesh {
     let mut modeller = Modeller::default();
-    for (name, _, place, turn) in CHAIRS {
+    for ((name, ..), stand) in CHAIRS.into_iter().zip(stands) {
         modeller.object(name);
-        let stand = DAffine3::from_translation(DVec3::from(place));
-        modeller.placed(stand * DAffine3::from_rotation_y(turn), chair);
+        modeller.placed(stand, chair);
     }
     modeller.mesh
 }
@@ -133,7 +241,9 @@ fn append(mesh: &mut Mesh, other: Mesh) {
         .extend(triangles.map(|t| t.map(|i| i + corners)));
     let object_of = other.object_of.into_iter();
     mesh.object_of.extend(object_of.map(|k| k + objects));
-    mesh.corner_uvs.extend(other.corner_uvs);
+    if !mesh.corner_uvs.is_empty() {
+        mesh.corner_uvs.extend(other.corner_uvs);
+    }
 }
 
 #[cfg(test)]

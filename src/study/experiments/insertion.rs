@@ -14,8 +14,9 @@ use crate::inverse::settings::Settings;
 use crate::math::picture::Picture;
 use crate::study::experiments::course::{cache_settings, paper_settings, solved};
 use crate::study::experiments::findings::{Grid, brief};
-use crate::study::experiments::furnished::{Furnished, built_in};
+use crate::study::experiments::furnished::{Furnished, built_in, of_twin};
 use crate::study::experiments::likeness::Likeness;
+use crate::study::experiments::twin::{Sizes, twin};
 use crate::study::experiments::{Bench, Findings, Study, Summary};
 use crate::transport::film::Film;
 use crate::transport::lit::Lit;
@@ -27,13 +28,10 @@ pub const STUDY: Study = Study {
     name: "insertion",
     question: "The paper: objects composited with the light found are consistent with the photograph, naive ones are not. By \
         how much, against a true rendering with the objects in the room?",
-    takes_capture: false,
     seeds: 1,
     run,
 };
 
-/// The photographs that the chairs are put into; both see both.
-const FRAMES: [usize; 2] = [5, 14];
 /// Key of the true renderings' noise.
 const TRUTH: u64 = 0x7472_7574;
 /// A pixel beside the objects belongs to their shadow and bleed if they change it by this share.
@@ -51,17 +49,33 @@ const PLACES: [&str; 2] = ["objects", "shadow and bleed"];
 
 /// What was found in one room: a likeness for each way and place.
 struct Scene {
-    name: &'static str,
+    name: String,
+    /// What the name of its pictures ends with.
+    file: &'static str,
     likeness: [[Likeness; 2]; 5],
     grid: Grid,
 }
 
 fn run(bench: &Bench) -> Result<Findings> {
     let limits = bench.limits(4);
-    let mut scenes = Vec::new();
-    for textured in [true, false] {
-        let room = built_in(textured, bench.quick)?;
-        bench.begin(room.name)?;
+    let sizes = Sizes {
+        long_side: if bench.quick { 40 } else { 160 },
+        paths: if bench.quick { 1_000_000 } else { 20_000_000 },
+    };
+    let twin = twin(bench, sizes)?;
+    let rooms: &[(bool, &str)] = match twin {
+        Some(_) => &[(false, "-twin")],
+        None => &[(true, "-textured"), (false, "-plain")],
+    };
+    let mut twin = twin.map(of_twin).transpose()?;
+    let (mut scenes, mut how) = (Vec::new(), String::new());
+    for &(textured, file) in rooms {
+        let room = match twin.take() {
+            Some(twin) => twin,
+            None => built_in(textured, bench.quick)?,
+        };
+        bench.begin(&room.name)?;
+        how += &format!("{} Photographs {:?}. ", room.how, room.frames);
         let time = if limits.seconds.is_finite() {
             limits.seconds
         } else {
@@ -79,18 +93,15 @@ fn run(bench: &Bench) -> Result<Findings> {
         let cache = solved(bench, &room.subject, &cache)?.estimate;
         let paper = solved(bench, &room.subject, &paper)?.estimate;
         bench.begin(&format!("{}, composites", room.name))?;
-        scenes.push(scene(&room, &cache, &paper, bench.quick)?);
+        scenes.push(scene(&room, file, &cache, &paper, bench.quick)?);
         (bench.show)(plot(&scenes));
     }
     Ok(Findings {
         how: format!(
-            "Two chairs of known colour beside the red wall of the built-in room, once with its textures and once with their \
-             mean colours, put into photographs {} and {} by each way and compared with a path-traced rendering of the room \
+            "{how}The chairs are put into these photographs by each way and compared with a path-traced rendering of the room \
              with the chairs in its mesh. PSNR and SSIM are of the pictures as shown (the truth's 99th percentile at 1, \
              sRGB); shadow and bleed are the pixels beside the chairs that they change by more than {} %. The composites' \
              noise and the photographs' count as error, also where the true light is used.",
-            FRAMES[0],
-            FRAMES[1],
             CHANGED * 100.0,
         ),
         tables: vec![("", table(&scenes))],
@@ -99,14 +110,19 @@ fn run(bench: &Bench) -> Result<Findings> {
         seen: scenes.iter().flat_map(seen).collect(),
         pictures: scenes
             .into_iter()
-            .zip(["-textured", "-plain"])
-            .map(|(scene, suffix)| (suffix, scene.grid))
+            .map(|scene| (scene.file, scene.grid))
             .collect(),
     })
 }
 
 /// Composites in both frames by every way, against the truth.
-fn scene(room: &Furnished, cache: &Estimate, paper: &Estimate, quick: bool) -> Result<Scene> {
+fn scene(
+    room: &Furnished,
+    file: &'static str,
+    cache: &Estimate,
+    paper: &Estimate,
+    quick: bool,
+) -> Result<Scene> {
     let (truth_samples, samples) = if quick { (128, 64) } else { (512, 128) };
     let problem = &room.subject.problem;
     let scene = &problem.scene;
@@ -122,11 +138,12 @@ fn scene(room: &Furnished, cache: &Estimate, paper: &Estimate, quick: bool) -> R
         .collect();
     let photographed = harmonics_of_photographs(scene.cameras.iter().zip(&pictures));
     let mut found = Scene {
-        name: room.name,
+        name: room.name.clone(),
+        file,
         likeness: [[Likeness::default(); 2]; 5],
         grid: Grid::new(WAYS.len() - 1),
     };
-    for frame in FRAMES {
+    for &frame in &room.frames {
         let camera = &scene.cameras[frame];
         let backdrop = Backdrop::new(
             frame,
@@ -215,7 +232,7 @@ fn table(scenes: &[Scene]) -> Table {
         for (way, places) in WAYS.iter().zip(&scene.likeness) {
             for (place, likeness) in PLACES.iter().zip(places) {
                 table.row(&[
-                    scene.name.into(),
+                    scene.name.as_str().into(),
                     (*way).into(),
                     (*place).into(),
                     likeness.pixels().into(),
@@ -262,7 +279,7 @@ fn summary(scenes: &[Scene]) -> Summary {
     let rows = scenes.iter().flat_map(|scene| {
         (WAYS.iter().zip(&scene.likeness)).map(move |(way, [inside, beside])| {
             vec![
-                scene.name.to_owned(),
+                scene.name.clone(),
                 (*way).to_owned(),
                 words(inside),
                 words(beside),

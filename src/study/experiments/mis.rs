@@ -5,13 +5,15 @@ use crate::export::plot::Plot;
 use crate::export::table::Table;
 use crate::inverse::settings::{LightSampling, Settings};
 use crate::room::Room;
+use crate::room::photographs::Rendering;
 use crate::study::experiments::course::{
     Errors, Gauge, Mark, cache_settings, cached, descend, paper_settings,
 };
 use crate::study::experiments::courses::{self, Kind, Spread, common_mark, plot, table, words};
 use crate::study::experiments::findings::brief;
 use crate::study::experiments::gradient::{Noise, noise};
-use crate::study::experiments::{Bench, Findings, Study, Summary, box_room};
+use crate::study::experiments::twin::{Sizes, twin};
+use crate::study::experiments::{Bench, Findings, Study, Subject, Summary, box_room};
 use crate::transport::material::Lobe;
 use glam::Vec3;
 
@@ -20,29 +22,28 @@ pub const STUDY: Study = Study {
     name: "mis",
     question: "The paper: multiple importance sampling speeds convergence markedly. Against light sampling alone and BSDF \
         sampling alone, under a small lamp and a large one, and with a rough surface near a lamp.",
-    takes_capture: false,
     seeds: 5,
     run,
 };
 
-/// The rooms.
-const ROOMS: [Lighting; 3] = [
-    Lighting {
+/// The study's own rooms.
+const ROOMS: [Lamp; 3] = [
+    Lamp {
         name: "small lamp",
         files: ["", "-seconds"],
-        lamp: 0.1,
+        half_side: 0.1,
         board: None,
     },
-    Lighting {
+    Lamp {
         name: "large lamp",
         files: ["-large", "-large-seconds"],
-        lamp: 0.85,
+        half_side: 0.85,
         board: None,
     },
-    Lighting {
+    Lamp {
         name: "rough board near a lamp",
         files: ["-rough", "-rough-seconds"],
-        lamp: 0.4,
+        half_side: 0.4,
         board: Some(Lobe {
             roughness: 0.1,
             specular: Vec3::splat(0.3),
@@ -59,45 +60,89 @@ const SAMPLINGS: [LightSampling; 3] = [
 /// A mean apart from another by less than this factor is as good.
 const AS_GOOD: f64 = 1.05;
 
-/// How one of the rooms is lit.
-struct Lighting {
+/// How one of the study's own rooms is lit.
+struct Lamp {
     name: &'static str,
     /// What the names of its plots over rays and over seconds end with.
     files: [&'static str; 2],
     /// Half side of the lamp in metres.
-    lamp: f64,
+    half_side: f64,
     /// Lobe of a board below the lamp; `None` where all is diffuse.
     board: Option<Lobe>,
 }
 
-impl Lighting {
-    fn room(&self) -> Room {
-        match self.board {
-            Some(lobe) => box_room::board_room(self.name, ALBEDO, self.lamp, lobe),
-            None => box_room::box_room(self.name, ALBEDO, self.lamp),
+/// One of the rooms that are compared.
+struct Lit {
+    files: [&'static str; 2],
+    room: Room,
+    rendering: Rendering,
+}
+
+impl Lamp {
+    fn lit(&self, quick: bool) -> Lit {
+        Lit {
+            files: self.files,
+            room: match self.board {
+                Some(lobe) => box_room::board_room(self.name, ALBEDO, self.half_side, lobe),
+                None => box_room::box_room(self.name, ALBEDO, self.half_side),
+            },
+            rendering: box_room::rendering(quick),
         }
     }
 }
 
 /// What was measured in one room.
 struct Scene {
-    name: &'static str,
+    name: String,
     files: [&'static str; 2],
     kinds: Vec<Kind>,
     noises: Vec<Noise>,
     cache: Vec<Mark>,
 }
 
+/// The study's own rooms in a phrase.
+fn own_rooms() -> String {
+    let [small, large, rough] = &ROOMS;
+    let lobe = rough.board.map_or_else(String::new, |lobe| {
+        format!(
+            "roughness {}, specular reflectance {}",
+            lobe.roughness, lobe.specular.x
+        )
+    });
+    format!(
+        "A box room of mean albedo {ALBEDO} under a lamp of half side {} m and under one of {} m with the same power, and \
+         one whose lamp of {} m hangs above a rough board (GGX, {lobe}) whose lobe the descent knows and the transport \
+         cache has to find",
+        small.half_side, large.half_side, rough.half_side,
+    )
+}
+
 fn run(bench: &Bench) -> Result<Findings> {
-    let limits = bench.limits(ROOMS.len() * SAMPLINGS.len() * bench.seeds as usize);
+    let twin = twin(bench, Sizes::small(bench.quick))?;
+    let how = twin
+        .as_ref()
+        .map_or_else(own_rooms, |twin| twin.words.clone());
+    let rooms: Vec<Lit> = match twin {
+        Some(twin) => vec![Lit {
+            files: ROOMS[0].files,
+            room: twin.room,
+            rendering: twin.rendering,
+        }],
+        None => ROOMS.iter().map(|lamp| lamp.lit(bench.quick)).collect(),
+    };
+    let limits = bench.limits(rooms.len() * SAMPLINGS.len() * bench.seeds as usize);
     let (pixels, paths) = if bench.quick { (300, 128) } else { (1000, 512) };
     let mut scenes = Vec::new();
-    for lighting in &ROOMS {
-        let name = lighting.name;
+    for Lit {
+        files,
+        room,
+        rendering,
+    } in &rooms
+    {
+        let name = room.name.as_str();
         bench.begin(name)?;
-        let room = lighting.room();
-        let subject = box_room::photograph(&room, bench.quick)?;
-        let truth = box_room::truth(&room);
+        let subject = Subject::of_room(room, rendering)?;
+        let truth = box_room::truth(room);
         let lobes: Vec<Option<Lobe>> = room.materials.iter().map(|m| m.lobe).collect();
         let bounces = paper_settings(1).max_bounces();
         let gauge = Gauge::new(&subject, bounces).knowing(lobes.clone());
@@ -117,12 +162,12 @@ fn run(bench: &Bench) -> Result<Findings> {
             noise(&subject.problem, &truth, &lobes, *sampling, pixels, paths)
         };
         let cache = |seed| Settings {
-            lobes: lighting.board.is_some(),
+            lobes: lobes.iter().any(Option::is_some),
             ..cache_settings(seed, bench.quick)
         };
         scenes.push(Scene {
-            name,
-            files: lighting.files,
+            name: name.to_owned(),
+            files: *files,
             kinds,
             noises: SAMPLINGS.iter().map(of).collect(),
             cache: (bench.seeds())
@@ -140,27 +185,16 @@ fn run(bench: &Bench) -> Result<Findings> {
         .collect();
     let mut plots = Vec::new();
     for scene in &scenes {
-        let draw = |label, x| drawn(scene.name, label, x, &scene.kinds, &scene.cache);
+        let draw = |label, x| drawn(&scene.name, label, x, &scene.kinds, &scene.cache);
         let [over_rays, over_seconds] = scene.files;
         plots.push((over_rays, draw("rays", |mark| mark.rays as f64)));
         plots.push((over_seconds, draw("seconds", |mark| mark.seconds)));
     }
     Ok(Findings {
         how: format!(
-            "The paper's descent (batches of 8, two bounces, nothing annealed) in a box room of mean albedo {ALBEDO} under \
-             a lamp of half side {} m and one of {} m with the same power, and in one whose lamp of {} m hangs above a rough \
-             board (GGX, {}) whose lobe the descent knows and the transport cache has to find, {} seeds. The variance is \
-             that of one path's derivative of a pixel's radiance at the true values, summed over unknowns, lobes held. \
+            "{how}. The paper's descent there (batches of 8, two bounces, nothing annealed), {} seeds. The variance is that \
+             of one path's derivative of a pixel's radiance at the true values, summed over unknowns, lobes held. \
              Seconds are those of this machine and whatever else ran on it; rays are the fairer axis.",
-            ROOMS[0].lamp,
-            ROOMS[1].lamp,
-            ROOMS[2].lamp,
-            ROOMS[2].board.map_or_else(String::new, |lobe| {
-                format!(
-                    "roughness {}, specular reflectance {}",
-                    lobe.roughness, lobe.specular.x
-                )
-            }),
             bench.seeds,
         ),
         tables: vec![
@@ -200,7 +234,7 @@ fn variances(scenes: &[Scene]) -> Table {
     for scene in scenes {
         for (sampling, noise) in SAMPLINGS.iter().zip(&scene.noises) {
             table.row(&[
-                scene.name.into(),
+                scene.name.as_str().into(),
                 sampling.word().into(),
                 noise.variance.into(),
                 noise.error.into(),

@@ -1,7 +1,7 @@
 //! The paper's experiments, each rerun by one command: `relit study NAME`.
 //!
 //! A study is a row of [`STUDIES`], from which the command, its help and `all` come. It runs on scenes of known truth,
-//! photographed in memory, and hands back tables, plots and what was seen, which [`Findings::write`] puts into files.
+//! photographed in memory, or on a capture, and hands back tables, plots and what was seen, which [`Findings::write`] puts into files.
 
 mod batch;
 mod bounces;
@@ -24,10 +24,12 @@ mod objects;
 mod precision;
 mod sampling;
 mod selection;
+mod standing;
 mod subject;
 mod summed;
 mod table1;
 mod textures;
+mod twin;
 
 pub use findings::{Findings, Grid, Summary};
 pub use subject::Subject;
@@ -46,8 +48,6 @@ pub struct Study {
     pub name: &'static str,
     /// What it asks.
     pub question: &'static str,
-    /// Whether it can be run on a capture instead of on rooms of its own.
-    pub takes_capture: bool,
     /// Seeds that it repeats solves with where none are named.
     pub seeds: u64,
     run: fn(&Bench) -> Result<Findings>,
@@ -84,7 +84,8 @@ pub struct Bench<'a> {
     pub time: Duration,
     /// How many seeds each solve is repeated with: 1, 2, …
     pub seeds: u64,
-    /// The capture to run on, for studies that take one.
+    /// The capture to run on instead of rooms of the study's own: `batch` and `textures` on its photographs, the others on
+    /// its twin, whose truth is known.
     pub subject: Option<&'a Subject>,
     /// Hears what is being done.
     pub say: &'a dyn Fn(&str),

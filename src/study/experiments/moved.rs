@@ -4,53 +4,70 @@ use crate::math::stats::quantile;
 use crate::room::Room;
 use crate::room::cameras::cameras;
 use crate::scene::Scene;
+use crate::scene::visibility::NOTHING;
 use crate::transport::material::Material;
 use glam::{DVec3, Vec2, Vec3};
 
-/// Objects of the box room whose albedo is asked for; they come first.
-pub const REFLECTORS: usize = 7;
-/// Size of the box room in metres.
-const SIZE: f64 = 2.0;
 /// Share of the rays whose error is below what is reported.
 const MOST: f64 = 0.99;
 
 /// Changes a room by a value; the changed room and the size of it in which errors are counted.
 pub type Change = fn(&Room, f64) -> (Room, f64);
 
-/// The box room `factor` times as large.
+/// Longest side of a room's bounding box.
+fn size(room: &Room) -> f64 {
+    let (low, high) = room.mesh.bounds();
+    (high - low).max_element()
+}
+
+/// A room `factor` times as large.
 pub fn scaled(room: &Room, factor: f64) -> (Room, f64) {
     let mut room = room.clone();
     room.mesh.positions.iter_mut().for_each(|p| *p *= factor);
-    room.views.iter_mut().flatten().for_each(|p| *p *= factor);
-    (room, SIZE * factor)
+    (room.views.iter_mut()).for_each(|view| view.pose.center *= factor);
+    let size = size(&room);
+    (room, size)
 }
 
-/// The box room with a speck at so many of its sizes: what a scan's stray triangle does to coordinates of 32 bits.
+/// A room with a speck at so many of its sizes: what a scan's stray triangle does to coordinates of 32 bits.
 pub fn with_outlier(room: &Room, distance: f64) -> (Room, f64) {
     let mut room = room.clone();
+    let size = size(&room);
     let first = room.mesh.positions.len() as u32;
-    let far = DVec3::new(0.6, 0.48, 0.64) * (SIZE * distance);
-    let corners = [DVec3::ZERO, DVec3::X, DVec3::Y].map(|p| far + p * (0.1 * SIZE));
+    let far = DVec3::new(0.6, 0.48, 0.64) * (size * distance);
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::Y].map(|p| far + p * (0.1 * size));
     room.mesh.positions.extend(corners);
     room.mesh.triangles.push([first, first + 1, first + 2]);
     room.mesh.object_of.push(room.mesh.objects.len() as u32);
     room.mesh.objects.push("speck".to_owned());
-    room.mesh.corner_uvs.push([Vec2::ZERO; 3]);
+    if !room.mesh.corner_uvs.is_empty() {
+        room.mesh.corner_uvs.push([Vec2::ZERO; 3]);
+    }
     room.materials
         .push(Material::diffuse(Vec3::splat(0.5), Vec3::ZERO));
-    (room, SIZE)
+    (room, size)
 }
 
-/// How far the hit points of the central rays of all pixels lie from where the ray of a camera in 64 bits meets the
-/// plane of the same triangle in 64 bits, in units of `size`: 99 % of them are nearer. A ray that meets nothing is one
-/// size off.
-pub fn hit_error(room: &Room, scene: &Scene, size: f64) -> f64 {
+/// Whether the central ray of each pixel of each camera meets something, one pixel after the other.
+pub fn meets(scene: &Scene) -> Vec<bool> {
+    let pixels = scene.ids().triangles.iter().flatten();
+    pixels.map(|&triangle| triangle != NOTHING).collect()
+}
+
+/// How far the hit points of the central rays of pixels lie from where the ray of a camera in 64 bits meets the plane of
+/// the same triangle in 64 bits, in units of `size`: 99 % of them are nearer. Of pixels that met something in the room as
+/// it was; one that now meets nothing is one size off.
+pub fn hit_error(room: &Room, scene: &Scene, met: &[bool], size: f64) -> f64 {
     let lens = scene.cameras.first().map(|camera| camera.intrinsics);
     let [width, height] = lens.map_or([0; 2], |lens| [lens.width, lens.height]);
     let exact = cameras(&room.views, [width, height]);
     let mut errors = Vec::new();
+    let mut met = met.iter();
     for (camera, (lens, pose)) in scene.cameras.iter().zip(&exact) {
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            if met.next() != Some(&true) {
+                continue;
+            }
             let at = Vec2::new(x as f32, y as f32) + 0.5;
             let Some(hit) = scene.intersect(&camera.ray(at)) else {
                 errors.push(1.0);
@@ -83,7 +100,7 @@ mod tests {
         let room = box_room("room", 0.5, 0.25);
         let error = |(room, size): (Room, f64)| {
             let lit = room.lit([16, 12]).expect("a scene");
-            hit_error(&room, &lit.scene, size)
+            hit_error(&room, &lit.scene, &[true; 16 * 12 * 6], size)
         };
         for factor in [1e-3, 1.0, 1e3] {
             assert!(error(scaled(&room, factor)) < 1e-6);

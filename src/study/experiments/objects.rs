@@ -1,23 +1,27 @@
 //! Single objects whose photographs are far more exact than what is asked of a fit.
 
 use crate::capture::photograph::Photograph;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::room::Room;
+use crate::room::cameras::View;
 use crate::room::photographs::{Rendering, linear, render};
 use crate::room::shape::Modeller;
+use crate::room::truth::seen_pixels;
 use crate::scene::visibility::NOTHING;
 use crate::study::experiments::chair::chair;
 use crate::study::experiments::subject::Subject;
+use crate::study::experiments::twin::Studied;
 use crate::study::experiments::{box_room, closed_form};
 use crate::transport::material::Material;
 use glam::{DAffine3, DVec3, Vec3};
+use std::cmp::Reverse;
 
 /// An object in front of cameras.
 pub struct Posed {
     /// In words.
-    pub name: &'static str,
+    pub name: String,
     /// Its name in the scene.
-    pub object: &'static str,
+    pub object: String,
     /// What it is and how it was photographed, a sentence.
     pub how: String,
     /// The scene with its photographs.
@@ -41,8 +45,8 @@ pub fn convex(quick: bool) -> Result<Posed> {
     let room = gem();
     let photographs = closed_form::photographs(&room, size);
     Ok(Posed {
-        name: "convex, under a lamp",
-        object: "gem",
+        name: "convex, under a lamp".to_owned(),
+        object: "gem".to_owned(),
         how: format!(
             "A convex polyhedron of {} triangles below a square lamp, nothing else, in {} photographs of {} × {} pixels in \
              closed form (Lambert's polygon irradiance, 25 points for each part of a pixel), rounded to 32 bits; they are \
@@ -82,7 +86,7 @@ fn gem() -> Room {
             Material::diffuse(Vec3::new(0.65, 0.45, 0.25), Vec3::ZERO),
             Material::diffuse(Vec3::ZERO, Vec3::new(12.0, 10.0, 8.0)),
         ],
-        views: views.map(|view| view.map(DVec3::from)).to_vec(),
+        views: View::all(&views),
     }
 }
 
@@ -96,36 +100,26 @@ pub fn shadowed(quick: bool) -> Result<Posed> {
     } else {
         ([96, 72], 128)
     };
-    let mut room = box_room::furnished("chair in a room", 0.5, 0.25, "chair", |m| {
+    let object = "chair";
+    let mut room = box_room::furnished("chair in a room", 0.5, 0.25, object, |m| {
         let turn = DAffine3::from_rotation_y(0.5);
         let place = DAffine3::from_translation(DVec3::new(-0.3, 0.0, -0.25)) * turn;
         m.placed(place, chair);
     });
     // The chair from nearby, besides the views of the room.
     for eye in [[0.5, 0.8, 0.5], [-0.8, 1.0, 0.5], [0.5, 0.5, -0.7]] {
-        room.views
-            .push([DVec3::from(eye), DVec3::new(-0.3, 0.45, -0.25)]);
+        let target = DVec3::new(-0.3, 0.45, -0.25);
+        room.views.push(View::towards(eye.into(), target));
     }
-    // Two halves of their own noise, whose difference tells how exact their mean is.
-    let half = |seed| {
-        let rendering = Rendering {
-            seed,
-            samples,
-            size,
-        };
-        render(&room, &rendering)
+    let rendering = Rendering {
+        seed: box_room::NOISE,
+        samples,
+        size,
     };
-    let halves = [half(box_room::NOISE)?, half(box_room::NOISE + 1)?];
-    let mean = |(a, b): (&Photograph, &Photograph)| {
-        let pixels = a.pixels.iter().zip(&b.pixels);
-        linear(size, pixels.map(|(&a, &b)| (a + b) * 0.5).collect())
-    };
-    let photographs: Vec<Photograph> = halves[0].iter().zip(&halves[1]).map(mean).collect();
-    let subject = Subject::of_photographs(&room, photographs)?;
-    let floor = noise_of(&subject, "chair", &halves);
+    let (subject, floor) = photographed(&room, &rendering, object)?;
     Ok(Posed {
-        name: "self-shadowing, in a room",
-        object: "chair",
+        name: "self-shadowing, in a room".to_owned(),
+        object: object.to_owned(),
         how: format!(
             "A chair in a box room of mean albedo 0.5, all of whose seven reflectors and whose lamp are unknown too, in {} \
              photographs of {} × {} pixels with {} paths each and all bounces, from random numbers that the solver does not \
@@ -141,6 +135,57 @@ pub fn shadowed(quick: bool) -> Result<Posed> {
         aim: 0.05,
         floor,
     })
+}
+
+/// The object of a capture's twin that most pixels see, of those that are no lamps; all others are unknown too.
+///
+/// # Errors
+/// All objects are lamps.
+pub fn of_twin(twin: &Studied) -> Result<Posed> {
+    let room = &twin.room;
+    let seen = seen_pixels(&room.lit(twin.rendering.size)?);
+    let reflectors = (0..seen.len()).filter(|&i| room.materials[i].emission == Vec3::ZERO);
+    let object = reflectors.max_by_key(|&i| (seen[i], Reverse(i)));
+    let object = object
+        .map(|i| room.mesh.objects[i].clone())
+        .ok_or_else(|| {
+            Error::new(
+                &room.name,
+                "every object of it is a lamp",
+                "run the study on rooms of its own",
+            )
+        })?;
+    let (subject, floor) = photographed(room, &twin.rendering, &object)?;
+    Ok(Posed {
+        name: format!("{object}, in the {}", room.name),
+        how: format!(
+            "{}, twice with other random numbers; of its {} objects, all of them unknown, the errors of {object} are told.",
+            twin.words,
+            seen.len(),
+        ),
+        object,
+        subject,
+        interreflects: true,
+        target: 0.14,
+        aim: 0.05,
+        floor,
+    })
+}
+
+/// A room photographed in two halves of their own noise, whose difference tells how exact the mean of an object's
+/// radiance is.
+fn photographed(room: &Room, rendering: &Rendering, object: &str) -> Result<(Subject, f64)> {
+    let half = |seed| render(room, &Rendering { seed, ..*rendering });
+    let halves = [half(rendering.seed)?, half(rendering.seed + 1)?];
+    let mean = |(a, b): (&Photograph, &Photograph)| {
+        let pixels = a.pixels.iter().zip(&b.pixels);
+        let means = pixels.map(|(&a, &b)| (a + b) * 0.5).collect();
+        linear(rendering.size, means)
+    };
+    let photographs: Vec<Photograph> = halves[0].iter().zip(&halves[1]).map(mean).collect();
+    let subject = Subject::of_photographs(room, photographs)?;
+    let floor = noise_of(&subject, object, &halves);
+    Ok((subject, floor))
 }
 
 /// Relative standard error of an object's mean radiance, channels pooled, from photographs in two independent halves.
@@ -174,8 +219,9 @@ mod tests {
     fn the_closed_form_is_what_paths_render_on_the_mean() {
         // From further away too, where pixels see outlines.
         let mut room = gem();
+        let eye = DVec3::new(1.1, 0.9, 0.9);
         room.views
-            .push([DVec3::new(1.1, 0.9, 0.9), DVec3::new(0.0, 0.7, 0.0)]);
+            .push(View::towards(eye, DVec3::new(0.0, 0.7, 0.0)));
         let size = [32, 24];
         let exact = closed_form::photographs(&room, size);
         let rendering = Rendering {

@@ -12,6 +12,7 @@ use crate::study::experiments::courses::{self, Kind, Quantity, common_mark, plot
 use crate::study::experiments::evenness::{Evenness, measure};
 use crate::study::experiments::findings::brief;
 use crate::study::experiments::selection::Groups;
+use crate::study::experiments::twin::studied;
 use crate::study::experiments::{Bench, Findings, Limits, Study, Summary, box_room};
 use crate::transport::path::PathOptions;
 
@@ -20,7 +21,6 @@ pub const STUDY: Study = Study {
     name: "sampling",
     question: "The paper sees \"high potential in investigating better sampling strategies\". What do pixels drawn by object or \
         by residual bring the descent, and points of a low-discrepancy sequence the transport cache?",
-    takes_capture: false,
     seeds: 3,
     run,
 };
@@ -50,7 +50,10 @@ const WAYS: [(&str, Way); 5] = [
 
 fn run(bench: &Bench) -> Result<Findings> {
     let limits = bench.limits(WAYS.len() * bench.seeds as usize);
-    let subject = box_room::photographed("box room", ALBEDO, LAMP, bench.quick)?;
+    let words = format!("A box room of mean albedo {ALBEDO}");
+    let own = || box_room::box_room("box room", ALBEDO, LAMP);
+    let studied = studied(bench, &words, own)?;
+    let subject = studied.photographed()?;
     let gauge = Gauge::new(&subject, paper_settings(1).max_bounces());
     let names = WAYS.iter().map(|(name, _)| (*name).to_owned());
     let course = |index: usize, seed| {
@@ -59,18 +62,18 @@ fn run(bench: &Bench) -> Result<Findings> {
     };
     let kinds = courses::run(bench, names, course, of_loss)?;
     bench.begin("paths")?;
-    let truth = box_room::truth(&box_room::box_room("box room", ALBEDO, LAMP));
+    let truth = box_room::truth(&studied.room);
     let (pixels, most) = if bench.quick { (16, 256) } else { (64, 4096) };
     let evenness = measure(&subject.problem, &truth, pixels, most);
 
     Ok(Findings {
         how: format!(
-            "The paper's descent in a box room of mean albedo {ALBEDO}, {} seeds, batches of 8, nothing annealed, with \
+            "{}. The paper's descent there, {} seeds, batches of 8, nothing annealed, with \
              pixels drawn uniformly, from each object alike, and from blocks of 8 × 8 pixels by their residual (looked at \
              every {LOOK_EVERY} steps, whose rays count); each with gradients as they come and weighed back to what uniform \
              draws fit. Held-out loss is over uniform pixels. Paths: standard deviation of a pixel's mean radiance over 16 \
              repetitions, root mean square over {pixels} pixels, at the true values.",
-            bench.seeds,
+            studied.words, bench.seeds,
         ),
         tables: vec![
             ("", table("pixels", &kinds, &[])),

@@ -19,20 +19,21 @@ const BOUNCES: u32 = 64;
 /// Paths of which the lamps' shares are taken.
 const SHARED: usize = 10_000;
 
-/// Paths through the pixels of all photographs, one after the other. The last two objects are their lamps, drawn alike.
+/// Paths through the pixels of all photographs, one after the other. Two objects are their lamps, drawn alike.
 pub struct Paths {
     vertices: Vec<Vertex>,
     ends: Vec<usize>,
     surfaces: usize,
+    lamps: [usize; 2],
 }
 
 impl Paths {
-    /// Traces so many paths.
-    pub fn trace(problem: &Problem, count: usize) -> Self {
+    /// Traces so many paths, with these objects as lamps.
+    pub fn trace(problem: &Problem, lamps: [usize; 2], count: usize) -> Self {
         let scene = &*problem.scene;
         let surfaces = scene.objects.len();
         let mut weights = vec![0.0; surfaces];
-        weights[surfaces.saturating_sub(2)..].fill(1.0);
+        lamps.iter().for_each(|&lamp| weights[lamp] = 1.0);
         let lights = Emitters::new(scene, &weights);
         let believed = vec![ALBEDO; surfaces];
         let tracer = tracer(scene, &lights, &believed, LightSampling::Mis, BOUNCES);
@@ -51,6 +52,7 @@ impl Paths {
             vertices,
             ends,
             surfaces,
+            lamps,
         }
     }
 
@@ -90,14 +92,13 @@ impl Paths {
     }
 
     /// Radiance of each path in 32 bits.
-    fn radiances(&self, count: usize, lamps: [f32; 2]) -> impl Iterator<Item = f32> {
+    fn radiances(&self, count: usize, radiances: [f32; 2]) -> impl Iterator<Item = f32> {
         let mut unknowns = Unknowns {
             albedo: vec![Vec3::splat(ALBEDO); self.surfaces],
             emission: vec![Vec3::ZERO; self.surfaces],
         };
-        let first = self.surfaces - lamps.len();
-        for (emission, lamp) in unknowns.emission[first..].iter_mut().zip(lamps) {
-            *emission = Vec3::splat(lamp);
+        for (lamp, radiance) in self.lamps.into_iter().zip(radiances) {
+            unknowns.emission[lamp] = Vec3::splat(radiance);
         }
         let mut gathered = Vec::new();
         let mut gradient = Gradient::new(2 * self.surfaces);
@@ -108,11 +109,10 @@ impl Paths {
     }
 
     /// Sum over paths in 64 bits throughout, from the same weights.
-    fn exact(&self, count: usize, lamps: [f64; 2]) -> f64 {
-        let first = self.surfaces - lamps.len();
+    fn exact(&self, count: usize, radiances: [f64; 2]) -> f64 {
         let emission = |surface: u32| {
-            let lamp = (surface as usize).checked_sub(first);
-            lamp.map_or(0.0, |lamp| lamps[lamp])
+            let lamp = self.lamps.iter().position(|&l| l == surface as usize);
+            lamp.map_or(0.0, |lamp| radiances[lamp])
         };
         let of = |path: &[Vertex]| {
             path.iter().rev().fold(0.0, |beyond, v| {

@@ -9,6 +9,7 @@ use crate::study::experiments::course::{
 };
 use crate::study::experiments::findings::brief;
 use crate::study::experiments::objects::{self, Posed};
+use crate::study::experiments::twin::{Sizes, twin};
 use crate::study::experiments::{Bench, Findings, Limits, Study, Summary};
 
 /// The study.
@@ -16,7 +17,6 @@ pub const STUDY: Study = Study {
     name: "table1",
     question: "The paper, relative error of the diffuse albedo of single objects: 0.00037 % and 0.14 %, where LIME has 0.45 % \
         and 1.37 %. Does a convex object under a lamp, and one that shadows itself in a room, come out as exactly?",
-    takes_capture: false,
     seeds: 10,
     run,
 };
@@ -34,13 +34,20 @@ struct Solved {
 }
 
 fn run(bench: &Bench) -> Result<Findings> {
-    let shares = 2 * bench.seeds as usize + (4.0 * PAPER_SHARE) as usize;
-    let limits = bench.limits(shares);
+    let objects = match twin(bench, Sizes::small(bench.quick))? {
+        Some(twin) => vec![objects::of_twin(&twin)?],
+        None => vec![
+            objects::convex(bench.quick)?,
+            objects::shadowed(bench.quick)?,
+        ],
+    };
+    let each = bench.seeds as f64 + PAPER_SEEDS as f64 * PAPER_SHARE;
+    let limits = bench.limits((objects.len() as f64 * each) as usize);
+    let how: String = (objects.iter())
+        .map(|posed| format!("{} ", posed.how))
+        .collect();
     let mut all: Vec<Solved> = Vec::new();
-    for posed in [
-        objects::convex(bench.quick)?,
-        objects::shadowed(bench.quick)?,
-    ] {
+    for posed in objects {
         all.push(Solved {
             posed,
             cache: Vec::new(),
@@ -55,7 +62,7 @@ fn run(bench: &Bench) -> Result<Findings> {
             let posed = &all[last].posed;
             let solver = if by_cache { "transport cache" } else { "paper" };
             bench.begin(&format!("{}, {solver}, seed {seed}", posed.name))?;
-            let gauge = Gauge::new(&posed.subject, u32::MAX).watching(posed.object);
+            let gauge = Gauge::new(&posed.subject, u32::MAX).watching(&posed.object);
             if by_cache {
                 let settings = settings(posed, seed, bench.quick, limits.seconds);
                 let end = cached(bench, &gauge, &settings)?;
@@ -74,13 +81,11 @@ fn run(bench: &Bench) -> Result<Findings> {
     bench.go_on()?;
     Ok(Findings {
         how: format!(
-            "{} {} Both solved by the transport cache with preset `balanced`, light sampling alone where nothing but lamps \
+            "{how}Solved by the transport cache with preset `balanced`, light sampling alone where nothing but lamps \
              gives light, and a `--target-error` of their own, as one colour an object; everything else is the \
              solver's as it is. Errors are ‖ρ̂ − ρ‖₂ / ‖ρ‖₂ over RGB, seeds 1 to {}. The paper's objects are others than \
              these, so that its numbers are marks to aim at, not the same measurement. Seconds are those of this machine \
              and whatever else ran on it{}.",
-            all[0].posed.how,
-            all[1].posed.how,
             bench.seeds,
             if limits.seconds.is_finite() {
                 format!(
@@ -169,7 +174,7 @@ fn table(all: &[Solved]) -> Table {
         for (solver, marks) in [("transport cache", &solved.cache), ("paper", &solved.paper)] {
             for (seed, mark) in (1u64..).zip(marks) {
                 table.row(&[
-                    solved.posed.object.into(),
+                    solved.posed.object.as_str().into(),
                     solver.into(),
                     seed.into(),
                     mark.errors.object.into(),
@@ -223,7 +228,7 @@ fn row(solved: &Solved, solver: &str, marks: &[Mark]) -> Vec<String> {
         mark.errors.emission.unwrap_or(f64::NAN) * 100.0
     });
     vec![
-        solved.posed.name.to_owned(),
+        solved.posed.name.clone(),
         solver.to_owned(),
         brief(root_mean_square(&errors)),
         each.join(", "),

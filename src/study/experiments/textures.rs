@@ -26,7 +26,6 @@ pub const STUDY: Study = Study {
     name: "textures",
     question: "The paper: once lights are in place, albedos per triangle and then of ever finer triangles recover textures. At \
         what cost, beside the transport cache's cells of the size of pixels?",
-    takes_capture: true,
     seeds: 1,
     run,
 };

@@ -1,0 +1,239 @@
+//! The twin of a capture: a room with its mesh and its cameras whose colours and lamps are those that a solve of the
+//! capture found. What is true of it is known, so that studies can count errors there.
+
+use crate::capture::camera::Pose;
+use crate::capture::mesh::Mesh;
+use crate::error::{Error, Result};
+use crate::inverse::estimate::Estimate;
+use crate::inverse::settings::Settings;
+use crate::room::Room;
+use crate::room::cameras::View;
+use crate::room::photographs::Rendering;
+use crate::scene::Scene;
+use crate::scene::camera::Camera;
+use crate::study::experiments::course::{cache_settings, solved};
+use crate::study::experiments::{Bench, Subject, box_room};
+use crate::transport::material::Material;
+use glam::Vec3;
+
+/// No surface reflects more, as in studies' own rooms; light between whiter ones would hardly ever end.
+const WHITEST: f32 = 0.98;
+/// Fewest and most paths a pixel of its photographs.
+const PATHS: [u64; 2] = [16, 128];
+
+/// The room that a study runs in, and how it is photographed.
+#[derive(Debug, Clone)]
+pub struct Studied {
+    /// Geometry and truth.
+    pub room: Room,
+    /// How it is photographed.
+    pub rendering: Rendering,
+    /// What it is, a phrase that begins a sentence.
+    pub words: String,
+    /// Whether it is the twin of a capture.
+    pub is_twin: bool,
+}
+
+impl Studied {
+    /// The room, photographed with all bounces.
+    ///
+    /// # Errors
+    /// The mesh holds nothing to see.
+    pub fn photographed(&self) -> Result<Subject> {
+        Subject::of_room(&self.room, &self.rendering)
+    }
+}
+
+/// How a twin is photographed.
+#[derive(Debug, Clone, Copy)]
+pub struct Sizes {
+    /// Pixels along the longer side.
+    pub long_side: u32,
+    /// Paths of all photographs together, as far as each pixel gets no fewer than 16 and no more than 128.
+    pub paths: u64,
+}
+
+impl Sizes {
+    /// As small as the photographs of studies' own box room.
+    pub fn small(quick: bool) -> Self {
+        let [width, _] = box_room::rendering(quick).size;
+        Self {
+            long_side: width,
+            paths: if quick { 1_000_000 } else { 8_000_000 },
+        }
+    }
+}
+
+/// The room that a study of one room runs in: the twin of its capture, else a room of its own, which `words` describe.
+///
+/// # Errors
+/// As [`twin`].
+pub fn studied(bench: &Bench, words: &str, own: impl FnOnce() -> Room) -> Result<Studied> {
+    Ok(match twin(bench, Sizes::small(bench.quick))? {
+        Some(twin) => twin,
+        None => Studied {
+            room: own(),
+            rendering: box_room::rendering(bench.quick),
+            words: words.to_owned(),
+            is_twin: false,
+        },
+    })
+}
+
+/// The twin of the capture that a study is run on; `None` where it runs on rooms of its own.
+///
+/// # Errors
+/// The capture cannot be solved, no lamp was found in it, or the study is to end.
+pub fn twin(bench: &Bench, sizes: Sizes) -> Result<Option<Studied>> {
+    let Some(subject) = bench.subject else {
+        return Ok(None);
+    };
+    bench.begin(&format!("solving {} for its twin", subject.name))?;
+    let settings = Settings {
+        exposures: true,
+        ..cache_settings(1, bench.quick)
+    };
+    let estimate = solved(bench, subject, &settings)?.estimate;
+    let room = room_of(subject, &estimate)?;
+    let rendering = rendering(&subject.problem.scene.cameras, sizes);
+    let [width, height] = rendering.size;
+    Ok(Some(Studied {
+        words: format!(
+            "The {}: its mesh, its views through ideal lenses, and the colours and lamps that the transport cache found in \
+             it (one an object, light from outside left away), photographed with all bounces in {} photographs of {width} × \
+             {height} pixels with {} paths each, so that the truth is known",
+            room.name,
+            room.views.len(),
+            rendering.samples,
+        ),
+        room,
+        rendering,
+        is_twin: true,
+    }))
+}
+
+/// The room that an estimate describes.
+fn room_of(subject: &Subject, estimate: &Estimate) -> Result<Room> {
+    let scene = &*subject.problem.scene;
+    let materials: Vec<Material> = (estimate.objects.iter())
+        .map(|object| {
+            let albedo = object.albedo.clamp(Vec3::ZERO, Vec3::splat(WHITEST));
+            Material::diffuse(albedo, object.emission)
+        })
+        .collect();
+    if materials.iter().all(|m| m.emission == Vec3::ZERO) {
+        return Err(Error::new(
+            &subject.name,
+            "no lamp was found on its mesh, so that its twin would be dark",
+            "run the study on rooms of its own",
+        ));
+    }
+    Ok(Room {
+        name: format!("twin of {}", subject.name),
+        mesh: mesh(scene),
+        materials,
+        views: scene.cameras.iter().map(|c| view(scene, c)).collect(),
+    })
+}
+
+/// The scene's triangles in the capture's coordinates.
+fn mesh(scene: &Scene) -> Mesh {
+    let placed = |p: &Vec3| p.as_dvec3() + scene.origin;
+    Mesh {
+        positions: scene.positions.iter().map(placed).collect(),
+        triangles: scene.triangles.clone(),
+        object_of: scene.object_of.clone(),
+        objects: scene.objects.iter().map(|o| o.name.clone()).collect(),
+        ..Mesh::default()
+    }
+}
+
+/// A camera's view through a lens without distortion.
+fn view(scene: &Scene, camera: &Camera) -> View {
+    let lens = &camera.intrinsics;
+    View {
+        pose: Pose {
+            rotation: camera.rotation.as_dmat3(),
+            center: camera.center.as_dvec3() + scene.origin,
+        },
+        half_field: 0.5 * f64::from(lens.width) / lens.fx,
+    }
+}
+
+/// Photographs with the shape of the first camera's.
+fn rendering(cameras: &[Camera], sizes: Sizes) -> Rendering {
+    let size = (cameras.first()).map_or([1; 2], |camera| {
+        let small = camera.shrunk(sizes.long_side).intrinsics;
+        [small.width, small.height]
+    });
+    let pixels = cameras.len() as u64 * u64::from(size[0]) * u64::from(size[1]);
+    let [fewest, most] = PATHS;
+    Rendering {
+        seed: box_room::NOISE,
+        samples: (sizes.paths / pixels.max(1)).clamp(fewest, most) as u32,
+        size,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::experiments::box_room::{box_room, photographed};
+    use crate::study::trade::Judge;
+    use std::time::Duration;
+
+    fn bench(subject: &Subject) -> Bench<'_> {
+        Bench {
+            quick: true,
+            time: Duration::from_secs(1),
+            seeds: 1,
+            subject: Some(subject),
+            say: &|_| {},
+            show: &|_| {},
+            stopped: &|| false,
+        }
+    }
+
+    #[test]
+    fn a_twin_has_the_captures_views_and_nearly_its_photographs_and_its_truth_is_its_own() {
+        let mut subject = photographed("room", 0.5, 0.25, true).expect("a room");
+        subject.judge = Judge::HeldOut;
+        let twin = twin(&bench(&subject), Sizes::small(true));
+        let twin = twin.expect("solved").expect("on a capture");
+        let original = box_room("room", 0.5, 0.25);
+        for (view, other) in twin.room.views.iter().zip(&original.views) {
+            assert!(view.pose.center.distance(other.pose.center) < 1e-5);
+            assert!((view.half_field - other.half_field).abs() < 1e-12);
+        }
+        assert_eq!(twin.room.mesh.triangles, original.mesh.triangles);
+        let truth = box_room::truth(&original);
+        for (material, wanted) in twin.room.materials.iter().zip(&truth.albedo) {
+            let found = material.albedo_at(&crate::scene::geometry::Hit {
+                t: 0.0,
+                triangle: 0,
+                b1: 0.0,
+                b2: 0.0,
+            });
+            assert!((found - *wanted).abs().max_element() < 0.1 || material.emission != Vec3::ZERO);
+        }
+        let photographed = twin.photographed().expect("a room");
+        assert!(photographed.truth().is_some());
+        let mean = |subject: &Subject| {
+            let pixels = subject.problem.photographs.iter().flat_map(|p| &p.pixels);
+            pixels
+                .map(|pixel| f64::from(pixel.element_sum()))
+                .sum::<f64>()
+        };
+        let ratio = mean(&photographed) / mean(&subject);
+        assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+    }
+
+    #[test]
+    fn a_dark_capture_has_no_twin() {
+        let mut room = box_room("dark", 0.5, 0.25);
+        (room.materials.iter_mut()).for_each(|material| material.emission = Vec3::ZERO);
+        let subject = Subject::of_room(&room, &box_room::rendering(true)).expect("a room");
+        let refused = twin(&bench(&subject), Sizes::small(true)).expect_err("no lamp");
+        assert!(refused.to_string().contains("no lamp"), "{refused}");
+    }
+}
