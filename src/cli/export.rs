@@ -8,7 +8,7 @@ use crate::room;
 use crate::room::photographs::{KEPT, Rendering};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// `relit export`.
 #[derive(Debug, Args)]
@@ -43,6 +43,44 @@ enum Word {
     Probe,
 }
 
+impl Word {
+    /// What names of its files end with.
+    fn endings(self) -> &'static [&'static str] {
+        match self {
+            Self::Glb => &["glb"],
+            Self::Obj => &["obj"],
+            Self::Ply => &["ply"],
+            Self::Mitsuba => &["xml"],
+            Self::Csv => &["csv"],
+            Self::Probe => &["exr", "hdr"],
+        }
+    }
+
+    /// Refuses a name that says that the file is of another format; one that says nothing is as good as any.
+    fn check(self, path: &Path) -> Result<()> {
+        let ending = path.extension().and_then(|ending| ending.to_str());
+        let ending = ending.unwrap_or_default().to_ascii_lowercase();
+        let is_of = |word: &Self| word.endings().contains(&ending.as_str());
+        let other = Self::value_variants().iter().find(|word| is_of(word));
+        let (Some(other), false) = (other, is_of(&self)) else {
+            return Ok(());
+        };
+        let name = |word: Self| {
+            word.to_possible_value()
+                .map_or(String::new(), |v| v.get_name().to_owned())
+        };
+        Err(Error::usage(
+            path.display(),
+            format!("is no name for --format {}", name(self)),
+            format!(
+                "let it end with .{}, or choose --format {}",
+                self.endings().join(" or ."),
+                name(*other)
+            ),
+        ))
+    }
+}
+
 /// `relit demo`.
 #[derive(Debug, Args)]
 pub struct DemoArguments {
@@ -63,6 +101,7 @@ pub struct DemoArguments {
 /// # Errors
 /// The results cannot be read, or the file cannot be written.
 pub fn export(arguments: &ExportArguments) -> Result<()> {
+    arguments.format.check(&arguments.out)?;
     let format = match (arguments.format, arguments.at) {
         (Word::Glb, _) => Format::Glb,
         (Word::Obj, _) => Format::Obj,

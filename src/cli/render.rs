@@ -1,6 +1,6 @@
 //! `relit render`: a picture of the room in its estimated light, from a photograph's camera or any other.
 
-use crate::capture::camera::{Intrinsics, Pose};
+use crate::capture::read::camera_file;
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
 use crate::export::exr::{Precision, write_rgb};
@@ -13,9 +13,8 @@ use crate::transport::denoise::{denoise, guides};
 use crate::transport::film::Film;
 use crate::transport::layers::Split;
 use clap::Args;
-use glam::{DMat3, DMat4, DVec3, Vec3};
-use serde::Deserialize;
-use std::path::{Path, PathBuf};
+use glam::Vec3;
+use std::path::PathBuf;
 
 /// `relit render`.
 #[derive(Debug, Args)]
@@ -30,7 +29,7 @@ pub struct RenderArguments {
         conflicts_with = "camera"
     )]
     frame: Option<usize>,
-    /// A camera of its own: JSON with w, h, fl_x, fl_y, cx, cy and transform_matrix as in transforms.json
+    /// A camera of its own: JSON with w, h, fl_x, fl_y, cx, cy and transform_matrix, and what else a frame of transforms.json has
     #[arg(long, value_name = "FILE")]
     camera: Option<PathBuf>,
     /// Samples a pixel
@@ -84,7 +83,13 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
         ..
     } = arguments.saved.load()?;
     let (camera, frame) = match (arguments.frame, &arguments.camera) {
-        (_, Some(path)) => (read_camera(path, capture.scene.origin)?, 0),
+        (_, Some(path)) => {
+            let (intrinsics, pose, remarks) = camera_file::read(path)?;
+            for remark in remarks {
+                eprintln!("warning: {remark}");
+            }
+            (Camera::new(&intrinsics, &pose, capture.scene.origin), 0)
+        }
         (frame, None) => {
             let frame = frame.unwrap_or(0);
             (capture.full_camera(frame)?, frame)
@@ -135,82 +140,4 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
             )
         }
     }
-}
-
-/// The fields of one frame of transforms.json.
-#[derive(Debug, Deserialize)]
-struct CameraFile {
-    w: u32,
-    h: u32,
-    fl_x: f64,
-    fl_y: f64,
-    cx: f64,
-    cy: f64,
-    #[serde(default)]
-    k1: f64,
-    #[serde(default)]
-    k2: f64,
-    #[serde(default)]
-    p1: f64,
-    #[serde(default)]
-    p2: f64,
-    transform_matrix: [[f64; 4]; 4],
-}
-
-/// Largest picture in pixels.
-const MOST_PIXELS: u64 = 1 << 28;
-
-fn read_camera(path: &Path, origin: DVec3) -> Result<Camera> {
-    let bytes = std::fs::read(path).map_err(|error| Error::io(path, &error))?;
-    let file: CameraFile = serde_json::from_slice(&bytes).map_err(|error| {
-        Error::file(
-            path,
-            error,
-            "write w, h, fl_x, fl_y, cx, cy and transform_matrix as in transforms.json",
-        )
-    })?;
-    let field = |name: &str, problem: &str, remedy: &str| {
-        Err(Error::new(
-            format!("{}: {name}", path.display()),
-            problem,
-            remedy,
-        ))
-    };
-    let pixels = u64::from(file.w) * u64::from(file.h);
-    if pixels == 0 || pixels > MOST_PIXELS {
-        return field(
-            "w, h",
-            "no size for a picture",
-            "give sizes from 1 to 16384",
-        );
-    }
-    if !(file.fl_x > 0.0 && file.fl_y > 0.0) {
-        return field("fl_x, fl_y", "no focal length", "give lengths in pixels");
-    }
-    let matrix = DMat4::from_cols_array_2d(&file.transform_matrix).transpose();
-    let rotation = DMat3::from_mat4(matrix);
-    let drift = rotation.transpose() * rotation - DMat3::IDENTITY;
-    let rigid =
-        drift.to_cols_array().iter().all(|v| v.abs() < 1e-3) && rotation.determinant() > 0.0;
-    if !rigid || !matrix.is_finite() {
-        return field(
-            "transform_matrix",
-            "is no rigid motion",
-            "give camera-to-world with x right, y up, looking down -z",
-        );
-    }
-    let intrinsics = Intrinsics {
-        width: file.w,
-        height: file.h,
-        fx: file.fl_x,
-        fy: file.fl_y,
-        cx: file.cx,
-        cy: file.cy,
-        distortion: [file.k1, file.k2, file.p1, file.p2],
-    };
-    let pose = Pose {
-        rotation,
-        center: matrix.w_axis.truncate(),
-    };
-    Ok(Camera::new(&intrinsics, &pose, origin))
 }

@@ -21,6 +21,12 @@ fn results_are_exported() {
         );
     }
     refused(
+        &place.relit(&["export", "out", "--format", "glb", "--out", "b.obj"]),
+        2,
+        &["b.obj", "--format glb", ".glb", "choose --format obj"],
+    );
+    assert!(!place.path("b.obj").exists());
+    refused(
         &place.relit(&["export", "out", "--format", "probe", "--out", "p.exr"]),
         2,
         &["--at"],

@@ -83,6 +83,20 @@ fn results_are_rendered_edited_and_moved() {
     ]));
     let picture = image::open(place.path("b.png")).expect("an image");
     assert_eq!((picture.width(), picture.height()), (8, 6));
+    // Its lens is read as a capture's is: other models are refused, not taken for a pinhole.
+    let model = camera.replace(r#""w": 8"#, r#""camera_model": "EQUIRECTANGULAR", "w": 8"#);
+    for (text, parts) in [
+        (model, ["camera_model", "EQUIRECTANGULAR"]),
+        (camera.replace(r#""w": 8, "#, ""), ["w", "is absent"]),
+        (
+            camera.replace("[0,0,0,1]", "[0,0,1,1]"),
+            ["transform_matrix", "last row"],
+        ),
+    ] {
+        fs::write(place.path("other.json"), text).expect("writes");
+        let words = ["render", "out", "--camera", "other.json", "--out", "d.png"];
+        refused(&place.relit(&words), 1, &parts);
+    }
     refused(
         &place.relit(&["render", "out", "--frame", "9", "--out", "c.exr"]),
         2,

@@ -199,6 +199,24 @@ fn two_pictures_are_wiped_flipped_and_shown_side_by_side() {
 }
 
 #[test]
+fn where_no_inserted_object_can_be_read_the_composite_says_so() {
+    let (mut harness, _recorder) = solving(Harness::builder());
+    click(&mut harness, "Insert");
+    type_into(&mut harness, "Object file", "/nowhere/chair.glb");
+    click(&mut harness, "Add");
+    click(&mut harness, "Naive beside ours");
+    for _ in 0..200 {
+        harness.run_steps(1);
+        let text = "No inserted object can be read; the log says why";
+        if harness.query_all_by_label(text).count() == 2 {
+            return;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    panic!("it waits for a composite that never comes");
+}
+
+#[test]
 fn objects_are_inserted_moved_duplicated_deleted_and_brought_back() {
     let (mut harness, recorder) = solving(Harness::builder());
     click(&mut harness, "Insert");

@@ -131,6 +131,13 @@ impl Insertions {
         visible
     }
 
+    /// Whether objects are shown, and the file of each was tried in vain.
+    pub fn none_can_be_read(&self) -> bool {
+        let shown = self.visible();
+        let unreadable = |placement: &Placement| self.models.is_unreadable(&placement.file);
+        !shown.is_empty() && shown.iter().all(unreadable)
+    }
+
     /// Replaces all objects, as undo does.
     pub fn replace(&mut self, objects: Vec<Inserted>) {
         if self.objects == objects {

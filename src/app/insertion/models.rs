@@ -14,9 +14,16 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 /// An object's file, and its shape unless it cannot be read (the worker says why).
 type Read = (PathBuf, Option<ObjectModel>);
 
+/// What is known of an object's file.
+enum Shape {
+    Reading,
+    Unreadable,
+    Read(ObjectModel),
+}
+
 /// Shapes by file.
 pub struct Models {
-    known: HashMap<PathBuf, Option<ObjectModel>>,
+    known: HashMap<PathBuf, Shape>,
     sender: Sender<Read>,
     receiver: Receiver<Read>,
 }
@@ -38,13 +45,14 @@ impl Models {
         for object in objects {
             let file = &object.placement.file;
             if !self.known.contains_key(file) {
-                self.known.insert(file.clone(), None);
+                self.known.insert(file.clone(), Shape::Reading);
                 self.read(ctx, file.clone());
             }
         }
         let mut read = Vec::new();
         while let Ok((file, model)) = self.receiver.try_recv() {
-            self.known.insert(file.clone(), model);
+            let shape = model.map_or(Shape::Unreadable, Shape::Read);
+            self.known.insert(file.clone(), shape);
             read.push(file);
         }
         read
@@ -65,9 +73,21 @@ impl Models {
             });
     }
 
+    /// Whether a file was tried and cannot be read.
+    pub fn is_unreadable(&self, file: &Path) -> bool {
+        matches!(self.known.get(file), Some(Shape::Unreadable))
+    }
+
+    fn shape(&self, file: &Path) -> Option<&ObjectModel> {
+        match self.known.get(file)? {
+            Shape::Read(model) => Some(model),
+            Shape::Reading | Shape::Unreadable => None,
+        }
+    }
+
     /// A power of ten that makes an object at most a third of the scene, where it is larger than that as modelled.
     pub fn fitting_scale(&self, file: &Path, scene: &Scene) -> Option<f64> {
-        let (low, high) = self.known.get(file)?.as_ref()?.bounds();
+        let (low, high) = self.shape(file)?.bounds();
         let size = (high - low).max_element();
         let diameter = f64::from(scene.diameter);
         if size <= diameter || !size.is_finite() {
@@ -78,7 +98,7 @@ impl Models {
 
     /// The corners of the box around a placed object, in scene coordinates; bit 0 of the index is x, 1 is y, 2 is z.
     pub fn corners(&self, placement: &Placement, scene: &Scene) -> Option<[Vec3; 8]> {
-        let model = self.known.get(&placement.file)?.as_ref()?;
+        let model = self.shape(&placement.file)?;
         let (low, high) = model.bounds();
         let transform = placement.transform(model, scene.up.as_dvec3()).ok()?;
         Some(std::array::from_fn(|index| {
@@ -143,7 +163,7 @@ mod tests {
         let model = ObjectModel::from_corners("cube", corners, material).expect("a model");
         let model = extent(&model).expect("it has a size");
         let mut models = Models::default();
-        models.known.insert("cube.obj".into(), Some(model));
+        models.known.insert("cube.obj".into(), Shape::Read(model));
         models
     }
 

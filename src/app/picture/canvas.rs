@@ -118,6 +118,8 @@ pub fn missing(ui: &mut Ui, app: &App, quantity: Quantity) {
                 "No photograph was taken from here"
             } else if app.insertions.visible().is_empty() && app.edits.is_empty() {
                 "Insert an object, or change a lamp or a material, to see the composite"
+            } else if app.edits.is_empty() && app.insertions.none_can_be_read() {
+                "No inserted object can be read; the log says why"
             } else {
                 "Compositing…"
             }

@@ -12,6 +12,7 @@
 //! header is believed before it was compared with the file's length or the camera's size.
 
 pub mod accessor;
+pub mod camera_file;
 pub mod confine;
 mod exposure;
 pub(in crate::capture) mod fields;

@@ -1,12 +1,34 @@
 //! Camera-to-world matrices: what is tolerated, what is refused.
 
 use crate::capture::camera::Pose;
+use crate::capture::read::fields::Fields;
+use crate::error::{self, Error};
 use glam::{DMat3, DVec3, DVec4};
 
 /// Columns further than this from orthonormal (scale taken out) are no rotation but a shear.
 const MAX_SHEAR: f64 = 1e-2;
 /// Deviations up to this are the rounding of single precision and are not worth a word.
 const ROUNDING: f64 = 1e-4;
+
+/// The pose of a frame, and a remark where its matrix had to be changed.
+///
+/// # Errors
+/// There is no matrix, or it is no rigid motion.
+pub fn of_frame(fields: &Fields) -> error::Result<(Pose, Option<String>)> {
+    const NAME: &str = "transform_matrix";
+    let place = fields.place(NAME);
+    let rows = fields
+        .matrix(NAME)?
+        .ok_or_else(|| Error::new(&place, "is absent", "add the camera-to-world matrix"))?;
+    let (pose, remark) = from_rows(&rows).map_err(|problem| {
+        Error::new(
+            &place,
+            format!("the matrix {problem}"),
+            "give the camera-to-world rotation and position",
+        )
+    })?;
+    Ok((pose, remark.map(|remark| format!("{NAME} {remark}"))))
+}
 
 /// The rigid pose nearest to a 3×4 or 4×4 row-major matrix, and a remark where that changed more than rounding.
 ///

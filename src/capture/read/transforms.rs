@@ -142,18 +142,8 @@ fn read_frame(
     let (intrinsics, said) = lens::read(shared, fields, [header.width, header.height])?;
     let mut remarks: Vec<String> = said.into_iter().map(str::to_owned).collect();
 
-    let place = fields.place("transform_matrix");
-    let rows = fields
-        .matrix("transform_matrix")?
-        .ok_or_else(|| Error::new(&place, "is absent", "add the camera-to-world matrix"))?;
-    let (pose, remark) = pose::from_rows(&rows).map_err(|problem| {
-        Error::new(
-            &place,
-            format!("the matrix {problem}"),
-            "give the camera-to-world rotation and position",
-        )
-    })?;
-    remarks.extend(remark.map(|r| format!("transform_matrix {r}")));
+    let (pose, remark) = pose::of_frame(fields)?;
+    remarks.extend(remark);
 
     let source = if fields.get("exposure").is_some() {
         fields

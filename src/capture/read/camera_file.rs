@@ -1,0 +1,61 @@
+//! One camera in a file of its own: the fields of a frame of transforms.json, with the size of its picture.
+
+use crate::capture::camera::{Intrinsics, Pose};
+use crate::capture::read::fields::Fields;
+use crate::capture::read::{lens, pose};
+use crate::error::{Error, Result};
+use serde_json::Value;
+use std::path::Path;
+
+/// Longest file in bytes; a camera is some hundred.
+const MOST_BYTES: u64 = 1 << 20;
+/// Largest picture in pixels.
+const MOST_PIXELS: u64 = 1 << 28;
+
+/// Reads a camera, with remarks about what had to be guessed.
+///
+/// # Errors
+/// No JSON, a lens model other than those of captures, no size, a pose that is no rigid motion.
+pub fn read(path: &Path) -> Result<(Intrinsics, Pose, Vec<String>)> {
+    let length = (path.metadata())
+        .map_err(|error| Error::io(path, &error))?
+        .len();
+    if length > MOST_BYTES {
+        return Err(Error::file(
+            path,
+            "is too long for a camera",
+            "give the fields of one frame",
+        ));
+    }
+    let bytes = std::fs::read(path).map_err(|error| Error::io(path, &error))?;
+    let value: Value = serde_json::from_slice(&bytes).map_err(|error| {
+        Error::file(
+            path,
+            error,
+            "write w, h, fl_x, fl_y, cx, cy and transform_matrix as in transforms.json",
+        )
+    })?;
+    let fields = Fields::new(format!("{}: ", path.display()), &value)?;
+    let side = |name: &str| {
+        fields.count(name)?.ok_or_else(|| {
+            Error::new(
+                fields.place(name),
+                "is absent",
+                "give the picture's size in pixels",
+            )
+        })
+    };
+    let size = [side("w")?, side("h")?];
+    if size.iter().map(|&side| u64::from(side)).product::<u64>() > MOST_PIXELS {
+        return Err(Error::new(
+            fields.place("w, h"),
+            "no size for a picture",
+            "give sizes from 1 to 16384",
+        ));
+    }
+    let (intrinsics, said) = lens::read(&fields, &fields, size)?;
+    let (pose, remark) = pose::of_frame(&fields)?;
+    let remarks = said.into_iter().map(str::to_owned).chain(remark);
+    let remarks = remarks.map(|remark| format!("{}: {remark}", path.display()));
+    Ok((intrinsics, pose, remarks.collect()))
+}
