@@ -6,6 +6,7 @@ use glam::{DVec3, Vec3};
 use relit::capture::mesh::Mesh;
 use relit::inverse::estimate::{Estimate, ObjectEstimate};
 use relit::inverse::settings::Settings;
+use relit::inverse::sharpness::Sharpness;
 use relit::inverse::solver::{Control, Observer, Problem, Progress, Termination, solve};
 use relit::inverse::survey::Survey;
 use relit::inverse::texture::{Refined, Task, refine};
@@ -66,10 +67,16 @@ static ROOM: LazyLock<Room> = LazyLock::new(|| room([64, 48], 96));
 
 static SETTINGS: LazyLock<Settings> = LazyLock::new(Settings::default);
 
+/// All photographs as sharp as each other.
+static USUAL: Sharpness = Sharpness {
+    contrast: Vec::new(),
+};
+
 fn task<'a>(problem: &'a Problem, survey: &'a Survey, paths: u64) -> Task<'a> {
     Task {
         problem,
         survey,
+        sharpness: &USUAL,
         settings: &SETTINGS,
         paths,
         max_bounces: 1000,

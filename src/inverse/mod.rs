@@ -13,6 +13,7 @@ pub mod outside;
 pub mod paper;
 pub mod parameters;
 pub mod settings;
+pub mod sharpness;
 pub mod solver;
 pub mod survey;
 pub mod texture;

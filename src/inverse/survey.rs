@@ -63,6 +63,16 @@ pub struct Survey {
 }
 
 impl Survey {
+    /// For each of the photographs, whether no pixel of it is in the fit: those that are held out as a whole, and those that
+    /// show nothing of use.
+    pub fn unfitted(&self, photographs: usize) -> Vec<bool> {
+        let mut unfitted = vec![true; photographs];
+        for pixel in self.pixels.iter().filter(|p| !p.held_out) {
+            unfitted[pixel.frame as usize] = false;
+        }
+        unfitted
+    }
+
     /// Casts the rays of all pixels, or of a keyed share of about `most_pixels` and of the objects that few pixels see.
     pub fn new(problem: &Problem, settings: &Settings, most_pixels: usize) -> Self {
         let scene = &*problem.scene;

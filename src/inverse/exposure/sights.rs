@@ -47,10 +47,7 @@ impl Sights {
         if size <= 0.0 {
             return Self::default();
         }
-        let mut held_out = vec![true; problem.photographs.len()];
-        for pixel in survey.pixels.iter().filter(|p| !p.held_out) {
-            held_out[pixel.frame as usize] = false;
-        }
+        let held_out = survey.unfitted(problem.photographs.len());
         let value = |p: &SurveyedPixel| {
             problem.photographs[p.frame as usize].pixels[p.pixel as usize].as_dvec3()
         };

@@ -90,7 +90,7 @@ impl Measurements {
                 .map(|(r, pixel)| {
                     let level = *r * albedo + pixel.gloss;
                     let variance = level * level + floor * floor;
-                    *r * *r / variance.max(Vec3::splat(f32::MIN_POSITIVE))
+                    *r * *r * pixel.weight / variance.max(Vec3::splat(f32::MIN_POSITIVE))
                 })
                 .collect();
             let scale = 1.0 / mean_channel(&raw).max(f32::MIN_POSITIVE);
@@ -294,6 +294,7 @@ mod tests {
             measured: Vec3::splat(0.3),
             saturated: false,
             fold: index as usize % FOLDS,
+            weight: 1.0,
             base: 1.0,
             gloss: Vec3::ZERO,
             landings: Vec::new(),
@@ -327,6 +328,7 @@ mod tests {
             measured: truth * white(index as usize) + 1e-3,
             saturated: index >= 95,
             fold: index as usize % FOLDS,
+            weight: 1.0,
             base: 1.0,
             gloss: Vec3::ZERO,
             landings: Vec::new(),
@@ -360,6 +362,7 @@ mod tests {
                     measured: Vec3::splat(measured),
                     saturated,
                     fold: i as usize % FOLDS,
+                    weight: 1.0,
                     base: 1.0,
                     gloss: Vec3::ZERO,
                     landings: Vec::new(),

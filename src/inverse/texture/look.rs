@@ -1,5 +1,6 @@
 //! Where the parts of each pixel of an object land on its triangles.
 
+use crate::inverse::sharpness::Sharpness;
 use crate::inverse::solver::Problem;
 use crate::inverse::survey::SurveyedPixel;
 use crate::math::rng::{Stream, splitmix64};
@@ -35,6 +36,8 @@ pub struct SeenPixel {
     pub saturated: bool,
     /// Which of the [`FOLDS`] it belongs to.
     pub fold: usize,
+    /// How much it says beside a pixel of a photograph of the usual sharpness.
+    pub weight: f32,
     /// What the base of the surface sends in this direction over what it sends along its normal; 1 without a lobe.
     pub base: f32,
     /// Radiance that its lobe sends here, where that was found.
@@ -72,12 +75,13 @@ pub fn look(
     problem: &Problem,
     object: u32,
     pixels: &[&SurveyedPixel],
+    sharpness: &Sharpness,
     glossy: bool,
     seed: u64,
 ) -> Vec<SeenPixel> {
     let seen: Vec<Option<SeenPixel>> = pixels
         .par_iter()
-        .map(|pixel| look_through(problem, object, pixel, seed))
+        .map(|pixel| look_through(problem, object, pixel, sharpness, seed))
         .collect();
     let mut seen: Vec<SeenPixel> = seen.into_iter().flatten().collect();
     if glossy {
@@ -100,6 +104,7 @@ fn look_through(
     problem: &Problem,
     object: u32,
     surveyed: &SurveyedPixel,
+    sharpness: &Sharpness,
     seed: u64,
 ) -> Option<SeenPixel> {
     let scene = &*problem.scene;
@@ -141,6 +146,7 @@ fn look_through(
         measured,
         saturated: photograph.is_saturated(surveyed.pixel as usize),
         fold: fold(surveyed.frame, surveyed.pixel),
+        weight: sharpness.weight(surveyed.frame as usize),
         base: 1.0,
         gloss: Vec3::ZERO,
         landings,

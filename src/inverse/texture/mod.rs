@@ -21,6 +21,7 @@ mod whole;
 
 use crate::inverse::estimate::{Estimate, TexelEstimate};
 use crate::inverse::settings::Settings;
+use crate::inverse::sharpness::Sharpness;
 use crate::inverse::solver::{Problem, Termination};
 use crate::inverse::survey::{Survey, SurveyedPixel};
 use crate::transport::path::PathOptions;
@@ -49,6 +50,8 @@ pub struct Task<'a> {
     pub problem: &'a Problem,
     /// What the pixels see.
     pub survey: &'a Survey,
+    /// How sharp the photographs are.
+    pub sharpness: &'a Sharpness,
     /// Parameters.
     pub settings: &'a Settings,
     /// Paths to trace in each sweep.

@@ -66,7 +66,14 @@ impl Surface {
         width: f32,
     ) -> Option<Self> {
         let seed = task.settings.seed;
-        let pixels = look(task.problem, object as u32, pixels, glossy, seed);
+        let pixels = look(
+            task.problem,
+            object as u32,
+            pixels,
+            task.sharpness,
+            glossy,
+            seed,
+        );
         Self::cut(&task.problem.scene, object, glossy, pixels, seed, width)
     }
 

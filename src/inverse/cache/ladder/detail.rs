@@ -4,6 +4,7 @@ use super::Ladder;
 use crate::inverse::cache::evaluate::Linearised;
 use crate::inverse::cache::roles::Role;
 use crate::inverse::estimate::Estimate;
+use crate::inverse::sharpness::Sharpness;
 use crate::inverse::solver::Termination;
 use crate::inverse::texture::{Refined, Task, refine};
 use crate::transport::arrival::Cast;
@@ -59,10 +60,19 @@ impl Ladder<'_, '_> {
                 self.roles[k] == Role::Reflector && self.monitor.known.of(k).albedo.is_none()
             })
             .collect();
+        let unfitted = self.survey.unfitted(self.problem.photographs.len());
+        let sharpness = Sharpness::new(self.problem, &unfitted);
+        let warnings = &mut self.monitor.progress.warnings;
+        warnings.extend(
+            sharpness
+                .remark()
+                .filter(|remark| !warnings.contains(remark)),
+        );
         let settings = self.monitor.settings.clone();
         let task = Task {
             problem: self.problem,
             survey: &self.survey,
+            sharpness: &sharpness,
             settings: &settings,
             paths: self.budget.round_paths,
             max_bounces: self.max_bounces,

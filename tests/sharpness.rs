@@ -1,0 +1,94 @@
+//! Which photographs are blurred, by what others show of the same edges.
+
+use glam::Vec3;
+use relit::capture::photograph::Photograph;
+use relit::inverse::sharpness::Sharpness;
+use relit::inverse::solver::Problem;
+use relit::math::rng::Stream;
+use relit::room;
+use relit::scene::Scene;
+use std::sync::{Arc, LazyLock};
+
+/// The built-in room and its photographs.
+static ROOM: LazyLock<Problem> = LazyLock::new(|| {
+    let capture = room::capture().expect("it is in the program");
+    let photographs = capture.frames.iter().map(|frame| frame.load());
+    Problem {
+        scene: Arc::new(Scene::new(&capture).expect("a scene")),
+        photographs: photographs
+            .collect::<Result<_, _>>()
+            .expect("they are in the program"),
+    }
+});
+
+/// The room with one photograph changed.
+fn with(frame: usize, change: impl Fn(&Photograph, u32, u32) -> Vec3) -> Problem {
+    let mut problem = ROOM.clone();
+    let photograph = &problem.photographs[frame];
+    let pixels = (0..photograph.pixels.len() as u32).map(|pixel| {
+        change(
+            photograph,
+            pixel % photograph.width,
+            pixel / photograph.width,
+        )
+    });
+    problem.photographs[frame] = Arc::new(Photograph {
+        pixels: pixels.collect(),
+        ..Photograph::clone(photograph)
+    });
+    problem
+}
+
+/// The mean over five pixels in a row, as a hand that moved makes it.
+fn moved(photograph: &Photograph, x: u32, y: u32) -> Vec3 {
+    let row = |x: u32| photograph.pixels[(y * photograph.width + x) as usize];
+    let near = x.saturating_sub(2)..(x + 3).min(photograph.width);
+    let count = near.len() as f32;
+    near.map(row).sum::<Vec3>() / count
+}
+
+fn contrasts(problem: &Problem) -> Vec<Option<f64>> {
+    let none = vec![false; problem.photographs.len()];
+    Sharpness::new(problem, &none).contrast
+}
+
+#[test]
+fn a_blurred_photograph_is_told_from_sharp_and_from_noisy_ones() {
+    let usual = contrasts(&ROOM);
+    println!("{usual:?}");
+    let known: Vec<usize> = (0..usual.len()).filter(|&i| usual[i].is_some()).collect();
+    assert!(known.len() >= 8);
+    for &frame in &known {
+        let contrast = usual[frame].expect("known");
+        assert!((0.8..1.25).contains(&contrast), "{frame}: {contrast}");
+    }
+    for &frame in known.iter().step_by(3) {
+        let was = usual[frame].expect("known");
+        let [blurred, noisy] = [
+            with(frame, moved),
+            with(frame, |photograph, x, y| {
+                let mut stream = Stream::new(5, frame as u64, u64::from(y), u64::from(x));
+                let factor = 1.0 + 0.1 * (2.0 * stream.uniform() - 1.0);
+                photograph.pixels[(y * photograph.width + x) as usize] * factor
+            }),
+        ]
+        .map(|problem| contrasts(&problem));
+        println!("{frame}: {was} {:?} {:?}", blurred[frame], noisy[frame]);
+        assert!(blurred[frame].is_some_and(|c| c < 0.85 * was), "{frame}");
+        assert!(
+            noisy[frame].is_some_and(|c| (c / was - 1.0).abs() < 0.1),
+            "{frame}"
+        );
+    }
+}
+
+#[test]
+fn photographs_that_are_left_out_have_no_say_and_none() {
+    let blurred = with(4, moved);
+    let mut left_out = vec![false; blurred.photographs.len()];
+    left_out[4] = true;
+    let [with, without] = [&blurred, &ROOM].map(|p| Sharpness::new(p, &left_out));
+    assert_eq!(with, without);
+    assert_eq!(with.contrast[4], None);
+    assert_eq!(with.weight(4), 1.0);
+}
