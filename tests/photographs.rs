@@ -26,6 +26,7 @@ fn work(edits: &Edits, placements: Vec<Placement>) -> Photographs {
         relight: !edits.is_empty(),
         samples: 16,
         denoise: false,
+        finish: true,
         frames: vec![0, 1],
     }
 }

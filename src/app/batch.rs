@@ -136,6 +136,7 @@ impl App {
             relight: !edits.is_empty(),
             samples,
             denoise,
+            finish: self.insertions.finish,
         };
         let ctx = ctx.clone();
         match Batch::begin(work, folder, move || ctx.request_repaint()) {

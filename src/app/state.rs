@@ -126,6 +126,7 @@ pub struct App {
     opening: Option<Source>,
     pub(super) sent_view: Option<(Option<usize>, u64, u32, bool)>,
     pub(super) sent_insertions: Vec<Placement>,
+    sent_finish: bool,
     pub(super) sent_edits: Edits,
     pub(super) edited: Edited,
 }
@@ -181,6 +182,7 @@ impl App {
             opening: None,
             sent_view: None,
             sent_insertions: Vec::new(),
+            sent_finish: true,
             sent_edits: Edits::default(),
             edited: Edited::default(),
         }
@@ -395,6 +397,10 @@ impl App {
             if self.connection.send(Command::View(request)) {
                 self.sent_view = Some(key);
             }
+        }
+        let finish = self.insertions.finish;
+        if finish != self.sent_finish && self.connection.send(Command::Match(finish)) {
+            self.sent_finish = finish;
         }
         let placements = self.insertions.placements();
         if placements != self.sent_insertions

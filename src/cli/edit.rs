@@ -87,6 +87,7 @@ pub fn edit(arguments: &EditArguments) -> Result<()> {
         relight: true,
         samples: arguments.spp,
         denoise: arguments.denoise,
+        finish: true,
     });
     let results = Results {
         capture,

@@ -29,6 +29,9 @@ pub struct InsertArguments {
     /// Smooths the noise of the light that the objects add and take away
     #[arg(long)]
     denoise: bool,
+    /// Whether objects take the blur and the grain of 8-bit photographs
+    #[arg(long, value_name = "BOOL", default_value_t = true, action = ArgAction::Set)]
+    finish: bool,
     /// Beginning of the names of the files to write
     #[arg(long, value_name = "PREFIX")]
     out: PathBuf,
@@ -60,6 +63,7 @@ pub fn insert(arguments: &InsertArguments) -> Result<()> {
         relight: !edits.is_empty(),
         samples: arguments.spp,
         denoise: arguments.denoise,
+        finish: arguments.finish,
     };
     write_with_progress(&work, &materials, &|frame| match arguments.frame {
         Which::One(_) => arguments.out.clone(),

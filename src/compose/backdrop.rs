@@ -1,12 +1,15 @@
 //! The photograph that objects are put into, and how light becomes its values.
 
 use crate::capture::exposure::Exposure;
-use crate::capture::photograph::Photograph;
+use crate::capture::photograph::{Encoding, Photograph};
+use crate::compose::finish::Finish;
 use crate::error::{Error, Result};
 use crate::export::picture::shown_at;
+use crate::math::color::luminance;
 use crate::math::picture::Picture;
 use crate::scene::camera::Camera;
 use glam::Vec3;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// A photograph with its camera.
@@ -22,8 +25,23 @@ pub struct Backdrop {
     pub exposure: Exposure,
     /// The value at which each channel of the photograph saturates; infinite for linear files.
     pub saturation: Vec3,
+    /// How soft and how grainy it is, which what is put into it shares; nothing for linear files, which are mostly rendered.
+    pub finish: Finish,
     /// The exposure at which it is shown as 8-bit sRGB: its own, or the 99th percentile of the photograph as taken at 1.
     pub shown_at: f32,
+}
+
+/// A pixel with and without what is put there.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Mixed {
+    /// The share of it that is covered.
+    pub alpha: f32,
+    /// Radiance with it.
+    pub over: Vec3,
+    /// Radiance without it.
+    pub under: Vec3,
+    /// Whether anything changes.
+    pub changed: bool,
 }
 
 impl Backdrop {
@@ -54,6 +72,10 @@ impl Backdrop {
             ));
         }
         Ok(Self {
+            finish: match photograph.encoding {
+                Encoding::Linear => Finish::default(),
+                Encoding::Srgb8 | Encoding::Srgb16 => Finish::of(&picture, photograph.saturation),
+            },
             frame: frame as u64,
             camera: camera.clone(),
             shown_at: shown_at(photograph.saturation, &picture.pixels),
@@ -69,20 +91,174 @@ impl Backdrop {
         self.exposure.at(&self.camera.intrinsics, size, pixel)
     }
 
+    /// The photograph with surfaces over a share of its pixels, by the radiance with and without them; as soft and as grainy as it
+    /// is itself. Pixels that nothing changes, and none around them either as far as a soft edge reaches, are the photograph's to
+    /// the bit.
+    pub fn composite(&self, layers: &[Mixed]) -> Picture {
+        let size = [self.photograph.width, self.photograph.height].map(|side| side as usize);
+        if self.finish.is_none() {
+            return self.each(|pixel| match layers[pixel] {
+                Mixed { changed: false, .. } => self.photograph.pixels[pixel],
+                Mixed {
+                    alpha, over, under, ..
+                } => self.blend(pixel, alpha, over, under),
+            });
+        }
+
+        // What covers, what it covers, and what changes beside it, each as soft as the photograph.
+        let soft = |value: &(dyn Fn(usize, &Mixed) -> Vec3 + Sync)| {
+            let values: Vec<Vec3> = (layers.par_iter().enumerate())
+                .map(|(pixel, layer)| value(pixel, layer))
+                .collect();
+            self.finish.softened(&values, size)
+        };
+        let alphas = soft(&|_, layer| Vec3::splat(layer.alpha));
+        let covers = soft(&|pixel, layer| layer.over * layer.alpha * self.exposure_at(pixel));
+        let changes = soft(&|pixel, layer| match layer.changed {
+            true => (layer.over - layer.under) * (1.0 - layer.alpha) * self.exposure_at(pixel),
+            false => Vec3::ZERO,
+        });
+        self.each(|pixel| {
+            let (alpha, cover, change) = (alphas[pixel].x, covers[pixel], changes[pixel]);
+            if alpha == 0.0 && change == Vec3::ZERO {
+                return self.photograph.pixels[pixel];
+            }
+            let behind = self.behind(pixel, layers[pixel].under * self.exposure_at(pixel));
+            let exact = cover + behind * (1.0 - alpha) + change;
+            let place = [self.frame, pixel as u64];
+            let grain = self.finish.grain(place, luminance(exact), alpha);
+            (exact + grain).clamp(Vec3::ZERO, self.saturation)
+        })
+    }
+
+    /// A picture of the photograph's size.
+    fn each(&self, color: impl Fn(usize) -> Vec3 + Sync + Send) -> Picture {
+        let pixels = 0..self.photograph.pixels.len();
+        Picture {
+            pixels: pixels.into_par_iter().map(color).collect(),
+            ..*self.photograph
+        }
+    }
+
+    /// The photograph at a pixel; a channel that is saturated was at least as bright as the estimate says.
+    fn behind(&self, pixel: usize, under: Vec3) -> Vec3 {
+        let photograph = self.photograph.pixels[pixel];
+        let saturated = photograph.cmpge(self.saturation);
+        Vec3::select(saturated, photograph.max(under), photograph)
+    }
+
     /// The pixel with a surface over `alpha` of it: α · over + (1 − α) · (photograph + over − under), where `over` and
     /// `under` are radiances with and without.
     ///
     /// A channel that is saturated in the photograph was at least as bright as the estimate says, and a saturating
     /// photograph's composite saturates with it.
     pub fn blend(&self, pixel: usize, alpha: f32, over: Vec3, under: Vec3) -> Vec3 {
-        let photograph = self.photograph.pixels[pixel];
         let exposure = self.exposure_at(pixel);
         let (over, under) = (over * exposure, under * exposure);
+        let behind = self.behind(pixel, under);
         if !self.saturation.is_finite() {
-            return over * alpha + (photograph + over - under) * (1.0 - alpha);
+            return over * alpha + (behind + over - under) * (1.0 - alpha);
         }
-        let saturated = photograph.cmpge(self.saturation);
-        let behind = Vec3::select(saturated, photograph.max(under), photograph);
         (over * alpha + (behind + over - under) * (1.0 - alpha)).clamp(Vec3::ZERO, self.saturation)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::capture::camera::{Intrinsics, Pose};
+    use glam::{DMat3, DVec3, Vec2};
+
+    const SIDE: u32 = 40;
+    const LEVEL: f32 = 0.3;
+    const OBJECT: f32 = 0.7;
+
+    /// A square object, with a shadow right of it, before a grey photograph with some finish.
+    fn composite(finish: Finish) -> Vec<f32> {
+        let intrinsics = Intrinsics {
+            width: SIDE,
+            height: SIDE,
+            fx: 40.0,
+            fy: 40.0,
+            cx: 20.0,
+            cy: 20.0,
+            distortion: [0.0; 4],
+        };
+        let pose = Pose {
+            rotation: DMat3::IDENTITY,
+            center: DVec3::ZERO,
+        };
+        let photograph = Picture::from_fn(SIDE, SIDE, |_, _| Vec3::splat(LEVEL));
+        let backdrop = Backdrop {
+            frame: 4,
+            camera: Camera::new(&intrinsics, &pose, DVec3::ZERO),
+            photograph: Arc::new(photograph),
+            exposure: Exposure::default(),
+            saturation: Vec3::ONE,
+            finish,
+            shown_at: 1.0,
+        };
+        let layers: Vec<Mixed> = (0..SIDE * SIDE)
+            .map(|pixel| {
+                let (x, y) = (pixel % SIDE, pixel / SIDE);
+                let inside = (12..22).contains(&x) && (12..22).contains(&y);
+                let shadow = (22..26).contains(&x) && (12..22).contains(&y);
+                let over = if inside { OBJECT } else { 0.1 };
+                Mixed {
+                    alpha: f32::from(u8::from(inside)),
+                    over: Vec3::splat(over),
+                    under: Vec3::splat(LEVEL),
+                    changed: inside || shadow,
+                }
+            })
+            .collect();
+        let composite = backdrop.composite(&layers);
+        composite.pixels.iter().map(|p| p.x).collect()
+    }
+
+    fn at(pixels: &[f32], x: u32, y: u32) -> f32 {
+        pixels[(y * SIDE + x) as usize]
+    }
+
+    #[test]
+    fn objects_and_their_shadows_become_soft_and_what_is_far_stays_to_the_bit() {
+        let exact = composite(Finish::default());
+        assert_eq!([at(&exact, 11, 17), at(&exact, 12, 17)], [LEVEL, OBJECT]);
+        assert!((at(&exact, 23, 17) - 0.1).abs() < 1e-6);
+        let soft = composite(Finish {
+            blur: Vec2::new(1.2, 0.8),
+            grain: Vec::new(),
+        });
+        // Half of the step falls on either side, nothing is lost, and the middle is as it was.
+        let sum = at(&soft, 11, 17) + at(&soft, 12, 17);
+        assert!((sum - (LEVEL + OBJECT)).abs() < 1e-4, "{sum}");
+        assert!(at(&soft, 11, 17) > LEVEL + 0.05);
+        let total = |pixels: &[f32]| pixels.iter().map(|&p| f64::from(p)).sum::<f64>();
+        assert!((total(&soft) / total(&exact) - 1.0).abs() < 1e-5);
+        assert!((at(&soft, 16, 17) - OBJECT).abs() < 1e-3);
+        assert_eq!(at(&soft, 5, 17), LEVEL);
+    }
+
+    #[test]
+    fn objects_take_grain_and_the_photograph_and_its_shadows_keep_their_own() {
+        let grainy = composite(Finish {
+            blur: Vec2::ZERO,
+            grain: vec![(0.5, Vec3::splat(0.02))],
+        });
+        let inside: Vec<f64> = (12..22)
+            .flat_map(|y| (12..22).map(move |x| (x, y)))
+            .map(|(x, y)| f64::from(at(&grainy, x, y) - OBJECT))
+            .collect();
+        let variance = inside.iter().map(|v| v * v).sum::<f64>() / inside.len() as f64;
+        assert!((variance.sqrt() / 0.02 - 1.0).abs() < 0.2, "{variance}");
+        assert_eq!(at(&grainy, 5, 17), LEVEL);
+        assert!((at(&grainy, 23, 17) - 0.1).abs() < 1e-6);
+        assert_eq!(
+            grainy,
+            composite(Finish {
+                blur: Vec2::ZERO,
+                grain: vec![(0.5, Vec3::splat(0.02))],
+            })
+        );
     }
 }

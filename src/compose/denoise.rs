@@ -1,5 +1,6 @@
 //! A composite with its noise smoothed: the objects' own light, and what they change around them, each by itself.
 
+use crate::compose::backdrop::Mixed;
 use crate::compose::insert::{Insertion, Layers};
 use crate::compose::world::FurnishedScene;
 use crate::math::picture::Picture;
@@ -38,10 +39,15 @@ pub fn denoised(halves: [&Insertion; 2]) -> (Picture, Layers) {
         ..*backdrop.photograph
     };
     let without = each(&|pixel| with.pixels[pixel] - delta.pixels[pixel]);
-    let composite = each(&|pixel| match alpha[pixel] {
-        0.0 if delta.pixels[pixel] == Vec3::ZERO => backdrop.photograph.pixels[pixel],
-        alpha => backdrop.blend(pixel, alpha, with.pixels[pixel], without.pixels[pixel]),
-    });
+    let mixed: Vec<Mixed> = (alpha.iter().enumerate())
+        .map(|(pixel, &alpha)| Mixed {
+            alpha,
+            over: with.pixels[pixel],
+            under: without.pixels[pixel],
+            changed: alpha != 0.0 || delta.pixels[pixel] != Vec3::ZERO,
+        })
+        .collect();
+    let composite = backdrop.composite(&mixed);
     let layers = Layers {
         shadow: Layers::shadow_of(&with, &without, &alpha),
         with,

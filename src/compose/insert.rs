@@ -3,7 +3,7 @@
 //! The scene is rendered with and without the objects from the same random numbers, so that paths that no object
 //! touches cancel to the bit, and the photograph stays what it was wherever the objects do nothing.
 
-use crate::compose::backdrop::Backdrop;
+use crate::compose::backdrop::{Backdrop, Mixed};
 use crate::compose::placement::PlacedObject;
 use crate::compose::world::FurnishedScene;
 use crate::math::picture::Picture;
@@ -139,14 +139,20 @@ impl Insertion {
     ///
     /// Pixels that no object changes, and all of them where none is inserted, are the photograph's to the bit.
     pub fn composite(&self) -> Picture {
-        self.picture(|pixel| {
-            let sums = &self.pixels[pixel];
-            if !sums.changed {
-                return self.backdrop.photograph.pixels[pixel];
+        let mixed = |pixel: usize| match self.pixels[pixel].changed {
+            false => Mixed::default(),
+            true => {
+                let (over, under, alpha) = self.means(pixel);
+                Mixed {
+                    alpha,
+                    over,
+                    under,
+                    changed: true,
+                }
             }
-            let (with, without, alpha) = self.means(pixel);
-            self.backdrop.blend(pixel, alpha, with, without)
-        })
+        };
+        let layers: Vec<Mixed> = (0..self.pixels.len()).into_par_iter().map(mixed).collect();
+        self.backdrop.composite(&layers)
     }
 
     /// What the composite is made from.

@@ -2,6 +2,7 @@
 
 pub mod backdrop;
 pub mod denoise;
+pub mod finish;
 pub mod insert;
 pub mod naive;
 pub mod object;

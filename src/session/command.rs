@@ -57,6 +57,8 @@ pub enum Command {
     View(ViewRequest),
     /// The inserted objects, all of them; replaces those before. Empty takes them away.
     Insert(Vec<Placement>),
+    /// Whether inserted objects take the blur and the grain of 8-bit photographs; they do unless told otherwise.
+    Match(bool),
     /// The changes made by hand to what is found, all of them; replaces those before.
     Edit(Edits),
     /// Writes what `relit solve` writes, into a folder, from the worker's own estimate.

@@ -3,6 +3,7 @@
 
 use crate::capture::exposure::Exposure;
 use crate::compose::backdrop::Backdrop;
+use crate::compose::finish::Finish;
 use crate::compose::insert::Insertion as Composite;
 use crate::compose::naive::{Pasted, harmonics_of_estimate, harmonics_of_photographs};
 use crate::compose::object::ObjectModel;
@@ -129,6 +130,8 @@ struct Relit {
 pub struct Inserting {
     library: Library,
     placements: Vec<Placement>,
+    /// Whether they are left without the photograph's blur and grain.
+    exact: bool,
     frame: usize,
     stale: Option<Instant>,
     relit: Option<Relit>,
@@ -153,6 +156,14 @@ impl Inserting {
         &self.placements
     }
 
+    /// Chooses whether objects take the blur and the grain of their photograph.
+    pub fn take_finish(&mut self, matched: bool) {
+        if self.exact == matched {
+            self.exact = !matched;
+            self.update();
+        }
+    }
+
     /// Moves to another frame.
     pub fn look(&mut self, frame: usize) {
         if frame != self.frame {
@@ -171,6 +182,7 @@ impl Inserting {
         self.library.photographed = None;
         *self = Self {
             library: std::mem::take(&mut self.library),
+            exact: self.exact,
             sequence: self.sequence,
             ..Self::default()
         };
@@ -276,6 +288,9 @@ impl Inserting {
             return Ok(unplaced);
         }
         let mut backdrop = backdrop(capture, &light.found, self.frame)?;
+        if self.exact {
+            backdrop.finish = Finish::default();
+        }
         self.relight(capture, light, &backdrop);
         if let Some(relit) = &self.relit {
             backdrop.photograph = relit.photograph.clone();

@@ -3,6 +3,7 @@
 
 use crate::compose::backdrop::Backdrop;
 use crate::compose::denoise::denoised;
+use crate::compose::finish::Finish;
 use crate::compose::object::surface::Surface;
 use crate::compose::placement::{PlacedObject, Placement};
 use crate::compose::relight::Relighting;
@@ -36,6 +37,8 @@ pub struct Photographs {
     pub samples: u32,
     /// Whether the light's noise is smoothed.
     pub denoise: bool,
+    /// Whether objects take the blur and the grain of 8-bit photographs.
+    pub finish: bool,
     /// Which photographs, by frame.
     pub frames: Vec<usize>,
 }
@@ -148,6 +151,9 @@ impl Photographs {
         let photograph = self.capture.full_photograph(frame)?;
         let exposure = self.found.exposure(frame);
         let mut backdrop = Backdrop::new(frame, &camera, &photograph, exposure)?;
+        if !self.finish {
+            backdrop.finish = Finish::default();
+        }
         if let Some(lights) = lights {
             let (options, seed) = (path_options(&self.settings), self.settings.seed);
             let taken = backdrop.clone();

@@ -239,6 +239,9 @@ fn objects_are_inserted_moved_duplicated_deleted_and_brought_back() {
     assert!(point.is_some_and(|p| p.y.abs() < 1e-5), "{point:?}");
     assert!(!harness.state().app.insertions.placing);
 
+    click(&mut harness, "Blur and grain of the photograph");
+    let matched = |command: &Command| matches!(command, Command::Match(false));
+    assert!(recorder.sent().iter().any(matched));
     click(&mut harness, "Duplicate");
     assert_eq!(placements(&recorder), Some(2));
     click(&mut harness, "Delete");

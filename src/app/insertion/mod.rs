@@ -27,7 +27,6 @@ impl Inserted {
 }
 
 /// All inserted objects and how they are being edited.
-#[derive(Default)]
 pub struct Insertions {
     /// The objects, in the order in which they were added.
     pub objects: Vec<Inserted>,
@@ -37,10 +36,26 @@ pub struct Insertions {
     pub placing: bool,
     /// The handle that is being dragged.
     pub dragged: Option<Handle>,
+    /// Whether they take the blur and the grain of 8-bit photographs.
+    pub finish: bool,
     /// The path as typed.
     pub path: String,
     /// The shapes of the objects' files.
     pub models: Models,
+}
+
+impl Default for Insertions {
+    fn default() -> Self {
+        Self {
+            objects: Vec::new(),
+            chosen: None,
+            placing: false,
+            dragged: None,
+            finish: true,
+            path: String::new(),
+            models: Models::default(),
+        }
+    }
 }
 
 /// Endings that can be inserted.

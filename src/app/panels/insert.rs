@@ -210,6 +210,13 @@ fn results(ui: &mut Ui, app: &mut App) {
             }
         }
     });
+    ui.checkbox(
+        &mut app.insertions.finish,
+        "Blur and grain of the photograph",
+    )
+    .on_hover_text(
+        "Makes objects as soft and as grainy as the 8-bit photograph that they are put into",
+    );
     if let Some(insertion) = &app.snapshot.insertion {
         ui.weak(format!(
             "{} samples a pixel, {:.1} s after the last change",

@@ -77,6 +77,7 @@ impl Worker {
                 self.keeper.touch();
                 self.inserting.place(placements);
             }
+            Command::Match(matched) => self.inserting.take_finish(matched),
             Command::Edit(edits) => {
                 if self.edits != edits {
                     self.answer_for(CHANGED);
