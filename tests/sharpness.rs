@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use relit::capture::photograph::Photograph;
+use relit::inverse::settings::Settings;
 use relit::inverse::sharpness::Sharpness;
 use relit::inverse::solver::Problem;
 use relit::math::rng::Stream;
@@ -49,7 +50,7 @@ fn moved(photograph: &Photograph, x: u32, y: u32) -> Vec3 {
 
 fn contrasts(problem: &Problem) -> Vec<Option<f64>> {
     let none = vec![false; problem.photographs.len()];
-    Sharpness::new(problem, &none).contrast
+    Sharpness::new(problem, &Settings::default(), &none).contrast
 }
 
 #[test]
@@ -87,7 +88,8 @@ fn photographs_that_are_left_out_have_no_say_and_none() {
     let blurred = with(4, moved);
     let mut left_out = vec![false; blurred.photographs.len()];
     left_out[4] = true;
-    let [with, without] = [&blurred, &ROOM].map(|p| Sharpness::new(p, &left_out));
+    let [with, without] =
+        [&blurred, &ROOM].map(|p| Sharpness::new(p, &Settings::default(), &left_out));
     assert_eq!(with, without);
     assert_eq!(with.contrast[4], None);
     assert_eq!(with.weight(4), 1.0);

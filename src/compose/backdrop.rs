@@ -25,7 +25,8 @@ pub struct Backdrop {
     pub exposure: Exposure,
     /// The value at which each channel of the photograph saturates; infinite for linear files.
     pub saturation: Vec3,
-    /// How soft and how grainy it is, which what is put into it shares; nothing for linear files, which are mostly rendered.
+    /// How soft and how grainy what is put into it becomes: as it is itself; nothing for linear files, which are mostly rendered,
+    /// and where that is not wanted.
     pub finish: Finish,
     /// The exposure at which it is shown as 8-bit sRGB: its own, or the 99th percentile of the photograph as taken at 1.
     pub shown_at: f32,
@@ -74,7 +75,9 @@ impl Backdrop {
         Ok(Self {
             finish: match photograph.encoding {
                 Encoding::Linear => Finish::default(),
-                Encoding::Srgb8 | Encoding::Srgb16 => Finish::of(&picture, photograph.saturation),
+                Encoding::Srgb8 | Encoding::Srgb16 => {
+                    Finish::of(&picture, &photograph.usable, photograph.saturation)
+                }
             },
             frame: frame as u64,
             camera: camera.clone(),

@@ -26,6 +26,10 @@ const LEAST_EDGES: usize = 50;
 const PIXEL: f64 = 1.0 / 12.0;
 /// Halvings that find a softness.
 const HALVINGS: u32 = 40;
+/// Pixels on all sides that what tells something needs to be sound.
+const AROUND: usize = 4;
+/// A Gaussian narrower than this is not what its samples say; three pixels of its variance are.
+const NARROW: f32 = 0.6;
 /// Softness in pixels below which pictures are left as they are, and above which it is none of the camera's.
 const SOFT: [f32; 2] = [0.3, 4.0];
 /// Steps of brightness, each with as many pixels as any other.
@@ -52,11 +56,15 @@ pub struct Finish {
 }
 
 impl Finish {
-    /// Of a photograph, whose channels saturate at `saturation`.
-    pub fn of(photograph: &Picture, saturation: Vec3) -> Self {
-        let told: Vec<bool> = (photograph.pixels.iter())
-            .map(|pixel| pixel.is_finite() && pixel.cmplt(saturation).all())
+    /// Of a photograph, whose channels saturate at `saturation`, by its `usable` pixels (all of them where it is empty).
+    pub fn of(photograph: &Picture, usable: &[bool], saturation: Vec3) -> Self {
+        let told: Vec<bool> = (photograph.pixels.iter().enumerate())
+            .map(|(index, pixel)| {
+                let usable = usable.is_empty() || usable[index];
+                usable && pixel.is_finite() && pixel.cmplt(saturation).all()
+            })
             .collect();
+        let told = eroded(&told, photograph.width as usize);
         let levels: Vec<f32> = photograph.pixels.iter().map(|&p| luminance(p)).collect();
         let shape = [photograph.width as usize, photograph.height as usize];
         let mut found = Self {
@@ -109,6 +117,23 @@ impl Finish {
     }
 }
 
+/// Which pixels are so and all around them too, as far as slopes and blurs look.
+fn eroded(told: &[bool], width: usize) -> Vec<bool> {
+    let height = told.len() / width.max(1);
+    let along = |told: &[bool], down: bool| -> Vec<bool> {
+        (0..told.len())
+            .map(|index| {
+                let (x, y) = (index % width, index / width);
+                let (at, side) = if down { (y, height) } else { (x, width) };
+                let near = at.saturating_sub(AROUND)..(at + AROUND + 1).min(side);
+                let place = |i: usize| if down { i * width + x } else { y * width + i };
+                near.map(place).all(|i| told[i])
+            })
+            .collect()
+    };
+    along(&along(told, false), true)
+}
+
 /// Half the length of a blur's kernel in pixels.
 fn reach(deviation: f32) -> usize {
     (3.0 * deviation).ceil() as usize
@@ -120,9 +145,14 @@ fn blurred(values: &[Vec3], shape: [usize; 2], deviation: f32, down: bool) -> Ve
         return values.to_vec();
     }
     let reach = reach(deviation) as isize;
-    let kernel: Vec<f32> = (-reach..=reach)
-        .map(|i| (-0.5 * (i as f32 / deviation).powi(2)).exp())
-        .collect();
+    let variance = deviation * deviation;
+    let kernel: Vec<f32> = match deviation < NARROW {
+        true => vec![0.5 * variance, 1.0 - variance, 0.5 * variance],
+        false => (-reach..=reach)
+            .map(|i| (-0.5 * (i * i) as f32 / variance).exp())
+            .collect(),
+    };
+    let reach = (kernel.len() / 2) as isize;
     let sum: f32 = kernel.iter().sum();
     let [width, height] = shape;
     (0..values.len())
@@ -167,10 +197,9 @@ fn softness(
     let mut ratios: Vec<f64> = (2..height - 2)
         .flat_map(|y| (2..width - 2).map(move |x| y * width + x))
         .filter(|&at| {
-            let near = [at - 2 * along, at - along, at, at + along, at + 2 * along];
             let here = slope(at, along).abs();
             let level = own[at + along].x.max(own[at - along].x);
-            near.iter().all(|&i| told[i])
+            told[at]
                 && here > (EDGE * level).max(ABOVE_GRAIN * grain(level))
                 && slope(at, other).abs() < ACROSS * here
                 && here >= slope(at - along, along).abs()
@@ -223,11 +252,7 @@ fn grain(photograph: &Picture, levels: &[f32], told: &[bool]) -> Vec<(f32, Vec3)
     };
     let mut seen: Vec<(f32, f32, usize)> = (3..height - 3)
         .flat_map(|y| (3..width - 3).map(move |x| y * width + x))
-        .filter(|&at| {
-            [at - width, at, at + width]
-                .iter()
-                .all(|&row| told[row - 1..=row + 1].iter().all(|t| *t))
-        })
+        .filter(|&at| told[at])
         .map(|at| {
             let across = mean(at + 2) - mean(at - 2);
             let down = mean(at + 2 * width) - mean(at - 2 * width);
@@ -306,7 +331,7 @@ mod tests {
     fn softness_and_grain_are_what_the_picture_was_given() {
         for (blur, grain) in [([0.0, 0.0], 0.02), ([1.0, 1.0], 0.02), ([2.0, 0.6], 0.04)] {
             let blur = Vec2::from(blur);
-            let found = Finish::of(&bricks(blur, grain), Vec3::INFINITY);
+            let found = Finish::of(&bricks(blur, grain), &[], Vec3::INFINITY);
             println!("{blur} {grain}: {found:?}");
             let off = (found.blur - blur).abs();
             assert!(
@@ -326,19 +351,41 @@ mod tests {
 
     #[test]
     fn exact_pictures_get_nothing_and_small_ones_are_not_asked() {
-        let exact = Finish::of(&bricks(Vec2::ZERO, 0.0), Vec3::INFINITY);
+        let exact = Finish::of(&bricks(Vec2::ZERO, 0.0), &[], Vec3::INFINITY);
         assert_eq!(exact.blur, Vec2::ZERO);
         assert_eq!(exact.grain([0, 0], 0.5, 1.0), Vec3::ZERO);
         for side in [1, 2, 5, 8] {
             let small = Picture::from_fn(side, side, |x, y| Vec3::splat((x * y) as f32));
-            assert!(Finish::of(&small, Vec3::ONE).is_none(), "{side}");
+            assert!(Finish::of(&small, &[], Vec3::ONE).is_none(), "{side}");
         }
         let black = Picture::from_fn(50, 40, |_, _| Vec3::ZERO);
-        let found = Finish::of(&black, Vec3::ONE);
+        let found = Finish::of(&black, &[], Vec3::ONE);
         assert_eq!(
             (found.blur, found.grain([0, 0], 0.0, 1.0)),
             (Vec2::ZERO, Vec3::ZERO)
         );
+    }
+
+    #[test]
+    fn what_is_masked_says_nothing() {
+        let mut picture = bricks(Vec2::splat(1.0), 0.02);
+        let whole = Finish::of(&picture, &[], Vec3::INFINITY);
+        // Stripes of nothing, as sharp as can be.
+        let usable: Vec<bool> = (0..picture.pixels.len())
+            .map(|index| index % SIZE[0] % 60 >= 8)
+            .collect();
+        for (pixel, usable) in picture.pixels.iter_mut().zip(&usable) {
+            *pixel *= f32::from(u8::from(*usable));
+        }
+        let found = Finish::of(&picture, &usable, Vec3::INFINITY);
+        assert!(
+            (found.blur - whole.blur).abs().max_element() < 0.15,
+            "{found:?}"
+        );
+        for level in [0.15, 0.5] {
+            let ratio = found.grain_at(level) / whole.grain_at(level);
+            assert!((ratio - 1.0).abs().max_element() < 0.2, "{level}: {ratio}");
+        }
     }
 
     #[test]
@@ -347,7 +394,7 @@ mod tests {
         let mut point = vec![Vec3::ZERO; width * height];
         point[15 * width + 20] = Vec3::ONE;
         let finish = Finish {
-            blur: Vec2::new(2.0, 1.0),
+            blur: Vec2::new(2.0, 0.4),
             grain: Vec::new(),
         };
         let soft = finish.softened(&point, [width, height]);
@@ -362,7 +409,7 @@ mod tests {
             soft.iter().enumerate().map(term).sum()
         };
         assert!((moment(0, false) - 1.0).abs() < 1e-5);
-        for (down, wanted) in [(false, 4.0), (true, 1.0)] {
+        for (down, wanted) in [(false, 4.0), (true, 0.16)] {
             assert!(
                 (moment(2, down) / wanted - 1.0).abs() < 0.05,
                 "{}",

@@ -137,18 +137,16 @@ impl Insertion {
 
     /// The photograph with the objects, in the photograph's values.
     ///
-    /// Pixels that no object changes, and all of them where none is inserted, are the photograph's to the bit.
+    /// Pixels that no object changes, and none around them as far as soft edges reach, and all of them where none is inserted, are
+    /// the photograph's to the bit.
     pub fn composite(&self) -> Picture {
-        let mixed = |pixel: usize| match self.pixels[pixel].changed {
-            false => Mixed::default(),
-            true => {
-                let (over, under, alpha) = self.means(pixel);
-                Mixed {
-                    alpha,
-                    over,
-                    under,
-                    changed: true,
-                }
+        let mixed = |pixel: usize| {
+            let (over, under, alpha) = self.means(pixel);
+            Mixed {
+                alpha,
+                over,
+                under,
+                changed: self.pixels[pixel].changed,
             }
         };
         let layers: Vec<Mixed> = (0..self.pixels.len()).into_par_iter().map(mixed).collect();

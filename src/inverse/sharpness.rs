@@ -6,6 +6,8 @@
 //! sharpness a photograph explains all pairs in least squares.
 
 use crate::capture::photograph::Photograph;
+use crate::inverse::held_out::is_held_out;
+use crate::inverse::settings::Settings;
 use crate::inverse::solver::Problem;
 use crate::math::color::luminance;
 use crate::math::stats::quantile;
@@ -62,10 +64,10 @@ struct Levels<'a> {
 }
 
 impl Sharpness {
-    /// Compares the photographs that are not `left_out`.
-    pub fn new(problem: &Problem, left_out: &[bool]) -> Self {
-        let levels: Vec<Levels> = (problem.photographs.par_iter())
-            .map(|photograph| Levels::new(photograph))
+    /// Compares the photographs that are not `left_out`, by pixels that `settings` do not hold out.
+    pub fn new(problem: &Problem, settings: &Settings, left_out: &[bool]) -> Self {
+        let levels: Vec<Levels> = (problem.photographs.par_iter().enumerate())
+            .map(|(frame, photograph)| Levels::new(photograph, frame, settings))
             .collect();
         let frames = levels.len();
         let steps: Vec<Vec<Step>> = (0..frames)
@@ -110,11 +112,11 @@ impl Sharpness {
         })
     }
 
-    /// How much a photograph's pixels say of what is fine: the squared contrast, as a signal beside the same noise; 1 where it is
-    /// not told.
+    /// How much a photograph's pixels say of what is fine: the squared contrast of a blurred one, as a signal beside the same noise;
+    /// 1 of others, since noise adds contrast too, and where it is not told.
     pub fn weight(&self, frame: usize) -> f32 {
         let contrast = self.contrast.get(frame).copied().flatten();
-        contrast.unwrap_or(1.0).powi(2) as f32
+        contrast.unwrap_or(1.0).min(1.0).powi(2) as f32
     }
 }
 
@@ -295,15 +297,17 @@ fn step_in(
 }
 
 impl<'a> Levels<'a> {
-    fn new(photograph: &'a Photograph) -> Self {
-        let mut all: Vec<f64> = (photograph.pixels.iter())
-            .map(|&pixel| f64::from(luminance(pixel)))
+    fn new(photograph: &'a Photograph, frame: usize, settings: &Settings) -> Self {
+        let usable = |index: usize| photograph.usable.is_empty() || photograph.usable[index];
+        let mut all: Vec<f64> = (photograph.pixels.iter().enumerate())
+            .filter(|(index, _)| usable(*index))
+            .map(|(_, &pixel)| f64::from(luminance(pixel)))
             .collect();
         let least = (quantile(&mut all, 0.5).unwrap_or(0.0) * ABOVE_NOISE) as f32;
         let says = |(index, &pixel): (usize, &Vec3)| {
-            let usable = photograph.usable.is_empty() || photograph.usable[index];
             let level = luminance(pixel);
-            match usable && level > least && !photograph.is_saturated(index) {
+            let told = usable(index) && !is_held_out(settings, frame as u32, index as u32);
+            match told && level > least && !photograph.is_saturated(index) {
                 true => level.ln(),
                 false => f32::NAN,
             }

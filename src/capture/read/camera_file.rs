@@ -5,6 +5,8 @@ use crate::capture::read::fields::Fields;
 use crate::capture::read::{lens, pose};
 use crate::error::{Error, Result};
 use serde_json::Value;
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 /// Longest file in bytes; a camera is some hundred.
@@ -17,17 +19,17 @@ const MOST_PIXELS: u64 = 1 << 28;
 /// # Errors
 /// No JSON, a lens model other than those of captures, no size, a pose that is no rigid motion.
 pub fn read(path: &Path) -> Result<(Intrinsics, Pose, Vec<String>)> {
-    let length = (path.metadata())
-        .map_err(|error| Error::io(path, &error))?
-        .len();
-    if length > MOST_BYTES {
+    let failed = |error: std::io::Error| Error::io(path, &error);
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(failed)?;
+    (file.take(MOST_BYTES + 1).read_to_end(&mut bytes)).map_err(failed)?;
+    if bytes.len() as u64 > MOST_BYTES {
         return Err(Error::file(
             path,
             "is too long for a camera",
             "give the fields of one frame",
         ));
     }
-    let bytes = std::fs::read(path).map_err(|error| Error::io(path, &error))?;
     let value: Value = serde_json::from_slice(&bytes).map_err(|error| {
         Error::file(
             path,

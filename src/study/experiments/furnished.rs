@@ -141,6 +141,13 @@ pub fn of_twin(twin: Studied) -> Result<Furnished> {
     let photographs = render(&twin.room, &twin.rendering)?;
     let mut furnished = furnish(twin.room, photographs, [stand(0), stand(1)])?;
     furnished.frames = most_seen(&furnished);
+    if furnished.frames.is_empty() {
+        return Err(Error::new(
+            &furnished.name,
+            "no photograph sees the two chairs from far enough away",
+            "run the study on rooms of its own",
+        ));
+    }
     furnished.how = format!(
         "{}. Two chairs of known colour, {height:.2} high, stand where its ground is level, free and seen.",
         twin.words

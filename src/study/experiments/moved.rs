@@ -33,8 +33,10 @@ pub fn scaled(room: &Room, factor: f64) -> (Room, f64) {
 pub fn with_outlier(room: &Room, distance: f64) -> (Room, f64) {
     let mut room = room.clone();
     let size = size(&room);
+    let (low, high) = room.mesh.bounds();
     let first = room.mesh.positions.len() as u32;
-    let far = DVec3::new(0.6, 0.48, 0.64) * (size * distance);
+    let middle = (low + high) * 0.5;
+    let far = middle + DVec3::new(0.6, 0.48, 0.64) * (size * distance);
     let corners = [DVec3::ZERO, DVec3::X, DVec3::Y].map(|p| far + p * (0.1 * size));
     room.mesh.positions.extend(corners);
     room.mesh.triangles.push([first, first + 1, first + 2]);

@@ -144,14 +144,15 @@ pub fn shadowed(quick: bool) -> Result<Posed> {
 pub fn of_twin(twin: &Studied) -> Result<Posed> {
     let room = &twin.room;
     let seen = seen_pixels(&room.lit(twin.rendering.size)?);
-    let reflectors = (0..seen.len()).filter(|&i| room.materials[i].emission == Vec3::ZERO);
+    let reflectors =
+        (0..seen.len()).filter(|&i| seen[i] > 0 && room.materials[i].emission == Vec3::ZERO);
     let object = reflectors.max_by_key(|&i| (seen[i], Reverse(i)));
     let object = object
         .map(|i| room.mesh.objects[i].clone())
         .ok_or_else(|| {
             Error::new(
                 &room.name,
-                "every object of it is a lamp",
+                "every object of it that is seen is a lamp",
                 "run the study on rooms of its own",
             )
         })?;

@@ -99,7 +99,7 @@ pub fn twin(bench: &Bench, sizes: Sizes) -> Result<Option<Studied>> {
     let [width, height] = rendering.size;
     Ok(Some(Studied {
         words: format!(
-            "The {}: its mesh, its views through ideal lenses, and the colours and lamps that the transport cache found in \
+            "The {}: its mesh, its views through ideal lenses of the first one's shape, and the colours and lamps that the transport cache found in \
              it (one an object, light from outside left away), photographed with all bounces in {} photographs of {width} × \
              {height} pixels with {} paths each, so that the truth is known",
             room.name,

@@ -61,14 +61,14 @@ impl Ladder<'_, '_> {
             })
             .collect();
         let unfitted = self.survey.unfitted(self.problem.photographs.len());
-        let sharpness = Sharpness::new(self.problem, &unfitted);
+        let settings = self.monitor.settings.clone();
+        let sharpness = Sharpness::new(self.problem, &settings, &unfitted);
         let warnings = &mut self.monitor.progress.warnings;
         warnings.extend(
             sharpness
                 .remark()
                 .filter(|remark| !warnings.contains(remark)),
         );
-        let settings = self.monitor.settings.clone();
         let task = Task {
             problem: self.problem,
             survey: &self.survey,
