@@ -44,16 +44,21 @@ enum Word {
 }
 
 impl Word {
+    /// The format, with the place of a probe.
+    fn format(self, at: DVec3) -> Format {
+        match self {
+            Self::Glb => Format::Glb,
+            Self::Obj => Format::Obj,
+            Self::Ply => Format::Ply,
+            Self::Mitsuba => Format::Mitsuba,
+            Self::Csv => Format::Csv,
+            Self::Probe => Format::Probe { at },
+        }
+    }
+
     /// What names of its files end with.
     fn endings(self) -> &'static [&'static str] {
-        match self {
-            Self::Glb => &["glb"],
-            Self::Obj => &["obj"],
-            Self::Ply => &["ply"],
-            Self::Mitsuba => &["xml"],
-            Self::Csv => &["csv"],
-            Self::Probe => &["exr", "hdr"],
-        }
+        self.format(DVec3::ZERO).endings()
     }
 
     /// Refuses a name that says that the file is of another format; one that says nothing is as good as any.
@@ -102,21 +107,14 @@ pub struct DemoArguments {
 /// The results cannot be read, or the file cannot be written.
 pub fn export(arguments: &ExportArguments) -> Result<()> {
     arguments.format.check(&arguments.out)?;
-    let format = match (arguments.format, arguments.at) {
-        (Word::Glb, _) => Format::Glb,
-        (Word::Obj, _) => Format::Obj,
-        (Word::Ply, _) => Format::Ply,
-        (Word::Mitsuba, _) => Format::Mitsuba,
-        (Word::Csv, _) => Format::Csv,
-        (Word::Probe, Some(at)) => Format::Probe { at },
-        (Word::Probe, None) => {
-            return Err(Error::usage(
-                "--format probe",
-                "a probe needs a place",
-                "add --at x,y,z",
-            ));
-        }
-    };
+    if matches!(arguments.format, Word::Probe) && arguments.at.is_none() {
+        return Err(Error::usage(
+            "--format probe",
+            "a probe needs a place",
+            "add --at x,y,z",
+        ));
+    }
+    let format = arguments.format.format(arguments.at.unwrap_or_default());
     let Loaded {
         capture, estimate, ..
     } = arguments.saved.load()?;

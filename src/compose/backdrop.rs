@@ -1,7 +1,7 @@
 //! The photograph that objects are put into, and how light becomes its values.
 
 use crate::capture::exposure::Exposure;
-use crate::capture::photograph::{Encoding, Photograph};
+use crate::capture::photograph::Photograph;
 use crate::compose::finish::Finish;
 use crate::error::{Error, Result};
 use crate::export::picture::shown_at;
@@ -25,8 +25,7 @@ pub struct Backdrop {
     pub exposure: Exposure,
     /// The value at which each channel of the photograph saturates; infinite for linear files.
     pub saturation: Vec3,
-    /// How soft and how grainy what is put into it becomes: as it is itself; nothing for linear files, which are mostly rendered,
-    /// and where that is not wanted.
+    /// How soft and how grainy what is put into it becomes: not at all, or as it is itself.
     pub finish: Finish,
     /// The exposure at which it is shown as 8-bit sRGB: its own, or the 99th percentile of the photograph as taken at 1.
     pub shown_at: f32,
@@ -46,7 +45,7 @@ pub struct Mixed {
 }
 
 impl Backdrop {
-    /// The backdrop of a frame; `exposure` is the estimate's for it.
+    /// The backdrop of a frame, what is put into it exact; `exposure` is the estimate's for it.
     ///
     /// # Errors
     /// Camera and photograph differ in size.
@@ -73,12 +72,7 @@ impl Backdrop {
             ));
         }
         Ok(Self {
-            finish: match photograph.encoding {
-                Encoding::Linear => Finish::default(),
-                Encoding::Srgb8 | Encoding::Srgb16 => {
-                    Finish::of(&picture, &photograph.usable, photograph.saturation)
-                }
-            },
+            finish: Finish::default(),
             frame: frame as u64,
             camera: camera.clone(),
             shown_at: shown_at(photograph.saturation, &picture.pixels),
@@ -109,20 +103,21 @@ impl Backdrop {
         }
 
         // What covers, what it covers, and what changes beside it, each as soft as the photograph.
+        let alphas: Vec<f32> = layers.iter().map(|layer| layer.alpha).collect();
+        let alphas = self.finish.softened(&alphas, size);
         let soft = |value: &(dyn Fn(usize, &Mixed) -> Vec3 + Sync)| {
             let values: Vec<Vec3> = (layers.par_iter().enumerate())
                 .map(|(pixel, layer)| value(pixel, layer))
                 .collect();
             self.finish.softened(&values, size)
         };
-        let alphas = soft(&|_, layer| Vec3::splat(layer.alpha));
         let covers = soft(&|pixel, layer| layer.over * layer.alpha * self.exposure_at(pixel));
         let changes = soft(&|pixel, layer| match layer.changed {
             true => (layer.over - layer.under) * (1.0 - layer.alpha) * self.exposure_at(pixel),
             false => Vec3::ZERO,
         });
         self.each(|pixel| {
-            let (alpha, cover, change) = (alphas[pixel].x, covers[pixel], changes[pixel]);
+            let (alpha, cover, change) = (alphas[pixel], covers[pixel], changes[pixel]);
             if alpha == 0.0 && change == Vec3::ZERO {
                 return self.photograph.pixels[pixel];
             }

@@ -4,13 +4,15 @@
 //! single image"), along rows and columns apart, as a hand moves. Grain by second differences (Immerkær 1996, "Fast noise
 //! variance estimation") where the photograph is smooth, in steps of brightness.
 
+use crate::capture::photograph::{Encoding, Photograph};
 use crate::math::color::luminance;
-use crate::math::picture::Picture;
 use crate::math::rng::Stream;
 use crate::math::stats::quantile;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
+use std::iter::Sum;
+use std::ops::{Div, Mul};
 
 /// Standard deviation in pixels of the blur that edges are compared with.
 const KNOWN_BLUR: f32 = 1.0;
@@ -56,20 +58,23 @@ pub struct Finish {
 }
 
 impl Finish {
-    /// Of a photograph, whose channels saturate at `saturation`, by its `usable` pixels (all of them where it is empty).
-    pub fn of(photograph: &Picture, usable: &[bool], saturation: Vec3) -> Self {
+    /// Of an 8-bit or 16-bit photograph; none of linear ones, which are mostly rendered.
+    pub fn of(photograph: &Photograph) -> Self {
+        if photograph.encoding == Encoding::Linear {
+            return Self::default();
+        }
+        let shape = [photograph.width, photograph.height].map(|side| side as usize);
         let told: Vec<bool> = (photograph.pixels.iter().enumerate())
             .map(|(index, pixel)| {
-                let usable = usable.is_empty() || usable[index];
-                usable && pixel.is_finite() && pixel.cmplt(saturation).all()
+                let usable = photograph.usable.is_empty() || photograph.usable[index];
+                usable && pixel.is_finite() && !photograph.is_saturated(index)
             })
             .collect();
-        let told = eroded(&told, photograph.width as usize);
+        let told = eroded(&told, shape[0]);
         let levels: Vec<f32> = photograph.pixels.iter().map(|&p| luminance(p)).collect();
-        let shape = [photograph.width as usize, photograph.height as usize];
         let mut found = Self {
             blur: Vec2::ZERO,
-            grain: grain(photograph, &levels, &told),
+            grain: grain(&photograph.pixels, &levels, &told, shape),
         };
         let grain = |level: f32| luminance(found.grain_at(level));
         let blur = [false, true].map(|down| softness(&levels, &told, &grain, shape, down));
@@ -97,7 +102,7 @@ impl Finish {
     }
 
     /// A picture, or one number a pixel, made as soft as the photograph.
-    pub fn softened(&self, values: &[Vec3], [width, height]: [usize; 2]) -> Vec<Vec3> {
+    pub fn softened<T: Blend>(&self, values: &[T], [width, height]: [usize; 2]) -> Vec<T> {
         let rows = blurred(values, [width, height], self.blur.x, false);
         blurred(&rows, [width, height], self.blur.y, true)
     }
@@ -134,23 +139,28 @@ fn eroded(told: &[bool], width: usize) -> Vec<bool> {
     along(&along(told, false), true)
 }
 
-/// Half the length of a blur's kernel in pixels.
-fn reach(deviation: f32) -> usize {
-    (3.0 * deviation).ceil() as usize
+/// What can be blurred.
+pub trait Blend:
+    Copy + Send + Sync + Sum + Mul<f32, Output = Self> + Div<f32, Output = Self>
+{
 }
 
+impl Blend for f32 {}
+impl Blend for Vec3 {}
+
 /// A Gaussian blur along rows or columns; the picture goes on as its border beyond it.
-fn blurred(values: &[Vec3], shape: [usize; 2], deviation: f32, down: bool) -> Vec<Vec3> {
+fn blurred<T: Blend>(values: &[T], shape: [usize; 2], deviation: f32, down: bool) -> Vec<T> {
     if deviation <= 0.0 || values.is_empty() {
         return values.to_vec();
     }
-    let reach = reach(deviation) as isize;
     let variance = deviation * deviation;
     let kernel: Vec<f32> = match deviation < NARROW {
         true => vec![0.5 * variance, 1.0 - variance, 0.5 * variance],
-        false => (-reach..=reach)
-            .map(|i| (-0.5 * (i * i) as f32 / variance).exp())
-            .collect(),
+        false => {
+            let reach = (3.0 * deviation).ceil() as i32;
+            let weight = |i: i32| (-0.5 * (i * i) as f32 / variance).exp();
+            (-reach..=reach).map(weight).collect()
+        }
     };
     let reach = (kernel.len() / 2) as isize;
     let sum: f32 = kernel.iter().sum();
@@ -164,7 +174,7 @@ fn blurred(values: &[Vec3], shape: [usize; 2], deviation: f32, down: bool) -> Ve
                 true => (y as isize + i).clamp(0, height as isize - 1) as usize * width + x,
             };
             let terms = (-reach..=reach).zip(&kernel);
-            terms.map(|(i, k)| values[at(i)] * *k).sum::<Vec3>() / sum
+            terms.map(|(i, k)| values[at(i)] * *k).sum::<T>() / sum
         })
         .collect()
 }
@@ -182,23 +192,23 @@ fn softness(
     }
     let (along, other) = if down { (width, 1) } else { (1, width) };
     // Three pixels along an edge are alike but for their grain.
-    let own: Vec<Vec3> = (0..levels.len())
+    let own: Vec<f32> = (0..levels.len())
         .map(|at| {
             let near = [
                 at.saturating_sub(other),
                 at,
                 (at + other).min(levels.len() - 1),
             ];
-            Vec3::splat(near.iter().map(|&i| levels[i]).sum::<f32>() / near.len() as f32)
+            near.iter().map(|&i| levels[i]).sum::<f32>() / near.len() as f32
         })
         .collect();
     let known = blurred(&own, [width, height], KNOWN_BLUR, down);
-    let slope = |at: usize, step: usize| own[at + step].x - own[at - step].x;
+    let slope = |at: usize, step: usize| own[at + step] - own[at - step];
     let mut ratios: Vec<f64> = (2..height - 2)
         .flat_map(|y| (2..width - 2).map(move |x| y * width + x))
         .filter(|&at| {
             let here = slope(at, along).abs();
-            let level = own[at + along].x.max(own[at - along].x);
+            let level = own[at + along].max(own[at - along]);
             told[at]
                 && here > (EDGE * level).max(ABOVE_GRAIN * grain(level))
                 && slope(at, other).abs() < ACROSS * here
@@ -206,7 +216,7 @@ fn softness(
                 && here > slope(at + along, along).abs()
         })
         .filter_map(|at| {
-            let after = (known[at + along].x - known[at - along].x).abs();
+            let after = (known[at + along] - known[at - along]).abs();
             (after > 0.0).then(|| f64::from(slope(at, along).abs() / after))
         })
         .collect();
@@ -237,8 +247,12 @@ fn softness_of(ratio: f64) -> f64 {
 }
 
 /// Standard deviations by luminance where the photograph is smooth.
-fn grain(photograph: &Picture, levels: &[f32], told: &[bool]) -> Vec<(f32, Vec3)> {
-    let (width, height) = (photograph.width as usize, photograph.height as usize);
+fn grain(
+    pixels: &[Vec3],
+    levels: &[f32],
+    told: &[bool],
+    [width, height]: [usize; 2],
+) -> Vec<(f32, Vec3)> {
     if width < 7 || height < 7 {
         return Vec::new();
     }
@@ -265,8 +279,7 @@ fn grain(photograph: &Picture, levels: &[f32], told: &[bool]) -> Vec<(f32, Vec3)
         return Vec::new();
     }
     let second = |at: usize| -> Vec3 {
-        let p = |i: usize| photograph.pixels[i];
-        let row = |i: usize| p(i - 1) - p(i) * 2.0 + p(i + 1);
+        let row = |i: usize| pixels[i - 1] - pixels[i] * 2.0 + pixels[i + 1];
         row(at - width) - row(at) * 2.0 + row(at + width)
     };
     let step = |part: &mut [(f32, f32, usize)]| {
@@ -295,7 +308,7 @@ mod tests {
     const SIZE: [usize; 2] = [240, 180];
 
     /// Bricks of random colours, exact to the pixel's area, then blurred, with grain that grows with the level.
-    fn bricks(blur: Vec2, grain: f32) -> Picture {
+    fn bricks(blur: Vec2, grain: f32) -> Photograph {
         let [width, height] = SIZE;
         let mut stream = Stream::new(7, 0, 0, 0);
         let colors: Vec<f32> = (0..400).map(|_| 0.1 + 0.8 * stream.uniform()).collect();
@@ -320,10 +333,19 @@ mod tests {
         let noisy = |(index, &pixel): (usize, &Vec3)| {
             pixel + finish.grain([3, index as u64], luminance(pixel), 1.0)
         };
-        Picture {
-            width: width as u32,
-            height: height as u32,
-            pixels: soft.iter().enumerate().map(noisy).collect(),
+        let pixels = soft.iter().enumerate().map(noisy).collect();
+        photograph(width as u32, height as u32, pixels, Vec3::INFINITY)
+    }
+
+    fn photograph(width: u32, height: u32, pixels: Vec<Vec3>, saturation: Vec3) -> Photograph {
+        Photograph {
+            width,
+            height,
+            pixels,
+            usable: Vec::new(),
+            encoding: Encoding::Srgb8,
+            saturation,
+            limits: Vec::new(),
         }
     }
 
@@ -331,7 +353,7 @@ mod tests {
     fn softness_and_grain_are_what_the_picture_was_given() {
         for (blur, grain) in [([0.0, 0.0], 0.02), ([1.0, 1.0], 0.02), ([2.0, 0.6], 0.04)] {
             let blur = Vec2::from(blur);
-            let found = Finish::of(&bricks(blur, grain), &[], Vec3::INFINITY);
+            let found = Finish::of(&bricks(blur, grain));
             println!("{blur} {grain}: {found:?}");
             let off = (found.blur - blur).abs();
             assert!(
@@ -351,15 +373,16 @@ mod tests {
 
     #[test]
     fn exact_pictures_get_nothing_and_small_ones_are_not_asked() {
-        let exact = Finish::of(&bricks(Vec2::ZERO, 0.0), &[], Vec3::INFINITY);
+        let exact = Finish::of(&bricks(Vec2::ZERO, 0.0));
         assert_eq!(exact.blur, Vec2::ZERO);
         assert_eq!(exact.grain([0, 0], 0.5, 1.0), Vec3::ZERO);
         for side in [1, 2, 5, 8] {
-            let small = Picture::from_fn(side, side, |x, y| Vec3::splat((x * y) as f32));
-            assert!(Finish::of(&small, &[], Vec3::ONE).is_none(), "{side}");
+            let pixels = (0..side * side).map(|i| Vec3::splat((i % side * (i / side)) as f32));
+            let small = photograph(side, side, pixels.collect(), Vec3::ONE);
+            assert!(Finish::of(&small).is_none(), "{side}");
         }
-        let black = Picture::from_fn(50, 40, |_, _| Vec3::ZERO);
-        let found = Finish::of(&black, &[], Vec3::ONE);
+        let black = photograph(50, 40, vec![Vec3::ZERO; 50 * 40], Vec3::ONE);
+        let found = Finish::of(&black);
         assert_eq!(
             (found.blur, found.grain([0, 0], 0.0, 1.0)),
             (Vec2::ZERO, Vec3::ZERO)
@@ -369,7 +392,7 @@ mod tests {
     #[test]
     fn what_is_masked_says_nothing() {
         let mut picture = bricks(Vec2::splat(1.0), 0.02);
-        let whole = Finish::of(&picture, &[], Vec3::INFINITY);
+        let whole = Finish::of(&picture);
         // Stripes of nothing, as sharp as can be.
         let usable: Vec<bool> = (0..picture.pixels.len())
             .map(|index| index % SIZE[0] % 60 >= 8)
@@ -377,7 +400,8 @@ mod tests {
         for (pixel, usable) in picture.pixels.iter_mut().zip(&usable) {
             *pixel *= f32::from(u8::from(*usable));
         }
-        let found = Finish::of(&picture, &usable, Vec3::INFINITY);
+        picture.usable = usable;
+        let found = Finish::of(&picture);
         assert!(
             (found.blur - whole.blur).abs().max_element() < 0.15,
             "{found:?}"

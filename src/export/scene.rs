@@ -30,6 +30,20 @@ pub enum Format {
     },
 }
 
+impl Format {
+    /// What names of its files end with, the usual one first.
+    pub const fn endings(self) -> &'static [&'static str] {
+        match self {
+            Self::Glb => &["glb"],
+            Self::Obj => &["obj"],
+            Self::Ply => &["ply"],
+            Self::Mitsuba => &["xml"],
+            Self::Csv => &["csv"],
+            Self::Probe { .. } => &["hdr", "exr"],
+        }
+    }
+}
+
 /// One object with its own vertices, in the capture's coordinates.
 #[derive(Debug, Clone)]
 pub struct Part {

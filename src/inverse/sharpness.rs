@@ -12,7 +12,7 @@ use crate::inverse::solver::Problem;
 use crate::math::color::luminance;
 use crate::math::stats::quantile;
 use crate::scene::Scene;
-use crate::scene::visibility::NOTHING;
+use crate::scene::geometry::Ray;
 use glam::{Vec2, Vec3};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -22,11 +22,11 @@ const PAIRS: usize = 6_000;
 /// Photographs that each is compared with at most.
 const OTHERS: usize = 24;
 /// A step counts from this on, as a logarithm, ...
-const LEAST_STEP: f64 = 0.1;
+const LEAST_STEP: f32 = 0.1;
 /// ... and from so many times the usual one on, which is mostly noise.
-const ABOVE_USUAL: f64 = 4.0;
+const ABOVE_USUAL: f32 = 4.0;
 /// A step counts as no larger than this.
-const MOST_STEP: f64 = 1.0;
+const MOST_STEP: f32 = 1.0;
 /// Steps that two photographs must share, seen from either.
 const LEAST_STEPS: usize = 40;
 /// Photographs that must be compared, for the usual sharpness to say something.
@@ -49,18 +49,34 @@ pub struct Sharpness {
     pub contrast: Vec<Option<f64>>,
 }
 
-/// Steps of two photographs between the same points.
+/// The logarithmic steps of two photographs between the same points.
 #[derive(Debug, Clone, Copy)]
 struct Step {
-    other: usize,
-    own: f64,
-    others: f64,
+    other: u32,
+    own: f32,
+    others: f32,
+}
+
+/// What a photograph shares with the others.
+#[derive(Debug, Default)]
+struct Steps {
+    /// The larger of both photographs' steps, for each that is shared.
+    sizes: Vec<f32>,
+    /// Those that could be more than noise.
+    large: Vec<Step>,
 }
 
 /// A photograph's pixels as logarithms of luminance; not a number where one says nothing.
 struct Levels<'a> {
     photograph: &'a Photograph,
     logarithms: Vec<f32>,
+}
+
+impl Step {
+    /// The larger of both.
+    fn size(&self) -> f32 {
+        self.own.abs().max(self.others.abs())
+    }
 }
 
 impl Sharpness {
@@ -70,18 +86,18 @@ impl Sharpness {
             .map(|(frame, photograph)| Levels::new(photograph, frame, settings))
             .collect();
         let frames = levels.len();
-        let steps: Vec<Vec<Step>> = (0..frames)
+        let mut steps: Vec<Steps> = (0..frames)
             .into_par_iter()
             .map(|frame| match left_out[frame] {
-                true => Vec::new(),
+                true => Steps::default(),
                 false => steps(problem, &levels, left_out, frame),
             })
             .collect();
-        let mut sizes: Vec<f64> = (steps.iter().flatten())
-            .map(|step| step.own.abs().max(step.others.abs()))
-            .collect();
-        let usual = quantile(&mut sizes, 0.5).unwrap_or(0.0);
-        let least = LEAST_STEP.max(ABOVE_USUAL * usual);
+        let mut sizes: Vec<f32> = Vec::with_capacity(steps.iter().map(|s| s.sizes.len()).sum());
+        for of_frame in &mut steps {
+            sizes.append(&mut of_frame.sizes);
+        }
+        let least = LEAST_STEP.max(ABOVE_USUAL * middle(&mut sizes));
         Self {
             contrast: explained(&ratios(&steps, least), frames),
         }
@@ -120,19 +136,32 @@ impl Sharpness {
     }
 }
 
+/// One in the middle of some numbers by size; 0 where there are none.
+fn middle(values: &mut [f32]) -> f32 {
+    let place = values.len() / 2;
+    match values.is_empty() {
+        true => 0.0,
+        false => *values.select_nth_unstable_by(place, f32::total_cmp).1,
+    }
+}
+
 /// For ordered pairs of photographs, the logarithm of the ratio of the energies of steps, and how many there are.
-fn ratios(steps: &[Vec<Step>], least: f64) -> Vec<Vec<(usize, f64, usize)>> {
-    let of = |steps: &Vec<Step>| {
-        let mut large: Vec<&Step> = (steps.iter())
-            .filter(|step| step.own.abs().max(step.others.abs()) >= least)
+fn ratios(steps: &[Steps], least: f32) -> Vec<Vec<(usize, f64, usize)>> {
+    let of = |steps: &Steps| {
+        let mut large: Vec<&Step> = (steps.large.iter())
+            .filter(|step| step.size() >= least)
             .collect();
         large.sort_by_key(|step| step.other);
-        let energy = |step: f64| step.clamp(-MOST_STEP, MOST_STEP).powi(2);
+        let energy = |step: f32| f64::from(step.clamp(-MOST_STEP, MOST_STEP)).powi(2);
         (large.chunk_by(|a, b| a.other == b.other))
             .map(|of_pair| {
                 let own: f64 = of_pair.iter().map(|s| energy(s.own)).sum();
                 let others: f64 = of_pair.iter().map(|s| energy(s.others)).sum();
-                (of_pair[0].other, (own / others).ln(), of_pair.len())
+                (
+                    of_pair[0].other as usize,
+                    (own / others).ln(),
+                    of_pair.len(),
+                )
             })
             .filter(|(_, ratio, _)| ratio.is_finite())
             .collect()
@@ -184,7 +213,7 @@ fn explained(ratios: &[Vec<(usize, f64, usize)>], frames: usize) -> Vec<Option<f
 }
 
 /// The steps between neighbouring pixels of a photograph, and between the same points in others.
-fn steps(problem: &Problem, levels: &[Levels], left_out: &[bool], frame: usize) -> Vec<Step> {
+fn steps(problem: &Problem, levels: &[Levels], left_out: &[bool], frame: usize) -> Steps {
     let scene = &*problem.scene;
     let own = &levels[frame];
     let (width, height) = (own.photograph.width, own.photograph.height);
@@ -197,7 +226,7 @@ fn steps(problem: &Problem, levels: &[Levels], left_out: &[bool], frame: usize) 
             .step_by(apart)
             .map(move |x| [x, y])
     });
-    let mut found = Vec::new();
+    let mut found = Steps::default();
     for [x, y] in places {
         for [u, v] in [[x + 1, y], [x, y + 1]] {
             let step = own.at([u, v]) - own.at([x, y]);
@@ -212,12 +241,18 @@ fn steps(problem: &Problem, levels: &[Levels], left_out: &[bool], frame: usize) 
                 continue;
             }
             for &other in &others {
-                if let Some(step_there) = step_in(scene, &levels[other], other, object, [a, b]) {
-                    found.push(Step {
-                        other,
-                        own: f64::from(step),
-                        others: f64::from(step_there),
-                    });
+                let there = step_in(scene, &levels[other], other, object, [a, b]);
+                let Some(others) = there else {
+                    continue;
+                };
+                let both = Step {
+                    other: other as u32,
+                    own: step,
+                    others,
+                };
+                found.sizes.push(both.size());
+                if both.size() >= LEAST_STEP {
+                    found.large.push(both);
                 }
             }
         }
@@ -247,21 +282,10 @@ fn others(scene: &Scene, left_out: &[bool], frame: usize) -> Vec<usize> {
 fn point(scene: &Scene, frame: usize, [x, y]: [u32; 2], width: u32) -> Option<(u32, Vec3)> {
     let triangle = scene.ids().triangles[frame][(y * width + x) as usize];
     let ray = scene.cameras[frame].ray(Vec2::new(x as f32, y as f32) + 0.5);
-    Some((
-        *scene.object_of.get(triangle as usize)?,
-        ray.origin + ray.direction * depth(scene, triangle, ray.origin, ray.direction)?,
-    ))
-}
-
-/// How far along a ray the plane of a triangle lies.
-fn depth(scene: &Scene, triangle: u32, origin: Vec3, direction: Vec3) -> Option<f32> {
-    if triangle == NOTHING {
-        return None;
-    }
-    let [corner, _, _] = scene.corners(triangle);
-    let normal = scene.normals[triangle as usize];
-    let depth = (corner - origin).dot(normal) / direction.dot(normal);
-    (depth.is_finite() && depth > 0.0).then_some(depth)
+    let object = *scene.object_of.get(triangle as usize)?;
+    let distance = scene.plane_distance(triangle, &ray);
+    let is_ahead = distance.is_finite() && distance > 0.0;
+    is_ahead.then(|| (object, ray.origin + ray.direction * distance))
 }
 
 /// The step between two points of an object in another photograph, where it sees both about as finely.
@@ -287,8 +311,9 @@ fn step_in(
         }
         let to_point = point - camera.center;
         let distance = to_point.length();
-        let seen = depth(scene, triangle, camera.center, to_point / distance)?;
-        if (seen - distance).abs() > SAME_DEPTH * distance {
+        let seen = scene.plane_distance(triangle, &Ray::new(camera.center, to_point / distance));
+        let is_same = (seen - distance).abs() <= SAME_DEPTH * distance;
+        if !is_same {
             return None;
         }
     }

@@ -249,9 +249,7 @@ impl FrameView<'_> {
     /// Where the ray through a place of the picture meets a triangle's plane; `None` where it runs along it.
     fn on_plane(&self, triangle: u32, at: Vec2) -> Option<SurveyPoint> {
         let ray = self.camera.ray(at);
-        let normal = self.scene.normals[triangle as usize];
-        let [corner, _, _] = self.scene.corners(triangle);
-        let t = normal.dot(corner - ray.origin) / normal.dot(ray.direction);
+        let t = self.scene.plane_distance(triangle, &ray);
         let point = ray.origin + ray.direction * t;
         (t > 0.0 && point.is_finite()).then(|| self.seen_from(triangle, point))
     }

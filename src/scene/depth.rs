@@ -157,9 +157,7 @@ fn mesh_depth(scene: &Scene, camera: &Camera, at: Vec2, triangle: u32) -> f64 {
         return f64::INFINITY;
     }
     let ray = camera.ray(at);
-    let normal = scene.normals[triangle as usize];
-    let [corner, _, _] = scene.corners(triangle);
-    let along = normal.dot(corner - ray.origin) / normal.dot(ray.direction);
+    let along = scene.plane_distance(triangle, &ray);
     let forward = -camera.rotation.z_axis;
     f64::from(along * ray.direction.dot(forward))
 }

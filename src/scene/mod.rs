@@ -166,6 +166,15 @@ impl Scene {
         self.triangles[triangle as usize].map(|i| self.positions[i as usize])
     }
 
+    /// How far along a ray the plane of a triangle lies, in units of its direction: negative behind it, not finite where the ray
+    /// runs along the plane.
+    #[inline]
+    pub fn plane_distance(&self, triangle: u32, ray: &Ray) -> f32 {
+        let normal = self.normals[triangle as usize];
+        let [corner, _, _] = self.corners(triangle);
+        normal.dot(corner - ray.origin) / normal.dot(ray.direction)
+    }
+
     /// The point of a hit, recomputed from its barycentrics (more exact than origin + t · direction).
     #[inline]
     pub fn point(&self, hit: &Hit) -> Vec3 {

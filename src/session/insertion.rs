@@ -39,11 +39,12 @@ pub struct Inserted {
     pub naive_estimate: Pasted,
 }
 
-/// Objects already read, and the photographs' light; both outlast a change of placement.
+/// Objects already read, the photographs' light, and how the last photograph looks; all outlast a change of placement.
 #[derive(Debug, Default)]
 pub struct Library {
     models: HashMap<PathBuf, Arc<ObjectModel>>,
     photographed: Option<Harmonics>,
+    finish: Option<(usize, Finish)>,
 }
 
 impl Library {
@@ -58,6 +59,21 @@ impl Library {
         let model = Arc::new(ObjectModel::read(path)?);
         self.models.insert(path.clone(), model.clone());
         Ok(model)
+    }
+
+    /// The blur and the grain of a photograph at the working resolution; found once while it is shown.
+    ///
+    /// # Errors
+    /// The frame does not exist.
+    fn finish(&mut self, capture: &OpenCapture, frame: usize) -> Result<Finish> {
+        if let Some((known, finish)) = &self.finish
+            && *known == frame
+        {
+            return Ok(finish.clone());
+        }
+        let finish = Finish::of(capture.frame(frame)?.1);
+        self.finish = Some((frame, finish.clone()));
+        Ok(finish)
     }
 
     /// Puts objects into a backdrop; the composite is coarse at first.
@@ -180,6 +196,7 @@ impl Inserting {
     /// Forgets the objects, as when another capture is opened; files stay read.
     pub fn reset(&mut self) {
         self.library.photographed = None;
+        self.library.finish = None;
         *self = Self {
             library: std::mem::take(&mut self.library),
             exact: self.exact,
@@ -288,8 +305,8 @@ impl Inserting {
             return Ok(unplaced);
         }
         let mut backdrop = backdrop(capture, &light.found, self.frame)?;
-        if self.exact {
-            backdrop.finish = Finish::default();
+        if !self.exact {
+            backdrop.finish = self.library.finish(capture, self.frame)?;
         }
         self.relight(capture, light, &backdrop);
         if let Some(relit) = &self.relit {

@@ -151,8 +151,8 @@ impl Photographs {
         let photograph = self.capture.full_photograph(frame)?;
         let exposure = self.found.exposure(frame);
         let mut backdrop = Backdrop::new(frame, &camera, &photograph, exposure)?;
-        if !self.finish {
-            backdrop.finish = Finish::default();
+        if self.finish && !self.placements.is_empty() {
+            backdrop.finish = Finish::of(&photograph);
         }
         if let Some(lights) = lights {
             let (options, seed) = (path_options(&self.settings), self.settings.seed);

@@ -46,11 +46,10 @@ pub enum Sheet {
     },
 }
 
-/// A format that can be exported: its name, what reads it, and the ending of its files.
+/// A format that can be exported: its name, and what reads it.
 struct Format {
     name: &'static str,
     help: &'static str,
-    ending: &'static str,
     format: ExportFormat,
 }
 
@@ -59,40 +58,41 @@ const FORMATS: [Format; 6] = [
     Format {
         name: "GLB",
         help: "Base colours and emissive strength, for Blender and engines",
-        ending: "glb",
         format: ExportFormat::Glb,
     },
     Format {
         name: "OBJ",
         help: "With an MTL file and the images of its textures beside it",
-        ending: "obj",
         format: ExportFormat::Obj,
     },
     Format {
         name: "PLY",
         help: "Albedo as vertex colours",
-        ending: "ply",
         format: ExportFormat::Ply,
     },
     Format {
         name: "Mitsuba 3",
         help: "A scene file that Mitsuba 3 renders",
-        ending: "xml",
         format: ExportFormat::Mitsuba,
     },
     Format {
         name: "CSV",
         help: "The table of objects",
-        ending: "csv",
         format: ExportFormat::Csv,
     },
     Format {
         name: "Light probe",
         help: "The light at a point as a panorama (.hdr or .exr)",
-        ending: "hdr",
         format: ExportFormat::Probe { at: DVec3::ZERO },
     },
 ];
+
+impl Format {
+    /// The usual ending of its files.
+    fn ending(&self) -> &'static str {
+        self.format.endings()[0]
+    }
+}
 
 impl Sheet {
     /// The sheet for saving.
@@ -112,7 +112,7 @@ impl Sheet {
     /// The sheet for exporting; `at` is where a probe would be taken.
     pub fn export(name: &str, at: DVec3) -> Self {
         Self::Export {
-            file: format!("{}.{}", file_name(name), FORMATS[0].ending),
+            file: format!("{}.{}", file_name(name), FORMATS[0].ending()),
             format: 0,
             at,
             mixed: true,
@@ -123,7 +123,7 @@ impl Sheet {
     pub fn probe(name: &str, at: DVec3) -> Self {
         let last = FORMATS.len() - 1;
         Self::Export {
-            file: format!("{}-light.{}", file_name(name), FORMATS[last].ending),
+            file: format!("{}-light.{}", file_name(name), FORMATS[last].ending()),
             format: last,
             at,
             mixed: true,
@@ -240,7 +240,7 @@ fn export(
             if response.clicked() {
                 *chosen = index;
                 *file = PathBuf::from(&*file)
-                    .with_extension(format.ending)
+                    .with_extension(format.ending())
                     .to_string_lossy()
                     .into_owned();
             }

@@ -6,6 +6,7 @@ use crate::export::table::Table;
 use crate::math::color::luminance_f64;
 use crate::math::rng::Stream;
 use crate::math::stats::Moments;
+use crate::room::photographs::Rendering;
 use crate::scene::visibility::NOTHING;
 use crate::study::experiments::findings::brief;
 use crate::study::experiments::twin::studied;
@@ -75,16 +76,17 @@ struct Fit {
 
 fn run(bench: &Bench) -> Result<Findings> {
     let words = format!("A box room of mean albedo {ALBEDO}");
-    let own = || box_room::box_room("box room", ALBEDO, LAMP);
-    let studied = studied(bench, &words, own)?;
     let (size, reference, samples) = match bench.quick {
         true => ([24, 18], 256, QUICK_SAMPLES),
         false => ([48, 36], 1024, SAMPLES),
     };
-    let lit = match studied.is_twin {
-        true => studied.room.lit(studied.rendering.size)?,
-        false => studied.room.lit(size)?,
+    let own = || {
+        let room = box_room::box_room("box room", ALBEDO, LAMP);
+        let rendering = box_room::rendering(bench.quick);
+        (room, Rendering { size, ..rendering })
     };
+    let studied = studied(bench, &words, own)?;
+    let lit = studied.room.lit(studied.rendering.size)?;
 
     // Light found by BSDF sampling alone is noisy, as light through a door is; that found by both is not.
     let options =

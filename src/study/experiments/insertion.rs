@@ -63,17 +63,15 @@ fn run(bench: &Bench) -> Result<Findings> {
         paths: if bench.quick { 1_000_000 } else { 20_000_000 },
     };
     let twin = twin(bench, sizes)?;
-    let rooms: &[(bool, &str)] = match twin {
-        Some(_) => &[(false, "-twin")],
-        None => &[(true, "-textured"), (false, "-plain")],
+    let rooms = match twin {
+        Some(twin) => vec![(of_twin(twin)?, false, "-twin")],
+        None => vec![
+            (built_in(true, bench.quick)?, true, "-textured"),
+            (built_in(false, bench.quick)?, false, "-plain"),
+        ],
     };
-    let mut twin = twin.map(of_twin).transpose()?;
     let (mut scenes, mut how) = (Vec::new(), String::new());
-    for &(textured, file) in rooms {
-        let room = match twin.take() {
-            Some(twin) => twin,
-            None => built_in(textured, bench.quick)?,
-        };
+    for (room, textured, file) in rooms {
         bench.begin(&room.name)?;
         how += &format!("{} Photographs {:?}. ", room.how, room.frames);
         let time = if limits.seconds.is_finite() {

@@ -44,11 +44,11 @@ fn run(bench: &Bench) -> Result<Findings> {
         (low..=high).step_by(step).map(|k| 10f64.powi(k)).collect()
     };
     let words = format!("A box room of mean albedo {ALBEDO}");
-    let own = || box_room::box_room("box room", ALBEDO, LAMP);
-    let mut studied = studied(bench, &words, own)?;
-    if !studied.is_twin {
-        studied.rendering = box_room::rendering(true);
-    }
+    let own = || {
+        let room = box_room::box_room("box room", ALBEDO, LAMP);
+        (room, box_room::rendering(true))
+    };
+    let studied = studied(bench, &words, own)?;
     let subject = studied.photographed()?;
     let (words, room) = (studied.words, studied.room);
     let reflects: Vec<bool> = (room.materials.iter())

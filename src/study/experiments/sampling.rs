@@ -51,7 +51,10 @@ const WAYS: [(&str, Way); 5] = [
 fn run(bench: &Bench) -> Result<Findings> {
     let limits = bench.limits(WAYS.len() * bench.seeds as usize);
     let words = format!("A box room of mean albedo {ALBEDO}");
-    let own = || box_room::box_room("box room", ALBEDO, LAMP);
+    let own = || {
+        let room = box_room::box_room("box room", ALBEDO, LAMP);
+        (room, box_room::rendering(bench.quick))
+    };
     let studied = studied(bench, &words, own)?;
     let subject = studied.photographed()?;
     let gauge = Gauge::new(&subject, paper_settings(1).max_bounces());

@@ -30,8 +30,6 @@ pub struct Studied {
     pub rendering: Rendering,
     /// What it is, a phrase that begins a sentence.
     pub words: String,
-    /// Whether it is the twin of a capture.
-    pub is_twin: bool,
 }
 
 impl Studied {
@@ -68,16 +66,20 @@ impl Sizes {
 ///
 /// # Errors
 /// As [`twin`].
-pub fn studied(bench: &Bench, words: &str, own: impl FnOnce() -> Room) -> Result<Studied> {
-    Ok(match twin(bench, Sizes::small(bench.quick))? {
-        Some(twin) => twin,
-        None => Studied {
-            room: own(),
-            rendering: box_room::rendering(bench.quick),
+pub fn studied(
+    bench: &Bench,
+    words: &str,
+    own: impl FnOnce() -> (Room, Rendering),
+) -> Result<Studied> {
+    let twin = twin(bench, Sizes::small(bench.quick))?;
+    Ok(twin.unwrap_or_else(|| {
+        let (room, rendering) = own();
+        Studied {
+            room,
+            rendering,
             words: words.to_owned(),
-            is_twin: false,
-        },
-    })
+        }
+    }))
 }
 
 /// The twin of the capture that a study is run on; `None` where it runs on rooms of its own.
@@ -108,7 +110,6 @@ pub fn twin(bench: &Bench, sizes: Sizes) -> Result<Option<Studied>> {
         ),
         room,
         rendering,
-        is_twin: true,
     }))
 }
 
