@@ -1,6 +1,6 @@
 //! relit's hierarchy against Embree's `rtcIntersect1` and `rtcOccluded1`: one thread, the same triangles and rays.
 //!
-//! `cargo run --release [-- RUNS [EMBREE_CONFIG]]`; the figures are medians over paired, alternating runs.
+//! `cargo run --release [-- RUNS [EMBREE_CONFIG [SCENE]]]`; the figures are medians over paired, alternating runs.
 
 mod embree;
 mod scenes;
@@ -44,6 +44,7 @@ fn main() {
         .next()
         .map_or(9, |n| n.parse().expect("a number of runs"));
     let config = arguments.next().unwrap_or_default();
+    let wanted = arguments.next().unwrap_or_default();
     println!(
         "relit: {:?}; {runs} paired runs of {RAYS} rays, one thread",
         InstructionSet::widest()
@@ -60,8 +61,8 @@ fn main() {
         Scene::room("furnished room", 0.05, 60),
         Scene::room("fine room", 0.02, 200),
     ];
-    for scene in scenes {
-        compare(&scene, runs, &config);
+    for scene in scenes.iter().filter(|scene| scene.name.contains(&wanted)) {
+        compare(scene, runs, &config);
     }
 }
 

@@ -26,7 +26,11 @@ impl Scene {
             name,
             positions: Vec::new(),
             triangles: Vec::new(),
-            eyes: room.views.iter().map(|[eye, _]| eye.as_vec3()).collect(),
+            eyes: room
+                .views
+                .iter()
+                .map(|view| view.pose.center.as_vec3())
+                .collect(),
             lamp: [Vec3::new(-0.6, 2.5, -0.4), Vec3::new(0.6, 2.5, 0.4)],
         };
         for t in &room.mesh.triangles {

@@ -6,6 +6,7 @@ use relit::export::capture::write;
 use relit::export::exr::Precision;
 use relit::math::rng::Stream;
 use relit::room::Room;
+use relit::room::cameras::View;
 use relit::room::photographs::Rendering;
 use relit::transport::material::Material;
 use std::path::Path;
@@ -94,7 +95,8 @@ fn hall(triangles: usize, photographs: usize, objects: usize) -> Room {
         .map(|_| {
             let mut within = |half: f64| (f64::from(builder.stream.uniform()) * 2.0 - 1.0) * half;
             let eye = DVec3::new(within(4.5), 2.1 + within(0.5), within(4.5));
-            [eye, DVec3::new(within(4.0), 0.9 + within(0.9), within(4.0))]
+            let target = DVec3::new(within(4.0), 0.9 + within(0.9), within(4.0));
+            View::towards(eye, target)
         })
         .collect();
     Room {

@@ -2,7 +2,7 @@
 
 use super::lanes::Lanes;
 use super::shear::Shear;
-use super::slabs::Slabs;
+use super::slabs::{Slabs, reciprocal};
 use super::{Bvh, Child, GROUP, Group, Node, WIDTH, prefetch};
 use crate::scene::geometry::Ray;
 
@@ -15,12 +15,13 @@ pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
     stack: &mut [u32],
 ) -> bool {
     let (nodes, groups): (&[Node], &[Group]) = (&bvh.nodes, &bvh.groups);
-    let slabs = Slabs::<B>::new(ray);
-    let shear = Shear::<T>::new(ray);
+    let inverse = reciprocal(ray.direction);
+    let slabs = Slabs::<B>::new(ray, inverse);
+    let shear = Shear::<T>::new(ray, inverse);
     let mut depth = 0;
     let mut current = Child::inner(0);
     loop {
-        // Descend to the first child that is met, leaving the others on the stack.
+        // Descend to the last child that is met, the one with the fewest triangles; the others go onto the stack.
         while !current.is_leaf() {
             let node = &nodes[current.0 as usize];
             let (_, mask) = slabs.meet(node, ray.t_max);
@@ -28,8 +29,9 @@ pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
                 current = Child::EMPTY;
                 break;
             }
-            current = node.child(mask.trailing_zeros() as usize);
-            let others = mask & (mask - 1);
+            let last = 31 - mask.leading_zeros();
+            current = node.child(last as usize);
+            let others = mask ^ 1 << last;
             if others != 0 {
                 B::pack(&node.rows[Node::CHILDREN], others, &mut stack[depth..]);
                 depth += others.count_ones() as usize;

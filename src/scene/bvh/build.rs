@@ -6,6 +6,7 @@ use super::split::{Bounds, Primitive};
 use super::{Bvh, Child, GROUP, Group, InstructionSet, Node, WIDTH};
 use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
+use std::cmp::Reverse;
 
 /// Subtrees of more primitives than this, and than a share of all, are built and laid out side by side.
 const ALONE: usize = 8192;
@@ -98,7 +99,7 @@ impl<C: Fn(u32) -> [Vec3; 3] + Sync> Layout<'_, C> {
         }
         // Lay the children out side by side and append them in order.
         tree.nodes.push(Node::empty());
-        let children = binary::open(self.binary, root);
+        let children = self.children(root);
         let stacked = children.len() - 1;
         let parts: Vec<Subtree> = children
             .par_iter()
@@ -116,7 +117,7 @@ impl<C: Fn(u32) -> [Vec3; 3] + Sync> Layout<'_, C> {
     fn place(&self, root: usize, stacked: usize, tree: &mut Subtree) -> Child {
         let index = tree.nodes.len();
         tree.nodes.push(Node::empty());
-        let children = binary::open(self.binary, root);
+        let children = self.children(root);
         let stacked = stacked + children.len() - 1;
         tree.stack = tree.stack.max(stacked);
         for (lane, child_index) in children.into_iter().enumerate() {
@@ -131,6 +132,13 @@ impl<C: Fn(u32) -> [Vec3; 3] + Sync> Layout<'_, C> {
             tree.nodes[index].set(lane, reference, &child.bounds, self.margin);
         }
         Child::inner(index)
+    }
+
+    /// The binary nodes that become a wide one's children, those with the most triangles first.
+    fn children(&self, root: usize) -> Vec<usize> {
+        let mut children = binary::open(self.binary, root);
+        children.sort_by_key(|&child| Reverse(self.binary[child].count));
+        children
     }
 
     /// Stores a leaf's triangles in groups; unused lanes repeat the last triangle.

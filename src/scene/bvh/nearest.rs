@@ -2,7 +2,7 @@
 
 use super::lanes::Lanes;
 use super::shear::Shear;
-use super::slabs::Slabs;
+use super::slabs::{Slabs, reciprocal};
 use super::{Bvh, Child, GROUP, Group, Node, WIDTH, prefetch};
 use crate::scene::geometry::{Hit, Ray};
 
@@ -29,8 +29,9 @@ pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
         b2: 0.0,
     };
     let (nodes, groups): (&[Node], &[Group]) = (&bvh.nodes, &bvh.groups);
-    let slabs = Slabs::<B>::new(ray);
-    let shear = Shear::<T>::new(ray);
+    let inverse = reciprocal(ray.direction);
+    let slabs = Slabs::<B>::new(ray, inverse);
+    let shear = Shear::<T>::new(ray, inverse);
     let mut depth = 0;
     let mut current = Child::inner(0);
     loop {

@@ -3,6 +3,7 @@
 use super::lanes::{Lanes, splat};
 use super::{GROUP, Group};
 use crate::scene::geometry::{Hit, Ray};
+use glam::Vec3A;
 
 /// A ray as the triangle test wants it.
 pub(super) struct Shear<L> {
@@ -15,8 +16,9 @@ pub(super) struct Shear<L> {
 }
 
 impl<L: Lanes<GROUP>> Shear<L> {
+    /// `inverse` holds the reciprocals of the direction's components that are not tiny.
     #[inline(always)]
-    pub fn new(ray: &Ray) -> Self {
+    pub fn new(ray: &Ray, inverse: Vec3A) -> Self {
         let (origin, direction) = (ray.origin.to_array(), ray.direction.to_array());
         let size = ray.direction.abs();
         let z = if size.z >= size.x && size.z >= size.y {
@@ -25,7 +27,7 @@ impl<L: Lanes<GROUP>> Shear<L> {
             usize::from(size.y > size.x)
         };
         let axes = [(z + 1) % 3, (z + 2) % 3, z];
-        let scale = 1.0 / direction[z];
+        let scale = inverse.to_array()[z];
         let shear = [
             direction[axes[0]] * scale,
             direction[axes[1]] * scale,

@@ -3,6 +3,7 @@
 use super::lanes::{Lanes, splat};
 use super::{Node, WIDTH};
 use crate::scene::geometry::Ray;
+use glam::{Vec3, Vec3A};
 
 /// A ray as the box test wants it.
 pub(super) struct Slabs<L> {
@@ -16,26 +17,20 @@ pub(super) struct Slabs<L> {
 }
 
 impl<L: Lanes<WIDTH>> Slabs<L> {
+    /// `inverse` is the [`reciprocal`] of the ray's direction.
     #[inline(always)]
-    pub fn new(ray: &Ray) -> Self {
-        // A zero component would make 0 · ∞; a tiny one gives slabs that are as good as parallel.
-        let tiny = ray.direction.abs().max_element() * 1e-24;
-        let [x, y, z] = ray.direction.to_array();
-        let inverse = [
-            reciprocal(x, tiny),
-            reciprocal(y, tiny),
-            reciprocal(z, tiny),
-        ];
+    pub fn new(ray: &Ray, inverse: Vec3A) -> Self {
         // Slab distances are off by at most three roundings (pbrt 4ed, 6.1.2): widen the far side by more.
         const WIDEN: f32 = 1.0 + 8.0 * f32::EPSILON;
+        let negative = inverse.is_negative_bitmask() as usize;
         Self {
             origin: splat(ray.origin.to_array()),
-            inverse: splat(inverse),
-            inverse_far: splat(inverse.map(|i| i * WIDEN)),
+            inverse: splat(inverse.to_array()),
+            inverse_far: splat((inverse * WIDEN).to_array()),
             near: [
-                usize::from(inverse[0] < 0.0),
-                2 + usize::from(inverse[1] < 0.0),
-                4 + usize::from(inverse[2] < 0.0),
+                negative & 1,
+                2 + (negative >> 1 & 1),
+                4 + (negative >> 2 & 1),
             ],
             t_min: L::splat(ray.t_min),
         }
@@ -68,7 +63,12 @@ impl<L: Lanes<WIDTH>> Slabs<L> {
     }
 }
 
+/// One over each component of a direction; where one is next to nothing, something huge of its sign.
 #[inline(always)]
-fn reciprocal(d: f32, tiny: f32) -> f32 {
-    1.0 / if d.abs() < tiny { tiny.copysign(d) } else { d }
+pub(super) fn reciprocal(direction: Vec3) -> Vec3A {
+    // A zero component would make 0 · ∞; a tiny one gives slabs that are as good as parallel.
+    let tiny = Vec3A::splat(direction.abs().max_element() * 1e-24);
+    let direction = Vec3A::from(direction);
+    let is_tiny = direction.abs().cmplt(tiny);
+    Vec3A::select(is_tiny, tiny.copysign(direction), direction).recip()
 }

@@ -1,26 +1,31 @@
 //! Which instructions a ray is traced with.
 
+use super::lanes::Portable;
 #[cfg(target_arch = "x86_64")]
 use super::lanes::{Eight, Four};
-use super::lanes::{Lanes, Portable};
 use super::{Bvh, GROUP, InstructionSet, WIDTH, any, nearest};
 use crate::scene::geometry::{Hit, Ray};
+use std::cell::RefCell;
 
-/// Stack entries kept in the frame; deeper hierarchies take theirs from the heap.
-const SHALLOW: usize = 64;
+/// Entries of a thread's stacks; deeper hierarchies take theirs from the heap, ray by ray.
+const SHALLOW: usize = 128;
+
+thread_local! {
+    // A stack in the frame would have to be cleared for every ray.
+    static NEAREST: RefCell<[nearest::Entry; SHALLOW]> = const { RefCell::new([0; SHALLOW]) };
+    // A whole vector is put onto this one at a time.
+    static ANY: RefCell<[u32; SHALLOW + WIDTH]> = const { RefCell::new([0; SHALLOW + WIDTH]) };
+}
 
 #[inline]
 pub(super) fn intersect(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
     if bvh.nodes.is_empty() {
         return None;
     }
-    let hit = match bvh.instructions {
-        // SAFETY: `Bvh::instructions` is at most what `InstructionSet::widest` detected.
-        #[cfg(target_arch = "x86_64")]
-        InstructionSet::Avx512 => unsafe { nearest_avx512(bvh, ray) },
-        #[cfg(target_arch = "x86_64")]
-        InstructionSet::Avx2 => unsafe { nearest_avx2(bvh, ray) },
-        _ => nearest_with::<Portable<WIDTH>, Portable<GROUP>>(bvh, ray),
+    let hit = if bvh.stack_size <= SHALLOW {
+        NEAREST.with_borrow_mut(|stack| nearest_hit(bvh, ray, stack))
+    } else {
+        nearest_hit(bvh, ray, &mut vec![0; bvh.stack_size])
     };
     (hit.triangle != u32::MAX).then_some(hit)
 }
@@ -30,55 +35,101 @@ pub(super) fn occluded(bvh: &Bvh, ray: &Ray) -> bool {
     if bvh.nodes.is_empty() {
         return false;
     }
+    if bvh.stack_size <= SHALLOW {
+        ANY.with_borrow_mut(|stack| any_hit(bvh, ray, stack))
+    } else {
+        any_hit(bvh, ray, &mut vec![0; bvh.stack_size + WIDTH])
+    }
+}
+
+#[inline(always)]
+fn nearest_hit(bvh: &Bvh, ray: &Ray, stack: &mut [nearest::Entry]) -> Hit {
     match bvh.instructions {
         // SAFETY: `Bvh::instructions` is at most what `InstructionSet::widest` detected.
         #[cfg(target_arch = "x86_64")]
-        InstructionSet::Avx512 => unsafe { any_avx512(bvh, ray) },
+        InstructionSet::Avx512 => unsafe { nearest_avx512(bvh, ray, stack) },
         #[cfg(target_arch = "x86_64")]
-        InstructionSet::Avx2 => unsafe { any_avx2(bvh, ray) },
-        _ => any_with::<Portable<WIDTH>, Portable<GROUP>>(bvh, ray),
+        InstructionSet::Avx2 => unsafe { nearest_avx2(bvh, ray, stack) },
+        _ => nearest::traverse::<Portable<WIDTH>, Portable<GROUP>>(bvh, ray, stack),
+    }
+}
+
+#[inline(always)]
+fn any_hit(bvh: &Bvh, ray: &Ray, stack: &mut [u32]) -> bool {
+    match bvh.instructions {
+        // SAFETY: `Bvh::instructions` is at most what `InstructionSet::widest` detected.
+        #[cfg(target_arch = "x86_64")]
+        InstructionSet::Avx512 => unsafe { any_avx512(bvh, ray, stack) },
+        #[cfg(target_arch = "x86_64")]
+        InstructionSet::Avx2 => unsafe { any_avx2(bvh, ray, stack) },
+        _ => any::traverse::<Portable<WIDTH>, Portable<GROUP>>(bvh, ray, stack),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,bmi1,bmi2,lzcnt,popcnt")]
-fn nearest_avx512(bvh: &Bvh, ray: &Ray) -> Hit {
-    nearest_with::<Eight, Four>(bvh, ray)
+fn nearest_avx512(bvh: &Bvh, ray: &Ray, stack: &mut [nearest::Entry]) -> Hit {
+    nearest::traverse::<Eight, Four>(bvh, ray, stack)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn nearest_avx2(bvh: &Bvh, ray: &Ray) -> Hit {
-    nearest_with::<Eight, Four>(bvh, ray)
+fn nearest_avx2(bvh: &Bvh, ray: &Ray, stack: &mut [nearest::Entry]) -> Hit {
+    nearest::traverse::<Eight, Four>(bvh, ray, stack)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,bmi1,bmi2,lzcnt,popcnt")]
-fn any_avx512(bvh: &Bvh, ray: &Ray) -> bool {
-    any_with::<Eight, Four>(bvh, ray)
+fn any_avx512(bvh: &Bvh, ray: &Ray, stack: &mut [u32]) -> bool {
+    any::traverse::<Eight, Four>(bvh, ray, stack)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn any_avx2(bvh: &Bvh, ray: &Ray) -> bool {
-    any_with::<Eight, Four>(bvh, ray)
+fn any_avx2(bvh: &Bvh, ray: &Ray, stack: &mut [u32]) -> bool {
+    any::traverse::<Eight, Four>(bvh, ray, stack)
 }
 
-#[inline(always)]
-fn nearest_with<B: Lanes<WIDTH>, T: Lanes<GROUP>>(bvh: &Bvh, ray: &Ray) -> Hit {
-    if bvh.stack_size <= SHALLOW {
-        nearest::traverse::<B, T>(bvh, ray, &mut [0; SHALLOW])
-    } else {
-        nearest::traverse::<B, T>(bvh, ray, &mut vec![0; bvh.stack_size])
+#[cfg(test)]
+mod tests {
+    use super::SHALLOW;
+    use crate::scene::bvh::Bvh;
+    use crate::scene::geometry::Ray;
+    use glam::Vec3;
+
+    /// Triangles across the x axis, each a little farther and larger than the one before: nothing splits them evenly.
+    fn chain() -> (Vec<Vec3>, Vec<[u32; 3]>) {
+        let sizes = (-700..700).map(|step| 1.04f32.powi(step));
+        let positions: Vec<Vec3> = sizes
+            .flat_map(|x| {
+                [[-1.0, -1.0], [1.0, -1.0], [0.0, 1.0]].map(|[y, z]| Vec3::new(1.0, y, z) * x)
+            })
+            .collect();
+        let triangles = (0..positions.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]);
+        let triangles = triangles.collect();
+        (positions, triangles)
     }
-}
 
-#[inline(always)]
-fn any_with<B: Lanes<WIDTH>, T: Lanes<GROUP>>(bvh: &Bvh, ray: &Ray) -> bool {
-    // A whole vector is put on the stack at a time.
-    if bvh.stack_size <= SHALLOW {
-        any::traverse::<B, T>(bvh, ray, &mut [0; SHALLOW + WIDTH])
-    } else {
-        any::traverse::<B, T>(bvh, ray, &mut vec![0; bvh.stack_size + WIDTH])
+    #[test]
+    fn hierarchies_deeper_than_the_threads_stacks_are_traversed_whole() {
+        let (positions, triangles) = chain();
+        let bvh = Bvh::new(&positions, &triangles);
+        assert!(bvh.stack_size > SHALLOW, "only {}", bvh.stack_size);
+        for (index, _) in triangles.iter().enumerate().step_by(50) {
+            // Between this triangle and the next, forward and back.
+            let x = positions[3 * index].x;
+            let origin = Vec3::X * x * 1.02;
+            let hit = |direction| {
+                let ray = Ray::new(origin, direction);
+                let hit = bvh.intersect(&ray);
+                assert_eq!(bvh.occluded(&ray), hit.is_some());
+                hit.map(|hit| hit.triangle as usize)
+            };
+            let next = Some(index + 1).filter(|&next| next < triangles.len());
+            assert_eq!(hit(Vec3::X), next);
+            assert_eq!(hit(-Vec3::X), Some(index));
+            // Across the line, nothing is met: each triangle lies in a plane of its own.
+            assert_eq!(hit(Vec3::Y), None);
+        }
     }
 }
