@@ -125,6 +125,9 @@ fn balanced_recovers_albedo_and_lamp_within_its_reported_errors() {
     let error = mean_absolute_error(&solution.estimate, materials);
     println!("mean absolute error {error}");
     assert!(error < 0.01, "mean absolute error {error}");
+    let depth = (solution.progress.stages.iter()).find(|stage| stage.name == "depth");
+    let said = depth.map(|stage| stage.why.as_str()).expect("its depth");
+    assert!(said.contains("leave nothing out"), "{said}");
 }
 
 /// 2 MiB hold some twelve thousand of the million paths.

@@ -5,7 +5,7 @@ use crate::cli::interrupt::Interrupt;
 use crate::cli::parameters::duration;
 use crate::cli::solve::use_threads;
 use crate::error::Result;
-use crate::inverse::settings::Settings;
+use crate::inverse::settings::{Preset, Settings};
 use crate::inverse::solver::Problem;
 use crate::session::command::Source;
 use crate::session::open::open;
@@ -13,6 +13,7 @@ use crate::session::snapshot::OpenCapture;
 use crate::study::trade::plan::{self, Run};
 use crate::study::trade::{Curve, Heard, Trade, combine, measure, rooms};
 use clap::Args;
+use clap::builder::PossibleValuesParser;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -33,6 +34,9 @@ pub struct TradeArguments {
     /// The presets alone, without the settings around them
     #[arg(long)]
     presets: bool,
+    /// One preset and the settings around it alone, each with as much of the time
+    #[arg(long, value_name = "PRESET", conflicts_with = "presets", value_parser = PossibleValuesParser::new(Preset::WORDS))]
+    around: Option<String>,
     /// Key of all random numbers, and of the first generated room
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -61,10 +65,10 @@ pub fn trade(arguments: &TradeArguments) -> Result<()> {
         seed: arguments.seed,
         ..Settings::default()
     };
-    let runs = if arguments.presets {
-        plan::presets(&base)
-    } else {
-        plan::everything(&base)
+    let runs = match &arguments.around {
+        Some(preset) => plan::around(preset, &base),
+        None if arguments.presets => plan::presets(&base),
+        None => plan::everything(&base),
     };
     let (trade, folder) = match arguments.rooms {
         Some(count) => {

@@ -165,7 +165,15 @@ pub fn write_layers(path: &Path, width: u32, height: u32, layers: &[Layer]) -> R
         .collect();
     let attributes = ImageAttributes::new(IntegerBounds::from_dimensions(size));
     let image = Image::from_layers(attributes, exr_layers);
-    write_atomically(path, |writer| Ok(image.write().to_buffered(writer)?))
+    write_atomically(path, |writer| {
+        image
+            .write()
+            .to_buffered(writer)
+            .map_err(|error| match error {
+                exr::error::Error::Io(error) => error.into(),
+                other => other.into(),
+            })
+    })
 }
 
 #[cfg(test)]

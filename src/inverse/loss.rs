@@ -6,6 +6,7 @@ use crate::inverse::held_out::is_held_out;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::Problem;
 use crate::math::rng::{Stream, splitmix64};
+use crate::math::stats::Moments;
 use crate::scene::visibility::NOTHING;
 use crate::transport::arrival::Cast;
 use crate::transport::lit::Lit;
@@ -34,6 +35,17 @@ pub struct Losses {
     /// On held-out pixels; `None` where there are none.
     pub held_out: Option<f64>,
     /// What measuring them took; dropped samples count as black.
+    pub cast: Cast,
+}
+
+/// The light that reaches the photographs after a number of bounces.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rest {
+    /// Its share of all light, in the channel in which that is most.
+    pub share: f64,
+    /// Standard error of the share, by how pixels differ.
+    pub stderr: f64,
+    /// What measuring it took.
     pub cast: Cast,
 }
 
@@ -82,6 +94,15 @@ impl LossProbe {
         }
     }
 
+    /// The same pixels and paths, of at most so many bounces.
+    #[must_use]
+    pub fn deepened(&self, max_bounces: u32) -> Self {
+        Self {
+            max_bounces,
+            ..self.clone()
+        }
+    }
+
     /// Renders both sets with an estimate.
     pub fn measure(&self, problem: &Problem, estimate: &Estimate) -> Losses {
         let lit = estimate.lit(&problem.scene);
@@ -108,38 +129,48 @@ impl LossProbe {
         self.differences(problem, &lit, &self.held_out)
     }
 
+    /// How much of the light in the photographs comes after `bounces` bounces, by an estimate: the same paths as long as the probe's,
+    /// cut off there. `None` where no pixel is in the fit, or all is black.
+    pub fn beyond(&self, problem: &Problem, estimate: &Estimate, bounces: u32) -> Option<Rest> {
+        let lit = estimate.lit(&problem.scene);
+        let each: Vec<([DVec3; 2], Cast)> = (self.train.par_iter())
+            .map(|&pixel| {
+                let [whole, cut] = [self.max_bounces, bounces]
+                    .map(|most| self.rendered(problem, &lit, pixel, most));
+                let mut cast = whole.1;
+                cast += cut.1;
+                ([whole.0, whole.0 - cut.0], cast)
+            })
+            .collect();
+        let cast = each.iter().map(|e| e.1).sum();
+        let count = each.len() as f64;
+        let mean = |of: usize| each.iter().map(|e| e.0[of]).sum::<DVec3>() / count;
+        let [all, late] = [mean(0), mean(1)];
+        let shares = late / all;
+        let channel = (0..3)
+            .filter(|&c| shares[c].is_finite())
+            .max_by(|&a, &b| shares[a].total_cmp(&shares[b]))?;
+        // A ratio of means, to first order.
+        let share = shares[channel];
+        let mut off = Moments::default();
+        for ([all, late], _) in &each {
+            off.push(late[channel] - share * all[channel]);
+        }
+        Some(Rest {
+            share,
+            stderr: off.standard_error() / all[channel],
+            cast,
+        })
+    }
+
     fn differences(&self, problem: &Problem, lit: &Lit, pixels: &[(u32, u32)]) -> (Vec<f64>, Cast) {
-        let options = PathOptions {
-            max_bounces: self.max_bounces,
-            ..Default::default()
-        };
         let each: Vec<(f64, Cast)> = pixels
             .par_iter()
             .map(|&(frame, pixel)| {
-                let camera = &problem.scene.cameras[frame as usize];
+                let (shown, cast) = self.rendered(problem, lit, (frame, pixel), self.max_bounces);
                 let photograph = &problem.photographs[frame as usize];
-                let corner = Vec2::new(
-                    (pixel % photograph.width) as f32,
-                    (pixel / photograph.width) as f32,
-                );
-                let mut sum = DVec3::ZERO;
-                let mut cast = Cast::default();
-                for sample in 0..self.samples {
-                    let mut stream =
-                        Stream::new(self.seed, u64::from(frame), u64::from(pixel), KEY + sample);
-                    let [dx, dy] = stream.uniform2();
-                    let path = radiance(
-                        lit,
-                        &camera.ray(corner + Vec2::new(dx, dy)),
-                        &mut stream,
-                        &options,
-                    );
-                    sum += path.radiance.as_dvec3();
-                    cast.rays += u64::from(path.rays);
-                    cast.rejected += u64::from(path.rejected);
-                }
                 let measured = photograph.pixels[pixel as usize].as_dvec3();
-                let missing = measured - sum / self.samples as f64;
+                let missing = measured - shown;
                 let at_least = photograph.saturated(pixel as usize);
                 let wrong = DVec3::select(at_least, missing.max(DVec3::ZERO), missing.abs());
                 (wrong.element_sum() / 3.0, cast)
@@ -147,6 +178,40 @@ impl LossProbe {
             .collect();
         let cast = each.iter().map(|e| e.1).sum();
         (each.into_iter().map(|e| e.0).collect(), cast)
+    }
+
+    /// What a pixel of a frame shows by paths of at most so many bounces.
+    fn rendered(
+        &self,
+        problem: &Problem,
+        lit: &Lit,
+        (frame, pixel): (u32, u32),
+        max_bounces: u32,
+    ) -> (DVec3, Cast) {
+        let options = PathOptions {
+            max_bounces,
+            ..Default::default()
+        };
+        let camera = &problem.scene.cameras[frame as usize];
+        let width = problem.photographs[frame as usize].width;
+        let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+        let mut sum = DVec3::ZERO;
+        let mut cast = Cast::default();
+        for sample in 0..self.samples {
+            let mut stream =
+                Stream::new(self.seed, u64::from(frame), u64::from(pixel), KEY + sample);
+            let [dx, dy] = stream.uniform2();
+            let path = radiance(
+                lit,
+                &camera.ray(corner + Vec2::new(dx, dy)),
+                &mut stream,
+                &options,
+            );
+            sum += path.radiance.as_dvec3();
+            cast.rays += u64::from(path.rays);
+            cast.rejected += u64::from(path.rejected);
+        }
+        (sum / self.samples as f64, cast)
     }
 }
 

@@ -24,6 +24,19 @@ fn the_trade_is_measured_against_the_truth_or_held_out_pixels() {
     fs::remove_file(place.path("room/truth.json")).expect("removed");
     assert_eq!(measured("1s", "without")["measure"], "held_out");
 
+    let around = ["trade", "room", "--around", "preview", "--time", "1s"];
+    done(&place.relit(&[&around[..], &["--out", "around"]].concat()));
+    let text = fs::read_to_string(place.path("around/trade.json")).expect("written");
+    let trade: Value = serde_json::from_str(&text).expect("JSON");
+    let curves = trade["curves"].as_array().expect("curves");
+    let name = |curve: &Value| curve["name"].as_str().map(|n| n.starts_with("preview"));
+    assert!(curves.len() > 1 && curves.iter().all(|c| name(c) == Some(true)));
+
+    refused(
+        &place.relit(&["trade", "room", "--around", "best", "--time", "1s"]),
+        2,
+        &["--around"],
+    );
     refused(
         &place.relit(&["trade", "room", "--time", "0"]),
         2,

@@ -136,25 +136,19 @@ fn frame(
     let lens = camera(values, [shared, fields], [header.width, header.height])?;
 
     let place = fields.place("transform_matrix");
-    let refuse = |problem: String| {
-        Error::new(
-            &place,
-            format!("the matrix {problem}"),
-            "give the camera-to-world rotation and position",
-        )
-    };
+    let refuse = |problem: &str| pose::refused(&place, problem);
     let rows = fields
         .matrix("transform_matrix")?
         .as_deref()
         .and_then(rows_of)
-        .ok_or_else(|| refuse("is no 3×4 or 4×4 matrix".into()))?;
+        .ok_or_else(|| refuse("is no 3×4 or 4×4 matrix"))?;
     let rows = *back * rows;
     if !rows.is_finite() {
         return Ok(None);
     }
     let row = |r: DVec4| r.to_array().to_vec();
     let rows: Vec<Vec<f64>> = (0..3).map(|i| row(rows.row(i))).collect();
-    let (pose, _) = pose::from_rows(&rows).map_err(refuse)?;
+    let (pose, _) = pose::from_rows(&rows).map_err(|problem| refuse(&problem))?;
 
     let mask = match fields.text("mask_path")? {
         Some(mask) => Some(folder.file(&fields.place("mask_path"), mask)?),

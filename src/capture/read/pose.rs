@@ -20,14 +20,17 @@ pub fn of_frame(fields: &Fields) -> error::Result<(Pose, Option<String>)> {
     let rows = fields
         .matrix(NAME)?
         .ok_or_else(|| Error::new(&place, "is absent", "add the camera-to-world matrix"))?;
-    let (pose, remark) = from_rows(&rows).map_err(|problem| {
-        Error::new(
-            &place,
-            format!("the matrix {problem}"),
-            "give the camera-to-world rotation and position",
-        )
-    })?;
+    let (pose, remark) = from_rows(&rows).map_err(|problem| refused(&place, &problem))?;
     Ok((pose, remark.map(|remark| format!("{NAME} {remark}"))))
+}
+
+/// What is said of a matrix at a place in a file that is no pose, for the reason that [`from_rows`] gives.
+pub fn refused(place: &str, problem: &str) -> Error {
+    Error::new(
+        place,
+        format!("the matrix {problem}"),
+        "give the camera-to-world rotation and position",
+    )
 }
 
 /// The rigid pose nearest to a 3×4 or 4×4 row-major matrix, and a remark where that changed more than rounding.

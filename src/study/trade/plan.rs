@@ -80,6 +80,16 @@ pub fn everything(base: &Settings) -> Vec<Run> {
     runs
 }
 
+/// The preset of a word and its variations alone, each with as much of the time: what the preset's own settings are chosen by.
+pub fn around(word: &str, base: &Settings) -> Vec<Run> {
+    let mut runs = everything(base);
+    runs.retain(|run| run.settings.preset.word() == word);
+    for run in &mut runs {
+        run.weight = 1.0;
+    }
+    runs
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -104,5 +114,18 @@ mod tests {
                 .count();
             assert_eq!(changed, usize::from(!run.is_preset), "{}", run.name);
         }
+    }
+    #[test]
+    fn around_a_preset_are_it_and_its_variations_with_equal_shares() {
+        let base = Settings::default();
+        let runs = around("preview", &base);
+        assert!(runs[0].is_preset && runs.len() > 1);
+        for run in &runs {
+            assert_eq!((run.settings.preset, run.weight), (Preset::Preview, 1.0));
+        }
+        let all: usize = (Preset::WORDS.iter())
+            .map(|word| around(word, &base).len())
+            .sum();
+        assert_eq!(all, everything(&base).len());
     }
 }

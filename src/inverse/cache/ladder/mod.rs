@@ -1,5 +1,6 @@
 //! The transport-cache solver: a light-field start, then rounds of full paths until the errors are small enough.
 
+mod depth;
 mod detail;
 mod known;
 mod lamps;
@@ -205,6 +206,7 @@ impl Ladder<'_, '_> {
         }
         if self.stages < 2 {
             self.objects()?;
+            self.tell_depth();
             self.reached(2);
             self.tell()?;
         }
