@@ -110,15 +110,15 @@ fn the_papers_descent_goes_on_from_any_checkpoint() {
 
 #[test]
 fn the_transport_cache_goes_on_from_the_last_finished_stage() {
-    // Exposures, light field, objects and lobes come first; one round of the refinement is enough to tell.
+    // Exposures, light field, objects with their depth, and lobes come first; one round of the refinement is enough to tell.
     let refining = |progress: &Progress| {
         let before = progress.stages.last().map_or(0, |stage| stage.iterations);
-        progress.stages.len() == 4 && progress.iterations > before
+        progress.stages.len() == 5 && progress.iterations > before
     };
     let settings = Settings::default();
     let (whole, kept) = run(&settings, None, refining);
     assert_eq!(whole.termination, Termination::Cancelled);
-    for stages in [2, 3, 4] {
+    for stages in [2, 4, 5] {
         let checkpoint = kept
             .iter()
             .find(|c| c.progress.stages.len() == stages)
