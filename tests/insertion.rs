@@ -5,6 +5,7 @@ use relit::capture::camera::{Intrinsics, Pose};
 use relit::capture::exposure::{Exposure, Vignetting};
 use relit::capture::mesh::Mesh;
 use relit::capture::photograph::{Encoding, Photograph, PhotographSource};
+use relit::capture::response::Response;
 use relit::capture::{Capture, Frame};
 use relit::compose::backdrop::Backdrop;
 use relit::compose::insert::Insertion;
@@ -390,6 +391,32 @@ fn an_object_in_the_corner_is_dimmed_as_the_photograph_is() {
     let middle = (SIDE * SIDE / 2 + SIDE / 2) as usize;
     let middle = backdrop.blend(middle, 1.0, Vec3::ONE, Vec3::ZERO);
     assert!((middle - 1.0).abs().max_element() < 1e-2, "{middle}");
+}
+
+/// Through a camera's curve light is added, not values.
+#[test]
+fn light_is_composed_on_the_sensor_and_shown_through_the_cameras_curve() {
+    let (capture, lit) = lamp_room();
+    let mut backdrop = backdrop(&capture, &lit);
+    let curve = Response {
+        terms: [0.2, 0.6, -0.4].map(Vec3::splat),
+    };
+    backdrop.saturation = Vec3::ONE;
+    backdrop.exposure.response = Some(curve);
+    let shown = |light: f32| curve.value(Vec3::splat(light), Vec3::ONE);
+    backdrop.photograph = Arc::new(Picture::from_fn(SIDE, SIDE, |_, _| shown(0.4)));
+    // The surface hides a share of the pixel, and takes a tenth of the light that shines past it.
+    for (alpha, over, under, want) in [
+        (1.0, 0.3, 0.4, 0.3),
+        (0.0, 0.3, 0.4, 0.3),
+        (0.5, 0.3, 0.4, 0.3),
+        (0.25, 0.8, 0.9, 0.425),
+        (1.0, 9.0, 0.4, 9.0),
+    ] {
+        let got = backdrop.blend(1, alpha, Vec3::splat(over), Vec3::splat(under));
+        let want = shown(want).min(Vec3::ONE);
+        assert!((got - want).abs().max_element() < 1e-5, "{got} {want}");
+    }
 }
 
 #[test]

@@ -4,9 +4,12 @@ mod scenes;
 
 use glam::{DVec3, Vec3};
 use relit::capture::exposure::{Exposure, Vignetting};
+use relit::capture::photograph::{Encoding, Photograph};
 use relit::inverse::estimate::Estimate;
 use relit::inverse::settings::{Preset, Settings};
 use relit::inverse::solver::{Control, Observer, Problem, Progress, Solution, Termination, solve};
+use relit::math::color::{linear_to_srgb, srgb_to_linear};
+use relit::math::stats::quantile;
 use relit::transport::material::Material;
 use scenes::albedo;
 use std::sync::{Arc, LazyLock};
@@ -433,7 +436,7 @@ fn exposures_that_differ_are_found_and_cost_no_accuracy() {
     };
     let automatic = exposed(|frame| Exposure {
         factor: factor(frame),
-        vignetting: None,
+        ..Exposure::default()
     });
     let solution = run(&automatic, &preset(Preset::Preview));
     let stage = solution.progress.stages.first().expect("stages");
@@ -464,8 +467,8 @@ fn a_lens_that_dims_its_corners_is_found_and_costs_no_accuracy() {
         power: Vec3::splat(8.0),
     };
     let dimmed = exposed(|_| Exposure {
-        factor: Vec3::ONE,
         vignetting: Some(lens),
+        ..Exposure::default()
     });
     let solution = run(&dimmed, &preset(Preset::Preview));
     let found = solution.estimate.vignetting.expect("a lens that dims");
@@ -479,10 +482,69 @@ fn a_lens_that_dims_its_corners_is_found_and_costs_no_accuracy() {
     );
 }
 
+/// A camera of raised contrast, of eight bits, of which the lamp saturates; its files say how each photograph was exposed, as
+/// EXIF records do.
+#[test]
+fn a_camera_that_bends_values_is_found_and_costs_little_accuracy() {
+    let size = [144, 108];
+    let (mesh, materials) = scenes::lamp_room();
+    let capture = scenes::capture(mesh, &scenes::room_views(), size);
+    let linear = scenes::photographed(&capture, &materials, 96, 43);
+    let full = Vec3::splat(brightest_wall(&linear));
+    let photographs = linear.photographs.iter().enumerate();
+    let bent = Problem {
+        photographs: photographs
+            .map(|(frame, photograph)| {
+                let exposure = Vec3::splat(0.5 + 0.2 * frame as f32);
+                let values = photograph
+                    .pixels
+                    .iter()
+                    .map(|radiance| (*radiance * exposure / full).map(contrasty) * full / exposure);
+                Arc::new(Photograph {
+                    encoding: Encoding::Srgb8,
+                    saturation: full / exposure,
+                    ..scenes::photograph(size, values.collect())
+                })
+            })
+            .collect(),
+        scene: linear.scene.clone(),
+    };
+    let settings = preset(Preset::Preview);
+    let solution = run(&bent, &settings);
+    let stage = solution.progress.stages.first().expect("stages");
+    assert!(solution.estimate.response.is_some(), "{}", stage.why);
+    let without = run(
+        &bent,
+        &Settings {
+            exposures: false,
+            ..settings.clone()
+        },
+    );
+    let [fixed, with, without] = [run(&linear, &settings), solution, without]
+        .map(|solution| mean_absolute_error(&solution.estimate, &materials));
+    println!("{fixed} {with} {without}");
+    assert!(with < fixed + 0.02 && without > 2.0 * with);
+}
+
+/// Radiance that one pixel in twenty exceeds.
+fn brightest_wall(problem: &Problem) -> f32 {
+    let pixels = problem.photographs.iter().flat_map(|p| &p.pixels);
+    let mut all: Vec<f64> = pixels.map(|p| f64::from(p.max_element())).collect();
+    quantile(&mut all, 0.95).expect("pixels") as f32
+}
+
+/// What a file of eight bits, read as sRGB, shows of light: darker shadows and brighter highlights.
+fn contrasty(light: f32) -> f32 {
+    let straight = linear_to_srgb(light.min(1.0));
+    let steep = straight * straight * (3.0 - 2.0 * straight);
+    srgb_to_linear(((straight + steep) * 0.5 * 255.0).round() / 255.0)
+}
+
 #[test]
 fn photographs_that_agree_keep_their_exposure() {
     assert_eq!(PREVIEW.estimate.exposures, None);
     assert_eq!(PREVIEW.estimate.vignetting, None);
+    assert_eq!(PREVIEW.estimate.response, None);
     let stage = PREVIEW
         .progress
         .stages

@@ -1,8 +1,11 @@
-//! How radiance becomes the values of a photograph: exposure, white balance, and a lens that dims towards the corners.
+//! How radiance becomes the values of a photograph: exposure, white balance, a lens that dims towards the corners, and the camera's
+//! response.
 
 use crate::capture::camera::Intrinsics;
+use crate::capture::response::Response;
 use crate::math::picture::Picture;
 use glam::{DVec2, Vec3};
+use rayon::prelude::*;
 
 /// How a lens dims what lies off its axis: by a power of the angle's cosine.
 ///
@@ -28,13 +31,15 @@ impl Vignetting {
     }
 }
 
-/// What radiance is multiplied by to become the values of one photograph.
+/// What radiance goes through to become the values of one photograph.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Exposure {
     /// Exposure and white balance: the factor on the lens's axis, per channel.
     pub factor: Vec3,
     /// How it falls off from there; `None` where it does not.
     pub vignetting: Option<Vignetting>,
+    /// How values follow the light that comes of both; `None` where they are that light.
+    pub response: Option<Response>,
 }
 
 impl Default for Exposure {
@@ -43,13 +48,14 @@ impl Default for Exposure {
         Self {
             factor: Vec3::ONE,
             vignetting: None,
+            response: None,
         }
     }
 }
 
 impl Exposure {
-    /// The factor in the middle of a pixel, counted row by row from the top left, of a picture through the lens, which may be
-    /// larger or smaller than the lens says.
+    /// The factor from radiance to light on the sensor in the middle of a pixel, counted row by row from the top left, of a picture
+    /// through the lens, which may be larger or smaller than the lens says.
     pub fn at(&self, lens: &Intrinsics, [width, height]: [u32; 2], pixel: usize) -> Vec3 {
         let Some(vignetting) = &self.vignetting else {
             return self.factor;
@@ -61,12 +67,32 @@ impl Exposure {
         self.factor * vignetting.factor(lens, middle * DVec2::new(across, down))
     }
 
-    /// Turns radiance into values, in place.
-    pub fn apply(&self, lens: &Intrinsics, picture: &mut Picture) {
-        let size = [picture.width, picture.height];
-        for (pixel, value) in picture.pixels.iter_mut().enumerate() {
-            *value *= self.at(lens, size, pixel);
+    /// The light on the sensor that shows as a value of a photograph that saturates at `saturation`, in its units.
+    pub fn light(&self, value: Vec3, saturation: Vec3) -> Vec3 {
+        match &self.response {
+            Some(response) => response.light(value, saturation),
+            None => value,
         }
+    }
+
+    /// The value that light on the sensor shows as: the inverse of [`Exposure::light`].
+    pub fn value(&self, light: Vec3, saturation: Vec3) -> Vec3 {
+        match &self.response {
+            Some(response) => response.value(light, saturation),
+            None => light,
+        }
+    }
+
+    /// Turns radiance into the values of a photograph that saturates at `saturation`, in place.
+    pub fn apply(&self, lens: &Intrinsics, saturation: Vec3, picture: &mut Picture) {
+        let size = [picture.width, picture.height];
+        picture
+            .pixels
+            .par_iter_mut()
+            .enumerate()
+            .for_each(|(pixel, value)| {
+                *value = self.value(*value * self.at(lens, size, pixel), saturation);
+            });
     }
 }
 
@@ -105,6 +131,7 @@ mod tests {
             vignetting: Some(Vignetting {
                 power: Vec3::splat(4.0),
             }),
+            response: None,
         };
         // Four pixels of the large picture around the middle of one of the small.
         let large = |x: usize, y: usize| exposure.at(&LENS, [80, 60], y * 80 + x);

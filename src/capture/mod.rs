@@ -11,6 +11,7 @@ pub mod photograph;
 pub mod place;
 pub mod read;
 pub mod regroup;
+pub mod response;
 pub mod segment;
 pub mod truth;
 pub mod working;

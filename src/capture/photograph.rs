@@ -39,7 +39,7 @@ pub struct Photograph {
 }
 
 /// Pixels above this share of saturation may have been brighter than they show.
-const BELOW_SATURATION: f32 = 0.97;
+pub const BELOW_SATURATION: f32 = 0.97;
 
 impl Photograph {
     /// The channels in which a pixel may have been brighter than it shows: its value there is a lower bound.

@@ -131,7 +131,7 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
             };
             if saturation.is_finite() {
                 let exposure = estimate.exposure(frame as usize);
-                exposure.apply(&camera.intrinsics, &mut picture);
+                exposure.apply(&camera.intrinsics, saturation, &mut picture);
             }
             write_png(
                 &arguments.out,

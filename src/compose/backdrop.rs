@@ -21,7 +21,7 @@ pub struct Backdrop {
     pub camera: Camera,
     /// The photograph's values, linear.
     pub photograph: Arc<Picture>,
-    /// From the estimate's radiance to the photograph's values.
+    /// From the estimate's radiance to light on the sensor and to the photograph's values.
     pub exposure: Exposure,
     /// The value at which each channel of the photograph saturates; infinite for linear files.
     pub saturation: Vec3,
@@ -82,10 +82,21 @@ impl Backdrop {
         })
     }
 
-    /// The factor from radiance to the photograph's value at a pixel.
+    /// The factor from radiance to light on the sensor at a pixel.
     pub fn exposure_at(&self, pixel: usize) -> Vec3 {
         let size = [self.photograph.width, self.photograph.height];
         self.exposure.at(&self.camera.intrinsics, size, pixel)
+    }
+
+    /// The light on the sensor that the photograph shows at a pixel.
+    pub fn light(&self, pixel: usize) -> Vec3 {
+        self.exposure
+            .light(self.photograph.pixels[pixel], self.saturation)
+    }
+
+    /// What light on the sensor shows as.
+    pub fn value(&self, light: Vec3) -> Vec3 {
+        self.exposure.value(light, self.saturation)
     }
 
     /// The photograph with surfaces over a share of its pixels, by the radiance with and without them; as soft and as grainy as it
@@ -122,7 +133,7 @@ impl Backdrop {
                 return self.photograph.pixels[pixel];
             }
             let behind = self.behind(pixel, layers[pixel].under * self.exposure_at(pixel));
-            let exact = cover + behind * (1.0 - alpha) + change;
+            let exact = self.value(cover + behind * (1.0 - alpha) + change);
             let place = [self.frame, pixel as u64];
             let grain = self.finish.grain(place, luminance(exact), alpha);
             (exact + grain).clamp(Vec3::ZERO, self.saturation)
@@ -138,15 +149,15 @@ impl Backdrop {
         }
     }
 
-    /// The photograph at a pixel; a channel that is saturated was at least as bright as the estimate says.
+    /// The light that the photograph shows at a pixel; a channel that is saturated was at least as bright as the estimate says.
     fn behind(&self, pixel: usize, under: Vec3) -> Vec3 {
-        let photograph = self.photograph.pixels[pixel];
-        let saturated = photograph.cmpge(self.saturation);
-        Vec3::select(saturated, photograph.max(under), photograph)
+        let saturated = self.photograph.pixels[pixel].cmpge(self.saturation);
+        let light = self.light(pixel);
+        Vec3::select(saturated, light.max(under), light)
     }
 
-    /// The pixel with a surface over `alpha` of it: α · over + (1 − α) · (photograph + over − under), where `over` and
-    /// `under` are radiances with and without.
+    /// The pixel with a surface over `alpha` of it: α · over + (1 − α) · (photograph + over − under), in light on the sensor, where
+    /// `over` and `under` are radiances with and without.
     ///
     /// A channel that is saturated in the photograph was at least as bright as the estimate says, and a saturating
     /// photograph's composite saturates with it.
@@ -154,10 +165,11 @@ impl Backdrop {
         let exposure = self.exposure_at(pixel);
         let (over, under) = (over * exposure, under * exposure);
         let behind = self.behind(pixel, under);
+        let light = over * alpha + (behind + over - under) * (1.0 - alpha);
         if !self.saturation.is_finite() {
-            return over * alpha + (behind + over - under) * (1.0 - alpha);
+            return light;
         }
-        (over * alpha + (behind + over - under) * (1.0 - alpha)).clamp(Vec3::ZERO, self.saturation)
+        self.value(light).clamp(Vec3::ZERO, self.saturation)
     }
 }
 

@@ -164,8 +164,13 @@ impl Pasted {
             let cells = (GRID * GRID) as f32;
             let size = [backdrop.photograph.width, backdrop.photograph.height];
             (covered > 0).then(|| {
-                let light = sum * exposure.at(lens, size, pixel);
-                (pixel, light / cells, covered as f32 / cells)
+                let light = sum / covered as f32 * exposure.at(lens, size, pixel);
+                let alpha = covered as f32 / cells;
+                (
+                    pixel,
+                    exposure.value(light, backdrop.saturation) * alpha,
+                    alpha,
+                )
             })
         };
         Self {

@@ -30,20 +30,21 @@ pub fn relit(backdrop: &Backdrop, before: &[Vec3], after: &[Vec3]) -> Picture {
             .map(|(pixel, ((photograph, before), after))| {
                 let exposure = backdrop.exposure_at(pixel);
                 let (before, after) = (*before * exposure, *after * exposure);
-                let channel =
-                    |c: usize| changed(photograph[c], before[c], after[c], backdrop.saturation[c]);
-                Vec3::new(channel(0), channel(1), channel(2))
+                let light = backdrop.light(pixel);
+                let saturated = photograph.cmpge(backdrop.saturation);
+                let channel = |c: usize| changed(light[c], before[c], after[c], saturated.test(c));
+                let relit = Vec3::new(channel(0), channel(1), channel(2));
+                let value = backdrop.value(relit).clamp(Vec3::ZERO, backdrop.saturation);
+                Vec3::select(before.cmpeq(after), *photograph, value)
             })
             .collect(),
         ..**photograph
     }
 }
 
-fn changed(photograph: f32, before: f32, after: f32, saturation: f32) -> f32 {
-    if before == after {
-        return photograph;
-    }
-    let seen = if photograph >= saturation {
+/// The light in a channel of the photograph, from two renders of it.
+fn changed(photograph: f32, before: f32, after: f32, saturated: bool) -> f32 {
+    let seen = if saturated {
         photograph.max(before)
     } else {
         photograph
@@ -53,7 +54,7 @@ fn changed(photograph: f32, before: f32, after: f32, saturation: f32) -> f32 {
     } else {
         1.0
     };
-    (seen * ratio + (after - before * ratio).max(0.0)).clamp(0.0, saturation)
+    seen * ratio + (after - before * ratio).max(0.0)
 }
 
 /// A photograph on its way from one light into another, a band of rows at a time.
@@ -165,23 +166,78 @@ impl Relighting {
 mod tests {
     use super::*;
 
+    use crate::capture::camera::{Intrinsics, Pose};
+    use crate::capture::exposure::Exposure;
+    use crate::capture::response::Response;
+    use crate::compose::finish::Finish;
+    use crate::scene::camera::Camera;
+    use glam::{DMat3, DVec3};
+
+    /// One pixel of a photograph that saturates at a value, from one light into another.
+    fn pixel(photograph: f32, before: f32, after: f32, saturation: f32) -> f32 {
+        by(Exposure::default(), photograph, before, after, saturation)
+    }
+
+    fn by(exposure: Exposure, photograph: f32, before: f32, after: f32, saturation: f32) -> f32 {
+        let intrinsics = Intrinsics {
+            width: 1,
+            height: 1,
+            fx: 1.0,
+            fy: 1.0,
+            cx: 0.5,
+            cy: 0.5,
+            distortion: [0.0; 4],
+        };
+        let pose = Pose {
+            rotation: DMat3::IDENTITY,
+            center: DVec3::ZERO,
+        };
+        let backdrop = Backdrop {
+            frame: 0,
+            camera: Camera::new(&intrinsics, &pose, DVec3::ZERO),
+            photograph: Arc::new(Picture::from_fn(1, 1, |_, _| Vec3::splat(photograph))),
+            exposure,
+            saturation: Vec3::splat(saturation),
+            finish: Finish::default(),
+            shown_at: 1.0,
+        };
+        let picture = relit(&backdrop, &[Vec3::splat(before)], &[Vec3::splat(after)]);
+        picture.pixels[0].y
+    }
+
     #[test]
     fn light_is_multiplied_added_where_it_was_dark_and_left_where_nothing_changes() {
         let linear = f32::INFINITY;
-        assert_eq!(changed(0.3, 0.2, 0.2, linear), 0.3);
+        assert_eq!(pixel(0.3, 0.2, 0.2, linear), 0.3);
         // Detail that the estimate misses keeps its contrast.
-        assert!((changed(0.3, 0.2, 0.1, linear) - 0.15).abs() < 1e-7);
-        assert!((changed(0.3, 0.2, 0.4, linear) - 0.6).abs() < 1e-7);
-        assert_eq!(changed(0.0, 0.0, 0.7, linear), 0.7);
-        assert_eq!(changed(0.5, 0.5, 0.0, linear), 0.0);
+        assert!((pixel(0.3, 0.2, 0.1, linear) - 0.15).abs() < 1e-7);
+        assert!((pixel(0.3, 0.2, 0.4, linear) - 0.6).abs() < 1e-7);
+        assert_eq!(pixel(0.0, 0.0, 0.7, linear), 0.7);
+        assert_eq!(pixel(0.5, 0.5, 0.0, linear), 0.0);
         // Beyond the greatest ratio the rest is added; a photograph that agrees shows `after` all the same.
-        assert!((changed(0.01, 0.01, 1.0, linear) - 1.0).abs() < 1e-6);
+        assert!((pixel(0.01, 0.01, 1.0, linear) - 1.0).abs() < 1e-6);
     }
 
     #[test]
     fn what_was_saturated_was_brighter_than_it_shows_and_nothing_exceeds_saturation() {
-        assert_eq!(changed(1.0, 8.0, 2.0, 1.0), 1.0);
-        assert!((changed(1.0, 8.0, 0.8, 1.0) - 0.8).abs() < 1e-6);
-        assert_eq!(changed(0.9, 0.5, 5.0, 1.0), 1.0);
+        assert_eq!(pixel(1.0, 8.0, 2.0, 1.0), 1.0);
+        assert!((pixel(1.0, 8.0, 0.8, 1.0) - 0.8).abs() < 1e-6);
+        assert_eq!(pixel(0.9, 0.5, 5.0, 1.0), 1.0);
+    }
+
+    /// Half of the light shows as the camera would have shown it, not as half of the value.
+    #[test]
+    fn light_is_changed_before_the_camera_bends_it() {
+        let exposure = Exposure {
+            response: Some(Response {
+                terms: [0.3, 0.2, -0.3].map(Vec3::splat),
+            }),
+            ..Exposure::default()
+        };
+        let shown = |light: f32| exposure.value(Vec3::splat(light), Vec3::ONE).y;
+        let relit = by(exposure, shown(0.4), 0.5, 0.25, 1.0);
+        assert!((relit - shown(0.2)).abs() < 1e-5, "{relit}");
+        assert!((relit / shown(0.4) - 0.5).abs() > 0.05);
+        assert_eq!(by(exposure, shown(0.4), 0.5, 0.5, 1.0), shown(0.4));
     }
 }

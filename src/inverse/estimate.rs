@@ -1,6 +1,7 @@
 //! What comes out: emission, materials, outside light, exposures, each with a confidence.
 
 use crate::capture::exposure::{Exposure, Vignetting};
+use crate::capture::response::Response;
 use crate::math::nullable;
 use crate::math::stats::quantile;
 use crate::scene::Scene;
@@ -29,6 +30,8 @@ pub struct Estimate {
     pub exposures: Option<Vec<Vec3>>,
     /// How the lens dims the corners of all frames, where that was found.
     pub vignetting: Option<Vignetting>,
+    /// How the camera's values follow the light, where that was found not to be the files' own curve.
+    pub response: Option<Response>,
 }
 
 /// What is known of one object; also its entry in `estimate.json` and `report.json`, where what is no number is `null`.
@@ -184,12 +187,14 @@ impl Estimate {
         quantile(&mut relative, 0.5)
     }
 
-    /// What turns radiance into a frame's values: what was estimated of exposure, white balance and vignetting.
+    /// What turns radiance into a frame's values: what was estimated of exposure, white balance, vignetting and
+    /// response.
     pub fn exposure(&self, frame: usize) -> Exposure {
         let factor = self.exposures.as_ref().and_then(|e| e.get(frame));
         Exposure {
             factor: factor.copied().unwrap_or(Vec3::ONE),
             vignetting: self.vignetting,
+            response: self.response,
         }
     }
 

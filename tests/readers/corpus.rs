@@ -266,6 +266,25 @@ fn results_name_no_files_elsewhere_and_nothing_impossible() {
         let error = relit::session::save::load(folder.path()).unwrap_err();
         assert!(error.place.ends_with(field), "{field}: {error}");
     }
+    let bent = |a: f32| serde_json::json!([[a, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]);
+    for (field, value) in [
+        ("exposures", serde_json::json!([[0.0, 1.0, 1.0]])),
+        ("vignetting", serde_json::json!([1e9, 0.0, 0.0])),
+        ("vignetting", serde_json::json!([null, 0.0, 0.0])),
+        // Values that stand, or fall, as light grows.
+        ("response", bent(-1.0)),
+        ("response", bent(-3.0)),
+    ] {
+        let mut file = sound.clone();
+        file[field] = value;
+        let folder = targets::results_with("estimate.json", file.to_string().as_bytes()).unwrap();
+        let error = relit::session::save::load(folder.path()).unwrap_err();
+        assert!(error.place.ends_with(field), "{field}: {error}");
+    }
+    let mut file = sound.clone();
+    file["response"] = bent(0.2);
+    let folder = targets::results_with("estimate.json", file.to_string().as_bytes()).unwrap();
+    relit::session::save::load(folder.path()).expect("a curve that rises");
 }
 
 /// The greatest resident memory so far, where the system keeps it.

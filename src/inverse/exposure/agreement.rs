@@ -101,6 +101,7 @@ fn exposures(shared: &[Sight], photographs: usize) -> Logarithms {
     let parts = Parts {
         exposures: true,
         vignetting: false,
+        response: false,
     };
     fit(shared, photographs, parts)
 }
@@ -180,6 +181,7 @@ mod tests {
                     cell: cell as u64,
                     level: DVec3::splat(shown + exposure),
                     off_axis: 0.0,
+                    full: DVec3::ZERO,
                 });
             }
         }

@@ -1,32 +1,34 @@
-//! Exposure and white balance of each photograph, and vignetting of all of them, where the photographs disagree about surfaces
-//! that they share.
+//! Exposure and white balance of each photograph, and vignetting and response of all of them, where the photographs disagree
+//! about surfaces that they share.
 //!
 //! What a pixel shows is its surface's radiance times its photograph's exposure, one factor a channel, times what the lens lets
-//! through at its distance from the axis. On surface cells that several photographs see, the logarithms are fitted by least
-//! absolute differences, so that highlights, mis-registration and people decide nothing. One common factor stays open; by
-//! convention the exposures' median is 1 in each channel, and the lens dims nothing on its axis.
+//! through at its distance from the axis, bent by the camera's response. On surface cells that several photographs see, the
+//! logarithms are fitted by least absolute differences of values, so that highlights, mis-registration and people decide
+//! nothing. One common factor stays open; by convention the exposures' median is 1 in each channel, and the lens dims nothing on
+//! its axis. A power of all light stays open too unless the exposures are known: see [`Response`].
 
 mod agreement;
 mod fit;
+mod normal;
 mod sights;
+mod undo;
 
-use crate::capture::exposure::{Exposure, Vignetting};
-use crate::capture::photograph::Photograph;
+use crate::capture::exposure::Vignetting;
+use crate::capture::response::Response;
 use crate::inverse::solver::Problem;
 use crate::math::stats::Moments;
 use crate::scene::camera::Camera;
 pub use agreement::Agreement;
 use fit::{Parts, compare, disagreements, fit};
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 pub use sights::Sights;
 use sights::{Sight, shared};
-use std::sync::Arc;
 
-/// Share of the disagreement on cells left out of the fit that exposures must explain, next to vignetting where that is found.
+/// Share of the disagreement on cells left out of the fit that exposures must explain, next to vignetting and response where
+/// those are found.
 const LEAST_GAIN: f64 = 0.05;
-/// Share of what they leave that vignetting must explain, and by how many standard errors.
-const LEAST_VIGNETTING: f64 = 0.01;
+/// Share of what they leave that vignetting, and then the response, must explain, and by how many standard errors.
+const LEAST_OF_CAMERA: f64 = 0.01;
 const SIGNIFICANT: f64 = 4.0;
 /// Photographs whose focal lengths, in widths of their pictures, differ by more were not taken through one lens.
 const ONE_LENS: f64 = 0.05;
@@ -40,10 +42,14 @@ pub struct Exposures {
     pub differ: bool,
     /// How all photographs dim towards their corners, where that explains enough of the rest.
     pub vignetting: Option<Vignetting>,
+    /// How the values of all photographs follow the light, where that explains enough of what is left then.
+    pub response: Option<Response>,
     /// Share of the disagreement, on surfaces left out of the fit, that exposures explain.
     pub gain: f64,
     /// Share of what exposures leave of it that vignetting explains.
     pub vignetting_gain: f64,
+    /// Share of what both leave that the response explains.
+    pub response_gain: f64,
 }
 
 impl Exposures {
@@ -52,10 +58,15 @@ impl Exposures {
     /// that it can test more than that.
     pub fn new(problem: &Problem, sights: &Sights) -> Option<Self> {
         let one_lens = one_lens(&problem.scene.cameras);
-        Self::of(sights, problem.photographs.len(), one_lens)
+        let files_bend = (problem.photographs.iter()).all(|p| p.saturation.is_finite());
+        let camera = Shared {
+            one_lens,
+            may_bend: one_lens && files_bend,
+        };
+        Self::of(sights, problem.photographs.len(), camera)
     }
 
-    fn of(sights: &Sights, photographs: usize, one_lens: bool) -> Option<Self> {
+    fn of(sights: &Sights, photographs: usize, camera: Shared) -> Option<Self> {
         let shared = shared(&sights.fitted);
         // What is found on one half of the cells is tried on the other.
         let (fitted, tested): (Vec<Sight>, Vec<Sight>) =
@@ -63,29 +74,47 @@ impl Exposures {
         if tested.is_empty() {
             return None;
         }
-        let with = |exposures, vignetting| {
+        let with = |exposures, vignetting, response| {
             let parts = Parts {
                 exposures,
                 vignetting,
+                response,
             };
             let found = fit(&fitted, photographs, parts);
             (disagreements(&tested, &found), found)
         };
-        let [(exposed, _), (both, found)] = [with(true, false), with(true, true)];
+        let is_needed = |before: &[f64], after: &[f64]| {
+            explained(before, after) > LEAST_OF_CAMERA && is_significant(before, after)
+        };
+        let [(exposed, _), (both, found)] =
+            [false, true].map(|vignetting| with(true, vignetting, false));
         let vignetting_gain = explained(&exposed, &both);
-        let dims = one_lens
-            && found.power.min_element() > 0.0
-            && vignetting_gain > LEAST_VIGNETTING
-            && is_significant(&exposed, &both);
-        let gain = if dims {
-            explained(&with(false, true).0, &both)
-        } else {
-            explained(&with(false, false).0, &exposed)
-        };
-        let parts = Parts {
-            exposures: gain > LEAST_GAIN,
+        let dims = camera.one_lens && found.power.min_element() > 0.0 && is_needed(&exposed, &both);
+        let exposed = if dims { both } else { exposed };
+        let alone = with(false, dims, false).0;
+
+        // A response beside the exposures, or in their place: known exposures and a power look like others.
+        let mut parts = Parts {
+            exposures: false,
             vignetting: dims,
+            response: false,
         };
+        let mut gain = explained(&alone, &exposed);
+        let mut response_gain = 0.0;
+        if camera.may_bend {
+            let [bent, both] = [false, true].map(|exposures| with(exposures, dims, true).0);
+            let beside = explained(&bent, &both) > LEAST_GAIN;
+            let [before, after] = match beside {
+                true => [&exposed, &both],
+                false => [&alone, &bent],
+            };
+            response_gain = explained(before, after);
+            parts.response = is_needed(before, after);
+            if parts.response {
+                gain = explained(&bent, &both);
+            }
+        }
+        parts.exposures = gain > LEAST_GAIN;
 
         let mut found = fit(&shared, photographs, parts);
         if parts.exposures {
@@ -98,14 +127,16 @@ impl Exposures {
             vignetting: dims.then(|| Vignetting {
                 power: found.power.as_vec3(),
             }),
+            response: found.response,
             gain,
             vignetting_gain,
+            response_gain,
         })
     }
 
     /// Whether there is anything to undo.
     pub fn needed(&self) -> bool {
-        self.differ || self.vignetting.is_some()
+        self.differ || self.vignetting.is_some() || self.response.is_some()
     }
 
     /// The largest and the least factor, of the mean over channels.
@@ -115,43 +146,15 @@ impl Exposures {
             (low.min(m), high.max(m))
         })
     }
+}
 
-    /// The problem as photographs of equal exposure, taken by a lens that dims nothing, show it.
-    pub fn undone(&self, problem: &Problem) -> Problem {
-        let cameras = &problem.scene.cameras;
-        let photographs = (problem.photographs.par_iter().zip(cameras))
-            .zip(&self.factors)
-            .map(|((photograph, camera), factor)| {
-                let exposure = Exposure {
-                    factor: *factor,
-                    vignetting: self.vignetting,
-                };
-                let size = [photograph.width, photograph.height];
-                let factors: Vec<Vec3> = (0..photograph.pixels.len())
-                    .map(|pixel| exposure.at(&camera.intrinsics, size, pixel))
-                    .collect();
-                let varies = self.vignetting.is_some() && photograph.saturation.is_finite();
-                let limits = match varies || !photograph.limits.is_empty() {
-                    true => (factors.iter().enumerate())
-                        .map(|(pixel, factor)| photograph.limit(pixel) / *factor)
-                        .collect(),
-                    false => Vec::new(),
-                };
-                let pixels = photograph.pixels.iter().zip(&factors);
-                Arc::new(Photograph {
-                    pixels: pixels.map(|(value, factor)| *value / *factor).collect(),
-                    saturation: photograph.saturation / *factor,
-                    limits,
-                    usable: photograph.usable.clone(),
-                    ..**photograph
-                })
-            })
-            .collect();
-        Problem {
-            photographs,
-            ..problem.clone()
-        }
-    }
+/// What all photographs may have in common.
+#[derive(Debug, Clone, Copy)]
+struct Shared {
+    /// They may have been taken through one lens.
+    one_lens: bool,
+    /// All of them saturate, so that a camera may have bent them alike.
+    may_bend: bool,
 }
 
 /// Whether all photographs may have been taken through one lens.
@@ -193,6 +196,11 @@ mod tests {
     const EXPOSURES: Parts = Parts {
         exposures: true,
         vignetting: false,
+        response: false,
+    };
+    const LENS: Shared = Shared {
+        one_lens: true,
+        may_bend: false,
     };
 
     fn sight(frame: usize, cell: usize, level: f64) -> Sight {
@@ -201,6 +209,7 @@ mod tests {
             cell: cell as u64,
             level: DVec3::splat(level),
             off_axis: 0.0,
+            full: DVec3::ZERO,
         }
     }
 
@@ -220,6 +229,7 @@ mod tests {
                             cell,
                             level: level + *exposure + DVec3::splat(error),
                             off_axis: -0.3 * f64::from(stream.uniform()),
+                            full: DVec3::ZERO,
                         });
                     }
                 }
@@ -294,7 +304,7 @@ mod tests {
             held_out: Vec::new(),
         };
         let [with, without] =
-            [with, without].map(|s| Exposures::of(&s, 4, true).expect("cells are shared"));
+            [with, without].map(|s| Exposures::of(&s, 4, LENS).expect("cells are shared"));
         let of_fitted = |e: &Exposures| [e.factors[0], e.factors[1], e.factors[3]];
         assert_eq!(of_fitted(&with), of_fitted(&without));
         assert_eq!((with.gain, with.differ), (without.gain, without.differ));
@@ -321,7 +331,7 @@ mod tests {
         let exposures = [0.5, 0.0, -0.4, 0.9].map(DVec3::splat);
         let power = DVec3::new(1.0, 2.0, 4.0);
         let sights = dimmed(&exposures, power);
-        let found = Exposures::of(&sights, 4, true).expect("cells are shared");
+        let found = Exposures::of(&sights, 4, LENS).expect("cells are shared");
         assert!(found.differ);
         let vignetting = found.vignetting.expect("a lens that dims");
         let off = vignetting.power.as_dvec3() - power;
@@ -331,14 +341,18 @@ mod tests {
             let off = found.as_dvec3().map(f64::ln) - *truth;
             assert!(off.abs().max_element() < 0.03, "{off}");
         }
-        let other_lenses = Exposures::of(&sights, 4, false).expect("cells are shared");
+        const DIFFERENT: Shared = Shared {
+            one_lens: false,
+            may_bend: false,
+        };
+        let other_lenses = Exposures::of(&sights, 4, DIFFERENT).expect("cells are shared");
         assert_eq!(other_lenses.vignetting, None);
     }
 
     #[test]
     fn a_lens_that_dims_needs_no_exposures() {
         let sights = dimmed(&[DVec3::ZERO; 4], DVec3::splat(4.0));
-        let found = Exposures::of(&sights, 4, true).expect("cells are shared");
+        let found = Exposures::of(&sights, 4, LENS).expect("cells are shared");
         assert!(found.vignetting.is_some() && !found.differ && found.needed());
         assert_eq!(found.factors, [Vec3::ONE; 4]);
     }
@@ -346,8 +360,111 @@ mod tests {
     #[test]
     fn a_lens_that_brightens_its_corners_is_not_believed() {
         let sights = dimmed(&[DVec3::ZERO; 4], DVec3::splat(-2.0));
-        let found = Exposures::of(&sights, 4, true).expect("cells are shared");
+        let found = Exposures::of(&sights, 4, LENS).expect("cells are shared");
         assert_eq!(found.vignetting, None);
+    }
+
+    const CAMERA: Shared = Shared {
+        one_lens: true,
+        may_bend: true,
+    };
+
+    /// A camera of raised contrast with a shoulder, less of it in one channel.
+    fn contrasty() -> Response {
+        Response {
+            terms: [
+                Vec3::new(-0.4, -0.3, -0.2),
+                Vec3::ZERO,
+                Vec3::new(0.9, 0.7, 0.5),
+            ],
+        }
+    }
+
+    /// What the sights show through a response, of photographs that were divided by the exposures known of them.
+    fn bent(mut sights: Vec<Sight>, response: &Response, known: impl Fn(usize) -> f64) -> Sights {
+        for sight in &mut sights {
+            sight.full = DVec3::splat(3.4 - known(sight.frame));
+            let light = sight.level - sight.full;
+            let value = std::array::from_fn(|c| response.log_value(c, light[c]));
+            sight.level = DVec3::from_array(value) + sight.full;
+        }
+        sights.retain(|sight| (sight.level - sight.full).max_element() < -0.03);
+        Sights {
+            fitted: sights,
+            held_out: Vec::new(),
+        }
+    }
+
+    /// The power by which what is found as light grows with the true light, in one channel, and how far it is from that.
+    fn power_between(found: &Response, truth: &Response, channel: usize) -> (f64, f64) {
+        let lights: Vec<f64> = (0..80).map(|k| -4.0 + 0.05 * f64::from(k)).collect();
+        let told = |light: &f64| found.log_light(channel, truth.log_value(channel, *light))[0];
+        let [x, y] = [
+            lights.clone(),
+            lights.iter().map(told).collect::<Vec<f64>>(),
+        ];
+        let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+        let (mx, my) = (mean(&x), mean(&y));
+        let both: f64 = x.iter().zip(&y).map(|(x, y)| (x - mx) * (y - my)).sum();
+        let power = both / x.iter().map(|x| (x - mx) * (x - mx)).sum::<f64>();
+        let off = (x.iter().zip(&y)).map(|(x, y)| (y - my - power * (x - mx)).abs());
+        (power, off.fold(0.0, f64::max))
+    }
+
+    #[test]
+    fn a_camera_that_bends_values_is_found_up_to_a_power() {
+        let exposures = [0.7, 0.2, 0.0, -0.5, -0.9, 0.4].map(DVec3::splat);
+        let truth = contrasty();
+        let sights = bent(seen(&exposures, 0.1), &truth, |_| 0.0);
+        let found = Exposures::of(&sights, 6, CAMERA).expect("cells are shared");
+        assert!(found.differ && found.vignetting.is_none());
+        let response = found.response.expect("a response");
+        for channel in 0..3 {
+            let (power, off) = power_between(&response, &truth, channel);
+            assert!(off < 0.05, "{channel}: {off} from a power of {power}");
+            // Exposures are of the same power.
+            for (found, truth) in found.factors.iter().zip(&exposures) {
+                let told = f64::from(found[channel]).ln() - power * (truth[channel] - 0.1);
+                assert!(told.abs() < 0.06, "{channel}: {told}");
+            }
+        }
+        // With the files' own curve the light is bent by much more.
+        let none = Response {
+            terms: [Vec3::ZERO; 3],
+        };
+        assert!(power_between(&none, &truth, 0).1 > 0.15);
+    }
+
+    /// Where exposures are known, as of photographs with an EXIF record, the power is found as well, and no exposures.
+    #[test]
+    fn known_exposures_tell_the_power_of_a_camera() {
+        let known = |frame: usize| [0.9, 0.0, -0.8, 0.4][frame];
+        let truth = Response {
+            terms: [Vec3::new(-0.25, -0.2, 0.2), Vec3::ZERO, Vec3::ZERO],
+        };
+        let sights = bent(seen(&[DVec3::ZERO; 4], 0.1), &truth, known);
+        let found = Exposures::of(&sights, 4, CAMERA).expect("cells are shared");
+        assert!(!found.differ && found.needed(), "{}", found.gain);
+        let response = found.response.expect("a response");
+        for channel in 0..3 {
+            let (power, off) = power_between(&response, &truth, channel);
+            assert!((power - 1.0).abs() < 0.03 && off < 0.05, "{power} {off}");
+        }
+    }
+
+    #[test]
+    fn a_camera_that_bends_nothing_is_given_no_response() {
+        let exposures = [0.7, 0.2, -0.5, -0.9].map(DVec3::splat);
+        let straight = Response {
+            terms: [Vec3::ZERO; 3],
+        };
+        let sights = bent(seen(&exposures, 0.2), &straight, |_| 0.0);
+        let found = Exposures::of(&sights, 4, CAMERA).expect("cells are shared");
+        assert!(found.differ && found.response.is_none());
+        // Nor one whose files are linear, or where no two photographs were taken with one camera.
+        let sights = bent(seen(&exposures, 0.1), &contrasty(), |_| 0.0);
+        let found = Exposures::of(&sights, 4, LENS).expect("cells are shared");
+        assert_eq!(found.response, None);
     }
 
     #[test]
@@ -356,9 +473,9 @@ mod tests {
             fitted: seen(&[DVec3::ZERO; 5], 0.2),
             held_out: Vec::new(),
         };
-        let found = Exposures::of(&sights, 5, true).expect("cells are shared");
+        let found = Exposures::of(&sights, 5, LENS).expect("cells are shared");
         assert!(found.gain.abs() < 0.02, "{}", found.gain);
         assert!(!found.needed());
-        assert_eq!(Exposures::of(&Sights::default(), 5, true), None);
+        assert_eq!(Exposures::of(&Sights::default(), 5, LENS), None);
     }
 }

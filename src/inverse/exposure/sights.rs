@@ -22,6 +22,8 @@ pub(super) struct Sight {
     pub level: DVec3,
     /// Where in the photograph, as [`Vignetting::off_axis`].
     pub off_axis: f64,
+    /// The logarithm of the value at which its photograph saturates.
+    pub full: DVec3,
 }
 
 /// What the photographs show of the cells, in order of cells.
@@ -87,6 +89,7 @@ impl Sights {
             cell,
             level: (sum.value / sum.count).map(f64::ln),
             off_axis: sum.off_axis / sum.count,
+            full: (problem.photographs[frame as usize].saturation.as_dvec3()).map(f64::ln),
         };
         let (held_out, fitted) = (sums.into_iter().map(sight)).partition(|s| held_out[s.frame]);
         Self { fitted, held_out }

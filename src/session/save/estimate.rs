@@ -1,6 +1,7 @@
 //! `estimate.json`: everything that later commands need, with the maps beside it.
 
 use crate::capture::exposure::Vignetting;
+use crate::capture::response::{Response, TERMS};
 use crate::error::{Error, Result};
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::inverse::settings::{PARAMETERS, Settings};
@@ -44,6 +45,9 @@ pub struct EstimateFile {
     /// The power of all frames' [`Vignetting`].
     #[serde(default)]
     pub vignetting: Option<Rgb>,
+    /// The terms of the camera's [`Response`].
+    #[serde(default)]
+    pub response: Option<[Rgb; TERMS]>,
     /// What was changed by hand; `objects` and maps hold what was found.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edits: Option<EditsRecord>,
@@ -98,12 +102,13 @@ impl EstimateFile {
                 .as_ref()
                 .map(|exposures| exposures.iter().map(|&e| rgb(e)).collect()),
             vignetting: estimate.vignetting.map(|v| rgb(v.power)),
+            response: estimate.response.map(|r| r.terms.map(rgb)),
             edits: edits.record(&capture.scene),
         };
         Ok((file, bytes))
     }
 
-    /// Refuses files of a later version, and parameters, surfaces and exposures out of their ranges.
+    /// Refuses files of a later version, and parameters, surfaces and what cameras do out of their ranges.
     ///
     /// # Errors
     /// The version is not known, or a value is out of range.
@@ -138,6 +143,13 @@ impl EstimateFile {
         let exposures = self.exposures.iter().flatten().flatten().flatten();
         if !exposures.into_iter().all(|&e| e.is_finite() && e > 0.0) {
             return impossible("exposures");
+        }
+        let most = Vec3::splat(MOST_POWER);
+        if (self.vignetting()).is_some_and(|v| !v.power.abs().cmple(most).all()) {
+            return impossible("vignetting");
+        }
+        if (self.response()).is_some_and(|response| !response.is_possible()) {
+            return impossible("response");
         }
         Ok(())
     }
@@ -199,12 +211,6 @@ impl EstimateFile {
         {
             return Err(misfit("exposures"));
         }
-        let vignetting = self.vignetting.map(|power| Vignetting {
-            power: Vec3::from_array(power.map(|v| v.unwrap_or(f32::NAN))),
-        });
-        if vignetting.is_some_and(|v| !v.power.abs().cmple(Vec3::splat(MOST_POWER)).all()) {
-            return Err(misfit("vignetting"));
-        }
         Ok(Estimate {
             objects,
             texels: maps.texels.clone(),
@@ -215,9 +221,26 @@ impl EstimateFile {
                     .map(|e| Vec3::from_array(e.map(|v| v.unwrap_or(1.0))))
                     .collect()
             }),
-            vignetting,
+            vignetting: self.vignetting(),
+            response: self.response(),
         })
     }
+
+    fn vignetting(&self) -> Option<Vignetting> {
+        self.vignetting.map(|power| Vignetting {
+            power: color(power),
+        })
+    }
+
+    fn response(&self) -> Option<Response> {
+        self.response.map(|terms| Response {
+            terms: terms.map(color),
+        })
+    }
+}
+
+fn color(rgb: Rgb) -> Vec3 {
+    Vec3::from_array(rgb.map(|v| v.unwrap_or(f32::NAN)))
 }
 
 impl CaptureReference {

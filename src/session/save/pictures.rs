@@ -124,7 +124,8 @@ fn frame(
         ..photograph.clone()
     };
     let exposure = estimate.exposure(index);
-    exposure.apply(&camera.intrinsics, &mut render);
+    let saturation = capture.frame(index)?.1.saturation;
+    exposure.apply(&camera.intrinsics, saturation, &mut render);
     let error = Picture {
         pixels: (render.pixels.iter().zip(&photograph.pixels))
             .map(|(r, p)| *r - *p)

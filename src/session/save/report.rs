@@ -1,5 +1,6 @@
 //! `report.json`: what a solve did and found, in numbers.
 
+use crate::capture::response::TERMS;
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::inverse::settings::{Preset, Settings};
 use crate::inverse::solver::{Progress, Stage, Termination};
@@ -52,6 +53,8 @@ pub struct Report {
     pub exposures: Option<Vec<Rgb>>,
     /// The power of the cosine of the angle off the axis by which the lens dims all frames.
     pub vignetting: Option<Rgb>,
+    /// The terms of the camera's [`Response`](crate::capture::response::Response).
+    pub response: Option<[Rgb; TERMS]>,
     /// Samples dropped, by cause.
     pub rejected_samples: BTreeMap<String, u64>,
     /// What a person should know.
@@ -160,6 +163,7 @@ impl Report {
                 .as_ref()
                 .map(|exposures| exposures.iter().map(|&e| rgb(e)).collect()),
             vignetting: estimate.vignetting.map(|v| rgb(v.power)),
+            response: estimate.response.map(|r| r.terms.map(rgb)),
             rejected_samples: progress.rejected.clone(),
             warnings,
         }

@@ -1,5 +1,6 @@
 //! One view being drawn.
 
+use crate::capture::exposure::Exposure;
 use crate::inverse::estimate::Estimate;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
@@ -27,6 +28,8 @@ pub struct Target {
     camera: Camera,
     estimate: Arc<Estimate>,
     photograph: Option<Arc<Picture>>,
+    /// Where the photograph's channels saturate.
+    saturation: Vec3,
     /// The camera of the coarse first picture, until that is drawn.
     coarse: Option<Camera>,
     hits: Option<Hits>,
@@ -71,6 +74,7 @@ impl Target {
             let k = &camera.intrinsics;
             Some(Arc::new(box_filter(&whole, k.width, k.height)))
         });
+        let saturation = frame.and_then(|frame| Some(capture.photographs.get(frame)?.saturation));
         let coarse = camera.shrunk(first_long_side);
         let world = estimate.lit(&scene);
         let split = request.layers.then(|| Arc::new(Split::new(&world)));
@@ -86,6 +90,7 @@ impl Target {
             camera,
             estimate: estimate.clone(),
             photograph,
+            saturation: saturation.unwrap_or(Vec3::INFINITY),
             coarse: Some(coarse),
             hits: None,
             stale: true,
@@ -166,11 +171,11 @@ impl Target {
         self.rendered = Some((picture, 1));
     }
 
-    /// The layers of a render by lamp, in the size and the values of the shown pictures.
+    /// The layers of a render by lamp, in the size of the shown pictures and in light on the sensor.
     fn layers_of(&self, render: &Progressive, camera: &Camera) -> Option<Arc<LightLayers>> {
         let split = render.split()?;
         let pictures = render.layer_pictures(camera).into_iter();
-        let shown = pictures.map(|picture| self.enlarged(self.exposed(picture)));
+        let shown = pictures.map(|picture| self.enlarged(self.on_sensor(picture)));
         Some(Arc::new(LightLayers {
             layers: split.sources().iter().copied().zip(shown).collect(),
             samples: render.samples(),
@@ -187,11 +192,25 @@ impl Target {
     }
 
     /// Radiance in the values of the frame's photograph.
-    fn exposed(&self, mut radiance: Picture) -> Picture {
-        let frame = self.frame;
-        if let Some(frame) = frame {
-            let exposure = self.estimate.exposure(frame);
-            exposure.apply(&self.camera.intrinsics, &mut radiance);
+    fn exposed(&self, radiance: Picture) -> Picture {
+        self.seen_by(
+            self.frame.map(|frame| self.estimate.exposure(frame)),
+            radiance,
+        )
+    }
+
+    /// Radiance as light on the sensor of the frame's camera, in which lamps add up.
+    fn on_sensor(&self, radiance: Picture) -> Picture {
+        let exposure = self.frame.map(|frame| Exposure {
+            response: None,
+            ..self.estimate.exposure(frame)
+        });
+        self.seen_by(exposure, radiance)
+    }
+
+    fn seen_by(&self, exposure: Option<Exposure>, mut radiance: Picture) -> Picture {
+        if let Some(exposure) = exposure {
+            exposure.apply(&self.camera.intrinsics, self.saturation, &mut radiance);
         }
         radiance
     }

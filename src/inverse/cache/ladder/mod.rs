@@ -255,6 +255,19 @@ impl Ladder<'_, '_> {
                 exposures.vignetting_gain * 100.0
             ));
         }
+        if let Some(response) = exposures.response {
+            let [half, full] =
+                [0.5, 1.0].map(|value| response.light(Vec3::splat(value), Vec3::ONE));
+            let of_half = half / full * 100.0;
+            why.push_str(&format!(
+                "; a response other than the files' own curve, by which half of the greatest value is {:.0} %, {:.0} % and {:.0} % of the \
+                 greatest light (red, green, blue), explains {:.0} % of what is left",
+                of_half.x,
+                of_half.y,
+                of_half.z,
+                exposures.response_gain * 100.0
+            ));
+        }
         let stage = Stage {
             name: "exposures".to_owned(),
             seconds: self.monitor.seconds() - started,
@@ -374,6 +387,7 @@ impl Ladder<'_, '_> {
         let exposures = self.exposures.as_ref();
         self.estimate.exposures = (exposures.filter(|e| e.differ)).map(|e| e.factors.clone());
         self.estimate.vignetting = exposures.and_then(|e| e.vignetting);
+        self.estimate.response = exposures.and_then(|e| e.response);
         if let Some(detail) = &self.detail {
             let object_of = &self.problem.scene.object_of;
             let refined = detail.scaled_to(&self.unknowns.albedo, object_of);

@@ -1,0 +1,197 @@
+//! How a camera turns light into the values of its files, where that is not the curve that the files name.
+
+use glam::{DVec3, Vec3};
+
+/// Shapes that a response is made of, as functions of the light's logarithm.
+pub const TERMS: usize = 3;
+/// The least and the greatest slope of a response that can be told from noise.
+const SLOPES: [f64; 2] = [0.1, 10.0];
+/// Steps of the inverse at most, and the change of a logarithm that ends them.
+const STEPS: usize = 60;
+const STANDING: f64 = 1e-10;
+
+/// A camera's response, as the light that its values stand for: the logarithm of light is y + a y + b (√V − 1) + c (V − 1), where
+/// y is the logarithm of the value V. Values, after the file's own curve (sRGB) is undone, and light are shares of those that
+/// saturate.
+///
+/// The first term is a power, the others bend the middle and the highlights; in the dark, and above saturation, a power is left.
+/// Any power of such a curve is one as well. Exposures that are not known leave the power open (Grossberg and Nayar 2003):
+/// then the terms are such that over what the photographs show the logarithm of light grows, on the whole, as the value's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Response {
+    /// a, b and c, each per channel.
+    pub terms: [Vec3; TERMS],
+}
+
+impl Response {
+    /// The shapes at the logarithm of a value, and their slopes.
+    pub fn shapes(log_value: f64) -> [[f64; 2]; TERMS] {
+        let inside = log_value.min(0.0);
+        let beyond = log_value - inside;
+        let root = (0.5 * inside).exp();
+        [
+            [log_value, 1.0],
+            [(0.5 * inside).exp_m1() + 0.5 * beyond, 0.5 * root],
+            [inside.exp_m1() + beyond, root * root],
+        ]
+    }
+
+    /// The logarithm of the light that became a value of a logarithm in a channel, and how it grows with that.
+    pub fn log_light(&self, channel: usize, log_value: f64) -> [f64; 2] {
+        let mut sum = [log_value, 1.0];
+        for (term, shape) in self.terms.iter().zip(Self::shapes(log_value)) {
+            let term = f64::from(term[channel]);
+            sum = [sum[0] + term * shape[0], sum[1] + term * shape[1]];
+        }
+        sum
+    }
+
+    /// The logarithm of the value that light of a logarithm becomes: the inverse of [`Response::log_light`], by Newton's method
+    /// between bounds that close in.
+    pub fn log_value(&self, channel: usize, log_light: f64) -> f64 {
+        let [mut low, mut high] = [f64::NEG_INFINITY, f64::INFINITY];
+        let mut value = log_light;
+        for _ in 0..STEPS {
+            let [light, slope] = self.log_light(channel, value);
+            let over = light - log_light;
+            if over > 0.0 {
+                high = value;
+            } else {
+                low = value;
+            }
+            let mut next = value - over / slope;
+            if !(low..=high).contains(&next) {
+                next = 0.5 * (low + high);
+            }
+            let change = (next - value).abs();
+            value = next;
+            if change < STANDING {
+                break;
+            }
+        }
+        value
+    }
+
+    /// The light of a value, both in the photograph's units, in which it saturates at `saturation`. A photograph that does not
+    /// saturate shows light as it is.
+    pub fn light(&self, value: Vec3, saturation: Vec3) -> Vec3 {
+        each(value, saturation, |channel, log| {
+            self.log_light(channel, log)[0]
+        })
+    }
+
+    /// The value of light: the inverse of [`Response::light`].
+    pub fn value(&self, light: Vec3, saturation: Vec3) -> Vec3 {
+        each(light, saturation, |channel, log| {
+            self.log_value(channel, log)
+        })
+    }
+
+    /// Whether light grows with the values, at slopes that can be told.
+    pub fn is_possible(&self) -> bool {
+        let terms = self.terms.map(Vec3::as_dvec3);
+        let [least, most] = SLOPES.map(DVec3::splat);
+        let slope =
+            |root: DVec3| DVec3::ONE + terms[0] + terms[1] * root * 0.5 + terms[2] * root * root;
+        // A parabola in the root of the value: its slope is extreme at the ends or at its vertex.
+        let vertex = (-terms[1] / (4.0 * terms[2])).map(|root| {
+            if root.is_finite() {
+                root.clamp(0.0, 1.0)
+            } else {
+                0.0
+            }
+        });
+        let possible = |root| slope(root).cmpge(least).all() && slope(root).cmple(most).all();
+        terms.iter().all(|term| term.is_finite())
+            && [DVec3::ZERO, DVec3::ONE, vertex].into_iter().all(possible)
+    }
+}
+
+/// Changes the logarithms of positive colours in the channels that saturate.
+fn each(color: Vec3, saturation: Vec3, change: impl Fn(usize, f64) -> f64) -> Vec3 {
+    Vec3::from_array(std::array::from_fn(|channel| {
+        let full = f64::from(saturation[channel]);
+        let share = f64::from(color[channel]) / full;
+        if full.is_finite() && share > 0.0 {
+            (change(channel, share.ln()).exp() * full) as f32
+        } else {
+            color[channel]
+        }
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A curve of raised contrast, with a shoulder; a power; none.
+    fn bent() -> Response {
+        Response {
+            terms: [
+                Vec3::new(0.35, 0.2, 0.0),
+                Vec3::new(0.4, 0.0, 0.0),
+                Vec3::new(-0.45, 0.0, 0.0),
+            ],
+        }
+    }
+
+    #[test]
+    fn light_and_values_are_told_from_each_other_at_every_level() {
+        let response = bent();
+        assert!(response.is_possible());
+        for full in [1.0, 1e-6, 3e5] {
+            let saturation = Vec3::splat(full);
+            for level in -60..=6 {
+                let light = saturation * (f32::from(level as i8) * 0.25).exp();
+                let value = response.value(light, saturation);
+                let back = response.light(value, saturation);
+                let off = (back / light - Vec3::ONE).abs().max_element();
+                assert!(off < 1e-5, "{full} {level}: {off}");
+                // A power by its definition, and nothing where nothing bends.
+                let power = full * (value.y / full).powf(1.2);
+                assert!((light.y / power - 1.0).abs() < 1e-5);
+                assert!((value.z / light.z - 1.0).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn slopes_are_those_of_finite_differences() {
+        let response = bent();
+        for level in -40..=10 {
+            let at = f64::from(level) * 0.2 + 0.01;
+            let step = 1e-5;
+            let [[above, _], [below, _]] = [at + step, at - step].map(|y| response.log_light(0, y));
+            let slope = response.log_light(0, at)[1];
+            assert!(
+                ((above - below) / (2.0 * step) - slope).abs() < 1e-8,
+                "{at}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_shows_no_light_or_never_saturates_stays() {
+        let response = bent();
+        for color in [Vec3::ZERO, Vec3::new(-0.1, 0.0, 0.0)] {
+            assert_eq!(response.light(color, Vec3::ONE), color);
+            assert_eq!(response.value(color, Vec3::ONE), color);
+        }
+        let radiance = Vec3::new(0.3, 70.0, 1e-5);
+        assert_eq!(response.light(radiance, Vec3::INFINITY), radiance);
+    }
+
+    #[test]
+    fn curves_that_fall_or_stand_or_are_no_numbers_are_not_possible() {
+        let with = |a: f32, b: f32, c: f32| Response {
+            terms: [a, b, c].map(Vec3::splat),
+        };
+        assert!(with(0.0, 0.0, 0.0).is_possible());
+        assert!(!with(-0.95, 0.0, 0.0).is_possible());
+        // It falls in the middle alone, and in the highlights alone.
+        assert!(!with(0.0, -6.0, 2.0).is_possible());
+        assert!(!with(0.0, 0.0, -1.0).is_possible());
+        assert!(!with(f32::NAN, 0.0, 0.0).is_possible());
+        assert!(!with(0.0, 0.0, 10.0).is_possible());
+    }
+}
