@@ -5,6 +5,8 @@ use relit::capture::read::{ReadOptions, read};
 use relit::capture::working::load_working;
 use relit::scene::Scene;
 use relit::scene::prepare::prepare;
+use relit::session::command::{OpenOptions, Source};
+use relit::session::open::open;
 use std::path::PathBuf;
 
 /// The folder of a capture, or a line saying that it is absent.
@@ -54,14 +56,12 @@ fn a_scan_without_objects_is_cut_into_segments_and_reduced_to_a_budget() {
     };
     let capture = read(&folder, &ReadOptions::default()).unwrap();
     assert_eq!(capture.mesh.triangles.len(), 309_026);
-    assert!((50..=400).contains(&capture.mesh.objects.len()));
+    assert!(capture.cut.is_some() && capture.mesh.objects.len() == 1);
+    let open = open(&Source::Folder(folder), &OpenOptions::default()).unwrap();
+    assert!((50..=400).contains(&open.capture.mesh.objects.len()));
     assert_eq!(capture.frames.len(), 75);
     assert!(capture.frames.iter().all(|frame| frame.depth.is_some()));
-    println!(
-        "{} objects; {:?}",
-        capture.mesh.objects.len(),
-        capture.warnings
-    );
+    println!("{:#?} {:#?}", open.summary, open.warnings);
 
     let working = load_working(&capture, 1 << 20).unwrap();
     let pixels: usize = working.photographs.iter().map(|p| p.pixels.len()).sum();

@@ -62,6 +62,7 @@ fn capture(rectangles: &[(f64, f64, f64, bool)], frame: Frame) -> Capture {
     Capture {
         name: "test".into(),
         folder: None,
+        cut: None,
         mesh,
         frames: vec![frame],
         up: DVec3::Y,

@@ -33,12 +33,23 @@ pub struct Capture {
     pub folder: Option<PathBuf>,
     /// Triangles grouped in objects.
     pub mesh: Mesh,
+    /// How its mesh is cut into segments, where it has no objects of its own. The reader leaves it whole.
+    pub cut: Option<Cut>,
     /// Posed photographs, in the order of transforms.json.
     pub frames: Vec<Frame>,
     /// Unit up vector: the cameras' mean up unless overruled.
     pub up: DVec3,
     /// What was odd but could be worked around, each a full sentence naming file and field.
     pub warnings: Vec<String>,
+}
+
+/// How a mesh without objects is cut into segments (see [`segment`]).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cut {
+    /// The mesh's file.
+    pub file: PathBuf,
+    /// The number of segments that a person asked for.
+    pub wanted: Option<usize>,
 }
 
 /// One posed photograph.

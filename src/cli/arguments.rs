@@ -11,6 +11,7 @@ use crate::cli::parameters::{Parameters, duration};
 use crate::cli::render::RenderArguments;
 use crate::cli::study::StudyArguments;
 use crate::cli::trade::TradeArguments;
+use crate::inverse::held_out::HoldOut;
 use crate::inverse::settings::Settings;
 use crate::session::command::OpenOptions;
 use crate::session::save::pictures::Frames;
@@ -131,9 +132,12 @@ impl SolveOptions {
 }
 
 impl ReadOptions {
-    /// The same for the session.
-    pub fn open(&self) -> OpenOptions {
-        self.over(OpenOptions::default())
+    /// The same for the session, where a solve keeps pixels out of its fits.
+    pub fn open(&self, settings: &Settings) -> OpenOptions {
+        self.over(OpenOptions {
+            hold_out: HoldOut::from(settings),
+            ..OpenOptions::default()
+        })
     }
 
     /// The same, with what is not said here as it was before.

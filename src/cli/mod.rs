@@ -88,8 +88,9 @@ fn open(arguments: &Arguments, window: Option<Window>) -> Result<()> {
         Some(_) if !display() => "no display".to_owned(),
         Some(window) => {
             solve::use_threads(arguments.solve.threads)?;
-            let opened = (source.clone(), arguments.solve.read.open());
-            match window(Some(opened), arguments.solve.settings()) {
+            let settings = arguments.solve.settings();
+            let opened = (source.clone(), arguments.solve.read.open(&settings));
+            match window(Some(opened), settings) {
                 Ok(()) => return Ok(()),
                 Err(error) => error.to_string(),
             }

@@ -39,8 +39,10 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
     let settings = options.parameters.over(&base.unwrap_or_default());
 
     // Read the capture.
-    let before = earlier.as_ref().map(|earlier| earlier.options.clone());
-    let read = options.read.over(before.unwrap_or_default());
+    let read = match &earlier {
+        Some(earlier) => options.read.over(earlier.options.clone()),
+        None => options.read.open(&settings),
+    };
     let capture = Arc::new(open(source, &read)?);
     let seconds_load = started.elapsed().as_secs_f64();
     eprintln!("{}: {}", capture.name, capture.summary.join(", "));

@@ -4,6 +4,7 @@ use crate::cli::arguments::ReadOptions;
 use crate::cli::solve::use_threads;
 use crate::cli::trade::time;
 use crate::error::Result;
+use crate::inverse::settings::Settings;
 use crate::session::command::Source;
 use crate::session::open::open;
 use crate::study::experiments::{Bench, STUDIES, Study};
@@ -63,10 +64,13 @@ pub fn study(arguments: &StudyArguments) -> Result<()> {
         .iter()
         .filter(|study| arguments.name == ALL || study.name == arguments.name)
         .collect();
-    let subject = arguments
-        .capture
-        .clone()
-        .map(|folder| open(&Source::Folder(folder), &arguments.read.open())?.subject());
+    let subject = arguments.capture.clone().map(|folder| {
+        open(
+            &Source::Folder(folder),
+            &arguments.read.open(&Settings::default()),
+        )?
+        .subject()
+    });
     let subject = subject.transpose()?;
     for study in wanted {
         let seeds = if arguments.quick {

@@ -3,6 +3,43 @@
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
 use crate::math::rng::splitmix64;
+use serde::{Deserialize, Serialize};
+
+/// What is kept out of every fit, as [`Settings`] say it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct HoldOut {
+    /// Share of the pixels.
+    pub held_out: f64,
+    /// Every so many frames, instead of single pixels; 0 keeps single pixels.
+    pub hold_out: u64,
+}
+
+impl From<&Settings> for HoldOut {
+    fn from(settings: &Settings) -> Self {
+        Self {
+            held_out: settings.held_out,
+            hold_out: settings.hold_out,
+        }
+    }
+}
+
+impl Default for HoldOut {
+    fn default() -> Self {
+        Self::from(&Settings::default())
+    }
+}
+
+impl HoldOut {
+    /// The settings that keep it out.
+    pub fn settings(self) -> Settings {
+        Settings {
+            held_out: self.held_out,
+            hold_out: self.hold_out,
+            ..Settings::default()
+        }
+    }
+}
 
 /// Whether a pixel is held out: a keyed share of all pixels, or every K-th frame whole (frames 0, K, 2K, …).
 ///

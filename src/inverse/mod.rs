@@ -3,6 +3,7 @@
 pub mod cache;
 pub mod estimate;
 pub mod exposure;
+pub mod faces;
 pub mod held_out;
 pub mod known;
 pub mod lobe;

@@ -61,6 +61,7 @@ impl Room {
         Capture {
             name: self.name.clone(),
             folder: None,
+            cut: None,
             mesh: self.mesh.clone(),
             frames: cameras
                 .into_iter()

@@ -4,6 +4,7 @@ use crate::capture::place::Coordinates;
 use crate::capture::regroup::Regroup;
 pub use crate::compose::placement::Placement;
 pub use crate::export::scene::Format as ExportFormat;
+use crate::inverse::held_out::HoldOut;
 use crate::inverse::settings::Settings;
 use crate::scene::camera::Camera;
 use crate::session::edits::Edits;
@@ -132,6 +133,9 @@ pub struct OpenOptions {
     pub coordinates: Coordinates,
     /// Number of segments that a mesh without objects is cut into; `None` chooses.
     pub segments: Option<u64>,
+    /// What says nothing when a mesh is cut into segments, as it is kept out of every fit.
+    #[serde(flatten)]
+    pub hold_out: HoldOut,
     /// How its objects were changed by hand.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub objects: Vec<Regroup>,

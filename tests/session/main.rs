@@ -2,8 +2,10 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod recut;
 mod regroup;
 
+use relit::capture::Capture;
 use relit::capture::place::Coordinates;
 use relit::inverse::estimate::Estimate;
 use relit::inverse::settings::Settings;
@@ -19,7 +21,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 
-static ROOM: LazyLock<relit::capture::Capture> = LazyLock::new(common::room);
+static ROOM: LazyLock<Capture> = LazyLock::new(common::room);
 
 /// Iterates until told to stop, counting its steps; the estimate says how many.
 fn count_up(
@@ -67,21 +69,21 @@ struct Rig {
 impl Rig {
     /// A session on the tiny room whose first solve panics at a step, if one is given.
     fn new(panic_at: Option<u64>) -> Self {
-        Self::spawn(panic_at, false)
+        Self::spawn(ROOM.clone(), panic_at, false)
     }
 
     /// A session whose solves can be gone on with after their end.
     fn resumable() -> Self {
-        Self::spawn(None, true)
+        Self::spawn(ROOM.clone(), None, true)
     }
 
-    fn spawn(panic_at: Option<u64>, resumable: bool) -> Self {
+    fn spawn(capture: Capture, panic_at: Option<u64>, resumable: bool) -> Self {
         let steps = Arc::new(AtomicU64::new(0));
         let shared = steps.clone();
         let mut fault = panic_at;
         let backend = Backend {
-            open: Box::new(|source, options| {
-                OpenCapture::new(source.clone(), options.clone(), ROOM.clone())
+            open: Box::new(move |source, options| {
+                OpenCapture::new(source.clone(), options.clone(), capture.clone())
             }),
             solve: Box::new(move |_: &Problem, _: &Settings, resume, observer| {
                 Ok(count_up(observer, &shared, fault.take(), resume, resumable))

@@ -135,6 +135,7 @@ pub fn room() -> OpenCapture {
     let capture = Capture {
         name: "small room".into(),
         folder: None,
+        cut: None,
         mesh: Mesh {
             positions: vec![
                 corner(-1.0, 0.0, 1.0),

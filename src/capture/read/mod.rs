@@ -28,10 +28,8 @@ mod ply_elements;
 pub(in crate::capture) mod pose;
 mod transforms;
 
-use crate::capture::Capture;
-use crate::capture::mesh::Mesh;
 use crate::capture::read::mesh::RawMesh;
-use crate::capture::segment::segment;
+use crate::capture::{Capture, Cut};
 use crate::error::{Error, Result};
 use confine::Confine;
 use glam::DVec3;
@@ -68,44 +66,44 @@ pub fn read(folder: &Path, options: &ReadOptions) -> Result<Capture> {
     let mut warnings = Vec::new();
     let transforms = transforms::read(&confine, options.up, &mut warnings)?;
     let raw = mesh::read(&transforms.mesh, &confine, &mut warnings)?;
-    let mesh = with_objects(raw, &transforms.mesh, options.segments, &mut warnings);
+    let cut = cut(&raw, &transforms.mesh, options.segments, &mut warnings);
     Ok(Capture {
         name: name_of(folder),
         folder: Some(folder.to_path_buf()),
-        mesh,
+        mesh: raw.mesh,
+        cut,
         frames: transforms.frames,
         up: transforms.up,
         warnings,
     })
 }
 
-/// Cuts a mesh without objects into segments, if that is wanted; a single object of a scan's complexity counts as none.
-fn with_objects(
-    raw: RawMesh,
+/// How a mesh without objects is to be cut, if that is wanted; a single object of a scan's complexity counts as none.
+fn cut(
+    raw: &RawMesh,
     path: &Path,
-    segments: Option<usize>,
+    wanted: Option<usize>,
     warnings: &mut Vec<String>,
-) -> Mesh {
-    let mut mesh = raw.mesh;
+) -> Option<Cut> {
+    let mesh = &raw.mesh;
     let whole = !raw.has_objects
         || (mesh.objects.len() == 1 && mesh.triangles.len() > MAX_TRIANGLES_OF_ONE_OBJECT);
-    let place = path.display();
-    match segments {
-        Some(1) if mesh.objects.len() == 1 => {}
-        Some(_) if !whole && mesh.objects.len() > 1 => warnings.push(format!(
-            "{place}: the mesh has {} objects of its own; it is not cut into segments",
-            mesh.objects.len()
-        )),
-        None if !whole => {}
-        _ => {
-            segment(&mut mesh, segments);
+    match wanted {
+        Some(1) if mesh.objects.len() == 1 => None,
+        Some(_) if !whole && mesh.objects.len() > 1 => {
             warnings.push(format!(
-                "{place}: the mesh has no objects; it was cut into {} segments by normal and colour (--segments changes the number)",
+                "{}: the mesh has {} objects of its own; it is not cut into segments",
+                path.display(),
                 mesh.objects.len()
             ));
+            None
         }
+        None if !whole => None,
+        _ => Some(Cut {
+            file: path.to_path_buf(),
+            wanted,
+        }),
     }
-    mesh
 }
 
 /// The folder's own name, also of `.` and `..`.

@@ -1,6 +1,7 @@
 //! Faces and which of them share an edge.
 
 use crate::capture::mesh::Mesh;
+use crate::capture::segment::shown::{ShownFace, filled};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -8,6 +9,8 @@ use rayon::prelude::*;
 const NORMAL_WEIGHT: f64 = 1.0;
 /// See [`NORMAL_WEIGHT`].
 const COLOR_WEIGHT: f64 = 0.5;
+/// How much a change of brightness counts against one of hue, which light and shadow change less.
+const BRIGHTNESS_WEIGHT: f64 = 0.5;
 
 /// The dual graph of a mesh with what segmentation looks at.
 #[derive(Debug)]
@@ -16,8 +19,11 @@ pub struct FaceGraph {
     pub area: Vec<f64>,
     /// Unit normals, smoothed over the corners; zero for faces without area.
     pub normal: Vec<DVec3>,
-    /// Colours relative to the mesh's mean, compressed by the square root, as perception does; zero without vertex colours.
+    /// Colours relative to the mesh's mean, compressed by the square root, as perception does, and with half of their brightness:
+    /// what photographs show, or the vertex colours; zero without either.
     pub color: Vec<DVec3>,
+    /// Whether a face is part of a patch that photographs show saturated.
+    pub saturated: Vec<bool>,
     /// Middles.
     pub centroid: Vec<DVec3>,
     /// Pairs of faces that share an edge.
@@ -25,8 +31,8 @@ pub struct FaceGraph {
 }
 
 impl FaceGraph {
-    /// The graph of a mesh; vertices at equal positions count as one.
-    pub fn new(mesh: &Mesh) -> Self {
+    /// The graph of a mesh, of which photographs show each face; vertices at equal positions count as one.
+    pub fn new(mesh: &Mesh, shown: &[ShownFace]) -> Self {
         let welded = mesh.weld();
         let corners: Vec<[u32; 3]> = mesh
             .triangles
@@ -58,15 +64,18 @@ impl FaceGraph {
                 (sum + cross.normalize_or_zero()).normalize_or_zero()
             })
             .collect();
+        let edges = shared_edges(&corners);
+        let (color, saturated) = filled(mesh, shown, &vertex_colors(mesh), &edges);
         Self {
             area: crosses.iter().map(|cross| cross.length() * 0.5).collect(),
             normal,
-            color: colors(mesh),
+            color: relative(color),
+            saturated,
             centroid: corners
                 .iter()
                 .map(|t| t.map(position).iter().sum::<DVec3>() / 3.0)
                 .collect(),
-            edges: shared_edges(&corners),
+            edges,
         }
     }
 
@@ -86,26 +95,28 @@ impl FaceGraph {
     }
 }
 
-/// Colour of each face: the mean of its corners.
-fn colors(mesh: &Mesh) -> Vec<DVec3> {
+/// Compressed colour of each face: the mean of its corners; zero without vertex colours.
+fn vertex_colors(mesh: &Mesh) -> Vec<DVec3> {
     if mesh.vertex_colors.is_empty() {
         return vec![DVec3::ZERO; mesh.triangles.len()];
     }
-    let compressed: Vec<DVec3> = mesh
-        .vertex_colors
-        .iter()
-        .map(|c| {
-            let c = c.as_dvec3().max(DVec3::ZERO);
-            DVec3::new(c.x.sqrt(), c.y.sqrt(), c.z.sqrt())
-        })
+    let compressed: Vec<DVec3> = (mesh.vertex_colors.iter())
+        .map(|c| c.as_dvec3().max(DVec3::ZERO).map(f64::sqrt))
         .collect();
-    let sum: DVec3 = compressed.iter().sum();
-    let mean = sum.element_sum() / (3.0 * compressed.len() as f64);
+    let of_face = |t: &[u32; 3]| t.iter().map(|&i| compressed[i as usize]).sum::<DVec3>() / 3.0;
+    mesh.triangles.iter().map(of_face).collect()
+}
+
+/// Colours over the mean of all, with less of their brightness.
+fn relative(mut colors: Vec<DVec3>) -> Vec<DVec3> {
+    let sum: DVec3 = colors.iter().sum();
+    let mean = sum.element_sum() / (3.0 * colors.len() as f64);
     let scale = if mean > 0.0 { mean.recip() } else { 0.0 };
-    mesh.triangles
-        .iter()
-        .map(|t| t.iter().map(|&i| compressed[i as usize]).sum::<DVec3>() * (scale / 3.0))
-        .collect()
+    for color in &mut colors {
+        let gray = DVec3::splat(color.element_sum() / 3.0);
+        *color = (*color - gray * (1.0 - BRIGHTNESS_WEIGHT)) * scale;
+    }
+    colors
 }
 
 /// Pairs of faces that share two corners; at an edge of more than two faces each is paired with the next.

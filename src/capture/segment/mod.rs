@@ -1,30 +1,42 @@
-//! Cuts a mesh without objects into segments by normal and colour.
+//! Cuts a mesh without objects into segments by normal and colour, as its photographs show it.
 //!
 //! Fine segments first, by the graph-based segmentation of Felzenszwalb and Huttenlocher (2004) over the edges between
 //! faces, where concave edges count more than convex ones (Karpathy et al. 2013); then neighbours are merged in
 //! Ward's order (1963: the least increase of the area-weighted variance of normal and colour) to the number wanted.
+//! Light changes smoothly where paint does not, and brightness more than hue: of the colour counts what changes at the border
+//! of two segments, and half of it where it is brightness.
+//! What photographs show saturated, lamps and windows, is never joined with what they do not.
 //! Every quantity is relative to the mesh's own area and colours: size, tessellation and exposure do not matter.
 
 mod graph;
 mod sets;
+mod shown;
 mod ward;
 
 use crate::capture::mesh::Mesh;
 use graph::FaceGraph;
 use sets::Sets;
+pub use shown::ShownFace;
 
 /// Felzenszwalb and Huttenlocher's k: the contrast that a segment of one mean face tolerates.
 const FINE_CONTRAST: f64 = 0.2;
 
 /// Replaces the mesh's objects by segments, named "segment 000", "segment 001", … by descending area.
 ///
-/// `wanted` is the number of segments; `None` lets the mesh's complexity decide. The result depends on nothing else.
-pub fn segment(mesh: &mut Mesh, wanted: Option<usize>) {
-    let graph = FaceGraph::new(mesh);
+/// `shown` is what photographs show of each face; it goes before the mesh's own colours. `wanted` is the
+/// number of segments, besides those that are saturated; `None` lets the mesh's complexity decide. The result depends on
+/// nothing else. Returns the number of saturated segments.
+pub fn segment(mesh: &mut Mesh, shown: &[ShownFace], wanted: Option<usize>) -> usize {
+    let graph = FaceGraph::new(mesh, shown);
     let fine = fine_segments(&graph);
     let (segment_of, count) = ward::merge(&graph, &fine, wanted);
     mesh.object_of = segment_of;
     mesh.objects = (0..count).map(|i| format!("segment {i:03}")).collect();
+    let mut saturated = vec![false; count];
+    for (&segment, &is_saturated) in mesh.object_of.iter().zip(&graph.saturated) {
+        saturated[segment as usize] |= is_saturated;
+    }
+    saturated.iter().filter(|is| **is).count()
 }
 
 /// Felzenszwalb–Huttenlocher: for each face, a face that stands for its segment.
@@ -45,7 +57,13 @@ fn fine_segments(graph: &FaceGraph) -> Vec<u32> {
     for edge in order {
         let contrast = contrasts[edge as usize];
         let [a, b] = graph.edges[edge as usize].map(|face| sets.find(face));
-        if a == b || contrast > tolerance[a as usize].min(tolerance[b as usize]) {
+        let [left, right] = graph.edges[edge as usize].map(|face| graph.saturated[face as usize]);
+        // A lamp is one segment, whatever its shape.
+        let tolerated = match left && right {
+            true => f64::INFINITY,
+            false => tolerance[a as usize].min(tolerance[b as usize]),
+        };
+        if a == b || left != right || contrast > tolerated {
             continue;
         }
         let total = size[a as usize] + size[b as usize];
@@ -60,6 +78,10 @@ fn fine_segments(graph: &FaceGraph) -> Vec<u32> {
 mod tests {
     use super::*;
     use glam::{DVec3, Vec3};
+
+    fn unseen(faces: usize) -> Vec<ShownFace> {
+        vec![ShownFace::default(); faces]
+    }
 
     /// Floor (half of it red), back wall and a floating square, each a grid of `n` × `n` quads with a little noise.
     fn room(n: usize, scale: f64, exposure: f32) -> Mesh {
@@ -110,7 +132,7 @@ mod tests {
     fn surfaces_and_colours_come_apart_at_any_size_and_exposure() {
         for (scale, exposure) in [(1.0, 1.0), (1e-3, 1e4), (1e5, 1e-5)] {
             let mut mesh = room(20, scale, exposure);
-            segment(&mut mesh, Some(4));
+            segment(&mut mesh, &unseen(2400), Some(4));
             assert_eq!(mesh.objects.len(), 4);
             let squares: Vec<&[u32]> = mesh.object_of.chunks(800).collect();
             for whole in &squares[1..] {
@@ -126,9 +148,9 @@ mod tests {
     fn the_number_wanted_is_met_and_areas_descend() {
         for wanted in [1, 2, 3, 4, 10, 100] {
             let mut mesh = room(20, 1.0, 1.0);
-            segment(&mut mesh, Some(wanted));
+            segment(&mut mesh, &unseen(2400), Some(wanted));
             assert!(mesh.objects.len() <= wanted && mesh.objects.len() >= wanted.min(4));
-            let graph = FaceGraph::new(&mesh);
+            let graph = FaceGraph::new(&mesh, &unseen(2400));
             let mut areas = vec![0.0; mesh.objects.len()];
             for (&object, area) in mesh.object_of.iter().zip(&graph.area) {
                 areas[object as usize] += area;
@@ -146,7 +168,7 @@ mod tests {
             objects: vec!["mesh".into()],
             ..Mesh::default()
         };
-        segment(&mut flat, None);
+        segment(&mut flat, &unseen(2), None);
         assert!(flat.objects.len() == 1 && flat.object_of == [0, 0]);
     }
 }

@@ -6,11 +6,11 @@ use glam::DVec3;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 use std::cmp::Reverse;
-use std::collections::{BTreeSet, BinaryHeap};
+use std::collections::{BTreeMap, BinaryHeap};
 
 /// Without a number wanted, merging ends where the next merge would add this share of the mesh's area times the
 /// square of a full change of normal or colour.
-const MERGE_LIMIT: f64 = 1e-3;
+const MERGE_LIMIT: f64 = 5e-4;
 /// Without a number wanted, at most so many segments, however complex the mesh.
 const MAX_SEGMENTS: usize = 400;
 
@@ -25,6 +25,8 @@ struct Region {
     normal: DVec3,
     color: DVec3,
     position: DVec3,
+    /// Whether photographs show it saturated: it is a segment by itself.
+    saturated: bool,
     /// Counts the changes, so that outdated merges are recognised.
     version: u32,
 }
@@ -34,14 +36,15 @@ impl Region {
         self.position / self.area.max(f64::MIN_POSITIVE)
     }
 
-    /// By how much the area-weighted variance of normal and colour grows if two regions become one.
-    fn cost(&self, other: &Self) -> f64 {
+    /// By how much the area-weighted variance of normal and colour grows if two regions become one. Of the colour counts no more
+    /// than what changes at their border: what changes on the way from middle to middle is light.
+    fn cost(&self, other: &Self, border: &Border) -> f64 {
         if self.area <= 0.0 || other.area <= 0.0 {
             return 0.0;
         }
         let difference = |a: DVec3, b: DVec3| (a / self.area).distance_squared(b / other.area);
-        let change =
-            difference(self.normal, other.normal) + 2.0 * difference(self.color, other.color);
+        let color = difference(self.color, other.color).min(border.contrast_squared());
+        let change = difference(self.normal, other.normal) + 2.0 * color;
         change * self.area * other.area / (self.area + other.area)
     }
 
@@ -54,34 +57,75 @@ impl Region {
     }
 }
 
+/// Sums over the edges between two regions, seen from one of them.
+#[derive(Debug, Clone, Copy, Default)]
+struct Border {
+    /// Its colour less the other's.
+    change: DVec3,
+    edges: f64,
+}
+
+impl Border {
+    fn reversed(self) -> Self {
+        Self {
+            change: -self.change,
+            ..self
+        }
+    }
+
+    fn extend(&mut self, other: Self) {
+        self.change += other.change;
+        self.edges += other.edges;
+    }
+
+    /// Square of the change of colour across it; infinite where regions have none.
+    fn contrast_squared(&self) -> f64 {
+        if self.edges == 0.0 {
+            return f64::INFINITY;
+        }
+        (self.change / self.edges).length_squared()
+    }
+}
+
+/// The regions around each, with the borders to them; those that are saturated have none.
+fn borders(graph: &FaceGraph, region_of: &[u32], regions: &[Region]) -> Vec<BTreeMap<u32, Border>> {
+    let mut neighbors = vec![BTreeMap::<u32, Border>::new(); regions.len()];
+    for &[a, b] in &graph.edges {
+        let change = graph.color[a as usize] - graph.color[b as usize];
+        let (a, b) = (region_of[a as usize], region_of[b as usize]);
+        let stays = [a, b].map(|region| regions[region as usize].saturated);
+        if a != b && stays == [false; 2] {
+            let border = Border { change, edges: 1.0 };
+            neighbors[a as usize].entry(b).or_default().extend(border);
+            let back = neighbors[b as usize].entry(a).or_default();
+            back.extend(border.reversed());
+        }
+    }
+    neighbors
+}
+
 /// Merges the segments of `fine` (for each face one that stands for its segment) to `wanted` of them.
 ///
 /// Returns for each face its segment's number, by descending area, and the number of segments.
 pub fn merge(graph: &FaceGraph, fine: &[u32], wanted: Option<usize>) -> (Vec<u32>, usize) {
     let (region_of, mut regions) = sum_up(graph, fine);
-    let mut neighbors = vec![BTreeSet::new(); regions.len()];
-    for &[a, b] in &graph.edges {
-        let (a, b) = (region_of[a as usize], region_of[b as usize]);
-        if a != b {
-            neighbors[a as usize].insert(b);
-            neighbors[b as usize].insert(a);
-        }
-    }
+    let mut neighbors = borders(graph, &region_of, &regions);
     link_islands(&regions, &mut neighbors);
 
     // The cheapest merge first; costs are never negative, so their bits order as they do.
     let mut heap = BinaryHeap::new();
-    let candidate = |regions: &[Region], a: u32, b: u32| {
+    let candidate = |regions: &[Region], a: u32, b: u32, border: &Border| {
         let (ra, rb) = (&regions[a as usize], &regions[b as usize]);
-        Reverse((ra.cost(rb).to_bits(), a, b, ra.version, rb.version))
+        Reverse((ra.cost(rb, border).to_bits(), a, b, ra.version, rb.version))
     };
     for (a, around) in (0..).zip(&neighbors) {
-        heap.extend(around.range(a + 1..).map(|&b| candidate(&regions, a, b)));
+        let after = around.range(a + 1..);
+        heap.extend(after.map(|(&b, border)| candidate(&regions, a, b, border)));
     }
     let mut fresh = heap.len().max(LEAST_CANDIDATES);
     let total: f64 = regions.iter().map(|region| region.area).sum();
     let mut sets = Sets::new(regions.len());
-    let mut count = regions.len();
+    let mut count = regions.iter().filter(|region| !region.saturated).count();
     while let Some(Reverse((cost, a, b, version_a, version_b))) = heap.pop() {
         let enough = match wanted {
             Some(wanted) => count <= wanted.max(1),
@@ -101,15 +145,21 @@ pub fn merge(graph: &FaceGraph, fine: &[u32], wanted: Option<usize>) -> (Vec<u32
         regions[child as usize].version = u32::MAX;
         count -= 1;
         let moved = std::mem::take(&mut neighbors[child as usize]);
-        for other in moved {
+        for (other, border) in moved {
             neighbors[other as usize].remove(&child);
             if other != root {
-                neighbors[other as usize].insert(root);
-                neighbors[root as usize].insert(other);
+                let joined = neighbors[root as usize].entry(other).or_default();
+                joined.extend(border);
+                let seen_back = joined.reversed();
+                neighbors[other as usize].insert(root, seen_back);
             }
         }
         let around = &neighbors[root as usize];
-        heap.extend(around.iter().map(|&b| candidate(&regions, root, b)));
+        heap.extend(
+            around
+                .iter()
+                .map(|(&b, border)| candidate(&regions, root, b, border)),
+        );
         // A region that takes up one speck after the other leaves outdated candidates behind.
         if heap.len() > 2 * fresh {
             heap.retain(|Reverse((_, a, b, version_a, version_b))| {
@@ -141,17 +191,19 @@ fn sum_up(graph: &FaceGraph, fine: &[u32]) -> (Vec<u32>, Vec<Region>) {
             region.normal += graph.normal[face] * area;
             region.color += graph.color[face] * area;
             region.position += graph.centroid[face] * area;
+            region.saturated = graph.saturated[face];
             *slot
         })
         .collect();
     (region_of, regions)
 }
 
-/// Makes separate pieces of the mesh neighbours: each piece's largest region of the nearest one in a larger piece.
-fn link_islands(regions: &[Region], neighbors: &mut [BTreeSet<u32>]) {
+/// Makes separate pieces of the mesh neighbours: each piece's largest region of the nearest one in a larger piece. Pieces that are
+/// saturated stay apart, as lamps are.
+fn link_islands(regions: &[Region], neighbors: &mut [BTreeMap<u32, Border>]) {
     let mut sets = Sets::new(regions.len());
     for (a, around) in (0..).zip(neighbors.iter()) {
-        for &b in around {
+        for &b in around.keys() {
             let (a, b) = (sets.find(a), sets.find(b));
             if a != b {
                 sets.join(a, b);
@@ -163,7 +215,11 @@ fn link_islands(regions: &[Region], neighbors: &mut [BTreeSet<u32>]) {
     for a in 0..regions.len() as u32 {
         members[sets.find(a) as usize].push(a);
     }
-    members.retain(|piece| !piece.is_empty());
+    members.retain(|piece| {
+        piece
+            .first()
+            .is_some_and(|&a| !regions[a as usize].saturated)
+    });
     let area = |piece: &[u32]| -> f64 { piece.iter().map(|&a| regions[a as usize].area).sum() };
     members.sort_by(|a, b| area(b).total_cmp(&area(a)).then(a[0].cmp(&b[0])));
 
@@ -178,8 +234,8 @@ fn link_islands(regions: &[Region], neighbors: &mut [BTreeSet<u32>]) {
             // Of equally near ones the first.
             let nearest = larger.nearest_neighbors(&place(largest));
             if let Some(nearest) = nearest.iter().map(|region| region.data).min() {
-                neighbors[largest as usize].insert(nearest);
-                neighbors[nearest as usize].insert(largest);
+                neighbors[largest as usize].insert(nearest, Border::default());
+                neighbors[nearest as usize].insert(largest, Border::default());
             }
         }
         for x in piece {

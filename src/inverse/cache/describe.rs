@@ -15,6 +15,8 @@ use glam::{DVec3, Vec3};
 
 /// An albedo with a larger standard error than this is as good as unknown.
 const UNKNOWN_ALBEDO: f32 = 0.2 * ALBEDO_DEVIATION;
+/// An emission with a larger relative standard error than this is as good as unknown.
+const UNKNOWN_EMISSION: f32 = 0.5;
 /// An emitting object that fewer pixels see is known only through its light.
 const FEW_PIXELS: u64 = 19;
 
@@ -74,6 +76,10 @@ pub fn estimate(
                             .into();
                     if seen < FEW_PIXELS {
                         object.note.push_str("; only a few pixels see it");
+                    }
+                    if is_unknown(object.emission, object.emission_stderr) {
+                        object.identifiable = false;
+                        object.note = "the photographs hardly tell how much light it gives".into();
                     }
                 }
                 Role::Unseen => {
@@ -146,6 +152,11 @@ pub fn doubt_white(estimate: &mut Estimate, brightness: &[f32]) {
     }
 }
 
+/// Whether an emission is as good as unknown; how strong a channel is that hardly shines does not matter.
+fn is_unknown(emission: Vec3, stderr: Vec3) -> bool {
+    stderr.max_element() > UNKNOWN_EMISSION * emission.max_element()
+}
+
 /// What to take for an albedo that is hardly known: drawn to the room's typical one by what is believed of any albedo.
 fn drawn(albedo: Vec3, stderr: Vec3, typical: Vec3) -> Vec3 {
     let known = stderr * stderr / (ALBEDO_DEVIATION * ALBEDO_DEVIATION);
@@ -192,6 +203,14 @@ mod tests {
         assert!(at(UNKNOWN_ALBEDO) < 0.02);
         assert!((at(ALBEDO_DEVIATION) - 0.2).abs() < 1e-6);
         assert!((at(f32::INFINITY) - 0.4).abs() < 1e-6);
+    }
+
+    #[test]
+    fn an_emission_is_known_where_its_error_is_small_beside_its_brightest_channel() {
+        let red = Vec3::new(2.0, 0.1, 0.0);
+        assert!(!is_unknown(red, Vec3::splat(0.3)));
+        assert!(is_unknown(red, Vec3::new(1.1, 0.0, 0.0)));
+        assert!(is_unknown(red, Vec3::INFINITY));
     }
 
     #[test]

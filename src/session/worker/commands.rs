@@ -1,6 +1,7 @@
 //! What each command does.
 
 use crate::export::{light_layers, scene};
+use crate::inverse::held_out::HoldOut;
 use crate::session::command::{Command, ExportRequest, OpenOptions, ViewCamera};
 use crate::session::save::pictures::Frames;
 use crate::session::save::{self, Results};
@@ -22,13 +23,24 @@ impl Worker {
         self.touch();
         match command {
             Command::Open(source) => {
-                return Some(Next::Open(source, OpenOptions::default()));
+                let options = OpenOptions {
+                    hold_out: HoldOut::from(&self.settings),
+                    ..OpenOptions::default()
+                };
+                return Some(Next::Open(source, options));
             }
             Command::Resume(folder) => return Some(Next::Resume(folder)),
             Command::Reset => {
                 self.paused = false;
                 self.step = false;
-                return self.capture.is_some().then_some(Next::Solve(None));
+                let open = self.capture.as_ref()?;
+                let hold_out = HoldOut::from(&self.settings);
+                // Segments that were changed by hand stay.
+                let is_cut = open.capture.cut.is_some() && open.options.objects.is_empty();
+                return Some(match is_cut && open.options.hold_out != hold_out {
+                    true => Next::Recut(hold_out),
+                    false => Next::Solve(None),
+                });
             }
             Command::Reframe(mut options) => {
                 let go_on = self.solving && !self.paused;

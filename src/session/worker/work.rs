@@ -1,6 +1,7 @@
 //! The worker's main loop: waiting, opening, resuming, solving, and what happens when one of them panics.
 
 use crate::error::Error;
+use crate::inverse::held_out::HoldOut;
 use crate::inverse::solver::{Checkpoint, Problem};
 use crate::session::command::{OpenOptions, Regrouping, Source};
 use crate::session::edits::Edits;
@@ -26,6 +27,8 @@ pub(super) enum Next {
     Resume(PathBuf),
     /// Solve what is open, from the start or from a checkpoint.
     Solve(Option<Checkpoint>),
+    /// Cut the mesh of what is open anew, as other pixels are kept out of the fits, and solve it from the start.
+    Recut(HoldOut),
     /// Read what is open again with other options, and solve on if so.
     Reframe(Box<OpenOptions>, bool),
     /// Read what is open again with other objects, and solve it from the start; where that fails, solve on if so.
@@ -57,6 +60,7 @@ impl Worker {
             Next::Open(source, options) => self.open(&source, &options),
             Next::Resume(folder) => self.resume(&folder),
             Next::Solve(checkpoint) => self.solve(checkpoint.as_ref()),
+            Next::Recut(hold_out) => self.recut(hold_out),
             Next::Reframe(options, go_on) => self.reframe(&options, go_on),
             Next::Regroup(wanted, go_on) => self.regroup(*wanted, go_on),
             Next::Quit => Next::Quit,
@@ -159,6 +163,24 @@ impl Worker {
             true => Next::Solve(self.checkpoint.clone()),
             false => Next::Wait,
         }
+    }
+
+    /// Reads the open capture with segments of which other pixels say nothing, and starts over.
+    fn recut(&mut self, hold_out: HoldOut) -> Next {
+        let Some(old) = self.capture.clone() else {
+            return Next::Wait;
+        };
+        let before = std::mem::replace(&mut self.phase, Phase::Loading);
+        self.publish(true);
+        let options = OpenOptions {
+            hold_out,
+            ..old.options.clone()
+        };
+        if self.reopen(&options) {
+            return Next::Solve(None);
+        }
+        self.phase = before;
+        Next::Wait
     }
 
     /// Reads the open capture with other objects, and starts over.

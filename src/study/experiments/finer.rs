@@ -58,6 +58,7 @@ pub fn cut(problem: &Problem, pixels: u64) -> Result<(Problem, Vec<u32>)> {
     let capture = Capture {
         name: String::new(),
         folder: None,
+        cut: None,
         mesh,
         frames: scene
             .cameras
