@@ -6,8 +6,9 @@
 Solves with `--hold-out 8`, renders frames 0, 8, 16, … and compares sRGB values from 0 to 1 at 270 × 180 pixels: one gain
 a channel is fitted on the left half of each picture, the right half is scored, every pixel whose ray hits the mesh counts.
 `--free` scores a free colour for each triangle beside it, the mean of what the other photographs show of it at the exposures that
-relit found: no light, no materials, nothing that an object could be put into.
-For captures with a mesh in PLY or OBJ and pinhole cameras. Needs `pip install mitsuba scipy pillow`; `DRJIT_LIBLLVM_PATH` as for
+relit found, and one colour for each segment, the mean of what they show of that: no light, no materials, nothing that an object
+could be put into.
+For captures with a mesh in PLY or OBJ and pinhole cameras. Needs `pip install mitsuba scipy pillow trimesh`; `DRJIT_LIBLLVM_PATH` as for
 benches/mitsuba.
 """
 
@@ -19,8 +20,10 @@ import tempfile
 
 import mitsuba as mi
 import numpy as np
+import trimesh
 from PIL import Image
 from scipy.ndimage import gaussian_filter
+from scipy.spatial import KDTree
 
 mi.set_variant("llvm_ad_rgb")
 WIDTH, HEIGHT = 270, 180
@@ -73,22 +76,36 @@ def linear(capture, frame):
     return reduced(to_linear(pixels / 255.0))
 
 
-def free_colors(scene, transforms, capture, exposures):
-    """For each triangle the mean of what the photographs that are not held out show of it; the mean of all where none does."""
-    count = sum(shape.face_count() for shape in scene.shapes())
+def segments(scene, results):
+    """The segment of each triangle: the object of `scene.glb` whose triangle lies where it does."""
+    found = list(trimesh.load(results / "scene.glb").geometry.values())
+    tree = KDTree(np.concatenate([part.triangles_center for part in found]))
+    numbers = np.repeat(np.arange(len(found)), [len(part.faces) for part in found])
+    middles = []
+    for shape in scene.shapes():
+        parameters = mi.traverse(shape)
+        corners = np.array(parameters["vertex_positions"]).reshape(-1, 3)
+        middles.append(corners[np.array(parameters["faces"]).reshape(-1, 3)].mean(1))
+    return numbers[tree.query(np.concatenate(middles))[1]]
+
+
+def free_colors(scene, transforms, capture, exposures, group):
+    """For each group of triangles the mean of what the photographs that are not held out show of it; the mean of all where none does."""
+    count = group.max() + 1
     sums, seen = np.zeros((count, 3)), np.zeros(count)
     for index, frame in enumerate(transforms["frames"]):
         if index % 8:
             met = triangles(scene, transforms, frame)
             shown = (linear(capture, frame) / exposures[index])[met >= 0]
-            seen += np.bincount(met[met >= 0], minlength=count)
+            of = group[met[met >= 0]]
+            seen += np.bincount(of, minlength=count)
             for c in range(3):
-                sums[:, c] += np.bincount(met[met >= 0], shown[:, c], count)
+                sums[:, c] += np.bincount(of, shown[:, c], count)
     known = seen > 0
     colors = np.empty((count, 3))
     colors[known] = sums[known] / seen[known, None]
     colors[~known] = colors[known].mean(0)
-    return colors
+    return colors[group]
 
 
 def gains(rendered, photograph, mask):
@@ -128,14 +145,19 @@ def main():
     transforms = json.loads((options.capture / "transforms.json").read_text())
     mesh = options.capture / transforms["mesh_path"]
     scene = mi.load_dict({"type": "scene", "mesh": {"type": mesh.suffix[1:], "filename": str(mesh)}})
-    squares, free, similar, covered = [], [], [], []
+    squares, similar, covered = [], [], []
+    free = {"a free colour for each triangle": [], "one colour for each segment": []}
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([options.relit, "solve", options.capture, "--hold-out", "8", "--time", options.time, "--views", "none",
                         "--out", folder], check=True, capture_output=True)
         report = json.loads((pathlib.Path(folder) / "report.json").read_text())
         print(f"solved in {report['seconds_solve']:.0f} s ({report['stopped_because']})", flush=True)
         exposures = np.array(report.get("exposures") or np.ones((len(transforms["frames"]), 3)))
-        colors = free_colors(scene, transforms, options.capture, exposures) if options.free else None
+        colors = []
+        if options.free:
+            each = np.arange(sum(shape.face_count() for shape in scene.shapes()))
+            groups = [each, segments(scene, pathlib.Path(folder))]
+            colors = [free_colors(scene, transforms, options.capture, exposures, group) for group in groups]
         for index in range(0, len(transforms["frames"]), 8):
             frame = transforms["frames"][index]
             file = pathlib.Path(folder) / "rendered.exr"
@@ -149,17 +171,18 @@ def main():
             similar.append(ssim(shown, photograph, scored))
             covered.append((met >= 0).mean())
             line = f"frame {index:3}: {-10 * np.log10(square):5.2f} dB, SSIM {similar[-1]:.3f}"
-            if options.free:
-                free.append(score(np.where((met >= 0)[..., None], colors[met], 0), photograph, met >= 0)[1])
-                line += f", a free colour for each triangle {-10 * np.log10(free[-1]):5.2f} dB"
+            for (what, found), shown_by in zip(free.items(), colors):
+                found.append(score(np.where((met >= 0)[..., None], shown_by[met], 0), photograph, met >= 0)[1])
+                line += f", {what} {-10 * np.log10(found[-1]):5.2f} dB"
             print(line, flush=True)
             if options.pictures:
                 options.pictures.mkdir(parents=True, exist_ok=True)
                 both = (np.concatenate([photograph, shown], 1) * 255).astype(np.uint8)
                 Image.fromarray(both).save(options.pictures / f"{index:03}.png")
     print(f"{decibels(squares)}, SSIM {np.mean(similar):.3f}, rays that hit the mesh {np.mean(covered):.2f}")
-    if options.free:
-        print(f"a free colour for each triangle: {decibels(free)}")
+    for what, found in free.items():
+        if found:
+            print(f"{what}: {decibels(found)}")
 
 
 if __name__ == "__main__":

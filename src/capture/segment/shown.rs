@@ -9,6 +9,9 @@ const ENOUGH_PIXELS: f64 = 4.0;
 /// Patches that a smaller share of all pixels see are no lamps, and no holes in lamps.
 const LEAST_SHARE: f64 = 1e-4;
 
+/// A patch around which the brightest channel, compressed, is a larger share of its own has no edge: it is lit brightly and gives no light.
+const NO_EDGE: f64 = 0.8;
+
 /// What photographs show of one face, all brought to one exposure.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ShownFace {
@@ -40,6 +43,7 @@ pub fn filled(
     let pixels: Vec<f64> = shown.iter().map(|face| f64::from(face.pixels)).collect();
     let bright = without_specks(bright, &pixels, edges, true);
     let bright = without_specks(bright, &pixels, edges, false);
+    let bright = without_highlights(bright, &known, edges);
     (known.iter().map(|k| k.look.truncate()).collect(), bright)
 }
 
@@ -129,6 +133,42 @@ fn fill(known: &mut [Known], edges: &[[u32; 2]]) -> bool {
 fn weighed(known: &[Known]) -> Vec<(DVec4, f64)> {
     let weigh = |k: &Known| (k.look * k.weight, k.weight);
     known.iter().map(weigh).collect()
+}
+
+/// Takes for no lamps the patches that rise from what is around them without an edge, as a pool of light on a floor does.
+fn without_highlights(mut bright: Vec<bool>, known: &[Known], edges: &[[u32; 2]]) -> Vec<bool> {
+    let mut sets = Sets::new(bright.len());
+    for &[a, b] in edges {
+        let (x, y) = (sets.find(a), sets.find(b));
+        if bright[a as usize] && bright[b as usize] && x != y {
+            sets.join(x, y);
+        }
+    }
+    // Sums of the brightest channel inside each patch and around it, with their counts.
+    let level = |face: u32| known[face as usize].look.truncate().max_element();
+    let mut inside = vec![(0.0, 0.0); bright.len()];
+    let mut around = inside.clone();
+    for (face, known) in (0..).zip(known) {
+        let sum = &mut inside[sets.find(face) as usize];
+        sum.0 += level(face) * known.weight;
+        sum.1 += known.weight;
+    }
+    for &[a, b] in edges {
+        let (lamp, other) = match [a, b].map(|face| bright[face as usize]) {
+            [true, false] => (a, b),
+            [false, true] => (b, a),
+            _ => continue,
+        };
+        let sum = &mut around[sets.find(lamp) as usize];
+        sum.0 += level(other);
+        sum.1 += 1.0;
+    }
+    for (face, bright) in (0..).zip(&mut bright) {
+        let patch = sets.find(face) as usize;
+        let (inside, around) = (inside[patch], around[patch]);
+        *bright &= around.0 * inside.1 <= NO_EDGE * inside.0 * around.1;
+    }
+    bright
 }
 
 /// Turns patches of one kind that few pixels see, and that border on the other, into that.
@@ -225,5 +265,24 @@ mod tests {
         let speck = face(1.0, 1.0, 12);
         let (_, bright) = strip(&[wall, wall, speck, wall, wall]);
         assert_eq!(bright, [false; 5]);
+    }
+
+    #[test]
+    fn a_pool_of_light_that_saturates_is_no_lamp_and_a_pane_of_the_same_radiance_is() {
+        let lit = [0.2, 0.5, 0.9, 1.0, 1.0, 1.0, 0.9, 0.5, 0.2];
+        // An orange floor, white only where all channels are saturated.
+        let shown = |radiance: &f32| match *radiance {
+            1.0 => face(1.0, 1.0, 100),
+            level => ShownFace {
+                radiance: Vec3::new(level, 0.5 * level, 0.2 * level),
+                saturated: 0.0,
+                pixels: 100,
+            },
+        };
+        let (_, bright) = strip(&lit.each_ref().map(shown));
+        assert_eq!(bright, [false; 9]);
+        let pane = [0.2, 0.2, 0.2, 1.0, 1.0, 1.0, 0.2, 0.2, 0.2];
+        let (_, bright) = strip(&pane.each_ref().map(shown));
+        assert_eq!(bright, pane.map(|radiance| radiance == 1.0));
     }
 }
