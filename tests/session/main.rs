@@ -7,6 +7,7 @@ mod regroup;
 
 use relit::capture::Capture;
 use relit::capture::place::Coordinates;
+use relit::error::Result;
 use relit::inverse::estimate::Estimate;
 use relit::inverse::settings::Settings;
 use relit::inverse::solver::{
@@ -69,21 +70,25 @@ struct Rig {
 impl Rig {
     /// A session on the tiny room whose first solve panics at a step, if one is given.
     fn new(panic_at: Option<u64>) -> Self {
-        Self::spawn(ROOM.clone(), panic_at, false)
+        Self::spawn(|_| Ok(ROOM.clone()), panic_at, false)
     }
 
     /// A session whose solves can be gone on with after their end.
     fn resumable() -> Self {
-        Self::spawn(ROOM.clone(), None, true)
+        Self::spawn(|_| Ok(ROOM.clone()), None, true)
     }
 
-    fn spawn(capture: Capture, panic_at: Option<u64>, resumable: bool) -> Self {
+    fn spawn(
+        read: impl Fn(&OpenOptions) -> Result<Capture> + Send + 'static,
+        panic_at: Option<u64>,
+        resumable: bool,
+    ) -> Self {
         let steps = Arc::new(AtomicU64::new(0));
         let shared = steps.clone();
         let mut fault = panic_at;
         let backend = Backend {
             open: Box::new(move |source, options| {
-                OpenCapture::new(source.clone(), options.clone(), capture.clone())
+                OpenCapture::new(source.clone(), options.clone(), read(options)?)
             }),
             solve: Box::new(move |_: &Problem, _: &Settings, resume, observer| {
                 Ok(count_up(observer, &shared, fault.take(), resume, resumable))

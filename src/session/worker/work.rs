@@ -165,22 +165,19 @@ impl Worker {
         }
     }
 
-    /// Reads the open capture with segments of which other pixels say nothing, and starts over.
+    /// Reads the open capture with segments of which other pixels say nothing, and starts over; where that fails, with the
+    /// segments as they are.
     fn recut(&mut self, hold_out: HoldOut) -> Next {
         let Some(old) = self.capture.clone() else {
             return Next::Wait;
         };
-        let before = std::mem::replace(&mut self.phase, Phase::Loading);
+        self.phase = Phase::Loading;
         self.publish(true);
-        let options = OpenOptions {
+        self.reopen(&OpenOptions {
             hold_out,
             ..old.options.clone()
-        };
-        if self.reopen(&options) {
-            return Next::Solve(None);
-        }
-        self.phase = before;
-        Next::Wait
+        });
+        Next::Solve(None)
     }
 
     /// Reads the open capture with other objects, and starts over.
