@@ -42,6 +42,11 @@ pub struct Photograph {
 pub const BELOW_SATURATION: f32 = 0.97;
 
 impl Photograph {
+    /// Whether a pixel may be used.
+    pub fn is_usable(&self, pixel: usize) -> bool {
+        self.usable.is_empty() || self.usable[pixel]
+    }
+
     /// The channels in which a pixel may have been brighter than it shows: its value there is a lower bound.
     pub fn saturated(&self, pixel: usize) -> BVec3 {
         self.pixels[pixel].cmpge(self.limit(pixel) * BELOW_SATURATION)

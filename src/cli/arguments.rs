@@ -116,7 +116,7 @@ pub struct ReadOptions {
     /// Metres per unit of the capture's files [default: 1]
     #[arg(long, value_name = "METRES")]
     pub scale: Option<f64>,
-    /// Segments that a mesh without objects is cut into, about
+    /// Segments that a mesh without objects is cut into, about, besides those that photographs show saturated
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub segments: Option<u64>,
     /// Let paths in the capture lead out of its folder; only for captures that you trust

@@ -66,7 +66,7 @@ impl Finish {
         let shape = [photograph.width, photograph.height].map(|side| side as usize);
         let told: Vec<bool> = (photograph.pixels.iter().enumerate())
             .map(|(index, pixel)| {
-                let usable = photograph.usable.is_empty() || photograph.usable[index];
+                let usable = photograph.is_usable(index);
                 usable && pixel.is_finite() && !photograph.is_saturated(index)
             })
             .collect();

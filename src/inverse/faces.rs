@@ -26,11 +26,10 @@ pub fn shown(problem: &Problem, hold_out: HoldOut) -> Vec<ShownFace> {
     {
         let full = taken.saturation * BELOW_SATURATION;
         for (pixel, &triangle) in triangles.iter().enumerate() {
-            let is_usable = taken.usable.is_empty() || taken.usable[pixel];
             let Some(sum) = sums.get_mut(triangle as usize) else {
                 continue;
             };
-            if !is_usable || is_held_out(&settings, frame as u32, pixel as u32) {
+            if !taken.is_usable(pixel) || is_held_out(&settings, frame as u32, pixel as u32) {
                 continue;
             }
             let is_full = taken.pixels[pixel].cmpge(full).all();

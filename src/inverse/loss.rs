@@ -70,7 +70,7 @@ impl LossProbe {
             let end = before + photograph.pixels.len();
             while next < end {
                 let pixel = next - before;
-                let usable = photograph.usable.is_empty() || photograph.usable[pixel];
+                let usable = photograph.is_usable(pixel);
                 if usable && sees_mesh[frame].get(pixel) != Some(&NOTHING) {
                     let held = is_held_out(settings, frame as u32, pixel as u32);
                     sets[usize::from(held)].push((frame as u32, pixel as u32));

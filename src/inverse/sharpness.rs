@@ -323,15 +323,15 @@ fn step_in(
 
 impl<'a> Levels<'a> {
     fn new(photograph: &'a Photograph, frame: usize, settings: &Settings) -> Self {
-        let usable = |index: usize| photograph.usable.is_empty() || photograph.usable[index];
         let mut all: Vec<f64> = (photograph.pixels.iter().enumerate())
-            .filter(|(index, _)| usable(*index))
+            .filter(|(index, _)| photograph.is_usable(*index))
             .map(|(_, &pixel)| f64::from(luminance(pixel)))
             .collect();
         let least = (quantile(&mut all, 0.5).unwrap_or(0.0) * ABOVE_NOISE) as f32;
         let says = |(index, &pixel): (usize, &Vec3)| {
             let level = luminance(pixel);
-            let told = usable(index) && !is_held_out(settings, frame as u32, index as u32);
+            let told =
+                photograph.is_usable(index) && !is_held_out(settings, frame as u32, index as u32);
             match told && level > least && !photograph.is_saturated(index) {
                 true => level.ln(),
                 false => f32::NAN,

@@ -80,7 +80,7 @@ impl Survey {
         let mut seen = vec![0u64; scene.objects.len()];
         for (photograph, triangles) in problem.photographs.iter().zip(&centers.triangles) {
             for (pixel, &triangle) in triangles.iter().enumerate() {
-                let usable = photograph.usable.is_empty() || photograph.usable[pixel];
+                let usable = photograph.is_usable(pixel);
                 if let Some(&object) = scene.object_of.get(triangle as usize)
                     && usable
                 {
@@ -102,7 +102,7 @@ impl Survey {
                 };
                 let mut surveyed = Surveyed::default();
                 for pixel in 0..photograph.pixels.len() {
-                    let usable = photograph.usable.is_empty() || photograph.usable[pixel];
+                    let usable = photograph.is_usable(pixel);
                     let triangle = centers.triangles[frame][pixel] as usize;
                     let rare = scene
                         .object_of

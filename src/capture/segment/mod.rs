@@ -6,7 +6,7 @@
 //! Light changes smoothly where paint does not, and brightness more than hue: of the colour counts what changes at the border
 //! of two segments, and half of it where it is brightness.
 //! What photographs show saturated, lamps and windows, is never joined with what they do not.
-//! Every quantity is relative to the mesh's own area and colours: size, tessellation and exposure do not matter.
+//! Every quantity is relative to the mesh's own area and colours: size and exposure do not matter.
 
 mod graph;
 mod sets;

@@ -26,6 +26,14 @@ impl Sets {
         x
     }
 
+    /// Joins the sets of any two members.
+    pub fn unite(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.find(a), self.find(b));
+        if a != b {
+            self.join(a, b);
+        }
+    }
+
     /// Joins the sets that two standing members stand for; returns the one that stands for both.
     pub fn join(&mut self, a: u32, b: u32) -> u32 {
         let (root, child) = if self.size[a as usize] >= self.size[b as usize] {

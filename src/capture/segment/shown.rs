@@ -8,8 +8,8 @@ use glam::{DVec3, DVec4, Vec3};
 const ENOUGH_PIXELS: f64 = 4.0;
 /// Patches that a smaller share of all pixels see are no lamps, and no holes in lamps.
 const LEAST_SHARE: f64 = 1e-4;
-
-/// A patch around which the brightest channel, compressed, is a larger share of its own has no edge: it is lit brightly and gives no light.
+/// A patch around which the brightest channel, compressed, is a larger share of its own has no edge: it is lit brightly and gives
+/// no light.
 const NO_EDGE: f64 = 0.8;
 
 /// What photographs show of one face, all brought to one exposure.
@@ -88,7 +88,9 @@ fn take_own(known: &mut [Known], own: &[DVec3]) {
 /// Adds to each known face part of what is known of its neighbours, the less the more pixels see it.
 fn smooth(known: &mut [Known], edges: &[[u32; 2]]) {
     let before = known.to_vec();
-    let mut sums = weighed(known);
+    let mut sums: Vec<(DVec4, f64)> = (before.iter())
+        .map(|k| (k.look * k.weight, k.weight))
+        .collect();
     for &[a, b] in edges {
         for (own, other) in [(a, b), (b, a)] {
             let (own, other) = (own as usize, &before[other as usize]);
@@ -130,20 +132,20 @@ fn fill(known: &mut [Known], edges: &[[u32; 2]]) -> bool {
     filled
 }
 
-fn weighed(known: &[Known]) -> Vec<(DVec4, f64)> {
-    let weigh = |k: &Known| (k.look * k.weight, k.weight);
-    known.iter().map(weigh).collect()
+/// The patches of neighbours that are alike.
+fn patches(bright: &[bool], edges: &[[u32; 2]]) -> Sets {
+    let mut sets = Sets::new(bright.len());
+    for &[a, b] in edges {
+        if bright[a as usize] == bright[b as usize] {
+            sets.unite(a, b);
+        }
+    }
+    sets
 }
 
 /// Takes for no lamps the patches that rise from what is around them without an edge, as a pool of light on a floor does.
 fn without_highlights(mut bright: Vec<bool>, known: &[Known], edges: &[[u32; 2]]) -> Vec<bool> {
-    let mut sets = Sets::new(bright.len());
-    for &[a, b] in edges {
-        let (x, y) = (sets.find(a), sets.find(b));
-        if bright[a as usize] && bright[b as usize] && x != y {
-            sets.join(x, y);
-        }
-    }
+    let mut sets = patches(&bright, edges);
     // Sums of the brightest channel inside each patch and around it, with their counts.
     let level = |face: u32| known[face as usize].look.truncate().max_element();
     let mut inside = vec![(0.0, 0.0); bright.len()];
@@ -178,27 +180,19 @@ fn without_specks(
     edges: &[[u32; 2]],
     kind: bool,
 ) -> Vec<bool> {
-    let mut sets = Sets::new(bright.len());
-    let mut borders = Vec::new();
-    for &[a, b] in edges {
-        match bright[a as usize] == bright[b as usize] {
-            true => {
-                let (a, b) = (sets.find(a), sets.find(b));
-                if a != b {
-                    sets.join(a, b);
-                }
-            }
-            false => borders.push(if bright[a as usize] == kind { a } else { b }),
-        }
-    }
+    let mut sets = patches(&bright, edges);
     let least = LEAST_SHARE * pixels.iter().sum::<f64>();
     let mut seen = vec![0.0; bright.len()];
     for (face, pixels) in (0..).zip(pixels) {
         seen[sets.find(face) as usize] += pixels;
     }
     let mut at_border = vec![false; bright.len()];
-    for face in borders {
-        at_border[sets.find(face) as usize] = true;
+    for &[a, b] in edges {
+        if bright[a as usize] != bright[b as usize] {
+            for face in [a, b] {
+                at_border[sets.find(face) as usize] = true;
+            }
+        }
     }
     for (face, bright) in (0..).zip(&mut bright) {
         let patch = sets.find(face) as usize;

@@ -204,10 +204,7 @@ fn link_islands(regions: &[Region], neighbors: &mut [BTreeMap<u32, Border>]) {
     let mut sets = Sets::new(regions.len());
     for (a, around) in (0..).zip(neighbors.iter()) {
         for &b in around.keys() {
-            let (a, b) = (sets.find(a), sets.find(b));
-            if a != b {
-                sets.join(a, b);
-            }
+            sets.unite(a, b);
         }
     }
     // Pieces by descending area, each with its regions; ties by the first region.

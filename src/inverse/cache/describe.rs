@@ -74,12 +74,11 @@ pub fn estimate(
                     object.note =
                         "its own light hides what it reflects; emission is all that leaves it"
                             .into();
-                    if seen < FEW_PIXELS {
-                        object.note.push_str("; only a few pixels see it");
-                    }
                     if is_unknown(object.emission, object.emission_stderr) {
                         object.identifiable = false;
                         object.note = "the photographs hardly tell how much light it gives".into();
+                    } else if seen < FEW_PIXELS {
+                        object.note.push_str("; only a few pixels see it");
                     }
                 }
                 Role::Unseen => {

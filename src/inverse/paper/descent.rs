@@ -377,7 +377,7 @@ fn draw(problem: &Problem, settings: &Settings, stream: &mut Stream) -> Option<D
                 at -= photograph.pixels.len();
                 continue;
             }
-            let usable = photograph.usable.is_empty() || photograph.usable[at];
+            let usable = photograph.is_usable(at);
             if usable && !is_held_out(settings, frame as u32, at as u32) {
                 return Some(Drawn {
                     frame: frame as u32,

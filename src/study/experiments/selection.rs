@@ -60,7 +60,7 @@ impl Groups {
         let mut pixels: Vec<Vec<(u32, u32)>> = Vec::new();
         for (frame, photograph) in problem.photographs.iter().enumerate() {
             for pixel in 0..photograph.pixels.len() as u32 {
-                let usable = photograph.usable.is_empty() || photograph.usable[pixel as usize];
+                let usable = photograph.is_usable(pixel as usize);
                 if !usable || is_held_out(settings, frame as u32, pixel) {
                     continue;
                 }
