@@ -58,7 +58,7 @@ fn eight_bit(mut photograph: Photograph, exposure: f32) -> Photograph {
 
 const SIZE: [u32; 2] = [192, 144];
 
-/// A wall of 4 m × 3 m that three cameras see in full, in `photographed` linear radiance at each point, each camera at its exposure.
+/// A wall of 4 m × 3 m that three cameras see in full, showing the given radiance at each point.
 fn wall(photographed: impl Fn(usize, DVec3) -> Vec3) -> (Capture, Vec<DVec3>) {
     let mut modeller = Modeller::default();
     modeller.object("wall");
