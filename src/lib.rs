@@ -12,7 +12,9 @@
 //!   estimate,       insertion,     glb, obj, built-in
 //!   solvers         naive SH       exr, plots  capture
 //!        └─────┬────────┘
-//!          transport    paths: sampling, bsdf, emitters, NEE + MIS
+//!        calibrate      whether photographs agree with the mesh
+//!            │
+//!        transport      paths: sampling, bsdf, emitters, NEE + MIS
 //!            │
 //!          scene        mesh, objects, hierarchy, cameras
 //!            ├── capture   readers: obj, ply, glb, transforms.json, images
@@ -21,6 +23,7 @@
 
 #[cfg(feature = "gui")]
 pub mod app;
+pub mod calibrate;
 pub mod capture;
 pub mod cli;
 pub mod compose;

@@ -10,6 +10,7 @@ const LAYERS: &[&[&str]] = &[
     &["capture"],
     &["scene"],
     &["transport"],
+    &["calibrate"],
     &["inverse"],
     &["compose", "export", "room"],
     &["study"],

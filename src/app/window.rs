@@ -4,7 +4,9 @@ use crate::app::layout::{self, Pane, Panes};
 use crate::app::pace::Pace;
 use crate::app::picture::inspect;
 use crate::app::preferences::Preferences;
-use crate::app::shell::{files, keys, menu, palette, start, status, thumbnails, toolbar};
+use crate::app::shell::{
+    alignment, files, keys, menu, palette, start, status, thumbnails, toolbar,
+};
 use crate::app::state::App;
 use crate::app::{action, model, picture, theme};
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
@@ -158,6 +160,7 @@ impl eframe::App for Window {
         keys::show(&ctx, &mut self.app);
         palette::show(&ctx, &mut self.app);
         self.app.notices.show(&ctx);
+        alignment::show(&mut self.app, &ctx);
         // A drag is saved once it has ended.
         if !ctx.input(|input| input.pointer.any_down()) {
             self.save();

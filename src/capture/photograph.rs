@@ -1,6 +1,7 @@
 //! Photographs in linear light.
 
 use crate::capture::camera::Intrinsics;
+use crate::capture::orientation::Orientation;
 use crate::capture::read;
 use crate::error::Result;
 use glam::{BVec3, Vec3};
@@ -42,6 +43,28 @@ pub struct Photograph {
 pub const BELOW_SATURATION: f32 = 0.97;
 
 impl Photograph {
+    /// The photograph turned or mirrored.
+    pub fn oriented(&self, orientation: Orientation) -> Self {
+        let size = [self.width, self.height];
+        let [width, height] = orientation.size(size);
+        let usable = match self.usable.len() {
+            0 => Vec::new(),
+            _ => orientation.apply(&self.usable, size),
+        };
+        let limits = match self.limits.len() {
+            0 => Vec::new(),
+            _ => orientation.apply(&self.limits, size),
+        };
+        Self {
+            width,
+            height,
+            pixels: orientation.apply(&self.pixels, size),
+            usable,
+            limits,
+            ..*self
+        }
+    }
+
     /// Whether a pixel may be used.
     pub fn is_usable(&self, pixel: usize) -> bool {
         self.usable.is_empty() || self.usable[pixel]
@@ -66,8 +89,8 @@ impl Photograph {
 /// Where a photograph's pixels come from.
 #[derive(Debug, Clone)]
 pub enum PhotographSource {
-    /// A file, read when needed.
-    File(PathBuf),
+    /// A file, read when needed, and how it lies in it.
+    File(PathBuf, Orientation),
     /// Already in memory.
     Memory(Arc<Photograph>),
 }
@@ -92,10 +115,22 @@ impl PhotographSource {
     ) -> Result<(Arc<Photograph>, usize)> {
         match self {
             Self::Memory(photograph) => Ok((photograph.clone(), 0)),
-            Self::File(path) => {
-                let (photograph, invalid) = read::image::read(path, intrinsics, exposure)?;
+            Self::File(path, orientation) => {
+                let (photograph, invalid) =
+                    read::image::read(path, *orientation, intrinsics, exposure)?;
                 Ok((Arc::new(photograph), invalid))
             }
+        }
+    }
+
+    /// The photograph turned or mirrored, after what is done to it already.
+    pub fn oriented(&self, orientation: Orientation) -> Self {
+        match self {
+            Self::File(path, before) => Self::File(path.clone(), before.then(orientation)),
+            Self::Memory(same) if orientation == Orientation::default() => {
+                Self::Memory(same.clone())
+            }
+            Self::Memory(photograph) => Self::Memory(Arc::new(photograph.oriented(orientation))),
         }
     }
 }

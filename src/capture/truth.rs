@@ -1,6 +1,7 @@
 //! The true materials and lights of a capture, read for evaluation alone: no solver imports this.
 
 use crate::capture::camera::Intrinsics;
+use crate::capture::orientation::Orientation;
 use crate::capture::photograph::Photograph;
 use crate::capture::read::confine::Confine;
 use crate::capture::read::image;
@@ -102,5 +103,7 @@ pub fn read_albedo(
     }
     let place = folder.join(&name).display().to_string();
     let path = confine.file(&place, &name)?;
-    Ok(Some(image::read(&path, intrinsics, None)?.0))
+    Ok(Some(
+        image::read(&path, Orientation::default(), intrinsics, None)?.0,
+    ))
 }

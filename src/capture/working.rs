@@ -54,7 +54,7 @@ pub fn load_working(capture: &Capture, max_pixels: u64) -> Result<Working> {
         let (photograph, invalid) = loaded?;
         if invalid > 0 {
             let place = match &frame.photograph {
-                PhotographSource::File(path) => path.display().to_string(),
+                PhotographSource::File(path, _) => path.display().to_string(),
                 PhotographSource::Memory(_) => format!("frame {index}"),
             };
             warnings.push(format!(

@@ -1,6 +1,8 @@
 //! The commands and their options.
 
+use crate::capture::orientation::Orientation;
 use crate::capture::place::Coordinates;
+use crate::capture::reading::{Axes, Reading};
 use crate::cli::edit::EditArguments;
 use crate::cli::evaluate::EvaluateArguments;
 use crate::cli::export::{DemoArguments, ExportArguments};
@@ -110,6 +112,11 @@ pub struct SolveOptions {
 /// How to read a capture.
 #[derive(Debug, Args)]
 pub struct ReadOptions {
+    #[command(flatten)]
+    pub reading: ReadingOptions,
+    /// Solve even where the photographs do not show the mesh from their poses
+    #[arg(long)]
+    pub trust_poses: bool,
     /// Up axis of the capture [default: the cameras' mean up]
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
     pub up: Option<DVec3>,
@@ -124,6 +131,78 @@ pub struct ReadOptions {
     pub allow_outside: bool,
 }
 
+/// How the numbers of a capture's files are meant, where they follow other conventions than the format's.
+#[derive(Debug, Args)]
+pub struct ReadingOptions {
+    /// Axes of the poses: x right, y up, looking down -z (opengl), or x right, y down, looking down +z (opencv)
+    #[arg(long, value_name = "AXES", value_parser = ["opengl", "opencv"])]
+    pub axes: Option<String>,
+    /// Turn the mesh about the x axis by so many degrees, to agree with the poses
+    #[arg(long, value_name = "90|180|270", value_parser = quarters)]
+    pub mesh_turn: Option<u8>,
+    /// Multiply the mesh's coordinates, to be in the unit of the poses
+    #[arg(long, value_name = "FACTOR", value_parser = factor)]
+    pub mesh_scale: Option<f64>,
+    /// Multiply all focal lengths
+    #[arg(long, value_name = "FACTOR", value_parser = factor)]
+    pub focal: Option<f64>,
+    /// Multiply focal lengths and principal points, for photographs of another size than the lens is given for
+    #[arg(long, value_name = "FACTOR", value_parser = factor)]
+    pub lens_scale: Option<f64>,
+    /// Turn all photographs clockwise by so many degrees
+    #[arg(long, value_name = "90|180|270", value_parser = quarters)]
+    pub turn: Option<u8>,
+    /// Exchange left and right of all photographs
+    #[arg(long)]
+    pub mirror: bool,
+    /// Give each pose the photograph of the frame N later
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub shift: Option<i32>,
+}
+
+impl ReadingOptions {
+    /// The same, with what is not said here as it was before.
+    fn over(&self, before: Reading) -> Reading {
+        let axes = match self.axes.as_deref() {
+            Some("opencv") => Axes::OpenCv,
+            Some(_) => Axes::OpenGl,
+            None => before.axes,
+        };
+        let orientation = match (self.turn, self.mirror) {
+            (None, false) => before.orientation,
+            (turns, mirrored) => Orientation {
+                turns: turns.unwrap_or(0),
+                mirrored,
+            },
+        };
+        Reading {
+            axes,
+            mesh_turns: self.mesh_turn.unwrap_or(before.mesh_turns),
+            mesh_scale: self.mesh_scale.unwrap_or(before.mesh_scale),
+            focal: self.focal.unwrap_or(before.focal),
+            lens_scale: self.lens_scale.unwrap_or(before.lens_scale),
+            orientation,
+            shift: self.shift.unwrap_or(before.shift),
+        }
+    }
+}
+
+/// Quarter turns of an angle in degrees.
+fn quarters(text: &str) -> std::result::Result<u8, String> {
+    match text.parse::<i32>().map(|degrees| degrees.rem_euclid(360)) {
+        Ok(degrees) if degrees % 90 == 0 => Ok((degrees / 90) as u8),
+        _ => Err("90, 180 or 270 is wanted".to_owned()),
+    }
+}
+
+/// A factor above zero.
+fn factor(text: &str) -> std::result::Result<f64, String> {
+    let number = text.parse().ok();
+    number
+        .filter(|factor: &f64| factor.is_finite() && *factor > 0.0)
+        .ok_or_else(|| "a factor above 0 is wanted".to_owned())
+}
+
 impl SolveOptions {
     /// The parameters that the options give, over the defaults.
     pub fn settings(&self) -> Settings {
@@ -136,6 +215,7 @@ impl ReadOptions {
     pub fn open(&self, settings: &Settings) -> OpenOptions {
         self.over(OpenOptions {
             hold_out: HoldOut::from(settings),
+            check_alignment: !self.trust_poses,
             ..OpenOptions::default()
         })
     }
@@ -144,6 +224,7 @@ impl ReadOptions {
     pub fn over(&self, before: OpenOptions) -> OpenOptions {
         OpenOptions {
             up: self.up.or(before.up),
+            reading: self.reading.over(before.reading),
             coordinates: Coordinates {
                 scale: self.scale.or(before.coordinates.scale),
                 ..before.coordinates

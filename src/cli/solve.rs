@@ -43,7 +43,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
         Some(earlier) => options.read.over(earlier.options.clone()),
         None => options.read.open(&settings),
     };
-    let capture = Arc::new(open(source, &read)?);
+    let capture = Arc::new(open(source, &read)?.aligned()?);
     let seconds_load = started.elapsed().as_secs_f64();
     eprintln!("{}: {}", capture.name, capture.summary.join(", "));
     for warning in &capture.warnings {

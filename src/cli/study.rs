@@ -69,6 +69,7 @@ pub fn study(arguments: &StudyArguments) -> Result<()> {
             &Source::Folder(folder),
             &arguments.read.open(&Settings::default()),
         )?
+        .aligned()?
         .subject()
     });
     let subject = subject.transpose()?;

@@ -78,7 +78,7 @@ pub fn trade(arguments: &TradeArguments) -> Result<()> {
         None => {
             let folder = arguments.capture.clone();
             let source = folder.map_or(Source::BuiltInRoom, Source::Folder);
-            let capture = open(&source, &arguments.read.open(&base))?;
+            let capture = open(&source, &arguments.read.open(&base))?.aligned()?;
             let trade = of_capture(arguments, &capture, &runs, &interrupt)?;
             (trade, source.default_out())
         }

@@ -1,6 +1,7 @@
 //! An imported scan as a capture: images, mesh.ply, transforms.json.
 
 use crate::capture::import::{DepthImage, Import, ImportedFrame, Lens};
+use crate::capture::orientation::Orientation;
 use crate::capture::photograph::Photograph;
 use crate::capture::read::image;
 use crate::error::{Error, Result};
@@ -63,7 +64,12 @@ fn write_frame(folder: &Path, index: usize, frame: &ImportedFrame) -> Result<Ent
         copy(&frame.photograph, &folder.join(format!("{name}.{ending}")))?;
         ending
     } else {
-        let (mut photograph, _) = image::read(&frame.photograph, &frame.lens.pinhole, None)?;
+        let (mut photograph, _) = image::read(
+            &frame.photograph,
+            Orientation::default(),
+            &frame.lens.pinhole,
+            None,
+        )?;
         if let Some(mask) = &frame.mask {
             apply_mask(&mut photograph, mask, &frame.lens)?;
         }
@@ -109,7 +115,7 @@ fn write_depth(path: &Path, depth: &DepthImage) -> Result<()> {
 
 /// Makes pixels unusable where the mask is dark (below one half).
 fn apply_mask(photograph: &mut Photograph, path: &Path, lens: &Lens) -> Result<()> {
-    let (mask, _) = image::read(path, &lens.pinhole, None)?;
+    let (mask, _) = image::read(path, Orientation::default(), &lens.pinhole, None)?;
     let count = photograph.pixels.len();
     photograph.usable.resize(count, true);
     for (usable, value) in photograph.usable.iter_mut().zip(&mask.pixels) {

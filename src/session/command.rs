@@ -1,6 +1,7 @@
 //! What the window or the command line asks of the worker.
 
 use crate::capture::place::Coordinates;
+use crate::capture::reading::Reading;
 use crate::capture::regroup::Regroup;
 pub use crate::compose::placement::Placement;
 pub use crate::export::scene::Format as ExportFormat;
@@ -128,6 +129,9 @@ pub struct ExportRequest {
 pub struct OpenOptions {
     /// Up axis in the capture's coordinates; `None` takes the cameras' mean up.
     pub up: Option<DVec3>,
+    /// How the files' numbers are meant.
+    #[serde(skip_serializing_if = "Reading::is_default")]
+    pub reading: Reading,
     /// Scale and ground.
     #[serde(flatten)]
     pub coordinates: Coordinates,
@@ -139,6 +143,9 @@ pub struct OpenOptions {
     /// How its objects were changed by hand.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub objects: Vec<Regroup>,
+    /// Whether it is looked whether the photographs show the mesh from their poses.
+    #[serde(skip)]
+    pub check_alignment: bool,
     /// Whether paths in the capture may lead out of its folder. Never kept in files, which may be someone else's.
     #[serde(skip)]
     pub allow_outside: bool,

@@ -1,7 +1,10 @@
 //! From a source to a capture that can be solved and shown.
 
-use crate::capture::photograph::PhotographSource;
+use crate::calibrate::alignment::{Alignment, Verdict};
+use crate::calibrate::photographs::{leave_out, name, without_hot_pixels};
+use crate::capture::photograph::{Photograph, PhotographSource};
 use crate::capture::read::{ReadOptions, read};
+use crate::capture::reading::Reading;
 use crate::capture::regroup::regroup;
 use crate::capture::segment::segment;
 use crate::capture::working::{Working, load_working};
@@ -11,7 +14,8 @@ use crate::inverse::faces::shown;
 use crate::inverse::held_out::HoldOut;
 use crate::inverse::solver::Problem;
 use crate::room;
-use crate::scene::prepare::prepare;
+use crate::scene::Scene;
+use crate::scene::prepare::{Prepared, prepare};
 use crate::session::command::{OpenOptions, Source};
 use crate::session::snapshot::OpenCapture;
 use std::fs;
@@ -26,12 +30,13 @@ const WORKING_PIXELS: u64 = 4_000_000;
 /// Something in it is missing or broken.
 pub fn open(source: &Source, options: &OpenOptions) -> Result<OpenCapture> {
     let capture = match source {
-        Source::BuiltInRoom => room::capture(),
+        Source::BuiltInRoom => Ok(room::capture()?.read_as(&options.reading)),
         Source::Folder(folder) => read(
             folder,
             &ReadOptions {
                 up: options.up,
                 segments: options.segments.map(|n| n as usize),
+                reading: options.reading,
                 allow_outside: options.allow_outside,
             },
         ),
@@ -48,24 +53,86 @@ impl OpenCapture {
         // Results belong to a capture in whatever coordinates.
         let hash = hash(&capture)?;
         let mut capture = capture.placed(options.up, &options.coordinates)?;
-        let working = load_working(&capture, WORKING_PIXELS)?;
+        let mut working = load_working(&capture, WORKING_PIXELS)?;
+        leave_out(&capture, &mut working)?;
+        let alignment = options
+            .check_alignment
+            .then(|| alignment(&capture, &working))
+            .transpose()?;
         if let Some(cut) = capture.cut.clone() {
             cut_up(&mut capture, &cut, &working, options.hold_out)?;
         }
         regroup(&mut capture.mesh, &options.objects)?;
-        let prepared = prepare(&capture, &working)?;
+        let prepared = prepare(&capture, &working).map_err(|error| {
+            let read_wrongly = alignment
+                .as_ref()
+                .and_then(|a| a.error(&capture.name, &options.reading));
+            read_wrongly.unwrap_or(error)
+        })?;
+        let mut warnings = prepared.warnings.clone();
+        let photographs = cool(&capture, &prepared, &mut warnings);
+        warnings.extend(alignment.as_ref().and_then(Alignment::warning));
         Ok(Self {
             name: capture.name.clone(),
             hash,
             source,
             options,
             summary: prepared.summary(),
-            warnings: prepared.warnings,
+            warnings,
             scene: Arc::new(prepared.scene),
-            photographs: prepared.photographs,
+            photographs,
             capture: Arc::new(capture),
+            alignment,
         })
     }
+
+    /// The reading with which the photographs agree with the mesh, where they plainly do not as the capture is read now.
+    pub fn other_reading(&self) -> Option<Reading> {
+        match self.alignment.as_ref()?.verdict {
+            Verdict::Wrong { reading, .. } => Some(self.options.reading.then(&reading)),
+            _ => None,
+        }
+    }
+
+    /// Refuses a capture whose photographs plainly do not show the mesh from their poses.
+    ///
+    /// # Errors
+    /// It is read wrongly; the remedy says how to read it.
+    pub fn aligned(self) -> Result<Self> {
+        let error = self
+            .alignment
+            .as_ref()
+            .and_then(|alignment| alignment.error(&self.name, &self.options.reading));
+        error.map_or(Ok(self), Err)
+    }
+}
+
+/// The photographs without hot pixels, which are counted in a warning for each photograph.
+fn cool(
+    capture: &Capture,
+    prepared: &Prepared,
+    warnings: &mut Vec<String>,
+) -> Vec<Arc<Photograph>> {
+    let scene = &prepared.scene;
+    let cooled = (prepared.photographs.iter().enumerate()).map(|(frame, photograph)| {
+        let seen = &scene.ids().triangles[frame];
+        let object = |pixel: usize| scene.object_of.get(seen[pixel] as usize).copied();
+        let Some((cooled, count)) = without_hot_pixels(photograph, object) else {
+            return photograph.clone();
+        };
+        warnings.push(format!(
+            "{}: {count} pixels are a thousand times as bright as all around them and are left out",
+            name(capture, frame)
+        ));
+        cooled
+    });
+    cooled.collect()
+}
+
+/// How well the photographs agree with the mesh.
+fn alignment(capture: &Capture, working: &Working) -> Result<Alignment> {
+    let scene = Scene::new(&capture.at(working))?;
+    Ok(Alignment::new(&scene, &working.photographs))
 }
 
 /// Cuts the mesh of a capture into segments, by what its photographs show of it too.
@@ -108,7 +175,7 @@ fn hash(capture: &Capture) -> Result<String> {
         let k = &frame.intrinsics;
         hasher.update(format!("{k:?} {:?} {:?}", frame.pose, frame.exposure).as_bytes());
         match &frame.photograph {
-            PhotographSource::File(path) => {
+            PhotographSource::File(path, _) => {
                 let bytes = fs::read(path).map_err(|error| Error::io(path, &error))?;
                 hasher.update(blake3::hash(&bytes).as_bytes());
             }

@@ -1,5 +1,6 @@
 //! What the worker shows: immutable, shared, latest wins.
 
+use crate::calibrate::alignment::Alignment;
 use crate::capture::Capture;
 use crate::capture::photograph::Photograph;
 use crate::compose::placement::Placement;
@@ -93,6 +94,8 @@ pub struct OpenCapture {
     pub summary: Vec<String>,
     /// What is odd about it.
     pub warnings: Vec<String>,
+    /// How well the photographs agree with the mesh, where the options ask for that.
+    pub alignment: Option<Alignment>,
 }
 
 /// Pictures of one view.

@@ -164,6 +164,7 @@ pub fn room() -> OpenCapture {
         name: capture.name.clone(),
         scene: Arc::new(Scene::new(&capture).expect("a scene")),
         photographs: (0..3).map(|index| Arc::new(photograph(index))).collect(),
+        alignment: None,
         summary: vec!["5 triangles in 3 objects".into()],
         warnings: capture.warnings.clone(),
         capture: Arc::new(capture),

@@ -1,5 +1,6 @@
 //! Around the panes: menus, tool bar, status bar, notices, palette, start page, dialogs.
 
+pub mod alignment;
 pub mod dialogs;
 pub mod files;
 pub mod keys;

@@ -3,6 +3,7 @@
 use crate::capture::camera::Pose;
 use crate::capture::import::ImportedFrame;
 use crate::capture::import::Lens;
+use crate::capture::orientation::Orientation;
 use crate::capture::photograph::Photograph;
 use crate::capture::read::image;
 use crate::error::{Error, Result};
@@ -33,7 +34,12 @@ impl View {
         let Some(depth) = &frame.depth else {
             return Err(Error::file(&frame.photograph, "has no depth image", ""));
         };
-        let (photograph, _) = image::read(&frame.photograph, &frame.lens.pinhole, frame.exposure)?;
+        let (photograph, _) = image::read(
+            &frame.photograph,
+            Orientation::default(),
+            &frame.lens.pinhole,
+            frame.exposure,
+        )?;
         Ok(Self {
             pose: frame.pose,
             lens: depth.lens,

@@ -48,12 +48,11 @@ pub fn from_exif(
     }
 }
 
-/// Time × ISO / F² of an EXIF block (a TIFF file), the linear multiplier up to the sensor's own scale.
+/// Time × ISO / F² of an EXIF record, the linear multiplier up to the sensor's own scale.
 ///
 /// `None` where the time is absent or the numbers are impossible. ISO and F-number count as 100 and 1 where absent:
 /// a phone's lens has but one.
-pub fn of_exif(block: Vec<u8>) -> Option<f64> {
-    let exif = exif::Reader::new().read_raw(block).ok()?;
+pub fn of_exif(exif: &exif::Exif) -> Option<f64> {
     let number = |tag| -> Option<f64> {
         let field = exif.get_field(tag, exif::In::PRIMARY)?;
         match &field.value {

@@ -1,6 +1,7 @@
 //! Photographs from EXR, Radiance HDR, PNG (8 and 16 bit) and JPEG, in linear light.
 
 use crate::capture::camera::Intrinsics;
+use crate::capture::orientation::Orientation;
 use crate::capture::photograph::{Encoding, Photograph};
 use crate::capture::read::exposure;
 use crate::error::{Error, Result};
@@ -28,6 +29,8 @@ pub struct Header {
     pub height: u32,
     /// How the values are stored.
     pub encoding: Encoding,
+    /// How EXIF says that the picture lies in the file; upright where it says nothing.
+    pub orientation: Orientation,
     /// Time × ISO / F² where EXIF has it.
     pub exif_exposure: Option<f64>,
 }
@@ -40,12 +43,18 @@ pub fn header(path: &Path) -> Result<Header> {
     let mut decoder = decoder(path)?;
     let (width, height) = decoder.dimensions();
     let encoding = encoding(path, decoder.color_type())?;
-    let block = decoder.exif_metadata().ok().flatten();
+    let exif = decoder.exif_metadata().ok().flatten();
+    let exif = exif.and_then(|block| exif::Reader::new().read_raw(block).ok());
+    let orientation = exif.as_ref().and_then(|exif| {
+        let field = exif.get_field(exif::Tag::Orientation, exif::In::PRIMARY)?;
+        Orientation::from_exif(field.value.get_uint(0)?)
+    });
     Ok(Header {
         width,
         height,
         encoding,
-        exif_exposure: block.and_then(exposure::of_exif),
+        orientation: orientation.unwrap_or_default(),
+        exif_exposure: exif.as_ref().and_then(exposure::of_exif),
     })
 }
 
@@ -53,14 +62,16 @@ pub fn header(path: &Path) -> Result<Header> {
 /// infinite or negative make a pixel unusable (its colour is then zero); such values, alpha apart, are counted.
 ///
 /// # Errors
-/// The file cannot be read, is no image, or has another size than the camera.
+/// The file cannot be read, is no image, or has, turned as `orientation` says, another size than the camera.
 pub fn read(
     path: &Path,
+    orientation: Orientation,
     intrinsics: &Intrinsics,
     exposure: Option<f64>,
 ) -> Result<(Photograph, usize)> {
     let decoder = decoder(path)?;
-    let (width, height) = decoder.dimensions();
+    let (stored_width, stored_height) = decoder.dimensions();
+    let [width, height] = orientation.size([stored_width, stored_height]);
     if (width, height) != (intrinsics.width, intrinsics.height) {
         return Err(Error::file(
             path,
@@ -97,8 +108,8 @@ pub fn read(
         usable.clear();
     }
     let photograph = Photograph {
-        width,
-        height,
+        width: stored_width,
+        height: stored_height,
         pixels,
         usable,
         encoding,
@@ -108,7 +119,10 @@ pub fn read(
         },
         limits: Vec::new(),
     };
-    Ok((photograph, invalid))
+    match orientation == Orientation::default() {
+        true => Ok((photograph, invalid)),
+        false => Ok((photograph.oriented(orientation), invalid)),
+    }
 }
 
 /// Opens the decoder that the file's first bytes ask for, with its size checked and its memory limited.

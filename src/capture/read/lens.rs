@@ -54,25 +54,36 @@ pub fn read(
         }
     }
 
-    // The size must be the image's own.
+    // A lens that is given for the same photograph at another size is scaled to this one.
     let [width, height] = size;
-    for (name, actual) in [("w", width), ("h", height)] {
-        if let Some(stated) = of(name).count(name)?
-            && stated != actual
-        {
+    let mut scale = DVec2::ONE;
+    if let Some([stated_width, stated_height]) = stated_size(shared, frame)?
+        && [stated_width, stated_height] != size
+    {
+        let ratio = |a: u32, b: u32| f64::from(a) / f64::from(b);
+        scale = DVec2::new(ratio(width, stated_width), ratio(height, stated_height));
+        let same_shape = (scale.x * f64::from(stated_height) - f64::from(height)).abs() < 1.0;
+        if !same_shape {
             let photograph = frame.text("file_path")?.unwrap_or("the photograph");
+            let remedy = match (stated_width, stated_height) == (height, width) {
+                true => "turn the photographs: pass --turn 90 or --turn 270",
+                false => "correct the intrinsics or use photographs of the camera's size",
+            };
             return Err(Error::new(
-                of(name).place(name),
-                format!("is {stated}, but {photograph} is {width}×{height} pixels"),
-                "correct the intrinsics or use photographs of the camera's size",
+                of("w").place("w"),
+                format!(
+                    "the lens is given for {stated_width}×{stated_height} pixels, but {photograph} has {width}×{height}"
+                ),
+                remedy,
             ));
         }
+        remarks.push("the lens is given for another size of the same photograph, and scaled to it");
     }
 
     // Focal length in pixels, or from the field of view.
     let half = |extent: u32, angle: f64| f64::from(extent) * 0.5 / (angle * 0.5).tan();
     let fx = match (number("fl_x")?, number("camera_angle_x")?) {
-        (Some(f), _) => f,
+        (Some(f), _) => f * scale.x,
         (None, Some(angle)) => half(width, angle),
         (None, None) => {
             return Err(Error::new(
@@ -83,23 +94,26 @@ pub fn read(
         }
     };
     let fy = match (number("fl_y")?, number("camera_angle_y")?) {
-        (Some(f), _) => f,
+        (Some(f), _) => f * scale.y,
         (None, Some(angle)) => half(height, angle),
         (None, None) => {
             remarks.push("fl_y is absent and taken equal to fl_x");
             fx
         }
     };
-    let mut center = |name: &str, extent: u32| -> Result<f64> {
+    let mut center = |name: &str, extent: u32, scale: f64| -> Result<f64> {
         Ok(match number(name)? {
-            Some(c) => c,
+            Some(c) => c * scale,
             None => {
                 remarks.push("cx or cy is absent and taken as the middle of the photograph");
                 f64::from(extent) * 0.5
             }
         })
     };
-    let (cx, cy) = (center("cx", width)?, center("cy", height)?);
+    let (cx, cy) = (
+        center("cx", width, scale.x)?,
+        center("cy", height, scale.y)?,
+    );
     let mut distortion = [0.0; 4];
     for (value, name) in distortion.iter_mut().zip(["k1", "k2", "p1", "p2"]) {
         *value = number(name)?.unwrap_or(0.0);
@@ -127,6 +141,19 @@ pub fn read(
             .push("the lens distortion turns back inside the photograph; its corners may be wrong");
     }
     Ok((intrinsics, remarks))
+}
+
+/// Width and height that the lens is given for, where both are stated.
+pub fn stated_size(shared: &Fields, frame: &Fields) -> Result<Option<[u32; 2]>> {
+    let count = |name: &str| match frame.get(name) {
+        Some(_) => frame.count(name),
+        None => shared.count(name),
+    };
+    let sizes = [count("w")?, count("h")?];
+    Ok(match sizes {
+        [Some(w), Some(h)] if w > 0 && h > 0 => Some([w, h]),
+        _ => None,
+    })
 }
 
 /// Whether the distortion can be undone at the photograph's corners and edges, to a tenth of a pixel.

@@ -29,6 +29,7 @@ pub(in crate::capture) mod pose;
 mod transforms;
 
 use crate::capture::read::mesh::RawMesh;
+use crate::capture::reading::Reading;
 use crate::capture::{Capture, Cut};
 use crate::error::{Error, Result};
 use confine::Confine;
@@ -45,6 +46,8 @@ pub struct ReadOptions {
     pub up: Option<DVec3>,
     /// About how many segments a mesh without objects is cut into; 1 leaves it whole.
     pub segments: Option<usize>,
+    /// How the files' numbers are meant.
+    pub reading: Reading,
     /// Lets file paths inside the capture lead out of its folder.
     pub allow_outside: bool,
 }
@@ -64,10 +67,15 @@ pub fn read(folder: &Path, options: &ReadOptions) -> Result<Capture> {
     }
     let confine = Confine::new(folder, options.allow_outside)?;
     let mut warnings = Vec::new();
-    let transforms = transforms::read(&confine, options.up, &mut warnings)?;
+    let transforms = transforms::read(
+        &confine,
+        options.up,
+        options.reading.orientation,
+        &mut warnings,
+    )?;
     let raw = mesh::read(&transforms.mesh, &confine, &mut warnings)?;
     let cut = cut(&raw, &transforms.mesh, options.segments, &mut warnings);
-    Ok(Capture {
+    let capture = Capture {
         name: name_of(folder),
         folder: Some(folder.to_path_buf()),
         mesh: raw.mesh,
@@ -75,7 +83,8 @@ pub fn read(folder: &Path, options: &ReadOptions) -> Result<Capture> {
         frames: transforms.frames,
         up: transforms.up,
         warnings,
-    })
+    };
+    Ok(capture.read_as(&options.reading))
 }
 
 /// How a mesh without objects is to be cut, if that is wanted; a single object of a scan's complexity counts as none.

@@ -1,6 +1,7 @@
 //! transforms.json: cameras, photographs, exposures, the way to the mesh, and which way is up.
 
 use crate::capture::Frame;
+use crate::capture::orientation::Orientation;
 use crate::capture::photograph::PhotographSource;
 use crate::capture::read::confine::Confine;
 use crate::capture::read::fields::Fields;
@@ -37,6 +38,7 @@ pub struct Transforms {
 pub fn read(
     confine: &Confine,
     up: Option<DVec3>,
+    orientation: Orientation,
     warnings: &mut Vec<String>,
 ) -> Result<Transforms> {
     let path = confine.folder().join("transforms.json");
@@ -55,7 +57,7 @@ pub fn read(
         .map_err(|e| Error::file(&file, format!("is not valid JSON: {e}"), "correct the file"))?;
     let shared = Fields::new(format!("{place}: "), &value)?;
 
-    let frames = read_frames(confine, &shared, warnings)?;
+    let frames = read_frames(confine, &shared, orientation, warnings)?;
     let mesh = find_mesh(confine, &shared)?;
     if shared.get("applied_transform").is_some() {
         warnings.push(format!(
@@ -76,6 +78,7 @@ pub fn read(
 fn read_frames(
     confine: &Confine,
     shared: &Fields,
+    orientation: Orientation,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Frame>> {
     let place = shared.place("frames");
@@ -91,7 +94,7 @@ fn read_frames(
         .enumerate()
         .map(|(index, entry)| {
             let fields = Fields::new(format!("{place}[{index}]."), entry)?;
-            read_frame(confine, shared, &fields)
+            read_frame(confine, shared, &fields, orientation)
         })
         .collect();
 
@@ -116,11 +119,12 @@ fn read_frames(
     Ok(frames)
 }
 
-/// Reads one entry of `frames`.
+/// Reads one entry of `frames`; `orientation` is how a person says that all photographs lie.
 fn read_frame(
     confine: &Confine,
     shared: &Fields,
     fields: &Fields,
+    orientation: Orientation,
 ) -> Result<(Frame, image::Header, Vec<String>)> {
     let place = fields.place("file_path");
     let name = fields
@@ -139,8 +143,20 @@ fn read_frame(
             "run `relit import` on the folder, which resamples its photographs to a pinhole",
         ));
     }
-    let (intrinsics, said) = lens::read(shared, fields, [header.width, header.height])?;
+    // A camera of the stored picture's size was calibrated on that; else EXIF says how the picture is turned.
+    let stored = [header.width, header.height];
+    let turned = header.orientation;
+    let lies = match lens::stated_size(shared, fields)? {
+        Some(size) if size == orientation.size(stored) => Orientation::default(),
+        Some(size) if size == turned.then(orientation).size(stored) => turned,
+        _ => Orientation::default(),
+    };
+    let shown = lies.then(orientation).size(stored);
+    let (intrinsics, said) = lens::read(shared, fields, shown)?;
     let mut remarks: Vec<String> = said.into_iter().map(str::to_owned).collect();
+    if lies != Orientation::default() {
+        remarks.push("the photograph is turned as its EXIF record says".into());
+    }
 
     let (pose, remark) = pose::of_frame(fields)?;
     remarks.extend(remark);
@@ -168,7 +184,7 @@ fn read_frame(
         intrinsics,
         pose,
         exposure,
-        photograph: PhotographSource::File(photograph),
+        photograph: PhotographSource::File(photograph, lies),
         depth,
     };
     Ok((frame, header, remarks))

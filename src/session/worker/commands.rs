@@ -25,6 +25,7 @@ impl Worker {
             Command::Open(source) => {
                 let options = OpenOptions {
                     hold_out: HoldOut::from(&self.settings),
+                    check_alignment: true,
                     ..OpenOptions::default()
                 };
                 return Some(Next::Open(source, options));

@@ -118,8 +118,13 @@ impl Worker {
             Ok(capture) => {
                 self.seconds_load = self.started.elapsed().as_secs_f64();
                 self.keep(true);
+                let suspect = capture.other_reading().is_some();
                 self.adopt(capture);
                 self.set_aside();
+                if suspect {
+                    self.phase = Phase::Paused;
+                    return Next::Wait;
+                }
                 Next::Solve(None)
             }
             // What was open stays open.

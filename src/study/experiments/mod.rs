@@ -22,6 +22,7 @@ mod mis;
 mod moved;
 mod objects;
 mod precision;
+pub mod readings;
 mod sampling;
 mod selection;
 mod standing;

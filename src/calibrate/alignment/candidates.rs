@@ -1,0 +1,93 @@
+//! Other ways to read a capture, each of which is a mistake that people make.
+
+use crate::capture::orientation::Orientation;
+use crate::capture::reading::{Axes, Reading};
+
+/// Units that meshes and poses are written in, in metres, and powers of ten besides.
+const UNITS: [f64; 9] = [0.001, 0.01, 0.0254, 0.1, 0.3048, 10.0, 39.37, 100.0, 1000.0];
+/// Photographs over the size that their lens is given for.
+const SIZES: [f64; 6] = [0.125, 0.25, 0.5, 2.0, 4.0, 8.0];
+/// Factors of scale and focal length are tried in steps of 5 %, twice as fine as edges blur by being a pixel off, ...
+const STEP: f64 = 1.05;
+/// ... up to a factor of 2.5; focal lengths a tenth or ten times as long too.
+const STEPS: i32 = 19;
+
+/// Readings so near to that of the files that photographs fit both somewhat: scale and focal length 5 and 10 % off.
+pub fn near() -> Vec<Reading> {
+    [-2, -1, 1, 2].into_iter().flat_map(factor).collect()
+}
+
+/// All other readings.
+pub fn all() -> Vec<Reading> {
+    let given = Reading::default();
+    let mut readings: Vec<Reading> = (1..=STEPS).flat_map(|n| [n, -n]).flat_map(factor).collect();
+    readings.extend(UNITS.map(|mesh_scale| Reading {
+        mesh_scale,
+        ..given
+    }));
+    readings.extend([0.1, 10.0].map(|focal| Reading { focal, ..given }));
+    readings.extend(SIZES.map(|lens_scale| Reading {
+        lens_scale,
+        ..given
+    }));
+    let turned = [1, 2, 3].map(Orientation::turned);
+    let mirrored = [0, 2].map(|n| Orientation::MIRRORED.then(Orientation::turned(n)));
+    readings.extend(
+        turned
+            .into_iter()
+            .chain(mirrored)
+            .map(|orientation| Reading {
+                orientation,
+                ..given
+            }),
+    );
+    readings.extend([-1, 1].map(|shift| Reading { shift, ..given }));
+    for axes in [Axes::OpenGl, Axes::OpenCv] {
+        for mesh_turns in 0..4 {
+            readings.push(Reading {
+                axes,
+                mesh_turns,
+                ..given
+            });
+        }
+    }
+    readings.retain(|reading| !reading.is_default());
+    readings
+}
+
+/// Scale and focal length off by some steps.
+fn factor(steps: i32) -> [Reading; 2] {
+    let factor = STEP.powi(steps);
+    let given = Reading::default();
+    [
+        Reading {
+            mesh_scale: factor,
+            ..given
+        },
+        Reading {
+            focal: factor,
+            ..given
+        },
+    ]
+}
+
+/// Readings between a reading and its neighbours, to find its factor more exactly; none where it has no factor.
+pub fn finer(reading: &Reading) -> Vec<Reading> {
+    let steps = (-4..=4).filter(|&n| n != 0);
+    let factors = steps.map(|n| STEP.powf(f64::from(n) / 5.0));
+    match (reading.mesh_scale != 1.0, reading.focal != 1.0) {
+        (true, false) => factors
+            .map(|f| Reading {
+                mesh_scale: reading.mesh_scale * f,
+                ..*reading
+            })
+            .collect(),
+        (false, true) => factors
+            .map(|f| Reading {
+                focal: reading.focal * f,
+                ..*reading
+            })
+            .collect(),
+        _ => Vec::new(),
+    }
+}

@@ -1,0 +1,195 @@
+//! How much better a photograph's own edges fit the mesh's where they should be than where they should not.
+
+use crate::calibrate::alignment::edges::{Edge, Edges, Towards};
+use crate::capture::photograph::Photograph;
+use crate::math::color::luminance;
+use crate::math::stats::Moments;
+use glam::Vec3;
+
+/// Edges are compared with the photograph at displacements up to this many pixels, ...
+const REACH: i32 = 8;
+/// ... of which those from this distance on tell what chance gives.
+const FAR: f32 = 5.0;
+/// Fewer edges of a kind say nothing.
+const MIN_EDGES: usize = 30;
+/// A kind of edge says at most this much, in standard deviations, so that no one decides alone.
+const MAX_SCORE: f64 = 8.0;
+/// Radiance below this is darkness.
+const DARK: f32 = 1e-8;
+
+/// How much a photograph changes from pixel to pixel, as a rank within it: whatever its exposure, contrast and noise.
+#[derive(Debug, Clone)]
+pub struct Contrast {
+    width: i32,
+    height: i32,
+    /// Rank from 0 to 1 of the change towards the right and down; no number where there is no neighbour.
+    ranks: [Vec<f32>; 2],
+}
+
+impl Contrast {
+    /// Of pixels of logarithmic luminance, row by row.
+    pub fn new(levels: &[f32], width: u32, height: u32) -> Self {
+        let (columns, rows) = (width as usize, height as usize);
+        let mut changes = Vec::with_capacity(2 * levels.len());
+        for pixel in 0..levels.len() {
+            if pixel % columns + 1 < columns {
+                changes.push(((levels[pixel] - levels[pixel + 1]).abs(), 0, pixel));
+            }
+            if pixel / columns + 1 < rows {
+                changes.push(((levels[pixel] - levels[pixel + columns]).abs(), 1, pixel));
+            }
+        }
+        changes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut ranks = [vec![f32::NAN; levels.len()], vec![f32::NAN; levels.len()]];
+        for (place, &(_, towards, pixel)) in changes.iter().enumerate() {
+            ranks[towards][pixel] = place as f32 / changes.len() as f32;
+        }
+        Self {
+            width: width as i32,
+            height: height as i32,
+            ranks,
+        }
+    }
+
+    /// Mean rank of a photograph's changes at edges displaced by (dx, dy); `None` where they leave the picture.
+    fn at(&self, edges: &[Edge], dx: i32, dy: i32) -> Option<f64> {
+        let (mut sum, mut count) = (0.0, 0u32);
+        for edge in edges {
+            let (x, y) = (edge.x + dx, edge.y + dy);
+            if x < 0 || y < 0 || x >= self.width || y >= self.height {
+                continue;
+            }
+            let ranks = match edge.towards {
+                Towards::Right => &self.ranks[0],
+                Towards::Down => &self.ranks[1],
+            };
+            let rank = ranks[(y * self.width + x) as usize];
+            if rank.is_finite() {
+                sum += f64::from(rank);
+                count += 1;
+            }
+        }
+        (count as usize >= MIN_EDGES / 2).then(|| sum / f64::from(count))
+    }
+
+    /// How well the photograph's changes fit edges of the mesh, in standard deviations of what displaced edges give: near zero
+    /// by chance, a few where they fit. Zero where there are too few edges.
+    pub fn score(&self, edges: &Edges) -> f64 {
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for kind in edges.kinds.iter().filter(|kind| kind.len() >= MIN_EDGES) {
+            if let Some(score) = self.score_of(kind) {
+                let count = kind.len() as f64;
+                sum += count.sqrt() * score.clamp(-MAX_SCORE, MAX_SCORE);
+                weights += count;
+            }
+        }
+        if weights > 0.0 {
+            sum / f64::sqrt(weights)
+        } else {
+            0.0
+        }
+    }
+
+    /// The same for edges of one kind.
+    fn score_of(&self, edges: &[Edge]) -> Option<f64> {
+        let side = 2 * REACH + 1;
+        let profile: Vec<Option<f64>> = (0..side * side)
+            .map(|i| self.at(edges, i % side - REACH, i / side - REACH))
+            .collect();
+        // The best of nine neighbouring displacements, since poses are off by a pixel.
+        let best = |dx: i32, dy: i32| -> Option<f64> {
+            let around = (-1..=1).flat_map(|y| (-1..=1).map(move |x| (dx + x, dy + y)));
+            let values =
+                around.filter_map(|(x, y)| profile[((y + REACH) * side + x + REACH) as usize]);
+            values.reduce(f64::max)
+        };
+        let mut far = Moments::default();
+        for dy in 1 - REACH..REACH {
+            for dx in 1 - REACH..REACH {
+                if ((dx * dx + dy * dy) as f32).sqrt() >= FAR {
+                    far.push(best(dx, dy)?);
+                }
+            }
+        }
+        let deviation = far.variance().sqrt();
+        (deviation > 0.0).then(|| best(0, 0).map(|here| (here - far.mean) / deviation))?
+    }
+}
+
+/// Logarithmic luminance of a photograph reduced to another size, each pixel the mean of those that it covers.
+pub fn levels(photograph: &Photograph, width: u32, height: u32) -> Vec<f32> {
+    let span = |index: u32, count: u32, of: u32| {
+        let from = (u64::from(index) * u64::from(of) / u64::from(count)) as u32;
+        let to = (u64::from(index + 1) * u64::from(of) / u64::from(count)) as u32;
+        from..to.max(from + 1)
+    };
+    let pixel = |x: u32, y: u32| {
+        let mut sum = Vec3::ZERO;
+        let mut count = 0.0;
+        for row in span(y, height, photograph.height) {
+            for column in span(x, width, photograph.width) {
+                sum += photograph.pixels[(row * photograph.width + column) as usize];
+                count += 1.0;
+            }
+        }
+        let level = luminance(sum / count);
+        match level.is_finite() {
+            true => level.max(DARK).ln(),
+            false => DARK.ln(),
+        }
+    };
+    (0..height)
+        .flat_map(|y| (0..width).map(move |x| (x, y)))
+        .map(|(x, y)| pixel(x, y))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::rng::Stream;
+
+    /// A picture with a bright disc in noise, and the edges of a disc displaced by `(dx, dy)`.
+    fn disc(dx: i32, dy: i32) -> (Contrast, Edges) {
+        let (width, height) = (96i32, 72i32);
+        let inside = |x: i32, y: i32| (x - 48).pow(2) + (y - 36).pow(2) < 400;
+        let mut stream = Stream::new(81, 0, 0, 0);
+        let levels: Vec<f32> = (0..width * height)
+            .map(|i| f32::from(inside(i % width, i / width)) + 0.5 * stream.uniform())
+            .collect();
+        let mut edges = Edges::default();
+        for y in 0..height - 1 {
+            for x in 0..width - 1 {
+                for (towards, there) in [
+                    (Towards::Right, inside(x + 1, y)),
+                    (Towards::Down, inside(x, y + 1)),
+                ] {
+                    if inside(x, y) != there {
+                        let (x, y) = (x + dx, y + dy);
+                        edges.kinds[0].push(Edge { x, y, towards });
+                    }
+                }
+            }
+        }
+        (Contrast::new(&levels, width as u32, height as u32), edges)
+    }
+
+    #[test]
+    fn edges_in_place_score_and_displaced_ones_do_not() {
+        let score = |dx, dy| {
+            let (contrast, edges) = disc(dx, dy);
+            contrast.score(&edges)
+        };
+        assert!(score(0, 0) > 4.0, "{}", score(0, 0));
+        assert!(score(1, 0) > 4.0, "{}", score(1, 0));
+        assert!(score(5, 4).abs() < 2.5, "{}", score(5, 4));
+    }
+
+    #[test]
+    fn a_picture_without_contrast_or_edges_scores_nothing() {
+        let (contrast, edges) = disc(0, 0);
+        assert_eq!(contrast.score(&Edges::default()), 0.0);
+        let flat = Contrast::new(&vec![0.0; 96 * 72], 96, 72);
+        assert!(flat.score(&edges).abs() < 2.5, "{}", flat.score(&edges));
+    }
+}

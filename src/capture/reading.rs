@@ -1,0 +1,245 @@
+//! How the numbers of a capture's files are meant: axes, units, sizes, and which photograph belongs to which pose.
+//!
+//! Files rarely say it. The default is the format's own convention; a person may say otherwise, and
+//! [`crate::calibrate::alignment`] finds out which reading the photographs agree with.
+
+use crate::capture::camera::Intrinsics;
+use crate::capture::orientation::Orientation;
+use crate::capture::photograph::PhotographSource;
+use crate::capture::{Capture, Frame};
+use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::FRAC_PI_2;
+
+/// Which way a camera's axes point.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Axes {
+    /// x right, y up, looking down −z.
+    #[default]
+    OpenGl,
+    /// x right, y down, looking down +z.
+    OpenCv,
+}
+
+/// How a capture's files are to be read.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Reading {
+    /// Axes of the poses.
+    pub axes: Axes,
+    /// Quarter turns of the mesh about the x axis, 0 to 3: 3 takes a mesh whose z is up to poses whose y is up.
+    pub mesh_turns: u8,
+    /// What the mesh's coordinates are multiplied by to be in the poses' unit.
+    pub mesh_scale: f64,
+    /// What focal lengths are multiplied by.
+    pub focal: f64,
+    /// What focal lengths and principal points are multiplied by: photographs over the size that the lens is given for.
+    pub lens_scale: f64,
+    /// How all photographs are turned or mirrored, after what their files say.
+    pub orientation: Orientation,
+    /// Pose k has the photograph of frame k + `shift`, around the end.
+    pub shift: i32,
+}
+
+impl Default for Reading {
+    fn default() -> Self {
+        Self {
+            axes: Axes::OpenGl,
+            mesh_turns: 0,
+            mesh_scale: 1.0,
+            focal: 1.0,
+            lens_scale: 1.0,
+            orientation: Orientation::default(),
+            shift: 0,
+        }
+    }
+}
+
+impl Reading {
+    /// Whether files are read by the format's own conventions.
+    pub fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// This reading followed by another, which was found on the capture as this one reads it.
+    pub fn then(&self, next: &Self) -> Self {
+        Self {
+            axes: match (self.axes, next.axes) {
+                (a, b) if a == b => Axes::OpenGl,
+                _ => Axes::OpenCv,
+            },
+            mesh_turns: (self.mesh_turns + next.mesh_turns) % 4,
+            mesh_scale: self.mesh_scale * next.mesh_scale,
+            focal: self.focal * next.focal,
+            lens_scale: self.lens_scale * next.lens_scale,
+            orientation: self.orientation.then(next.orientation),
+            shift: self.shift + next.shift,
+        }
+    }
+
+    /// The rotation that takes the mesh's coordinates to those of the poses.
+    pub fn mesh_rotation(&self) -> DMat3 {
+        match self.mesh_turns % 4 {
+            0 => DMat3::IDENTITY,
+            turns => DMat3::from_rotation_x(f64::from(turns) * FRAC_PI_2),
+        }
+    }
+
+    /// The options of the command line that ask for this reading; empty for the default.
+    pub fn options(&self) -> String {
+        let number = |value: f64| {
+            let text = format!("{value:.3}");
+            match value {
+                v if v < 0.1 => format!("{v:.3e}"),
+                _ => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+            }
+        };
+        let mut options = Vec::new();
+        if self.axes == Axes::OpenCv {
+            options.push("--axes opencv".to_owned());
+        }
+        if self.mesh_turns != 0 {
+            options.push(format!("--mesh-turn {}", 90 * u32::from(self.mesh_turns)));
+        }
+        for (name, value) in [
+            ("--mesh-scale", self.mesh_scale),
+            ("--focal", self.focal),
+            ("--lens-scale", self.lens_scale),
+        ] {
+            if value != 1.0 {
+                options.push(format!("{name} {}", number(value)));
+            }
+        }
+        if self.orientation.mirrored {
+            options.push("--mirror".to_owned());
+        }
+        if self.orientation.turns != 0 {
+            options.push(format!("--turn {}", 90 * u32::from(self.orientation.turns)));
+        }
+        if self.shift != 0 {
+            options.push(format!("--shift={}", self.shift));
+        }
+        options.join(" ")
+    }
+}
+
+impl Intrinsics {
+    /// The lens as a reading means it. For photographs turned by a quarter it is that of the turned picture; a principal point in
+    /// the middle of the picture stays there, and another is taken for the turned picture's already.
+    pub fn read_as(&self, reading: &Reading) -> Self {
+        let mut lens = *self;
+        lens.fx *= reading.focal * reading.lens_scale;
+        lens.fy *= reading.focal * reading.lens_scale;
+        lens.cx *= reading.lens_scale;
+        lens.cy *= reading.lens_scale;
+        if reading.orientation.turns % 2 == 1 {
+            (lens.width, lens.height) = (self.height, self.width);
+            let middle = |center: f64, from: u32, to: u32| {
+                let (from, to) = (f64::from(from) * 0.5, f64::from(to) * 0.5);
+                match (center - from).abs() < (center - to).abs() {
+                    true => center * to / from,
+                    false => center,
+                }
+            };
+            lens.cx = middle(lens.cx, self.width, lens.width);
+            lens.cy = middle(lens.cy, self.height, lens.height);
+        }
+        lens
+    }
+}
+
+impl Capture {
+    /// The capture as a reading means it. Photographs in files are turned when they are read.
+    pub fn read_as(mut self, reading: &Reading) -> Self {
+        if reading.is_default() {
+            return self;
+        }
+        let mean_up = |frames: &[Frame]| -> DVec3 {
+            let sum: DVec3 = frames.iter().map(|f| f.pose.rotation.y_axis).sum();
+            sum.normalize_or_zero()
+        };
+        let up_is_the_cameras = mean_up(&self.frames).abs_diff_eq(self.up, 1e-9);
+        let to_poses = reading.mesh_rotation() * reading.mesh_scale;
+        for position in &mut self.mesh.positions {
+            *position = to_poses * *position;
+        }
+        for frame in &mut self.frames {
+            if reading.axes == Axes::OpenCv {
+                frame.pose.rotation.y_axis *= -1.0;
+                frame.pose.rotation.z_axis *= -1.0;
+            }
+            // A photograph in a file was read for its turned size already.
+            let in_file = matches!(frame.photograph, PhotographSource::File(..));
+            let lens = Reading {
+                orientation: match in_file {
+                    true => Orientation::default(),
+                    false => reading.orientation,
+                },
+                ..*reading
+            };
+            frame.intrinsics = frame.intrinsics.read_as(&lens);
+            frame.photograph = frame.photograph.oriented(reading.orientation);
+        }
+        if up_is_the_cameras {
+            self.up = mean_up(&self.frames);
+        }
+        let count = self.frames.len();
+        let shown: Vec<_> = (self.frames.iter())
+            .map(|frame| {
+                (
+                    frame.photograph.clone(),
+                    frame.exposure,
+                    frame.depth.clone(),
+                )
+            })
+            .collect();
+        for (index, frame) in self.frames.iter_mut().enumerate() {
+            let of = (index as i64 + i64::from(reading.shift)).rem_euclid(count as i64) as usize;
+            (frame.photograph, frame.exposure, frame.depth) = shown[of].clone();
+        }
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_say_what_differs_from_the_format() {
+        assert_eq!(Reading::default().options(), "");
+        let reading = Reading {
+            axes: Axes::OpenCv,
+            mesh_turns: 3,
+            mesh_scale: 0.01,
+            focal: 1.25,
+            lens_scale: 0.5,
+            orientation: Orientation::turned(2),
+            shift: -1,
+        };
+        assert_eq!(
+            reading.options(),
+            "--axes opencv --mesh-turn 270 --mesh-scale 1.000e-2 --focal 1.25 --lens-scale 0.5 --turn 180 --shift=-1"
+        );
+    }
+
+    #[test]
+    fn a_reading_after_another_is_their_product() {
+        let first = Reading {
+            mesh_scale: 0.01,
+            axes: Axes::OpenCv,
+            ..Reading::default()
+        };
+        let second = Reading {
+            mesh_scale: 0.95,
+            axes: Axes::OpenCv,
+            shift: 1,
+            ..Reading::default()
+        };
+        let both = first.then(&second);
+        assert_eq!(both.axes, Axes::OpenGl);
+        assert!((both.mesh_scale - 0.0095).abs() < 1e-12);
+        assert_eq!(both.shift, 1);
+    }
+}
