@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Exit code of an aborted program, as shells count it (128 + SIGINT).
-const ABORTED: i32 = 130;
+pub const ABORTED: i32 = 130;
 
 /// Whether the person asked to end.
 #[derive(Debug, Clone, Default)]

@@ -11,6 +11,7 @@ mod object_values;
 mod parameters;
 mod photographs;
 mod progress;
+pub mod reference;
 mod render;
 mod report;
 mod saved;
