@@ -1,4 +1,4 @@
-//! The table of `EXTREMES.md`: one test or more for each of its rows.
+//! The table of `docs/src/robustness.md`: one test or more for each of its rows.
 
 #[path = "../scenes/mod.rs"]
 mod scenes;

@@ -6,9 +6,11 @@ use crate::inverse::settings::Settings;
 use crate::room::Room;
 use crate::room::photographs::Rendering;
 use crate::study::experiments::course::{
-    Gauge, Mark, cache_settings, cached, descend, paper_settings, rays_at,
+    CACHE_WITHOUT, Gauge, Mark, cache_settings, cached, descend, paper_settings, rays_at,
 };
-use crate::study::experiments::courses::{Kind, Quantity, Spread, common_mark, plot, table, words};
+use crate::study::experiments::courses::{
+    Kind, Quantity, Spread, common_mark, comparison, plot, table, words,
+};
 use crate::study::experiments::twin::{Sizes, twin};
 use crate::study::experiments::{Bench, Findings, Study, Subject, Summary, box_room};
 
@@ -131,16 +133,15 @@ fn run(bench: &Bench) -> Result<Findings> {
             plot(&title, "rays", label, rays, |e| e.albedo, &drawn, &[]),
         ));
     }
-    let at_most = if limits.seconds.is_finite() {
-        format!("{:.1} s each", limits.seconds)
-    } else {
-        "cut short to try the program".to_owned()
-    };
     Ok(Findings {
         how: format!(
-            "{how}; {} seeds. The paper's descent ({at_most}) is compared at equal rays, where its errors are the same on every machine; the \
-             transport cache goes to where it ends by itself. The loss is measured with all bounces.",
+            "{how}; {} seeds. The paper's descent ({} each) is compared at equal rays, where its errors are the same on every machine; the \
+             transport cache goes to where it ends by itself, with {CACHE_WITHOUT}. The loss is measured with all bounces. {}Two \
+             bounces are called enough where albedo is off by no more than {TOLERABLE}, or by no more than {FACTOR} times what \
+             adaptive depth comes to.",
             bench.seeds,
+            limits.words(),
+            comparison(bench.seeds),
         ),
         tables: vec![("", table("room, solver, bounces", &kinds, &[]))],
         plots,
@@ -251,7 +252,7 @@ fn summary(scenes: &[Scene]) -> Summary {
 
 fn seen(scenes: &[Scene]) -> Vec<String> {
     let mut seen = Vec::new();
-    let mut first = None;
+    let (mut tried, mut short) = (0, Vec::new());
     for scene in scenes {
         let at = |depth: u64| {
             let found = scene.cache.iter().find(|(d, _)| *d == depth);
@@ -259,7 +260,8 @@ fn seen(scenes: &[Scene]) -> Vec<String> {
         };
         if let (Some(one), Some(two), Some(deep)) = (at(1), at(2), at(0)) {
             let enough = two.mean <= TOLERABLE.max(FACTOR * deep.mean);
-            first = first.or((!enough).then_some(&scene.name));
+            tried += 1;
+            short.extend((!enough).then_some(scene.name.as_str()));
             seen.push(format!(
                 "{}, transport cache: albedo is off by {} with one bounce, {} with two, {} with adaptive \
                  depth. Two are {}.",
@@ -272,17 +274,18 @@ fn seen(scenes: &[Scene]) -> Vec<String> {
         }
         seen.extend(balance(scene));
     }
-    seen.push(match first {
-        Some(name) => format!(
-            "By the transport cache, two bounces stop being enough (off by more than {TOLERABLE} and by more than {FACTOR} \
-             times what adaptive depth reaches) with {name}, of what was tried in this order.",
-        ),
-        None => "Two bounces were enough everywhere they were tried.".to_owned(),
-    });
+    let said = match (tried, short.as_slice()) {
+        (0, _) => return seen,
+        (_, []) => format!("in none of {tried} tried"),
+        (_, names) => format!("in {} of {tried} tried: {}", names.len(), names.join(", ")),
+    };
+    seen.push(format!(
+        "Two bounces are not enough for the transport cache {said}."
+    ));
     seen
 }
 
-/// Whether two bounces were the balance of the descent.
+/// Which depth served the descent best, and which are as good within the noise.
 fn balance(scene: &Scene) -> Option<String> {
     let (mark, errors) = at_equal_rays(scene);
     let known: Vec<(u64, Spread)> = (errors.into_iter())
@@ -290,16 +293,22 @@ fn balance(scene: &Scene) -> Option<String> {
         .collect();
     let (best, least) = *known.iter().min_by(|a, b| a.1.mean.total_cmp(&b.1.mean))?;
     let (_, two) = known.iter().find(|(depth, _)| *depth == 2)?;
-    let verdict = if best == 2 || !two.differs(&least) {
-        "two are as good as the best within noise: the paper is confirmed"
-    } else {
-        "the paper's two are not the balance here"
+    let bounces = |depth: u64| format!("{depth} bounce{}", if depth == 1 { "" } else { "s" });
+    let within: Vec<String> = (known.iter())
+        .filter(|(depth, error)| *depth != best && !error.differs(&least))
+        .map(|(depth, _)| bounces(*depth))
+        .collect();
+    let within = match (least.count, within.as_slice()) {
+        (0 | 1, _) => "one seed tells no noise".to_owned(),
+        (_, []) => "all others are worse beyond the noise".to_owned(),
+        (_, within) => format!("no different within the noise: {}", within.join(", ")),
     };
     Some(format!(
-        "{}, the paper's descent at {:.2} million rays: least error of albedo with {best} bounces, {}; two give \
-         {}; {verdict}.",
+        "{}, the paper's descent at {:.2} million rays: least error of albedo with {}, {}; two give {}; {within}. The \
+         paper takes two.",
         scene.name,
         rays_at(mark?) as f64 * 1e-6,
+        bounces(best),
         least.words(),
         two.words(),
     ))

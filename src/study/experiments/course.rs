@@ -222,6 +222,10 @@ pub fn solved(bench: &Bench, subject: &Subject, settings: &Settings) -> Result<S
     Ok(solution)
 }
 
+/// What [`cache_settings`] differ by from the program's own, a phrase.
+pub const CACHE_WITHOUT: &str = "exposures, the test for photographs that disagree, light from outside, lobes and textures \
+                                 switched off";
+
 /// The transport cache's settings in studies: the default preset, or the fastest where only tried.
 pub fn cache_settings(seed: u64, quick: bool) -> Settings {
     Settings {

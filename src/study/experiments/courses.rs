@@ -50,16 +50,34 @@ impl Spread {
         [self.mean / self.factor, self.mean * self.factor]
     }
 
-    /// Whether the mean differs from another by more than two standard errors of both.
+    /// Whether the mean differs from another by more than two standard errors of both. Never where either is of one seed,
+    /// which tells nothing of the noise.
     pub fn differs(&self, other: &Self) -> bool {
+        if self.count.min(other.count) < 2 {
+            return false;
+        }
         let squared = |s: &Self| s.factor.ln().powi(2) / s.count as f64;
         let error = (squared(self) + squared(other)).sqrt();
         (self.mean / other.mean).ln().abs() > 2.0 * error
     }
 
-    /// In words: "0.0123 (×/÷ 1.05)".
+    /// In words: "0.0123 (×/÷ 1.05)", without a factor where there is one value.
     pub fn words(&self) -> String {
-        format!("{} (×/÷ {:.2})", brief(self.mean), self.factor)
+        match self.count {
+            1 => brief(self.mean),
+            _ => format!("{} (×/÷ {:.2})", brief(self.mean), self.factor),
+        }
+    }
+}
+
+/// How errors over seeds are compared, a sentence that ends with a space; another one where a single seed allows none of it.
+pub fn comparison(seeds: u64) -> &'static str {
+    match seeds {
+        0 | 1 => "One seed tells nothing of the noise: no two errors are said to differ. ",
+        _ => {
+            "Errors are geometric means over seeds, with one deviation between seeds as a factor; two are said to differ where \
+             they are more than two standard errors apart. "
+        }
     }
 }
 
@@ -233,6 +251,9 @@ mod tests {
         assert!((wide.factor - (2f64.ln() * 2f64.sqrt()).exp()).abs() < 1e-12);
         assert!(!wide.differs(&spread(&[1.5, 1.6])));
         assert!(spread(&[1.0, 1.01]).differs(&spread(&[1.5, 1.51])));
+        // One value tells nothing of its noise.
+        assert!(!spread(&[1.0]).differs(&spread(&[9.0, 9.01])));
+        assert_eq!(spread(&[0.25]).words(), "0.250");
         assert!(Spread::over([f64::NAN, 0.0].into_iter()).is_none());
     }
 }

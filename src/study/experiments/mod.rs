@@ -105,6 +105,16 @@ pub struct Limits {
     pub seconds: f64,
 }
 
+impl Limits {
+    /// In words: "19.3 s", or "0.15 million rays" where the clock sets no limit.
+    fn words(&self) -> String {
+        match self.seconds.is_finite() {
+            true => format!("{:.1} s", self.seconds),
+            false => format!("{:.2} million rays", self.rays as f64 * 1e-6),
+        }
+    }
+}
+
 impl Bench<'_> {
     /// The share of one of `runs` solves.
     fn limits(&self, runs: usize) -> Limits {

@@ -28,9 +28,9 @@ pub struct Posed {
     pub subject: Subject,
     /// Whether light comes from other surfaces than lamps.
     pub interreflects: bool,
-    /// The error in percent that the paper has.
+    /// The error in percent that the paper has of an object of its own.
     pub target: f64,
-    /// Median relative standard error in percent at which a solve ends.
+    /// Median relative standard error in percent at which a solve is told to end: chosen below `target`.
     pub aim: f64,
     /// Relative error that the photographs' own noise makes in the object's mean radiance.
     pub floor: f64,
@@ -48,9 +48,11 @@ pub fn convex(quick: bool) -> Result<Posed> {
         name: "convex, under a lamp".to_owned(),
         object: "gem".to_owned(),
         how: format!(
-            "A convex polyhedron of {} triangles below a square lamp, nothing else, in {} photographs of {} × {} pixels in \
-             closed form (Lambert's polygon irradiance, 25 points for each part of a pixel), rounded to 32 bits; they are \
-             taken from so near that no outline is seen, whose pixels would be most of the paths' noise.",
+            "A convex polyhedron of {} triangles below a square black lamp, nothing else, in {} photographs (the last one of the \
+             lamp) of {} × {} pixels in \
+             closed form (Lambert's polygon irradiance, 25 points for each part of a pixel), rounded to 32 bits. They are \
+             taken from so near that no outline of the polyhedron is seen, as pixels at outlines would be most of the paths' \
+             noise: a framing that helps the fit.",
             room.mesh.triangles.len() - 2,
             room.views.len(),
             size[0],

@@ -188,9 +188,9 @@ fn findings(words: &str, noise: f64, lines: &[Line]) -> Findings {
     };
     Findings {
         how: format!(
-            "{words}, against the same in 64 bits: hit points of the photographs' central rays \
-             against planes and cameras as given; albedos fitted by preset `preview` with the same seed to the same \
-             photographs, against those of the room as it is or with the outlier one room away (two seeds differ by {}, and what moves the mesh's middle moves the cells in which light \
+            "{words}. Hit points of the photographs' central rays, against planes and cameras as given in 64 bits; albedos fitted \
+             by preset `preview` with the same seed to the same \
+             photographs, against those fitted to the room as it is or with the outlier one room away, in 32 bits too (two seeds differ by {}, and what moves the mesh's middle moves the cells in which light \
              is gathered too, so that less than twice that is none); radiance of paths as the fit evaluates them, against the same \
              products in 64 bits. Every number is the same on every machine.",
             brief(noise),
@@ -248,25 +248,32 @@ fn sentence(line: &Line) -> String {
     let (Some(first), Some(last)) = (line.points.first(), line.points.last()) else {
         return "not measured".to_owned();
     };
-    match line
-        .points
-        .iter()
-        .find(|p| p.1.is_nan() || p.1 > line.tolerable)
-    {
+    let too_large = |p: &(f64, f64)| p.1.is_nan() || p.1 > line.tolerable;
+    match line.points.iter().position(too_large) {
         None => format!(
-            "below {} everywhere from {:.0e} to {:.0e}, at most {}",
+            "below {} at all {} values tried from {:.0e} to {:.0e}, at most {}",
             brief(line.tolerable),
+            line.points.len(),
             first.0,
             last.0,
             brief(line.points.iter().map(|p| p.1).fold(0.0, f64::max)),
         ),
-        Some(worse) => format!(
-            "{} at {:.0e}, and above {} from {:.0e} on ({})",
-            brief(first.1),
-            first.0,
-            brief(line.tolerable),
-            worse.0,
-            brief(worse.1),
-        ),
+        Some(place) => {
+            let worse = line.points[place];
+            let count = line.points.iter().filter(|p| too_large(p)).count();
+            let goes_on = count == line.points.len() - place;
+            format!(
+                "{} at {:.0e}, and above {} first at {:.0e} ({}), {}",
+                brief(first.1),
+                first.0,
+                brief(line.tolerable),
+                worse.0,
+                brief(worse.1),
+                match goes_on {
+                    true => "and at all values tried beyond".to_owned(),
+                    false => format!("in all at {count} of {} values tried", line.points.len()),
+                },
+            )
+        }
     }
 }

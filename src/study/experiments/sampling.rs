@@ -8,7 +8,9 @@ use crate::inverse::settings::Settings;
 use crate::study::experiments::course::{
     Gauge, Mark, descend, descend_by, estimate, paper_settings, rays_at,
 };
-use crate::study::experiments::courses::{self, Kind, Quantity, common_mark, plot, table, words};
+use crate::study::experiments::courses::{
+    self, Kind, Quantity, common_mark, comparison, plot, table, words,
+};
 use crate::study::experiments::evenness::{Evenness, measure};
 use crate::study::experiments::findings::brief;
 use crate::study::experiments::selection::Groups;
@@ -71,12 +73,15 @@ fn run(bench: &Bench) -> Result<Findings> {
 
     Ok(Findings {
         how: format!(
-            "{}. The paper's descent there, {} seeds, batches of 8, nothing annealed, with \
+            "{}. The paper's descent there, {} seeds, each for {}, batches of 8, nothing annealed, with \
              pixels drawn uniformly, from each object alike, and from blocks of 8 × 8 pixels by their residual (looked at \
              every {LOOK_EVERY} steps, whose rays count); each with gradients as they come and weighed back to what uniform \
-             draws fit. Held-out loss is over uniform pixels. Paths: standard deviation of a pixel's mean radiance over 16 \
+             draws fit. Held-out loss is over uniform pixels. {}Paths: standard deviation of a pixel's mean radiance over 16 \
              repetitions, root mean square over {pixels} pixels, at the true values.",
-            studied.words, bench.seeds,
+            studied.words,
+            bench.seeds,
+            limits.words(),
+            comparison(bench.seeds),
         ),
         tables: vec![
             ("", table("pixels", &kinds, &[])),
@@ -198,8 +203,8 @@ fn summary(kinds: &[Kind], evenness: &[Evenness]) -> Summary {
             "what",
             "loss at equal rays",
             "albedo error at equal rays",
-            "loss at equal time",
-            "albedo error at equal time",
+            "loss at the end",
+            "albedo error at the end",
         ],
         rows,
     }
@@ -215,7 +220,7 @@ fn seen(kinds: &[Kind], evenness: &[Evenness]) -> Vec<String> {
                 continue;
             };
             let verdict = match (other.differs(&uniform), other.mean < uniform.mean) {
-                (false, _) => "no difference beyond the noise between seeds",
+                (false, _) => "no difference beyond what seeds tell of the noise",
                 (true, true) => "better",
                 (true, false) => "worse",
             };
@@ -231,8 +236,8 @@ fn seen(kinds: &[Kind], evenness: &[Evenness]) -> Vec<String> {
     if let (Some(few), Some(many)) = (evenness.first(), evenness.last()) {
         let gain = |at: &Evenness| brief((at.random / at.sequence).powi(2));
         seen.push(format!(
-            "Low-discrepancy points have {} times less variance than random numbers with {} paths a pixel and {} times less \
-             with {}; the transport cache uses them.",
+            "Random numbers have {} times the variance of low-discrepancy points with {} paths a pixel and {} times with {}; the \
+             transport cache uses the latter.",
             gain(few),
             few.paths,
             gain(many),

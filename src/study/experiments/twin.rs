@@ -102,7 +102,7 @@ pub fn twin(bench: &Bench, sizes: Sizes) -> Result<Option<Studied>> {
     Ok(Some(Studied {
         words: format!(
             "The {}: its mesh, its views through ideal lenses of the first one's shape, and the colours and lamps that the transport cache found in \
-             it (one an object, light from outside left away), photographed with all bounces in {} photographs of {width} × \
+             it (one an object, none above {WHITEST}, light from outside left away), photographed with all bounces in {} photographs of {width} × \
              {height} pixels with {} paths each, so that the truth is known",
             room.name,
             room.views.len(),
