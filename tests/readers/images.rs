@@ -4,6 +4,7 @@ use crate::{folder, open, transforms, write};
 use glam::Vec3;
 use image::{DynamicImage, ImageBuffer, ImageFormat, Rgb, Rgba};
 use relit::capture::camera::Intrinsics;
+use relit::capture::orientation::Orientation;
 use relit::capture::photograph::{Encoding, Photograph};
 use relit::capture::read::image::read;
 use std::io::Cursor;
@@ -28,6 +29,7 @@ fn decode(image: &DynamicImage, format: ImageFormat, exposure: Option<f64>) -> (
     write(folder.path(), "image", bytes.get_ref());
     read(
         &folder.path().join("image"),
+        Orientation::default(),
         &lens(image.width(), image.height()),
         exposure,
     )
@@ -48,7 +50,7 @@ fn exposures_in_radiance_files_are_divided_out() {
     let at = folder.path().join("image");
     let read_with = |lines: &str| {
         write(folder.path(), "image", &radiance(lines, [128, 64, 32, 129]));
-        read(&at, &lens(3, 1), None)
+        read(&at, Orientation::default(), &lens(3, 1), None)
     };
     let (plain, _) = read_with("").unwrap();
     assert!(
@@ -257,9 +259,17 @@ fn exposures_come_from_exif_relative_to_the_median_frame_if_all_have_them() {
 fn a_photograph_of_another_size_than_its_camera_is_an_error() {
     let folder = folder(&transforms(""));
     let path = folder.path().join("images/000.png");
-    let error = read(&path, &lens(5, 5), None).unwrap_err();
+    let error = read(&path, Orientation::default(), &lens(5, 5), None).unwrap_err();
     assert!(error.problem.contains("4×2") && error.problem.contains("5×5"));
-    assert!(read(Path::new("none.exr"), &lens(1, 1), None).is_err());
+    assert!(
+        read(
+            Path::new("none.exr"),
+            Orientation::default(),
+            &lens(1, 1),
+            None
+        )
+        .is_err()
+    );
 }
 
 /// The checksum of PNG chunks.

@@ -26,9 +26,11 @@ const LONG_SIDE: u32 = 128;
 const MAX_FRAMES: usize = 24;
 /// ... with readings near to that of the files so many, ...
 const NEAR_FRAMES: usize = 12;
-/// ... and so many to choose the readings that are compared on all.
-const SEARCH_FRAMES: usize = 8;
-/// Readings that are compared on all photographs.
+/// ... and all other readings in rounds: so many of the best of a round before on so many photographs.
+const ROUNDS: [(usize, usize); 2] = [(usize::MAX, 4), (24, 8)];
+/// Of the best readings of the last round, so many are looked for a better factor, ...
+const REFINED: usize = 2;
+/// ... and so many are compared on all photographs.
 const FINALISTS: usize = 5;
 /// An agreement that chance gives once in three million times: five standard deviations.
 const AGREES: f64 = 5.0;
@@ -254,20 +256,25 @@ impl<'a> Views<'a> {
 
     /// The reading that agrees best, with its scores; on the way the less promising are left behind.
     fn best(&self) -> Option<(Reading, Vec<f64>)> {
-        let ranked = |readings: Vec<Reading>| -> Vec<Reading> {
+        let ranked = |readings: Vec<Reading>, frames: usize| -> Vec<Reading> {
             let mut scored: Vec<(f64, Reading)> = (readings.into_iter())
-                .map(|reading| (total(&self.scores(&reading, SEARCH_FRAMES)), reading))
+                .map(|reading| (total(&self.scores(&reading, frames)), reading))
                 .collect();
             scored.sort_by(|a, b| b.0.total_cmp(&a.0));
-            let best = scored.into_iter().take(FINALISTS);
-            best.map(|(_, reading)| reading).collect()
+            scored.into_iter().map(|(_, reading)| reading).collect()
         };
-        let coarse = ranked(candidates::all());
-        let finer = coarse
-            .iter()
+        let mut left = candidates::all();
+        for (most, frames) in ROUNDS {
+            left.truncate(most);
+            left = ranked(left, frames);
+        }
+        left.truncate(FINALISTS);
+        let finer: Vec<Reading> = (left.iter().take(REFINED))
             .flat_map(candidates::finer)
-            .collect::<Vec<_>>();
-        let finalists = ranked([coarse, finer].concat());
+            .collect();
+        left.extend(finer);
+        let mut finalists = ranked(left, ROUNDS[1].1);
+        finalists.truncate(FINALISTS);
         (finalists.into_iter())
             .map(|reading| (reading, self.scores(&reading, MAX_FRAMES)))
             .max_by(|a, b| total(&a.1).total_cmp(&total(&b.1)))
