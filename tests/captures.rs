@@ -1,5 +1,9 @@
 //! Reads the captures beside the repository, where they are present.
 
+#[path = "common/beside.rs"]
+mod beside;
+
+use beside::beside;
 use relit::capture::photograph::Encoding;
 use relit::capture::read::{ReadOptions, read};
 use relit::capture::working::load_working;
@@ -7,27 +11,13 @@ use relit::scene::Scene;
 use relit::scene::prepare::prepare;
 use relit::session::command::{OpenOptions, Source};
 use relit::session::open::open;
-use std::path::PathBuf;
-
-/// The folder of a capture, or a line saying that it is absent.
-fn capture(name: &str) -> Option<PathBuf> {
-    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-        .join("../shared/captures")
-        .join(name);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    println!("skipped: ../shared/captures/{name} is absent");
-    None
-}
-
 #[test]
 fn rendered_rooms_load_with_objects_and_linear_photographs() {
     for (name, objects, triangles, frames, pixels) in [
         ("cornell", 8, 36, 5, 128 * 128),
         ("staircase", 31, 31_131, 16, 256 * 192),
     ] {
-        let Some(folder) = capture(name) else {
+        let Some(folder) = beside(&format!("captures/{name}")) else {
             continue;
         };
         let capture = read(&folder, &ReadOptions::default()).unwrap();
@@ -40,6 +30,7 @@ fn rendered_rooms_load_with_objects_and_linear_photographs() {
         assert_eq!(photograph.encoding, Encoding::Linear);
         assert_eq!(photograph.pixels.len(), pixels);
         let sum: f32 = photograph.pixels.iter().map(|p| p.x + p.y + p.z).sum();
+        println!("{name}: {sum} in its first photograph");
         assert!(sum.is_finite() && sum > 0.0);
         let scene = Scene::new(&capture).unwrap();
         assert_eq!(scene.cameras.len(), frames);
@@ -51,7 +42,7 @@ fn rendered_rooms_load_with_objects_and_linear_photographs() {
 
 #[test]
 fn a_scan_without_objects_is_cut_into_segments_and_reduced_to_a_budget() {
-    let Some(folder) = capture("office") else {
+    let Some(folder) = beside("captures/office") else {
         return;
     };
     let capture = read(&folder, &ReadOptions::default()).unwrap();

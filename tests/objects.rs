@@ -1,5 +1,9 @@
 //! Objects to insert: what their files mean, where they come to stand, and what hostile files are told.
 
+#[path = "common/beside.rs"]
+mod beside;
+
+use beside::beside;
 use glam::{DVec3, Vec3};
 use relit::compose::object::ObjectModel;
 use relit::compose::placement::Placement;
@@ -367,17 +371,15 @@ fn shared_objects_are_read() {
         ("teddyBear/teddyBear.obj", 0),
         ("suzi.glb", 15_744),
     ] {
-        let path = Path::new("../shared/objects").join(file);
-        if !path.exists() {
-            println!("skipped: {} is absent", path.display());
+        let Some(path) = beside(&format!("objects/{file}")) else {
             continue;
-        }
+        };
         let model = ObjectModel::read(&path).expect("a sound file");
         println!(
             "{file}: {} triangles, {:?}",
             model.corners.len(),
             model.warnings
         );
-        assert!(triangles == 0 || model.corners.len() == triangles);
+        assert_eq!(model.corners.len(), triangles, "{file}");
     }
 }

@@ -87,6 +87,7 @@ fn relative_errors(estimate: &Estimate, materials: &[Material]) -> Vec<f32> {
         })
         .collect();
     errors.sort_by(f32::total_cmp);
+    println!("relative errors {errors:?}");
     errors
 }
 

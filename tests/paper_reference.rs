@@ -1,5 +1,9 @@
 //! The Cornell box, photographed by another renderer, against our own rendering of its truth.
 
+#[path = "common/beside.rs"]
+mod beside;
+
+use beside::beside;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use relit::capture::read::{ReadOptions, read};
@@ -10,7 +14,6 @@ use relit::scene::Scene;
 use relit::transport::lit::Lit;
 use relit::transport::material::Material;
 use relit::transport::path::{PathOptions, radiance};
-use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Side of a block in pixels.
@@ -45,11 +48,9 @@ impl Difference {
 /// 960 blocks and channels at 5 standard errors, a false alarm in 1,800 seeds, and 15 whole photographs at 4: in 1,000.
 #[test]
 fn the_cornell_box_is_reproduced_from_its_truth_within_its_noise() {
-    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/captures/cornell");
-    if !folder.is_dir() {
-        println!("skipped: ../shared/captures/cornell is absent");
+    let Some(folder) = beside("captures/cornell") else {
         return;
-    }
+    };
     let capture = read(&folder, &ReadOptions::default()).expect("the capture is sound");
     let truth = Truth::read(&folder).expect("the truth is sound");
     let scene = Arc::new(Scene::new(&capture).expect("the mesh is sound"));

@@ -46,9 +46,11 @@ fn a_saturated_lamp_is_found_by_its_light() {
         for (k, (object, material)) in objects.iter().zip(&materials).enumerate() {
             if k == LAMP {
                 let off = (object.emission / material.emission - Vec3::ONE).abs();
+                println!("{preset:?}: lamp {off} off");
                 assert!(off.max_element() < lamp_error, "{preset:?}: {object:?}");
             } else {
                 let off = (object.albedo - albedo(material)).abs().element_sum() / 3.0;
+                println!("{preset:?}: {k} {off} off");
                 assert!(off < albedo_error, "{preset:?}: {k}: {object:?}");
                 assert_eq!(object.emission, Vec3::ZERO, "{preset:?}: {k}");
             }
@@ -93,9 +95,11 @@ fn a_lamp_whose_clipped_light_is_blurred_is_found_too() {
     let solution = scenes::solved(&problem, &settings);
     let objects = &solution.estimate.objects;
     let off = (objects[LAMP].emission / materials[LAMP].emission - Vec3::ONE).abs();
+    println!("lamp {off} off");
     assert!(off.max_element() < 0.1, "{:?}", objects[LAMP]);
     for (k, material) in materials.iter().enumerate().filter(|(k, _)| *k != LAMP) {
         let off = (objects[k].albedo - albedo(material)).abs().element_sum() / 3.0;
+        println!("{k} {off} off");
         assert!(off < 0.03, "{k}: {:?}", objects[k]);
     }
 }
@@ -132,5 +136,6 @@ fn what_exceeds_lower_bounds_has_no_loss_and_no_slope() {
         .collect();
     let losses = LossProbe::new(&problem, &settings, 100, 4, 3).measure(&problem, &estimate);
     let train = losses.train.expect("pixels are in the fit");
+    println!("loss {train}");
     assert!(train < 2e-5, "{train}");
 }

@@ -49,6 +49,7 @@ fn rows(name: &str, findings: &Findings, suffix: &str) -> Vec<Vec<String>> {
     );
     let path = folder.path().join(format!("{name}{suffix}.csv"));
     let text = fs::read_to_string(path).expect("written");
+    println!("{name}{suffix}\n{text}{}", findings.seen.join("\n"));
     // Commas between quotes part no cells.
     let cells = |line: &str| -> Vec<String> {
         let parts = line.split('"').enumerate();

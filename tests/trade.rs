@@ -96,6 +96,7 @@ fn one_solve_gives_a_course_of_falling_errors_with_what_it_cost() {
     assert!(errors.len() >= 2 && errors[0] > 0.1, "{errors:?}");
     assert!(errors[errors.len() - 1] < 0.8 * errors[0], "{errors:?}");
     let end = preview.points.last().expect("an estimate");
+    println!("{errors:?} {end:?}");
     assert!(end.error < 0.1 && end.reported.is_some(), "{end:?}");
 }
 

@@ -118,18 +118,26 @@ mod tests {
     }
 
     #[test]
-    fn every_parameter_is_an_option_and_its_default_round_trips() {
+    fn every_parameter_is_an_option_by_which_it_gets_its_value() {
         for parameter in PARAMETERS {
-            let text = match parameter.get(&Settings::default()) {
-                Value::Flag(flag) => flag.to_string(),
-                Value::Whole(n) => n.to_string(),
-                Value::Real(x) => x.to_string(),
-                Value::Choice(word) => word,
+            let values: Vec<String> = match parameter.kind {
+                Kind::Flag => [true, false].map(|flag| flag.to_string()).to_vec(),
+                Kind::Whole { min, max } => [min, max].map(|n| n.to_string()).to_vec(),
+                Kind::Real { min, max, .. } => [min, max].map(|x| x.to_string()).to_vec(),
+                Kind::Choice(words) => words.iter().map(ToString::to_string).collect(),
             };
             let option = format!("--{}", parameter.name.replace('_', "-"));
-            let mut settings = given(&[&option, &text]).expect("the default is allowed");
-            settings.held_out = Settings::default().held_out;
-            assert_eq!(settings, Settings::default(), "{option}");
+            let mut reached = Vec::new();
+            for text in &values {
+                let settings = given(&[&option, text]).expect("the value is allowed");
+                reached.push(match parameter.get(&settings) {
+                    Value::Flag(flag) => flag.to_string(),
+                    Value::Whole(n) => n.to_string(),
+                    Value::Real(x) => x.to_string(),
+                    Value::Choice(word) => word,
+                });
+            }
+            assert_eq!(reached, values, "{option}");
         }
     }
 

@@ -319,19 +319,39 @@ impl Parameter {
 mod tests {
     use super::*;
 
+    /// A value that a parameter may have and by default has not.
+    fn other(parameter: &Parameter) -> Value {
+        let default = parameter.get(&Settings::default());
+        let values = match parameter.kind {
+            Kind::Flag => [true, false].map(Value::Flag).to_vec(),
+            Kind::Whole { min, max } => [min, max].map(Value::Whole).to_vec(),
+            Kind::Real { min, max, .. } => [min, max].map(Value::Real).to_vec(),
+            Kind::Choice(words) => (words.iter())
+                .map(|word| Value::Choice((*word).to_owned()))
+                .collect(),
+        };
+        let found = values.into_iter().find(|value| *value != default);
+        found.expect("more than one value is allowed")
+    }
+
     #[test]
-    fn every_default_is_allowed_and_every_value_round_trips() {
-        let mut settings = Settings::default();
-        for parameter in PARAMETERS {
-            let value = parameter.get(&settings);
-            assert_eq!(
-                parameter.set(&mut settings, &value),
-                Ok(()),
-                "{}",
-                parameter.name
-            );
+    fn every_value_round_trips_and_changes_its_own_parameter_alone() {
+        for changed in PARAMETERS {
+            let mut settings = Settings::default();
+            let value = other(changed);
+            assert_eq!(changed.set(&mut settings, &value), Ok(()));
+            for parameter in PARAMETERS {
+                let expected = match parameter.name == changed.name {
+                    true => value.clone(),
+                    false => parameter.get(&Settings::default()),
+                };
+                assert_eq!(parameter.get(&settings), expected, "{}", parameter.name);
+            }
+            // And back.
+            let default = changed.get(&Settings::default());
+            assert_eq!(changed.set(&mut settings, &default), Ok(()));
+            assert_eq!(settings, Settings::default(), "{}", changed.name);
         }
-        assert_eq!(settings, Settings::default());
     }
 
     #[test]

@@ -50,8 +50,13 @@ fn a_solve_writes_everything_and_all_of_it_can_be_read() {
             }
         }
     }
-    for name in ["loss.csv", "loss.png", "scene.glb"] {
-        assert!(place.path(&format!("{out}/{name}")).is_file(), "{name}");
+    let losses = fs::read_to_string(place.path(&format!("{out}/loss.csv"))).expect("reads");
+    assert!(losses.lines().count() > 1, "{losses}");
+    image::open(place.path(&format!("{out}/loss.png"))).expect("an image");
+    let (scene, ..) = gltf::import(place.path(&format!("{out}/scene.glb"))).expect("a glTF");
+    let names: Vec<_> = scene.nodes().filter_map(|node| node.name()).collect();
+    for (name, ..) in common::OBJECTS {
+        assert!(names.contains(&name), "{name}: {names:?}");
     }
     let left: Vec<_> = fs::read_dir(place.path(out))
         .expect("lists")

@@ -27,6 +27,10 @@ fn paths_of_one_to_a_thousand_bounces_are_solved() {
                 ..settings
             };
             let solution = run(&ROOM.0, &settings);
+            println!(
+                "{:?}, {bounces} bounces: {:?}",
+                settings.preset, solution.estimate.objects
+            );
             assert_ne!(
                 solution.termination,
                 Termination::Diverged,

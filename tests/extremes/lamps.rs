@@ -69,7 +69,11 @@ fn a_lamp_of_a_millionth_of_the_rooms_area_is_unbiased() {
         let moments = seen(&lit, target, &once, 91, 20_000);
         let truth = direct(half, 0.9, target, 0.6, 1e6);
         let z = z(&moments, truth);
-        println!("{target}: {} against {truth}, z {z:.2}", moments.mean);
+        let error = moments.standard_error() / truth;
+        println!(
+            "{target}: {} against {truth}, z {z:.2}, error {error:.4}",
+            moments.mean
+        );
         assert!(z.abs() < 4.0, "{target}: z {z}");
     }
     let target = DVec3::from_array(TARGETS[1]);
@@ -81,8 +85,11 @@ fn a_lamp_of_a_millionth_of_the_rooms_area_is_unbiased() {
     let alone = seen(&lit, target, &alone, 93, 40_000);
     let z = (both.mean - alone.mean) / both.standard_error().hypot(alone.standard_error());
     println!(
-        "all bounces: {} against {}, z {z:.2}",
-        both.mean, alone.mean
+        "all bounces: {} ± {} against {} ± {}, z {z:.2}",
+        both.mean,
+        both.standard_error(),
+        alone.mean,
+        alone.standard_error()
     );
     assert!(z.abs() < 4.0, "z {z}");
 }
@@ -132,7 +139,11 @@ fn a_million_emitting_triangles_are_drawn_by_their_area() {
         let moments = seen(&lit, target, &once, 94, 20_000);
         let truth = direct(0.4, 0.9, target, 0.6, 5.0);
         let z = z(&moments, truth);
-        println!("{target}: {} against {truth}, z {z:.2}", moments.mean);
+        let error = moments.standard_error() / truth;
+        println!(
+            "{target}: {} against {truth}, z {z:.2}, error {error:.4}",
+            moments.mean
+        );
         assert!(z.abs() < 4.0, "{target}: z {z}");
     }
     let chi2 = spread(&scene, &lit.emitters, 6, 8_000_000);

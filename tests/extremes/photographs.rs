@@ -41,6 +41,10 @@ fn photographs_of_one_pixel_are_solved() {
         for settings in all_solvers() {
             let estimate = run(&problem, &settings).estimate;
             let seen: u64 = estimate.objects.iter().map(|o| o.seen_pixels).sum();
+            println!(
+                "{:?}, {views} views: {seen} seen {:?}",
+                settings.preset, estimate.objects
+            );
             assert!(seen as usize <= views, "{seen}");
         }
     }
@@ -51,7 +55,11 @@ fn one_photograph_of_one_path_a_pixel_is_solved() {
     for (views, samples) in [(1, 64), (1, 1), (6, 1)] {
         let problem = photographed([32, 24], views, samples, &ROOM.1);
         for settings in all_solvers() {
-            run(&problem, &settings);
+            let estimate = run(&problem, &settings).estimate;
+            println!(
+                "{:?}, {views} views of {samples}: {:?}",
+                settings.preset, estimate.objects
+            );
         }
     }
 }

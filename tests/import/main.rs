@@ -237,25 +237,32 @@ fn to_edge(p: DVec3, wall: usize) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Checks that a vertex lies on a wall within half a voxel, or within one where walls meet, which surface nets round.
-pub fn check_vertex(p: DVec3, voxel: f64) {
-    let (distance, wall) = to_wall(p);
-    let bound = if to_edge(p, wall) > 1.5 * voxel {
-        0.5
-    } else {
-        1.0
-    };
-    assert!(distance < bound * voxel, "{p} is {distance} from the walls");
+/// Checks that every vertex lies on a wall within half a voxel, or within one where walls meet, which surface nets round.
+pub fn check_vertices(mesh: &Mesh, voxel: f64, world: impl Fn(DVec3) -> DVec3) {
+    assert!(
+        mesh.positions.len() > 1000,
+        "{} vertices",
+        mesh.positions.len()
+    );
+    for &p in &mesh.positions {
+        let p = world(p);
+        let (distance, wall) = to_wall(p);
+        let bound = if to_edge(p, wall) > 1.5 * voxel {
+            0.5
+        } else {
+            1.0
+        };
+        assert!(distance < bound * voxel, "{p} is {distance} from the walls");
+    }
 }
 
 /// Checks that a fused mesh is the room: on its walls within half a voxel, facing inwards, whole, with the walls' colours.
 /// `world` maps the import's points to the room's.
 pub fn check_room(mesh: &Mesh, voxel: f64, world: impl Fn(DVec3) -> DVec3) {
-    let (mut area, mut outwards) = (0.0, 0.0);
+    let (mut area, mut outwards, mut colored) = (0.0, 0.0, 0);
+    assert_eq!(mesh.vertex_colors.len(), mesh.positions.len());
     let mirrored = world(DVec3::X).cross(world(DVec3::Y)).dot(world(DVec3::Z)) < 0.0;
-    for &p in &mesh.positions {
-        check_vertex(world(p), voxel);
-    }
+    check_vertices(mesh, voxel, &world);
     for triangle in &mesh.triangles {
         let [a, b, c] = triangle.map(|i| world(mesh.positions[i as usize]));
         let normal = (b - a).cross(c - a) * if mirrored { -0.5 } else { 0.5 };
@@ -282,6 +289,8 @@ pub fn check_room(mesh: &Mesh, voxel: f64, world: impl Fn(DVec3) -> DVec3) {
                 COLORS[wall].map(|v| relit::math::color::srgb_to_linear(f32::from(v) / 255.0));
             let difference = *color - glam::Vec3::from_array(expected);
             assert!(difference.length() < 0.02, "{color} on wall {wall} at {p}");
+            colored += 1;
         }
     }
+    assert!(colored > 1000, "{colored} vertices lie far from edges");
 }

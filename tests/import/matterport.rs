@@ -1,6 +1,6 @@
 //! Matterport3D houses, by the data set's description of its files.
 
-use crate::{Camera, cameras, check_cameras, check_vertex, import, says, write};
+use crate::{Camera, cameras, check_cameras, check_vertices, import, says, write};
 use relit::capture::photograph::Encoding;
 use relit::export::exr::{Precision, write_rgb};
 use relit::math::picture::Picture;
@@ -147,9 +147,7 @@ fn undistorted_images_have_their_origin_at_the_bottom() {
     );
     let scan = import(folder.path()).unwrap();
     check_cameras(&scan, &cameras, |p| p);
-    for &p in &scan.mesh.positions {
-        check_vertex(p, 0.05);
-    }
+    check_vertices(&scan.mesh, 0.05, |p| p);
     for (from, to) in [
         ("scan ", "scan x y 1 "),
         ("intrinsics_matrix", "intrinsics_matrix x"),

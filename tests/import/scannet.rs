@@ -1,6 +1,6 @@
 //! ScanNet's exporter.
 
-use crate::{Camera, cameras, check_cameras, check_vertex, import, says, write};
+use crate::{Camera, cameras, check_cameras, check_vertices, import, says, write};
 use std::path::Path;
 use tempfile::TempDir;
 
@@ -39,9 +39,7 @@ fn the_room_comes_back_from_depth_of_another_size() {
     let scan = import(folder.path()).unwrap();
     assert!(says(&scan, "ScanNet"));
     check_cameras(&scan, &cameras, |p| p);
-    for &p in &scan.mesh.positions {
-        check_vertex(p, 0.05);
-    }
+    check_vertices(&scan.mesh, 0.05, |p| p);
 }
 
 #[test]

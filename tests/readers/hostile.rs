@@ -123,6 +123,8 @@ proptest! {
             if let Ok(capture) = with_mesh(name, &spoil(bytes, &damages)) {
                 let mesh = &capture.mesh;
                 prop_assert!(mesh.positions.iter().all(|p| p.is_finite()));
+                let corners = mesh.triangles.iter().flatten();
+                prop_assert!(corners.clone().all(|&i| (i as usize) < mesh.positions.len()));
                 prop_assert_eq!(mesh.object_of.len(), mesh.triangles.len());
                 prop_assert!(mesh.object_of.iter().all(|&o| (o as usize) < mesh.objects.len()));
             }

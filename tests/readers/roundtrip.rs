@@ -73,6 +73,7 @@ fn a_written_capture_reads_back() {
     assert_eq!(back.mesh.objects, original.mesh.objects);
     assert_eq!(back.mesh.object_of, original.mesh.object_of);
     assert_eq!(back.mesh.corner_uvs, original.mesh.corner_uvs);
+    assert_eq!(back.mesh.triangles.len(), original.mesh.triangles.len());
     for (t, u) in back.mesh.triangles.iter().zip(&original.mesh.triangles) {
         for (&i, &j) in t.iter().zip(u) {
             assert_eq!(
@@ -85,6 +86,7 @@ fn a_written_capture_reads_back() {
             );
         }
     }
+    assert_eq!(back.frames.len(), original.frames.len());
     for (a, b) in back.frames.iter().zip(&original.frames) {
         assert_eq!(a.intrinsics, b.intrinsics);
         assert_eq!(a.pose.center, b.pose.center);

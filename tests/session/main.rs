@@ -214,14 +214,18 @@ fn a_panic_becomes_an_event_the_estimate_stays_and_the_session_goes_on() {
     let message = &failed.events.last().expect("an event").message;
     assert!(message.contains("injected fault"), "{message}");
     assert_eq!(failed.events.last().map(|e| e.level), Some(Level::Error));
-    assert!(!failed.estimate.objects.is_empty());
+    // The estimate says of which step it is; the fault came at the two hundredth.
+    let step = failed.estimate.objects[1].seen_pixels;
+    assert!((1..200).contains(&step), "{step}");
 
     let folder = tempfile::tempdir().expect("a temporary folder");
     assert!(rig.session.send(Command::Save(folder.path().join("saved"))));
     rig.until("the save", |s| {
         s.events.iter().any(|e| e.message.starts_with("saved to"))
     });
-    assert!(folder.path().join("saved/estimate.json").is_file());
+    let saved = relit::session::save::load(&folder.path().join("saved")).expect("reads");
+    let kept = saved.file().objects.get("floor").expect("the floor");
+    assert!((step..200).contains(&kept.seen_pixels), "{kept:?}");
     assert!(rig.session.send(Command::Reset));
     rig.until("solving again", |s| {
         s.phase == Phase::Solving && iterations(s) > 3
@@ -491,5 +495,9 @@ fn layers_are_shown_when_asked_for_and_add_up_to_the_render() {
     rig.until("the file", |s| {
         s.events.iter().any(|e| e.message.starts_with("layers at"))
     });
-    assert!(file.exists());
+    let image = exr::prelude::read_all_flat_layers_from_file(&file).expect("layers");
+    let lamp = |layer: &exr::prelude::Layer<_>| {
+        (layer.attributes.layer_name.as_ref()).is_some_and(|name| name.to_string() == "lamp")
+    };
+    assert!(image.layer_data.iter().any(lamp));
 }

@@ -111,6 +111,7 @@ mod tests {
         let train = curve(&losses, |p| p.train);
         assert!(train.len() <= POINTS + 1 && train.last() == Some(&[5000.0, -2.0]));
         let held_out = curve(&losses, |p| p.held_out);
+        assert!(held_out.len() > POINTS / 4);
         assert!(held_out.iter().all(|p| p[0] > 0.0 && p[0] % 2.0 == 0.0));
     }
 }

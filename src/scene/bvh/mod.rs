@@ -3,6 +3,11 @@
 //! A hit does not depend on the hierarchy: among equally near triangles the lowest index wins, and every
 //! instruction set does the same arithmetic in the same order (no fused multiply-add).
 
+#![allow(
+    unsafe_code,
+    reason = "code for wider instruction sets is entered only after these were detected; every block says why it is sound"
+)]
+
 mod any;
 mod binary;
 mod build;
