@@ -20,6 +20,7 @@ mod trade;
 
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
+use crate::say;
 use crate::session::command::{OpenOptions, Source};
 use arguments::{Action, Arguments};
 use clap::Parser;
@@ -29,7 +30,8 @@ use object_values::ObjectValues;
 /// Opens the window on a source, read with some options, and returns when it is closed.
 pub type Window = fn(Option<(Source, OpenOptions)>, Settings) -> Result<()>;
 
-/// Runs the program with the process's arguments; the exit code: 0 done, 1 an error, 2 wrong usage.
+/// Runs the program with the process's arguments; the exit code: 0 done, 1 an error, 2 wrong usage, 128 and a signal's number
+/// where that ended the work.
 ///
 /// `window` is absent from builds without one; every command but the plain `relit` does without.
 pub fn run(window: Option<Window>) -> i32 {
@@ -45,26 +47,28 @@ pub fn run(window: Option<Window>) -> i32 {
         },
     };
     match outcome {
-        Ok(()) => 0,
+        Ok(code) => code,
         Err(error) => {
-            eprintln!("error: {error}");
+            say::aside(format_args!("error: {error}"));
             error.exit_code()
         }
     }
 }
 
-fn act(arguments: Arguments, window: Option<Window>) -> Result<()> {
+/// The exit code: 0, or what tells how the work was interrupted.
+fn act(arguments: Arguments, window: Option<Window>) -> Result<i32> {
+    let done = |()| 0;
     match arguments.action {
         None => open(&arguments, window),
-        Some(Action::Evaluate(evaluate)) => evaluate::evaluate(&evaluate),
-        Some(Action::Render(render)) => render::render(&render),
+        Some(Action::Evaluate(evaluate)) => evaluate::evaluate(&evaluate).map(done),
+        Some(Action::Render(render)) => render::render(&render).map(done),
         Some(Action::Insert(insert)) => insert::insert(&insert),
-        Some(Action::Export(files)) => export::export(&files),
-        Some(Action::Import(scan)) => import::import(&scan),
-        Some(Action::Demo(demo)) => export::demo(&demo),
+        Some(Action::Export(files)) => export::export(&files).map(done),
+        Some(Action::Import(scan)) => import::import(&scan).map(done),
+        Some(Action::Demo(demo)) => export::demo(&demo).map(done),
         Some(Action::Edit(edit)) => edit::edit(&edit),
         Some(Action::Trade(measured)) => trade::trade(&measured),
-        Some(Action::Study(studied)) => study::study(&studied),
+        Some(Action::Study(studied)) => study::study(&studied).map(done),
         Some(Action::Solve(capture)) => {
             let source = Source::Folder(capture.capture);
             let known = ObjectValues {
@@ -78,7 +82,7 @@ fn act(arguments: Arguments, window: Option<Window>) -> Result<()> {
 }
 
 /// `relit [CAPTURE]`: the window, or where none can be opened the same work headless.
-fn open(arguments: &Arguments, window: Option<Window>) -> Result<()> {
+fn open(arguments: &Arguments, window: Option<Window>) -> Result<i32> {
     let source = arguments
         .capture
         .clone()
@@ -91,12 +95,12 @@ fn open(arguments: &Arguments, window: Option<Window>) -> Result<()> {
             let settings = arguments.solve.settings();
             let opened = (source.clone(), arguments.solve.read.open(&settings));
             match window(Some(opened), settings) {
-                Ok(()) => return Ok(()),
+                Ok(()) => return Ok(0),
                 Err(error) => error.to_string(),
             }
         }
     };
-    eprintln!("relit: {reason}; solving without a window");
+    say::aside(format_args!("relit: {reason}; solving without a window"));
     solve::solve(&source, &arguments.solve, &ObjectValues::default())
 }
 
