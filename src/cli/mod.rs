@@ -23,9 +23,13 @@ use crate::inverse::settings::Settings;
 use crate::say;
 use crate::session::command::{OpenOptions, Source};
 use arguments::{Action, Arguments};
-use clap::Parser;
-use clap::error::ErrorKind;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, Parser};
 use object_values::ObjectValues;
+use std::path::Path;
+
+/// Letters that may be wrong, missing or swapped in a command that is still known for what it was meant as.
+const MAX_SLIPS: usize = 2;
 
 /// Opens the window on a source, read with some options, and returns when it is closed.
 pub type Window = fn(Option<(Source, OpenOptions)>, Settings) -> Result<()>;
@@ -43,7 +47,7 @@ pub fn run(window: Option<Window>) -> i32 {
                 let _ = error.print();
                 return 0;
             }
-            _ => Err(misuse(&error)),
+            _ => Err(mistyped(&error).unwrap_or_else(|| misuse(&error))),
         },
     };
     match outcome {
@@ -81,8 +85,46 @@ fn act(arguments: Arguments, window: Option<Window>) -> Result<i32> {
     }
 }
 
+/// The error for a first word that was meant as a command, where what clap makes of the line is a riddle.
+fn mistyped(error: &clap::Error) -> Option<Error> {
+    let first = std::env::args_os().nth(1)?;
+    let first = first.to_str().filter(|word| !word.starts_with('-'))?;
+    let is_command = |name: &str| Arguments::command().find_subcommand(name).is_some();
+    if is_command(first) || Path::new(first).exists() {
+        return None;
+    }
+    // With a capture's path alone, options are all that may follow.
+    let extra = match error.get(ContextKind::InvalidArg) {
+        Some(ContextValue::String(argument)) => !argument.starts_with('-'),
+        _ => false,
+    };
+    command_meant(first).or_else(|| extra.then(|| unknown_command(first, "see relit --help")))
+}
+
+/// The error for a word that is nearly a command's name.
+fn command_meant(word: &str) -> Option<Error> {
+    let command = Arguments::command();
+    let names = command.get_subcommands().map(|known| known.get_name());
+    let (distance, name) = names
+        .map(|name| (strsim::osa_distance(word, name), name))
+        .min()?;
+    // Two slips of the hand, but not half of the word.
+    let near = distance <= MAX_SLIPS && 2 * distance < name.len();
+    near.then(|| unknown_command(word, &format!("did you mean '{name}'?")))
+}
+
+fn unknown_command(word: &str, remedy: &str) -> Error {
+    let problem = format!("unknown command '{word}', and there is no such folder");
+    Error::usage("command line", problem, remedy)
+}
+
 /// `relit [CAPTURE]`: the window, or where none can be opened the same work headless.
 fn open(arguments: &Arguments, window: Option<Window>) -> Result<i32> {
+    if let Some(folder) = arguments.capture.as_ref().filter(|folder| !folder.exists())
+        && let Some(error) = folder.to_str().and_then(command_meant)
+    {
+        return Err(error);
+    }
     let source = arguments
         .capture
         .clone()
