@@ -21,6 +21,9 @@
 //!          math         colour, frames, statistics
 //! ```
 
+// What is printed goes through `say`, which a closed pipe does not stop.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
 #[cfg(feature = "gui")]
 pub mod app;
 pub mod calibrate;
@@ -32,6 +35,7 @@ pub mod export;
 pub mod inverse;
 pub mod math;
 pub mod room;
+pub mod say;
 pub mod scene;
 pub mod session;
 pub mod study;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 /// Layers from the bottom; those of one row may not import each other unless listed in [`BESIDE`].
 const LAYERS: &[&[&str]] = &[
     &["error"],
+    &["say"],
     &["math"],
     &["capture"],
     &["scene"],

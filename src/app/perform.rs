@@ -11,6 +11,7 @@ use crate::app::shell::dialogs::Ask;
 use crate::app::shell::files::Sheet;
 use crate::app::shell::palette::Palette;
 use crate::app::state::{App, Shown};
+use crate::say;
 use crate::session::command::{Command, Source};
 use crate::session::edits::Edits;
 use crate::session::snapshot::{Level, Phase};
@@ -327,10 +328,10 @@ impl App {
             if let Some(picture) = image::RgbImage::from_raw(width, height, bytes)
                 && let Err(error) = picture.save(&path)
             {
-                eprintln!(
+                say::aside(format_args!(
                     "{}: {error}; choose a folder that can be written",
                     path.display()
-                );
+                ));
             }
         });
         ctx.send_viewport_cmd(ViewportCommand::Screenshot(finished));

@@ -9,6 +9,7 @@ use crate::app::shell::{
 };
 use crate::app::state::App;
 use crate::app::{action, model, picture, theme};
+use crate::say;
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 use egui_tiles::Tree;
 use std::path::PathBuf;
@@ -124,7 +125,10 @@ impl Window {
         if let Some(path) = &self.kept
             && let Err(error) = self.saved.save(path)
         {
-            eprintln!("{}: {error}; the layout is not remembered", path.display());
+            let place = path.display();
+            say::aside(format_args!(
+                "{place}: {error}; the layout is not remembered"
+            ));
         }
     }
 }

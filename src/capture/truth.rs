@@ -4,6 +4,7 @@ use crate::capture::camera::Intrinsics;
 use crate::capture::orientation::Orientation;
 use crate::capture::photograph::Photograph;
 use crate::capture::read::confine::Confine;
+use crate::capture::read::fields::without_mark;
 use crate::capture::read::image;
 use crate::error::{Error, Result};
 use glam::DVec3;
@@ -65,7 +66,7 @@ impl Truth {
             ));
         }
         let text = std::fs::read(&path).map_err(|e| Error::io(&path, &e))?;
-        let truth: Self = serde_json::from_slice(&text).map_err(|e| {
+        let truth: Self = serde_json::from_slice(without_mark(&text)).map_err(|e| {
             Error::file(&path, format!("is no valid truth: {e}"), "correct the file")
         })?;
         for (name, object) in &truth.objects {

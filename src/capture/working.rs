@@ -3,7 +3,7 @@
 use crate::capture::camera::Intrinsics;
 use crate::capture::photograph::{Photograph, PhotographSource};
 use crate::capture::{Capture, Frame};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use glam::{BVec3, DVec3, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -30,7 +30,7 @@ pub struct Working {
 /// Frames are read in parallel; no more full-size photographs are held at once than there are threads.
 ///
 /// # Errors
-/// A photograph cannot be read or has another size than its camera.
+/// A photograph cannot be read or has another size than its camera, or there is no light in any of them.
 pub fn load_working(capture: &Capture, max_pixels: u64) -> Result<Working> {
     let factor = reduction(&capture.frames, max_pixels);
     let loaded: Vec<Result<(Arc<Photograph>, usize)>> = capture
@@ -62,6 +62,13 @@ pub fn load_working(capture: &Capture, max_pixels: u64) -> Result<Working> {
             ));
         }
         photographs.push(photograph);
+    }
+    if !photographs.iter().any(|photograph| holds_light(photograph)) {
+        return Err(Error::new(
+            &capture.name,
+            "no photograph holds light: all pixels are black, masked or no finite number",
+            "check how the photographs were exported",
+        ));
     }
     Ok(Working {
         photographs,
@@ -103,6 +110,13 @@ impl Intrinsics {
             distortion: self.distortion,
         }
     }
+}
+
+/// Whether any pixel that may be used shows light.
+fn holds_light(photograph: &Photograph) -> bool {
+    let is_lit =
+        |(index, value): (usize, &Vec3)| value.max_element() > 0.0 && photograph.is_usable(index);
+    photograph.pixels.iter().enumerate().any(is_lit)
 }
 
 /// The smallest factor that meets the budget; no photograph shrinks below one pixel.

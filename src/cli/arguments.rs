@@ -8,11 +8,13 @@ use crate::cli::evaluate::EvaluateArguments;
 use crate::cli::export::{DemoArguments, ExportArguments};
 use crate::cli::import::ImportArguments;
 use crate::cli::insert::InsertArguments;
+use crate::cli::interrupt::EXIT_CODES;
 use crate::cli::object_values::named_color;
 use crate::cli::parameters::{Parameters, duration};
 use crate::cli::render::RenderArguments;
 use crate::cli::study::StudyArguments;
 use crate::cli::trade::TradeArguments;
+use crate::export::overwrite;
 use crate::inverse::held_out::HoldOut;
 use crate::inverse::settings::Settings;
 use crate::session::command::OpenOptions;
@@ -27,7 +29,8 @@ use std::time::Duration;
 #[command(
     version,
     args_conflicts_with_subcommands = true,
-    disable_help_subcommand = true
+    disable_help_subcommand = true,
+    after_help = EXIT_CODES
 )]
 pub struct Arguments {
     /// Folder of the capture to open in the window; the built-in room if none is named
@@ -42,14 +45,17 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 pub enum Action {
     /// Solve a capture without a window and write the results
+    #[command(after_help = EXIT_CODES)]
     Solve(SolveArguments),
     /// Compare results with the truth of a capture
     Evaluate(EvaluateArguments),
     /// Render the room in its estimated light
     Render(RenderArguments),
     /// Put objects into a photograph
+    #[command(after_help = EXIT_CODES)]
     Insert(InsertArguments),
     /// Switch lamps, recolour walls, and render the result
+    #[command(after_help = EXIT_CODES)]
     Edit(EditArguments),
     /// Write the scene or its light for another program
     Export(ExportArguments),
@@ -58,6 +64,7 @@ pub enum Action {
     /// Write the built-in room as a capture, with its truth
     Demo(DemoArguments),
     /// Measure what exactness costs in seconds, over presets and settings
+    #[command(after_help = EXIT_CODES)]
     Trade(TradeArguments),
     /// Rerun experiments of the paper
     Study(StudyArguments),
@@ -104,9 +111,28 @@ pub struct SolveOptions {
     #[arg(long, value_name = "TIME", default_value = "8s", value_parser = time)]
     pub checkpoint: Duration,
     #[command(flatten)]
+    pub replace: Replace,
+    #[command(flatten)]
     pub read: ReadOptions,
     #[command(flatten)]
     pub parameters: Parameters,
+}
+
+/// What may be replaced.
+#[derive(Debug, Args)]
+pub struct Replace {
+    /// Replace files of captures and results of other captures too
+    #[arg(long)]
+    overwrite: bool,
+}
+
+impl Replace {
+    /// Lets the writers of files know.
+    pub fn apply(&self) {
+        if self.overwrite {
+            overwrite::permit();
+        }
+    }
 }
 
 /// How to read a capture.
@@ -246,6 +272,12 @@ pub fn frames(text: &str) -> std::result::Result<Frames, String> {
             .map(Frames::AtMost)
             .map_err(|_| "a number of frames, all or none is wanted".to_owned()),
     }
+}
+
+/// A whole number from 0.
+pub fn whole(text: &str) -> std::result::Result<u64, String> {
+    text.parse()
+        .map_err(|_| "a whole number from 0 is wanted".to_owned())
 }
 
 /// A time such as 90, 60s or 5m.

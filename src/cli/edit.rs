@@ -1,9 +1,12 @@
 //! `relit edit`: lamps off, walls recoloured, surfaces polished.
 
+use crate::cli::arguments::Replace;
 use crate::cli::object_values::{ObjectValues, named_color, named_number};
 use crate::cli::photographs::write_with_progress;
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
+use crate::export::overwrite;
+use crate::say;
 use crate::session::edits::Edits;
 use crate::session::photographs::Photographs;
 use crate::session::save::pictures::Frames;
@@ -46,13 +49,16 @@ pub struct EditArguments {
     /// Folder to write into
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    #[command(flatten)]
+    replace: Replace,
 }
 
-/// Changes objects of an estimate and writes it with new re-renders.
+/// Changes objects of an estimate and writes it with new re-renders; the exit code.
 ///
 /// # Errors
 /// An object is not there, or files cannot be read or written.
-pub fn edit(arguments: &EditArguments) -> Result<()> {
+pub fn edit(arguments: &EditArguments) -> Result<i32> {
+    arguments.replace.apply();
     // What was found would be lost, with the pictures of it.
     let place = |path: &PathBuf| path.canonicalize().ok();
     if place(&arguments.out).is_some_and(|out| place(&arguments.saved.dir) == Some(out)) {
@@ -62,6 +68,8 @@ pub fn edit(arguments: &EditArguments) -> Result<()> {
             "choose another folder",
         ));
     }
+    // Neither is what another solve found.
+    overwrite::check(&arguments.out.join(save::REPORT))?;
     let Loaded {
         saved,
         capture,
@@ -101,14 +109,15 @@ pub fn edit(arguments: &EditArguments) -> Result<()> {
         started: Instant::now(),
         seconds_load: 0.0,
     };
-    save::write_estimate(&arguments.out, &results)?;
+    save::write_edited(&arguments.out, &results)?;
+    let mut code = 0;
     if let Some(photographs) = &photographs {
         let folder = arguments.out.join("photographs");
         std::fs::create_dir_all(&folder).map_err(|error| Error::io(&folder, &error))?;
-        write_with_progress(photographs, &[], &|frame| {
+        code = write_with_progress(photographs, &[], &|frame| {
             folder.join(format!("{frame:03}"))
         })?;
     }
-    println!("results in {}", arguments.out.display());
-    Ok(())
+    say::line(format_args!("results in {}", arguments.out.display()));
+    Ok(code)
 }

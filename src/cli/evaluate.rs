@@ -1,6 +1,7 @@
 //! `relit evaluate`: the errors of an estimate against the truth.
 
 use crate::error::{Error, Result};
+use crate::say;
 use crate::session::command::{OpenOptions, Source};
 use crate::session::open::open;
 use crate::session::save;
@@ -50,11 +51,10 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<()> {
     if arguments.json {
         let text = serde_json::to_string_pretty(&evaluation)
             .map_err(|error| Error::new("evaluate", error, ""))?;
-        println!("{text}");
+        say::result(&say::json(&text))
     } else {
-        print!("{}", table(&evaluation));
+        say::result(table(&evaluation).trim_end())
     }
-    Ok(())
 }
 
 fn table(evaluation: &Evaluation) -> String {
@@ -87,13 +87,15 @@ fn table(evaluation: &Evaluation) -> String {
     for (name, value) in rows {
         text += &format!("{name:38} {:>10}\n", number(value));
     }
-    let names = evaluation.per_object.iter().map(|(n, _)| n.chars().count());
+    let per_object = evaluation.per_object.iter();
+    let per_object: Vec<_> = per_object.map(|(name, e)| (say::plain(name), e)).collect();
+    let names = per_object.iter().map(|(n, _)| n.chars().count());
     let width = names.max().unwrap_or(0).max(6);
     text += &format!(
         "\n{:width$}  {:>8}  {:>10}  {:>12}\n",
         "object", "pixels", "albedo err", "emission err"
     );
-    for (name, errors) in &evaluation.per_object {
+    for (name, errors) in &per_object {
         let albedo = errors.albedo_rel.filter(|_| errors.scored);
         text += &format!(
             "{name:width$}  {:>8}  {:>10}  {:>12}\n",

@@ -1,11 +1,13 @@
 //! `relit export` and `relit demo`: files for other programs, and the built-in room as a capture.
 
-use crate::cli::arguments::triple;
+use crate::cli::arguments::{Replace, triple, whole};
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
+use crate::export::overwrite;
 use crate::export::scene::{self, Format};
 use crate::room;
 use crate::room::photographs::{KEPT, Rendering};
+use crate::say;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
@@ -24,6 +26,8 @@ pub struct ExportArguments {
     /// File to write
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    #[command(flatten)]
+    replace: Replace,
 }
 
 /// The formats by name.
@@ -89,11 +93,13 @@ impl Word {
 /// `relit demo`.
 #[derive(Debug, Args)]
 pub struct DemoArguments {
-    /// Folder to write the capture into
+    /// Folder to write the capture into: new, or empty
     #[arg(long, value_name = "CAPTURE")]
     out: PathBuf,
+    #[command(flatten)]
+    replace: Replace,
     /// Renders the photographs anew with this key of all random numbers, instead of those kept in the program
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole, allow_negative_numbers = true)]
     seed: Option<u64>,
     /// Paths a pixel of photographs that are rendered anew
     #[arg(long, value_name = "N", default_value_t = KEPT.samples, requires = "seed",
@@ -106,7 +112,9 @@ pub struct DemoArguments {
 /// # Errors
 /// The results cannot be read, or the file cannot be written.
 pub fn export(arguments: &ExportArguments) -> Result<()> {
+    arguments.replace.apply();
     arguments.format.check(&arguments.out)?;
+    overwrite::check(&arguments.out)?;
     if matches!(arguments.format, Word::Probe) && arguments.at.is_none() {
         return Err(Error::usage(
             "--format probe",
@@ -120,9 +128,9 @@ pub fn export(arguments: &ExportArguments) -> Result<()> {
     } = arguments.saved.load()?;
     scene::write(&capture.scene, &estimate, format, &arguments.out)?;
     if let Some(lost) = scene::lost(&estimate, format) {
-        eprintln!("warning: {lost}");
+        say::warning(lost);
     }
-    println!("{}", arguments.out.display());
+    say::line(arguments.out.display());
     Ok(())
 }
 
@@ -131,12 +139,13 @@ pub fn export(arguments: &ExportArguments) -> Result<()> {
 /// # Errors
 /// The folder cannot be written.
 pub fn demo(arguments: &DemoArguments) -> Result<()> {
+    arguments.replace.apply();
     let anew = arguments.seed.map(|seed| Rendering {
         seed,
         samples: arguments.samples,
         ..KEPT
     });
     room::write(&arguments.out, anew.as_ref())?;
-    println!("{}", arguments.out.display());
+    say::line(arguments.out.display());
     Ok(())
 }

@@ -1,9 +1,10 @@
 //! `relit import`: scans of other programs as captures.
 
 use crate::capture::import::{self, AppliedTransform, Format, ImportOptions};
-use crate::cli::arguments::triple;
+use crate::cli::arguments::{Replace, triple};
 use crate::error::Result;
 use crate::export;
+use crate::say;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
@@ -19,6 +20,8 @@ pub struct ImportArguments {
     /// Folder to write the capture into: new, or empty
     #[arg(long, value_name = "CAPTURE")]
     out: PathBuf,
+    #[command(flatten)]
+    replace: Replace,
     /// Layout of the folder [default: found by its content]
     #[arg(long, value_name = "F", value_parser = PossibleValuesParser::new(Format::ALL.iter().map(|(word, _)| *word)))]
     format: Option<String>,
@@ -74,6 +77,7 @@ fn intrinsics(text: &str) -> std::result::Result<Intrinsics, String> {
 /// # Errors
 /// The scan cannot be read, or the capture cannot be written.
 pub fn import(arguments: &ImportArguments) -> Result<()> {
+    arguments.replace.apply();
     let named = |word: &String| Format::ALL.iter().find(|(name, _)| name == word);
     let options = ImportOptions {
         format: arguments.format.as_ref().and_then(named).map(|f| f.1),
@@ -104,9 +108,9 @@ pub fn import(arguments: &ImportArguments) -> Result<()> {
         bar.finish_and_clear();
     }
     for line in &scan.said {
-        println!("{line}");
+        say::line(line);
     }
     export::import::write(&arguments.out, &scan)?;
-    println!("{}", arguments.out.display());
+    say::line(arguments.out.display());
     Ok(())
 }

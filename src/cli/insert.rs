@@ -1,6 +1,6 @@
 //! `relit insert`: objects into a photograph, naively and by differential rendering.
 
-use crate::cli::arguments::triple;
+use crate::cli::arguments::{Replace, triple};
 use crate::cli::photographs::write_with_progress;
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::compose::object::surface::Surface;
@@ -35,13 +35,16 @@ pub struct InsertArguments {
     /// Beginning of the names of the files to write
     #[arg(long, value_name = "PREFIX")]
     out: PathBuf,
+    #[command(flatten)]
+    replace: Replace,
 }
 
-/// Inserts objects and writes the composites.
+/// Inserts objects and writes the composites; the exit code.
 ///
 /// # Errors
 /// The results or an object cannot be read, the frame does not exist, or a file cannot be written.
-pub fn insert(arguments: &InsertArguments) -> Result<()> {
+pub fn insert(arguments: &InsertArguments) -> Result<i32> {
+    arguments.replace.apply();
     let Loaded {
         saved,
         capture,

@@ -21,16 +21,22 @@ mod trade;
 
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
+use crate::say;
 use crate::session::command::{OpenOptions, Source};
 use arguments::{Action, Arguments};
-use clap::Parser;
-use clap::error::ErrorKind;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, Parser};
 use object_values::ObjectValues;
+use std::path::Path;
+
+/// Letters that may be wrong, missing or swapped in a command that is still known for what it was meant as.
+const MAX_SLIPS: usize = 2;
 
 /// Opens the window on a source, read with some options, and returns when it is closed.
 pub type Window = fn(Option<(Source, OpenOptions)>, Settings) -> Result<()>;
 
-/// Runs the program with the process's arguments; the exit code: 0 done, 1 an error, 2 wrong usage.
+/// Runs the program with the process's arguments; the exit code: 0 done, 1 an error, 2 wrong usage, 128 and a signal's number
+/// where that ended the work.
 ///
 /// `window` is absent from builds without one; every command but the plain `relit` does without.
 pub fn run(window: Option<Window>) -> i32 {
@@ -42,30 +48,32 @@ pub fn run(window: Option<Window>) -> i32 {
                 let _ = error.print();
                 return 0;
             }
-            _ => Err(misuse(&error)),
+            _ => Err(mistyped(&error).unwrap_or_else(|| misuse(&error))),
         },
     };
     match outcome {
-        Ok(()) => 0,
+        Ok(code) => code,
         Err(error) => {
-            eprintln!("error: {error}");
+            say::aside(format_args!("error: {error}"));
             error.exit_code()
         }
     }
 }
 
-fn act(arguments: Arguments, window: Option<Window>) -> Result<()> {
+/// The exit code: 0, or what tells how the work was interrupted.
+fn act(arguments: Arguments, window: Option<Window>) -> Result<i32> {
+    let done = |()| 0;
     match arguments.action {
         None => open(&arguments, window),
-        Some(Action::Evaluate(evaluate)) => evaluate::evaluate(&evaluate),
-        Some(Action::Render(render)) => render::render(&render),
+        Some(Action::Evaluate(evaluate)) => evaluate::evaluate(&evaluate).map(done),
+        Some(Action::Render(render)) => render::render(&render).map(done),
         Some(Action::Insert(insert)) => insert::insert(&insert),
-        Some(Action::Export(files)) => export::export(&files),
-        Some(Action::Import(scan)) => import::import(&scan),
-        Some(Action::Demo(demo)) => export::demo(&demo),
+        Some(Action::Export(files)) => export::export(&files).map(done),
+        Some(Action::Import(scan)) => import::import(&scan).map(done),
+        Some(Action::Demo(demo)) => export::demo(&demo).map(done),
         Some(Action::Edit(edit)) => edit::edit(&edit),
         Some(Action::Trade(measured)) => trade::trade(&measured),
-        Some(Action::Study(studied)) => study::study(&studied),
+        Some(Action::Study(studied)) => study::study(&studied).map(done),
         Some(Action::Solve(capture)) => {
             let source = Source::Folder(capture.capture);
             let known = ObjectValues {
@@ -78,8 +86,46 @@ fn act(arguments: Arguments, window: Option<Window>) -> Result<()> {
     }
 }
 
+/// The error for a first word that was meant as a command, where what clap makes of the line is a riddle.
+fn mistyped(error: &clap::Error) -> Option<Error> {
+    let first = std::env::args_os().nth(1)?;
+    let first = first.to_str().filter(|word| !word.starts_with('-'))?;
+    let is_command = |name: &str| Arguments::command().find_subcommand(name).is_some();
+    if is_command(first) || Path::new(first).exists() {
+        return None;
+    }
+    // With a capture's path alone, options are all that may follow.
+    let extra = match error.get(ContextKind::InvalidArg) {
+        Some(ContextValue::String(argument)) => !argument.starts_with('-'),
+        _ => false,
+    };
+    command_meant(first).or_else(|| extra.then(|| unknown_command(first, "see relit --help")))
+}
+
+/// The error for a word that is nearly a command's name.
+fn command_meant(word: &str) -> Option<Error> {
+    let command = Arguments::command();
+    let names = command.get_subcommands().map(|known| known.get_name());
+    let (distance, name) = names
+        .map(|name| (strsim::osa_distance(word, name), name))
+        .min()?;
+    // Two slips of the hand, but not half of the word.
+    let near = distance <= MAX_SLIPS && 2 * distance < name.len();
+    near.then(|| unknown_command(word, &format!("did you mean '{name}'?")))
+}
+
+fn unknown_command(word: &str, remedy: &str) -> Error {
+    let problem = format!("unknown command '{word}', and there is no such folder");
+    Error::usage("command line", problem, remedy)
+}
+
 /// `relit [CAPTURE]`: the window, or where none can be opened the same work headless.
-fn open(arguments: &Arguments, window: Option<Window>) -> Result<()> {
+fn open(arguments: &Arguments, window: Option<Window>) -> Result<i32> {
+    if let Some(folder) = arguments.capture.as_ref().filter(|folder| !folder.exists())
+        && let Some(error) = folder.to_str().and_then(command_meant)
+    {
+        return Err(error);
+    }
     let source = arguments
         .capture
         .clone()
@@ -92,12 +138,12 @@ fn open(arguments: &Arguments, window: Option<Window>) -> Result<()> {
             let settings = arguments.solve.settings();
             let opened = (source.clone(), arguments.solve.read.open(&settings));
             match window(Some(opened), settings) {
-                Ok(()) => return Ok(()),
+                Ok(()) => return Ok(0),
                 Err(error) => error.to_string(),
             }
         }
     };
-    eprintln!("relit: {reason}; solving without a window");
+    say::aside(format_args!("relit: {reason}; solving without a window"));
     solve::solve(&source, &arguments.solve, &ObjectValues::default())
 }
 

@@ -3,6 +3,7 @@
 use crate::cli::interrupt::Interrupt;
 use crate::compose::object::surface::Surface;
 use crate::error::Result;
+use crate::say;
 use crate::session::photographs::Photographs;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
@@ -11,7 +12,7 @@ use std::path::PathBuf;
 /// Steps of the bar.
 const LENGTH: u64 = 1000;
 
-/// Writes photographs and prints the paths of their files; `materials` as in [`Photographs::write_made_of`].
+/// Writes photographs and prints the paths of their files; the exit code. `materials` as in [`Photographs::write_made_of`].
 ///
 /// # Errors
 /// Something cannot be read or written.
@@ -19,7 +20,7 @@ pub fn write_with_progress(
     work: &Photographs,
     materials: &[Option<Surface>],
     prefix: &dyn Fn(usize) -> PathBuf,
-) -> Result<()> {
+) -> Result<i32> {
     let interrupt = Interrupt::listen()?;
     let target = if std::io::stderr().is_terminal() {
         ProgressDrawTarget::stderr()
@@ -37,17 +38,17 @@ pub fn write_with_progress(
     bar.finish_and_clear();
     let written = written?;
     for warning in &written.warnings {
-        eprintln!("warning: {warning}");
+        say::warning(warning);
     }
     if written.photographs < work.frames.len() {
-        eprintln!(
+        say::aside(format_args!(
             "interrupted after {} of {} photographs",
             written.photographs,
             work.frames.len()
-        );
+        ));
     }
     for path in &written.files {
-        println!("{}", path.display());
+        say::line(path.display());
     }
-    Ok(())
+    Ok(interrupt.exit_code())
 }

@@ -2,6 +2,7 @@
 
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{LossPoint, Progress};
+use crate::say;
 use crate::session::rates::Rates;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
@@ -61,15 +62,15 @@ impl Meter {
                 bar.set_position((done.clamp(0.0, 1.0) * LENGTH as f64) as u64);
                 bar.set_message(line);
             }
-            None => eprintln!("{line}"),
+            None => say::aside(line),
         }
     }
 
     /// Says something beside the progress.
     pub fn say(&self, line: &str) {
         match &self.bar {
-            Some(bar) => bar.suspend(|| eprintln!("{line}")),
-            None => eprintln!("{line}"),
+            Some(bar) => bar.suspend(|| say::aside(line)),
+            None => say::aside(line),
         }
     }
 

@@ -1,7 +1,6 @@
 //! The chapter on the command line, made from the commands themselves (see `tests/docs.rs`).
 
 use crate::cli::arguments::Arguments;
-use crate::cli::interrupt::ABORTED;
 use crate::inverse::settings::PARAMETERS;
 use clap::{Arg, ArgAction, Command, CommandFactory, Parser};
 use std::collections::BTreeSet;
@@ -85,14 +84,15 @@ pub fn markdown() -> String {
 
 /// What the process ends with.
 fn exit_codes() -> String {
-    format!(
-        "\n## Exit codes\n\n\
-         | code | meaning |\n| --- | --- |\n\
-         | 0 | Done; also after Ctrl-C once, which saves what there is |\n\
-         | 1 | Failed: a file cannot be read or written, or cannot be used |\n\
-         | 2 | Used wrongly: an unknown option, a missing argument, a value out of range |\n\
-         | {ABORTED} | Ctrl-C twice: ended at once |\n"
-    )
+    "\n## Exit codes\n\n\
+     | code | meaning |\n| --- | --- |\n\
+     | 0 | Done |\n\
+     | 1 | Failed: a file cannot be read or written, or cannot be used |\n\
+     | 2 | Used wrongly: an unknown option, a missing argument, a value out of range |\n\
+     | 130 | Interrupted by Ctrl-C; what there is is saved first, after a second Ctrl-C not |\n\
+     | 143 | Asked to terminate; what there is is saved first |\n\
+     | 129 | The terminal was closed; what there is is saved first |\n"
+        .to_owned()
 }
 
 /// One command: what it does, how it is called, examples, arguments, options.

@@ -1,12 +1,15 @@
 //! `relit render`: a picture of the room in its estimated light, from a photograph's camera or any other.
 
 use crate::capture::read::camera_file;
+use crate::cli::arguments::Replace;
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
 use crate::export::exr::{Precision, write_rgb};
 use crate::export::light_layers;
+use crate::export::overwrite;
 use crate::export::picture::{shown_at, write_png};
 use crate::math::picture::Picture;
+use crate::say;
 use crate::scene::camera::Camera;
 use crate::session::light::path_options;
 use crate::transport::denoise::{denoise, guides};
@@ -44,6 +47,8 @@ pub struct RenderArguments {
     /// Picture to write, .exr (radiance) or .png
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    #[command(flatten)]
+    replace: Replace,
 }
 
 /// How a picture is written, by its name's ending.
@@ -76,6 +81,8 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
             "choose .exr with --layers",
         ));
     }
+    arguments.replace.apply();
+    overwrite::check(&arguments.out)?;
     let Loaded {
         saved,
         capture,
@@ -86,7 +93,7 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
         (_, Some(path)) => {
             let (intrinsics, pose, remarks) = camera_file::read(path)?;
             for remark in remarks {
-                eprintln!("warning: {remark}");
+                say::warning(remark);
             }
             (Camera::new(&intrinsics, &pose, capture.scene.origin), 0)
         }

@@ -2,8 +2,10 @@
 
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::inverse::solver::{Progress, Termination};
+use crate::say;
 use crate::scene::Scene;
 use glam::Vec3;
+use std::borrow::Cow;
 use std::fmt::Write;
 
 /// Rows shown at most; the rest is in report.json.
@@ -11,10 +13,10 @@ const ROWS: usize = 24;
 
 /// Objects by emission, then by pixels seen, with standard errors.
 pub fn objects(scene: &Scene, estimate: &Estimate) -> String {
-    let mut rows: Vec<(&str, &ObjectEstimate)> = scene
+    let mut rows: Vec<(Cow<str>, &ObjectEstimate)> = scene
         .objects
         .iter()
-        .map(|o| o.name.as_str())
+        .map(|o| say::plain(&o.name))
         .zip(&estimate.objects)
         .collect();
     rows.sort_by(|(_, a), (_, b)| {

@@ -6,10 +6,12 @@ use crate::cli::object_values::ObjectValues;
 use crate::cli::progress::Meter;
 use crate::cli::report;
 use crate::error::{Error, Result};
+use crate::export::overwrite::CaptureId;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::known::Known;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{self, Checkpoint, Control, Observer, Problem, Progress};
+use crate::say;
 use crate::session::command::Source;
 use crate::session::edits::Edits;
 use crate::session::open::open;
@@ -19,12 +21,13 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Solves a source and writes the results.
+/// Solves a source and writes the results; the exit code.
 ///
 /// # Errors
 /// The capture cannot be read or solved, or the results cannot be written.
-pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> Result<()> {
+pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> Result<i32> {
     let started = Instant::now();
+    options.replace.apply();
     use_threads(options.threads)?;
     let interrupt = Interrupt::listen()?;
 
@@ -45,9 +48,13 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
     };
     let capture = Arc::new(open(source, &read)?.aligned()?);
     let seconds_load = started.elapsed().as_secs_f64();
-    eprintln!("{}: {}", capture.name, capture.summary.join(", "));
+    say::aside(format_args!(
+        "{}: {}",
+        capture.name,
+        capture.summary.join(", ")
+    ));
     for warning in &capture.warnings {
-        eprintln!("warning: {warning}");
+        say::warning(warning);
     }
     let mut edits = Edits::default();
     let checkpoint = match &earlier {
@@ -55,7 +62,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
             earlier.estimate_for(&capture)?;
             edits = earlier.edits_for(&capture)?;
             if earlier.checkpoint.is_none() {
-                eprintln!("warning: the earlier solve left nothing to go on from; starting over");
+                say::warning("the earlier solve left nothing to go on from; starting over");
             }
             earlier.checkpoint.as_ref()
         }
@@ -67,16 +74,20 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
         && settings.time > 0.0
         && checkpoint.progress.seconds >= settings.time
     {
-        eprintln!(
-            "warning: --time counts from the start of the earlier solve, which took {:.1} s; give more to go on",
+        say::warning(format_args!(
+            "--time counts from the start of the earlier solve, which took {:.1} s; give more to go on",
             checkpoint.progress.seconds
-        );
+        ));
     }
 
     // Find out now, not after the work, whether there is a place for its results.
-    drop(Staging::new(&folder)?);
+    drop(Staging::new(&folder, &CaptureId::from(capture.as_ref()))?);
 
     // Solve.
+    if interrupt.asked() {
+        say::aside("interrupted before there was anything to save");
+        return Ok(interrupt.exit_code());
+    }
     let problem = Problem {
         scene: capture.scene.clone(),
         photographs: capture.photographs.clone(),
@@ -108,7 +119,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
 
     // Write.
     if interrupt.asked() {
-        eprintln!("interrupted: saving what there is (again Ctrl-C to abort)");
+        say::aside("interrupted: saving what there is (again Ctrl-C to abort)");
     }
     let results = Results {
         estimate: Arc::new(solution.estimate),
@@ -119,15 +130,13 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
     };
     save::write(&folder, &results)?;
     for warning in &results.progress.warnings {
-        eprintln!("warning: {warning}");
+        say::warning(warning);
     }
-    println!("{}", report::objects(&capture.scene, &results.estimate));
-    println!(
-        "{}",
-        report::ending(&results.progress, solution.termination)
-    );
-    println!("results in {}", folder.display());
-    Ok(())
+    say::table(&report::objects(&capture.scene, &results.estimate));
+    say::line("");
+    say::line(report::ending(&results.progress, solution.termination));
+    say::line(format_args!("results in {}", folder.display()));
+    Ok(interrupt.exit_code())
 }
 
 /// Listens to the solver: shows progress, writes checkpoints, hears Ctrl-C.
@@ -174,13 +183,26 @@ impl Observer for Watch<'_> {
     }
 }
 
-/// Sets the number of worker threads for the whole process.
+/// More threads a core than this only wait for each other: each piece of work wakes all of them.
+const MAX_THREADS_A_CORE: usize = 4;
+
+/// Sets the number of worker threads for the whole process; says so where it is less than was asked for.
+///
+/// # Errors
+/// The system grants no threads.
 pub fn use_threads(threads: Option<u16>) -> Result<()> {
-    let Some(threads) = threads else {
+    let Some(threads) = threads.map(usize::from) else {
         return Ok(());
     };
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let used = threads.min(cores * MAX_THREADS_A_CORE);
+    if used < threads {
+        say::warning(format_args!(
+            "--threads {threads}: {used} are used, {MAX_THREADS_A_CORE} for each of the machine's {cores} cores"
+        ));
+    }
     rayon::ThreadPoolBuilder::new()
-        .num_threads(usize::from(threads))
+        .num_threads(used)
         .build_global()
         .map_err(|error| Error::new("--threads", error, "name fewer threads"))
 }

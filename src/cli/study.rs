@@ -1,10 +1,11 @@
 //! `relit study`: the paper's experiments.
 
-use crate::cli::arguments::ReadOptions;
+use crate::cli::arguments::{ReadOptions, Replace};
 use crate::cli::solve::use_threads;
 use crate::cli::trade::time;
 use crate::error::Result;
 use crate::inverse::settings::Settings;
+use crate::say;
 use crate::session::command::Source;
 use crate::session::open::open;
 use crate::study::experiments::{Bench, STUDIES, Study};
@@ -44,6 +45,8 @@ pub struct StudyArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
     #[command(flatten)]
+    replace: Replace,
+    #[command(flatten)]
     read: ReadOptions,
 }
 
@@ -59,6 +62,7 @@ fn names() -> PossibleValuesParser {
 /// # Errors
 /// The capture cannot be read, a solve cannot start, or a file cannot be written.
 pub fn study(arguments: &StudyArguments) -> Result<()> {
+    arguments.replace.apply();
     use_threads(arguments.threads)?;
     let wanted: Vec<&Study> = STUDIES
         .iter()
@@ -84,16 +88,16 @@ pub fn study(arguments: &StudyArguments) -> Result<()> {
             time: arguments.time,
             seeds: arguments.seeds.unwrap_or(seeds),
             subject: subject.as_ref(),
-            say: &|what| eprintln!("{}: {what} …", study.name),
+            say: &|what| say::aside(format_args!("{}: {what} …", study.name)),
             show: &|_| {},
             stopped: &|| false,
         };
         let findings = study.run(&bench)?;
         for path in findings.write(study, &arguments.out)? {
-            println!("{}", path.display());
+            say::line(path.display());
         }
         for sentence in &findings.seen {
-            println!("{sentence}");
+            say::line(sentence);
         }
     }
     Ok(())

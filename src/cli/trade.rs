@@ -1,12 +1,13 @@
 //! `relit trade`: what exactness costs on a capture, or on generated rooms.
 
-use crate::cli::arguments::ReadOptions;
+use crate::cli::arguments::{ReadOptions, Replace, whole};
 use crate::cli::interrupt::Interrupt;
 use crate::cli::parameters::duration;
 use crate::cli::solve::use_threads;
 use crate::error::Result;
 use crate::inverse::settings::{Preset, Settings};
 use crate::inverse::solver::Problem;
+use crate::say;
 use crate::session::command::Source;
 use crate::session::open::open;
 use crate::session::snapshot::OpenCapture;
@@ -38,11 +39,13 @@ pub struct TradeArguments {
     #[arg(long, value_name = "PRESET", conflicts_with = "presets", value_parser = PossibleValuesParser::new(Preset::WORDS))]
     around: Option<String>,
     /// Key of all random numbers, and of the first generated room
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole, allow_negative_numbers = true)]
     seed: u64,
     /// Threads to work with [default: one a core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
+    #[command(flatten)]
+    replace: Replace,
     #[command(flatten)]
     read: ReadOptions,
 }
@@ -54,11 +57,12 @@ pub fn time(text: &str) -> std::result::Result<Duration, String> {
     time.ok_or_else(|| "a time such as 90, 60s, 5m or 1h is wanted".to_owned())
 }
 
-/// Measures, writes trade.csv, trade.png and trade.json, and prints what was found.
+/// Measures, writes trade.csv, trade.png and trade.json, and prints what was found; the exit code.
 ///
 /// # Errors
 /// The capture cannot be read or solved, or the results cannot be written.
-pub fn trade(arguments: &TradeArguments) -> Result<()> {
+pub fn trade(arguments: &TradeArguments) -> Result<i32> {
+    arguments.replace.apply();
     use_threads(arguments.threads)?;
     let interrupt = Interrupt::listen()?;
     let base = Settings {
@@ -85,9 +89,9 @@ pub fn trade(arguments: &TradeArguments) -> Result<()> {
     };
     let folder = arguments.out.clone().unwrap_or(folder);
     trade.write(&folder)?;
-    print!("{}", trade.words());
-    println!("results in {}", folder.display());
-    Ok(())
+    say::table(&trade.words());
+    say::line(format_args!("results in {}", folder.display()));
+    Ok(interrupt.exit_code())
 }
 
 fn of_capture(
@@ -96,7 +100,11 @@ fn of_capture(
     runs: &[Run],
     interrupt: &Interrupt,
 ) -> Result<Trade> {
-    eprintln!("{}: {}", capture.name, capture.summary.join(", "));
+    say::aside(format_args!(
+        "{}: {}",
+        capture.name,
+        capture.summary.join(", ")
+    ));
     let judge = capture.judge()?;
     let problem = Problem {
         scene: capture.scene.clone(),
@@ -109,7 +117,7 @@ fn of_capture(
         runs,
         arguments.time,
         &|| interrupt.asked(),
-        &mut say,
+        &mut told,
     )?;
     Ok(Trade::new(
         &capture.name,
@@ -129,12 +137,12 @@ fn over_rooms(
     let mut measured = Vec::new();
     let mut seconds = Duration::ZERO;
     for seed in (0..count).map(|index| arguments.seed.wrapping_add(index)) {
-        eprintln!("generated room {seed}");
+        say::aside(format_args!("generated room {seed}"));
         let (problem, judge) = rooms::problem(seed, rooms::SIZE)?;
         let begun = Instant::now();
         let limit = arguments.time.div_f64(count as f64);
         let stopped = || interrupt.asked();
-        let curves = measure(&problem, &judge, runs, limit, &stopped, &mut say)?;
+        let curves = measure(&problem, &judge, runs, limit, &stopped, &mut told)?;
         seconds += begun.elapsed();
         // A room that was broken off would stand for solves that it does not have.
         if interrupt.asked() {
@@ -153,10 +161,10 @@ fn over_rooms(
 }
 
 /// A line a solve.
-fn say(heard: Heard) {
+fn told(heard: Heard) {
     match heard {
-        Heard::Begins(run) => eprintln!("{} …", run.name),
-        Heard::Ended(curve) => eprintln!("{}: {}", curve.name, ending(curve)),
+        Heard::Begins(run) => say::aside(format_args!("{} …", run.name)),
+        Heard::Ended(curve) => say::aside(format_args!("{}: {}", curve.name, ending(curve))),
     }
 }
 

@@ -354,7 +354,6 @@ mod tests {
         for (blur, grain) in [([0.0, 0.0], 0.02), ([1.0, 1.0], 0.02), ([2.0, 0.6], 0.04)] {
             let blur = Vec2::from(blur);
             let found = Finish::of(&bricks(blur, grain));
-            println!("{blur} {grain}: {found:?}");
             let off = (found.blur - blur).abs();
             assert!(
                 off.max_element() <= 0.15 + 0.15 * blur.max_element(),

@@ -1,6 +1,7 @@
 //! Files that appear whole or not at all.
 
 use crate::error::{Error, Result};
+use crate::export::overwrite;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -14,7 +15,8 @@ pub type WriteError = Box<dyn std::error::Error + Send + Sync>;
 /// folders are made. The file gets the permissions of any newly created file.
 ///
 /// # Errors
-/// The folder or file cannot be written, the disk is full, or `write` fails; nothing is left behind.
+/// The file is a capture's or of results (see [`overwrite`]), the folder or file cannot be written, the disk is full, or
+/// `write` fails; nothing is left behind.
 pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> std::result::Result<(), WriteError>,
@@ -28,6 +30,7 @@ pub fn write_atomically(
             "name another file",
         ));
     }
+    overwrite::check(path)?;
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),

@@ -5,13 +5,14 @@ use crate::capture::orientation::Orientation;
 use crate::capture::photograph::Photograph;
 use crate::capture::read::image;
 use crate::error::{Error, Result};
-use crate::export::atomic::{temporary_names, write_bytes};
+use crate::export::atomic::write_bytes;
 use crate::export::capture::{Entry, transforms};
+use crate::export::new_folder::NewFolder;
 use crate::export::{ply, resample};
 use rayon::prelude::*;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// Writes a capture into a folder that is new or empty, whole or not at all.
+/// Writes a capture into a folder that is new or empty, whole or not at all; see [`NewFolder`].
 ///
 /// Photographs are copied as they are where the capture's format holds their lens, and resampled to a pinhole otherwise; a
 /// mask becomes the alpha of a PNG or EXR. Depth goes along where it shows what the photograph shows.
@@ -19,7 +20,7 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// The folder holds something, an image is broken, or a file cannot be written.
 pub fn write(folder: &Path, import: &Import) -> Result<()> {
-    let staging = Staging::new(folder)?;
+    let staging = NewFolder::new(folder)?;
     let entries: Result<Vec<Entry>> = import
         .frames
         .par_iter()
@@ -132,55 +133,4 @@ fn copy(from: &Path, to: &Path) -> Result<()> {
     let mut target = std::fs::File::create(to).map_err(|e| Error::io(to, &e))?;
     std::io::copy(&mut source, &mut target).map_err(|e| Error::io(to, &e))?;
     Ok(())
-}
-
-/// A folder beside the one wanted, which takes its place when it is complete and vanishes otherwise.
-#[derive(Debug)]
-struct Staging {
-    folder: tempfile::TempDir,
-    place: PathBuf,
-}
-
-impl Staging {
-    fn new(place: &Path) -> Result<Self> {
-        let is_empty = match std::fs::read_dir(place) {
-            Ok(mut entries) => entries.next().is_none(),
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => true,
-            Err(e) => return Err(Error::io(place, &e)),
-        };
-        if !is_empty {
-            return Err(Error::file(
-                place,
-                "is not empty",
-                "name a new folder, or take away what is in it",
-            ));
-        }
-        let parent = match place.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
-        std::fs::create_dir_all(parent).map_err(|e| Error::io(parent, &e))?;
-        let folder = temporary_names(0o777)
-            .tempdir_in(parent)
-            .map_err(|e| Error::io(parent, &e))?;
-        Ok(Self {
-            folder,
-            place: place.to_path_buf(),
-        })
-    }
-
-    fn path(&self) -> &Path {
-        self.folder.path()
-    }
-
-    fn take_its_place(self) -> Result<()> {
-        let place = self.place;
-        if place.is_dir() {
-            std::fs::remove_dir(&place).map_err(|e| Error::io(&place, &e))?;
-        }
-        std::fs::rename(self.folder.path(), &place).map_err(|e| Error::io(&place, &e))?;
-        // Nothing is left to take away.
-        let _ = self.folder.keep();
-        Ok(())
-    }
 }

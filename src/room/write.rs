@@ -2,19 +2,23 @@
 
 use crate::error::Result;
 use crate::export::capture;
+use crate::export::new_folder::NewFolder;
 use crate::math::picture::Picture;
 use crate::room::photographs::{self, KEPT, Rendering};
 use crate::room::truth::{self, Truth};
 use crate::room::{Room, cameras};
 use std::path::Path;
 
-/// Writes the room into a folder: transforms.json, mesh.obj, images, truth.json and truth/albedo_NNN.exr.
+/// Writes the room into a folder that is new or empty, whole or not at all: transforms.json, mesh.obj, images, truth.json and
+/// truth/albedo_NNN.exr.
 ///
 /// The photographs are the kept ones, byte for byte, or newly rendered.
 ///
 /// # Errors
-/// A file cannot be written.
+/// The folder holds something (see [`NewFolder`]), or a file cannot be written.
 pub fn write(out: &Path, rendering: Option<&Rendering>) -> Result<()> {
+    let folder = NewFolder::new(out)?;
+    let out = folder.path();
     let room = Room::new();
     let made = rendering.unwrap_or(&KEPT);
     let images = out.join("images");
@@ -38,7 +42,7 @@ pub fn write(out: &Path, rendering: Option<&Rendering>) -> Result<()> {
         objects: truth::objects(&world),
     };
     capture::write_truth(out, &truth, &albedo)?;
-    // Last, so that a folder with transforms.json is a whole capture.
     let cameras = cameras::cameras(&room.views, made.size);
-    capture::write_transforms(out, cameras.into_iter(), world.scene.up.as_dvec3())
+    capture::write_transforms(out, cameras.into_iter(), world.scene.up.as_dvec3())?;
+    folder.take_its_place()
 }

@@ -81,7 +81,7 @@ fn an_interrupt_ends_the_solve_cleanly_with_its_results() {
         .expect("kill runs");
     assert!(sent.success());
     std::io::Read::read_to_string(&mut lines, &mut said).expect("reads");
-    assert_eq!(relit.wait().expect("ends").code(), Some(0), "{said}");
+    assert_eq!(relit.wait().expect("ends").code(), Some(130), "{said}");
     assert!(said.contains("interrupted"), "{said}");
     let report = place.json("relit-out/room/report.json");
     assert_eq!(report["stopped_because"], "cancelled");

@@ -5,6 +5,7 @@ use crate::app::model::lasso::Lasso;
 use crate::app::model::orbit::Orbit;
 use crate::app::model::surface::Surface;
 use crate::inverse::estimate::Estimate;
+use crate::say;
 use crate::session::snapshot::OpenCapture;
 use glam::Vec3;
 use std::sync::Arc;
@@ -115,7 +116,7 @@ fn make(ctx: &egui::Context, capture: &Arc<OpenCapture>) -> Receiver<Made> {
             }
         });
     if let Err(error) = spawned {
-        eprintln!("3D view: {error}; close other programs");
+        say::aside(format_args!("3D view: {error}; close other programs"));
     }
     receiver
 }

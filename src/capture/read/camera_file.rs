@@ -1,7 +1,7 @@
 //! One camera in a file of its own: the fields of a frame of transforms.json, with the size of its picture.
 
 use crate::capture::camera::{Intrinsics, Pose};
-use crate::capture::read::fields::Fields;
+use crate::capture::read::fields::{Fields, without_mark};
 use crate::capture::read::{lens, pose};
 use crate::error::{Error, Result};
 use serde_json::Value;
@@ -30,7 +30,7 @@ pub fn read(path: &Path) -> Result<(Intrinsics, Pose, Vec<String>)> {
             "give the fields of one frame",
         ));
     }
-    let value: Value = serde_json::from_slice(&bytes).map_err(|error| {
+    let value: Value = serde_json::from_slice(without_mark(&bytes)).map_err(|error| {
         Error::file(
             path,
             error,

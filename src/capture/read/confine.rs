@@ -41,9 +41,8 @@ impl Confine {
         if path.is_empty() {
             return Err(Error::new(place, "the path is empty", "name a file"));
         }
-        let relative = Path::new(path);
-        let full = base.join(relative);
-        if !self.allow_outside && !stays_inside(&self.folder, base, relative) {
+        let full = self.written_path(base, path);
+        if !self.allow_outside && !self.stays_inside(base, &full) {
             return Err(outside(place, path));
         }
         let resolved = full.canonicalize().map_err(|e| {
@@ -84,12 +83,46 @@ impl Confine {
 
     /// Whether a path is one that [`Confine::file`] refuses as leaving the folder, by its letters alone.
     pub fn leads_out(&self, path: &str) -> bool {
-        !self.allow_outside && !stays_inside(&self.folder, &self.folder, Path::new(path))
+        let full = self.written_path(&self.folder, path);
+        !self.allow_outside && !self.stays_inside(&self.folder, &full)
     }
 
     /// Whether something of this name lies in the folder.
     pub fn holds(&self, name: &str) -> bool {
-        self.folder.join(name).symlink_metadata().is_ok()
+        self.written_path(&self.folder, name)
+            .symlink_metadata()
+            .is_ok()
+    }
+
+    /// Where a path leads from `base`. Backslashes, as programs on Windows write them, part folders where no file has them in
+    /// its name.
+    fn written_path(&self, base: &Path, path: &str) -> PathBuf {
+        let full = base.join(path);
+        let is_inside = || self.stays_inside(base, &full);
+        if !path.contains('\\') || (is_inside() && full.symlink_metadata().is_ok()) {
+            return full;
+        }
+        base.join(path.replace('\\', "/"))
+    }
+
+    /// Whether a path from `base` never climbs above the folder on its way, or is an absolute one into it.
+    fn stays_inside(&self, base: &Path, full: &Path) -> bool {
+        let relative = match full.strip_prefix(base) {
+            Ok(relative) => relative,
+            Err(_) => {
+                let canonical = full.strip_prefix(&self.canonical);
+                let absolute = std::path::absolute(&self.folder).ok();
+                let named = absolute.and_then(|folder| full.strip_prefix(folder).ok());
+                let Some(relative) = canonical.ok().or(named) else {
+                    return false;
+                };
+                return never_climbs(0, relative);
+            }
+        };
+        let depth = base
+            .strip_prefix(&self.folder)
+            .map_or(0, |inner| inner.components().count() as i64);
+        never_climbs(depth, relative)
     }
 }
 
@@ -101,11 +134,8 @@ fn outside(place: &str, path: &str) -> Error {
     )
 }
 
-/// Whether a relative path never climbs above the folder on its way.
-fn stays_inside(folder: &Path, base: &Path, relative: &Path) -> bool {
-    let mut depth = base
-        .strip_prefix(folder)
-        .map_or(0, |inner| inner.components().count() as i64);
+/// Whether a path from a folder so deep never climbs above the top on its way.
+fn never_climbs(mut depth: i64, relative: &Path) -> bool {
     relative.components().all(|component| {
         match component {
             Component::Normal(_) => depth += 1,
@@ -130,11 +160,18 @@ mod tests {
         std::fs::write(folder.join("images/a.png"), "x").unwrap();
         let confined = Confine::new(&folder, false).unwrap();
         assert!(confined.file("field", "images/../images/a.png").is_ok());
+        assert!(confined.file("field", "images\\a.png").is_ok());
+        let within = |path: &str| folder.join(path).display().to_string();
+        assert!(confined.file("field", &within("images/a.png")).is_ok());
         let absolute = outer.path().join("secret");
         for path in [
             "../secret",
             "images/../../secret",
             "../capture/images/a.png",
+            "..\\secret",
+            "images\\..\\..\\secret",
+            &within("../secret"),
+            &within("images/../../capture/images/a.png"),
             absolute.to_str().unwrap(),
             "",
         ] {

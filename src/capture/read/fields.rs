@@ -4,6 +4,11 @@ use crate::error::{Error, Result};
 use glam::DVec3;
 use serde_json::{Map, Value};
 
+/// The text of a file without the mark that some Windows programs put before UTF-8.
+pub fn without_mark(text: &[u8]) -> &[u8] {
+    text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
+}
+
 /// A JSON object and where it stands, e.g. `transforms.json: frames[3].`.
 #[derive(Debug, Clone)]
 pub struct Fields<'a> {

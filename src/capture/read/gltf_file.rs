@@ -29,9 +29,37 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Gltf> {
         (gltf::json::deserialize::from_slice(bytes), None)
     };
     let root = root.map_err(|e| invalid(gltf::Error::Deserialize(e)))?;
+    if let Some((name, remedy)) = compression(&root) {
+        return Err(Error::file(
+            path,
+            format!("is compressed with {name}, which is not read"),
+            remedy,
+        ));
+    }
     check_accessors(&root).map_err(broken)?;
     let document = Document::from_json(root).map_err(invalid)?;
     Ok(Gltf { document, blob })
+}
+
+/// The compression that a file cannot be read without, and what to do about it.
+fn compression(root: &Root) -> Option<(&'static str, &'static str)> {
+    let required = |name: &str| root.extensions_required.iter().any(|r| r == name);
+    let known = [
+        (
+            "KHR_draco_mesh_compression",
+            "Draco",
+            "export the mesh without compression, or decode it: npx @gltf-transform/cli copy IN.glb OUT.glb",
+        ),
+        (
+            "EXT_meshopt_compression",
+            "meshopt",
+            "export the mesh without compression, or decode it: npx @gltf-transform/cli copy IN.glb OUT.glb",
+        ),
+    ];
+    let found = known
+        .into_iter()
+        .find(|(extension, ..)| required(extension))?;
+    Some((found.1, found.2))
 }
 
 /// The crate's validation looks up accessors of attributes before it knows that they exist.

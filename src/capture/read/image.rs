@@ -3,7 +3,7 @@
 use crate::capture::camera::Intrinsics;
 use crate::capture::orientation::Orientation;
 use crate::capture::photograph::{Encoding, Photograph};
-use crate::capture::read::exposure;
+use crate::capture::read::{cut_short, exposure};
 use crate::error::{Error, Result};
 use crate::math::color::srgb_to_linear;
 use glam::Vec3;
@@ -19,6 +19,9 @@ pub const MAX_PIXELS: u64 = 1 << 28;
 const MOST_STORED: u64 = 16;
 /// ... and any number up to this one; whole rows of what is stored are held while it is decoded.
 const STORED_WITHOUT_QUESTION: u64 = 1 << 20;
+
+/// What helps with a photograph that cannot be decoded whole.
+const AGAIN: &str = "copy it again from where it came, or take its frame out of transforms.json";
 
 /// What a photograph's header says.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,6 +86,9 @@ pub fn read(
         ));
     }
     let encoding = encoding(path, decoder.color_type())?;
+    if cut_short::jpeg(path).map_err(|e| Error::io(path, &e))? {
+        return Err(Error::file(path, "ends before its picture is whole", AGAIN));
+    }
     let decoded = DynamicImage::from_decoder(decoder).map_err(|e| broken(path, &e))?;
     let scale = (1.0 / exposure.unwrap_or(1.0)) as f32;
     let multiplied = match encoding {
@@ -264,9 +270,5 @@ fn linear_values(image: DynamicImage, encoding: Encoding) -> Vec<[f32; 4]> {
 }
 
 fn broken(path: &Path, error: &image::ImageError) -> Error {
-    Error::file(
-        path,
-        format!("cannot be decoded: {error}"),
-        "export it again",
-    )
+    Error::file(path, format!("cannot be decoded: {error}"), AGAIN)
 }

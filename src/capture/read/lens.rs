@@ -8,6 +8,10 @@ use glam::DVec2;
 /// Coefficients of lens models that relit does not have; they may be present but must be zero.
 const HIGHER_COEFFICIENTS: [&str; 8] = ["k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"];
 
+/// No lens without distortion draws what lies farther from its axis, as a tangent: the widest there are, of 9 mm for a picture
+/// of 36 × 24 mm, reach 2.4.
+const MAX_SLOPE: f64 = 2.5;
+
 /// Reads the lens of one frame for an image of `size` (width, height) pixels.
 ///
 /// Returns remarks about what had to be guessed.
@@ -114,10 +118,6 @@ pub fn read(
         center("cx", width, scale.x)?,
         center("cy", height, scale.y)?,
     );
-    let mut distortion = [0.0; 4];
-    for (value, name) in distortion.iter_mut().zip(["k1", "k2", "p1", "p2"]) {
-        *value = number(name)?.unwrap_or(0.0);
-    }
     for (name, f) in [("fl_x", fx), ("fl_y", fy)] {
         if !(f.is_finite() && f > 0.0) {
             return Err(Error::new(
@@ -126,6 +126,26 @@ pub fn read(
                 "give a positive focal length in pixels",
             ));
         }
+    }
+    for (name, c, extent, f) in [("cx", cx, width, fx), ("cy", cy, height, fy)] {
+        // From the principal point to the nearest edge; not above zero inside the picture.
+        let beside = (-c).max(c - f64::from(extent));
+        if beside > MAX_SLOPE * f {
+            return Err(Error::new(
+                of(name).place(name),
+                format!(
+                    "a principal point at {c} pixels is far outside the picture of {width}×{height}"
+                ),
+                "give it in pixels from the picture's top-left corner",
+            ));
+        }
+        if beside > 0.0 {
+            remarks.push("the principal point (cx, cy) lies outside the picture");
+        }
+    }
+    let mut distortion = [0.0; 4];
+    for (value, name) in distortion.iter_mut().zip(["k1", "k2", "p1", "p2"]) {
+        *value = number(name)?.unwrap_or(0.0);
     }
     let intrinsics = Intrinsics {
         width,

@@ -111,12 +111,24 @@ fn drop_unused(mesh: &mut Mesh) {
     }
 }
 
+/// Lists of names end here, with the number of the rest.
+const LISTED: usize = 5;
+
+/// The first few names and the number of the rest.
+pub fn listed(names: &[String]) -> String {
+    let first = names[..names.len().min(LISTED)].join(", ");
+    match names.len().saturating_sub(LISTED) {
+        0 => first,
+        rest => format!("{first} and {rest} more"),
+    }
+}
+
 /// Gives repeated names a number and empty ones a name.
 fn make_names_unique(path: &Path, names: &mut [String], warnings: &mut Vec<String>) {
     let mut taken: HashSet<String> = names.iter().cloned().collect();
     let mut seen = HashSet::new();
     let mut next = std::collections::HashMap::<String, usize>::new();
-    let mut renamed = 0;
+    let mut renamed: Vec<String> = Vec::new();
     for name in names.iter_mut() {
         if name.is_empty() {
             *name = "unnamed".into();
@@ -134,13 +146,15 @@ fn make_names_unique(path: &Path, names: &mut [String], warnings: &mut Vec<Strin
             }
         };
         seen.insert(unique.clone());
+        renamed.push(unique.clone());
         *name = unique;
-        renamed += 1;
     }
-    if renamed > 0 {
+    if !renamed.is_empty() {
         warnings.push(format!(
-            "{}: {renamed} objects had the name of another one and got a number",
-            path.display()
+            "{}: {} objects had the name of another one and got a number: {}",
+            path.display(),
+            renamed.len(),
+            listed(&renamed)
         ));
     }
 }

@@ -14,6 +14,7 @@
 pub mod accessor;
 pub mod camera_file;
 pub mod confine;
+mod cut_short;
 mod exposure;
 pub(in crate::capture) mod fields;
 mod gltf;

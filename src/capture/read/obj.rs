@@ -1,7 +1,8 @@
 //! Wavefront OBJ: every `o` or `g` is an object, taken up again where its name comes again. Parsed by tobj; materials are not
 //! needed here and not opened.
 
-use crate::capture::read::mesh::RawMesh;
+use crate::capture::read::fields::without_mark;
+use crate::capture::read::mesh::{RawMesh, listed};
 use crate::error::{Error, Result};
 use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashMap;
@@ -18,7 +19,10 @@ const UNNAMED: &str = "unnamed_object";
 pub fn read(path: &Path) -> Result<RawMesh> {
     let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
     // Comments and names in other encodings than UTF-8 are no reason to fail.
-    parse(path, String::from_utf8_lossy(&bytes).as_bytes())
+    parse(
+        path,
+        String::from_utf8_lossy(without_mark(&bytes)).as_bytes(),
+    )
 }
 
 fn parse(path: &Path, reader: impl BufRead) -> Result<RawMesh> {
@@ -48,16 +52,21 @@ fn parse(path: &Path, reader: impl BufRead) -> Result<RawMesh> {
     let colored = models.iter().any(|m| !m.mesh.vertex_color.is_empty());
     let textured = models.iter().any(|m| !m.mesh.texcoords.is_empty());
     let mut objects = HashMap::new();
+    let mut repeated: Vec<String> = Vec::new();
     for model in models {
         let part = model.mesh;
         if part.indices.is_empty() {
             continue;
         }
         let first = u32::try_from(mesh.positions.len()).map_err(|_| too_large(path))?;
-        let object = *(objects.entry(model.name.clone())).or_insert_with(|| {
+        let known = objects.get(&model.name).copied();
+        let object = known.unwrap_or(mesh.objects.len() as u32);
+        if known.is_none() {
+            objects.insert(model.name.clone(), object);
             mesh.objects.push(model.name);
-            mesh.objects.len() as u32 - 1
-        });
+        } else if !repeated.contains(&model.name) {
+            repeated.push(model.name);
+        }
         mesh.positions
             .extend(part.positions.chunks_exact(3).map(DVec3::from_slice));
         if u32::try_from(mesh.positions.len()).is_err() {
@@ -86,6 +95,16 @@ fn parse(path: &Path, reader: impl BufRead) -> Result<RawMesh> {
             mesh.corner_uvs
                 .resize(mesh.triangles.len(), [Vec2::ZERO; 3]);
         }
+    }
+    if !repeated.is_empty() {
+        raw.warnings.push(format!(
+            "{} several times and taken as one object each: {}; give each its own name to keep them apart",
+            match repeated.len() {
+                1 => "one name comes".to_owned(),
+                n => format!("{n} names come"),
+            },
+            listed(&repeated)
+        ));
     }
     raw.has_objects = mesh.objects.iter().any(|name| name != UNNAMED);
     Ok(raw)

@@ -4,7 +4,7 @@ use crate::capture::Frame;
 use crate::capture::orientation::Orientation;
 use crate::capture::photograph::PhotographSource;
 use crate::capture::read::confine::Confine;
-use crate::capture::read::fields::Fields;
+use crate::capture::read::fields::{Fields, without_mark};
 use crate::capture::read::{exposure, image, lens, pose};
 use crate::error::{Error, Result};
 use glam::DVec3;
@@ -53,7 +53,7 @@ pub fn read(
         ));
     }
     let text = std::fs::read(&file).map_err(|e| Error::io(&file, &e))?;
-    let value: Value = serde_json::from_slice(&text)
+    let value: Value = serde_json::from_slice(without_mark(&text))
         .map_err(|e| Error::file(&file, format!("is not valid JSON: {e}"), "correct the file"))?;
     let shared = Fields::new(format!("{place}: "), &value)?;
 

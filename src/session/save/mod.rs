@@ -10,12 +10,15 @@ mod saved;
 pub mod staging;
 mod write;
 
+pub use crate::export::overwrite::{CHECKPOINT, ESTIMATE, REPORT};
 pub use saved::{Saved, load, load_checkpoint};
-pub use write::{write, write_checkpoint, write_estimate};
+pub use write::{write, write_checkpoint, write_edited};
 
+use crate::export::overwrite::CaptureId;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Progress, Termination};
+use crate::session::command::Source;
 use crate::session::edits::{Edited, Edits};
 use crate::session::snapshot::OpenCapture;
 use estimate::EstimateFile;
@@ -23,13 +26,6 @@ use pictures::Frames;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::Instant;
-
-/// The estimate, for later commands.
-pub const ESTIMATE: &str = "estimate.json";
-/// What the solve did.
-pub const REPORT: &str = "report.json";
-/// Where a solve can be taken up again.
-pub const CHECKPOINT: &str = "checkpoint.json";
 
 /// Everything that is written at the end of a solve.
 #[derive(Debug, Clone)]
@@ -57,9 +53,26 @@ pub struct Results {
 }
 
 impl Results {
+    /// The capture that they are of, for whoever asks what they may replace.
+    pub fn capture_id(&self) -> CaptureId {
+        CaptureId::from(self.capture.as_ref())
+    }
+
     /// What was found, with the changes made by hand.
     pub fn edited(&self) -> Arc<Estimate> {
         Edited::default().of(&self.estimate, &self.edits)
+    }
+}
+
+impl From<&OpenCapture> for CaptureId {
+    fn from(capture: &OpenCapture) -> Self {
+        Self {
+            hash: capture.hash.clone(),
+            folder: match &capture.source {
+                Source::BuiltInRoom => None,
+                Source::Folder(folder) => Some(folder.clone()),
+            },
+        }
     }
 }
 

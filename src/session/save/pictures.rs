@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Folder of the pictures within the results.
-pub const FOLDER: &str = "views";
+pub use crate::export::overwrite::VIEWS as FOLDER;
 /// What is written of each frame.
 pub const KINDS: [&str; 6] = ["render", "albedo", "emission", "error", "stderr", "seen"];
 

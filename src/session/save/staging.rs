@@ -1,4 +1,5 @@
-//! All files of a result appear together, or none does.
+//! All files of a result appear together, or none does. They take the place of those of the same capture alone, and of no
+//! input (see [`crate::export::overwrite`]).
 //!
 //! Several programs may write into one folder: each fills a folder of its own, and they move their files into place one
 //! after the other. What a killed program left aside is removed by the next one. Both rest on locks on folders, which
@@ -6,6 +7,7 @@
 
 use crate::error::{Error, Result};
 use crate::export::atomic::write_bytes;
+use crate::export::overwrite::{self, CaptureId};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -24,11 +26,12 @@ pub struct Staging {
 }
 
 impl Staging {
-    /// Starts filling; creates the target folder if need be.
+    /// Starts filling with results of a capture; creates the target folder if need be.
     ///
     /// # Errors
-    /// The target cannot be written.
-    pub fn new(target: &Path) -> Result<Self> {
+    /// The target holds something else, or cannot be written.
+    pub fn new(target: &Path, capture: &CaptureId) -> Result<Self> {
+        overwrite::check_results(target, capture)?;
         fs::create_dir_all(target).map_err(|error| Error::io(target, &error))?;
         let _alone = locked(target);
         remove_abandoned(target);
@@ -63,19 +66,28 @@ impl Staging {
     /// It cannot be written.
     pub fn write(&mut self, name: impl AsRef<Path>, bytes: &[u8]) -> Result<()> {
         let path = self.file(&name)?;
-        write_bytes(&path, bytes).map_err(|error| Error {
-            place: self.target.join(name.as_ref()).display().to_string(),
-            ..error
-        })
+        write_bytes(&path, bytes).map_err(|error| self.named(error))
+    }
+
+    /// An error about a file aside, as one about the file that it will be.
+    pub fn named(&self, error: Error) -> Error {
+        let place = error.place.replace(
+            &self.aside.path().display().to_string(),
+            &self.target.display().to_string(),
+        );
+        Error { place, ..error }
     }
 
     /// Moves everything into place, in the order in which it was asked for, and removes those files of an earlier run
     /// that this one did not write: what `stale` names once nobody else moves files.
     ///
     /// # Errors
-    /// A file cannot be moved.
+    /// A file cannot be moved, or would take the place of an input.
     pub fn commit(self, stale: impl FnOnce(&Path) -> Vec<PathBuf>) -> Result<()> {
         let _alone = locked(&self.target);
+        for name in &self.files {
+            overwrite::check_input(&self.target.join(name))?;
+        }
         let stale = stale(&self.target);
         for name in &self.files {
             let target = self.target.join(name);
@@ -120,18 +132,26 @@ fn remove_abandoned(target: &Path) {
 mod tests {
     use super::*;
 
+    fn start(folder: &Path) -> Staging {
+        let capture = CaptureId {
+            hash: "1".to_owned(),
+            folder: None,
+        };
+        Staging::new(folder, &capture).expect("starts")
+    }
+
     #[test]
     fn a_dropped_staging_leaves_everything_and_a_commit_replaces_it_all() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let read = |name: &str| fs::read_to_string(folder.path().join(name)).ok();
         fs::write(folder.path().join("a"), "old").expect("writes");
         fs::write(folder.path().join("stale"), "old").expect("writes");
-        let mut dropped = Staging::new(folder.path()).expect("starts");
+        let mut dropped = start(folder.path());
         dropped.write("a", b"new").expect("writes");
         drop(dropped);
         assert_eq!(read("a").as_deref(), Some("old"));
 
-        let mut staging = Staging::new(folder.path()).expect("starts");
+        let mut staging = start(folder.path());
         staging.write("views/000.txt", b"v").expect("writes");
         staging.write("a", b"new").expect("writes");
         staging
@@ -150,10 +170,10 @@ mod tests {
         let abandoned = folder.path().join(format!("{UNFINISHED}killed"));
         fs::create_dir(&abandoned).expect("makes it");
         fs::write(abandoned.join("half"), "of it").expect("writes");
-        let mut living = Staging::new(folder.path()).expect("starts");
+        let mut living = start(folder.path());
         living.write("a", b"living").expect("writes");
         assert!(!abandoned.exists());
-        let mut other = Staging::new(folder.path()).expect("starts");
+        let mut other = start(folder.path());
         other.write("a", b"other").expect("writes");
         other.commit(|_| Vec::new()).expect("moves");
         living.commit(|_| Vec::new()).expect("moves");

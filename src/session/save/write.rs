@@ -15,53 +15,59 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Writes a folder of results. Everything is written aside and moved into place at the end, so that a failure
-/// leaves an earlier run's files untouched.
+/// The scene for other programs.
+const SCENE: &str = "scene.glb";
+
+/// Writes a folder of results: the estimate with its report and losses first, then the scene and the pictures. Each step is
+/// written aside and moved into place at its end, so that a failure leaves what was there before it.
 ///
 /// # Errors
-/// The folder cannot be written.
+/// The folder cannot be written, or is another capture's. Where the error says so, the estimate is written.
 pub fn write(folder: &Path, results: &Results) -> Result<()> {
     let started = Instant::now();
-    let mut staging = Staging::new(folder)?;
-    stage_estimate(&mut staging, folder, results)?;
-    losses(&results.progress.losses).write(&staging.file("loss.csv")?)?;
-    loss_plot(&results.progress.losses, &results.progress.stages)
-        .write(&staging.file("loss.png")?)?;
-    let report = Report::new(
-        &results.capture,
-        &results.settings,
-        &results.estimate,
-        &results.progress,
-        results.stopped_because,
-        Seconds {
+    let report = || {
+        let seconds = Seconds {
             total: results.started.elapsed().as_secs_f64(),
             load: results.seconds_load,
             write: started.elapsed().as_secs_f64(),
-        },
-    );
-    staging.write(REPORT, &json(REPORT, &report)?)?;
-    staging.commit(earlier)
+        };
+        let report = Report::new(
+            &results.capture,
+            &results.settings,
+            &results.estimate,
+            &results.progress,
+            results.stopped_because,
+            seconds,
+        );
+        json(REPORT, &report)
+    };
+    let mut staging = Staging::new(folder, &results.capture_id())?;
+    stage_estimate(&mut staging, folder, results)?;
+    staging.write(REPORT, &report()?)?;
+    let table = losses(&results.progress.losses).write(&staging.file("loss.csv")?);
+    table.map_err(|error| staging.named(error))?;
+    staging.commit(earlier)?;
+
+    write_shown(folder, results, |staging| {
+        loss_plot(&results.progress.losses, &results.progress.stages)
+            .write(&staging.file("loss.png")?)?;
+        staging.write(REPORT, &report()?)
+    })
 }
 
-/// Writes the estimate and its pictures alone, as after an edit.
+/// Writes an estimate that was changed by hand and the pictures of it.
 ///
 /// # Errors
-/// The folder cannot be written.
-pub fn write_estimate(folder: &Path, results: &Results) -> Result<()> {
-    let mut staging = Staging::new(folder)?;
+/// As [`write`].
+pub fn write_edited(folder: &Path, results: &Results) -> Result<()> {
+    let mut staging = Staging::new(folder, &results.capture_id())?;
     stage_estimate(&mut staging, folder, results)?;
-    staging.commit(earlier)
+    staging.commit(earlier)?;
+    write_shown(folder, results, |_| Ok(()))
 }
 
+/// The estimate with its maps and checkpoint, which must be there before it is.
 fn stage_estimate(staging: &mut Staging, folder: &Path, results: &Results) -> Result<()> {
-    pictures::write(staging, results)?;
-    let scene = staging.file("scene.glb")?;
-    scene::write(
-        &results.capture.scene,
-        &results.edited(),
-        Format::Glb,
-        &scene,
-    )?;
     let (file, maps) = results.file(folder)?;
     if let (Some(name), Some(bytes)) = (&file.maps, &maps) {
         staging.write(name, bytes)?;
@@ -76,12 +82,38 @@ fn stage_estimate(staging: &mut Staging, folder: &Path, results: &Results) -> Re
     staging.write(ESTIMATE, &json(ESTIMATE, &file)?)
 }
 
+/// Writes what is seen of an estimate that is in its place: the scene, the pictures, and what `and` adds.
+fn write_shown(
+    folder: &Path,
+    results: &Results,
+    and: impl FnOnce(&mut Staging) -> Result<()>,
+) -> Result<()> {
+    let mut staging = Staging::new(folder, &results.capture_id())?;
+    let scene = |staging: &mut Staging| {
+        let path = staging.file(SCENE)?;
+        let (scene, estimate) = (&results.capture.scene, results.edited());
+        scene::write(scene, &estimate, Format::Glb, &path)
+    };
+    scene(&mut staging)
+        .and_then(|()| pictures::write(&mut staging, results))
+        .and_then(|()| and(&mut staging))
+        .map_err(|error| staging.named(error))
+        .and_then(|()| staging.commit(|_| Vec::new()))
+        .map_err(|error| Error {
+            problem: format!(
+                "{}; the estimate is saved, its pictures and {SCENE} are not",
+                error.problem
+            ),
+            ..error
+        })
+}
+
 /// Writes `checkpoint.json` alone, while the solve runs.
 ///
 /// # Errors
 /// The folder cannot be written.
 pub fn write_checkpoint(folder: &Path, results: &Results) -> Result<()> {
-    let mut staging = Staging::new(folder)?;
+    let mut staging = Staging::new(folder, &results.capture_id())?;
     let (estimate, maps) = results.file(folder)?;
     if let (Some(name), Some(bytes)) = (&estimate.maps, &maps) {
         staging.write(name, bytes)?;
@@ -137,7 +169,7 @@ fn losses(points: &[LossPoint]) -> Table {
 /// Files of an earlier run that a new one replaces: those that it may not write again under the same name.
 fn earlier(folder: &Path) -> Vec<PathBuf> {
     let mut names = pictures::earlier(folder);
-    names.push(PathBuf::from(CHECKPOINT));
+    names.extend([CHECKPOINT, SCENE, "loss.png"].map(PathBuf::from));
     names.extend(earlier_maps(folder));
     names
 }

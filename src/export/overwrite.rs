@@ -1,0 +1,389 @@
+//! What may be replaced: no output takes the place of an input or of somebody else's results.
+//!
+//! Every file is asked about before it is written, by whatever command or by the window:
+//!
+//! - A file of a capture stays: its transforms.json, its truth, its mesh, and what a transforms.json in a folder above it
+//!   names, with what lies beside that in a folder of its own. A mesh that the reader would take for the capture's is not
+//!   put there either.
+//! - A file of results (estimate.json and what `relit solve` writes beside it) is replaced only by results of the same
+//!   capture: one with the same content, or the one that lies where theirs lay.
+//! - Any other file is the person's, and is replaced as by any program.
+//!
+//! [`permit`] lifts all of it, where a person says `--overwrite`.
+
+use crate::error::{Error, Result};
+use serde::Deserialize;
+use serde_json::Value;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// The estimate, for later commands.
+pub const ESTIMATE: &str = "estimate.json";
+/// What the solve did.
+pub const REPORT: &str = "report.json";
+/// Where a solve can be taken up again.
+pub const CHECKPOINT: &str = "checkpoint.json";
+/// The folder of the pictures within results.
+pub const VIEWS: &str = "views";
+/// What else is written beside an estimate, besides its maps.
+const BESIDE: [&str; 5] = [REPORT, "loss.csv", "loss.png", "scene.glb", VIEWS];
+/// What a capture's cameras are called.
+const CAMERAS: &str = "transforms.json";
+/// The meshes that its reader looks for where the cameras name none.
+const MESHES: [&str; 3] = ["mesh.glb", "mesh.ply", "mesh.obj"];
+
+static PERMITTED: AtomicBool = AtomicBool::new(false);
+
+/// Lets everything be replaced, for the rest of the program's life.
+pub fn permit() {
+    PERMITTED.store(true, Ordering::Relaxed);
+}
+
+/// Whether everything may be replaced.
+pub fn is_permitted() -> bool {
+    PERMITTED.load(Ordering::Relaxed)
+}
+
+/// Refuses to write a file that is a capture's or of results.
+///
+/// # Errors
+/// It is one.
+pub fn check(path: &Path) -> Result<()> {
+    refuse(path, Some)
+}
+
+/// Refuses to write a file that is a capture's; for those of results, [`check_results`] is asked about the folder.
+///
+/// # Errors
+/// It is one.
+pub fn check_input(path: &Path) -> Result<()> {
+    refuse(path, |owner| match owner {
+        Owner::Capture(..) => Some(owner),
+        Owner::Results(_) => None,
+    })
+}
+
+fn refuse(path: &Path, counts: impl Fn(Owner) -> Option<Owner>) -> Result<()> {
+    if is_permitted() {
+        return Ok(());
+    }
+    let what = match owner(path).and_then(counts) {
+        None => return Ok(()),
+        Some(Owner::Capture(folder, what)) => {
+            format!("is {what} of the capture in {}", folder.display())
+        }
+        Some(Owner::Results(folder)) => {
+            format!("belongs to the results in {}", folder.display())
+        }
+    };
+    let remedy = "name another file; the command line replaces it where --overwrite is added";
+    Err(Error::file(path, what, remedy))
+}
+
+/// The capture that results are of.
+#[derive(Debug, Clone)]
+pub struct CaptureId {
+    /// Hash of its content.
+    pub hash: String,
+    /// Its folder; `None` for the room built into the program.
+    pub folder: Option<PathBuf>,
+}
+
+/// Refuses a folder for results of a capture: those of another one are there, or files that results would replace and that
+/// belong to none.
+///
+/// # Errors
+/// So it is.
+pub fn check_results(folder: &Path, capture: &CaptureId) -> Result<()> {
+    if is_permitted() {
+        return Ok(());
+    }
+    let remedy = "name another folder; the command line writes over it where --overwrite is added";
+    let mut is_results = false;
+    for name in [ESTIMATE, CHECKPOINT] {
+        let path = folder.join(name);
+        if !path.exists() {
+            continue;
+        }
+        is_results = true;
+        let there = Reference::read(&path)
+            .ok_or_else(|| Error::file(&path, "is there and holds no results of relit", remedy))?;
+        if !there.is_of(folder, capture) {
+            let problem = format!("holds the results of another capture, {}", there.name);
+            return Err(Error::file(folder, problem, remedy));
+        }
+    }
+    let other = BESIDE.iter().map(|name| folder.join(name));
+    match other.into_iter().find(|path| !is_results && path.exists()) {
+        Some(path) => Err(Error::file(
+            &path,
+            "is there and belongs to no results of relit",
+            remedy,
+        )),
+        None => Ok(()),
+    }
+}
+
+/// To what a file belongs.
+enum Owner {
+    /// The capture in a folder, and what it is of it.
+    Capture(PathBuf, &'static str),
+    /// The results in a folder.
+    Results(PathBuf),
+}
+
+fn owner(path: &Path) -> Option<Owner> {
+    let place = place(path)?;
+    place.ancestors().skip(1).find_map(|folder| {
+        let name = place.strip_prefix(folder).ok()?;
+        if let Some(what) = of_capture(folder, name, &place) {
+            return Some(Owner::Capture(folder.to_owned(), what));
+        }
+        of_results(folder, name, &place).then(|| Owner::Results(folder.to_owned()))
+    })
+}
+
+/// The path with its folder resolved; a link in the last place is replaced itself, not what it leads to.
+fn place(path: &Path) -> Option<PathBuf> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let named = folder.canonicalize().ok()?.join(path.file_name()?);
+    match named.symlink_metadata() {
+        // Also in the letters that the disk has, where it takes capitals for small ones.
+        Ok(metadata) if !metadata.is_symlink() => named.canonicalize().ok().or(Some(named)),
+        _ => Some(named),
+    }
+}
+
+fn of_results(folder: &Path, name: &Path, place: &Path) -> bool {
+    let is_results = || {
+        [ESTIMATE, CHECKPOINT]
+            .iter()
+            .any(|n| folder.join(n).is_file())
+    };
+    let first = name
+        .iter()
+        .next()
+        .and_then(|n| n.to_str())
+        .unwrap_or_default();
+    let is_one = [ESTIMATE, CHECKPOINT].contains(&first)
+        || BESIDE.contains(&first)
+        || (first.starts_with("maps-") && first.ends_with(".safetensors"));
+    is_one && place.exists() && is_results()
+}
+
+/// What a file is of the capture in a folder.
+fn of_capture(folder: &Path, name: &Path, place: &Path) -> Option<&'static str> {
+    let cameras = folder.join(CAMERAS);
+    if !cameras.is_file() {
+        return None;
+    }
+    if name == Path::new(CAMERAS) {
+        return Some("the cameras");
+    }
+    let (exists, is_mesh) = (place.exists(), MESHES.iter().any(|m| name == Path::new(m)));
+    if exists && (name == Path::new("truth.json") || name.starts_with("truth")) {
+        return Some("the truth");
+    }
+    if !exists && !is_mesh {
+        return None;
+    }
+    let text = std::fs::read(&cameras).ok()?;
+    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&text);
+    // What cannot be read may name anything.
+    let Ok(file) = serde_json::from_slice::<Value>(text) else {
+        return Some("beside the broken cameras");
+    };
+    if is_mesh && file.get("mesh_path").is_none_or(Value::is_null) {
+        return Some("the mesh");
+    }
+    let named = |value: &Value, field: &str| -> Option<PathBuf> {
+        let name = value.get(field)?.as_str()?;
+        let as_written = self::place(&folder.join(name)).filter(|path| path.exists());
+        as_written.or_else(|| self::place(&folder.join(name.replace('\\', "/"))))
+    };
+    let same_stem =
+        |mesh: &PathBuf| mesh.parent() == place.parent() && mesh.file_stem() == place.file_stem();
+    if exists && named(&file, "mesh_path").as_ref().is_some_and(same_stem) {
+        return Some("the mesh");
+    }
+    let beside = |file: &PathBuf| {
+        file == place
+            || (exists && file.parent() == place.parent() && file.parent() != Some(folder))
+    };
+    let frames = file.get("frames").and_then(Value::as_array);
+    frames.into_iter().flatten().find_map(|frame| {
+        [
+            ("file_path", "a photograph"),
+            ("depth_file_path", "a depth image"),
+            ("mask_path", "a mask"),
+        ]
+        .into_iter()
+        .find(|(field, _)| named(frame, field).as_ref().is_some_and(beside))
+        .map(|(_, what)| what)
+    })
+}
+
+/// Of which capture results are, as estimate.json and checkpoint.json say.
+#[derive(Deserialize)]
+struct Reference {
+    name: String,
+    built_in: bool,
+    relative: Option<String>,
+    absolute: Option<PathBuf>,
+    hash: String,
+}
+
+impl Reference {
+    fn read(path: &Path) -> Option<Self> {
+        #[derive(Deserialize)]
+        struct Estimate {
+            capture: Reference,
+        }
+        #[derive(Deserialize)]
+        #[serde(untagged)]
+        enum Results {
+            Estimate(Estimate),
+            Checkpoint { estimate: Estimate },
+        }
+        let file = BufReader::new(File::open(path).ok()?);
+        Some(match serde_json::from_reader(file).ok()? {
+            Results::Estimate(estimate) | Results::Checkpoint { estimate } => estimate.capture,
+        })
+    }
+
+    fn is_of(&self, results: &Path, capture: &CaptureId) -> bool {
+        if self.hash == capture.hash {
+            return true;
+        }
+        let Some(folder) = &capture.folder else {
+            return self.built_in;
+        };
+        let Ok(folder) = folder.canonicalize() else {
+            return false;
+        };
+        let lay = [
+            self.relative.as_ref().map(|path| results.join(path)),
+            self.absolute.clone(),
+        ];
+        (lay.into_iter().flatten()).any(|path| path.canonicalize().is_ok_and(|p| p == folder))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn write(path: PathBuf, text: &str) {
+        fs::create_dir_all(path.parent().expect("a folder")).expect("makes it");
+        fs::write(path, text).expect("writes");
+    }
+
+    #[test]
+    fn what_a_capture_or_results_hold_is_refused_and_nothing_else() {
+        let outer = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| outer.path().join(name);
+        let cameras = r#"{"mesh_path": "scan\\room.ply", "frames": [{"file_path": "images/a/0.png"}, {"file_path": "1.png"}]}"#;
+        write(at("room/transforms.json"), cameras);
+        for name in [
+            "scan/room.ply",
+            "scan/notes.txt",
+            "images/a/0.png",
+            "images/a/left-out.png",
+            "1.png",
+            "plain.png",
+            "truth.json",
+        ] {
+            write(at(&format!("room/{name}")), "x");
+        }
+        for name in [
+            "estimate.json",
+            "report.json",
+            "views/000.render.exr",
+            "maps-1.safetensors",
+            "mine.png",
+        ] {
+            write(at(&format!("room/out/{name}")), "x");
+        }
+        for refused in [
+            "room/transforms.json",
+            "room/truth.json",
+            "room/scan/room.ply",
+            "room/images/a/0.png",
+            "room/images/a/left-out.png",
+            "room/images/../images/a/0.png",
+            "room/1.png",
+            "room/out/estimate.json",
+            "room/out/report.json",
+            "room/out/views/000.render.exr",
+            "room/out/maps-1.safetensors",
+        ] {
+            let error = check(&at(refused)).expect_err(refused);
+            assert!(
+                error.place.contains(refused) && error.remedy.contains("--overwrite"),
+                "{error}"
+            );
+        }
+        for free in [
+            "room/plain.png",
+            "room/scan/notes.txt",
+            "room/images/a/new.png",
+            "room/out/mine.png",
+            "room/out/checkpoint.json",
+            "new/folder/000.exr",
+            "mesh.obj",
+        ] {
+            check(&at(free)).expect(free);
+        }
+        write(at("hall/transforms.json"), r#"{"frames": []}"#);
+        check(&at("hall/mesh.glb")).expect_err("it would be taken for the mesh");
+        check(&at("room/mesh.glb")).expect("the cameras name another");
+        assert!(check_input(&at("room/out/report.json")).is_ok());
+        assert!(check_input(&at("room/1.png")).is_err());
+    }
+
+    #[test]
+    fn results_make_room_only_for_those_of_their_capture() {
+        let outer = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| outer.path().join(name);
+        write(at("room/transforms.json"), "{}");
+        write(at("hall/transforms.json"), "{}");
+        let own = |hash: &str, folder: &str| CaptureId {
+            hash: hash.to_owned(),
+            folder: Some(at(folder)),
+        };
+        let estimate = r#"{"capture": {"name": "room", "built_in": false, "relative": "../room", "absolute": null, "hash": "1"}, "x": 1}"#;
+        check_results(&at("out"), &own("1", "room")).expect("there is nothing");
+        write(at("out/loss.csv"), "mine");
+        check_results(&at("out"), &own("1", "room")).expect_err("a table of someone's");
+        for (name, text) in [
+            (ESTIMATE, estimate.to_owned()),
+            (
+                CHECKPOINT,
+                format!("{{\"estimate\": {estimate}, \"checkpoint\": null}}"),
+            ),
+        ] {
+            write(at("out").join(name), &text);
+            check_results(&at("out"), &own("1", "elsewhere")).expect("the same content");
+            check_results(&at("out"), &own("2", "room")).expect("changed since");
+            let error = check_results(&at("out"), &own("2", "hall")).expect_err("another capture");
+            assert!(error.problem.contains("another capture, room"), "{error}");
+            check_results(
+                &at("out"),
+                &CaptureId {
+                    hash: "2".into(),
+                    folder: None,
+                },
+            )
+            .expect_err("the built-in room");
+            fs::remove_file(at("out").join(name)).expect("removes");
+        }
+        write(at("out").join(ESTIMATE), "[1]");
+        check_results(&at("out"), &own("1", "room")).expect_err("someone's file");
+    }
+}
