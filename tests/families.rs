@@ -1,10 +1,9 @@
 //! Families of generated rooms: each holds what it promises.
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 use relit::math::rng::splitmix64;
 use relit::room::generated::{Family, Generated, generate};
-use relit::room::{photographs, truth};
-use relit::scene::Scene;
+use relit::room::photographs;
 use relit::transport::material::Albedo;
 
 /// Size of photographs that are rendered in a moment.
@@ -96,7 +95,7 @@ fn names_in_truth_are_the_objects_of_the_mesh_wherever_it_has_any() {
 
 #[test]
 fn unseen_lamps_light_rooms_in_which_no_pixel_sees_one() {
-    for seed in 1..12 {
+    for seed in 1..6 {
         let room = Family::Unseen.generate(seed, TINY).expect("a room");
         let lamps = room.truth.objects.values().filter(|o| o.is_emitter());
         assert!(lamps.count() > 0);
@@ -119,7 +118,7 @@ fn unseen_lamps_light_rooms_in_which_no_pixel_sees_one() {
 #[test]
 fn rays_leave_rooms_with_windows_for_light_that_the_truth_holds() {
     let mut suns = 0;
-    for seed in 1..9 {
+    for seed in 1..6 {
         let room = Family::Window.generate(seed, TINY).expect("a room");
         let outside = room.lit.outside.as_ref().expect("light from outside");
         assert!(outside.power() > 0.0);
@@ -222,14 +221,12 @@ fn shell_and_most_furniture_of_white_rooms_reflect_nine_tenths() {
 
 #[test]
 fn sparse_rooms_are_in_six_photographs_of_five_to_fifteen_percent_of_noise() {
-    for seed in SEEDS {
-        let [a, b] = [seed, seed].map(|seed| Family::Sparse.generate(seed, TINY).expect("a room"));
+    for a in rooms(Family::Sparse) {
         assert_eq!(a.capture.frames.len(), 6);
-        assert_eq!(hash(&a), hash(&b));
         // Against a rendering with hardly any noise.
         let clean = photographs::Rendering {
             seed: 99,
-            samples: 1024,
+            samples: 400,
             size: TINY,
         };
         let clean = photographs::render_lit(&a.lit, &clean);
@@ -244,7 +241,8 @@ fn sparse_rooms_are_in_six_photographs_of_five_to_fifteen_percent_of_noise() {
         let deviation = median / 0.674_49;
         assert!(
             (0.045..0.17).contains(&deviation),
-            "room {seed}: {deviation}"
+            "room {}: {deviation}",
+            a.seed
         );
     }
 }

@@ -1,6 +1,6 @@
 //! Rooms full of small things.
 
-use crate::room::furniture::{vessels, woodwork};
+use crate::room::furniture::woodwork;
 use crate::room::generated::furnisher::{Furnisher, Support};
 use glam::{DAffine3, DVec2, DVec3};
 
@@ -13,7 +13,7 @@ const RADIUS: [f64; 2] = [0.015, 0.07];
 /// Tries at finding a free place before a smaller thing is taken.
 const TRIES: u32 = 20;
 
-/// A plain room with shelves, and hundreds of boxes, drums, vases and bowls on its floor, furniture and shelves.
+/// A plain room with shelves, and hundreds of boxes, drums, cups and cones on its floor, furniture and shelves.
 pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     f.shell();
     f.lamps();
@@ -82,8 +82,8 @@ fn thing(f: &mut Furnisher, index: usize, supports: &[Support], places: &mut [Ve
     f.plain(&format!("thing-{index}"), [0.03, 0.9], |m| {
         m.placed(place, |m| match kind {
             0 => m.lathe(&[[radius, 0.0], [radius, height]], 8),
-            1 => vessels::bowl(m, radius),
-            2 => vessels::vase(m, (3.0 * radius).min(height)),
+            1 => m.lathe(&[[0.6 * radius, 0.0], [radius, height]], 8),
+            2 => m.lathe(&[[radius, 0.0], [0.3 * radius, height]], 8),
             _ => {
                 let half = half + DVec3::Y * height * 0.5;
                 m.rounded_box(DVec3::Y * height * 0.5, half, 0.0, 0);

@@ -2,7 +2,7 @@
 
 use crate::capture::Cut;
 use crate::capture::camera::Pose;
-use crate::capture::fuse::{MAX_BYTES, fuse, voxel_size};
+use crate::capture::fuse::{MAX_BYTES, fuse};
 use crate::capture::import::{DepthImage, ImportedFrame, Lens};
 use crate::capture::truth::Truth;
 use crate::error::{Error, Result};
@@ -20,6 +20,8 @@ use std::path::{Path, PathBuf};
 const KEY: u64 = 0x7363_616e;
 /// Width of the depth images in pixels.
 const WIDTH: u32 = 160;
+/// Edge of a voxel in metres: meshes as fine as those that telephones make of rooms.
+const VOXEL: f64 = 0.05;
 /// Metres a unit of the depth images.
 const UNIT: f64 = 0.001;
 /// Farthest depth in metres.
@@ -36,7 +38,7 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     f.lamps();
     f.furniture();
     f.look_around(16, 24);
-    f.expose(16.0, 48.0);
+    f.expose(8.0, 32.0);
 }
 
 /// Standard deviation of a depth in metres: a structured-light camera's (Nguyen, Izadi and Lovell 2012).
@@ -79,8 +81,7 @@ pub fn scan(draft: Draft) -> Result<Generated> {
             depth: Some(depth),
         });
     }
-    let voxel = voxel_size(&frames, None)?;
-    let fused = fuse(&frames, voxel.edge, MAX_BYTES, &mut |_, _| {})?;
+    let fused = fuse(&frames, VOXEL, MAX_BYTES, &mut |_, _| {})?;
 
     let photographs = files
         .iter()

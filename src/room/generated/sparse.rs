@@ -22,7 +22,7 @@ pub const NOISE: [f64; 2] = [0.05, 0.15];
 const KEY: u64 = 0x7370_6172_7365;
 /// Paths a pixel that are added at a time, and at most.
 const STEP: u32 = 16;
-const MAX_SAMPLES: u32 = 256;
+const MAX_SAMPLES: u32 = 128;
 /// A normal deviate is below this in size as often as not.
 const NORMAL_MEDIAN: f64 = 0.674_49;
 
@@ -70,7 +70,7 @@ fn trace(lit: &Lit, camera: &Camera, seed: u64, frame: u64, noise: f64) -> (Vec<
             .collect();
         // Half the difference of two halves is as uncertain as their mean.
         let own = quantile(&mut differences, 0.5).unwrap_or(0.0) / NORMAL_MEDIAN;
-        if own <= 0.7 * noise || 2 * films[0].samples >= MAX_SAMPLES {
+        if own <= 0.9 * noise || 2 * films[0].samples >= MAX_SAMPLES {
             let mean = a.iter().zip(&b).map(|(a, b)| (*a + *b) * 0.5);
             return (mean.collect(), own);
         }

@@ -6,8 +6,8 @@ use glam::Vec3;
 
 /// Least and greatest albedo of what is white, in any channel. Fresh white paint reaches about 0.95.
 const WHITE: [f64; 2] = [0.9, 0.96];
-/// Fraction of the furniture that is white.
-const FRACTION: f64 = 0.8;
+/// One piece of furniture in so many is not white.
+const OTHER: usize = 5;
 
 /// A plain room, painted white.
 pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
@@ -18,8 +18,9 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     f.lamps();
     let first = f.materials.len();
     f.furniture();
+    let other = f.count(1, OTHER - 1);
     for piece in first..f.materials.len() {
-        if f.between(0.0, 1.0) < FRACTION {
+        if (piece - first) % OTHER != other {
             paint(f, piece);
         }
     }

@@ -41,7 +41,7 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
         f.lamp(0, level * 0.5);
     }
     f.furniture();
-    f.look_around(4, 9);
+    f.look_around(4, 7);
     // Towards the openings, past their middle.
     for opening in &openings {
         let eye = f.eye();
@@ -49,7 +49,7 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
         let [s, t] = [(); 2].map(|()| f.between(-0.3, 1.3));
         f.look(eye, corner + u * s + v * t);
     }
-    f.expose(32.0, 128.0);
+    f.expose(16.0, 64.0);
 }
 
 fn openings(f: &mut Furnisher) -> Vec<Opening> {
