@@ -1,12 +1,14 @@
 //! `relit trade`: what exactness costs on a capture, or on generated rooms.
 
 use crate::cli::arguments::ReadOptions;
+use crate::cli::families;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::parameters::duration;
 use crate::cli::solve::use_threads;
 use crate::error::Result;
 use crate::inverse::settings::{Preset, Settings};
 use crate::inverse::solver::Problem;
+use crate::room::generated::Family;
 use crate::session::command::Source;
 use crate::session::open::open;
 use crate::session::snapshot::OpenCapture;
@@ -17,6 +19,9 @@ use clap::builder::PossibleValuesParser;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+/// Time for all solves of curves, where none is given.
+const CURVES: Duration = Duration::from_secs(5 * 60);
+
 /// `relit trade`.
 #[derive(Debug, Args)]
 pub struct TradeArguments {
@@ -25,12 +30,18 @@ pub struct TradeArguments {
     /// Folder to write into [default: relit-out/<capture>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Measure on N generated rooms instead of a capture, and take the mean
+    /// Solve N generated rooms of a family instead of a capture; with --presets or --around, the mean curve over plain ones
     #[arg(long, value_name = "N", conflicts_with = "capture", value_parser = clap::value_parser!(u64).range(1..))]
     rooms: Option<u64>,
-    /// Time for all solves together, loading excluded
-    #[arg(long, value_name = "TIME", default_value = "5m", value_parser = time)]
-    time: Duration,
+    /// The family of the generated rooms, or all of them [default: plain]
+    #[arg(long, value_name = "NAME", requires = "rooms", conflicts_with_all = ["presets", "around"], value_parser = PossibleValuesParser::new(families::names()))]
+    family: Option<String>,
+    /// The preset that generated rooms are solved with [default: balanced]
+    #[arg(long, value_name = "PRESET", requires = "rooms", conflicts_with_all = ["presets", "around"], value_parser = PossibleValuesParser::new(Preset::WORDS))]
+    preset: Option<String>,
+    /// Time for all solves together, loading excluded [default: 5m]; of a family, no further room is begun after it [default: none]
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    time: Option<Duration>,
     /// The presets alone, without the settings around them
     #[arg(long)]
     presets: bool,
@@ -54,13 +65,43 @@ pub fn time(text: &str) -> std::result::Result<Duration, String> {
     time.ok_or_else(|| "a time such as 90, 60s, 5m or 1h is wanted".to_owned())
 }
 
-/// Measures, writes trade.csv, trade.png and trade.json, and prints what was found.
+impl TradeArguments {
+    /// Seeds of so many generated rooms.
+    fn seeds(&self, count: u64) -> impl Iterator<Item = u64> {
+        let first = self.seed;
+        (0..count).map(move |index| first.wrapping_add(index))
+    }
+
+    /// The preset of solves of rooms of a family.
+    fn preset(&self) -> Preset {
+        let named = self.preset.as_deref();
+        let preset = Preset::ALL.iter().find(|p| Some(p.word()) == named);
+        preset.map_or(Settings::default().preset, |preset| *preset)
+    }
+
+    /// Time for all solves of curves.
+    fn limit(&self) -> Duration {
+        self.time.unwrap_or(CURVES)
+    }
+}
+
+/// Measures, writes trade.csv, trade.png and trade.json, or of families rooms.csv, rooms.png and rooms.json, and prints what was found.
 ///
 /// # Errors
 /// The capture cannot be read or solved, or the results cannot be written.
 pub fn trade(arguments: &TradeArguments) -> Result<()> {
     use_threads(arguments.threads)?;
     let interrupt = Interrupt::listen()?;
+    let of_generated = || Path::new("relit-out").join("generated-rooms");
+    if let Some(count) = arguments.rooms
+        && !arguments.presets
+        && arguments.around.is_none()
+    {
+        let out = arguments.out.clone().unwrap_or_else(of_generated);
+        let family = arguments.family.as_deref().unwrap_or(Family::Plain.name());
+        let (preset, seeds) = (arguments.preset(), arguments.seeds(count));
+        return families::families(&out, family, preset, seeds, arguments.time, &interrupt);
+    }
     let base = Settings {
         seed: arguments.seed,
         ..Settings::default()
@@ -73,7 +114,7 @@ pub fn trade(arguments: &TradeArguments) -> Result<()> {
     let (trade, folder) = match arguments.rooms {
         Some(count) => {
             let trade = over_rooms(arguments, count, &runs, &interrupt)?;
-            (trade, Path::new("relit-out").join("generated-rooms"))
+            (trade, of_generated())
         }
         None => {
             let folder = arguments.capture.clone();
@@ -107,7 +148,7 @@ fn of_capture(
         &problem,
         &judge,
         runs,
-        arguments.time,
+        arguments.limit(),
         &|| interrupt.asked(),
         &mut say,
     )?;
@@ -128,11 +169,11 @@ fn over_rooms(
 ) -> Result<Trade> {
     let mut measured = Vec::new();
     let mut seconds = Duration::ZERO;
-    for seed in (0..count).map(|index| arguments.seed.wrapping_add(index)) {
+    for seed in arguments.seeds(count) {
         eprintln!("generated room {seed}");
         let (problem, judge) = rooms::problem(seed, rooms::SIZE)?;
         let begun = Instant::now();
-        let limit = arguments.time.div_f64(count as f64);
+        let limit = arguments.limit().div_f64(count as f64);
         let stopped = || interrupt.asked();
         let curves = measure(&problem, &judge, runs, limit, &stopped, &mut say)?;
         seconds += begun.elapsed();
