@@ -1,9 +1,15 @@
 //! Families of generated rooms: each holds what it promises.
 
 use glam::{Vec2, Vec3};
+use relit::capture::photograph::Encoding;
+use relit::inverse::settings::Preset;
+use relit::math::color::linear_to_srgb;
 use relit::math::rng::splitmix64;
+use relit::math::stats::quantile;
 use relit::room::generated::{Family, Generated, generate};
-use relit::room::photographs;
+use relit::room::photographs::{self, Rendering};
+use relit::scene::Scene;
+use relit::study::families::{Heard, Plan, Quantiles, Row, run, summarize};
 use relit::transport::material::Albedo;
 
 /// Size of photographs that are rendered in a moment.
@@ -224,7 +230,7 @@ fn sparse_rooms_are_in_six_photographs_of_five_to_fifteen_percent_of_noise() {
     for a in rooms(Family::Sparse) {
         assert_eq!(a.capture.frames.len(), 6);
         // Against a rendering with hardly any noise.
-        let clean = photographs::Rendering {
+        let clean = Rendering {
             seed: 99,
             samples: 400,
             size: TINY,
@@ -237,12 +243,235 @@ fn sparse_rooms_are_in_six_photographs_of_five_to_fifteen_percent_of_noise() {
                 off.push(f64::from((noisy.y / clean.y - 1.0).abs()));
             }
         }
-        let median = relit::math::stats::quantile(&mut off, 0.5).expect("pixels");
+        let median = quantile(&mut off, 0.5).expect("pixels");
         let deviation = median / 0.674_49;
         assert!(
             (0.045..0.17).contains(&deviation),
             "room {}: {deviation}",
             a.seed
         );
+    }
+}
+
+/// Radiance without noise in the middle of each frame and in its corners, against what the photographs show: their ratios.
+fn exposures(room: &Generated) -> Vec<[f64; 2]> {
+    let clean = Rendering {
+        seed: 99,
+        samples: 200,
+        size: TINY,
+    };
+    let clean = photographs::render_lit(&room.lit, &clean);
+    let ratios = room
+        .capture
+        .frames
+        .iter()
+        .zip(&clean)
+        .map(|(frame, clean)| {
+            let taken = frame.load().expect("in memory");
+            let median = |middle: bool| {
+                let mut ratios = Vec::new();
+                for (i, (taken, clean)) in taken.pixels.iter().zip(&clean.pixels).enumerate() {
+                    let p =
+                        Vec2::new((i as u32 % TINY[0]) as f32, (i as u32 / TINY[0]) as f32) + 0.5;
+                    let off = (p / Vec2::new(TINY[0] as f32, TINY[1] as f32) - 0.5) * 2.0;
+                    let counts = if middle {
+                        off.length() < 0.6
+                    } else {
+                        off.length() > 1.1
+                    };
+                    if counts && taken.y < 0.9 && taken.y > 0.02 {
+                        ratios.push(f64::from(taken.y / clean.y));
+                    }
+                }
+                quantile(&mut ratios, 0.5).unwrap_or(f64::NAN)
+            };
+            [median(true), median(false)]
+        });
+    ratios.collect()
+}
+
+#[test]
+fn telephones_write_eight_bits_at_exposures_that_differ_and_dim_the_corners() {
+    for room in rooms(Family::Phone) {
+        for frame in &room.capture.frames {
+            let photograph = frame.load().expect("in memory");
+            assert_eq!(photograph.encoding, Encoding::Srgb8);
+            assert!(frame.exposure.is_none() && photograph.saturation == Vec3::ONE);
+            for value in photograph.pixels.iter().flat_map(|p| p.to_array()) {
+                let step = linear_to_srgb(value) * 255.0;
+                assert!((step - step.round()).abs() < 1e-3, "{step}");
+            }
+        }
+        let ratios = exposures(&room);
+        let known = ratios.iter().filter(|r| r.iter().all(|v| v.is_finite()));
+        let (middles, corners): (Vec<f64>, Vec<f64>) = known.map(|r| (r[0], r[1] / r[0])).unzip();
+        let [low, high] = [f64::min, f64::max].map(|end| middles.iter().copied().reduce(end));
+        assert!(
+            high.expect("frames") > 1.2 * low.expect("frames"),
+            "{middles:?}"
+        );
+        let dimmed = corners.iter().sum::<f64>() / corners.len() as f64;
+        assert!(dimmed < 0.95, "{corners:?}");
+    }
+}
+
+#[test]
+fn scans_have_no_objects_and_a_mesh_with_holes_near_the_true_one() {
+    let room = Family::Scanned.generate(1, TINY).expect("a room");
+    assert_eq!(room.capture.mesh.objects.len(), 1);
+    assert!(room.capture.cut.is_some() && room.truth.objects.is_empty());
+    let fused = Scene::new(&room.capture).expect("a scene");
+    let (mut off, mut missed) = (Vec::new(), 0);
+    for (index, frame) in room.capture.frames.iter().enumerate() {
+        // As known to the capture, and as it was.
+        let (known, is) = (&fused.cameras[index], &room.lit.scene.cameras[index]);
+        let moved = (known.center + fused.origin.as_vec3())
+            .distance(is.center + room.lit.scene.origin.as_vec3());
+        assert!(moved > 0.0 && moved < 0.02, "{moved}");
+        let turned = known.forward().angle_between(is.forward());
+        assert!(turned < 0.015, "{turned}");
+        assert_eq!(frame.intrinsics.width, TINY[0]);
+        for i in 0..TINY[0] * TINY[1] {
+            let center = Vec2::new((i % TINY[0]) as f32, (i / TINY[0]) as f32) + 0.5;
+            let depth = room.lit.scene.intersect(&is.ray(center)).expect("closed").t;
+            match fused.intersect(&is.ray(center)) {
+                Some(hit) => off.push(f64::from((hit.t - depth).abs())),
+                None => missed += 1,
+            }
+        }
+    }
+    let [median, most] = [0.5, 0.8].map(|q| quantile(&mut off, q).expect("seen"));
+    assert!(
+        median > 1e-4 && median < 0.03 && most < 0.15,
+        "{median} {most}"
+    );
+    assert!(
+        missed > 0 && missed * 3 < off.len(),
+        "{missed} of {}",
+        off.len()
+    );
+}
+
+fn plan(seeds: &[u64], preset: Preset) -> Plan {
+    Plan {
+        families: vec![Family::Plain],
+        seeds: seeds.to_vec(),
+        size: TINY,
+        preset,
+    }
+}
+
+#[test]
+fn rooms_that_are_in_the_table_are_not_solved_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("rooms.csv");
+    let solved = |plan: &Plan, limit: usize| {
+        let count = std::cell::Cell::new(0);
+        let summary = run(
+            folder.path(),
+            plan,
+            &|| count.get() >= limit,
+            &mut |heard| {
+                if matches!(heard, Heard::Begins(..)) {
+                    count.set(count.get() + 1);
+                }
+            },
+        );
+        (count.get(), summary.expect("solved"))
+    };
+    let text = || std::fs::read_to_string(&path).expect("written");
+    // A stop comes after the room that is being solved.
+    let (count, summary) = solved(&plan(&[1, 2], Preset::Preview), 1);
+    assert_eq!((count, summary.families["plain"].n), (1, 1));
+    let first = text();
+    assert_eq!(first.lines().count(), 2);
+    let (count, summary) = solved(&plan(&[1, 2], Preset::Preview), 9);
+    assert_eq!((count, summary.families["plain"].n), (1, 2));
+    assert!(text().starts_with(&first));
+    let both = text();
+    let (count, again) = solved(&plan(&[1, 2], Preset::Preview), 9);
+    assert_eq!((count, &text()), (0, &both));
+    assert_eq!(again.families, summary.families);
+    for name in ["rooms.json", "rooms.png"] {
+        assert!(folder.path().join(name).is_file(), "{name}");
+    }
+    // A line that was broken off is made again; other presets and versions are other solves, whose rows stay.
+    let broken = both[..both.len() - 9].replacen("0.1.0,preview", "0.0.9,preview", 1);
+    std::fs::write(&path, &broken).expect("written");
+    let (count, summary) = solved(&plan(&[1, 2], Preset::Preview), 1);
+    assert_eq!((count, summary.families["plain"].n), (1, 1));
+    assert_eq!(text().lines().count(), 3);
+    assert!(text().contains("0.0.9,preview"));
+    std::fs::write(&path, "a,b\n1,2\n").expect("written");
+    let error = run(
+        folder.path(),
+        &plan(&[1], Preset::Preview),
+        &|| true,
+        &mut |_| {},
+    );
+    assert!(
+        error
+            .expect_err("another table")
+            .to_string()
+            .contains("rooms.csv:1")
+    );
+}
+
+#[test]
+fn quantiles_and_pooled_figures_are_those_of_the_rows() {
+    let plan = plan(&[], Preset::Balanced);
+    let row = |i: u64| Row {
+        relit: env!("CARGO_PKG_VERSION").to_owned(),
+        preset: "balanced".to_owned(),
+        size: TINY,
+        family: Family::Glossy,
+        seed: i,
+        seconds: 2.0 * i as f64,
+        objects: 5,
+        albedo_mae: Some(0.01 * i as f64),
+        albedo_rel_median: None,
+        albedo_psnr: Some(20.0 + i as f64),
+        lamps_true: 2,
+        lamps_found: u64::from(i > 0),
+        lamps_false: u64::from(i == 7) * 3,
+        albedos: if i == 0 { 30 } else { 3 },
+        coverage_1: Some(if i == 0 { 0.5 } else { 1.0 }),
+        coverage_2: Some(1.0),
+        rays: 1000,
+    };
+    let rows: Vec<Row> = (0..=10).map(row).collect();
+    let summary = summarize(&plan, rows.iter());
+    let glossy = &summary.families["glossy"];
+    assert_eq!((glossy.n, glossy.rooms_with_false_lamps), (11, 1));
+    assert_eq!((glossy.lamps_found, glossy.lamps_true), (10, 22));
+    assert_eq!((glossy.albedos, glossy.coverage), (60, Some([0.75, 1.0])));
+    let near = |found: Quantiles, expected: [f64; 4]| {
+        let found = [found.q10, found.q50, found.q90, found.worst];
+        let pairs = found.into_iter().zip(expected);
+        assert!(
+            pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-12),
+            "{found:?}"
+        );
+    };
+    near(glossy.figures["albedo_mae"], [0.01, 0.05, 0.09, 0.10]);
+    near(glossy.figures["albedo_psnr"], [21.0, 25.0, 29.0, 20.0]);
+    near(glossy.figures["lamps_found"], [0.5, 0.5, 0.5, 0.0]);
+    near(glossy.figures["lamps_false"], [0.0, 0.0, 0.0, 3.0]);
+    assert!(!glossy.figures.contains_key("albedo_rel_median"));
+    let table = summary.words();
+    let line = table
+        .lines()
+        .find(|l| l.starts_with("glossy"))
+        .expect("a line");
+    for part in [
+        "11",
+        "0.0500",
+        "0.0900",
+        "25.0",
+        "10 / 22",
+        "75 / 100 %",
+        "10.0 / 20.0",
+    ] {
+        assert!(line.contains(part), "{part}: {line}");
     }
 }

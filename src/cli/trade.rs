@@ -45,8 +45,8 @@ pub struct TradeArguments {
     /// The presets alone, without the settings around them
     #[arg(long)]
     presets: bool,
-    /// One preset and the settings around it alone, each with as much of the time
-    #[arg(long, value_name = "PRESET", conflicts_with = "presets", value_parser = PossibleValuesParser::new(Preset::WORDS))]
+    /// One preset and the settings around it alone, each with as much of the time; all presets and all settings for `all`
+    #[arg(long, value_name = "PRESET|all", conflicts_with = "presets", value_parser = PossibleValuesParser::new(Preset::WORDS.iter().copied().chain([families::ALL])))]
     around: Option<String>,
     /// Key of all random numbers, and of the first generated room
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -107,7 +107,8 @@ pub fn trade(arguments: &TradeArguments) -> Result<()> {
         ..Settings::default()
     };
     let runs = match &arguments.around {
-        Some(preset) => plan::around(preset, &base),
+        Some(preset) if preset != families::ALL => plan::around(preset, &base),
+        Some(_) => plan::everything(&base),
         None if arguments.presets => plan::presets(&base),
         None => plan::everything(&base),
     };
