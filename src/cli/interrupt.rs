@@ -62,6 +62,7 @@ impl Interrupt {
 
 /// Whether the program was started to outlive its terminal, as by nohup.
 #[cfg(unix)]
+#[allow(unsafe_code, reason = "nothing safe tells how a signal is treated now")]
 fn is_hangup_ignored() -> bool {
     let mut action = std::mem::MaybeUninit::<libc::sigaction>::zeroed();
     // SAFETY: nothing is set; what is asked for is written where there is room for it, and zeros are a valid value of it.

@@ -4,6 +4,7 @@ mod arguments;
 mod edit;
 mod evaluate;
 mod export;
+mod families;
 mod import;
 mod insert;
 mod interrupt;

@@ -1,12 +1,14 @@
 //! `relit trade`: what exactness costs on a capture, or on generated rooms.
 
 use crate::cli::arguments::{ReadOptions, Replace, whole};
+use crate::cli::families;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::parameters::duration;
 use crate::cli::solve::use_threads;
 use crate::error::Result;
 use crate::inverse::settings::{Preset, Settings};
 use crate::inverse::solver::Problem;
+use crate::room::generated::Family;
 use crate::say;
 use crate::session::command::Source;
 use crate::session::open::open;
@@ -18,6 +20,9 @@ use clap::builder::PossibleValuesParser;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+/// Time for all solves of curves, where none is given.
+const CURVES: Duration = Duration::from_secs(5 * 60);
+
 /// `relit trade`.
 #[derive(Debug, Args)]
 pub struct TradeArguments {
@@ -26,17 +31,23 @@ pub struct TradeArguments {
     /// Folder to write into [default: relit-out/<capture>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Measure on N generated rooms instead of a capture, and take the mean
+    /// Solve N generated rooms of a family instead of a capture; with --presets or --around, the mean curve over plain ones
     #[arg(long, value_name = "N", conflicts_with = "capture", value_parser = clap::value_parser!(u64).range(1..))]
     rooms: Option<u64>,
-    /// Time for all solves together, loading excluded
-    #[arg(long, value_name = "TIME", default_value = "5m", value_parser = time)]
-    time: Duration,
+    /// The family of the generated rooms, or all of them [default: plain]
+    #[arg(long, value_name = "NAME", requires = "rooms", conflicts_with_all = ["presets", "around"], value_parser = PossibleValuesParser::new(families::names()))]
+    family: Option<String>,
+    /// The preset that generated rooms are solved with [default: balanced]
+    #[arg(long, value_name = "PRESET", requires = "rooms", conflicts_with_all = ["presets", "around"], value_parser = PossibleValuesParser::new(Preset::WORDS))]
+    preset: Option<String>,
+    /// Time for all solves together, loading excluded [default: 5m]; of a family, no further room is begun after it [default: none]
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    time: Option<Duration>,
     /// The presets alone, without the settings around them
     #[arg(long)]
     presets: bool,
-    /// One preset and the settings around it alone, each with as much of the time
-    #[arg(long, value_name = "PRESET", conflicts_with = "presets", value_parser = PossibleValuesParser::new(Preset::WORDS))]
+    /// One preset and the settings around it alone, each with as much of the time; all presets and all settings for `all`
+    #[arg(long, value_name = "PRESET|all", conflicts_with = "presets", value_parser = PossibleValuesParser::new(Preset::WORDS.iter().copied().chain([families::ALL])))]
     around: Option<String>,
     /// Key of all random numbers, and of the first generated room
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole, allow_negative_numbers = true)]
@@ -57,7 +68,28 @@ pub fn time(text: &str) -> std::result::Result<Duration, String> {
     time.ok_or_else(|| "a time such as 90, 60s, 5m or 1h is wanted".to_owned())
 }
 
-/// Measures, writes trade.csv, trade.png and trade.json, and prints what was found; the exit code.
+impl TradeArguments {
+    /// Seeds of so many generated rooms.
+    fn seeds(&self, count: u64) -> impl Iterator<Item = u64> {
+        let first = self.seed;
+        (0..count).map(move |index| first.wrapping_add(index))
+    }
+
+    /// The preset of solves of rooms of a family.
+    fn preset(&self) -> Preset {
+        let named = self.preset.as_deref();
+        let preset = Preset::ALL.iter().find(|p| Some(p.word()) == named);
+        preset.map_or(Settings::default().preset, |preset| *preset)
+    }
+
+    /// Time for all solves of curves.
+    fn limit(&self) -> Duration {
+        self.time.unwrap_or(CURVES)
+    }
+}
+
+/// Measures, writes trade.csv, trade.png and trade.json, or of families rooms.csv, rooms.png and rooms.json, and prints what was found; the
+/// exit code.
 ///
 /// # Errors
 /// The capture cannot be read or solved, or the results cannot be written.
@@ -65,19 +97,31 @@ pub fn trade(arguments: &TradeArguments) -> Result<i32> {
     arguments.replace.apply();
     use_threads(arguments.threads)?;
     let interrupt = Interrupt::listen()?;
+    let of_generated = || Path::new("relit-out").join("generated-rooms");
+    if let Some(count) = arguments.rooms
+        && !arguments.presets
+        && arguments.around.is_none()
+    {
+        let out = arguments.out.clone().unwrap_or_else(of_generated);
+        let family = arguments.family.as_deref().unwrap_or(Family::Plain.name());
+        let (preset, seeds) = (arguments.preset(), arguments.seeds(count));
+        families::families(&out, family, preset, seeds, arguments.time, &interrupt)?;
+        return Ok(interrupt.exit_code());
+    }
     let base = Settings {
         seed: arguments.seed,
         ..Settings::default()
     };
     let runs = match &arguments.around {
-        Some(preset) => plan::around(preset, &base),
+        Some(preset) if preset != families::ALL => plan::around(preset, &base),
+        Some(_) => plan::everything(&base),
         None if arguments.presets => plan::presets(&base),
         None => plan::everything(&base),
     };
     let (trade, folder) = match arguments.rooms {
         Some(count) => {
             let trade = over_rooms(arguments, count, &runs, &interrupt)?;
-            (trade, Path::new("relit-out").join("generated-rooms"))
+            (trade, of_generated())
         }
         None => {
             let folder = arguments.capture.clone();
@@ -115,7 +159,7 @@ fn of_capture(
         &problem,
         &judge,
         runs,
-        arguments.time,
+        arguments.limit(),
         &|| interrupt.asked(),
         &mut told,
     )?;
@@ -136,11 +180,11 @@ fn over_rooms(
 ) -> Result<Trade> {
     let mut measured = Vec::new();
     let mut seconds = Duration::ZERO;
-    for seed in (0..count).map(|index| arguments.seed.wrapping_add(index)) {
+    for seed in arguments.seeds(count) {
         say::aside(format_args!("generated room {seed}"));
         let (problem, judge) = rooms::problem(seed, rooms::SIZE)?;
         let begun = Instant::now();
-        let limit = arguments.time.div_f64(count as f64);
+        let limit = arguments.limit().div_f64(count as f64);
         let stopped = || interrupt.asked();
         let curves = measure(&problem, &judge, runs, limit, &stopped, &mut told)?;
         seconds += begun.elapsed();

@@ -22,4 +22,5 @@ pub mod probe;
 pub mod resample;
 pub mod scale;
 pub mod scene;
+pub mod strips;
 pub mod table;

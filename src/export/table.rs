@@ -36,9 +36,13 @@ impl Table {
 
     /// Appends a row.
     pub fn row(&mut self, cells: &[Cell]) {
+        self.text.push_str(&Self::line(cells));
+    }
+
+    /// A row as text, with the end of its line.
+    pub fn line(cells: &[Cell]) -> String {
         let fields: Vec<String> = cells.iter().map(Cell::field).collect();
-        self.text.push_str(&fields.join(","));
-        self.text.push('\n');
+        fields.join(",") + "\n"
     }
 
     /// The table as text.

@@ -1,12 +1,17 @@
-//! What photographs show of each face of a mesh, all brought to one exposure, for segments that follow it.
+//! What photographs show of each face of a mesh, all brought to one exposure, and meshes cut into segments that follow it.
 
 use crate::capture::photograph::BELOW_SATURATION;
-use crate::capture::segment::ShownFace;
+use crate::capture::segment::{ShownFace, segment};
+use crate::capture::working::Working;
+use crate::capture::{Capture, Cut};
+use crate::error::Result;
 use crate::inverse::exposure::{Exposures, Sights};
 use crate::inverse::held_out::{HoldOut, is_held_out};
 use crate::inverse::solver::Problem;
 use crate::inverse::survey::Survey;
+use crate::scene::prepare::prepare;
 use glam::DVec3;
+use std::sync::Arc;
 
 /// Pixels that are looked at for the exposures.
 const SURVEY_PIXELS: usize = 100_000;
@@ -42,6 +47,35 @@ pub fn shown(problem: &Problem, hold_out: HoldOut) -> Vec<ShownFace> {
         }
     }
     sums.iter().map(Sum::mean).collect()
+}
+
+/// Cuts the mesh of a capture into segments, by what its photographs show of it too.
+///
+/// # Errors
+/// The mesh has no triangle with an area, or no photograph sees the mesh.
+pub fn cut_up(
+    capture: &mut Capture,
+    cut: &Cut,
+    working: &Working,
+    hold_out: HoldOut,
+) -> Result<()> {
+    let prepared = prepare(capture, working)?;
+    let problem = Problem {
+        scene: Arc::new(prepared.scene),
+        photographs: prepared.photographs,
+    };
+    let lamps = segment(&mut capture.mesh, &shown(&problem, hold_out), cut.wanted);
+    let saturated = match lamps {
+        0 => String::new(),
+        1 => "; one is what photographs show saturated".to_owned(),
+        _ => format!("; {lamps} are what photographs show saturated"),
+    };
+    capture.warnings.push(format!(
+        "{}: the mesh has no objects; it was cut into {} segments by normal and by what photographs show (--segments changes the number){saturated}",
+        cut.file.display(),
+        capture.mesh.objects.len()
+    ));
+    Ok(())
 }
 
 /// Sums over the pixels of a face.

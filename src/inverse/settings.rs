@@ -113,6 +113,8 @@ macro_rules! choice {
         impl $name {
             /// The words, in order.
             pub const WORDS: &'static [&'static str] = &[$($word),*];
+            /// The choices, in order.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),*];
             /// The word of this choice.
             pub fn word(self) -> &'static str {
                 match self { $(Self::$variant => $word),* }

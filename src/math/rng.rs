@@ -64,6 +64,13 @@ impl Stream {
         [self.uniform(), self.uniform()]
     }
 
+    /// A standard normal number (Box and Muller 1958).
+    #[inline]
+    pub fn normal(&mut self) -> f32 {
+        let [u, v] = self.uniform2();
+        (-2.0 * (1.0 - u).ln()).sqrt() * (std::f32::consts::TAU * v).cos()
+    }
+
     /// A uniform index below `n` (`n` > 0), by Lemire's multiply-shift.
     #[inline]
     pub fn below(&mut self, n: usize) -> usize {

@@ -7,6 +7,7 @@ use crate::export::exr::{Precision, write_rgb};
 use crate::math::picture::Picture;
 use crate::room::Room;
 use crate::transport::film::Film;
+use crate::transport::lit::Lit;
 use crate::transport::path::PathOptions;
 use glam::Vec3;
 use image::ImageFormat;
@@ -56,15 +57,19 @@ pub struct Rendering {
 /// # Errors
 /// As [`Room::lit`].
 pub fn render(room: &Room, rendering: &Rendering) -> Result<Vec<Photograph>> {
-    let world = room.lit(rendering.size)?;
+    Ok(render_lit(&room.lit(rendering.size)?, rendering))
+}
+
+/// The same of a room that is lit already, by light from outside too.
+pub fn render_lit(world: &Lit, rendering: &Rendering) -> Vec<Photograph> {
     let options = PathOptions::default();
     let photograph = |(frame, camera)| {
         let mut film = Film::new(camera);
         let samples = rendering.samples;
-        film.add(&world, camera, &options, rendering.seed, frame, samples);
+        film.add(world, camera, &options, rendering.seed, frame, samples);
         linear(rendering.size, film.mean())
     };
-    Ok((0u64..).zip(&world.scene.cameras).map(photograph).collect())
+    (0u64..).zip(&world.scene.cameras).map(photograph).collect()
 }
 
 /// The photographs kept in the program.

@@ -46,7 +46,7 @@ pub struct ObjectTruth {
     /// Mean radiance that leaves an emitter, its own and what it reflects: emission + albedo · irradiance / π.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exitance: Option<[f32; 3]>,
-    /// Every surface is diffuse.
+    /// Roughness of its specular lobe; `None` where it is diffuse.
     pub roughness: Option<f32>,
     /// Whether the albedo varies over the object.
     pub textured: bool,
@@ -94,7 +94,7 @@ pub fn objects(world: &Lit) -> BTreeMap<String, ObjectTruth> {
                 albedo: albedo.to_array(),
                 emission: material.emission.to_array(),
                 exitance: emits.then(|| (material.emission + reflected()).to_array()),
-                roughness: None,
+                roughness: material.lobe.map(|lobe| lobe.roughness),
                 textured,
                 triangles: object.triangles.len(),
                 pixels: seen[index],

@@ -2,17 +2,14 @@
 
 use crate::calibrate::alignment::{Alignment, Verdict};
 use crate::calibrate::photographs::{leave_out, name, without_hot_pixels};
+use crate::capture::Capture;
 use crate::capture::photograph::{Photograph, PhotographSource};
 use crate::capture::read::{ReadOptions, read};
 use crate::capture::reading::Reading;
 use crate::capture::regroup::regroup;
-use crate::capture::segment::segment;
 use crate::capture::working::{Working, load_working};
-use crate::capture::{Capture, Cut};
 use crate::error::{Error, Result};
-use crate::inverse::faces::shown;
-use crate::inverse::held_out::HoldOut;
-use crate::inverse::solver::Problem;
+use crate::inverse::faces::cut_up;
 use crate::room;
 use crate::scene::Scene;
 use crate::scene::prepare::{Prepared, prepare};
@@ -133,27 +130,6 @@ fn cool(
 fn alignment(capture: &Capture, working: &Working) -> Result<Alignment> {
     let scene = Scene::new(&capture.at(working))?;
     Ok(Alignment::new(&scene, &working.photographs))
-}
-
-/// Cuts the mesh of a capture into segments, by what its photographs show of it too.
-fn cut_up(capture: &mut Capture, cut: &Cut, working: &Working, hold_out: HoldOut) -> Result<()> {
-    let prepared = prepare(capture, working)?;
-    let problem = Problem {
-        scene: Arc::new(prepared.scene),
-        photographs: prepared.photographs,
-    };
-    let lamps = segment(&mut capture.mesh, &shown(&problem, hold_out), cut.wanted);
-    let saturated = match lamps {
-        0 => String::new(),
-        1 => "; one is what photographs show saturated".to_owned(),
-        _ => format!("; {lamps} are what photographs show saturated"),
-    };
-    capture.warnings.push(format!(
-        "{}: the mesh has no objects; it was cut into {} segments by normal and by what photographs show (--segments changes the number){saturated}",
-        cut.file.display(),
-        capture.mesh.objects.len()
-    ));
-    Ok(())
 }
 
 /// Hash of what an estimate depends on: mesh, cameras, exposures and the bytes of the photographs.

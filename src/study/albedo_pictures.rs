@@ -1,7 +1,7 @@
 //! Albedo against true albedo pictures, pixel by pixel.
 
-use crate::capture::Capture;
-use crate::capture::truth::{Truth, read_albedo};
+use crate::capture::truth::Truth;
+use crate::capture::{Capture, Frame};
 use crate::error::Result;
 use crate::inverse::estimate::Estimate;
 use crate::scene::Scene;
@@ -9,7 +9,6 @@ use crate::scene::camera::Camera;
 use crate::transport::material::Material;
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
-use std::path::Path;
 
 /// Points along a pixel's side over which the estimate is box-filtered, as the truth is.
 const SIDE: u32 = 4;
@@ -57,16 +56,17 @@ struct Seen {
     albedo: Option<Vec3>,
 }
 
-/// Compares the estimated albedo with truth/albedo_NNN.exr of each frame that has one, and counts seen pixels in all.
+/// Compares the estimated albedo with the true albedo of each frame's pixels, row by row, of which `true_albedo` tells that of the frames
+/// that have one, and counts seen pixels in all.
 ///
 /// # Errors
-/// A true picture is broken or of another size than its frame.
+/// As `true_albedo`.
 pub fn compare(
-    folder: &Path,
     capture: &Capture,
     scene: &Scene,
     estimate: &Estimate,
     truth: &Truth,
+    true_albedo: impl Fn(usize, &Frame) -> Result<Option<Vec<Vec3>>>,
 ) -> Result<PictureErrors> {
     let materials = estimate.materials();
     let emitters: Vec<bool> = scene
@@ -81,7 +81,7 @@ pub fn compare(
     };
     for (index, frame) in capture.frames.iter().enumerate() {
         let camera = Camera::new(&frame.intrinsics, &frame.pose, scene.origin);
-        let known = read_albedo(folder, index, &frame.intrinsics)?;
+        let known = true_albedo(index, frame)?;
         let grid = if known.is_some() { SIDE } else { 0 };
         let seen = look(scene, &camera, &materials, &emitters, grid);
         for (pixel, seen) in seen.iter().enumerate() {
@@ -89,7 +89,7 @@ pub fn compare(
                 continue;
             };
             errors.seen_pixels[object] += 1;
-            let known = known.as_ref().and_then(|k| k.pixels.get(pixel));
+            let known = known.as_ref().and_then(|k| k.get(pixel));
             if let Some((albedo, known)) = seen.albedo.zip(known) {
                 let known = known.as_dvec3();
                 errors.squares += (albedo.as_dvec3() - known).length_squared();

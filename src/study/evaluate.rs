@@ -2,7 +2,7 @@
 
 use crate::capture::Capture;
 use crate::capture::photograph::Photograph;
-use crate::capture::truth::{ObjectTruth, Truth};
+use crate::capture::truth::{ObjectTruth, Truth, read_albedo};
 use crate::error::Result;
 use crate::inverse::estimate::{ENOUGH_PIXELS, Estimate, ObjectEstimate};
 use crate::math::stats::quantile;
@@ -156,7 +156,7 @@ impl Reference {
 /// `photographs` say whether the scale of the light is open.
 ///
 /// # Errors
-/// The truth is missing or broken.
+/// The truth is missing or broken, or a true picture is of another size than its frame.
 pub fn evaluate(
     folder: &Path,
     capture: &Capture,
@@ -165,7 +165,10 @@ pub fn evaluate(
     estimate: &Estimate,
 ) -> Result<Evaluation> {
     let truth = Truth::read(folder)?;
-    let pictures = albedo_pictures::compare(folder, capture, scene, estimate, &truth)?;
+    let pictures = albedo_pictures::compare(capture, scene, estimate, &truth, |index, frame| {
+        let picture = read_albedo(folder, index, &frame.intrinsics)?;
+        Ok(picture.map(|picture| picture.pixels))
+    })?;
     let reference = Reference {
         truth,
         seen_pixels: pictures.seen_pixels.clone(),

@@ -5,5 +5,6 @@ mod albedo_pictures;
 mod emission;
 pub mod evaluate;
 pub mod experiments;
+pub mod families;
 pub mod machine;
 pub mod trade;

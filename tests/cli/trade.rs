@@ -32,6 +32,26 @@ fn the_trade_is_measured_against_the_truth_or_held_out_pixels() {
     let name = |curve: &Value| curve["name"].as_str().map(|n| n.starts_with("preview"));
     assert!(curves.len() > 1 && curves.iter().all(|c| name(c) == Some(true)));
 
+    let rooms = [
+        "trade", "--rooms", "1", "--preset", "preview", "--out", "rooms",
+    ];
+    let output = place.relit(&rooms);
+    done(&output);
+    let table = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(table.lines().any(|l| l.starts_with("plain  ")), "{table}");
+    let text = fs::read_to_string(place.path("rooms/rooms.csv")).expect("written");
+    assert_eq!(text.lines().count(), 2);
+    let text = fs::read_to_string(place.path("rooms/rooms.json")).expect("written");
+    let summary: Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!(summary["families"]["plain"]["n"], 1);
+    for wrong in [
+        &["trade", "--rooms", "1", "--family", "none"][..],
+        &["trade", "room", "--family", "plain"],
+        &["trade", "--rooms", "1", "--family", "plain", "--presets"],
+    ] {
+        refused(&place.relit(wrong), 2, &["--family"]);
+    }
+
     refused(
         &place.relit(&["trade", "room", "--around", "best", "--time", "1s"]),
         2,

@@ -9,6 +9,7 @@ pub mod pane;
 pub mod surface;
 pub mod view;
 
+/// What tests of the 3D view share.
 #[cfg(test)]
 pub mod tests {
     use crate::capture::camera::{Intrinsics, Pose};

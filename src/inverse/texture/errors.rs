@@ -68,11 +68,7 @@ pub fn standard_errors(
 fn perturbation(system: &System, seed: u64, object: usize, draw: u64) -> Vec<Vec3> {
     let normal = |kind: u64, index: usize| {
         let mut stream = Stream::new(seed, 2 * object as u64 + kind, index as u64, KEY + draw);
-        Vec3::new(
-            gaussian(&mut stream),
-            gaussian(&mut stream),
-            gaussian(&mut stream),
-        )
+        Vec3::new(stream.normal(), stream.normal(), stream.normal())
     };
     let measured: Vec<Vec3> = (system.row_weights.par_iter().enumerate())
         .map(|(row, weight)| normal(0, row) / weight.max(Vec3::splat(f32::MIN_POSITIVE)).powf(0.5))
@@ -86,12 +82,6 @@ fn perturbation(system: &System, seed: u64, object: usize, draw: u64) -> Vec<Vec
         }
     }
     right
-}
-
-/// A standard normal number (Box and Muller 1958).
-fn gaussian(stream: &mut Stream) -> f32 {
-    let [u, v] = stream.uniform2();
-    (-2.0 * (1.0 - u).ln()).sqrt() * (std::f32::consts::TAU * v).cos()
 }
 
 /// The standard errors with those of the light added: of its smoothing and of the object's overall scale.

@@ -33,7 +33,7 @@ pub fn table(m: &mut Modeller, width: f64, depth: f64, height: f64) {
 }
 
 /// Heights of the boards of [`bookcase`], floor to top.
-const BOARDS: [f64; 6] = [0.06, 0.43, 0.78, 1.12, 1.45, 1.76];
+pub const BOARDS: [f64; 6] = [0.06, 0.43, 0.78, 1.12, 1.45, 1.76];
 
 /// An open bookcase with a back panel.
 pub fn bookcase(m: &mut Modeller, width: f64, depth: f64) {

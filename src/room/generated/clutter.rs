@@ -1,0 +1,116 @@
+//! Rooms full of small things.
+
+use crate::room::furniture::woodwork;
+use crate::room::generated::furnisher::{Furnisher, Support};
+use glam::{DAffine3, DVec2, DVec3};
+
+/// Number of things.
+const THINGS: [f64; 2] = [300.0, 1000.0];
+/// Things on each square metre of floor, at most, so that small rooms hold them.
+const DENSITY: f64 = 60.0;
+/// Radius of a thing in metres.
+const RADIUS: [f64; 2] = [0.015, 0.07];
+/// Tries at finding a free place before a smaller thing is taken.
+const TRIES: u32 = 20;
+
+/// A plain room with shelves, and hundreds of boxes, drums, cups and cones on its floor, furniture and shelves.
+pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
+    f.shell();
+    f.lamps();
+    for index in 0..f.count(1, 3) {
+        shelves(f, index);
+    }
+    f.furniture();
+    let floor = Support {
+        place: DAffine3::IDENTITY,
+        half: DVec2::new(f.size.x, f.size.z) * 0.5 - 0.05,
+        headroom: f.size.y,
+    };
+    let blocked = f.taken.clone();
+    let mut supports = vec![floor];
+    supports.append(&mut f.supports);
+    let mut places: Vec<Vec<(DVec2, f64)>> = vec![Vec::new(); supports.len()];
+    places[0] = blocked;
+    let most = (DENSITY * f.size.x * f.size.z).clamp(THINGS[0], THINGS[1]);
+    let wanted = f.scaled(THINGS[0], most.max(THINGS[0] + 1.0)) as usize;
+    for index in 0..wanted {
+        thing(f, index, &supports, &mut places);
+    }
+    f.look_around(6, 12);
+    f.expose(8.0, 48.0);
+}
+
+/// An open bookcase on the floor, whose boards are supports.
+fn shelves(f: &mut Furnisher, index: usize) {
+    let (width, depth) = (f.between(0.6, 1.1), f.between(0.25, 0.4));
+    let radius = 0.5 * width.hypot(depth);
+    let Some(at) = f.free(radius) else {
+        return;
+    };
+    let turn = DAffine3::from_rotation_y(f.between(0.0, std::f64::consts::TAU));
+    let place = DAffine3::from_translation(DVec3::new(at.x, 0.0, at.y)) * turn;
+    f.plain(&format!("shelves-{index}"), [0.1, 0.9], |m| {
+        m.placed(place, |m| woodwork::bookcase(m, width, depth));
+    });
+    let boards = woodwork::BOARDS;
+    for (board, above) in boards.iter().zip(boards.iter().skip(1)) {
+        f.supports.push(Support {
+            place: place * DAffine3::from_translation(DVec3::Y * (board + 0.025)),
+            half: DVec2::new(width, depth) * 0.5 - 0.03,
+            headroom: above - board - 0.03,
+        });
+    }
+}
+
+/// Stands a thing where there is room for it, however small it has to be.
+fn thing(f: &mut Furnisher, index: usize, supports: &[Support], places: &mut [Vec<(DVec2, f64)>]) {
+    let mut radius = f.scaled(RADIUS[0], RADIUS[1]);
+    let (which, at) = loop {
+        if let Some(found) = free(f, radius, supports, places) {
+            break found;
+        }
+        radius *= 0.7;
+    };
+    let support = supports[which];
+    places[which].push((at, radius));
+    let height = (radius * f.scaled(0.5, 5.0)).min(support.headroom * 0.95);
+    let turn = DAffine3::from_rotation_y(f.between(0.0, std::f64::consts::TAU));
+    let place = support.place * DAffine3::from_translation(DVec3::new(at.x, 0.001, at.y)) * turn;
+    let aspect = f.between(0.4, 0.9);
+    let half = DVec3::new(aspect, 0.0, (1.0 - aspect * aspect).sqrt()) * radius;
+    let kind = f.count(0, 3);
+    f.plain(&format!("thing-{index}"), [0.03, 0.9], |m| {
+        m.placed(place, |m| match kind {
+            0 => m.lathe(&[[radius, 0.0], [radius, height]], 8),
+            1 => m.lathe(&[[0.6 * radius, 0.0], [radius, height]], 8),
+            2 => m.lathe(&[[radius, 0.0], [0.3 * radius, height]], 8),
+            _ => {
+                let half = half + DVec3::Y * height * 0.5;
+                m.rounded_box(DVec3::Y * height * 0.5, half, 0.0, 0);
+            }
+        });
+    });
+}
+
+/// A support and a place on it that nothing has taken within a radius. Half of all things lie on the floor.
+fn free(
+    f: &mut Furnisher,
+    radius: f64,
+    supports: &[Support],
+    places: &[Vec<(DVec2, f64)>],
+) -> Option<(usize, DVec2)> {
+    for _ in 0..TRIES {
+        let which = match f.count(0, 1) {
+            0 => 0,
+            _ => f.count(0, supports.len() - 1),
+        };
+        let reach = supports[which].half - radius;
+        let share = DVec2::from([(); 2].map(|()| f.between(-1.0, 1.0)));
+        let at = reach * share;
+        let clear = |(center, other): &(DVec2, f64)| at.distance(*center) > radius + other;
+        if reach.min_element() > 0.0 && places[which].iter().all(clear) {
+            return Some((which, at));
+        }
+    }
+    None
+}

@@ -1,0 +1,290 @@
+//! What rooms of all families are furnished with: shell, lamps, boxes, drums and tables, and views of them.
+
+use crate::math::color::luminance;
+use crate::math::rng::Stream;
+use crate::room::cameras::View;
+use crate::room::furniture::woodwork;
+use crate::room::shape::Modeller;
+use crate::transport::environment::Environment;
+use crate::transport::material::Material;
+use glam::{DAffine3, DVec2, DVec3, Vec3};
+use std::sync::Arc;
+
+/// First of the keys of a room's random numbers: far from those of solvers.
+const KEY: u64 = 0x726f_6f6d;
+/// Tries at finding a free place before going without.
+const TRIES: u32 = 40;
+/// Eyes and furniture keep this far from each other and from walls, in metres.
+const MARGIN: f64 = 0.25;
+/// Eyes are at this height above the floor, in metres.
+pub const EYES: [f64; 2] = [1.0, 1.8];
+
+/// A level rectangle on which things can stand.
+#[derive(Debug, Clone, Copy)]
+pub struct Support {
+    /// Its middle, its sides along x and z.
+    pub place: DAffine3,
+    /// Half its sides in metres.
+    pub half: DVec2,
+    /// What stands on it is at most so high.
+    pub headroom: f64,
+}
+
+/// Puts a room together.
+pub struct Furnisher {
+    /// All draws.
+    pub stream: Stream,
+    /// What has been built so far.
+    pub modeller: Modeller,
+    /// One an object.
+    pub materials: Vec<Material>,
+    /// Width, height and depth in metres; the floor is y = 0, its middle the origin.
+    pub size: DVec3,
+    /// Circles on the floor that are taken.
+    pub taken: Vec<(DVec2, f64)>,
+    /// Tops of furniture.
+    pub supports: Vec<Support>,
+    /// From where it is photographed.
+    pub views: Vec<View>,
+    /// Light from outside.
+    pub outside: Option<Arc<Environment>>,
+    /// Paths a pixel in the photographs.
+    pub samples: u32,
+}
+
+impl Furnisher {
+    /// An empty room of a size drawn by (seed, family).
+    pub fn new(seed: u64, family: u64) -> Self {
+        let mut furnisher = Self {
+            stream: Stream::new(seed, KEY, family, 0),
+            modeller: Modeller::default(),
+            materials: Vec::new(),
+            size: DVec3::ZERO,
+            taken: Vec::new(),
+            supports: Vec::new(),
+            views: Vec::new(),
+            outside: None,
+            samples: 0,
+        };
+        furnisher.size = DVec3::new(
+            furnisher.scaled(2.4, 8.0),
+            furnisher.between(2.3, 3.6),
+            furnisher.scaled(2.4, 8.0),
+        );
+        furnisher
+    }
+
+    /// A number between two, all equally likely.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.stream.uniform_f64()
+    }
+
+    /// A number between two, all factors equally likely.
+    pub fn scaled(&mut self, low: f64, high: f64) -> f64 {
+        low * (high / low).powf(self.stream.uniform_f64())
+    }
+
+    /// A whole number from `low` to `high`.
+    pub fn count(&mut self, low: usize, high: usize) -> usize {
+        low + self.stream.below(high + 1 - low)
+    }
+
+    /// A colour with the given largest channel; the others are up to `saturation` less.
+    pub fn color(&mut self, value: f64, saturation: f64) -> Vec3 {
+        let channel = |f: &mut Self| 1.0 - f.between(0.0, saturation);
+        let color = Vec3::from([(); 3].map(|()| channel(self) as f32));
+        color / color.max_element() * value as f32
+    }
+
+    /// An object of a material.
+    pub fn object(&mut self, name: &str, material: Material, shapes: impl FnOnce(&mut Modeller)) {
+        self.modeller.object(name);
+        self.materials.push(material);
+        shapes(&mut self.modeller);
+    }
+
+    /// A diffuse object whose largest channel is `low` to `high`.
+    pub fn plain(&mut self, name: &str, [low, high]: [f64; 2], shapes: impl FnOnce(&mut Modeller)) {
+        let value = self.between(low, high);
+        let saturation = self.between(0.0, 0.8);
+        let albedo = self.color(value, saturation);
+        self.object(name, Material::diffuse(albedo, Vec3::ZERO), shapes);
+    }
+
+    /// Floor, ceiling and walls; the walls are one object, two or four.
+    pub fn shell(&mut self) {
+        self.shell_with(|m, _, [corner, u, v]| m.grid(corner, u, v, 4, 4));
+    }
+
+    /// The same with walls built by a function of their number, north, south, west and east, and of a corner and two sides.
+    pub fn shell_with(&mut self, wall: impl Fn(&mut Modeller, usize, [DVec3; 3])) {
+        let (half, height) = (self.size * 0.5, DVec3::Y * self.size.y);
+        let low = DVec3::new(-half.x, 0.0, -half.z);
+        let high = DVec3::new(half.x, self.size.y, half.z);
+        let (width, depth) = (DVec3::X * self.size.x, DVec3::Z * self.size.z);
+        self.plain("floor", [0.05, 0.7], |m| m.grid(low, depth, width, 4, 4));
+        self.plain("ceiling", [0.5, 0.92], |m| {
+            m.grid(high, -width, -depth, 4, 4)
+        });
+        let walls = [
+            [low, width, height],
+            [high, -height, -width],
+            [low, height, depth],
+            [high, -depth, -height],
+        ];
+        let together = [1, 2, 4][self.stream.below(3)];
+        for (index, group) in walls.chunks(together).enumerate() {
+            self.plain(&format!("wall-{index}"), [0.15, 0.92], |m| {
+                for (within, &sides) in group.iter().enumerate() {
+                    wall(m, index * together + within, sides);
+                }
+            });
+        }
+    }
+
+    /// One to five lamps, dim or bright.
+    pub fn lamps(&mut self) {
+        let brightness = self.scaled(0.3, 300.0);
+        for index in 0..self.count(1, 5) {
+            self.lamp(index, brightness);
+        }
+    }
+
+    /// What a lamp of about a brightness is made of.
+    pub fn luminous(&mut self, brightness: f64) -> Material {
+        let value = brightness * self.scaled(0.3, 3.0);
+        let color = self.color(1.0, 0.6);
+        let emission = color * (value as f32 / luminance(color));
+        let value = self.between(0.0, 0.8);
+        let albedo = self.color(value, 0.3);
+        Material::diffuse(albedo, emission)
+    }
+
+    /// A lamp: a panel below the ceiling, a box that hangs or a lantern that stands.
+    pub fn lamp(&mut self, index: usize, brightness: f64) {
+        let material = self.luminous(brightness);
+        let name = format!("lamp-{index}");
+        match self.count(0, 2) {
+            0 => {
+                let half = [0, 2].map(|axis| self.scaled(0.08, 0.35) * self.size[axis] * 0.5);
+                let at = self.place(half[0].max(half[1]));
+                let center = DVec3::new(at.x, self.size.y - 0.03, at.y);
+                let corner = center - DVec3::new(half[0], 0.0, half[1]);
+                let (u, v) = (DVec3::X * 2.0 * half[0], DVec3::Z * 2.0 * half[1]);
+                self.object(&name, material, |m| m.grid(corner, u, v, 2, 2));
+            }
+            1 => {
+                let half = DVec3::from([(); 3].map(|()| self.scaled(0.05, 0.2)));
+                let at = self.place(half.x.max(half.z));
+                let below = self.between(0.1, 0.6) + half.y;
+                let center = DVec3::new(at.x, self.size.y - below, at.y);
+                self.object(&name, material, |m| {
+                    m.rounded_box(center, half, 0.0, 0);
+                });
+            }
+            _ => {
+                let radius = self.scaled(0.06, 0.2);
+                let height = self.between(0.3, 1.2);
+                let at = self.free(radius).unwrap_or_else(|| self.place(radius));
+                let stand = DAffine3::from_translation(DVec3::new(at.x, 0.0, at.y));
+                self.object(&name, material, |m| {
+                    m.placed(stand, |m| m.lathe(&[[radius, 0.0], [radius, height]], 12));
+                });
+            }
+        }
+    }
+
+    /// Up to fourteen boxes, drums and tables that do not touch each other.
+    pub fn furniture(&mut self) {
+        for index in 0..self.count(2, 14) {
+            let radius = self.scaled(0.12, 0.6);
+            let height = self.scaled(0.15, 1.5);
+            let Some(at) = self.free(radius) else {
+                continue;
+            };
+            let turn = DAffine3::from_rotation_y(self.between(0.0, std::f64::consts::TAU));
+            let place = DAffine3::from_translation(DVec3::new(at.x, 0.0, at.y)) * turn;
+            let aspect = self.between(0.3, 0.95);
+            let half = DVec3::new(aspect, 0.0, (1.0 - aspect * aspect).sqrt()) * radius;
+            let kind = self.count(0, 2);
+            self.plain(&format!("piece-{index}"), [0.03, 0.9], |m| {
+                m.placed(place, |m| match kind {
+                    0 => {
+                        let half = half + DVec3::Y * height * 0.5;
+                        m.rounded_box(DVec3::Y * height * 0.5, half, 0.02, 1);
+                    }
+                    1 => m.lathe(&[[radius, 0.0], [radius, height]], 16),
+                    _ => woodwork::table(m, 2.0 * half.x, 2.0 * half.z, height),
+                });
+            });
+            let top = match kind {
+                1 => DVec2::splat(radius * std::f64::consts::FRAC_1_SQRT_2),
+                _ => DVec2::new(half.x, half.z) - 0.02,
+            };
+            self.supports.push(Support {
+                place: place * DAffine3::from_translation(DVec3::Y * height),
+                half: top,
+                headroom: self.size.y - height,
+            });
+        }
+    }
+
+    /// Views from free places at eye level to points all over the room, `low` to `high` of them.
+    pub fn look_around(&mut self, low: usize, high: usize) {
+        for _ in 0..self.count(low, high) {
+            let eye = self.eye();
+            let share = DVec3::from([(); 3].map(|()| self.between(-0.5, 0.5)));
+            let target = share * self.size + DVec3::Y * self.size.y * 0.5;
+            self.look(eye, target);
+        }
+    }
+
+    /// A free place at eye level.
+    pub fn eye(&mut self) -> DVec3 {
+        let at = self.free_point(MARGIN).unwrap_or_default();
+        DVec3::new(at.x, self.between(EYES[0], EYES[1]), at.y)
+    }
+
+    /// A view from an eye to a target.
+    pub fn look(&mut self, eye: DVec3, target: DVec3) {
+        // Never straight up or down, where a level camera is not defined.
+        let ahead = (eye - target).with_y(0.0).length() > 0.2;
+        self.views.push(View::towards(
+            eye,
+            if ahead { target } else { target + DVec3::X },
+        ));
+    }
+
+    /// Lets the photographs carry from much to little noise.
+    pub fn expose(&mut self, low: f64, high: f64) {
+        self.samples = self.scaled(low, high) as u32;
+    }
+
+    /// A point of the floor at least `radius` from the walls, where the room is that large.
+    pub fn place(&mut self, radius: f64) -> DVec2 {
+        let reach = (DVec2::new(self.size.x, self.size.z) * 0.5 - radius - 0.05).max(DVec2::ZERO);
+        DVec2::new(
+            self.between(-reach.x, reach.x),
+            self.between(-reach.y, reach.y),
+        )
+    }
+
+    /// A point of the floor that nothing within `radius` has taken.
+    pub fn free_point(&mut self, radius: f64) -> Option<DVec2> {
+        (0..TRIES)
+            .map(|_| self.place(radius))
+            .collect::<Vec<_>>()
+            .into_iter()
+            .find(|at| {
+                let clear = |(center, other): &(DVec2, f64)| at.distance(*center) > radius + other;
+                self.taken.iter().all(clear)
+            })
+    }
+
+    /// A free point, which is taken from now on.
+    pub fn free(&mut self, radius: f64) -> Option<DVec2> {
+        let at = self.free_point(radius)?;
+        self.taken.push((at, radius));
+        Some(at)
+    }
+}

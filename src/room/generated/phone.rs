@@ -1,0 +1,181 @@
+//! Photographs as a telephone takes them.
+
+use crate::capture::camera::Intrinsics;
+use crate::capture::exposure::{Exposure, Vignetting};
+use crate::capture::photograph::{Encoding, Photograph};
+use crate::error::{Error, Result};
+use crate::math::color::{luminance, srgb_to_linear, to_srgb8};
+use crate::math::picture::Picture;
+use crate::math::rng::Stream;
+use crate::room::generated::Generated;
+use crate::room::generated::draft::Draft;
+use crate::room::generated::furnisher::Furnisher;
+use crate::room::photographs::render_lit;
+use crate::transport::lit::Lit;
+use glam::Vec3;
+use image::codecs::jpeg::JpegEncoder;
+use image::{ExtendedColorType, ImageFormat};
+
+/// Key of the camera's random numbers.
+const KEY: u64 = 0x7068_6f6e_65;
+/// Where automatic exposure puts the geometric mean of the luminances, as a fraction of saturation.
+const MIDDLE: f64 = 0.18;
+/// Darkest luminance that automatic exposure counts, relative to the mean.
+const DARKEST: f32 = 1e-3;
+
+/// A plain room.
+pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
+    f.shell();
+    f.lamps();
+    f.furniture();
+    f.look_around(6, 14);
+    f.expose(24.0, 96.0);
+}
+
+/// The room in photographs of one telephone.
+pub fn photograph(draft: Draft) -> Result<Generated> {
+    let lit = draft.lit()?;
+    let files = files(&draft, &lit)?;
+    let photographs = files
+        .iter()
+        .map(|file| decode(file))
+        .collect::<Result<_>>()?;
+    Ok(draft.photographed(lit, photographs))
+}
+
+/// The camera of a room.
+struct Phone {
+    /// How the lens dims the corners.
+    vignetting: Vignetting,
+    /// Standard deviation of the blur in pixels.
+    blur: f64,
+    /// Of JPEG, in percent.
+    quality: u8,
+    /// Standard deviation of a pixel at saturation; in the dark as that of the number of photons.
+    noise: f32,
+}
+
+/// The photographs as JPEG files.
+pub fn files(draft: &Draft, lit: &Lit) -> Result<Vec<Vec<u8>>> {
+    let mut stream = Stream::new(draft.seed, KEY, draft.family as u64, 0);
+    let mut between = |low: f64, high: f64| low + (high - low) * stream.uniform_f64();
+    let phone = Phone {
+        vignetting: Vignetting {
+            power: Vec3::splat(between(1.0, 4.0) as f32),
+        },
+        blur: between(0.3, 0.7),
+        quality: between(85.0, 96.0) as u8,
+        noise: between(0.002, 0.01) as f32,
+    };
+    let [width, height] = draft.rendering.size;
+    (render_lit(lit, &draft.rendering).into_iter())
+        .zip(&lit.scene.cameras)
+        .map(|(photograph, camera)| {
+            let picture = Picture {
+                width,
+                height,
+                pixels: photograph.pixels,
+            };
+            let compensation = 2f64.powf(-0.5 + stream.uniform_f64());
+            let shot = phone.expose(&picture, &camera.intrinsics, compensation, &mut stream);
+            encode(&shot, phone.quality)
+        })
+        .collect()
+}
+
+impl Phone {
+    /// What the sensor makes of radiance, as fractions of saturation.
+    fn expose(
+        &self,
+        radiance: &Picture,
+        lens: &Intrinsics,
+        compensation: f64,
+        stream: &mut Stream,
+    ) -> Picture {
+        let mut picture = blurred(radiance, self.blur);
+        let exposure = Exposure {
+            factor: Vec3::splat((MIDDLE * compensation / middle(&picture)) as f32),
+            vignetting: Some(self.vignetting),
+            response: None,
+        };
+        exposure.apply(lens, Vec3::INFINITY, &mut picture);
+        for value in &mut picture.pixels {
+            let light = value.min(Vec3::ONE);
+            let deviation = light.map(f32::sqrt) * self.noise;
+            let normal = Vec3::from([(); 3].map(|()| stream.normal()));
+            *value = (*value + normal * deviation).max(Vec3::ZERO);
+        }
+        picture
+    }
+}
+
+/// The geometric mean of the luminances; positive.
+fn middle(picture: &Picture) -> f64 {
+    let luminances = || picture.pixels.iter().map(|p| luminance(*p));
+    let count = picture.pixels.len().max(1) as f32;
+    let darkest = (luminances().sum::<f32>() / count * DARKEST).max(f32::MIN_POSITIVE);
+    let logs: f64 = luminances().map(|l| f64::from(l.max(darkest)).ln()).sum();
+    (logs / f64::from(count)).exp()
+}
+
+/// The picture through a Gaussian blur; what lies beyond its edge is as the edge.
+fn blurred(picture: &Picture, sigma: f64) -> Picture {
+    const REACH: i64 = 2;
+    let weights = (-REACH..=REACH).map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp());
+    let weights: Vec<f64> = weights.collect();
+    let total: f64 = weights.iter().sum();
+    let along = |picture: &Picture, [dx, dy]: [i64; 2]| {
+        Picture::from_fn(picture.width, picture.height, |x, y| {
+            let tap = |(i, weight): (i64, &f64)| {
+                let at = |p: u32, d: i64, size: u32| {
+                    (i64::from(p) + i * d).clamp(0, i64::from(size) - 1) as usize
+                };
+                let column = at(x, dx, picture.width);
+                let row = at(y, dy, picture.height);
+                picture.pixels[row * picture.width as usize + column] * (weight / total) as f32
+            };
+            (-REACH..).zip(&weights).map(tap).sum()
+        })
+    };
+    along(&along(picture, [1, 0]), [0, 1])
+}
+
+fn encode(picture: &Picture, quality: u8) -> Result<Vec<u8>> {
+    let values: Vec<u8> = (picture.pixels.iter())
+        .flat_map(|pixel| to_srgb8(*pixel, 1.0))
+        .collect();
+    let mut file = Vec::new();
+    JpegEncoder::new_with_quality(&mut file, quality)
+        .encode(
+            &values,
+            picture.width,
+            picture.height,
+            ExtendedColorType::Rgb8,
+        )
+        .map_err(|error| broken(&error))?;
+    Ok(file)
+}
+
+/// The photograph in a JPEG file.
+pub fn decode(file: &[u8]) -> Result<Photograph> {
+    let image = image::load_from_memory_with_format(file, ImageFormat::Jpeg)
+        .map_err(|error| broken(&error))?
+        .into_rgb8();
+    let pixels = image.pixels().map(|pixel| {
+        let linear = pixel.0.map(|v| srgb_to_linear(f32::from(v) / 255.0));
+        Vec3::from(linear)
+    });
+    Ok(Photograph {
+        width: image.width(),
+        height: image.height(),
+        pixels: pixels.collect(),
+        usable: Vec::new(),
+        encoding: Encoding::Srgb8,
+        saturation: Vec3::ONE,
+        limits: Vec::new(),
+    })
+}
+
+fn broken(error: &image::ImageError) -> Error {
+    Error::new("generated photograph", error, "choose another size")
+}

@@ -1,0 +1,160 @@
+//! Rooms as a scan shows them: photographs of a telephone, and a mesh fused from noisy depth images.
+
+use crate::capture::Cut;
+use crate::capture::camera::Pose;
+use crate::capture::fuse::{MAX_BYTES, fuse};
+use crate::capture::import::{DepthImage, ImportedFrame, Lens};
+use crate::capture::truth::Truth;
+use crate::error::{Error, Result};
+use crate::math::rng::Stream;
+use crate::room::cameras;
+use crate::room::generated::draft::Draft;
+use crate::room::generated::furnisher::Furnisher;
+use crate::room::generated::{Generated, phone};
+use crate::scene::Scene;
+use crate::scene::camera::Camera;
+use glam::{DMat3, DVec3, Vec2};
+use std::path::{Path, PathBuf};
+
+/// Key of the depth camera's random numbers.
+const KEY: u64 = 0x7363_616e;
+/// Width of the depth images in pixels.
+const WIDTH: u32 = 160;
+/// Edge of a voxel in metres: meshes as fine as those that telephones make of rooms.
+const VOXEL: f64 = 0.05;
+/// Metres a unit of the depth images.
+const UNIT: f64 = 0.001;
+/// Farthest depth in metres.
+const FARTHEST: f64 = 5.0;
+/// Depth is lost where the cosine between ray and normal is smaller.
+const GRAZING: f32 = 0.2;
+/// Standard deviations of the poses, along each axis in metres and about each in radians.
+const SHIFT: f64 = 0.003;
+const TURN: f64 = 0.12 / 180.0 * std::f64::consts::PI;
+
+/// A plain room, seen from many places.
+pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
+    f.shell();
+    f.lamps();
+    f.furniture();
+    f.look_around(16, 24);
+    f.expose(8.0, 32.0);
+}
+
+/// Standard deviation of a depth in metres: a structured-light camera's (Nguyen, Izadi and Lovell 2012).
+pub fn deviation(depth: f64) -> f64 {
+    0.0012 + 0.0019 * (depth - 0.4).powi(2)
+}
+
+/// Scans the room: photographs and depth images from the same poses, known with an error; the mesh is what fusing makes of them.
+pub fn scan(draft: Draft) -> Result<Generated> {
+    let lit = draft.lit()?;
+    let files = phone::files(&draft, &lit)?;
+    let mut stream = Stream::new(draft.seed, KEY, 0, 0);
+    let folder = tempfile::tempdir().map_err(|e| Error::io(&std::env::temp_dir(), &e))?;
+    let known = cameras::cameras(&draft.room.views, draft.rendering.size);
+    let mut frames = Vec::new();
+    for (index, ((intrinsics, pose), file)) in known.into_iter().zip(&files).enumerate() {
+        let photograph = folder.path().join(format!("{index:03}.jpg"));
+        std::fs::write(&photograph, file).map_err(|e| Error::io(&photograph, &e))?;
+        let k = &intrinsics;
+        let lens = Lens::plain([k.width, k.height], [k.fx, k.fy], [k.cx, k.cy]);
+        let height = (WIDTH * k.height).div_ceil(k.width.max(1));
+        let depth = DepthImage {
+            path: folder.path().join(format!("{index:03}.png")),
+            lens: lens.resized([WIDTH, height]),
+            metres_per_unit: UNIT,
+            invalid: None,
+        };
+        let camera = Camera::new(&depth.lens.pinhole, &pose, lit.scene.origin);
+        write_depth(
+            &depth.path,
+            &measure(&lit.scene, &camera, &mut stream),
+            &camera,
+        )?;
+        frames.push(ImportedFrame {
+            photograph,
+            lens,
+            pose: jittered(&pose, &mut stream),
+            exposure: None,
+            mask: None,
+            depth: Some(depth),
+        });
+    }
+    let fused = fuse(&frames, VOXEL, MAX_BYTES, &mut |_, _| {})?;
+
+    let photographs = files
+        .iter()
+        .map(|file| phone::decode(file))
+        .collect::<Result<_>>()?;
+    let mut capture = draft.room.capture_of(photographs, draft.rendering.size);
+    for (frame, imported) in capture.frames.iter_mut().zip(&frames) {
+        frame.pose = imported.pose;
+    }
+    capture.mesh = fused.mesh;
+    capture.cut = Some(Cut {
+        file: PathBuf::from("fused mesh"),
+        wanted: None,
+    });
+    Ok(Generated {
+        family: draft.family,
+        seed: draft.seed,
+        capture,
+        lit,
+        truth: Truth::default(),
+    })
+}
+
+/// A pose as tracking finds it.
+fn jittered(pose: &Pose, stream: &mut Stream) -> Pose {
+    let mut normal = || DVec3::from([(); 3].map(|()| f64::from(stream.normal())));
+    let turn = normal() * TURN;
+    Pose {
+        rotation: DMat3::from_axis_angle(turn.try_normalize().unwrap_or(DVec3::X), turn.length())
+            * pose.rotation,
+        center: pose.center + normal() * SHIFT,
+    }
+}
+
+/// Depth in metres along the viewing direction; 0 where it was lost: far away, at grazing angles, and in a few discs.
+fn measure(scene: &Scene, camera: &Camera, stream: &mut Stream) -> Vec<f64> {
+    let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
+    let discs: Vec<[f32; 3]> = (0..2 + stream.below(5))
+        .map(|_| {
+            let [x, y] = stream.uniform2();
+            let radius = (0.02 + 0.06 * stream.uniform()) * width as f32;
+            [x * width as f32, y * height as f32, radius]
+        })
+        .collect();
+    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| [x, y]));
+    let depth = pixels.map(|[x, y]| {
+        let center = Vec2::new(x as f32, y as f32) + 0.5;
+        let noise = f64::from(stream.normal());
+        let in_disc = |&[x, y, radius]: &[f32; 3]| center.distance(Vec2::new(x, y)) < radius;
+        let ray = camera.ray(center);
+        let Some(hit) = scene.intersect(&ray).filter(|_| !discs.iter().any(in_disc)) else {
+            return 0.0;
+        };
+        let depth = f64::from(hit.t * ray.direction.dot(camera.forward()));
+        let cosine = scene.normals[hit.triangle as usize]
+            .dot(ray.direction)
+            .abs();
+        if depth > FARTHEST || cosine < GRAZING {
+            return 0.0;
+        }
+        (depth + noise * deviation(depth)).max(0.0)
+    });
+    depth.collect()
+}
+
+fn write_depth(path: &Path, depth: &[f64], camera: &Camera) -> Result<()> {
+    let units = depth.iter().map(|d| (d / UNIT).round() as u16).collect();
+    let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
+    let image = image::ImageBuffer::<image::Luma<u16>, Vec<u16>>::from_raw(width, height, units);
+    let saved = image.map(|image| image.save(path));
+    match saved {
+        Some(Ok(())) => Ok(()),
+        Some(Err(error)) => Err(Error::file(path, error, "make room for temporary files")),
+        None => Err(Error::file(path, "has no pixels", "choose another size")),
+    }
+}

@@ -1,0 +1,78 @@
+//! Few photographs, and noisy ones.
+
+use crate::error::Result;
+use crate::math::color::luminance;
+use crate::math::rng::{Stream, splitmix64};
+use crate::math::stats::quantile;
+use crate::room::generated::Generated;
+use crate::room::generated::draft::Draft;
+use crate::room::generated::furnisher::Furnisher;
+use crate::room::photographs::linear;
+use crate::scene::camera::Camera;
+use crate::transport::film::Film;
+use crate::transport::lit::Lit;
+use crate::transport::path::PathOptions;
+use glam::Vec3;
+
+/// Number of photographs.
+pub const PHOTOGRAPHS: usize = 6;
+/// Standard deviation of a pixel, relative to its value.
+pub const NOISE: [f64; 2] = [0.05, 0.15];
+/// Key of the noise that is added.
+const KEY: u64 = 0x7370_6172_7365;
+/// Paths a pixel that are added at a time, and at most.
+const STEP: u32 = 16;
+const MAX_SAMPLES: u32 = 128;
+/// A normal deviate is below this in size as often as not.
+const NORMAL_MEDIAN: f64 = 0.674_49;
+
+/// A plain room and six views of it.
+pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
+    f.shell();
+    f.lamps();
+    f.furniture();
+    f.look_around(PHOTOGRAPHS, PHOTOGRAPHS);
+    f.samples = MAX_SAMPLES;
+}
+
+/// Photographs with noise of a standard deviation drawn for the room: traced until their own is below it, and the rest added.
+pub fn photograph(draft: Draft) -> Result<Generated> {
+    let lit = draft.lit()?;
+    let mut stream = Stream::new(draft.seed, KEY, 0, 0);
+    let noise = NOISE[0] + (NOISE[1] - NOISE[0]) * stream.uniform_f64();
+    let photographs = (0..).zip(&lit.scene.cameras).map(|(frame, camera)| {
+        let (mut pixels, own) = trace(&lit, camera, draft.rendering.seed, frame, noise);
+        let missing = (noise * noise - own * own).max(0.0).sqrt();
+        for pixel in &mut pixels {
+            let factor = Vec3::from([(); 3].map(|()| stream.normal()));
+            *pixel *= (Vec3::ONE + factor * missing as f32).max(Vec3::ZERO);
+        }
+        linear(draft.rendering.size, pixels)
+    });
+    let photographs = photographs.collect();
+    Ok(draft.photographed(lit, photographs))
+}
+
+/// A picture and the standard deviation of its pixels, relative to their values, which is below `noise` unless that takes too many
+/// paths.
+fn trace(lit: &Lit, camera: &Camera, seed: u64, frame: u64, noise: f64) -> (Vec<Vec3>, f64) {
+    let mut films = [Film::new(camera), Film::new(camera)];
+    let options = PathOptions::default();
+    loop {
+        for (film, seed) in films.iter_mut().zip([seed, splitmix64(seed)]) {
+            film.add(lit, camera, &options, seed, frame, STEP / 2);
+        }
+        let [a, b] = films.each_ref().map(Film::mean);
+        let mut differences: Vec<f64> = (a.iter().zip(&b))
+            .map(|(a, b)| [luminance(*a), luminance(*b)].map(f64::from))
+            .filter(|[a, b]| a + b > 0.0)
+            .map(|[a, b]| (a - b).abs() / (a + b))
+            .collect();
+        // Half the difference of two halves is as uncertain as their mean.
+        let own = quantile(&mut differences, 0.5).unwrap_or(0.0) / NORMAL_MEDIAN;
+        if own <= 0.9 * noise || 2 * films[0].samples >= MAX_SAMPLES {
+            let mean = a.iter().zip(&b).map(|(a, b)| (*a + *b) * 0.5);
+            return (mean.collect(), own);
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! Rooms in the light of sky and sun, through openings in their walls.
+
+use crate::room::generated::furnisher::Furnisher;
+use crate::room::shape::Modeller;
+use crate::transport::environment::{Environment, direction_of, pixel_of};
+use glam::{DVec3, Vec3};
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+/// Width and height of the map of the light from outside: a sun of three degrees.
+const MAP: [usize; 2] = [128, 64];
+
+/// A rectangle of a wall, in fractions of its width and height.
+struct Opening {
+    wall: usize,
+    across: [f64; 2],
+    up: [f64; 2],
+    /// How thick the wall is, in metres.
+    reveal: f64,
+}
+
+/// A plain room with one or two openings; in two of five rooms a weak lamp.
+pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
+    let openings = openings(f);
+    f.shell_with(
+        |m, wall, sides| match openings.iter().find(|opening| opening.wall == wall) {
+            Some(opening) => around(m, opening, sides),
+            None => m.grid(sides[0], sides[1], sides[2], 4, 4),
+        },
+    );
+    let walls = walls(f.size);
+    f.plain("reveals", [0.3, 0.92], |m| {
+        for opening in &openings {
+            reveal(m, opening, walls[opening.wall]);
+        }
+    });
+    let level = f.scaled(0.3, 30.0);
+    let outside = sky(f, level, &openings[0]);
+    f.outside = outside.map(Arc::new);
+    if f.between(0.0, 1.0) < 0.4 {
+        f.lamp(0, level * 0.5);
+    }
+    f.furniture();
+    f.look_around(4, 7);
+    // Towards the openings, past their middle.
+    for opening in &openings {
+        let eye = f.eye();
+        let [corner, u, v] = opening_sides(opening, walls[opening.wall]);
+        let [s, t] = [(); 2].map(|()| f.between(-0.3, 1.3));
+        f.look(eye, corner + u * s + v * t);
+    }
+    f.expose(16.0, 64.0);
+}
+
+fn openings(f: &mut Furnisher) -> Vec<Opening> {
+    let first = f.count(0, 3);
+    let second = (first + f.count(1, 3)) % 4;
+    let count = f.count(1, 2);
+    [first, second][..count]
+        .iter()
+        .map(|&wall| {
+            let wide = f.between(0.25, 0.7);
+            let left = f.between(0.05, 0.95 - wide);
+            let sill = f.between(0.02, 0.4);
+            Opening {
+                wall,
+                across: [left, left + wide],
+                up: [sill, f.between(sill + 0.35, 0.95)],
+                reveal: f.between(0.05, 0.3),
+            }
+        })
+        .collect()
+}
+
+/// Corner and sides of the walls, as [`Furnisher::shell_with`] has them.
+fn walls(size: DVec3) -> [[DVec3; 3]; 4] {
+    let half = size * 0.5;
+    let (low, high) = (
+        DVec3::new(-half.x, 0.0, -half.z),
+        DVec3::new(half.x, size.y, half.z),
+    );
+    let [width, height, depth] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * size);
+    [
+        [low, width, height],
+        [high, -height, -width],
+        [low, height, depth],
+        [high, -depth, -height],
+    ]
+}
+
+/// The opening's range along each side of its wall.
+fn ranges(opening: &Opening, [_, u, v]: [DVec3; 3]) -> [[f64; 2]; 2] {
+    [u, v].map(|side| match side.y {
+        0.0 => opening.across,
+        rise if rise > 0.0 => opening.up,
+        _ => [1.0 - opening.up[1], 1.0 - opening.up[0]],
+    })
+}
+
+/// Corner and sides of an opening.
+fn opening_sides(opening: &Opening, sides: [DVec3; 3]) -> [DVec3; 3] {
+    let [corner, u, v] = sides;
+    let [s, t] = ranges(opening, sides);
+    [
+        corner + u * s[0] + v * t[0],
+        u * (s[1] - s[0]),
+        v * (t[1] - t[0]),
+    ]
+}
+
+/// The wall around an opening.
+fn around(m: &mut Modeller, opening: &Opening, sides: [DVec3; 3]) {
+    let [corner, u, v] = sides;
+    let [s, t] = ranges(opening, sides);
+    let mut part = |s: [f64; 2], t: [f64; 2]| {
+        let low = corner + u * s[0] + v * t[0];
+        m.grid(low, u * (s[1] - s[0]), v * (t[1] - t[0]), 2, 2);
+    };
+    part([0.0, 1.0], [0.0, t[0]]);
+    part([0.0, 1.0], [t[1], 1.0]);
+    part([0.0, s[0]], t);
+    part([s[1], 1.0], t);
+}
+
+/// The four sides of an opening through the thickness of its wall, seen from within it.
+fn reveal(m: &mut Modeller, opening: &Opening, sides: [DVec3; 3]) {
+    let [corner, u, v] = opening_sides(opening, sides);
+    let out = -u.cross(v).normalize_or_zero() * opening.reveal;
+    m.grid(corner, u, out, 2, 1);
+    m.grid(corner + v, out, u, 1, 2);
+    m.grid(corner, out, v, 1, 2);
+    m.grid(corner + u, v, out, 2, 1);
+}
+
+/// A sky of about a radiance, brighter towards the horizon, over darker ground; in three of five rooms with a sun that looks into
+/// an opening.
+fn sky(f: &mut Furnisher, level: f64, opening: &Opening) -> Option<Environment> {
+    let tint = f.color(1.0, 0.4);
+    let ground = f.color(1.0, 0.5) * f.between(0.1, 0.4) as f32;
+    let horizon = f.between(0.0, 1.0) as f32;
+    let [width, height] = MAP;
+    let mut pixels: Vec<Vec3> = (0..width * height)
+        .map(|pixel| {
+            let up = direction_of(width, height, pixel).y;
+            let light = match up > 0.0 {
+                true => tint * (1.0 + horizon * (1.0 - up)),
+                false => ground,
+            };
+            light * level as f32
+        })
+        .collect();
+    let shines = f.between(0.0, 1.0) < 0.6;
+    let [_, u, v] = walls(f.size)[opening.wall];
+    let out = -u.cross(v).normalize_or_zero();
+    let azimuth = out.z.atan2(out.x) + f.between(-1.1, 1.1);
+    let elevation = f.between(0.15, 1.0);
+    // Its irradiance, relative to that of an even sky.
+    let strength = f.scaled(0.3, 6.0);
+    let warmth = f.color(1.0, 0.3);
+    if shines {
+        let (sin, cos) = elevation.sin_cos();
+        let towards = DVec3::new(cos * azimuth.cos(), sin, cos * azimuth.sin()).as_vec3();
+        let pixel = pixel_of(width, height, towards);
+        let row = (pixel / width) as f64;
+        let edge = |row: f64| (PI * row / height as f64).cos();
+        let solid_angle = TAU * (edge(row) - edge(row + 1.0)) / width as f64;
+        pixels[pixel] += warmth * (strength * PI * level / solid_angle) as f32;
+    }
+    Environment::new(width, height, pixels)
+}

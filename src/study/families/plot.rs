@@ -1,0 +1,45 @@
+//! The rooms of each family as dots: albedo error, and how often the truth lies within two standard errors.
+
+use crate::export::strips::{Panel, Strips};
+use crate::room::generated::Family;
+use crate::study::families::{Row, Summary};
+
+/// How often a normal deviate lies within two standard deviations.
+const TWO_DEVIATIONS: f64 = 0.954_5;
+
+/// The picture of a summary and the rows that it is of.
+pub fn plot<'a>(summary: &Summary, rows: impl Iterator<Item = &'a Row>) -> Strips {
+    let rows: Vec<&Row> = rows.collect();
+    let families = Family::ALL.into_iter().map(Family::name);
+    let families: Vec<&str> = families
+        .filter(|name| summary.families.contains_key(name))
+        .collect();
+    let dots = |value: fn(&Row) -> Option<f64>| -> Vec<Vec<f64>> {
+        let of = |name: &&str| {
+            let rows = rows.iter().filter(|row| row.family.name() == *name);
+            rows.filter_map(|row| value(row)).collect()
+        };
+        families.iter().map(of).collect()
+    };
+    Strips {
+        title: format!(
+            "Generated rooms, {} preset: a dot a room, a bar the median",
+            summary.preset
+        ),
+        rows: families.iter().map(|name| (*name).to_owned()).collect(),
+        panels: [
+            Panel {
+                label: "mean absolute error of albedo".to_owned(),
+                logarithmic: true,
+                values: dots(|row| row.albedo_mae),
+                mark: None,
+            },
+            Panel {
+                label: "fraction of albedos within two standard errors".to_owned(),
+                logarithmic: false,
+                values: dots(|row| row.coverage_2),
+                mark: Some(TWO_DEVIATIONS),
+            },
+        ],
+    }
+}

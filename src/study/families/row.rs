@@ -1,0 +1,212 @@
+//! rooms.csv: a row a room and solve.
+
+use crate::error::{Error, Result};
+use crate::export::atomic::write_bytes;
+use crate::export::table::{Cell, Table};
+use crate::room::generated::Family;
+use crate::study::families::Plan;
+use std::fs::OpenOptions;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+const COLUMNS: [&str; 18] = [
+    "relit",
+    "preset",
+    "width",
+    "height",
+    "family",
+    "seed",
+    "seconds",
+    "objects",
+    "albedo_mae",
+    "albedo_rel_median",
+    "albedo_psnr",
+    "lamps_true",
+    "lamps_found",
+    "lamps_false",
+    "albedos",
+    "coverage_1",
+    "coverage_2",
+    "rays",
+];
+
+/// How a solve of a room compares with the truth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// The program's version.
+    pub relit: String,
+    /// The preset's word.
+    pub preset: String,
+    /// Width and height of the photographs in pixels.
+    pub size: [u32; 2],
+    /// The room's family.
+    pub family: Family,
+    /// Its seed.
+    pub seed: u64,
+    /// Seconds of solving, drawing and loading excluded.
+    pub seconds: f64,
+    /// Objects scored for their albedo.
+    pub objects: u64,
+    /// Mean absolute error of albedo over scored objects and RGB.
+    pub albedo_mae: Option<f64>,
+    /// Median over scored objects of the relative error over RGB.
+    pub albedo_rel_median: Option<f64>,
+    /// Peak signal-to-noise ratio in dB against the true albedo pictures.
+    pub albedo_psnr: Option<f64>,
+    /// Lamps that there are, whether photographs see them or not.
+    pub lamps_true: u64,
+    /// Of them, those whose emission was found within a factor of two.
+    pub lamps_found: u64,
+    /// Objects that give no light and were given more than 1 % of the brightest emission.
+    pub lamps_false: u64,
+    /// Albedos, one an object and channel, that should lie within their standard errors as often as they say.
+    pub albedos: u64,
+    /// Fraction of them within one standard error of the truth.
+    pub coverage_1: Option<f64>,
+    /// Within two.
+    pub coverage_2: Option<f64>,
+    /// Rays of the solve.
+    pub rays: u64,
+}
+
+impl Row {
+    /// Whether it was measured as a plan measures.
+    pub fn belongs_to(&self, plan: &Plan) -> bool {
+        self.relit == env!("CARGO_PKG_VERSION")
+            && self.preset == plan.preset.word()
+            && self.size == plan.size
+    }
+
+    fn cells(&self) -> [Cell; COLUMNS.len()] {
+        [
+            self.relit.as_str().into(),
+            self.preset.as_str().into(),
+            u64::from(self.size[0]).into(),
+            u64::from(self.size[1]).into(),
+            self.family.name().into(),
+            self.seed.into(),
+            self.seconds.into(),
+            self.objects.into(),
+            self.albedo_mae.into(),
+            self.albedo_rel_median.into(),
+            self.albedo_psnr.into(),
+            self.lamps_true.into(),
+            self.lamps_found.into(),
+            self.lamps_false.into(),
+            self.albedos.into(),
+            self.coverage_1.into(),
+            self.coverage_2.into(),
+            self.rays.into(),
+        ]
+    }
+
+    /// The row of a line; `None` where it is not whole.
+    fn parse(line: &str) -> Option<Self> {
+        let fields: Vec<&str> = line.split(',').collect();
+        let fields: [&str; COLUMNS.len()] = fields.try_into().ok()?;
+        let maybe = |text: &str| match text {
+            "" => Some(None),
+            text => text.parse::<f64>().ok().map(Some),
+        };
+        let whole = |index: usize| fields[index].parse::<u64>().ok();
+        Some(Self {
+            relit: fields[0].to_owned(),
+            preset: fields[1].to_owned(),
+            size: [fields[2].parse().ok()?, fields[3].parse().ok()?],
+            family: Family::of_name(fields[4])?,
+            seed: whole(5)?,
+            seconds: fields[6].parse().ok()?,
+            objects: whole(7)?,
+            albedo_mae: maybe(fields[8])?,
+            albedo_rel_median: maybe(fields[9])?,
+            albedo_psnr: maybe(fields[10])?,
+            lamps_true: whole(11)?,
+            lamps_found: whole(12)?,
+            lamps_false: whole(13)?,
+            albedos: whole(14)?,
+            coverage_1: maybe(fields[15])?,
+            coverage_2: maybe(fields[16])?,
+            rays: whole(17)?,
+        })
+    }
+}
+
+/// The rows of a folder's rooms.csv, which grows by a row at a time.
+#[derive(Debug)]
+pub struct Rows {
+    path: PathBuf,
+    rows: Vec<Row>,
+}
+
+impl Rows {
+    /// Reads rooms.csv, or begins it. A last line that was broken off is taken away.
+    ///
+    /// # Errors
+    /// The file cannot be read or written, or is another table.
+    pub fn open(folder: &Path) -> Result<Self> {
+        let path = folder.join("rooms.csv");
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
+            Err(error) => return Err(Error::io(&path, &error)),
+        };
+        let mut table = Table::new(&COLUMNS);
+        let mut rows = Vec::new();
+        if !text.is_empty() {
+            let another = |line: usize| {
+                Error::new(
+                    format!("{}:{line}", path.display()),
+                    "is no row of this program's table of rooms",
+                    "name another folder with --out",
+                )
+            };
+            let mut lines = text.split_inclusive('\n').enumerate();
+            let header = lines.next().map(|(_, line)| line.trim_end());
+            if header != table.as_str().lines().next() {
+                return Err(another(1));
+            }
+            for (index, line) in lines {
+                match Row::parse(line.trim_end()).filter(|_| line.ends_with('\n')) {
+                    Some(row) => rows.push(row),
+                    None if !line.ends_with('\n') => {}
+                    None => return Err(another(index + 1)),
+                }
+            }
+        }
+        for row in &rows {
+            table.row(&row.cells());
+        }
+        if table.as_str() != text {
+            write_bytes(&path, table.as_str().as_bytes())?;
+        }
+        Ok(Self { path, rows })
+    }
+
+    /// Whether a room was solved as a plan asks for.
+    pub fn holds(&self, plan: &Plan, family: Family, seed: u64) -> bool {
+        self.of(plan)
+            .any(|row| row.family == family && row.seed == seed)
+    }
+
+    /// The rows that were measured as a plan measures.
+    pub fn of<'a>(&'a self, plan: &'a Plan) -> impl Iterator<Item = &'a Row> {
+        self.rows.iter().filter(|row| row.belongs_to(plan))
+    }
+
+    /// Adds a row, in the file too.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn append(&mut self, row: Row) -> Result<()> {
+        let line = Table::line(&row.cells());
+        let io = |error: std::io::Error| Error::io(&self.path, &error);
+        let mut file = OpenOptions::new()
+            .append(true)
+            .open(&self.path)
+            .map_err(io)?;
+        file.write_all(line.as_bytes()).map_err(io)?;
+        file.sync_data().map_err(io)?;
+        self.rows.push(row);
+        Ok(())
+    }
+}

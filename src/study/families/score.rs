@@ -1,0 +1,119 @@
+//! One room, solved and compared with its truth.
+
+use crate::capture::working::load_working;
+use crate::error::Result;
+use crate::inverse::estimate::Estimate;
+use crate::inverse::faces::cut_up;
+use crate::inverse::held_out::HoldOut;
+use crate::inverse::settings::Settings;
+use crate::inverse::solver::{Control, Observer, Problem, Progress, solve};
+use crate::room::generated::Family;
+use crate::scene::Scene;
+use crate::scene::prepare::prepare;
+use crate::study::albedo_pictures;
+use crate::study::evaluate::{ObjectErrors, Reference};
+use crate::study::families::{Plan, Row, lamps, segments};
+use std::sync::Arc;
+
+/// Draws a room, solves it as `relit solve` solves a capture, and compares.
+///
+/// # Errors
+/// The room cannot be drawn or solved.
+pub fn measure(family: Family, seed: u64, plan: &Plan) -> Result<Row> {
+    let settings = Settings {
+        preset: plan.preset,
+        seed,
+        ..Settings::default()
+    };
+    let room = family.generate(seed, plan.size)?;
+    let mut capture = room.capture.clone();
+    let working = load_working(&capture, u64::MAX)?;
+    if let Some(cut) = capture.cut.clone() {
+        cut_up(&mut capture, &cut, &working, HoldOut::from(&settings))?;
+    }
+    let prepared = prepare(&capture, &working)?;
+    let problem = Problem {
+        scene: Arc::new(prepared.scene),
+        photographs: prepared.photographs,
+    };
+    let solution = solve(&problem, &settings, None, &mut Unwatched)?;
+
+    let (scene, estimate) = (&problem.scene, &solution.estimate);
+    let truth = match room.truth.objects.is_empty() {
+        true => segments::truth(&room, scene),
+        false => room.truth.clone(),
+    };
+    let pictures =
+        albedo_pictures::compare(&prepared.capture, scene, estimate, &truth, |frame, _| {
+            Ok(Some(room.albedo(frame).pixels))
+        })?;
+    let reference = Reference::new(truth, &prepared.capture, scene, &problem.photographs);
+    let errors = reference.errors(scene, estimate);
+    let lamps = lamps::count(&errors.per_object, room.lit.outside.as_deref());
+    let coverage = Coverage::of(scene, estimate, &errors.per_object);
+    Ok(Row {
+        relit: env!("CARGO_PKG_VERSION").to_owned(),
+        preset: plan.preset.word().to_owned(),
+        size: plan.size,
+        family,
+        seed,
+        seconds: solution.progress.seconds,
+        objects: errors.objects as u64,
+        albedo_mae: errors.albedo_mae,
+        albedo_rel_median: errors.albedo_rel_median,
+        albedo_psnr: pictures.psnr(),
+        lamps_true: lamps.there,
+        lamps_found: lamps.found,
+        lamps_false: lamps.made_up,
+        albedos: coverage.albedos,
+        coverage_1: coverage.fraction(0),
+        coverage_2: coverage.fraction(1),
+        rays: solution.progress.rays,
+    })
+}
+
+/// Lets a solve end by itself.
+struct Unwatched;
+
+impl Observer for Unwatched {
+    fn observe(&mut self, _: &Progress, _: &Estimate) -> Control {
+        Control::Continue
+    }
+}
+
+/// How many albedos lie within one and within two of their reported standard errors.
+#[derive(Debug, Default)]
+struct Coverage {
+    albedos: u64,
+    within: [u64; 2],
+}
+
+impl Coverage {
+    /// Over the channels of all objects whose albedo is scored and reported as determined.
+    fn of(scene: &Scene, estimate: &Estimate, errors: &[(String, ObjectErrors)]) -> Self {
+        let mut coverage = Self::default();
+        for (name, errors) in errors.iter().filter(|(_, errors)| errors.scored) {
+            let place = scene.objects.iter().position(|object| object.name == *name);
+            let estimated = place.and_then(|place| estimate.objects.get(place));
+            let Some((estimated, known)) = estimated
+                .filter(|object| object.albedo_identifiable)
+                .zip(errors.albedo_true)
+            else {
+                continue;
+            };
+            for (channel, known) in known.into_iter().enumerate() {
+                let off = (f64::from(estimated.albedo[channel]) - known).abs();
+                let error = f64::from(estimated.albedo_stderr[channel]);
+                coverage.albedos += 1;
+                for (within, errors) in coverage.within.iter_mut().zip([1.0, 2.0]) {
+                    *within += u64::from(off <= errors * error);
+                }
+            }
+        }
+        coverage
+    }
+
+    fn fraction(&self, which: usize) -> Option<f64> {
+        (self.albedos > 0).then(|| self.within[which] as f64 / self.albedos as f64)
+    }
+}

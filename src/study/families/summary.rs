@@ -1,0 +1,221 @@
+//! Figures over the rooms of each family: rooms.json, and a table.
+
+use crate::error::{Error, Result};
+use crate::export::atomic::write_bytes;
+use crate::math::stats::quantile;
+use crate::room::generated::Family;
+use crate::study::families::{Plan, Row};
+use crate::study::machine::Machine;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Which end of a figure is the worst.
+#[derive(Clone, Copy)]
+enum Worst {
+    Largest,
+    Smallest,
+}
+
+/// A number of a row, its name and its worst end.
+type Figure = (&'static str, fn(&Row) -> Option<f64>, Worst);
+
+const FIGURES: [Figure; 10] = [
+    ("seconds", |r| Some(r.seconds), Worst::Largest),
+    ("albedo_mae", |r| r.albedo_mae, Worst::Largest),
+    ("albedo_rel_median", |r| r.albedo_rel_median, Worst::Largest),
+    ("albedo_psnr", |r| r.albedo_psnr, Worst::Smallest),
+    ("lamps_found", Row::found, Worst::Smallest),
+    (
+        "lamps_false",
+        |r| Some(r.lamps_false as f64),
+        Worst::Largest,
+    ),
+    ("objects", |r| Some(r.objects as f64), Worst::Smallest),
+    ("coverage_1", |r| r.coverage_1, Worst::Smallest),
+    ("coverage_2", |r| r.coverage_2, Worst::Smallest),
+    ("rays", |r| Some(r.rays as f64), Worst::Largest),
+];
+
+impl Row {
+    /// Fraction of the lamps that were found; `None` where there are none.
+    fn found(&self) -> Option<f64> {
+        (self.lamps_true > 0).then(|| self.lamps_found as f64 / self.lamps_true as f64)
+    }
+}
+
+/// Quantiles of a figure over rooms that have it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Quantiles {
+    /// Rooms that have it.
+    pub n: usize,
+    /// A tenth of the rooms is below.
+    pub q10: f64,
+    /// The median.
+    pub q50: f64,
+    /// A tenth of the rooms is above.
+    pub q90: f64,
+    /// The largest of an error, a time or a number of false lamps, the smallest of all else.
+    pub worst: f64,
+}
+
+/// Figures of one family.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OfFamily {
+    /// Rooms.
+    pub n: usize,
+    /// Lamps in all of them.
+    pub lamps_true: u64,
+    /// Of them, those that were found.
+    pub lamps_found: u64,
+    /// Rooms with a false lamp.
+    pub rooms_with_false_lamps: usize,
+    /// Albedos of all rooms together whose errors are reported.
+    pub albedos: u64,
+    /// Fractions of them within one and two standard errors.
+    pub coverage: Option<[f64; 2]>,
+    /// Quantiles of each figure over rooms.
+    pub figures: BTreeMap<&'static str, Quantiles>,
+}
+
+/// What rooms.json holds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// The program's version.
+    pub relit: String,
+    /// The preset of every solve.
+    pub preset: String,
+    /// Width and height of the photographs in pixels.
+    pub size: [u32; 2],
+    /// What seconds were measured on last.
+    pub machine: Machine,
+    /// By name.
+    pub families: BTreeMap<&'static str, OfFamily>,
+}
+
+/// Figures over rows that were measured as a plan measures.
+pub fn summarize<'a>(plan: &Plan, rows: impl Iterator<Item = &'a Row>) -> Summary {
+    let mut families: BTreeMap<&'static str, Vec<&Row>> = BTreeMap::new();
+    for row in rows {
+        families.entry(row.family.name()).or_default().push(row);
+    }
+    Summary {
+        relit: env!("CARGO_PKG_VERSION").to_owned(),
+        preset: plan.preset.word().to_owned(),
+        size: plan.size,
+        machine: Machine::here(),
+        families: (families.into_iter())
+            .map(|(name, rows)| (name, OfFamily::of(&rows)))
+            .collect(),
+    }
+}
+
+impl OfFamily {
+    fn of(rows: &[&Row]) -> Self {
+        let sum = |value: fn(&Row) -> u64| rows.iter().map(|row| value(row)).sum::<u64>();
+        let albedos = sum(|row| row.albedos);
+        let within = |value: fn(&Row) -> Option<f64>| {
+            let counts = rows
+                .iter()
+                .map(|row| value(row).unwrap_or(0.0) * row.albedos as f64);
+            counts.sum::<f64>() / albedos as f64
+        };
+        let figures = FIGURES.iter().filter_map(|&(name, value, worst)| {
+            let mut values: Vec<f64> = rows.iter().filter_map(|row| value(row)).collect();
+            Some((name, Quantiles::of(&mut values, worst)?))
+        });
+        Self {
+            n: rows.len(),
+            lamps_true: sum(|row| row.lamps_true),
+            lamps_found: sum(|row| row.lamps_found),
+            rooms_with_false_lamps: rows.iter().filter(|row| row.lamps_false > 0).count(),
+            albedos,
+            coverage: (albedos > 0).then(|| [within(|r| r.coverage_1), within(|r| r.coverage_2)]),
+            figures: figures.collect(),
+        }
+    }
+}
+
+impl Quantiles {
+    fn of(values: &mut [f64], worst: Worst) -> Option<Self> {
+        let [q10, q50, q90] = [0.1, 0.5, 0.9].map(|q| quantile(values, q));
+        let end = match worst {
+            Worst::Largest => 1.0,
+            Worst::Smallest => 0.0,
+        };
+        Some(Self {
+            n: values.len(),
+            q10: q10?,
+            q50: q50?,
+            q90: q90?,
+            worst: quantile(values, end)?,
+        })
+    }
+}
+
+impl Summary {
+    /// Writes rooms.json into a folder.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<()> {
+        let path = folder.join("rooms.json");
+        let text = serde_json::to_string_pretty(self)
+            .map_err(|error| Error::file(&path, error, "nothing was written there"))?;
+        write_bytes(&path, text.as_bytes())
+    }
+
+    /// A table with a line a family, in the families' order.
+    pub fn words(&self) -> String {
+        let [width, height] = self.size;
+        let mut text = format!(
+            "{} preset, photographs of {width}×{height} pixels, {}\n",
+            self.preset,
+            self.machine.words()
+        );
+        text += &format!(
+            "{:9}  {:>5}  {:>12}  {:>11}  {:>6}  {:>10}  {:>11}  {:>11}  {:>14}\n",
+            "family",
+            "rooms",
+            "albedo error",
+            "worst tenth",
+            "PSNR",
+            "lamps",
+            "false lamps",
+            "coverage",
+            "seconds"
+        );
+        for family in Family::ALL {
+            if let Some(of) = self.families.get(family.name()) {
+                text += &of.line(family.name());
+            }
+        }
+        text
+    }
+}
+
+impl OfFamily {
+    fn line(&self, name: &str) -> String {
+        let figure = |name: &str, part: fn(&Quantiles) -> f64, digits: usize| {
+            let figure = self.figures.get(name);
+            figure.map_or("-".to_owned(), |f| format!("{:.digits$}", part(f)))
+        };
+        let coverage = self.coverage.map_or("-".to_owned(), |[one, two]| {
+            format!("{:.0} / {:.0} %", one * 100.0, two * 100.0)
+        });
+        format!(
+            "{name:9}  {:>5}  {:>12}  {:>11}  {:>6}  {:>10}  {:>11}  {coverage:>11}  {:>14}\n",
+            self.n,
+            figure("albedo_mae", |f| f.q50, 4),
+            figure("albedo_mae", |f| f.q90, 4),
+            figure("albedo_psnr", |f| f.q50, 1),
+            format!("{} / {}", self.lamps_found, self.lamps_true),
+            self.rooms_with_false_lamps,
+            format!(
+                "{} / {}",
+                figure("seconds", |f| f.q50, 1),
+                figure("seconds", |f| f.worst, 1)
+            ),
+        )
+    }
+}
