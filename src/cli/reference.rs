@@ -16,7 +16,8 @@ window's alone; importing scans is the command line's alone.
 
 * `relit COMMAND --help` prints what stands below.
 * What was found and written goes to standard output. Progress, warnings and errors go to standard error.
-* An error is one line: where, what is wrong, what to do.
+* An error is one line: where, what is wrong, what to do. The exit code is 0 where all went well, 1 after an error, and
+  2 where the command was used wrongly.
 * Times are written as `90`, `90s`, `5m` or `1h`.
 * Photographs are counted from 0, in the order of `transforms.json`.
 * Colours are linear and in the order red, green, blue.
@@ -62,7 +63,7 @@ pub fn check(words: &[&str]) -> Result<(), String> {
     }
 }
 
-/// The chapter, as Markdown: exit codes, every command with its arguments and options, and the parameters of a solve.
+/// The chapter, as Markdown: what the help ends with, every command with its arguments and options, and the parameters of a solve.
 pub fn markdown() -> String {
     let mut root = Arguments::command();
     root.build();
@@ -73,26 +74,15 @@ pub fn markdown() -> String {
         let name = command.get_name();
         text += &format!("| [`relit {name}`](#relit-{name}) | {} |\n", about(command));
     }
-    text += &exit_codes();
+    if let Some(note) = root.get_after_help() {
+        text += &format!("\n{note}.\n");
+    }
     text += &section("relit", &root);
     for command in root.get_subcommands() {
         text += &section(&format!("relit {}", command.get_name()), command);
     }
     text += &parameters(&root);
     text
-}
-
-/// What the process ends with.
-fn exit_codes() -> String {
-    "\n## Exit codes\n\n\
-     | code | meaning |\n| --- | --- |\n\
-     | 0 | Done |\n\
-     | 1 | Failed: a file cannot be read or written, or cannot be used |\n\
-     | 2 | Used wrongly: an unknown option, a missing argument, a value out of range |\n\
-     | 130 | Interrupted by Ctrl-C; what there is is saved first, after a second Ctrl-C not |\n\
-     | 143 | Asked to terminate; what there is is saved first |\n\
-     | 129 | The terminal was closed; what there is is saved first |\n"
-        .to_owned()
 }
 
 /// One command: what it does, how it is called, examples, arguments, options.
