@@ -293,7 +293,7 @@ fn a_full_disk_is_one_line_and_leaves_what_was_there() {
     };
     refused(limited(&WHOLE), "out/");
     refused(
-        limited(&["export", "out", "--format", "glb", "--out", "out/scene.glb"]),
+        limited(&["export", "out", "--format", "glb", "--out", "scene.glb"]),
         "scene.glb",
     );
     assert_eq!(

@@ -21,6 +21,9 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+/// What is said where work ends before it began.
+const NOTHING: &str = "interrupted before there was anything to save";
+
 /// Solves a source and writes the results; the exit code.
 ///
 /// # Errors
@@ -85,7 +88,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
 
     // Solve.
     if interrupt.asked() {
-        say::aside("interrupted before there was anything to save");
+        say::aside(NOTHING);
         return Ok(interrupt.exit_code());
     }
     let problem = Problem {
@@ -119,6 +122,11 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
 
     // Write.
     if interrupt.asked() {
+        // Before its first loss an estimate is what was supposed, and worth no earlier results.
+        if solution.progress.losses.is_empty() {
+            say::aside(NOTHING);
+            return Ok(interrupt.exit_code());
+        }
         say::aside("interrupted: saving what there is (again Ctrl-C to abort)");
     }
     let results = Results {
@@ -183,7 +191,8 @@ impl Observer for Watch<'_> {
     }
 }
 
-/// More threads a core than this only wait for each other: each piece of work wakes all of them.
+/// More threads a core than this gain nothing: whoever looks for work walks over the list of all of them, which takes most of
+/// the time of a thousand.
 const MAX_THREADS_A_CORE: usize = 4;
 
 /// Sets the number of worker threads for the whole process; says so where it is less than was asked for.

@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::export::atlas::Atlas;
-use crate::export::{glb, mitsuba, obj, objects, ply, probe};
+use crate::export::{glb, mitsuba, obj, objects, overwrite, ply, probe};
 use crate::inverse::estimate::{Estimate, ObjectEstimate, TexelEstimate};
 use crate::scene::Scene;
 use glam::{DVec3, Vec2, Vec3};
@@ -72,8 +72,11 @@ pub fn lost(estimate: &Estimate, format: Format) -> Option<&'static str> {
 /// Writes a scene and its estimate for another program.
 ///
 /// # Errors
-/// The file cannot be written, its ending does not fit a panorama, or the format cannot hold the scene.
+/// The file may not be replaced (see [`overwrite`]) or cannot be written, its ending does not fit a panorama, or the format
+/// cannot hold the scene.
 pub fn write(scene: &Arc<Scene>, estimate: &Estimate, format: Format, path: &Path) -> Result<()> {
+    // Before anything is written beside it.
+    overwrite::check(path)?;
     match format {
         Format::Glb => {
             let (parts, atlas) = mapped_parts(scene, estimate);

@@ -68,10 +68,10 @@ fn an_interrupt_ends_the_solve_cleanly_with_its_results() {
         .stderr(std::process::Stdio::piped())
         .spawn()
         .expect("relit starts");
-    // The first line of progress says that the solve is under way.
+    // The first loss says that the solve is under way.
     let mut said = String::new();
     let mut lines = std::io::BufReader::new(relit.stderr.take().expect("piped"));
-    while !said.contains(" s  ") {
+    while !said.contains(", loss ") {
         let read = std::io::BufRead::read_line(&mut lines, &mut said).expect("reads");
         assert!(read > 0, "{said}");
     }

@@ -17,7 +17,7 @@ fn endless(place: &Place, command: &mut Command) -> (Child, BufReader<ChildStder
         .expect("relit starts");
     let mut said = String::new();
     let mut lines = BufReader::new(relit.stderr.take().expect("piped"));
-    while !said.contains(" s  ") {
+    while !said.contains(", loss ") {
         let read = lines.read_line(&mut said).expect("reads");
         assert!(read > 0, "{said}");
     }
