@@ -14,7 +14,7 @@ use relit::transport::material::Albedo;
 
 /// Size of photographs that are rendered in a moment.
 const TINY: [u32; 2] = [24, 18];
-const SEEDS: std::ops::Range<u64> = 1..4;
+const SEEDS: std::ops::Range<u64> = 1..3;
 
 fn rooms(family: Family) -> impl Iterator<Item = Generated> {
     SEEDS.map(move |seed| family.generate(seed, TINY).expect("a room"))
@@ -54,24 +54,33 @@ fn seen(room: &Generated) -> Vec<Option<usize>> {
     seen
 }
 
-fn mean_light(room: &Generated) -> f32 {
-    let loaded = room
-        .capture
-        .frames
+fn sorted(names: &[String]) -> Vec<&String> {
+    let mut sorted: Vec<&String> = names.iter().collect();
+    sorted.sort();
+    sorted
+}
+
+fn lamps(room: &Generated) -> usize {
+    let lamps = room
+        .lit
+        .materials
         .iter()
-        .map(|f| f.load().expect("in memory"));
-    let means = loaded.map(|p| p.pixels.iter().map(|p| p.max_element()).sum::<f32>());
-    means.sum::<f32>() / (room.capture.frames.len() as u32 * TINY[0] * TINY[1]) as f32
+        .filter(|m| m.emission != Vec3::ZERO);
+    lamps.count()
 }
 
 #[test]
 fn the_same_seed_gives_the_same_bits_and_rooms_of_a_family_differ() {
     for family in Family::ALL {
-        let [a, again, b] = [1, 1, 2].map(|seed| family.generate(seed, TINY).expect("a room"));
+        let [a, again, b] = [1, 1, 2].map(|seed| family.generate(seed, [12, 9]).expect("a room"));
         assert_eq!(hash(&a), hash(&again), "{}", family.name());
         assert_ne!(hash(&a), hash(&b), "{}", family.name());
         assert_ne!(a.capture.mesh.bounds(), b.capture.mesh.bounds());
-        assert!(mean_light(&a) > 0.0, "{}", family.name());
+        for frame in &a.capture.frames {
+            let photograph = frame.load().expect("in memory");
+            let lit = photograph.pixels.iter().any(|p| p.max_element() > 0.0);
+            assert!(lit, "{}", family.name());
+        }
     }
 }
 
@@ -87,24 +96,10 @@ fn plain_rooms_are_what_they_were() {
 }
 
 #[test]
-fn names_in_truth_are_the_objects_of_the_mesh_wherever_it_has_any() {
-    for family in Family::ALL {
-        let room = family.generate(2, TINY).expect("a room");
-        let mut names = room.capture.mesh.objects.clone();
-        names.sort();
-        match family {
-            Family::Scanned => assert!(room.truth.objects.is_empty()),
-            _ => assert!(names.iter().eq(room.truth.objects.keys())),
-        }
-    }
-}
-
-#[test]
 fn unseen_lamps_light_rooms_in_which_no_pixel_sees_one() {
     for seed in 1..6 {
         let room = Family::Unseen.generate(seed, TINY).expect("a room");
-        let lamps = room.truth.objects.values().filter(|o| o.is_emitter());
-        assert!(lamps.count() > 0);
+        assert!(lamps(&room) > 0);
         for object in seen(&room) {
             let object = object.expect("the room is closed");
             assert_eq!(
@@ -131,8 +126,7 @@ fn rays_leave_rooms_with_windows_for_light_that_the_truth_holds() {
         let seen = seen(&room);
         let left = seen.iter().filter(|object| object.is_none()).count();
         assert!(left > 0 && left * 2 < seen.len(), "room {seed}: {left}");
-        let lamps = room.truth.objects.values().filter(|o| o.is_emitter());
-        assert!(lamps.count() <= 1);
+        assert!(lamps(&room) <= 1);
         // Whoever looks out sees the sky.
         let sky = room
             .capture
@@ -174,7 +168,9 @@ fn cluttered_rooms_hold_hundreds_of_things() {
 #[test]
 fn most_surfaces_of_patterned_rooms_are_textured() {
     for room in rooms(Family::Patterned) {
-        let surfaces = || room.truth.objects.values().filter(|o| !o.is_emitter());
+        let truth = room.truth();
+        assert!(truth.objects.keys().eq(sorted(&room.capture.mesh.objects)));
+        let surfaces = || truth.objects.values().filter(|o| !o.is_emitter());
         let textured = surfaces().filter(|o| o.textured).count();
         assert!(2 * textured > surfaces().count(), "{textured}");
         let mut varied = 0;
@@ -210,14 +206,15 @@ fn several_objects_of_glossy_rooms_have_lobes_over_a_diffuse_base() {
 #[test]
 fn shell_and_most_furniture_of_white_rooms_reflect_nine_tenths() {
     for room in rooms(Family::White) {
+        let truth = room.truth();
         let white = |name: &str| {
-            let albedo = room.truth.objects[name].albedo.expect("known");
+            let albedo = truth.objects[name].albedo.expect("known");
             albedo.min_element() >= 0.8999 && albedo.max_element() <= 0.97
         };
         let names = room.capture.mesh.objects.iter();
         let shell = ["floor", "ceiling", "wall-"];
         let (shell, rest): (Vec<_>, Vec<_>) = names
-            .filter(|name| !room.truth.objects[*name].is_emitter())
+            .filter(|name| !truth.objects[*name].is_emitter())
             .partition(|name| shell.iter().any(|s| name.starts_with(s)));
         assert!(shell.len() >= 3 && shell.iter().all(|name| white(name)));
         let painted = rest.iter().filter(|name| white(name)).count();
@@ -229,24 +226,29 @@ fn shell_and_most_furniture_of_white_rooms_reflect_nine_tenths() {
 fn sparse_rooms_are_in_six_photographs_of_five_to_fifteen_percent_of_noise() {
     for a in rooms(Family::Sparse) {
         assert_eq!(a.capture.frames.len(), 6);
-        // Against a rendering with hardly any noise.
-        let clean = Rendering {
-            seed: 99,
-            samples: 400,
-            size: TINY,
-        };
-        let clean = photographs::render_lit(&a.lit, &clean);
-        let mut off = Vec::new();
-        for (frame, clean) in a.capture.frames.iter().zip(&clean) {
+        // Against the mean of two renderings, whose own noise their difference tells.
+        let [one, other] = [99, 100].map(|seed| {
+            let rendering = Rendering {
+                seed,
+                samples: 150,
+                size: TINY,
+            };
+            photographs::render_lit(&a.lit, &rendering)
+        });
+        let (mut off, mut own) = (Vec::new(), Vec::new());
+        for (frame, clean) in a.capture.frames.iter().zip(one.iter().zip(&other)) {
             let noisy = frame.load().expect("in memory");
-            for (noisy, clean) in noisy.pixels.iter().zip(&clean.pixels) {
-                off.push(f64::from((noisy.y / clean.y - 1.0).abs()));
+            let clean = clean.0.pixels.iter().zip(&clean.1.pixels);
+            for (noisy, (one, other)) in noisy.pixels.iter().zip(clean) {
+                let mean = (one.y + other.y) * 0.5;
+                off.push(f64::from((noisy.y / mean - 1.0).abs()));
+                own.push(f64::from((one.y - other.y).abs() / (2.0 * mean)));
             }
         }
-        let median = quantile(&mut off, 0.5).expect("pixels");
-        let deviation = median / 0.674_49;
+        let [off, own] = [off, own].map(|mut v| quantile(&mut v, 0.5).expect("pixels") / 0.674_49);
+        let deviation = (off * off - own * own).max(0.0).sqrt();
         assert!(
-            (0.045..0.17).contains(&deviation),
+            (0.045..0.16).contains(&deviation),
             "room {}: {deviation}",
             a.seed
         );
@@ -319,7 +321,7 @@ fn telephones_write_eight_bits_at_exposures_that_differ_and_dim_the_corners() {
 fn scans_have_no_objects_and_a_mesh_with_holes_near_the_true_one() {
     let room = Family::Scanned.generate(1, TINY).expect("a room");
     assert_eq!(room.capture.mesh.objects.len(), 1);
-    assert!(room.capture.cut.is_some() && room.truth.objects.is_empty());
+    assert!(room.capture.cut.is_some() && room.truth().objects.is_empty());
     let fused = Scene::new(&room.capture).expect("a scene");
     let (mut off, mut missed) = (Vec::new(), 0);
     for (index, frame) in room.capture.frames.iter().enumerate() {

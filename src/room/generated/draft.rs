@@ -1,13 +1,12 @@
 //! A furnished room before it is photographed.
 
 use crate::capture::photograph::Photograph;
-use crate::capture::truth::Truth;
 use crate::error::Result;
 use crate::math::rng::splitmix64;
+use crate::room::Room;
 use crate::room::generated::furnisher::Furnisher;
 use crate::room::generated::{Family, Generated};
 use crate::room::photographs::Rendering;
-use crate::room::{Room, truth};
 use crate::transport::environment::Environment;
 use crate::transport::lit::Lit;
 use std::sync::Arc;
@@ -62,16 +61,12 @@ impl Draft {
         })
     }
 
-    /// The room with photographs, one a view, and the truth about its objects.
+    /// The room with photographs, one a view.
     pub fn photographed(self, lit: Lit, photographs: Vec<Photograph>) -> Generated {
-        let objects = truth::objects(&lit);
         Generated {
             family: self.family,
             seed: self.seed,
             capture: self.room.capture_of(photographs, self.rendering.size),
-            truth: Truth {
-                objects: objects.into_iter().map(|(n, o)| (n, o.into())).collect(),
-            },
             lit,
         }
     }

@@ -29,6 +29,7 @@ use crate::scene::geometry::Hit;
 use crate::transport::lit::Lit;
 use draft::Draft;
 use glam::{Vec2, Vec3};
+use std::collections::BTreeMap;
 
 /// A generated room, photographed, with all that is true of it.
 #[derive(Debug, Clone)]
@@ -43,11 +44,20 @@ pub struct Generated {
     /// The true room, in which the photographs were rendered: its geometry, materials, light and cameras. Frames are in the
     /// capture's order.
     pub lit: Lit,
-    /// What is true of each object by name; empty where the capture's mesh has no objects.
-    pub truth: Truth,
 }
 
 impl Generated {
+    /// What is true of each object by name; empty where the capture's mesh has no objects.
+    pub fn truth(&self) -> Truth {
+        let objects = match self.capture.cut {
+            Some(_) => BTreeMap::new(),
+            None => truth::objects(&self.lit),
+        };
+        Truth {
+            objects: objects.into_iter().map(|(n, o)| (n, o.into())).collect(),
+        }
+    }
+
     /// The true albedo that a frame's pixels see, the mean over each; black where they see nothing.
     pub fn albedo(&self, frame: usize) -> Picture {
         truth::albedo_picture(&self.lit, &self.lit.scene.cameras[frame])

@@ -17,7 +17,7 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageFormat};
 
 /// Key of the camera's random numbers.
-const KEY: u64 = 0x7068_6f6e_65;
+const KEY: u64 = 0x0070_686f_6e65;
 /// Where automatic exposure puts the geometric mean of the luminances, as a fraction of saturation.
 const MIDDLE: f64 = 0.18;
 /// Darkest luminance that automatic exposure counts, relative to the mean.

@@ -4,7 +4,6 @@ use crate::capture::Cut;
 use crate::capture::camera::Pose;
 use crate::capture::fuse::{MAX_BYTES, fuse};
 use crate::capture::import::{DepthImage, ImportedFrame, Lens};
-use crate::capture::truth::Truth;
 use crate::error::{Error, Result};
 use crate::math::rng::Stream;
 use crate::room::cameras;
@@ -101,7 +100,6 @@ pub fn scan(draft: Draft) -> Result<Generated> {
         seed: draft.seed,
         capture,
         lit,
-        truth: Truth::default(),
     })
 }
 

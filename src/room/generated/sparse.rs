@@ -20,9 +20,10 @@ pub const PHOTOGRAPHS: usize = 6;
 pub const NOISE: [f64; 2] = [0.05, 0.15];
 /// Key of the noise that is added.
 const KEY: u64 = 0x7370_6172_7365;
-/// Paths a pixel that are added at a time, and at most.
+/// Paths a pixel that are added at a time, enough of them for all but rooms whose noise is past bounds, and at most.
 const STEP: u32 = 16;
-const MAX_SAMPLES: u32 = 128;
+const ENOUGH_SAMPLES: u32 = 128;
+const MAX_SAMPLES: u32 = 512;
 /// A normal deviate is below this in size as often as not.
 const NORMAL_MEDIAN: f64 = 0.674_49;
 
@@ -32,7 +33,7 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     f.lamps();
     f.furniture();
     f.look_around(PHOTOGRAPHS, PHOTOGRAPHS);
-    f.samples = MAX_SAMPLES;
+    f.samples = ENOUGH_SAMPLES;
 }
 
 /// Photographs with noise of a standard deviation drawn for the room: traced until their own is below it, and the rest added.
@@ -53,8 +54,8 @@ pub fn photograph(draft: Draft) -> Result<Generated> {
     Ok(draft.photographed(lit, photographs))
 }
 
-/// A picture and the standard deviation of its pixels, relative to their values, which is below `noise` unless that takes too many
-/// paths.
+/// A picture and the standard deviation of its pixels, relative to their values: below `noise`, or below the largest of all rooms
+/// where that takes many paths.
 fn trace(lit: &Lit, camera: &Camera, seed: u64, frame: u64, noise: f64) -> (Vec<Vec3>, f64) {
     let mut films = [Film::new(camera), Film::new(camera)];
     let options = PathOptions::default();
@@ -70,7 +71,12 @@ fn trace(lit: &Lit, camera: &Camera, seed: u64, frame: u64, noise: f64) -> (Vec<
             .collect();
         // Half the difference of two halves is as uncertain as their mean.
         let own = quantile(&mut differences, 0.5).unwrap_or(0.0) / NORMAL_MEDIAN;
-        if own <= 0.9 * noise || 2 * films[0].samples >= MAX_SAMPLES {
+        let samples = 2 * films[0].samples;
+        let wanted = match samples < ENOUGH_SAMPLES {
+            true => 0.9 * noise,
+            false => 0.9 * NOISE[1],
+        };
+        if own <= wanted || samples >= MAX_SAMPLES {
             let mean = a.iter().zip(&b).map(|(a, b)| (*a + *b) * 0.5);
             return (mean.collect(), own);
         }

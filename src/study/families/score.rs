@@ -39,9 +39,9 @@ pub fn measure(family: Family, seed: u64, plan: &Plan) -> Result<Row> {
     let solution = solve(&problem, &settings, None, &mut Unwatched)?;
 
     let (scene, estimate) = (&problem.scene, &solution.estimate);
-    let truth = match room.truth.objects.is_empty() {
-        true => segments::truth(&room, scene),
-        false => room.truth.clone(),
+    let truth = match room.capture.cut {
+        Some(_) => segments::truth(&room, scene),
+        None => room.truth(),
     };
     let pictures =
         albedo_pictures::compare(&prepared.capture, scene, estimate, &truth, |frame, _| {
