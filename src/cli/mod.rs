@@ -25,7 +25,7 @@ use crate::inverse::settings::Settings;
 use crate::say;
 use crate::session::command::{OpenOptions, Source};
 use arguments::{Action, Arguments};
-use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
 use object_values::ObjectValues;
 use std::path::Path;
@@ -49,7 +49,7 @@ pub fn run(window: Option<Window>) -> i32 {
                 let _ = error.print();
                 return 0;
             }
-            _ => Err(mistyped(&error).unwrap_or_else(|| misuse(&error))),
+            _ => Err(mistyped().unwrap_or_else(|| misuse(&error))),
         },
     };
     match outcome {
@@ -88,18 +88,16 @@ fn act(arguments: Arguments, window: Option<Window>) -> Result<i32> {
 }
 
 /// The error for a first word that was meant as a command, where what clap makes of the line is a riddle.
-fn mistyped(error: &clap::Error) -> Option<Error> {
+fn mistyped() -> Option<Error> {
     let first = std::env::args_os().nth(1)?;
     let first = first.to_str().filter(|word| !word.starts_with('-'))?;
     let is_command = |name: &str| Arguments::command().find_subcommand(name).is_some();
     if is_command(first) || Path::new(first).exists() {
         return None;
     }
-    // With a capture's path alone, options are all that may follow.
-    let extra = match error.get(ContextKind::InvalidArg) {
-        Some(ContextValue::String(argument)) => !argument.starts_with('-'),
-        _ => false,
-    };
+    // Behind a capture's path nothing but options may follow.
+    let second = std::env::args_os().nth(2);
+    let extra = second.is_some_and(|word| !word.to_string_lossy().starts_with('-'));
     command_meant(first).or_else(|| extra.then(|| unknown_command(first, "see relit --help")))
 }
 

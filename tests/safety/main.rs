@@ -39,7 +39,9 @@ fn heard(output: &Output) -> String {
 /// Changes transforms.json of a capture.
 fn change(place: &Place, capture: &str, change: impl FnOnce(&mut Value)) {
     let path = place.path(capture).join("transforms.json");
-    let mut file: Value = serde_json::from_slice(&fs::read(&path).expect("reads")).expect("JSON");
+    let text = fs::read(&path).expect("reads");
+    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&text);
+    let mut file: Value = serde_json::from_slice(text).expect("JSON");
     change(&mut file);
     fs::write(&path, file.to_string()).expect("writes");
 }
