@@ -49,7 +49,9 @@ fn a_scan_without_objects_is_cut_into_segments_and_reduced_to_a_budget() {
     assert_eq!(capture.mesh.triangles.len(), 309_026);
     assert!(capture.cut.is_some() && capture.mesh.objects.len() == 1);
     let open = open(&Source::Folder(folder), &OpenOptions::default()).unwrap();
-    assert!((50..=400).contains(&open.capture.mesh.objects.len()));
+    // 158 were seen, and a twentieth more or fewer are as good.
+    let segments = open.capture.mesh.objects.len();
+    assert!((150..=166).contains(&segments), "{segments}");
     assert_eq!(capture.frames.len(), 75);
     assert!(capture.frames.iter().all(|frame| frame.depth.is_some()));
     println!("{:#?} {:#?}", open.summary, open.warnings);

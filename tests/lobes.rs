@@ -76,12 +76,15 @@ fn lobes_are_found_where_they_are_and_nowhere_else() {
     let (solution, _) = &*ROUGH_ROOM;
     told(solution);
     for (k, object) in solution.estimate.objects.iter().enumerate() {
-        let Some((_, _, roughness, _)) = k.checked_sub(FIRST).map(|i| ROUGH[i]) else {
+        let Some((_, _, roughness, specular)) = k.checked_sub(FIRST).map(|i| ROUGH[i]) else {
             assert_eq!(object.roughness, None, "object {k}");
             continue;
         };
-        let found = object.roughness.expect("it has a lobe");
-        assert!((found - roughness).abs() < 0.05, "{found} for {roughness}");
+        // 0.002 off at most are seen of either.
+        let (found, reflected) = object.lobe().expect("it has a lobe");
+        assert!((found - roughness).abs() < 0.01, "{found} for {roughness}");
+        let off = (reflected - specular).abs();
+        assert!(off < 0.01, "{reflected} for {specular}");
     }
 }
 
@@ -103,7 +106,8 @@ fn albedos_are_those_of_the_base() {
         };
         let off = relative_to_albedo(object.albedo - albedo, albedo);
         println!("object {k}: {off:.4} off, {:?}", object.specular);
-        assert!(off < 0.03 || albedo == Vec3::ZERO, "object {k}: {off}");
+        // 0.0099 of the brushed object and 0.0066 of the others are seen at most.
+        assert!(off < 0.012 || albedo == Vec3::ZERO, "object {k}: {off}");
     }
 }
 
@@ -127,7 +131,7 @@ fn without_lobes_highlights_raise_albedos() {
             off(with),
             off(without)
         );
-        assert!(off(without) > 5.0 * off(with));
+        assert!(off(without) > 5.0 * off(with) && off(without) > 0.12);
         assert!((without - truth).min_element() > 0.0);
     }
 }
@@ -168,8 +172,8 @@ fn a_texture_below_a_lobe_is_found() {
         assert_eq!(object.roughness.is_some(), k == FLOOR, "object {k}");
     }
     let (roughness, specular) = estimate.objects[FLOOR].lobe().expect("it has a lobe");
-    assert!((roughness - 0.2).abs() < 0.05, "{roughness}");
-    assert!((specular - 0.12).abs() < 0.04, "{specular}");
+    assert!((roughness - 0.2).abs() < 0.01, "{roughness}");
+    assert!((specular - 0.12).abs() < 0.01, "{specular}");
 
     let texels = estimate.texels.as_ref().expect("the tiles were found");
     let texels = scenes::texel_errors(texels, &tiles, 2 * FLOOR);

@@ -98,9 +98,17 @@ fn a_room_lit_through_its_window_keeps_its_walls_dark() {
     let problem = scenes::photographed_under(Some(sky()), &capture, &materials, 512, 71);
     let estimate = run(&problem).estimate;
     let outside = estimate.outside.as_ref().expect("the sky is seen");
-    assert!(outside.pixels.iter().all(|p| p.is_finite()));
+    // Upwards through the window it is what two views see.
+    let [width, height] = [outside.width, outside.height].map(|side| side as usize);
+    let found = Environment::new(width, height, outside.pixels.clone());
+    let upwards = Vec3::new(0.1, 0.3, 1.0).normalize();
+    let ratio = found.expect("a map").radiance(upwards) / sky().radiance(upwards);
+    println!("the sky is found at {ratio} of its radiance");
+    assert!((ratio - 1.0).abs().max_element() < 0.1, "{ratio}");
+    // 0.0076 and 0.065 are seen.
     let errors = relative_errors(&estimate, &materials);
-    assert!(errors[errors.len() / 2] < 0.05, "{errors:?}");
+    assert!(errors[errors.len() / 2] < 0.012, "{errors:?}");
+    assert!(errors[errors.len() - 1] < 0.08, "{errors:?}");
 }
 
 /// The same views twice, the second time overexposed: where the first measured the sky, its bound counts for nothing.
@@ -158,7 +166,9 @@ fn a_sky_that_all_photographs_show_as_white_is_found_by_its_light() {
     let (problem, materials) = overexposed();
     let estimate = run(&problem).estimate;
     let errors = relative_errors(&estimate, &materials);
-    assert!(errors[errors.len() / 2] < 0.1, "{errors:?}");
+    // 0.032 and 0.077 are seen.
+    assert!(errors[errors.len() / 2] < 0.05, "{errors:?}");
+    assert!(errors[errors.len() - 1] < 0.1, "{errors:?}");
 }
 
 /// Keeps every checkpoint.
@@ -209,11 +219,8 @@ fn a_room_with_its_lamp_and_a_black_window_has_no_light_from_outside() {
     assert!(solution.estimate.outside.is_none());
     let rung = (solution.progress.stages.iter()).find(|s| s.name == "outside light");
     assert!(rung.is_some_and(|s| !s.kept), "it was not even tried");
-    assert!(
-        solution
-            .estimate
-            .objects
-            .last()
-            .is_some_and(|lamp| lamp.emission.x > 13.0)
-    );
+    let lamp = solution.estimate.objects.last().expect("the lamp");
+    let off = (lamp.emission / Vec3::new(14.0, 12.0, 9.0) - 1.0).abs();
+    println!("lamp {off} off");
+    assert!(off.max_element() < 0.02, "{lamp:?}");
 }

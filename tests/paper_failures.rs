@@ -11,6 +11,8 @@ use relit::scene::Scene;
 use relit::transport::material::Material;
 use std::sync::Arc;
 
+const FLOOR: usize = 2;
+
 /// The lamp room's photographs, beside a mesh that lacks the objects of the given names; and the materials of the rest.
 fn room_without(names: &[&str]) -> (Problem, Vec<Material>) {
     let more = [
@@ -47,7 +49,8 @@ fn median(mut errors: Vec<f32>) -> f32 {
     errors[errors.len() / 2]
 }
 
-/// Ceiling and lamp were not scanned. Where light from outside stands for them, albedos stay what they are.
+/// Ceiling and lamp were not scanned. Where light from outside stands for them, most albedos are a fifth off and not as much
+/// again as they are.
 #[test]
 fn a_lamp_that_the_mesh_lacks() {
     let (problem, materials) = room_without(&["ceiling", "lamp"]);
@@ -62,8 +65,9 @@ fn a_lamp_that_the_mesh_lacks() {
     let [with, without] = [true, false].map(run);
     let [with, without] = [with, without].map(|s| errors(&s.estimate, &materials));
     println!("errors with light from outside {with:?}, without {without:?}");
+    // 0.180 and 0.913 are seen.
     let [with, without] = [with, without].map(median);
-    assert!(with < 0.25 && without > 3.0 * with, "{with} {without}");
+    assert!(with < 0.20 && without > 0.8, "{with} {without}");
 }
 
 /// A block was not scanned: its blue lands on whatever lies behind it, elsewhere in each photograph. The floor that it stands on,
@@ -89,7 +93,10 @@ fn a_part_that_the_mesh_lacks() {
         for (k, object) in estimate.objects.iter().enumerate() {
             assert_eq!(object.emission != Vec3::ZERO, Some(k) == lamp, "object {k}");
         }
-        assert!(median(found.clone()) < 0.03, "{found:?}");
-        assert!(found.iter().all(|e| *e < 0.2), "{found:?}");
+        // The floor is 0.131 off with a texture and 0.157 without, all else 0.023 at most.
+        for (k, error) in found.iter().enumerate() {
+            let allowed = if k == FLOOR { 0.18 } else { 0.03 };
+            assert!(*error < allowed, "{k}: {found:?}");
+        }
     }
 }

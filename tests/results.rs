@@ -117,6 +117,18 @@ impl Result {
         assert!(others > 0, "there is nothing else");
     }
 
+    /// The objects with a texture are these, as the stage says that looked for them.
+    fn assert_textures(&self, names: &[&str]) {
+        let stages = self.report["stages"].as_array().expect("stages");
+        let stage = stages.iter().find(|stage| stage["name"] == "textures");
+        let why = stage.and_then(|stage| stage["why"].as_str());
+        let why = why.expect("textures were looked for");
+        assert_eq!(why.matches(" cells, ").count(), names.len(), "{why}");
+        for name in names {
+            assert!(why.contains(&format!("{name} (")), "{name}: {why}");
+        }
+    }
+
     /// Errors of albedo are README's or less: mean absolute, and of the albedo pictures in dB.
     fn assert_albedo(&self, error: f64, decibel: f64) {
         let [found, psnr] = ["albedo_mae", "albedo_psnr"].map(|name| self.number(name));
@@ -135,6 +147,7 @@ fn the_built_in_room() {
     relit(&["demo", "--out", room.to_str().expect("a plain name")]);
     let result = Result::of(&room);
     result.assert_albedo(0.0024, 37.7);
+    result.assert_textures(&["rug", "books", "poster"]);
     result.assert_lamps(1, 2, 0.01);
     result.assert_nothing_else_emits();
 }
@@ -146,6 +159,7 @@ fn the_cornell_box() {
     };
     let result = Result::of(&capture);
     result.assert_albedo(0.0007, 44.0);
+    result.assert_textures(&[]);
     result.assert_lamps(1, 1, 0.001);
     result.assert_nothing_else_emits();
 }
@@ -157,6 +171,7 @@ fn the_staircase() {
     };
     let result = Result::of(&capture);
     result.assert_albedo(0.0035, 38.8);
+    result.assert_textures(&[]);
     result.assert_lamps(19, 9, 0.01);
     result.assert_nothing_else_emits();
 }

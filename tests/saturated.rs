@@ -34,9 +34,10 @@ fn a_saturated_lamp_is_found_by_its_light() {
     let (problem, materials) = clipped(CLIPPED);
     let saturated = |p: &Arc<Photograph>| (0..48 * 36).any(|i| p.is_saturated(i));
     assert!(problem.photographs.iter().any(saturated));
-    for (preset, albedo_error, lamp_error) in
-        [(Preset::Preview, 0.02, 0.1), (Preset::Balanced, 0.01, 0.03)]
-    {
+    for (preset, albedo_error, lamp_error) in [
+        (Preset::Preview, 0.015, 0.03),
+        (Preset::Balanced, 0.002, 0.01),
+    ] {
         let settings = Settings {
             preset,
             ..Settings::default()

@@ -109,7 +109,7 @@ fn balanced_recovers_albedo_and_lamp_within_its_reported_errors() {
     for (k, (object, material)) in objects.iter().zip(materials).enumerate() {
         if k == LAMP {
             let relative = (object.emission - material.emission).abs() / material.emission;
-            assert!(relative.max_element() < 0.03, "{}", object.emission);
+            assert!(relative.max_element() < 1e-3, "{}", object.emission);
             assert!(!object.albedo_identifiable && !object.note.is_empty());
         } else {
             let truth = albedo(material);
@@ -120,14 +120,15 @@ fn balanced_recovers_albedo_and_lamp_within_its_reported_errors() {
                 "object {k}: {} against {truth}, allowed {allowed}",
                 object.albedo
             );
-            assert!(object.albedo_stderr.max_element() < 0.05, "object {k}");
+            assert!(object.albedo_stderr.max_element() < 0.005, "object {k}");
             assert_eq!(object.emission, Vec3::ZERO, "object {k} glows");
             assert!(object.identifiable && object.albedo_identifiable);
         }
     }
     let error = mean_absolute_error(&solution.estimate, materials);
+    // 0.00062 is seen.
     println!("mean absolute error {error}");
-    assert!(error < 0.01, "mean absolute error {error}");
+    assert!(error < 0.001, "mean absolute error {error}");
     let depth = (solution.progress.stages.iter()).find(|stage| stage.name == "depth");
     let said = depth.map(|stage| stage.why.as_str()).expect("its depth");
     assert!(said.contains("leave nothing out"), "{said}");
@@ -155,7 +156,8 @@ fn with_little_memory_fewer_paths_are_stored_and_that_is_said() {
     assert!(rays[0] < rays[1] / 2, "{rays:?}");
     let error = mean_absolute_error(&solution.estimate, materials);
     println!("mean absolute error {error}, {rays:?} rays");
-    assert!(error < 0.05, "mean absolute error {error}");
+    // 0.0023 is seen, with ample memory 0.0022.
+    assert!(error < 0.004, "mean absolute error {error}");
     let ample = said_of(&PREVIEW);
     assert!(!ample.contains("memory"), "{ample}");
 }
@@ -164,7 +166,7 @@ fn with_little_memory_fewer_paths_are_stored_and_that_is_said() {
 fn preview_is_a_usable_first_answer() {
     let error = mean_absolute_error(&PREVIEW.estimate, &ROOM.1);
     println!("mean absolute error {error}");
-    assert!(error < 0.03, "mean absolute error {error}");
+    assert!(error < 0.004, "mean absolute error {error}");
     for (k, object) in PREVIEW.estimate.objects.iter().enumerate() {
         assert_eq!(object.emission != Vec3::ZERO, k == LAMP, "object {k}");
     }
@@ -389,7 +391,7 @@ fn time_steps_and_a_stop_end_every_solver_by_their_name() {
 }
 
 #[test]
-fn the_papers_descent_lowers_the_held_out_loss_to_a_third() {
+fn the_papers_descent_lowers_the_held_out_loss_to_an_eighth() {
     let settings = Settings {
         preset: Preset::Paper,
         steps: 6_000,
@@ -400,7 +402,7 @@ fn the_papers_descent_lowers_the_held_out_loss_to_a_third() {
     let held_out: Vec<f64> = losses.iter().filter_map(|l| l.held_out).collect();
     println!("{held_out:?}");
     let (first, last) = (held_out[0], held_out[held_out.len() - 1]);
-    assert!(last < first / 3.0, "{first} to {last}");
+    assert!(last < first / 8.0, "{first} to {last}");
 }
 
 /// The room as photographs show it that were taken at other exposures, one a frame.
@@ -451,14 +453,14 @@ fn exposures_that_differ_are_found_and_cost_no_accuracy() {
         println!("{frame}: {relative}");
         // Pixels carry some 10 % of noise, and such small photographs share some dozens of cells.
         assert!(
-            (relative - Vec3::ONE).abs().max_element() < 0.06,
+            (relative - Vec3::ONE).abs().max_element() < 0.03,
             "{frame}: {relative}"
         );
     }
     let [fixed, with, without] = errors_without_exposures(&automatic, &solution.estimate);
     println!("{fixed} {with} {without}");
     assert!(
-        with < fixed + 0.01 && without > 3.0 * with,
+        with < fixed + 0.002 && without > 0.08,
         "{fixed} {with} {without}"
     );
 }
@@ -477,12 +479,12 @@ fn a_lens_that_dims_its_corners_is_found_and_costs_no_accuracy() {
     let found = solution.estimate.vignetting.expect("a lens that dims");
     let off = (found.power - lens.power).abs().max_element();
     println!("{found:?}");
-    assert!(off < 0.8, "{found:?}");
+    assert!(off < 0.2, "{found:?}");
 
     let [fixed, with, without] = errors_without_exposures(&dimmed, &solution.estimate);
     println!("{fixed} {with} {without}");
     assert!(
-        with < fixed + 0.01 && without > 2.0 * with,
+        with < fixed + 0.003 && without > 0.2,
         "{fixed} {with} {without}"
     );
 }
@@ -528,7 +530,8 @@ fn a_camera_that_bends_values_is_found_and_costs_little_accuracy() {
     let [fixed, with, without] = [run(&linear, &settings), solution, without]
         .map(|solution| mean_absolute_error(&solution.estimate, &materials));
     println!("{fixed} {with} {without}");
-    assert!(with < fixed + 0.02 && without > 2.0 * with);
+    // 0.0016, 0.0019 and 0.085 are seen.
+    assert!(with < fixed + 0.001 && without > 0.06);
 }
 
 /// Radiance that one pixel in twenty exceeds.

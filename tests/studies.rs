@@ -118,7 +118,20 @@ fn every_study_runs_on_a_capture() {
         assert!(findings.how.contains(&twin), "{name}: {}", findings.how);
         if ["mis", "bounces", "sampling"].contains(&name) {
             let errors = numbers(&rows, "albedo_error");
-            assert!(errors.iter().all(|e| e.is_finite()), "{name}: {errors:?}");
+            // Dark as the descents begin, no albedo is off by more than a half in the mean; the cache ends near the truth.
+            assert!(
+                errors.iter().all(|e| (0.0..0.5).contains(e)),
+                "{name}: {errors:?}"
+            );
+            if name != "sampling" {
+                let kinds: Vec<String> = rows[1..].iter().map(|row| row[0].clone()).collect();
+                let of_cache =
+                    |kind: &str| kind.contains("transport cache") && !kind.ends_with(", 1");
+                let ends = (errors.iter().zip(&kinds)).filter(|(_, kind)| of_cache(kind));
+                let ends: Vec<f64> = ends.map(|(error, _)| *error).collect();
+                assert!(!ends.is_empty(), "{name}: {kinds:?}");
+                assert!(ends.iter().all(|e| *e < 0.02), "{name}: {ends:?}");
+            }
         }
     }
 }
@@ -141,7 +154,7 @@ fn batches_fall_from_the_dark_and_large_ones_take_fewer_steps_for_as_many_rays()
             let marks = of(batch, seed);
             assert!(marks.len() >= 5, "{batch}: {} marks", marks.len());
             let (first, last) = (marks[0], marks[marks.len() - 1]);
-            assert!(losses[last] <= losses[first], "{batch}: {losses:?}");
+            assert!(losses[last] < 0.9 * losses[first], "{batch}: {losses:?}");
             assert!(steps[last] < 0.5 * taken, "{batch}");
             taken = steps[last];
         }
@@ -207,7 +220,7 @@ fn the_same_samples_darken_an_l2_fit_as_predicted_and_two_sets_do_not() {
     let same = of("l2, same samples", "1");
     assert!(mean(&same, &scales) < 0.8, "{}", mean(&same, &scales));
     let off = mean(&same, &scales) / mean(&same, &predicted);
-    assert!((off - 1.0).abs() < 0.15, "{off}");
+    assert!((off - 1.0).abs() < 0.05, "{off}");
     let two = of("l2, two sets", "16");
     assert!(
         (mean(&two, &scales) - 1.0).abs() < 0.05,
@@ -230,13 +243,25 @@ fn one_bounce_makes_bright_walls_brighter_than_they_are_and_chosen_depth_does_no
     };
     let [one, two, chosen] = ["1", "2", "adaptive"]
         .map(|depth| last(&format!("mean albedo 0.8, transport cache, {depth}")));
-    assert!(chosen < 0.05 && two < one, "{one} {two} {chosen}");
+    assert!(chosen < 0.015 && two < one, "{one} {two} {chosen}");
     assert!(one > 1.5 * chosen, "{one} {chosen}");
     for depth in ["1", "2"] {
         assert!(last(&format!("mean albedo 0.8, paper, {depth}")) > chosen);
     }
-    let words = findings.seen.join(" ");
-    assert!(words.contains("Two are") || words.contains("Two bounces"));
+    // What is said of two bounces follows from the table: geometric means over seeds, one albedo in a hundred and twice what
+    // adaptive depth reaches are tolerable.
+    let mean = |depth: &str| {
+        let name = format!("mean albedo 0.8, transport cache, {depth}");
+        let places = (0..kinds.len()).filter(|&i| kinds[i] == name);
+        let logs: Vec<f64> = places.map(|i| errors[i].ln()).collect();
+        (logs.iter().sum::<f64>() / logs.len() as f64).exp()
+    };
+    let enough = mean("2") <= f64::max(0.01, 2.0 * mean("adaptive"));
+    let said = |words: &str| findings.seen.iter().any(|line| line.ends_with(words));
+    assert_eq!(said("Two are enough."), enough, "{:?}", findings.seen);
+    assert_eq!(said("Two are not enough."), !enough, "{:?}", findings.seen);
+    let everywhere = "Two bounces were enough everywhere they were tried.";
+    assert_eq!(said(everywhere), enough, "{:?}", findings.seen);
 }
 
 #[test]
@@ -253,33 +278,36 @@ fn a_convex_object_comes_out_as_exactly_as_its_closed_form_allows() {
     };
     let convex = of("gem", "transport cache");
     assert_eq!(convex.len(), 2);
-    assert!(convex.iter().all(|&error| error < 1e-3), "{convex:?}");
+    assert!(convex.iter().all(|&error| error < 1e-5), "{convex:?}");
     let shadowed = of("chair", "transport cache");
-    assert!(shadowed.iter().all(|&error| error < 0.1), "{shadowed:?}");
+    assert!(shadowed.iter().all(|&error| error < 0.012), "{shadowed:?}");
     let paper = of("gem", "paper");
     assert!(paper.iter().all(|&error| error > 1e-3), "{paper:?}");
 }
 
 #[test]
-fn composites_by_estimated_light_are_nearer_to_the_truth_than_pasted_objects() {
+fn composites_by_estimated_light_are_nearer_to_the_truth_than_objects_lit_by_the_photographs() {
     let findings = quick("insertion");
     let rows = rows("insertion", &findings, "");
     let [rooms, ways, places] = ["room", "way", "place"].map(|name| column(&rows, name));
-    let errors = numbers(&rows, "relative_error");
-    let of = |room: &str, way: &str, place: &str| {
+    let [errors, psnr] = ["relative_error", "psnr"].map(|name| numbers(&rows, name));
+    let place_of = |room: &str, way: &str, place: &str| {
         let mut all = 0..rooms.len();
         let found = all.find(|&i| rooms[i] == room && ways[i] == way && places[i] == place);
-        errors[found.expect("a row")]
+        found.expect("a row")
     };
+    let (naive, ours) = ("naive, light of the photographs", "ours, transport cache");
     for room in ["textured", "plain"] {
-        let at = |way, place| of(room, way, place);
-        let naive = at("naive, light of the photographs", "objects");
-        let ours = at("ours, transport cache", "objects");
-        assert!(ours < naive, "{room}: {ours} {naive}");
-        // The shadow is there, if noisy in so few samples.
-        for way in ["ours, transport cache", "ours, true light"] {
-            assert!(at(way, "shadow and bleed").is_finite(), "{room}, {way}");
-        }
+        let error = |way| errors[place_of(room, way, "objects")];
+        assert!(error(ours) < 0.85 * error(naive), "{room}: {errors:?}");
+        // The true light itself leaves the noise of so few samples.
+        assert!(
+            error(ours) < 1.2 * error("ours, true light"),
+            "{room}: {errors:?}"
+        );
+        // Noise nearly hides the shadow, which pasted objects lack; 0.17 and 0.18 dB are seen.
+        let shadow = |way| psnr[place_of(room, way, "shadow and bleed")];
+        assert!(shadow(ours) > shadow(naive) + 0.1, "{room}: {psnr:?}");
     }
 }
 
@@ -349,8 +377,9 @@ fn textures_of_the_transport_cache_beat_one_colour_an_object_and_triangles_have_
         unknowns.windows(2).skip(2).all(|pair| pair[0] < pair[1]),
         "{unknowns:?}"
     );
-    assert!(psnr.iter().all(|p| p.is_finite()), "{psnr:?}");
-    assert!(psnr[1] > psnr[0] - 0.5, "{psnr:?}");
+    // 28.8 dB against 26.7 are seen; the descent's states stand at 13 to 15 dB.
+    assert!(psnr[1] > psnr[0] + 1.5, "{psnr:?}");
+    assert!(psnr[2..].iter().all(|p| *p > 12.0), "{psnr:?}");
     let [(_, grid)] = &findings.pictures[..] else {
         panic!("one grid of pictures");
     };

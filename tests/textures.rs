@@ -117,7 +117,7 @@ fn the_poster_is_found_and_flat_walls_keep_one_colour() {
 }
 
 /// The mean square of errors over standard errors is 1 for exact ones; smoothing makes neighbours depend on each other,
-/// so that it scatters, and the errors may claim too much as little as too little.
+/// so that it scatters, and the errors may claim too much as little as too little: 0.0223, 0.66 and 0.0196 are seen.
 #[test]
 fn its_albedo_is_right_within_the_reported_errors() {
     let seen: Vec<_> = errors()
@@ -134,9 +134,9 @@ fn its_albedo_is_right_within_the_reported_errors() {
         seen.len()
     );
     assert!(seen.len() > 1000);
-    assert!(error < 0.03, "rms error {error}");
-    assert!((0.2..2.0).contains(&z2), "mean square of z is {z2}");
-    assert!(beyond < 0.05, "{beyond} are beyond three standard errors");
+    assert!(error < 0.027, "rms error {error}");
+    assert!((0.45..1.0).contains(&z2), "mean square of z is {z2}");
+    assert!(beyond < 0.03, "{beyond} are beyond three standard errors");
 }
 
 /// Stops a solve some rounds after textures were found.

@@ -74,7 +74,6 @@ fn a_material_replaces_that_of_the_file() {
             "metal",
             &["--material", &format!("metal:1,1,1,{roughness}")],
         );
-        println!("{roughness}: {metal:?} {black:?} {plain:?} {red:?}");
         let brighter = metal.iter().zip(black).all(|(metal, black)| *metal > black);
         assert!(brighter, "{roughness}: {metal:?} {black:?}");
     }

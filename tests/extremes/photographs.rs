@@ -1,6 +1,6 @@
 //! Photographs that hold next to nothing: every result is defined, and what they cannot tell is said.
 
-use crate::{ROOM, hurried, run, scenes};
+use crate::{ROOM, preset, run_briefly, scenes};
 use glam::Vec3;
 use relit::inverse::settings::{Preset, Settings};
 use relit::inverse::solver::Problem;
@@ -10,7 +10,7 @@ use std::sync::Arc;
 fn all_solvers() -> [Settings; 3] {
     [Preset::Preview, Preset::Balanced, Preset::Paper].map(|p| Settings {
         steps: 100,
-        ..hurried(p)
+        ..preset(p)
     })
 }
 
@@ -39,7 +39,7 @@ fn photographs_of_one_pixel_are_solved() {
     for views in [1, 6] {
         let problem = photographed([1, 1], views, 64, &ROOM.1);
         for settings in all_solvers() {
-            let estimate = run(&problem, &settings).estimate;
+            let estimate = run_briefly(&problem, &settings).estimate;
             let seen: u64 = estimate.objects.iter().map(|o| o.seen_pixels).sum();
             println!(
                 "{:?}, {views} views: {seen} seen {:?}",
@@ -55,7 +55,7 @@ fn one_photograph_of_one_path_a_pixel_is_solved() {
     for (views, samples) in [(1, 64), (1, 1), (6, 1)] {
         let problem = photographed([32, 24], views, samples, &ROOM.1);
         for settings in all_solvers() {
-            let estimate = run(&problem, &settings).estimate;
+            let estimate = run_briefly(&problem, &settings).estimate;
             println!(
                 "{:?}, {views} views of {samples}: {:?}",
                 settings.preset, estimate.objects
@@ -77,7 +77,7 @@ fn without_an_emitter_nothing_is_known_and_no_lamp_is_invented() {
             .all(|p| p.pixels.iter().all(|&v| v == Vec3::ZERO))
     );
     for settings in all_solvers() {
-        for object in run(&problem, &settings).estimate.objects {
+        for object in run_briefly(&problem, &settings).estimate.objects {
             assert_eq!(
                 object.emission,
                 Vec3::ZERO,
@@ -98,7 +98,7 @@ fn without_an_emitter_nothing_is_known_and_no_lamp_is_invented() {
 fn saturated_photographs_leave_everything_unknown() {
     let problem = with_photographs(&ROOM.0, Vec3::ONE, 1.0);
     for settings in all_solvers() {
-        for object in run(&problem, &settings).estimate.objects {
+        for object in run_briefly(&problem, &settings).estimate.objects {
             assert!(
                 !object.albedo_identifiable && !object.identifiable,
                 "{:?}: {object:?}",

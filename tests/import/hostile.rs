@@ -86,7 +86,10 @@ fn links_out_of_the_folder_are_refused() {
     let linked = TempDir::new().unwrap();
     std::os::unix::fs::symlink(folder.path().join("seq-01"), linked.path().join("seq-01")).unwrap();
     let error = import(linked.path()).unwrap_err();
-    println!("{error}");
+    assert!(
+        error.place.contains("seq-01") && error.problem.contains("leads out"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -36,13 +36,19 @@ pub const COLORS: [[u8; 3]; 6] = [
 /// A camera by its world-to-pixel map: OpenCV's axes, pixel centres at whole numbers.
 #[derive(Debug, Clone, Copy)]
 pub struct Camera {
+    /// Width and height in pixels.
     pub size: [u32; 2],
+    /// Focal lengths in pixels.
     pub fx: f64,
+    /// The same along y.
     pub fy: f64,
+    /// Principal point in pixels.
     pub cx: f64,
+    /// The same along y.
     pub cy: f64,
     /// Columns: right, down, forwards in the world.
     pub rotation: DMat3,
+    /// Where it stands, in metres.
     pub center: DVec3,
 }
 
