@@ -163,10 +163,6 @@ fn nothing_shown(
     if brightest <= black {
         return Some("is black");
     }
-    let first = usable().next().map(|pixel| photograph.pixels[pixel]);
-    if usable().count() > 1 && usable().all(|pixel| Some(photograph.pixels[pixel]) == first) {
-        return Some("has one colour everywhere");
-    }
     let saturated = usable().filter(|&pixel| photograph.saturated(pixel).all());
     if saturated.count() as f64 >= WHITE * usable().count() as f64 {
         return Some("is white");
@@ -174,7 +170,8 @@ fn nothing_shown(
     None
 }
 
-/// For each photograph another one with the same pixels, the first of them, or the second for the first.
+/// For each photograph another one with the same pixels, the first of them, or the second for the first. Photographs of one colour
+/// are no pictures that could be told apart.
 fn same_pictures(photographs: &[Arc<Photograph>]) -> Vec<Option<usize>> {
     let hashes: Vec<blake3::Hash> = photographs
         .iter()
@@ -189,7 +186,11 @@ fn same_pictures(photographs: &[Arc<Photograph>]) -> Vec<Option<usize>> {
         })
         .collect();
     (0..hashes.len())
-        .map(|frame| (0..hashes.len()).find(|&k| k != frame && hashes[k] == hashes[frame]))
+        .map(|frame| {
+            let first = photographs[frame].pixels.first();
+            let plain = photographs[frame].pixels.iter().all(|p| Some(p) == first);
+            (0..hashes.len()).find(|&k| k != frame && hashes[k] == hashes[frame] && !plain)
+        })
         .collect()
 }
 
@@ -217,17 +218,14 @@ mod tests {
     }
 
     #[test]
-    fn black_plain_and_white_photographs_show_nothing() {
+    fn black_and_white_photographs_show_nothing() {
         let why = |pixels: Vec<Vec3>| {
             let photograph = photograph(pixels, Encoding::Srgb8);
             nothing_shown(&photograph, brightest(&photograph), 0.5)
         };
         assert_eq!(why(ramp()), None);
         assert_eq!(why(vec![Vec3::splat(1e-4); 25]), Some("is black"));
-        assert_eq!(
-            why(vec![Vec3::splat(0.3); 25]),
-            Some("has one colour everywhere")
-        );
+        assert_eq!(why(vec![Vec3::splat(0.3); 25]), None);
         let mut nearly = vec![Vec3::ONE; 25];
         nearly[3] = Vec3::splat(0.99);
         assert_eq!(why(nearly), Some("is white"));

@@ -10,9 +10,9 @@ use std::fs;
 
 /// Grey photographs of a format, with a fine pattern that compresses badly.
 fn write_photographs(place: &Place, ending: &str, format: ImageFormat) {
-    for frame in 0..2 {
+    for frame in 0..2u32 {
         let picture = RgbImage::from_fn(24, 24, |x, y| {
-            Rgb([x * 7, y * 9, x * y * 11].map(|v| 60 + (v % 120) as u8))
+            Rgb([x * 7 + frame * 5, y * 9, x * y * 11].map(|v| 60 + (v % 120) as u8))
         });
         let path = place.path(&format!("room/images/00{frame}.{ending}"));
         picture.save_with_format(path, format).expect("writes");

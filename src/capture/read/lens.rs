@@ -73,11 +73,13 @@ pub fn read(
                 true => "turn the photographs: pass --turn 90 or --turn 270",
                 false => "correct the intrinsics or use photographs of the camera's size",
             };
+            let (name, stated) = match stated_width == width {
+                true => ("h", stated_height),
+                false => ("w", stated_width),
+            };
             return Err(Error::new(
-                of("w").place("w"),
-                format!(
-                    "the lens is given for {stated_width}×{stated_height} pixels, but {photograph} has {width}×{height}"
-                ),
+                of(name).place(name),
+                format!("is {stated}, but {photograph} is {width}×{height} pixels"),
                 remedy,
             ));
         }
