@@ -185,6 +185,7 @@ fn the_hall() {
     };
     let result = Result::of(&capture);
     result.assert_albedo(0.0023, 31.6);
+    result.assert_textures(&["obj_011", "obj_013", "obj_014", "obj_015"]);
     result.assert_lamps(200, 2, 0.001);
     result.assert_nothing_else_emits();
 }

@@ -9,6 +9,7 @@ pub mod pane;
 pub mod surface;
 pub mod view;
 
+/// A small scene for the tests of the view.
 #[cfg(test)]
 pub mod tests {
     use crate::capture::camera::{Intrinsics, Pose};
