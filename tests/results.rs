@@ -1,7 +1,9 @@
 //! The results that README states: rooms solved by `relit solve ROOM --preset balanced --seed 1`, measured by `relit evaluate`.
 //!
 //! A solve ends when its errors are small enough, never by the clock, so that a slow machine gives the same answer. Each bound is
-//! README's figure with a margin of 15 % of an error and 0.3 dB.
+//! README's figure with a margin of 15 % of an error and 0.3 dB. Other seeds differ by more: 1 to 3 leave the Cornell box at
+//! 0.00067, 0.00088 and 0.00091, and at 43.95, 43.88 and 43.93 dB. Where another course of random numbers takes seed 1 beyond its
+//! bound, README's figure has to be measured again.
 
 #[path = "common/beside.rs"]
 mod beside;
@@ -182,7 +184,8 @@ fn the_hall() {
         return;
     };
     let result = Result::of(&capture);
-    result.assert_albedo(1.0, 31.6);
+    result.assert_albedo(0.0023, 31.6);
+    result.assert_textures(&["obj_011", "obj_013", "obj_014", "obj_015"]);
     result.assert_lamps(200, 2, 0.001);
     result.assert_nothing_else_emits();
 }

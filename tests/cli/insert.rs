@@ -74,7 +74,8 @@ fn a_material_replaces_that_of_the_file() {
             "metal",
             &["--material", &format!("metal:1,1,1,{roughness}")],
         );
-        let brighter = metal.iter().zip(black).all(|(metal, black)| *metal > black);
+        // By 1.7 % in each channel at least.
+        let brighter = (metal.iter().zip(black)).all(|(metal, black)| *metal > 1.01 * black);
         assert!(brighter, "{roughness}: {metal:?} {black:?}");
     }
     refused(

@@ -1,6 +1,6 @@
 //! The paper's descent and the path tracer's depth at the ends of their ranges.
 
-use crate::{ROOM, preset, run, scenes};
+use crate::{ROOM, preset, run, run_briefly, scenes};
 use glam::Vec3;
 use relit::inverse::settings::{Loss, Preset, Settings};
 use relit::inverse::solver::{Problem, Termination};
@@ -22,7 +22,7 @@ fn paths_of_one_to_a_thousand_bounces_are_solved() {
                 textures: false,
                 ..settings
             };
-            let solution = run(&ROOM.0, &settings);
+            let solution = run_briefly(&ROOM.0, &settings);
             println!(
                 "{:?}, {bounces} bounces: {:?}",
                 settings.preset, solution.estimate.objects

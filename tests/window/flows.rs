@@ -354,8 +354,8 @@ fn a_changed_parameter_is_sent() {
 fn every_pane_draws_in_both_themes_with_the_fonts_shipped() {
     let (mut harness, recorder) = solving(Harness::builder());
     recorder.show(|snapshot| snapshot.insertion = Some(Arc::new(insertion(0))));
-    for theme in [egui::Theme::Dark, egui::Theme::Light] {
-        assert_eq!(harness.ctx.theme(), theme);
+    for light in [false, true] {
+        assert_eq!(harness.state().app.preferences.light, light);
         for pane in Pane::all() {
             harness.state_mut().app.bring_forward = Some(pane);
             harness.run_steps(2);
