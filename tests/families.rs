@@ -194,7 +194,7 @@ fn several_objects_of_glossy_rooms_have_lobes_over_a_diffuse_base() {
             assert!((0.1..=1.0).contains(&lobe.roughness) && lobe.specular.x >= 0.04);
         }
         let said = room
-            .truth
+            .truth()
             .objects
             .values()
             .filter(|o| o.roughness.is_some());
