@@ -193,11 +193,8 @@ fn several_objects_of_glossy_rooms_have_lobes_over_a_diffuse_base() {
         for lobe in &lobes {
             assert!((0.1..=1.0).contains(&lobe.roughness) && lobe.specular.x >= 0.04);
         }
-        let said = room
-            .truth()
-            .objects
-            .values()
-            .filter(|o| o.roughness.is_some());
+        let truth = room.truth();
+        let said = truth.objects.values().filter(|o| o.roughness.is_some());
         assert_eq!(said.count(), lobes.len());
         assert!(matches!(room.lit.materials[0].albedo, Albedo::Constant(c) if c.x > 0.0));
     }
