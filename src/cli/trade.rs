@@ -34,10 +34,10 @@ pub struct TradeArguments {
     #[arg(long, value_name = "N", conflicts_with = "capture", value_parser = clap::value_parser!(u64).range(1..))]
     rooms: Option<u64>,
     /// The family of the generated rooms, or all of them [default: plain]
-    #[arg(long, value_name = "NAME", requires = "rooms", conflicts_with_all = ["presets", "around"], value_parser = PossibleValuesParser::new(families::names()))]
+    #[arg(long, value_name = "NAME", requires = "rooms", conflicts_with_all = ["capture", "presets", "around"], value_parser = PossibleValuesParser::new(families::names()))]
     family: Option<String>,
     /// The preset that generated rooms are solved with [default: balanced]
-    #[arg(long, value_name = "PRESET", requires = "rooms", conflicts_with_all = ["presets", "around"], value_parser = PossibleValuesParser::new(Preset::WORDS))]
+    #[arg(long, value_name = "PRESET", requires = "rooms", conflicts_with_all = ["capture", "presets", "around"], value_parser = PossibleValuesParser::new(Preset::WORDS))]
     preset: Option<String>,
     /// Time for all solves together, loading excluded [default: 5m]; of a family, no further room is begun after it [default: none]
     #[arg(long, value_name = "TIME", value_parser = time)]
