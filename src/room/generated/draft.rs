@@ -16,10 +16,15 @@ const NOISE: u64 = 0x6e6f_6973_6500;
 
 /// A room, its light from outside, and how it is to be photographed.
 pub struct Draft {
+    /// Its family.
     pub family: Family,
+    /// Its seed.
     pub seed: u64,
+    /// Mesh, materials and views.
     pub room: Room,
+    /// Light from outside.
     pub outside: Option<Arc<Environment>>,
+    /// Noise and size of its photographs.
     pub rendering: Rendering,
 }
 

@@ -8,7 +8,7 @@ use crate::room::generated::{
 /// A kind of generated room. The numbers are part of the keys of its random numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Family {
-    /// See [`Family::about`], as for all.
+    /// Lamps in view.
     Plain = 0,
     /// No lamp in view.
     Unseen = 1,

@@ -36,8 +36,8 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     f.shell();
     f.lamps();
     f.furniture();
-    f.look_around(16, 24);
-    f.expose(8.0, 32.0);
+    f.look_around(12, 18);
+    f.expose(24.0, 64.0);
 }
 
 /// Standard deviation of a depth in metres: a structured-light camera's (Nguyen, Izadi and Lovell 2012).

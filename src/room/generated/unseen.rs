@@ -8,6 +8,8 @@ use glam::{DAffine3, DVec3};
 
 /// Tries at finding a place beside all fields of view.
 const TRIES: u32 = 60;
+/// Lamps that face upwards are at most so far up between the eyes and the ceiling.
+const LIFT: f64 = 0.3;
 /// Radius around a lamp, relative to its own, that is kept out of all fields.
 const CLEARANCE: f64 = 1.2;
 
@@ -15,7 +17,7 @@ const CLEARANCE: f64 = 1.2;
 pub fn furnish(f: &mut Furnisher, size: [u32; 2]) {
     f.shell();
     f.furniture();
-    f.look_around(4, 12);
+    f.look_around(4, 10);
     let brightness = f.scaled(0.3, 300.0);
     let aspect = f64::from(size[1]) / f64::from(size[0].max(1));
     for index in 0..f.count(1, 4) {
@@ -32,7 +34,7 @@ pub fn furnish(f: &mut Furnisher, size: [u32; 2]) {
             }
         }
     }
-    f.expose(24.0, 96.0);
+    f.expose(32.0, 96.0);
 }
 
 /// An opaque bowl on a cord with a lamp in it that shines on the ceiling.
@@ -40,8 +42,9 @@ fn bowl(f: &mut Furnisher, index: usize, name: &str, lamp: Material) {
     let radius = f.scaled(0.15, 0.35);
     let at = f.place(radius);
     let rim = 0.52 * radius;
-    // The rim hides the lamp from below it.
-    let height = f.between(EYES[1] + 0.05, f.size.y - rim - 0.1);
+    // The rim hides the lamp from below it. Near the ceiling it would light a spot too small for paths to find.
+    let lowest = EYES[1] + 0.05;
+    let height = f.between(lowest, lowest + LIFT * (f.size.y - rim - lowest));
     let place = DAffine3::from_translation(DVec3::new(at.x, height, at.y));
     f.plain(&format!("bowl-{index}"), [0.1, 0.9], |m| {
         m.placed(place, |m| vessels::bowl(m, radius));
@@ -65,7 +68,8 @@ fn cove(f: &mut Furnisher, index: usize, name: &str, lamp: Material) {
     };
     let length = length * f.between(0.3, 0.95);
     let (deep, thick) = (f.between(0.12, 0.25), 0.04);
-    let top = f.between(EYES[1] + 0.1, f.size.y - 0.12);
+    let lowest = EYES[1] + 0.1;
+    let top = f.between(lowest, lowest + LIFT * (f.size.y - lowest));
     let turn = match along_x {
         true => DAffine3::IDENTITY,
         false => DAffine3::from_rotation_y(std::f64::consts::FRAC_PI_2),

@@ -41,7 +41,7 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
         f.lamp(0, level * 0.5);
     }
     f.furniture();
-    f.look_around(4, 7);
+    f.look_around(3, 6);
     // Towards the openings, past their middle.
     for opening in &openings {
         let eye = f.eye();
@@ -49,7 +49,7 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
         let [s, t] = [(); 2].map(|()| f.between(-0.3, 1.3));
         f.look(eye, corner + u * s + v * t);
     }
-    f.expose(16.0, 64.0);
+    f.expose(48.0, 128.0);
 }
 
 fn openings(f: &mut Furnisher) -> Vec<Opening> {
@@ -59,13 +59,13 @@ fn openings(f: &mut Furnisher) -> Vec<Opening> {
     [first, second][..count]
         .iter()
         .map(|&wall| {
-            let wide = f.between(0.25, 0.7);
+            let wide = f.between(0.3, 0.8);
             let left = f.between(0.05, 0.95 - wide);
             let sill = f.between(0.02, 0.4);
             Opening {
                 wall,
                 across: [left, left + wide],
-                up: [sill, f.between(sill + 0.35, 0.95)],
+                up: [sill, f.between(sill + 0.45, 0.95)],
                 reveal: f.between(0.05, 0.3),
             }
         })
