@@ -19,6 +19,8 @@
 //!          scene        mesh, objects, hierarchy, cameras
 //!            ├── capture   readers: obj, ply, glb, transforms.json, images
 //!          math         colour, frames, statistics
+//!            │
+//!       error, say       failures with their remedies; what is said on the terminal
 //! ```
 
 // What is printed goes through `say`, which a closed pipe does not stop.

@@ -40,20 +40,19 @@ pub fn write_atomically(
     let temporary = temporary_names(0o666).tempfile_in(folder).map_err(io)?;
 
     let mut writer = BufWriter::new(temporary.as_file().try_clone().map_err(io)?);
-    write(&mut writer).map_err(|error| match cause(error.as_ref()) {
-        Some(error) => Error::io(path, error),
-        None => Error::file(path, error, "nothing was written there"),
+    write(&mut writer).map_err(|error| match error.downcast::<std::io::Error>() {
+        Ok(error) => Error::io(path, &error),
+        // Encoders of pictures and scenes hide that a disk is full.
+        Err(error) => Error::file(
+            path,
+            error,
+            "nothing was written there; see whether the disk has room for it",
+        ),
     })?;
     writer.flush().map_err(io)?;
     temporary.as_file().sync_all().map_err(io)?;
     temporary.persist(path).map_err(|error| io(error.error))?;
     Ok(())
-}
-
-/// The input/output error behind an error, as encoders of pictures wrap it.
-fn cause<'a>(error: &'a (dyn std::error::Error + 'static)) -> Option<&'a std::io::Error> {
-    let next = |error: &&'a (dyn std::error::Error + 'static)| error.source();
-    std::iter::successors(Some(error), next).find_map(|error| error.downcast_ref())
 }
 
 /// How what is not complete yet is named, and the permissions that it gets (the umask takes away from them).

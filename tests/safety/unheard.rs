@@ -12,7 +12,7 @@ fn a_solve_whose_listener_goes_away_saves_its_results() {
     // Both go through one pipe, as with 2>&1 | head -1.
     let (reader, writer) = std::io::pipe().expect("a pipe");
     let mut relit = place
-        .command(&[&solve("room", "out")[..], &["--overwrite"]].concat())
+        .command(&solve("room", "out"))
         .stdout(writer.try_clone().expect("a pipe"))
         .stderr(writer)
         .spawn()
