@@ -57,7 +57,7 @@ impl Orientation {
 
     /// Width and height of the shown picture.
     pub fn size(self, [width, height]: [u32; 2]) -> [u32; 2] {
-        if self.turns % 2 == 0 {
+        if self.turns.is_multiple_of(2) {
             [width, height]
         } else {
             [height, width]

@@ -56,6 +56,9 @@ impl<'a> Monitor<'a> {
     }
 
     /// Tells the observer, if a report is due, and obeys; the error says why to stop.
+    ///
+    /// # Errors
+    /// Why the solve is to end.
     pub fn tick(
         &mut self,
         estimate: &Estimate,
@@ -68,6 +71,9 @@ impl<'a> Monitor<'a> {
     }
 
     /// Tells the observer now; `checkpoint` is called only if the observer wants to keep one.
+    ///
+    /// # Errors
+    /// Why the solve is to end.
     pub fn report(
         &mut self,
         estimate: &Estimate,

@@ -180,12 +180,12 @@ pub fn write_images(folder: &Path, camera: &Camera, color: &str, depth: &str, pe
 }
 
 /// Imports with the given options.
-pub fn import_with(folder: &Path, options: &ImportOptions) -> Result<Import, Error> {
+pub(crate) fn import_with(folder: &Path, options: &ImportOptions) -> Result<Import, Error> {
     read(folder, options, &mut |_, _| {})
 }
 
 /// Imports with voxels of 5 cm.
-pub fn import(folder: &Path) -> Result<Import, Error> {
+pub(crate) fn import(folder: &Path) -> Result<Import, Error> {
     let options = ImportOptions {
         voxel: Some(0.05),
         ..ImportOptions::default()

@@ -38,6 +38,9 @@ pub fn noise(equations: &NormalEquations) -> DVec3 {
 }
 
 /// Fits the free parameters (indices into albedos, then emissions). `between` runs after every step and may end it.
+///
+/// # Errors
+/// What `between` returns.
 pub fn fit<E>(
     cache: &PathCache,
     start: &Unknowns,

@@ -138,6 +138,9 @@ impl<'a> Lobes<'a> {
 
     /// For each of the given objects, how many standard errors photographs of the same spots speak for a lobe; `None`
     /// where too few spots are seen by several photographs.
+    ///
+    /// # Errors
+    /// Why the solve is to end, where `tell` says so.
     pub fn evidence(
         &self,
         estimate: &Estimate,
@@ -176,6 +179,9 @@ impl<'a> Lobes<'a> {
 
     /// Finds an object's lobe, from nothing or from what was found before; `None` where nothing tells. What is found from
     /// before is by paths of its `turn`, independent of those of other turns.
+    ///
+    /// # Errors
+    /// Why the solve is to end, where `tell` says so.
     pub fn find(
         &self,
         lit: &Lit,
