@@ -277,11 +277,6 @@ fn with_and_without_agree_with_rendering_scenes_that_have_and_lack_the_object() 
         difference.push(f64::from(a.y - b.y));
     }
     let off = difference.mean.abs() / difference.standard_error();
-    let mean = film.mean().iter().map(|p| f64::from(p.y)).sum::<f64>() / difference.count as f64;
-    println!(
-        "{off} standard errors, each {} of the mean",
-        difference.standard_error() / mean
-    );
     assert!(off < 4.0, "{difference:?}");
 }
 

@@ -103,13 +103,6 @@ fn each_layer_is_what_its_source_alone_lights() {
             let mean = differences.iter().sum::<f64>() / n;
             let squares: f64 = differences.iter().map(|d| (d - mean).powi(2)).sum();
             let error = (squares / (n - 1.0) / n).sqrt();
-            let level = layer
-                .pixels
-                .iter()
-                .map(|p| f64::from(p[channel]))
-                .sum::<f64>()
-                / n;
-            println!("{source:?} {channel}: {mean} ± {error} of {level}");
             assert!(
                 mean.abs() < 4.5 * error,
                 "{source:?} {channel}: {mean} ± {error}"

@@ -323,7 +323,6 @@ fn rooms_come_apart_better_with_photographs_than_by_normals_at_the_same_number()
     }
     let [shown, blind] = &sums;
     println!("{shown:?}\n{blind:?}");
-    assert!(shown.purity > blind.purity, "{shown:?} {blind:?}");
     assert!(shown.albedo < 0.75 * blind.albedo, "{shown:?} {blind:?}");
     assert!(
         shown.lamps.len() > 4 && shown.lamps.iter().all(|alike| *alike > 0.9),

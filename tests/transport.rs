@@ -120,7 +120,6 @@ fn the_three_ways_of_finding_light_agree() {
                 .standard_error()
                 .hypot(b[channel].standard_error());
             let z = (a[channel].mean - b[channel].mean) / error;
-            println!("channel {channel}: {} ± {error}, z {z:.2}", a[channel].mean);
             assert!(
                 z.abs() < 4.0,
                 "channel {channel}: {} against {}, z {z}",
