@@ -213,16 +213,15 @@ fn verdict(budget: &str, batches: &[(u64, u64)], losses: &[Option<Spread>]) -> O
     if least.count < 2 {
         return Some(values);
     }
-    let says = |holds: bool| if holds { "yes" } else { "no" };
+    let says = |spread: &Spread| if worse(spread) { "yes" } else { "no" };
     Some(format!(
-        "{values} Worse than the best by more than the noise and 5 %, as the paper says of the smallest and the largest and \
-         not of {}: {} {}, {} {}, {} {}.",
-        PAPER.0,
+        "{values} Worse than the best by more than the noise and 5 %: {} {}, {} {}, {} {} (the paper: too small and too large \
+         ones are, 8 is not).",
         first.0,
-        says(worse(&first.1)),
-        last.0,
-        says(worse(&last.1)),
+        says(&first.1),
         PAPER.0,
-        says(worse(paper)),
+        says(paper),
+        last.0,
+        says(&last.1),
     ))
 }

@@ -274,14 +274,16 @@ fn seen(scenes: &[Scene]) -> Vec<String> {
         }
         seen.extend(balance(scene));
     }
-    let said = match (tried, short.as_slice()) {
-        (0, _) => return seen,
-        (_, []) => format!("in none of {tried} tried"),
-        (_, names) => format!("in {} of {tried} tried: {}", names.len(), names.join(", ")),
-    };
-    seen.push(format!(
-        "Two bounces are not enough for the transport cache {said}."
-    ));
+    if tried > 0 {
+        let but = match short.is_empty() {
+            true => String::new(),
+            false => format!("; not in {}", short.join(", ")),
+        };
+        seen.push(format!(
+            "Two bounces are enough for the transport cache in {} of {tried} rooms tried{but}.",
+            tried - short.len(),
+        ));
+    }
     seen
 }
 
@@ -312,4 +314,43 @@ fn balance(scene: &Scene) -> Option<String> {
         least.words(),
         two.words(),
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::experiments::course::Errors;
+
+    /// A room in which the cache ends at these errors with one bounce, two, and adaptive depth.
+    fn room(errors: [f64; 3]) -> Scene {
+        let kind = |error: f64| Kind {
+            name: String::new(),
+            courses: vec![vec![Mark {
+                index: None,
+                rays: 1,
+                seconds: 1.0,
+                steps: 1,
+                errors: Errors {
+                    albedo: Some(error),
+                    ..Errors::default()
+                },
+            }]],
+        };
+        Scene {
+            name: "a room".to_owned(),
+            file: "",
+            cache: [1, 2, 0].into_iter().zip(errors.map(kind)).collect(),
+            paper: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn two_bounces_are_enough_by_the_errors_and_nothing_is_said_of_no_room() {
+        assert!(seen(&[]).is_empty());
+        let said = seen(&[room([0.1, 0.009, 0.001]), room([0.1, 0.05, 0.001])]).join(" ");
+        assert!(said.contains("Two are enough.") && said.contains("Two are not enough."));
+        assert!(
+            said.contains("enough for the transport cache in 1 of 2 rooms tried; not in a room.")
+        );
+    }
 }

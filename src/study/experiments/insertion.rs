@@ -92,12 +92,15 @@ fn run(bench: &Bench) -> Result<Findings> {
     }
     Ok(Findings {
         how: format!(
-            "{how}The room is solved once by the transport cache, with {CACHE_WITHOUT} (but for textures in the textured room), \
-             and once by preset `paper`, which anneals, for {} s at most. \
+            "{how}Each room is solved once by the transport cache, with {CACHE_WITHOUT}{}, and once by preset `paper`, which anneals, for {} s at most. \
              The chairs are put into these photographs by each way and compared with a path-traced rendering of the room \
              with the chairs in its mesh. PSNR and SSIM are of the pictures as shown (the truth's 99th percentile at 1, \
              sRGB); shadow and bleed are the pixels beside the chairs that they change by more than {} %. The composites' \
              noise and the photographs' count as error, also where the true light is used.",
+            match bench.subject.is_some() || bench.quick {
+                true => "",
+                false => " (but for textures in the textured room)",
+            },
             brief(seconds_of_paper(limits)),
             CHANGED * 100.0,
         ),

@@ -277,3 +277,24 @@ fn sentence(line: &Line) -> String {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_that_is_too_large_once_is_not_said_to_be_so_beyond() {
+        let said = |errors: [f64; 4]| {
+            let points = (0..4).map(|i| 10f64.powi(i)).zip(errors).collect();
+            sentence(&Line {
+                axis: "size",
+                quantity: "hit points",
+                tolerable: 0.1,
+                points,
+            })
+        };
+        assert!(said([0.0, 0.01, 0.0, 0.05]).starts_with("below 0.100 at all 4 values"));
+        assert!(said([0.0, 0.2, 0.0, 0.0]).ends_with("in all at 1 of 4 values tried"));
+        assert!(said([0.0, 0.0, 0.2, f64::NAN]).ends_with("at all values tried beyond"));
+    }
+}

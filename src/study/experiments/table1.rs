@@ -86,8 +86,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         how: format!(
             "{how}Solved by the transport cache as one colour an object, with {CACHE_WITHOUT}, and with light sampling alone \
              where nothing but lamps gives light. {} Errors are ‖ρ̂ − ρ‖₂ / ‖ρ‖₂ over RGB, seeds 1 to {}. The paper's objects \
-             are others than these: its numbers are marks to aim at, not the same measurement, and the solver is told of them \
-             by where it is told to stop. The paper's descent runs per object with nothing annealed, for {} at {} seeds. \
+             are others than these: its numbers are marks to aim at, not the same measurement. The paper's descent runs per object with nothing annealed, for {} at {} seeds. \
              Seconds are those of this machine and whatever else ran on it.",
             stopping(bench.quick, &aims, limits),
             bench.seeds,

@@ -379,3 +379,35 @@ fn seen(states: &[State]) -> Vec<String> {
     }
     seen
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(scores: [f64; 5]) -> String {
+        let names = ["cache", "cache, textures", "paper", "cut 1 ×", "cut 2 ×"];
+        let states: Vec<State> = (names.iter().zip(scores))
+            .map(|(name, psnr)| State {
+                name: (*name).to_owned(),
+                unknowns: 1,
+                psnr: Some(psnr),
+                loss: None,
+                seconds: 1.0,
+                rays: 1,
+                picture: Picture::from_fn(1, 1, |_, _| Vec3::ZERO),
+            })
+            .collect();
+        seen(&states).join(" ")
+    }
+
+    #[test]
+    fn the_paper_s_gain_is_seen_where_every_subdivision_gains_over_one_colour_alone() {
+        let gains = said([24.0, 37.0, 25.0, 26.0, 27.0]);
+        assert!(gains.contains("at best better") && gains.contains("of it was seen"));
+        // The finest is best, but a cut before it lost.
+        let lost = said([24.0, 37.0, 26.0, 25.0, 27.0]);
+        assert!(lost.contains("not every subdivision") && lost.contains("was not seen"));
+        let worse = said([24.0, 37.0, 12.0, 13.0, 14.0]);
+        assert!(worse.contains("at best no better") && worse.contains("was not seen"));
+    }
+}
