@@ -43,12 +43,12 @@ pub fn write(folder: &Path, name: &str, bytes: &[u8]) {
 }
 
 /// Reads with the default options.
-pub fn open(folder: &Path) -> Result<Capture, Error> {
+pub(crate) fn open(folder: &Path) -> Result<Capture, Error> {
     read(folder, &ReadOptions::default())
 }
 
 /// The capture whose mesh is a file of this name and content.
-pub fn with_mesh(name: &str, bytes: &[u8]) -> Result<Capture, Error> {
+pub(crate) fn with_mesh(name: &str, bytes: &[u8]) -> Result<Capture, Error> {
     let folder = folder(&transforms(&format!(r#""mesh_path": "{name}","#)));
     write(folder.path(), name, bytes);
     open(folder.path())
