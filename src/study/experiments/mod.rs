@@ -65,6 +65,7 @@ pub const STUDIES: &[Study] = &[
     precision::STUDY,
     sampling::STUDY,
     estimators::STUDY,
+    readings::STUDY,
 ];
 
 impl Study {

@@ -6,7 +6,21 @@ use crate::capture::orientation::Orientation;
 use crate::capture::reading::{Axes, Reading};
 use crate::capture::working::load_working;
 use crate::error::Result;
+use crate::export::table::{Cell, Table};
+use crate::room;
+use crate::room::generated::Family;
 use crate::scene::Scene;
+use crate::study::experiments::{Bench, Findings, Study, Summary};
+use crate::study::trade::rooms;
+
+/// The study.
+pub const STUDY: Study = Study {
+    name: "readings",
+    question: "Captures whose files are read wrongly (axes, unit, focal length, order, orientation) are refused with the reading \
+        that mends them. How often, and how often is a sound capture refused?",
+    seeds: 5,
+    run,
+};
 
 /// A factor that is found is right within this part.
 const TOLERANCE: f64 = 0.03;
@@ -80,6 +94,81 @@ pub fn mistakes() -> Vec<Mistake> {
             },
         ),
     ]
+}
+
+fn run(bench: &Bench) -> Result<Findings> {
+    let mut table = Table::new(&["room", "mistake", "agreement", "refused", "right"]);
+    let mut summary = Summary {
+        columns: vec!["mistake", "rooms", "refused", "with the right remedy"],
+        rows: Vec::new(),
+    };
+    let mut row = |capture: &Capture, name: &str, outcome: &Outcome| {
+        table.row(&[
+            Cell::from(capture.name.as_str()),
+            Cell::from(name),
+            Cell::from(outcome.alignment.agreement),
+            Cell::from(u64::from(outcome.detected)),
+            Cell::from(u64::from(outcome.right_remedy)),
+        ]);
+    };
+
+    // Sound rooms of all families.
+    let mut rooms = vec![room::capture()?];
+    let (mut sound, mut refused, mut doubtful) = (0, 0, 0);
+    for family in Family::ALL {
+        for seed in bench.seeds() {
+            bench.begin(&format!("{} room {seed}, sound", family.name()))?;
+            let capture = family.generate(seed, rooms::SIZE)?.capture;
+            let outcome = judge(&capture, None)?;
+            sound += 1;
+            refused += u64::from(outcome.detected);
+            doubtful += u64::from(outcome.alignment.verdict == Verdict::Doubtful);
+            row(&capture, "none", &outcome);
+            if family == Family::Plain {
+                rooms.push(capture);
+            }
+        }
+    }
+
+    // Every mistake in the plain ones and in the built-in room.
+    let (mut made, mut found, mut mended) = (0, 0, 0);
+    for mistake in mistakes() {
+        let (mut detected, mut right) = (0, 0);
+        for capture in &rooms {
+            bench.begin(&format!("{}: {}", capture.name, mistake.name))?;
+            let outcome = judge(capture, Some(&mistake))?;
+            detected += u64::from(outcome.detected);
+            right += u64::from(outcome.right_remedy);
+            row(capture, mistake.name, &outcome);
+        }
+        made += rooms.len() as u64;
+        found += detected;
+        mended += right;
+        summary.rows.push(vec![
+            mistake.name.to_owned(),
+            rooms.len().to_string(),
+            detected.to_string(),
+            right.to_string(),
+        ]);
+    }
+    Ok(Findings {
+        how: format!(
+            "Mistakes in the built-in room and in {} plain generated rooms; sound rooms of all {} families.",
+            rooms.len() - 1,
+            Family::ALL.len()
+        ),
+        tables: vec![("", table)],
+        summary,
+        seen: vec![
+            format!(
+                "Of {made} captures with a mistake {found} were refused, {mended} with the right remedy."
+            ),
+            format!(
+                "Of {sound} sound captures {refused} were refused, and of {doubtful} it was said that it cannot be told."
+            ),
+        ],
+        ..Findings::default()
+    })
 }
 
 /// Whether a capture is taken to be sound, or `mistake` in it is found.
