@@ -128,18 +128,18 @@ fn exposure_divides_out_to_the_bit() {
     use relit::capture::read::{ReadOptions, read};
     use relit::export::exr::{Precision, write_rgb};
     use relit::math::picture::Picture;
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let write = |name: &str, bytes: &[u8]| {
-        std::fs::write(folder.path().join(name), bytes).expect("writes");
-    };
-    write(
-        "mesh.obj",
-        b"o t\nv -1 -1 -2\nv 1 -1 -2\nv 0 1 -2\nf 1 2 3\n",
-    );
     let pixels: Vec<Vec3> = (0..8)
         .map(|i| Vec3::new(0.3, 0.7, 1.1) * (i + 1) as f32)
         .collect();
     for exposure in [1.0f32, 1.0 / 1_048_576.0, 1_048_576.0] {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let write = |name: &str, bytes: &[u8]| {
+            std::fs::write(folder.path().join(name), bytes).expect("writes");
+        };
+        write(
+            "mesh.obj",
+            b"o t\nv -1 -1 -2\nv 1 -1 -2\nv 0 1 -2\nf 1 2 3\n",
+        );
         let picture = Picture {
             width: 4,
             height: 2,
