@@ -6,7 +6,6 @@ use egui::{Key, Modifiers, Role};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use glam::Vec3;
-use relit::app::action::Action;
 use relit::app::picture::quantity::Quantity;
 use relit::app::window::Window;
 use relit::session::command::Command;
@@ -304,14 +303,4 @@ fn files_are_written_in_the_mixed_light_unless_that_is_declined() {
             .query_by_label("In the light of the mixer")
             .is_none()
     );
-}
-
-#[test]
-fn the_readme_lists_what_every_key_does() {
-    let readme = include_str!("../../README.md");
-    let keys = Action::ALL.iter().filter(|a| a.shortcut().is_some());
-    for action in keys {
-        let row = format!("` | {} |", action.help());
-        assert!(readme.contains(&row), "no row ends with {row}");
-    }
 }
