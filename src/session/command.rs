@@ -23,7 +23,7 @@ pub enum Source {
 }
 
 impl Source {
-    /// The folder that results go into where none is named: relit-out/<capture>.
+    /// The folder that results go into where none is named: `relit-out/<capture>`.
     pub fn default_out(&self) -> PathBuf {
         let name = match self {
             Self::BuiltInRoom => "built-in-room".into(),

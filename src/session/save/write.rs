@@ -58,7 +58,7 @@ pub fn write(folder: &Path, results: &Results) -> Result<()> {
 /// Writes an estimate that was changed by hand and the pictures of it.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_edited(folder: &Path, results: &Results) -> Result<()> {
     let mut staging = Staging::new(folder, &results.capture_id())?;
     stage_estimate(&mut staging, folder, results)?;
