@@ -30,7 +30,10 @@ pub fn show(app: &mut App, ctx: &Context) {
             ui.label(&error.problem);
             ui.add_space(8.0);
             ui.horizontal(|ui| {
-                let read = format!("Read it with {}", reading.options());
+                let read = match reading.options().as_str() {
+                    "" => "Read it by its format's conventions".to_owned(),
+                    options => format!("Read it with {options}"),
+                };
                 if ui.button(read).clicked() {
                     options = Some(crate::session::command::OpenOptions {
                         reading,

@@ -103,10 +103,10 @@ impl Alignment {
                 condition(reading),
                 self.agreement
             ),
-            format!(
-                "pass {}, or --trust-poses to go on as it is",
-                before.then(reading).options()
-            ),
+            match before.then(reading).options().as_str() {
+                "" => "leave out the options that say how to read it, or pass --trust-poses to go on as it is".to_owned(),
+                options => format!("pass {options}, or --trust-poses to go on as it is"),
+            },
         ))
     }
 
