@@ -76,8 +76,8 @@ pub fn leave_out(capture: &Capture, working: &mut Working) -> Result<()> {
     Ok(())
 }
 
-/// Marks pixels as unusable that are far brighter than all around them and lie inside one object, of which `triangles` tells
-/// what each pixel sees; how many there were.
+/// Marks pixels as unusable that are far brighter than all around them and lie inside one object, as `object_at` tells
+/// for each pixel; and how many there were.
 pub fn without_hot_pixels(
     photograph: &Arc<Photograph>,
     object_at: impl Fn(usize) -> Option<u32>,

@@ -71,8 +71,8 @@ impl Alignment {
         let given = Reading::default();
         let scores = views.scores(&given, MAX_FRAMES);
         let agreement = total(&scores);
-        let near_scores = views.scores(&given, NEAR_FRAMES);
         let no_nearer = || {
+            let near_scores = views.scores(&given, NEAR_FRAMES);
             (candidates::near().iter())
                 .all(|near| !plainly_better(&views.scores(near, NEAR_FRAMES), &near_scores))
         };
