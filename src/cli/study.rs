@@ -37,8 +37,8 @@ pub struct StudyArguments {
     /// Only try it, in seconds: fewer values, smaller scenes, solves cut short
     #[arg(long)]
     quick: bool,
-    /// A capture to run on instead of rooms of the study's own: batch and textures on its photographs, the others on its
-    /// twin, a room with its mesh, its views and the colours and lamps found in it, whose truth is known
+    /// A capture to run on instead of rooms of the study's own: batch, textures and readings on its photographs, the others
+    /// on its twin, a room with its mesh, its views and the colours and lamps found in it, whose truth is known
     #[arg(long, value_name = "CAPTURE")]
     capture: Option<PathBuf>,
     /// Threads to work with [default: one a core]

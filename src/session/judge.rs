@@ -33,6 +33,7 @@ impl OpenCapture {
     pub fn subject(&self) -> Result<Subject> {
         Ok(Subject {
             name: self.name.clone(),
+            capture: self.capture.clone(),
             problem: Problem {
                 scene: self.scene.clone(),
                 photographs: self.photographs.clone(),

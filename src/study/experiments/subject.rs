@@ -1,5 +1,6 @@
 //! What a study solves: a scene with photographs, and its truth where that is known.
 
+use crate::capture::Capture;
 use crate::capture::photograph::Photograph;
 use crate::error::Result;
 use crate::inverse::solver::Problem;
@@ -7,12 +8,15 @@ use crate::room::Room;
 use crate::room::photographs::{self, Rendering};
 use crate::study::evaluate::Reference;
 use crate::study::trade::{Judge, rooms};
+use std::sync::Arc;
 
 /// A named problem with its truth.
 #[derive(Debug, Clone)]
 pub struct Subject {
     /// The name shown to people.
     pub name: String,
+    /// The files as they were read.
+    pub capture: Arc<Capture>,
     /// The scene and its photographs.
     pub problem: Problem,
     /// The truth, or that there is none.
@@ -33,9 +37,10 @@ impl Subject {
     /// # Errors
     /// The room's mesh holds nothing to see, or there is no photograph.
     pub fn of_photographs(room: &Room, photographs: Vec<Photograph>) -> Result<Self> {
-        let (problem, reference) = rooms::with_photographs(room, photographs)?;
+        let (capture, problem, reference) = rooms::with_photographs(room, photographs)?;
         Ok(Self {
             name: room.name.clone(),
+            capture: Arc::new(capture),
             problem,
             judge: Judge::Truth(Box::new(reference)),
         })

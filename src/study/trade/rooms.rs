@@ -1,5 +1,6 @@
 //! The trade over generated rooms: what presets are chosen on.
 
+use crate::capture::Capture;
 use crate::capture::photograph::Photograph;
 use crate::capture::truth::Truth;
 use crate::error::Result;
@@ -30,14 +31,19 @@ pub fn problem(seed: u64, size: [u32; 2]) -> Result<(Problem, Judge)> {
 /// # Errors
 /// The room's mesh holds nothing to see.
 pub fn photographed(room: &Room, rendering: &Rendering) -> Result<(Problem, Reference)> {
-    with_photographs(room, photographs::render(room, rendering)?)
+    let photographs = photographs::render(room, rendering)?;
+    let (_, problem, reference) = with_photographs(room, photographs)?;
+    Ok((problem, reference))
 }
 
-/// Any room with photographs of it, one a view and all of one size, with its truth.
+/// Any room with photographs of it, one a view and all of one size, as a capture, as a problem, and its truth.
 ///
 /// # Errors
 /// The room's mesh holds nothing to see, or there is no photograph.
-pub fn with_photographs(room: &Room, photographs: Vec<Photograph>) -> Result<(Problem, Reference)> {
+pub fn with_photographs(
+    room: &Room,
+    photographs: Vec<Photograph>,
+) -> Result<(Capture, Problem, Reference)> {
     let size = photographs.first().map_or([0; 2], |p| [p.width, p.height]);
     let capture = room.capture_of(photographs, size);
     let photographs: Vec<_> = capture
@@ -52,5 +58,5 @@ pub fn with_photographs(room: &Room, photographs: Vec<Photograph>) -> Result<(Pr
         scene: Arc::new(scene),
         photographs,
     };
-    Ok((problem, reference))
+    Ok((capture, problem, reference))
 }
