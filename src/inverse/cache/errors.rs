@@ -45,6 +45,8 @@ pub struct Released {
     pub step: [f64; 3],
     /// Standard error of that step, per channel.
     pub stderr: [f64; 3],
+    /// Half the second derivative of the squared error along it when the active ones follow, per channel.
+    pub curvature: [f64; 3],
 }
 
 impl Released {
@@ -53,6 +55,14 @@ impl Released {
         (0..3)
             .filter(|&c| self.step[c] > 0.0 && self.stderr[c] > 0.0)
             .map(|c| (self.step[c] / self.stderr[c]).powi(2))
+            .sum()
+    }
+
+    /// By how much the squared error falls over the channels that would rise.
+    pub fn gain(&self) -> f64 {
+        (0..3)
+            .filter(|&c| self.step[c] > 0.0)
+            .map(|c| self.step[c].powi(2) * self.curvature[c])
             .sum()
     }
 }
@@ -241,6 +251,7 @@ pub fn release(equations: &NormalEquations, free: &[usize], active: usize) -> Ve
             index,
             step: [0.0; 3],
             stderr: [f64::INFINITY; 3],
+            curvature: [0.0; 3],
         })
         .collect();
     let tests = match &equations.coupling {
@@ -252,6 +263,7 @@ pub fn release(equations: &NormalEquations, free: &[usize], active: usize) -> Ve
         for channel in 0..3 {
             let curvature = tested.curvature[channel];
             if curvature > LEAST_OWN * diagonal[channel] && curvature > 0.0 {
+                result.curvature[channel] = curvature;
                 result.step[channel] = score[channel] / curvature;
                 result.stderr[channel] = tested.variance[channel].max(0.0).sqrt() / curvature;
             }

@@ -270,7 +270,7 @@ mod tests {
             clusters,
             ..PathCache::default()
         };
-        let (even, free) = (Trust::even(roles.len()), roles::free(roles));
+        let (even, free) = (Trust::even(roles.len()), roles::free(roles, |_| true));
         let prior = Prior::new(roles.len(), roles.len(), Vec3::ONE);
         let between = |_: &Unknowns| Ok::<_, ()>(());
         fit(&cache, start, &free, &even, &prior, 30, between).expect("nothing ends it")

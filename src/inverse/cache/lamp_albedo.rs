@@ -13,8 +13,8 @@ use crate::inverse::parameters::Unknowns;
 use glam::{DVec3, Vec3};
 
 /// The parameters that are fitted under some roles, the albedos of lamps among them: indices into albedos, then emissions.
-pub fn free(roles: &[Role]) -> Vec<usize> {
-    free_with(roles, |role| role.reflects() || role == Role::Emitter)
+pub fn free(roles: &[Role], has_albedo: impl Fn(usize) -> bool) -> Vec<usize> {
+    free_with(roles, has_albedo)
 }
 
 /// The same beliefs with nothing expected of the albedos of lamps.
@@ -133,12 +133,19 @@ mod tests {
                 c.rows.iter_mut().for_each(|r| r.0 -= 1);
                 c
             });
-            descend(clusters.collect(), &about, &roles::free(&roles), &prior).unknowns
+            descend(
+                clusters.collect(),
+                &about,
+                &about,
+                &roles::free(&roles, |_| true),
+                &prior,
+            )
+            .unknowns
         };
-        let free = free(&roles);
+        let free = free(&roles, |_| true);
         let mut clusters = room(albedo, seen);
         hold_exitance(&mut clusters, &roles, &roles::places(&free, 3));
-        let mut found = descend(clusters, &about, &free, &beliefs(&prior, &roles)).unknowns;
+        let mut found = descend(clusters, &about, &about, &free, &beliefs(&prior, &roles)).unknowns;
         leave_out(&mut found, &roles);
         (plain, found)
     }

@@ -25,17 +25,23 @@ pub struct Descended {
     pub clusters: Vec<Linearised>,
 }
 
-/// Fits the parameters in `free` (indices into albedos, then emissions) to clusters that were linearised about `about`.
+/// Fits the parameters in `free` (indices into albedos, then emissions) to clusters that were linearised about `about`, beginning
+/// at `start`.
 ///
 /// One step would not do: the Hessian, which must not be indefinite, holds the square of the derivatives' noise besides
 /// their product across sets, so that what few paths meet would stay near where it began. Weights are found anew at each.
 pub fn descend(
     mut clusters: Vec<Linearised>,
     about: &Unknowns,
+    start: &Unknowns,
     free: &[usize],
     prior: &Prior,
 ) -> Descended {
-    let mut unknowns = about.clone();
+    let from_about: Vec<DVec3> = (free.iter())
+        .map(|&i| (start.value(i) - about.value(i)).as_dvec3())
+        .collect();
+    clusters.par_iter_mut().for_each(|c| c.step(&from_about));
+    let mut unknowns = start.clone();
     let mut steps = 0;
     let mut before = f64::INFINITY;
     loop {
@@ -96,7 +102,7 @@ mod tests {
             propose(&equations, &[0], &about, LEAST_DAMPING)
         };
         assert!(one.albedo[0].x < 0.5, "{}", one.albedo[0]);
-        let found = descend(clusters, &about, &[0], &prior);
+        let found = descend(clusters, &about, &about, &[0], &prior);
         let albedo = f64::from(found.unknowns.albedo[0].x);
         assert!((albedo - truth).abs() < 0.08, "{albedo}");
     }

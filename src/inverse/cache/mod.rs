@@ -19,6 +19,7 @@ pub mod lamp_albedo;
 pub mod lamp_patches;
 pub mod linear;
 pub mod memory;
+pub mod model_error;
 pub mod path_noise;
 pub mod prior;
 mod reached;

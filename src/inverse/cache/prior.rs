@@ -8,6 +8,9 @@ use std::collections::BTreeMap;
 
 /// Standard deviation of an albedo of which nothing is known, about [`ALBEDO_MEAN`].
 pub const ALBEDO_DEVIATION: f32 = 0.5;
+/// Standard deviation of the albedo of what no photograph sees: that of an even distribution from 0 to 1 is 0.29, and few
+/// surfaces are black or lose no light.
+pub const UNSEEN_DEVIATION: f32 = 0.25;
 /// Where an albedo stays of which nothing is known.
 pub const ALBEDO_MEAN: f32 = 0.5;
 /// Standard deviation of light from a direction outside that no photograph looks in, in mean radiances of what the
@@ -28,6 +31,20 @@ pub struct ExpectedAlbedo {
     pub mean: Vec<Vec3>,
     /// Standard deviations.
     pub deviation: Vec<Vec3>,
+}
+
+impl ExpectedAlbedo {
+    /// Before anything was found: of surfaces that so many pixels see, and of others (`seen` may be shorter).
+    pub fn unknown(surfaces: usize, seen: &[u64]) -> Self {
+        let deviation = |k: usize| match seen.get(k) {
+            Some(0) => UNSEEN_DEVIATION,
+            _ => ALBEDO_DEVIATION,
+        };
+        Self {
+            mean: vec![Vec3::splat(ALBEDO_MEAN); surfaces],
+            deviation: (0..surfaces).map(|k| Vec3::splat(deviation(k))).collect(),
+        }
+    }
 }
 
 /// Normal distributions of the unknowns; nothing is believed of a lamp.

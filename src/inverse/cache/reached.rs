@@ -24,6 +24,9 @@ pub struct Reached {
     pub roles: Vec<Role>,
     /// Values of all unknowns.
     pub unknowns: Unknowns,
+    /// Variance of what the model lacks, relative to what surfaces reflect.
+    #[serde(default)]
+    pub model_variance: f64,
     albedo_errors: Vec<[Option<f32>; 3]>,
     emission_errors: Vec<[Option<f32>; 3]>,
     /// Roughness and specular reflectance of each object that has a lobe.
@@ -53,6 +56,7 @@ impl Reached {
             directions: prior.directions().to_vec(),
             roles: roles.to_vec(),
             unknowns: unknowns.clone(),
+            model_variance: 0.0,
             albedo_errors: finite(&errors.albedo),
             emission_errors: finite(&errors.emission),
             lobes: (lobes.iter())

@@ -5,14 +5,14 @@ use crate::inverse::cache::PathCache;
 use crate::inverse::cache::errors::{Released, release};
 use crate::inverse::cache::fit::Fit;
 use crate::inverse::cache::judge::judge;
-use crate::inverse::cache::roles::{self, Role};
+use crate::inverse::cache::roles::Role;
 use crate::inverse::solver::Termination;
 use crate::math::color::luminance;
 use crate::transport::emitters::Emitters;
 use glam::Vec3;
 
 /// χ² (three channels) above which a light is there, and below which it is not.
-const SIGNIFICANT: f64 = 25.0;
+pub(super) const SIGNIFICANT: f64 = 25.0;
 /// Rounds of changing roles at most.
 const MOST_CHANGES: usize = 8;
 /// A glow below this share of an object's photographed radiance is no light but a shortcoming of the model.
@@ -25,7 +25,7 @@ impl Ladder<'_, '_> {
     /// What the paths say of light from objects that are held dark.
     pub(super) fn test_dark(&mut self, cache: &PathCache) -> Vec<Released> {
         let objects = self.roles.len();
-        let mut free = roles::free(&self.roles);
+        let mut free = self.free();
         let active = free.len();
         free.extend(
             (0..objects)

@@ -6,7 +6,7 @@ use crate::inverse::cache::clusters::mean_radiance;
 use crate::inverse::cache::equations::NormalEquations;
 use crate::inverse::cache::evaluate::Linearised;
 use crate::inverse::cache::fit::{LEAST_DAMPING, propose};
-use crate::inverse::cache::prior::{ALBEDO_DEVIATION, ALBEDO_MEAN, ExpectedAlbedo};
+use crate::inverse::cache::prior::ExpectedAlbedo;
 use crate::inverse::cache::roles::{self, Role};
 use crate::inverse::cache::trust::Trust;
 use crate::inverse::loss::Losses;
@@ -74,35 +74,36 @@ impl Ladder<'_, '_> {
         if !self.open {
             return;
         }
-        let surfaces = self.roles.len();
-        let nothing = (Vec3::splat(ALBEDO_MEAN), Vec3::splat(ALBEDO_DEVIATION));
-        let (mean, deviation) = (0..surfaces)
-            .map(|k| match self.roles[k] {
-                Role::Reflector => (
-                    self.unknowns.albedo[k],
-                    self.errors.albedo[k].clamp(Vec3::splat(LEAST_DEVIATION), nothing.1),
-                ),
-                _ => nothing,
-            })
-            .unzip();
-        self.prior = (self.prior.clone()).with_albedo(Some(ExpectedAlbedo { mean, deviation }));
+        let mut expected = ExpectedAlbedo::unknown(self.roles.len(), &self.survey.seen);
+        for (k, role) in self.roles.iter().enumerate() {
+            if *role == Role::Reflector {
+                let deviation = &mut expected.deviation[k];
+                *deviation = self.errors.albedo[k].clamp(Vec3::splat(LEAST_DEVIATION), *deviation);
+                expected.mean[k] = self.unknowns.albedo[k];
+            }
+        }
+        self.prior = (self.prior.clone()).with_albedo(Some(expected));
     }
 
     /// Fits all seen objects as reflectors, then those that plainly give light as emitters; light from outside is
     /// fitted where `outside` is [`Role::Unseen`].
     fn tell_lamps(&mut self, cache: &PathCache, outside: Role) -> Result<(), Termination> {
-        for (k, role) in self.roles.iter_mut().enumerate() {
-            *role = match self.survey.seen.get(k) {
-                Some(0) => Role::Unseen,
-                Some(_) => Role::Reflector,
-                None => outside,
-            };
-        }
         self.unknowns = Unknowns::new(self.roles.len());
-        self.hold();
         self.trust = Trust::even(self.roles.len());
-        let fitted = self.fit(cache)?;
-        self.settle_roles(cache, fitted)?;
+        // Lamps in view first: taken for white walls they would call for light upon them from whatever is out of sight.
+        for out_of_sight in [Role::Dark, Role::Unseen] {
+            for (k, role) in self.roles.iter_mut().enumerate() {
+                match self.survey.seen.get(k) {
+                    Some(0) => *role = out_of_sight,
+                    Some(_) if out_of_sight == Role::Dark => *role = Role::Reflector,
+                    Some(_) => {}
+                    None => *role = outside,
+                }
+            }
+            self.hold();
+            let fitted = self.fit(cache)?;
+            self.settle_roles(cache, fitted)?;
+        }
         self.weigh(cache)?;
         for (error, albedo) in self.errors.albedo.iter_mut().zip(&self.unknowns.albedo) {
             *error = (*error * *error + *albedo * *albedo * (LIGHT_FIELD_BIAS * LIGHT_FIELD_BIAS))
@@ -200,7 +201,7 @@ impl Ladder<'_, '_> {
     /// outside is free. The fall is measured across the two sets of paths, so that fitting their noise gains nothing.
     fn outside_gain(&self, cache: &PathCache) -> f64 {
         let surfaces = self.roles.len();
-        let mut free = roles::free(&self.roles);
+        let mut free = self.free();
         free.extend(surfaces + self.outside.first as usize..2 * surfaces);
         let linearised = cache.linearise(&self.unknowns, &roles::places(&free, surfaces), &[]);
         let even = Trust::even(surfaces);

@@ -8,19 +8,21 @@ mod light_field;
 mod lobes;
 mod refit;
 mod rounds;
+mod search;
 mod trace;
 
 use super::budget::Budget;
 use super::clusters::{Cluster, brightness, cluster, mean_radiance};
 use super::errors::{StandardErrors, standard_errors};
+use super::evaluate::Linearised;
 use super::fit::{Fit, fit};
 use super::lamp_patches::LampPatches;
-use super::prior::Prior;
+use super::prior::{ExpectedAlbedo, Prior};
 use super::reached::Reached;
 use super::roles::{self, Role};
 use super::trace::OutsideGrid;
 use super::trust::Trust;
-use super::{PathCache, describe};
+use super::{PathCache, describe, model_error};
 use crate::error;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::exposure::{Agreement, Exposures, Sights};
@@ -43,6 +45,11 @@ const OUTSIDE_WIDTH: usize = 12;
 const OUTSIDE_HEIGHT: usize = 6;
 /// Longest path in bounces of losses, textures, lobes and of what lamps reflect; those of the fits end by chance alone.
 const MOST_BOUNCES: u32 = 1000;
+/// Searches for lamps out of sight at most.
+const MAX_SEARCHES: usize = 3;
+/// Part of the mesh's area that a surface out of sight must have for its albedo to be fitted: what is smaller changes the light
+/// in the room by less than the errors that are aimed at.
+const UNSEEN_AREA: f64 = 1e-3;
 /// Stages of a solve that goes all the way.
 const STAGES: u32 = 4;
 
@@ -70,6 +77,8 @@ pub struct Ladder<'a, 'o> {
     path_noise: Vec<f64>,
     unknowns: Unknowns,
     errors: StandardErrors,
+    /// Variance of what the model lacks, relative to what surfaces reflect.
+    model_variance: f64,
     /// The rough specular lobe of each object that has one.
     lobes: Vec<Option<Lobe>>,
     /// Where the photographs disagree.
@@ -153,8 +162,9 @@ pub fn solve(
     let sky = (start.open)
         .then(|| MeasuredOutside::new(problem, &survey))
         .flatten();
-    let prior =
-        (prior.with_albedo(start.expected.clone())).with_directions(start.directions.clone());
+    let expected =
+        (start.expected.clone()).unwrap_or_else(|| ExpectedAlbedo::unknown(surfaces, &survey.seen));
+    let prior = (prior.with_albedo(Some(expected))).with_directions(start.directions.clone());
     let mut ladder = Ladder {
         problem,
         budget,
@@ -170,6 +180,7 @@ pub fn solve(
         max_bounces,
         outside,
         errors: start.errors(),
+        model_variance: start.model_variance,
         roles: start.roles,
         trust: Trust::even(surfaces),
         prior,
@@ -297,14 +308,26 @@ impl Ladder<'_, '_> {
     /// where nothing but the model enters.
     fn objects(&mut self) -> Result<(), Termination> {
         let started = self.monitor.seconds();
-        self.monitor.phase("tracing paths to the lamps");
-        let lights = self.lights();
-        let (cache, limit) = self.stored(&lights, None, 1, self.budget.round_paths)?;
-        self.monitor.phase("fitting albedo and emission");
-        // Tests of roles weigh all alike: whatever the residuals of a wrong role say is no measure of trust.
-        self.trust = Trust::even(self.roles.len());
-        let fitted = self.fit(&cache)?;
-        self.settle_roles(&cache, fitted)?;
+        self.search_anew()?;
+        let mut stored = None;
+        for _ in 0..MAX_SEARCHES {
+            // Albedos that a lamp put right may show another.
+            if stored.is_some() && !self.search_unseen(false)? {
+                break;
+            }
+            self.monitor.phase("tracing paths to the lamps");
+            let lights = self.lights();
+            let (cache, limit) = self.stored(&lights, None, 1, self.budget.round_paths)?;
+            self.monitor.phase("fitting albedo and emission");
+            // Tests of roles weigh all alike: whatever the residuals of a wrong role say is no measure of trust.
+            self.trust = Trust::even(self.roles.len());
+            let fitted = self.fit(&cache)?;
+            self.settle_roles(&cache, fitted)?;
+            stored = Some((cache, limit));
+        }
+        let Some((cache, limit)) = stored else {
+            return Ok(());
+        };
         let added = self.test_glow(&cache)?;
         self.weigh(&cache)?;
         let why = match added.as_slice() {
@@ -318,8 +341,26 @@ impl Ladder<'_, '_> {
         Ok(())
     }
 
+    /// The parameters that are fitted. What leaves a surface out of sight is one unknown to the light field, however much of it
+    /// is reflected; paths that go all the way tell the albedo.
+    fn free(&self) -> Vec<usize> {
+        roles::free(&self.roles, |k| self.has_free_albedo(k))
+    }
+
+    /// Whether a surface's albedo is fitted, if it is no lamp: where photographs see it, or where so much of it is out of sight
+    /// that what it reflects counts.
+    fn has_free_albedo(&self, k: usize) -> bool {
+        let objects = &self.problem.scene.objects;
+        match self.survey.seen.get(k) {
+            None => false,
+            Some(0) if self.stages == 0 => false,
+            Some(0) => objects[k].area > UNSEEN_AREA * objects.iter().map(|o| o.area).sum::<f64>(),
+            Some(_) => true,
+        }
+    }
+
     fn fit(&mut self, cache: &PathCache) -> Result<Fit, Termination> {
-        let free = roles::free(&self.roles);
+        let free = self.free();
         let (monitor, estimate, checkpoint) = (&mut self.monitor, &self.estimate, &self.checkpoint);
         let fitted = fit(
             cache,
@@ -340,6 +381,7 @@ impl Ladder<'_, '_> {
     fn weigh(&mut self, cache: &PathCache) -> Result<(), Termination> {
         let residuals =
             cache.linearise(&self.unknowns, &vec![usize::MAX; 2 * self.roles.len()], &[]);
+        self.tell_model_error(&residuals);
         self.trust = Trust::from_residuals(&residuals, self.roles.len());
         let fitted = self.fit(cache)?;
         self.take(&fitted);
@@ -348,7 +390,7 @@ impl Ladder<'_, '_> {
 
     /// Takes over a fit under the present roles, with its errors.
     fn take(&mut self, fitted: &Fit) {
-        let free = roles::free(&self.roles);
+        let free = self.free();
         let errors = standard_errors(&fitted.equations, &free, self.roles.len());
         self.merge_errors(errors);
         self.take_values(fitted);
@@ -364,13 +406,24 @@ impl Ladder<'_, '_> {
     /// Takes over the errors of what is fitted; what is held keeps those that its tests gave it.
     fn merge_errors(&mut self, errors: StandardErrors) {
         for (k, role) in self.roles.iter().enumerate() {
-            if role.reflects() {
+            if *role != Role::Emitter && self.has_free_albedo(k) {
                 self.errors.albedo[k] = errors.albedo[k];
             }
             if role.emits() {
                 self.errors.emission[k] = errors.emission[k];
             }
         }
+    }
+
+    /// Finds how far the model is off from the residuals that a fit has left.
+    fn tell_model_error(&mut self, residuals: &[Linearised]) {
+        let textured = self.estimate.texels.as_ref().map(|t| t.textured.as_slice());
+        self.model_variance = model_error::variance(
+            &self.clusters,
+            residuals,
+            &self.unknowns,
+            textured.unwrap_or(&[]),
+        );
     }
 
     fn describe(&mut self) {
@@ -384,6 +437,7 @@ impl Ladder<'_, '_> {
             self.sky.as_ref(),
             &self.lobes,
         );
+        model_error::add_to(&mut self.estimate, &self.roles, self.model_variance);
         let exposures = self.exposures.as_ref();
         self.estimate.exposures = (exposures.filter(|e| e.differ)).map(|e| e.factors.clone());
         self.estimate.vignetting = exposures.and_then(|e| e.vignetting);
@@ -432,7 +486,7 @@ impl Ladder<'_, '_> {
     fn reached(&mut self, stages: u32) {
         self.stages = stages;
         self.monitor.progress.seconds = self.monitor.seconds();
-        let reached = Reached::new(
+        let mut reached = Reached::new(
             stages,
             self.open,
             &self.prior,
@@ -441,6 +495,7 @@ impl Ladder<'_, '_> {
             &self.errors,
             &self.lobes,
         );
+        reached.model_variance = self.model_variance;
         self.checkpoint = Checkpoint::new(&self.monitor.progress, &reached);
     }
 

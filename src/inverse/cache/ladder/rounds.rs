@@ -115,7 +115,7 @@ impl Ladder<'_, '_> {
             self.roles.len(),
             self.budget.round_paths,
         );
-        let free = lamp_albedo::free(&self.roles);
+        let free = lamp_albedo::free(&self.roles, |k| self.has_free_albedo(k));
         Ok(Rounds {
             lights,
             places: roles::places(&free, self.roles.len()),
@@ -189,9 +189,9 @@ impl Ladder<'_, '_> {
 
     /// Fits all that is free, the lamps' own albedos among it, to clusters linearised about `about`, and takes what was found.
     pub(super) fn descend(&mut self, clusters: Vec<Linearised>, about: &Unknowns) -> Descended {
-        let free = lamp_albedo::free(&self.roles);
+        let free = lamp_albedo::free(&self.roles, |k| self.has_free_albedo(k));
         let prior = lamp_albedo::beliefs(&self.prior, &self.roles);
-        let found = descend(clusters, about, &free, &prior);
+        let found = descend(clusters, about, &self.unknowns, &free, &prior);
         let equations = jackknifed(
             found.equations.clone(),
             &found.clusters,
@@ -200,6 +200,7 @@ impl Ladder<'_, '_> {
         );
         let errors = standard_errors(&equations, &free, self.roles.len());
         self.unknowns.clone_from(&found.unknowns);
+        self.tell_model_error(&found.clusters);
         lamp_albedo::leave_out(&mut self.unknowns, &self.roles);
         self.monitor.progress.iterations += 1;
         self.merge_errors(errors);
