@@ -80,6 +80,15 @@ fn mistakes_in_a_box_with_five_photographs_are_found() {
     }
 }
 
+/// A capture as a solve opens it.
+fn open(capture: &Capture, check_alignment: bool) -> OpenCapture {
+    let options = OpenOptions {
+        check_alignment,
+        ..OpenOptions::default()
+    };
+    OpenCapture::new(Source::BuiltInRoom, options, capture.clone()).expect("opens")
+}
+
 fn with_pose_of(capture: &Capture, frame: usize, other: usize) -> Capture {
     let mut wrong = capture.clone();
     wrong.frames[frame].pose = wrong.frames[other].pose;
@@ -99,10 +108,7 @@ fn a_photograph_with_the_pose_of_another_one_is_left_out_and_named() {
     };
     assert_eq!(astray, [shows(2, 9), shows(9, 2)]);
 
-    let open = |capture| {
-        OpenCapture::new(Source::BuiltInRoom, OpenOptions::default(), capture).expect("opens")
-    };
-    let opened = open(with_pose_of(&sound, 3, 7));
+    let opened = open(&with_pose_of(&sound, 3, 7), true);
     let used = |frame: usize| {
         let photograph = &opened.photographs[frame];
         (0..photograph.pixels.len()).any(|pixel| photograph.is_usable(pixel))
@@ -128,7 +134,7 @@ fn a_photograph_with_the_pose_of_another_one_is_left_out_and_named() {
     // Of three photographs none is left out, although one is wrong.
     let mut few = with_pose_of(&sound, 3, 7);
     few.frames = [3, 7, 5].map(|frame| few.frames[frame].clone()).to_vec();
-    let opened = open(few);
+    let opened = open(&few, true);
     let said: Vec<_> = opened
         .warnings
         .iter()
@@ -165,23 +171,16 @@ fn photographs_of_nothing_agree_with_nothing() {
     assert_eq!(outcome.alignment.verdict, Verdict::Doubtful, "{outcome:?}");
 
     // What is solved for is as uncertain as a guess.
-    let open = |check_alignment, capture: &Capture| {
-        let options = OpenOptions {
-            check_alignment,
-            ..OpenOptions::default()
-        };
-        OpenCapture::new(Source::BuiltInRoom, options, capture.clone()).expect("opens")
-    };
     let exact = Estimate {
         objects: vec![ObjectEstimate::default()],
         ..Estimate::default()
     };
     let held = |capture: &OpenCapture| capture.in_doubt(exact.clone()).objects.remove(0);
-    let doubted = held(&open(true, &capture));
+    let doubted = held(&open(&capture, true));
     assert!(!doubted.identifiable && doubted.albedo_stderr.min_element() > 0.25);
     assert!(doubted.note.contains("poses"), "{}", doubted.note);
-    let trusted = held(&open(false, &capture));
+    let trusted = held(&open(&capture, false));
     assert_eq!(trusted, ObjectEstimate::default());
     let sound = room::capture().expect("the room");
-    assert_eq!(held(&open(true, &sound)), ObjectEstimate::default());
+    assert_eq!(held(&open(&sound, true)), ObjectEstimate::default());
 }
