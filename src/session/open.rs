@@ -95,20 +95,19 @@ impl OpenCapture {
         }
     }
 
-    /// An estimate from this capture. Where it cannot be told whether its photographs show the mesh, nothing is determined by
-    /// them: the standard error of an albedo is at least that of any albedo from 0 to 1 about what was found.
+    /// An estimate from this capture. Where its photographs may not show the mesh from their poses, or plainly do not, nothing is
+    /// determined by them: the standard error of an albedo is at least that of any albedo from 0 to 1 about what was found.
     pub fn in_doubt(&self, mut estimate: Estimate) -> Estimate {
-        let verdict = self.alignment.as_ref().map(|alignment| &alignment.verdict);
-        if verdict != Some(&Verdict::Doubtful) {
-            return estimate;
+        match self.alignment.as_ref().map(|alignment| &alignment.verdict) {
+            None | Some(Verdict::Sound) => return estimate,
+            Some(Verdict::Doubtful | Verdict::Wrong { .. }) => {}
         }
         for object in &mut estimate.objects {
             let off = object.albedo - 0.5;
             let guess = (off * off + 1.0 / 12.0).map(f32::sqrt);
             object.albedo_stderr = object.albedo_stderr.max(guess);
             object.identifiable = false;
-            object.note =
-                "it cannot be told whether the photographs show it from their poses".into();
+            object.note = "the photographs may not show it from their poses".into();
         }
         estimate
     }
