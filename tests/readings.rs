@@ -1,9 +1,17 @@
 //! Mistakes that all photographs of a capture share are found before anything is solved, and sound captures are not refused.
 //! `relit study readings` measures the same over many rooms.
 
-use relit::calibrate::alignment::Verdict;
+#[path = "common/beside.rs"]
+mod beside;
+
+use relit::calibrate::alignment::{Astray, Verdict, Why};
+use relit::capture::Capture;
+use relit::capture::read::{ReadOptions, read};
+use relit::inverse::estimate::{Estimate, ObjectEstimate};
 use relit::room;
 use relit::room::generated::generate;
+use relit::session::command::{OpenOptions, Source};
+use relit::session::snapshot::OpenCapture;
 use relit::study::experiments::readings::{judge, mistakes};
 
 #[test]
@@ -16,6 +24,7 @@ fn mistakes_in_the_built_in_room_are_found_with_their_remedies() {
         "photographs upside down",
         "photographs mirrored",
         "photographs shifted by one",
+        "all photographs the same",
         "poses with OpenCV's axes",
         "mesh with z up, poses with y up",
     ] {
@@ -42,7 +51,101 @@ fn sound_rooms_are_taken_for_sound() {
             capture.name
         );
         assert!(outcome.alignment.agreement > 5.0, "{}", capture.name);
+        assert_eq!(outcome.alignment.astray, [], "{}", capture.name);
     }
+}
+
+/// A box looks much alike from all sides; its edges fit a wrong reading somewhat.
+#[test]
+fn mistakes_in_a_box_with_five_photographs_are_found() {
+    let Some(folder) = beside::beside("captures/cornell") else {
+        return;
+    };
+    let capture = read(&folder, &ReadOptions::default()).expect("a capture");
+    let sound = judge(&capture, None).expect("a capture");
+    assert_eq!(sound.alignment.verdict, Verdict::Sound);
+    assert_eq!(sound.alignment.astray, []);
+    for name in ["mesh with z up, poses with y up", "photographs mirrored"] {
+        let all = mistakes();
+        let mistake = all.iter().find(|m| m.name == name).expect("a mistake");
+        let outcome = judge(&capture, Some(mistake)).expect("a capture");
+        assert!(outcome.right_remedy, "{name}: {outcome:?}");
+    }
+    // One of the five has the pose of another one, and its own is lost.
+    for (frame, other) in [(0, 1), (1, 3), (2, 0), (3, 4), (4, 0)] {
+        let wrong = with_pose_of(&capture, frame, other);
+        let outcome = judge(&wrong, None).expect("a capture");
+        let why = Why::Shares(other);
+        assert_eq!(outcome.alignment.astray, [Astray { frame, why }]);
+    }
+}
+
+/// A capture as a solve opens it.
+fn open(capture: &Capture, check_alignment: bool) -> OpenCapture {
+    let options = OpenOptions {
+        check_alignment,
+        ..OpenOptions::default()
+    };
+    OpenCapture::new(Source::BuiltInRoom, options, capture.clone()).expect("opens")
+}
+
+fn with_pose_of(capture: &Capture, frame: usize, other: usize) -> Capture {
+    let mut wrong = capture.clone();
+    wrong.frames[frame].pose = wrong.frames[other].pose;
+    wrong
+}
+
+#[test]
+fn a_photograph_with_the_pose_of_another_one_is_left_out_and_named() {
+    let sound = room::capture().expect("the room");
+    let mut exchanged = sound.clone();
+    (exchanged.frames[2].pose, exchanged.frames[9].pose) =
+        (sound.frames[9].pose, sound.frames[2].pose);
+    let astray = judge(&exchanged, None).expect("a capture").alignment.astray;
+    let shows = |frame, other| Astray {
+        frame,
+        why: Why::Shows(other),
+    };
+    assert_eq!(astray, [shows(2, 9), shows(9, 2)]);
+
+    let opened = open(&with_pose_of(&sound, 3, 7), true);
+    let used = |frame: usize| {
+        let photograph = &opened.photographs[frame];
+        (0..photograph.pixels.len()).any(|pixel| photograph.is_usable(pixel))
+    };
+    assert_eq!(
+        (0..16).filter(|&frame| !used(frame)).collect::<Vec<_>>(),
+        [3]
+    );
+    let warned = |opened: &OpenCapture, words: &str| {
+        let named = opened
+            .warnings
+            .iter()
+            .filter(|w| w.starts_with("frame 003 "));
+        named.filter(|w| w.contains(words)).count()
+    };
+    assert_eq!(
+        warned(&opened, "it is left out"),
+        1,
+        "{:?}",
+        opened.warnings
+    );
+
+    // Of three photographs none is left out, although one is wrong.
+    let mut few = with_pose_of(&sound, 3, 7);
+    few.frames = [3, 7, 5].map(|frame| few.frames[frame].clone()).to_vec();
+    let opened = open(&few, true);
+    let said: Vec<_> = opened
+        .warnings
+        .iter()
+        .filter(|w| w.contains("frame 000"))
+        .collect();
+    assert!(
+        said.len() == 1 && said[0].contains("check its pose"),
+        "{:?}",
+        opened.warnings
+    );
+    assert!((0..3).all(|frame| opened.photographs[frame].is_usable(1000)));
 }
 
 /// Where nothing of the room is in the photographs, that is said: they are noise.
@@ -66,4 +169,18 @@ fn photographs_of_nothing_agree_with_nothing() {
     }
     let outcome = judge(&capture, None).expect("a capture");
     assert_eq!(outcome.alignment.verdict, Verdict::Doubtful, "{outcome:?}");
+
+    // What is solved for is as uncertain as a guess.
+    let exact = Estimate {
+        objects: vec![ObjectEstimate::default()],
+        ..Estimate::default()
+    };
+    let held = |capture: &OpenCapture| capture.in_doubt(exact.clone()).objects.remove(0);
+    let doubted = held(&open(&capture, true));
+    assert!(!doubted.identifiable && doubted.albedo_stderr.min_element() > 0.25);
+    assert!(doubted.note.contains("poses"), "{}", doubted.note);
+    let trusted = held(&open(&capture, false));
+    assert_eq!(trusted, ObjectEstimate::default());
+    let sound = room::capture().expect("the room");
+    assert_eq!(held(&open(&sound, true)), ObjectEstimate::default());
 }

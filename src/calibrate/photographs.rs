@@ -1,5 +1,6 @@
 //! Photographs that cannot be of the room, and pixels that cannot be of a photograph: found, left out and named.
 
+use crate::calibrate::alignment::{Astray, Why};
 use crate::capture::Capture;
 use crate::capture::photograph::{Encoding, Photograph, PhotographSource};
 use crate::capture::working::Working;
@@ -16,6 +17,8 @@ const WHITE: f64 = 0.99;
 /// A pixel is hot that is so many times as bright as the brightest around it, inside one object that surrounds it. Path
 /// tracing noise of 64 samples a pixel reaches that where one path carries 64,000 times the mean.
 const HOT: f32 = 1000.0;
+/// At least this many photographs are left: of two that contradict each other, neither is outvoted.
+const MIN_LEFT: usize = 3;
 
 /// Marks what cannot be as unusable, and says so among the warnings.
 ///
@@ -60,20 +63,51 @@ pub fn leave_out(capture: &Capture, working: &mut Working) -> Result<()> {
         ));
     }
     for (frame, reason) in reasons.into_iter().enumerate() {
-        let photograph = &mut working.photographs[frame];
         if let Some(reason) = reason {
-            let usable = vec![false; photograph.pixels.len()];
-            *photograph = Arc::new(Photograph {
-                usable,
-                ..(**photograph).clone()
-            });
-            let name = name(capture, frame);
-            working
-                .warnings
-                .push(format!("{name} {reason}; it is left out"));
+            take_out(capture, working, frame, &reason);
         }
     }
     Ok(())
+}
+
+/// Marks photographs that show something else than their poses see as unusable, and says so among the warnings. Where too few
+/// would be left, they stay, and only that is said.
+pub fn leave_out_astray(capture: &Capture, working: &mut Working, astray: &[Astray]) {
+    let is_used = |p: &Arc<Photograph>| (0..p.pixels.len()).any(|pixel| p.is_usable(pixel));
+    let used = working.photographs.iter().filter(|p| is_used(p)).count();
+    let left = used.saturating_sub(astray.len());
+    for &Astray { frame, why } in astray {
+        let reason = match why {
+            Why::Shows(other) => format!(
+                "shows what the pose of {} sees, and not what its own does",
+                name(capture, other)
+            ),
+            Why::Shares(other) => format!(
+                "has the pose of {}, but is another picture and does not fit the mesh from there",
+                name(capture, other)
+            ),
+        };
+        if left >= MIN_LEFT {
+            take_out(capture, working, frame, &reason);
+        } else {
+            let name = name(capture, frame);
+            let warning = format!("{name} {reason}; check its pose: too few others would be left");
+            working.warnings.push(warning);
+        }
+    }
+}
+
+/// Marks a photograph as unusable and says why.
+fn take_out(capture: &Capture, working: &mut Working, frame: usize, reason: &str) {
+    let photograph = &mut working.photographs[frame];
+    let usable = vec![false; photograph.pixels.len()];
+    *photograph = Arc::new(Photograph {
+        usable,
+        ..(**photograph).clone()
+    });
+    let name = name(capture, frame);
+    let warning = format!("{name} {reason}; it is left out");
+    working.warnings.push(warning);
 }
 
 /// Marks pixels as unusable that are far brighter than all around them and lie inside one object, as `object_at` tells

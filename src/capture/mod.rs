@@ -6,6 +6,7 @@ pub mod camera;
 pub mod exposure;
 pub mod fuse;
 pub mod import;
+pub mod inputs;
 pub mod mesh;
 pub mod orientation;
 pub mod photograph;

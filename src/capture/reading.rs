@@ -88,13 +88,6 @@ impl Reading {
 
     /// The options of the command line that ask for this reading; empty for the default.
     pub fn options(&self) -> String {
-        let number = |value: f64| {
-            let text = format!("{value:.3}");
-            match value {
-                v if v < 0.1 => format!("{v:.3e}"),
-                _ => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-            }
-        };
         let mut options = Vec::new();
         if self.axes == Axes::OpenCv {
             options.push("--axes opencv".to_owned());
@@ -122,6 +115,51 @@ impl Reading {
         }
         options.join(" ")
     }
+
+    /// What is done to the files to read them so, in plain words; empty for the default.
+    pub fn words(&self) -> String {
+        let mut words = Vec::new();
+        if self.axes == Axes::OpenCv {
+            words.push("read the poses with OpenCV's axes".to_owned());
+        }
+        if self.mesh_turns != 0 {
+            let degrees = 90 * u32::from(self.mesh_turns);
+            words.push(format!("turn the mesh by {degrees}° about its x axis"));
+        }
+        for (what, factor) in [
+            ("multiply the mesh's size", self.mesh_scale),
+            ("multiply the focal lengths", self.focal),
+            (
+                "fit the lens to the photographs' size: multiply it",
+                self.lens_scale,
+            ),
+        ] {
+            if factor != 1.0 {
+                words.push(format!("{what} by {}", number(factor)));
+            }
+        }
+        if self.orientation.mirrored {
+            words.push("mirror the photographs".to_owned());
+        }
+        if self.orientation.turns != 0 {
+            let degrees = 90 * u32::from(self.orientation.turns);
+            words.push(format!("turn the photographs by {degrees}°"));
+        }
+        match self.shift {
+            0 => {}
+            1 => words.push("give each pose the next photograph".to_owned()),
+            -1 => words.push("give each pose the photograph before".to_owned()),
+            n => words.push(format!("give each pose the photograph {n} frames later")),
+        }
+        words.join(" and ")
+    }
+}
+
+/// A factor to a thousandth of itself or better, without an exponent.
+fn number(factor: f64) -> String {
+    let places = 3 - factor.log10().floor().min(0.0) as i32;
+    let text = format!("{factor:.0$}", places.max(0) as usize);
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 impl Intrinsics {
@@ -220,7 +258,32 @@ mod tests {
         };
         assert_eq!(
             reading.options(),
-            "--axes opencv --mesh-turn 270 --mesh-scale 1.000e-2 --focal 1.25 --lens-scale 0.5 --turn 180 --shift=-1"
+            "--axes opencv --mesh-turn 270 --mesh-scale 0.01 --focal 1.25 --lens-scale 0.5 --turn 180 --shift=-1"
+        );
+    }
+
+    #[test]
+    fn words_say_what_is_done() {
+        let sound = Reading::default();
+        let read = |reading: Reading| reading.words();
+        assert_eq!(read(sound), "");
+        let axes = Axes::OpenCv;
+        assert_eq!(
+            read(Reading { axes, ..sound }),
+            "read the poses with OpenCV's axes"
+        );
+        let (mesh_scale, mesh_turns) = (0.0254, 3);
+        assert_eq!(
+            read(Reading {
+                mesh_scale,
+                mesh_turns,
+                ..sound
+            }),
+            "turn the mesh by 270° about its x axis and multiply the mesh's size by 0.0254"
+        );
+        assert_eq!(
+            read(Reading { shift: -1, ..sound }),
+            "give each pose the photograph before"
         );
     }
 

@@ -9,6 +9,7 @@ use crate::cli::export::{DemoArguments, ExportArguments};
 use crate::cli::import::ImportArguments;
 use crate::cli::insert::InsertArguments;
 use crate::cli::interrupt::EXIT_CODES;
+use crate::cli::numbers::{above_zero, from_one, quarters, shift, threads, triple};
 use crate::cli::object_values::named_color;
 use crate::cli::parameters::{Parameters, duration};
 use crate::cli::render::RenderArguments;
@@ -19,8 +20,9 @@ use crate::inverse::held_out::HoldOut;
 use crate::inverse::settings::Settings;
 use crate::session::command::OpenOptions;
 use crate::session::save::pictures::Frames;
-use clap::{Args, Parser, Subcommand};
+use clap::{Arg, Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use glam::{DVec3, Vec3};
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -39,6 +41,28 @@ pub struct Arguments {
     pub solve: SolveOptions,
     #[command(subcommand)]
     pub action: Option<Action>,
+}
+
+impl Arguments {
+    /// Reads a command line; its first word is the program.
+    ///
+    /// # Errors
+    /// It is no such line, or asks for help.
+    pub fn from_words<W: Into<OsString> + Clone>(
+        words: impl IntoIterator<Item = W>,
+    ) -> std::result::Result<Self, clap::Error> {
+        // A number below zero is the value of the option before it, for which it may be wrong, and no option.
+        let numbers = |argument: Arg| match argument.is_positional() {
+            true => argument,
+            false => {
+                let takes_one = argument.get_action().takes_values();
+                argument.allow_negative_numbers(takes_one)
+            }
+        };
+        let command = Self::command().mut_args(numbers);
+        let command = command.mut_subcommands(|command| command.mut_args(numbers));
+        Self::from_arg_matches(&command.try_get_matches_from(words)?)
+    }
 }
 
 /// What to do instead of opening the window.
@@ -99,7 +123,7 @@ pub struct SolveOptions {
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Threads to work with [default: one a core]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<u16>,
     /// Go on from what an earlier solve left in the output folder
     #[arg(long)]
@@ -147,10 +171,10 @@ pub struct ReadOptions {
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
     pub up: Option<DVec3>,
     /// Metres per unit of the capture's files [default: 1]
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", value_parser = above_zero)]
     pub scale: Option<f64>,
     /// Segments that a mesh without objects is cut into, about, besides those that photographs show saturated
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = from_one::<u64>)]
     pub segments: Option<u64>,
     /// Let paths in the capture lead out of its folder; only for captures that you trust
     #[arg(long)]
@@ -167,13 +191,13 @@ pub struct ReadingOptions {
     #[arg(long, value_name = "90|180|270", value_parser = quarters)]
     pub mesh_turn: Option<u8>,
     /// Multiply the mesh's coordinates, to be in the unit of the poses
-    #[arg(long, value_name = "FACTOR", value_parser = factor)]
+    #[arg(long, value_name = "FACTOR", value_parser = above_zero)]
     pub mesh_scale: Option<f64>,
     /// Multiply all focal lengths
-    #[arg(long, value_name = "FACTOR", value_parser = factor)]
+    #[arg(long, value_name = "FACTOR", value_parser = above_zero)]
     pub focal: Option<f64>,
     /// Multiply focal lengths and principal points, for photographs of another size than the lens is given for
-    #[arg(long, value_name = "FACTOR", value_parser = factor)]
+    #[arg(long, value_name = "FACTOR", value_parser = above_zero)]
     pub lens_scale: Option<f64>,
     /// Turn all photographs clockwise by so many degrees
     #[arg(long, value_name = "90|180|270", value_parser = quarters)]
@@ -182,7 +206,7 @@ pub struct ReadingOptions {
     #[arg(long)]
     pub mirror: bool,
     /// Give each pose the photograph of the frame N later
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    #[arg(long, value_name = "N", value_parser = shift)]
     pub shift: Option<i32>,
 }
 
@@ -211,22 +235,6 @@ impl ReadingOptions {
             shift: self.shift.unwrap_or(before.shift),
         }
     }
-}
-
-/// Quarter turns of an angle in degrees.
-fn quarters(text: &str) -> std::result::Result<u8, String> {
-    match text.parse::<i32>().map(|degrees| degrees.rem_euclid(360)) {
-        Ok(degrees) if degrees % 90 == 0 => Ok((degrees / 90) as u8),
-        _ => Err("90, 180 or 270 is wanted".to_owned()),
-    }
-}
-
-/// A factor above zero.
-fn factor(text: &str) -> std::result::Result<f64, String> {
-    let number = text.parse().ok();
-    number
-        .filter(|factor: &f64| factor.is_finite() && *factor > 0.0)
-        .ok_or_else(|| "a factor above 0 is wanted".to_owned())
 }
 
 impl SolveOptions {
@@ -274,12 +282,6 @@ pub fn frames(text: &str) -> std::result::Result<Frames, String> {
     }
 }
 
-/// A whole number from 0.
-pub fn whole(text: &str) -> std::result::Result<u64, String> {
-    text.parse()
-        .map_err(|_| "a whole number from 0 is wanted".to_owned())
-}
-
 /// A time such as 90, 60s or 5m.
 pub fn time(text: &str) -> std::result::Result<Duration, String> {
     duration(text)
@@ -287,15 +289,53 @@ pub fn time(text: &str) -> std::result::Result<Duration, String> {
         .ok_or_else(|| "a time such as 90, 60s, 5m or 1h is wanted".to_owned())
 }
 
-/// Three numbers with commas between.
-pub fn triple(text: &str) -> std::result::Result<DVec3, String> {
-    let numbers: Vec<f64> = text
-        .split(',')
-        .map(|part| part.trim().parse().ok().filter(|v: &f64| v.is_finite()))
-        .collect::<Option<_>>()
-        .unwrap_or_default();
-    match numbers[..] {
-        [x, y, z] => Ok(DVec3::new(x, y, z)),
-        _ => Err("three numbers are wanted, e.g. 0,1,0".to_owned()),
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is said where an option of a command is given a value.
+    fn said(command: &str, option: &str, value: &str) -> String {
+        let words = ["relit", command, option, value];
+        Arguments::from_words(words).map_or_else(|error| error.to_string(), |_| String::new())
+    }
+
+    #[test]
+    fn a_wrong_number_is_answered_with_the_option_the_value_and_what_is_wanted() {
+        let command = Arguments::command();
+        let mut numbers = 0;
+        for command in command.get_subcommands() {
+            let options = command
+                .get_arguments()
+                .filter(|a| a.get_action().takes_values());
+            for option in options.filter_map(|argument| argument.get_long()) {
+                let option = format!("--{option}");
+                for value in ["-1", "a"] {
+                    let said = said(command.get_name(), &option, value);
+                    let vague = [
+                        "unexpected argument",
+                        "invalid digit",
+                        "invalid float",
+                        "is not in",
+                    ];
+                    assert!(!vague.iter().any(|words| said.contains(words)), "{said}");
+                    let named = said.contains(&option) && said.contains(&format!("'{value}'"));
+                    numbers += u32::from(named && said.contains("wanted"));
+                }
+            }
+        }
+        assert!(numbers > 60, "{numbers}");
+        for (option, value, wanted) in [
+            ("--shift", "a", "a whole number such as 1 or -1 is wanted"),
+            ("--focal", "-1", "a number above 0 is wanted"),
+            ("--mesh-scale", "0", "a number above 0 is wanted"),
+            ("--turn", "45", "90, 180 or 270 is wanted"),
+            ("--threads", "0", "a whole number from 1 to 65535 is wanted"),
+        ] {
+            let said = said("solve", option, value);
+            assert!(
+                said.contains(option) && said.contains(value) && said.contains(wanted),
+                "{said}"
+            );
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! `relit edit`: lamps off, walls recoloured, surfaces polished.
 
 use crate::cli::arguments::Replace;
+use crate::cli::numbers::from_one;
 use crate::cli::object_values::{ObjectValues, named_color, named_number};
 use crate::cli::photographs::write_with_progress;
 use crate::cli::saved::{Loaded, SavedOptions};
@@ -41,7 +42,7 @@ pub struct EditArguments {
     #[arg(long)]
     photographs: bool,
     /// Samples a pixel of the light in photographs
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = from_one::<u32>)]
     spp: u32,
     /// Smooths the noise of the light in photographs
     #[arg(long)]

@@ -1,5 +1,6 @@
 //! `relit evaluate`: the errors of an estimate against the truth.
 
+use crate::cli::numbers::threads;
 use crate::error::{Error, Result};
 use crate::say;
 use crate::session::command::{OpenOptions, Source};
@@ -24,7 +25,7 @@ pub struct EvaluateArguments {
     #[arg(long)]
     json: bool,
     /// Threads to work with [default: one a core]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<u16>,
 }
 

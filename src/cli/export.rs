@@ -1,6 +1,7 @@
 //! `relit export` and `relit demo`: files for other programs, and the built-in room as a capture.
 
-use crate::cli::arguments::{Replace, triple, whole};
+use crate::cli::arguments::Replace;
+use crate::cli::numbers::{from_one, triple, whole};
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
 use crate::export::overwrite;
@@ -99,11 +100,11 @@ pub struct DemoArguments {
     #[command(flatten)]
     replace: Replace,
     /// Renders the photographs anew with this key of all random numbers, instead of those kept in the program
-    #[arg(long, value_name = "N", value_parser = whole, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = whole::<u64>)]
     seed: Option<u64>,
     /// Paths a pixel of photographs that are rendered anew
     #[arg(long, value_name = "N", default_value_t = KEPT.samples, requires = "seed",
-          value_parser = clap::value_parser!(u32).range(1..))]
+          value_parser = from_one::<u32>)]
     samples: u32,
 }
 

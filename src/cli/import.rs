@@ -1,7 +1,8 @@
 //! `relit import`: scans of other programs as captures.
 
 use crate::capture::import::{self, AppliedTransform, Format, ImportOptions};
-use crate::cli::arguments::{Replace, triple};
+use crate::cli::arguments::Replace;
+use crate::cli::numbers::{above_zero, from_one, triple};
 use crate::error::Result;
 use crate::export;
 use crate::say;
@@ -29,13 +30,13 @@ pub struct ImportArguments {
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// Edge of the voxels of a fused mesh [default: 1/256 of the depth's extent]
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", value_parser = above_zero)]
     voxel: Option<f64>,
     /// Take every N-th frame as a photograph; depth is fused from all
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = from_one::<u32>)]
     every: Option<u32>,
     /// Take at most N photographs, evenly spaced [default: 200 of a video, else all]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = from_one::<u32>)]
     most_frames: Option<u32>,
     /// Up axis of the capture [default: the cameras' mean up]
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]

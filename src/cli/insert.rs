@@ -1,6 +1,7 @@
 //! `relit insert`: objects into a photograph, naively and by differential rendering.
 
-use crate::cli::arguments::{Replace, triple};
+use crate::cli::arguments::Replace;
+use crate::cli::numbers::{above_zero, degrees, from_one, triple};
 use crate::cli::photographs::write_with_progress;
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::compose::object::surface::Surface;
@@ -24,7 +25,7 @@ pub struct InsertArguments {
     #[command(flatten)]
     objects: Objects,
     /// Samples a pixel
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = from_one::<u32>)]
     spp: u32,
     /// Smooths the noise of the light that the objects add and take away
     #[arg(long)]
@@ -157,7 +158,7 @@ impl Args for Objects {
             )
             .arg(
                 option("scale", "S", "Factor on the file's size [default: 1]")
-                    .value_parser(clap::value_parser!(f64)),
+                    .value_parser(above_zero),
             )
             .arg(
                 option(
@@ -165,8 +166,7 @@ impl Args for Objects {
                     "DEG",
                     "Turn about the up axis, counter-clockwise from above [default: 0]",
                 )
-                .allow_hyphen_values(true)
-                .value_parser(clap::value_parser!(f64)),
+                .value_parser(degrees),
             )
             .arg(
                 option(

@@ -8,6 +8,7 @@ mod families;
 mod import;
 mod insert;
 mod interrupt;
+mod numbers;
 mod object_values;
 mod parameters;
 mod photographs;
@@ -25,8 +26,8 @@ use crate::inverse::settings::Settings;
 use crate::say;
 use crate::session::command::{OpenOptions, Source};
 use arguments::{Action, Arguments};
+use clap::CommandFactory;
 use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser};
 use object_values::ObjectValues;
 use std::path::Path;
 
@@ -41,7 +42,7 @@ pub type Window = fn(Option<(Source, OpenOptions)>, Settings) -> Result<()>;
 ///
 /// `window` is absent from builds without one; every command but the plain `relit` does without.
 pub fn run(window: Option<Window>) -> i32 {
-    let outcome = match Arguments::try_parse() {
+    let outcome = match Arguments::from_words(std::env::args_os()) {
         Ok(arguments) => act(arguments, window),
         Err(error) => match error.kind() {
             ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {

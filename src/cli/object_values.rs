@@ -1,6 +1,6 @@
 //! Values of objects as the command line names them: NAME=R,G,B and NAME=V.
 
-use crate::cli::arguments::triple;
+use crate::cli::numbers::triple;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::session::edits::{Edits, ObjectEdit};

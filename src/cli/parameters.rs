@@ -78,7 +78,6 @@ fn option(parameter: &'static Parameter) -> Arg {
         .value_name(value_name)
         .help(help)
         .help_heading("Parameters of the solve")
-        .allow_negative_numbers(true)
         .value_parser(ValueParser::new(move |text: &str| parse(parameter, text)))
 }
 

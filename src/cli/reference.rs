@@ -2,7 +2,7 @@
 
 use crate::cli::arguments::Arguments;
 use crate::inverse::settings::PARAMETERS;
-use clap::{Arg, ArgAction, Command, CommandFactory, Parser};
+use clap::{Arg, ArgAction, Command, CommandFactory};
 use std::collections::BTreeSet;
 
 /// What holds for all commands.
@@ -55,7 +55,7 @@ const EXAMPLES: &[&str] = &[
 /// What is wrong with it.
 pub fn check(words: &[&str]) -> Result<(), String> {
     let line = std::iter::once(&"relit").chain(words);
-    match Arguments::try_parse_from(line) {
+    match Arguments::from_words(line) {
         Ok(_) => Ok(()),
         Err(error) if error.use_stderr() => Err(error.to_string()),
         // Help and version.

@@ -2,6 +2,7 @@
 
 use crate::capture::read::camera_file;
 use crate::cli::arguments::Replace;
+use crate::cli::numbers::{from_one, whole};
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
 use crate::export::exr::{Precision, write_rgb};
@@ -28,6 +29,7 @@ pub struct RenderArguments {
     #[arg(
         long,
         value_name = "N",
+        value_parser = whole::<usize>,
         required_unless_present = "camera",
         conflicts_with = "camera"
     )]
@@ -36,7 +38,7 @@ pub struct RenderArguments {
     #[arg(long, value_name = "FILE")]
     camera: Option<PathBuf>,
     /// Samples a pixel
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = from_one::<u32>)]
     spp: u32,
     /// Smooths the noise, guided by what each pixel sees
     #[arg(long, conflicts_with = "layers")]

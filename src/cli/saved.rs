@@ -1,5 +1,6 @@
 //! Commands on the results of an earlier solve.
 
+use crate::cli::numbers::threads;
 use crate::error::Result;
 use crate::inverse::estimate::Estimate;
 use crate::session::command::{OpenOptions, Source};
@@ -20,7 +21,7 @@ pub struct SavedOptions {
     #[arg(long, value_name = "DIR")]
     pub capture: Option<PathBuf>,
     /// Threads to work with [default: one a core]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<u16>,
     /// Let paths in the capture lead out of its folder; only for captures that you trust
     #[arg(long)]

@@ -1,6 +1,7 @@
 //! `relit study`: the paper's experiments.
 
 use crate::cli::arguments::{ReadOptions, Replace};
+use crate::cli::numbers::{seeds, threads};
 use crate::cli::solve::use_threads;
 use crate::cli::trade::time;
 use crate::error::Result;
@@ -32,7 +33,7 @@ pub struct StudyArguments {
     #[arg(long, value_name = "TIME", default_value = "5m", value_parser = time)]
     time: Duration,
     /// Seeds that each solve is repeated with: 1, 2, … [default: 5, of table1 10; quick: 2]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000))]
+    #[arg(long, value_name = "N", value_parser = seeds)]
     seeds: Option<u64>,
     /// Only try it, in seconds: fewer values, smaller scenes, solves cut short
     #[arg(long)]
@@ -42,7 +43,7 @@ pub struct StudyArguments {
     #[arg(long, value_name = "CAPTURE")]
     capture: Option<PathBuf>,
     /// Threads to work with [default: one a core]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<u16>,
     #[command(flatten)]
     replace: Replace,

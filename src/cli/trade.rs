@@ -1,8 +1,9 @@
 //! `relit trade`: what exactness costs on a capture, or on generated rooms.
 
-use crate::cli::arguments::{ReadOptions, Replace, whole};
+use crate::cli::arguments::{ReadOptions, Replace};
 use crate::cli::families;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::numbers::{from_one, threads, whole};
 use crate::cli::parameters::duration;
 use crate::cli::solve::use_threads;
 use crate::error::Result;
@@ -32,7 +33,7 @@ pub struct TradeArguments {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Solve N generated rooms of a family instead of a capture; with --presets or --around, the mean curve over plain ones
-    #[arg(long, value_name = "N", conflicts_with = "capture", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", conflicts_with = "capture", value_parser = from_one::<u64>)]
     rooms: Option<u64>,
     /// The family of the generated rooms, or all of them [default: plain]
     #[arg(long, value_name = "NAME", requires = "rooms", conflicts_with_all = ["presets", "around", "capture"], value_parser = PossibleValuesParser::new(families::names()))]
@@ -50,10 +51,10 @@ pub struct TradeArguments {
     #[arg(long, value_name = "PRESET|all", conflicts_with = "presets", value_parser = PossibleValuesParser::new(Preset::WORDS.iter().copied().chain([families::ALL])))]
     around: Option<String>,
     /// Key of all random numbers, and of the first generated room
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>)]
     seed: u64,
     /// Threads to work with [default: one a core]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<u16>,
     #[command(flatten)]
     replace: Replace,

@@ -7,10 +7,13 @@
 //!   put there either.
 //! - A file of results (estimate.json and what `relit solve` writes beside it) is replaced only by results of the same
 //!   capture: one with the same content, or the one that lies where theirs lay.
+//! - A file that the same run has read stays: an inserted object with its textures, a camera, a scan, and what a capture names
+//!   outside of its folder.
 //! - Any other file is the person's, and is replaced as by any program.
 //!
 //! [`permit`] lifts all of it, where a person says `--overwrite`.
 
+use crate::capture::inputs;
 use crate::error::{Error, Result};
 use serde::Deserialize;
 use serde_json::Value;
@@ -46,7 +49,7 @@ pub fn is_permitted() -> bool {
     PERMITTED.load(Ordering::Relaxed)
 }
 
-/// Refuses to write a file that is a capture's or of results.
+/// Refuses to write a file that is a capture's, of results, or another one that was read.
 ///
 /// # Errors
 /// It is one.
@@ -54,13 +57,13 @@ pub fn check(path: &Path) -> Result<()> {
     refuse(path, Some)
 }
 
-/// Refuses to write a file that is a capture's; for those of results, [`check_results`] is asked about the folder.
+/// Refuses to write a file that is a capture's or another one that was read; for those of results, [`check_results`] is asked about the folder.
 ///
 /// # Errors
 /// It is one.
 pub fn check_input(path: &Path) -> Result<()> {
     refuse(path, |owner| match owner {
-        Owner::Capture(..) => Some(owner),
+        Owner::Capture(..) | Owner::Run => Some(owner),
         Owner::Results(_) => None,
     })
 }
@@ -77,6 +80,7 @@ fn refuse(path: &Path, counts: impl Fn(Owner) -> Option<Owner>) -> Result<()> {
         Some(Owner::Results(folder)) => {
             format!("belongs to the results in {}", folder.display())
         }
+        Some(Owner::Run) => "was read as an input".to_owned(),
     };
     let remedy = "name another file; the command line replaces it where --overwrite is added";
     Err(Error::file(path, what, remedy))
@@ -132,17 +136,21 @@ enum Owner {
     Capture(PathBuf, &'static str),
     /// The results in a folder.
     Results(PathBuf),
+    /// The run that is writing, which has read it.
+    Run,
 }
 
 fn owner(path: &Path) -> Option<Owner> {
     let place = place(path)?;
-    place.ancestors().skip(1).find_map(|folder| {
+    let of_folder = place.ancestors().skip(1).find_map(|folder| {
         let name = place.strip_prefix(folder).ok()?;
         if let Some(what) = of_capture(folder, name, &place) {
             return Some(Owner::Capture(folder.to_owned(), what));
         }
         of_results(folder, name, &place).then(|| Owner::Results(folder.to_owned()))
-    })
+    });
+    let was_read = || (place.exists() && inputs::holds(&place)).then_some(Owner::Run);
+    of_folder.or_else(was_read)
 }
 
 /// The path with its folder resolved; a link in the last place is replaced itself, not what it leads to.

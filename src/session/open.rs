@@ -1,7 +1,7 @@
 //! From a source to a capture that can be solved and shown.
 
 use crate::calibrate::alignment::{Alignment, Verdict};
-use crate::calibrate::photographs::{leave_out, name, without_hot_pixels};
+use crate::calibrate::photographs::{leave_out, leave_out_astray, name, without_hot_pixels};
 use crate::capture::Capture;
 use crate::capture::photograph::{Photograph, PhotographSource};
 use crate::capture::read::{ReadOptions, read};
@@ -9,6 +9,7 @@ use crate::capture::reading::Reading;
 use crate::capture::regroup::regroup;
 use crate::capture::working::{Working, load_working};
 use crate::error::{Error, Result};
+use crate::inverse::estimate::Estimate;
 use crate::inverse::faces::cut_up;
 use crate::room;
 use crate::scene::Scene;
@@ -56,6 +57,9 @@ impl OpenCapture {
             .check_alignment
             .then(|| alignment(&capture, &working))
             .transpose()?;
+        if let Some(alignment) = &alignment {
+            leave_out_astray(&capture, &mut working, &alignment.astray);
+        }
         if let Some(cut) = capture.cut.clone() {
             cut_up(&mut capture, &cut, &working, options.hold_out)?;
         }
@@ -89,6 +93,23 @@ impl OpenCapture {
             Verdict::Wrong { reading, .. } => Some(self.options.reading.then(&reading)),
             _ => None,
         }
+    }
+
+    /// An estimate from this capture. Where its photographs may not show the mesh from their poses, or plainly do not, nothing is
+    /// determined by them: the standard error of an albedo is at least that of any albedo from 0 to 1 about what was found.
+    pub fn in_doubt(&self, mut estimate: Estimate) -> Estimate {
+        match self.alignment.as_ref().map(|alignment| &alignment.verdict) {
+            None | Some(Verdict::Sound) => return estimate,
+            Some(Verdict::Doubtful | Verdict::Wrong { .. }) => {}
+        }
+        for object in &mut estimate.objects {
+            let off = object.albedo - 0.5;
+            let guess = (off * off + 1.0 / 12.0).map(f32::sqrt);
+            object.albedo_stderr = object.albedo_stderr.max(guess);
+            object.identifiable = false;
+            object.note = "the photographs may not show it from their poses".into();
+        }
+        estimate
     }
 
     /// Refuses a capture whose photographs plainly do not show the mesh from their poses.

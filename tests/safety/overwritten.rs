@@ -87,6 +87,78 @@ fn files_of_captures_and_of_results_stay_unless_a_person_says_so() {
     done(&place.relit(&solve("room", "demo")));
 }
 
+/// What a command reads from elsewhere is no capture's, and stays all the same.
+#[test]
+fn what_a_command_has_read_outside_of_the_capture_stays() {
+    let place = solved();
+    let photographs = place.path("photographs");
+    fs::rename(place.path("room/images"), &photographs).expect("moves");
+    change(&place, "room", |file| {
+        for frame in 0..2 {
+            let name = format!("../photographs/00{frame}.exr");
+            file["frames"][frame]["file_path"] = name.into();
+        }
+        let mut camera = file["frames"][0].clone();
+        for field in ["w", "h", "fl_x", "fl_y", "cx", "cy"] {
+            camera[field] = file[field].clone();
+        }
+        fs::write(place.path("camera.png"), camera.to_string()).expect("writes");
+    });
+    let object = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n";
+    fs::write(place.path("a.obj"), object).expect("writes");
+    fs::write(place.path("a.mtl"), "newmtl a\nmap_Kd a.naive.png\n").expect("writes");
+    let texture = image::RgbImage::from_pixel(2, 2, image::Rgb([90, 80, 70]));
+    texture.save(place.path("a.naive.png")).expect("writes");
+    let before = all_files(&place.path(""));
+
+    let render = ["render", "out", "--allow-outside", "--spp", "1", "--out"];
+    let insert = [
+        "insert",
+        "out",
+        "--allow-outside",
+        "--frame",
+        "0",
+        "--spp",
+        "1",
+        "--object",
+        "a.obj",
+        "--at",
+        "0,0,0",
+        "--out",
+        "a",
+    ];
+    for (command, file) in [
+        (
+            [&render[..], &["photographs/001.exr", "--frame", "0"]].concat(),
+            "photographs/001.exr",
+        ),
+        (
+            [&render[..], &["camera.png", "--camera", "camera.png"]].concat(),
+            "camera.png",
+        ),
+        (insert.to_vec(), "a.naive.png"),
+    ] {
+        refused(
+            &place.relit(&command),
+            1,
+            &[file, "was read", "--overwrite"],
+        );
+        let kept = fs::read(place.path(file)).expect("reads");
+        let was = before.iter().find(|(name, _)| name.ends_with(file));
+        assert!(was.is_some_and(|(_, bytes)| *bytes == kept), "{file}");
+    }
+    done(&place.relit(&[&render[..], &["new.exr", "--frame", "0"]].concat()));
+    done(
+        &place.relit(
+            &[
+                &render[..],
+                &["camera.png", "--camera", "camera.png", "--overwrite"],
+            ]
+            .concat(),
+        ),
+    );
+}
+
 #[test]
 fn results_make_room_only_for_those_of_the_same_capture() {
     let place = solved();

@@ -50,6 +50,16 @@ fn numbers_below_zero_are_refused_for_what_they_are() {
         2,
         &["bounces", "whole number"],
     );
+    for (option, value, wanted) in [
+        ("--focal", "-1", "a number above 0"),
+        ("--mesh-scale", "0", "a number above 0"),
+        ("--shift", "a", "a whole number such as 1 or -1"),
+        ("--threads", "-2", "a whole number from 1"),
+        ("--scale", "-0.01", "a number above 0"),
+    ] {
+        let refusal = place.relit(&with(&[option, value]));
+        refused(&refusal, 2, &[option, value, wanted]);
+    }
     let demo = ["demo", "--out", "demo", "--seed", "-1"];
     refused(&place.relit(&demo), 2, &["seed", "whole number from 0"]);
     let trade = ["trade", "room", "--seed", "-1"];

@@ -1,6 +1,7 @@
 //! What the window offers where photographs do not show the mesh from their poses.
 
 use crate::app::state::App;
+use crate::capture::reading::Reading;
 use crate::session::command::Command;
 use crate::session::snapshot::Phase;
 use egui::{Align2, Context, Window};
@@ -29,12 +30,8 @@ pub fn show(app: &mut App, ctx: &Context) {
             ui.set_max_width(460.0);
             ui.label(&error.problem);
             ui.add_space(8.0);
-            ui.horizontal(|ui| {
-                let read = match reading.options().as_str() {
-                    "" => "Read it by its format's conventions".to_owned(),
-                    options => format!("Read it with {options}"),
-                };
-                if ui.button(read).clicked() {
+            ui.horizontal_wrapped(|ui| {
+                if ui.button(button(&reading)).clicked() {
                     options = Some(crate::session::command::OpenOptions {
                         reading,
                         ..capture.options.clone()
@@ -48,5 +45,15 @@ pub fn show(app: &mut App, ctx: &Context) {
         app.send(Command::Run);
     } else if as_it_is {
         app.send(Command::Run);
+    }
+}
+
+/// What the button that reads the capture so says.
+fn button(reading: &Reading) -> String {
+    let words = reading.words();
+    let mut letters = words.chars();
+    match letters.next() {
+        Some(first) => first.to_uppercase().chain(letters).collect(),
+        None => "Read the files by their format's conventions".to_owned(),
     }
 }

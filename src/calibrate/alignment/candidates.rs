@@ -17,6 +17,31 @@ pub fn near() -> Vec<Reading> {
     [-2, -1, 1, 2].into_iter().flat_map(factor).collect()
 }
 
+/// Readings that turn, mirror or exchange something: what looks alike from several sides fits some of them too.
+pub fn exchanged() -> Vec<Reading> {
+    let given = Reading::default();
+    let turned = [1, 2, 3].map(Orientation::turned);
+    let mirrored = [0, 2].map(|n| Orientation::MIRRORED.then(Orientation::turned(n)));
+    let mut readings: Vec<Reading> = (turned.into_iter().chain(mirrored))
+        .map(|orientation| Reading {
+            orientation,
+            ..given
+        })
+        .collect();
+    readings.extend([-1, 1].map(|shift| Reading { shift, ..given }));
+    for axes in [Axes::OpenGl, Axes::OpenCv] {
+        for mesh_turns in 0..4 {
+            readings.push(Reading {
+                axes,
+                mesh_turns,
+                ..given
+            });
+        }
+    }
+    readings.retain(|reading| !reading.is_default());
+    readings
+}
+
 /// All other readings.
 pub fn all() -> Vec<Reading> {
     let given = Reading::default();
@@ -30,27 +55,7 @@ pub fn all() -> Vec<Reading> {
         lens_scale,
         ..given
     }));
-    let turned = [1, 2, 3].map(Orientation::turned);
-    let mirrored = [0, 2].map(|n| Orientation::MIRRORED.then(Orientation::turned(n)));
-    readings.extend(
-        turned
-            .into_iter()
-            .chain(mirrored)
-            .map(|orientation| Reading {
-                orientation,
-                ..given
-            }),
-    );
-    readings.extend([-1, 1].map(|shift| Reading { shift, ..given }));
-    for axes in [Axes::OpenGl, Axes::OpenCv] {
-        for mesh_turns in 0..4 {
-            readings.push(Reading {
-                axes,
-                mesh_turns,
-                ..given
-            });
-        }
-    }
+    readings.extend(exchanged());
     readings.retain(|reading| !reading.is_default());
     readings
 }

@@ -5,6 +5,7 @@
 //! two, where poses have nothing to do with photographs, and 6 to 40 where they belong together. It needs no other photograph,
 //! so that it also tells when all of them are wrong. `relit study readings` measures how often it is right.
 
+mod astray;
 mod candidates;
 mod edges;
 mod score;
@@ -15,6 +16,7 @@ use crate::capture::reading::{Axes, Reading};
 use crate::error::Error;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
+pub use astray::{Astray, Why};
 use edges::edges;
 use rayon::prelude::*;
 use score::{Contrast, levels};
@@ -27,11 +29,10 @@ const MAX_FRAMES: usize = 24;
 /// ... with readings near to that of the files so many, ...
 const NEAR_FRAMES: usize = 12;
 /// ... and all other readings in rounds: so many of the best of a round before on so many photographs.
-const ROUNDS: [(usize, usize); 2] = [(usize::MAX, 4), (24, 8)];
-/// Of the best readings of the last round, so many are looked for a better factor, ...
-const REFINED: usize = 2;
-/// ... and so many are compared on all photographs.
-const FINALISTS: usize = 5;
+const ROUNDS: [(usize, usize); 2] = [(usize::MAX, 4), (24, 12)];
+/// Of the best readings of the last round so many are looked for a better factor, and then so many are compared on all
+/// photographs: where edges are few, a factor that is off by half a step is not among the first two.
+const FINALISTS: usize = 6;
 /// An agreement that chance gives once in three million times: five standard deviations.
 const AGREES: f64 = 5.0;
 /// Less than this is what chance gives: two standard deviations.
@@ -46,6 +47,8 @@ pub struct Alignment {
     pub agreement: f64,
     /// What follows from it.
     pub verdict: Verdict,
+    /// Single photographs that do not show the mesh from their poses, where the others do.
+    pub astray: Vec<Astray>,
 }
 
 /// What follows from an agreement.
@@ -71,12 +74,7 @@ impl Alignment {
         let given = Reading::default();
         let scores = views.scores(&given, MAX_FRAMES);
         let agreement = total(&scores);
-        let no_nearer = || {
-            let near_scores = views.scores(&given, NEAR_FRAMES);
-            (candidates::near().iter())
-                .all(|near| !plainly_better(&views.scores(near, NEAR_FRAMES), &near_scores))
-        };
-        let verdict = match agreement >= AGREES && no_nearer() {
+        let verdict = match agreement >= AGREES && !views.may_be_another() {
             true => Verdict::Sound,
             false => match views.best() {
                 Some((reading, found)) if plainly_better(&found, &scores) => Verdict::Wrong {
@@ -87,7 +85,15 @@ impl Alignment {
                 _ => Verdict::Doubtful,
             },
         };
-        Self { agreement, verdict }
+        let astray = match verdict {
+            Verdict::Sound => astray::astray(&views, &scores),
+            Verdict::Doubtful | Verdict::Wrong { .. } => Vec::new(),
+        };
+        Self {
+            agreement,
+            verdict,
+            astray,
+        }
     }
 
     /// The error of a capture that is plainly read wrongly; `before` is how it is read now.
@@ -238,6 +244,19 @@ impl<'a> Views<'a> {
         }
     }
 
+    /// Whether some other reading could be better than that of the files, although that one agrees.
+    fn may_be_another(&self) -> bool {
+        let given = Reading::default();
+        let near_scores = self.scores(&given, NEAR_FRAMES);
+        let nearer = (candidates::near().iter())
+            .any(|near| plainly_better(&self.scores(near, NEAR_FRAMES), &near_scores));
+        let few = ROUNDS[0].1;
+        let agreement = total(&self.scores(&given, few));
+        nearer
+            || (candidates::exchanged().iter())
+                .any(|other| total(&self.scores(other, few)) > agreement)
+    }
+
     /// A camera as another reading has it, relative to the mesh as it is.
     fn camera(&self, frame: usize, reading: &Reading) -> Camera {
         let mut camera = self.scene.cameras[frame].clone();
@@ -269,9 +288,7 @@ impl<'a> Views<'a> {
             left = ranked(left, frames);
         }
         left.truncate(FINALISTS);
-        let finer: Vec<Reading> = (left.iter().take(REFINED))
-            .flat_map(candidates::finer)
-            .collect();
+        let finer: Vec<Reading> = (left.iter()).flat_map(candidates::finer).collect();
         left.extend(finer);
         let mut finalists = ranked(left, ROUNDS[1].1);
         finalists.truncate(FINALISTS);

@@ -3,6 +3,7 @@
 use crate::capture::fuse;
 use crate::capture::import::folder::Folder;
 use crate::capture::import::{ImportedFrame, memory_bound};
+use crate::capture::inputs;
 use crate::capture::mesh::Mesh;
 use crate::capture::read::confine::Confine;
 use crate::capture::read::mesh;
@@ -27,6 +28,7 @@ pub fn read(
         true => folder.confine().clone(),
         false => Confine::new(beside.unwrap_or(Path::new(".")), false)?,
     };
+    inputs::note(path);
     let mut remarks = Vec::new();
     let raw = mesh::read(path, &confine, &mut remarks)?;
     let mut mesh = raw.mesh;

@@ -1,6 +1,7 @@
 //! One camera in a file of its own: the fields of a frame of transforms.json, with the size of its picture.
 
 use crate::capture::camera::{Intrinsics, Pose};
+use crate::capture::inputs;
 use crate::capture::read::fields::{Fields, without_mark};
 use crate::capture::read::{lens, pose};
 use crate::error::{Error, Result};
@@ -22,6 +23,7 @@ pub fn read(path: &Path) -> Result<(Intrinsics, Pose, Vec<String>)> {
     let failed = |error: std::io::Error| Error::io(path, &error);
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(failed)?;
+    inputs::note(path);
     (file.take(MOST_BYTES + 1).read_to_end(&mut bytes)).map_err(failed)?;
     if bytes.len() as u64 > MOST_BYTES {
         return Err(Error::file(

@@ -1,5 +1,6 @@
 //! Keeps the paths written in a capture inside its folder.
 
+use crate::capture::inputs;
 use crate::error::{Error, Result};
 use std::path::{Component, Path, PathBuf};
 
@@ -33,7 +34,8 @@ impl Confine {
         &self.folder
     }
 
-    /// The existing regular file that `path`, relative to `base` (a folder inside), leads to. `place` names the field for messages.
+    /// The existing regular file that `path`, relative to `base` (a folder inside), leads to, which is
+    /// remembered as an input. `place` names the field for messages.
     ///
     /// # Errors
     /// The path is empty, leaves the folder (also by a symbolic link), or leads to no regular file.
@@ -70,6 +72,7 @@ impl Confine {
                 "make it smaller",
             ));
         }
+        inputs::note(&resolved);
         Ok(full)
     }
 

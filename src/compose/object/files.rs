@@ -1,5 +1,6 @@
 //! Files that an object file refers to: only from its own folder, and of bounded size.
 
+use crate::capture::inputs;
 use crate::error::{Error, Result};
 use crate::math::color::srgb_to_linear;
 use crate::math::picture::Picture;
@@ -15,7 +16,7 @@ const MAX_SIDE: u32 = 16_384;
 /// Longest side that a texture is kept at; larger ones are halved until they fit.
 const KEPT_SIDE: u32 = 4096;
 
-/// Reads a whole file of bounded size.
+/// Reads a whole file of bounded size, and remembers it as an input.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     let metadata = std::fs::metadata(path).map_err(|e| Error::io(path, &e))?;
     if !metadata.is_file() {
@@ -28,6 +29,7 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
             "reduce the object",
         ));
     }
+    inputs::note(path);
     std::fs::read(path).map_err(|e| Error::io(path, &e))
 }
 

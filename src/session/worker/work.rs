@@ -311,7 +311,7 @@ impl Worker {
         self.touch();
         match outcome {
             Ok(Ok(solution)) => {
-                self.estimate = Arc::new(solution.estimate);
+                self.estimate = Arc::new(capture.in_doubt(solution.estimate));
                 self.progress = Arc::new(solution.progress);
                 self.checkpoint = solution.checkpoint;
                 self.phase = Phase::Finished(solution.termination);

@@ -1,0 +1,98 @@
+//! Numbers as people type them. What is refused is said with what is allowed.
+
+use glam::DVec3;
+use std::ops::RangeInclusive;
+
+/// What a parser hands back: the value, or what is wanted instead.
+type Parsed<T> = std::result::Result<T, String>;
+
+/// A whole number from 0.
+pub fn whole<T: TryFrom<u64>>(text: &str) -> Parsed<T> {
+    within(text, 0..=u64::MAX).ok_or_else(|| "a whole number from 0 is wanted".to_owned())
+}
+
+/// A whole number from 1.
+pub fn from_one<T: TryFrom<u64>>(text: &str) -> Parsed<T> {
+    within(text, 1..=u64::MAX).ok_or_else(|| "a whole number from 1 is wanted".to_owned())
+}
+
+/// A number of threads.
+pub fn threads(text: &str) -> Parsed<u16> {
+    let range = 1..=u64::from(u16::MAX);
+    within(text, range).ok_or_else(|| format!("a whole number from 1 to {} is wanted", u16::MAX))
+}
+
+/// A number of seeds.
+pub fn seeds(text: &str) -> Parsed<u64> {
+    within(text, 1..=1000).ok_or_else(|| "a whole number from 1 to 1000 is wanted".to_owned())
+}
+
+fn within<T: TryFrom<u64>>(text: &str, range: RangeInclusive<u64>) -> Option<T> {
+    let number = text.parse().ok().filter(|number| range.contains(number))?;
+    T::try_from(number).ok()
+}
+
+/// A number of frames to move on by, or back.
+pub fn shift(text: &str) -> Parsed<i32> {
+    text.parse()
+        .map_err(|_| "a whole number such as 1 or -1 is wanted".to_owned())
+}
+
+/// A factor or a length above zero.
+pub fn above_zero(text: &str) -> Parsed<f64> {
+    finite(text)
+        .filter(|number| *number > 0.0)
+        .ok_or_else(|| "a number above 0 is wanted".to_owned())
+}
+
+/// An angle in degrees.
+pub fn degrees(text: &str) -> Parsed<f64> {
+    finite(text).ok_or_else(|| "a number of degrees is wanted".to_owned())
+}
+
+/// Quarter turns of an angle in degrees.
+pub fn quarters(text: &str) -> Parsed<u8> {
+    match text.parse::<i32>().map(|degrees| degrees.rem_euclid(360)) {
+        Ok(degrees) if degrees % 90 == 0 => Ok((degrees / 90) as u8),
+        _ => Err("90, 180 or 270 is wanted".to_owned()),
+    }
+}
+
+/// Three numbers with commas between.
+pub fn triple(text: &str) -> Parsed<DVec3> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| finite(part.trim())).collect();
+    match numbers.as_deref() {
+        Some(&[x, y, z]) => Ok(DVec3::new(x, y, z)),
+        _ => Err("three numbers are wanted, e.g. 0,1,0".to_owned()),
+    }
+}
+
+fn finite(text: &str) -> Option<f64> {
+    text.parse().ok().filter(|number: &f64| number.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_out_of_range_are_refused_with_what_is_wanted() {
+        let wanted = |error: Parsed<u16>| error.expect_err("no such number");
+        assert_eq!(whole::<usize>("0"), Ok(0));
+        assert_eq!(from_one::<u32>("7"), Ok(7));
+        assert_eq!(threads("65535"), Ok(65535));
+        for text in ["0", "-1", "a", "", "1.5", "65536"] {
+            assert_eq!(
+                wanted(threads(text)),
+                "a whole number from 1 to 65535 is wanted"
+            );
+        }
+        assert_eq!((shift("-2"), quarters("-90")), (Ok(-2), Ok(3)));
+        assert!(shift("a").is_err() && shift("0.5").is_err() && quarters("45").is_err());
+        assert_eq!((above_zero("0.01"), degrees("-90")), (Ok(0.01), Ok(-90.0)));
+        for text in ["0", "-1", "a", "inf", "NaN"] {
+            assert!(above_zero(text).is_err(), "{text}");
+        }
+        assert!(degrees("inf").is_err() && triple("0,1").is_err() && triple("0,a,1").is_err());
+    }
+}
