@@ -93,7 +93,6 @@ const fn ctrl_shift(key: Key) -> Option<KeyboardShortcut> {
 actions! {
     OpenFolder, File, "Open capture…", "Chooses a capture's folder with a file dialog", ctrl(Key::O);
     OpenRoom, File, "Open built-in room", "Opens the room that is built into the program", ctrl_shift(Key::O);
-    TakeUp, File, "Take up the last session", "Goes on from what was kept of the last session of this capture, with its changes and objects", None;
     StartPage, File, "Start page", "Shows recent captures and the field for a typed path", ctrl(Key::N);
     Save, File, "Save results…", "Writes estimate, report and pictures into a folder", ctrl(Key::S);
     Export, File, "Export…", "Writes one file for another program", ctrl(Key::E);
@@ -133,11 +132,9 @@ actions! {
     RunPause, Solve, "Run / Pause", "Starts, holds or goes on with the solve", key(Key::Space);
     Step, Solve, "Step", "One iteration, then pause", key(Key::Period);
     Finish, Solve, "Finish", "Ends the solve and keeps the estimate", None;
-    Reset, Solve, "Reset", "Forgets the estimate and starts over", ctrl(Key::R);
+    Reset, Solve, "Reset", "Solves anew, with changes and objects as they are; the session so far is kept under File > Sessions", ctrl(Key::R);
+    StartOver, Solve, "Start over", "Solves as if nothing had been done; the session so far is kept under File > Sessions", None;
     MeasureTrade, Solve, "Measure / cancel the trade", "Measures what exactness costs in seconds on this capture, or ends the measurement", ctrl(Key::M);
-
-    Studies, Solve, "Studies", "Shows the paper's experiments, to be run and plotted here", None;
-    RunStudy, Solve, "Start / cancel the study", "Runs the chosen experiment and writes its files, or ends it", None;
 
     PreviousFrame, View, "Previous photograph", "Steps to the photograph before", key(Key::OpenBracket);
     NextFrame, View, "Next photograph", "Steps to the next photograph", key(Key::CloseBracket);

@@ -33,8 +33,6 @@ pub enum Pane {
     Stages,
     /// Error over seconds, and where to stop.
     Trade,
-    /// The paper's experiments.
-    Studies,
     /// What happened.
     Log,
 }
@@ -55,7 +53,6 @@ impl Pane {
             Self::Loss,
             Self::Stages,
             Self::Trade,
-            Self::Studies,
             Self::Log,
         ];
         pictures.chain(rest).collect()
@@ -76,7 +73,6 @@ impl Pane {
             Self::Loss => "Loss",
             Self::Stages => "Stages",
             Self::Trade => "Trade",
-            Self::Studies => "Studies",
             Self::Log => "Log",
         }
     }
@@ -109,7 +105,6 @@ pub fn first_layout() -> Tree<Pane> {
         Pane::Insert,
         Pane::Settings,
         Pane::Trade,
-        Pane::Studies,
     ]);
     let course = tabs(&[
         Pane::Loss,
@@ -216,7 +211,6 @@ impl Behavior<Pane> for Panes<'_> {
                         Pane::Loss => panels::loss::pane(ui, self.app),
                         Pane::Stages => panels::stages::pane(ui, self.app),
                         Pane::Trade => panels::trade::pane(ui, self.app),
-                        Pane::Studies => panels::studies::pane(ui, self.app),
                         _ => panels::log::pane(ui, self.app),
                     }
                 });

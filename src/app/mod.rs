@@ -19,7 +19,6 @@ mod run;
 pub mod shell;
 pub mod size;
 pub mod state;
-pub mod studies;
 pub mod task;
 pub mod theme;
 pub mod trade;

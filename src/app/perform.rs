@@ -51,7 +51,6 @@ impl App {
             Action::Redo => self.history.can_redo(),
             Action::SwitchLamp => self.can_switch_lamp(),
             Action::ResetMaterial => self.can_reset_material(),
-            Action::TakeUp => self.snapshot.earlier.is_some(),
             Action::JoinObjects => self.can_regroup() && self.chosen_objects().len() > 1,
             Action::RenameObject => self.can_regroup() && self.selected.is_some(),
             Action::CutOut => self.can_regroup(),
@@ -61,7 +60,6 @@ impl App {
             Action::SaveLayers => self.view().is_some_and(|view| view.layers.is_some()),
             Action::Place | Action::Duplicate | Action::Delete => self.insertions.chosen.is_some(),
             Action::MeasureTrade => self.trade.doing().is_some() || self.can_measure(),
-            Action::RunStudy => self.can_run_study(),
             Action::Finish => matches!(self.snapshot.phase, Phase::Solving | Phase::Paused),
             Action::SavePhotographs => self.can_write_photographs(),
             Action::CancelPhotographs => self.batch.is_some(),
@@ -78,6 +76,7 @@ impl App {
             | Action::RunPause
             | Action::Step
             | Action::Reset
+            | Action::StartOver
             | Action::PreviousFrame
             | Action::NextFrame
             | Action::FrameSelection
@@ -96,11 +95,6 @@ impl App {
         match action {
             Action::OpenFolder => self.ask(Ask::Capture, ctx),
             Action::OpenRoom => self.open(Source::BuiltInRoom),
-            Action::TakeUp => {
-                if let Some(folder) = self.snapshot.earlier.clone() {
-                    self.send(Command::Resume(folder));
-                }
-            }
             Action::StartPage => self.start_page = !self.start_page,
             Action::Save => self.sheet = Sheet::save(self.capture_name()),
             Action::Export => self.sheet = Sheet::export(self.capture_name(), self.probe_point()),
@@ -171,6 +165,7 @@ impl App {
             Action::Step => self.send(Command::Step),
             Action::Finish => self.send(Command::Finish),
             Action::Reset => self.send(Command::Reset),
+            Action::StartOver => self.send(Command::StartOver),
             Action::SolveOn => {
                 self.send_edits();
                 self.send(Command::SolveOn);
@@ -179,12 +174,6 @@ impl App {
             Action::MeasureTrade => {
                 self.bring_forward = Some(Pane::Trade);
                 self.measure_or_cancel(ctx);
-            }
-
-            Action::Studies => self.bring_forward = Some(Pane::Studies),
-            Action::RunStudy => {
-                self.bring_forward = Some(Pane::Studies);
-                self.run_or_cancel_study(ctx);
             }
 
             Action::PreviousFrame => self.step_frame(-1),

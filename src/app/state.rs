@@ -19,9 +19,9 @@ use crate::app::shell::dialogs::{Ask, Dialogs};
 use crate::app::shell::files::Sheet;
 use crate::app::shell::notices::Notices;
 use crate::app::shell::palette::Palette;
+use crate::app::shell::sessions::Sessions;
 use crate::app::shell::status::Memory;
 use crate::app::shell::thumbnails::Thumbnails;
-use crate::app::studies::StudiesView;
 use crate::app::trade::TradeView;
 use crate::app::undo::History;
 use crate::inverse::estimate::Estimate;
@@ -79,8 +79,6 @@ pub struct App {
     pub objects: ObjectsTable,
     /// The trade of speed for exactness.
     pub trade: TradeView,
-    /// The paper's experiments.
-    pub studies: StudiesView,
     /// What the next click in a view is asked for.
     pub picking: Option<Pick>,
     /// Photographs that are being written.
@@ -91,6 +89,8 @@ pub struct App {
     pub dialogs: Dialogs,
     /// Saving and exporting.
     pub sheet: Sheet,
+    /// The list of sessions.
+    pub sessions: Sessions,
     /// The command palette, while it is open.
     pub palette: Option<Palette>,
     /// Whether the window of keys is open.
@@ -156,12 +156,12 @@ impl App {
             model: ModelView::default(),
             objects: ObjectsTable::default(),
             trade: TradeView::default(),
-            studies: StudiesView::default(),
             picking: None,
             batch: None,
             notices: Notices::default(),
             dialogs: Dialogs::default(),
             sheet: Sheet::default(),
+            sessions: Sessions::default(),
             palette: None,
             keys: false,
             start_page: false,
@@ -275,7 +275,6 @@ impl App {
         self.convert_photograph();
         self.mix_light();
         self.take_trade();
-        self.take_study();
         self.take_batch();
         self.take_models(ctx);
         self.request();
@@ -307,7 +306,8 @@ impl App {
     }
 
     fn capture_changed(&mut self) {
-        self.frame = 0;
+        self.frame = self.snapshot.frame.min(self.frames().saturating_sub(1));
+        self.sessions.closed = false;
         self.shown = Shown::Frame;
         self.selected = None;
         self.picking = None;

@@ -5,7 +5,7 @@ use crate::app::pace::Pace;
 use crate::app::picture::inspect;
 use crate::app::preferences::Preferences;
 use crate::app::shell::{
-    alignment, files, keys, menu, palette, start, status, thumbnails, toolbar,
+    alignment, files, keys, menu, palette, sessions, start, status, thumbnails, toolbar,
 };
 use crate::app::state::App;
 use crate::app::{action, model, picture, theme};
@@ -70,6 +70,12 @@ impl Window {
         Panel::top("tools")
             .frame(frame(ui, 8, 4))
             .show(ui, |ui| toolbar::bar(ui, app));
+        if sessions::has_line(app) {
+            Panel::top("session")
+                .exact_size(sessions::LINE)
+                .frame(frame(ui, 8, 4))
+                .show(ui, |ui| sessions::line(ui, app));
+        }
         Panel::bottom("status")
             .exact_size(24.0)
             .frame(frame(ui, 8, 2))

@@ -167,6 +167,11 @@ impl Inserting {
         self.update();
     }
 
+    /// The frame that is shown.
+    pub fn frame(&self) -> usize {
+        self.frame
+    }
+
     /// The inserted objects.
     pub fn placements(&self) -> &[Placement] {
         &self.placements

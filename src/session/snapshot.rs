@@ -10,9 +10,9 @@ use crate::inverse::solver::{Progress, Termination};
 use crate::scene::Scene;
 use crate::session::command::{OpenOptions, Source};
 use crate::session::edits::Edits;
+use crate::session::keep::Kept;
 use crate::transport::layers;
 use glam::Vec3;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 pub use crate::math::picture::Picture;
@@ -45,8 +45,12 @@ pub struct Snapshot {
     pub regroupings: u64,
     /// The inserted objects that the open capture came with, as a session that was taken up.
     pub inserted: Arc<Vec<Placement>>,
-    /// The folder of the capture's last session, where it was kept and not taken up.
-    pub earlier: Option<PathBuf>,
+    /// The photograph that was shown when the open capture's session was saved.
+    pub frame: usize,
+    /// Which session the open capture goes on with, in words; `None` where a new one began.
+    pub continued: Option<String>,
+    /// All sessions that are kept, the newest first.
+    pub kept: Arc<Vec<Kept>>,
     /// Pictures of the requested view.
     pub view: Option<Arc<View>>,
     /// Composites of the requested frame, where objects are inserted or anything was changed by hand.

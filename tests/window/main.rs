@@ -9,5 +9,5 @@ mod light;
 mod names;
 mod photographs;
 mod rendering;
-mod studies;
+mod sessions;
 mod trade;

@@ -1,6 +1,7 @@
 //! The start page: the built-in room, a typed path, recent captures, and where to drop a folder.
 
 use crate::app::action::Action;
+use crate::app::shell::sessions;
 use crate::app::state::App;
 use crate::app::theme;
 use crate::session::command::Source;
@@ -28,6 +29,11 @@ pub fn page(ui: &mut Ui, app: &mut App) {
         drop_area(ui);
         ui.add_space(10.0);
         recent(ui, app);
+        if !app.snapshot.kept.is_empty() {
+            ui.add_space(10.0);
+            ui.weak("Sessions");
+            sessions::list(ui, app, 4);
+        }
     });
 }
 
