@@ -114,11 +114,10 @@ actions! {
     Delete, Edit, "Delete object", "Takes the chosen inserted object away", key(Key::Delete);
     NaiveBesideOurs, Edit, "Naive beside ours", "Shows the naive composite and ours side by side", None;
     WipeNaiveOurs, Edit, "Wipe naive and ours", "Shows the naive composite and ours under a wipe", ctrl(Key::W);
-    BeforeAfter, Edit, "Before and after", "Shows the photograph and the composite under a wipe", ctrl(Key::B);
-    Lights, Edit, "Light mixer", "Shows a switch, a strength and a colour for the light of each lamp", key(Key::L);
-    CompareRelit, Edit, "Before and after relighting", "Shows the re-render and the mixed light under a wipe", key(Key::B);
-    ResetMix, Edit, "Reset the light mixer", "Puts all lamps back to the light that was found", None;
-    KeepMix, Edit, "Give lamps this light", "Makes the mixed light the lamps' own emission, for exports and composites", None;
+    BeforeAfter, Edit, "Before and after", "Shows the photograph as taken and as it was changed under a wipe", key(Key::B);
+    WipeRender, Edit, "Wipe with the re-render", "Shows the re-render and the changed photograph under a wipe", ctrl(Key::B);
+    Lights, Edit, "Lights", "Shows a switch, a strength and a colour for the light of each lamp", key(Key::L);
+    ResetLights, Edit, "Reset all lights", "Puts all lamps and the light from outside back to what was found", None;
     Material, Edit, "Material", "Shows albedo, emission and gloss of the selected object, to be changed", key(Key::M);
     SwitchLamp, Edit, "Switch lamp off / on", "Switches the selected lamp off, or on again", key(Key::K);
     SolveOn, Solve, "Solve on with pinned values", "Holds the pinned values and solves the rest on from the last stage", ctrl_shift(Key::R);
@@ -150,6 +149,8 @@ actions! {
     JumpToFrame, View, "View from photograph", "Puts the 3D view's camera where the photograph was taken", key(Key::J);
     RenderFromHere, View, "Re-render from 3D view", "Re-renders from the 3D view's camera instead of the photograph's", key(Key::R);
 
+    Compose, Window, "Compose", "Shows the photograph as you change it, large", ctrl(Key::Num1);
+    Inspect, Window, "Inspect", "Shows all pictures of the view in a grid", ctrl(Key::Num2);
     Thumbnails, Window, "Thumbnails", "Shows or hides the strip of photographs", ctrl(Key::T);
     ResetLayout, Window, "Reset layout", "Puts all panes back where they were at first", None;
     Larger, Window, "Larger interface", "Makes everything in the window larger", ctrl(Key::Plus);

@@ -7,7 +7,7 @@ pub mod document;
 pub mod grouping;
 pub mod insertion;
 pub mod layout;
-pub mod mixer;
+pub mod lights;
 pub mod model;
 pub mod pace;
 pub mod panels;

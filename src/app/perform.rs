@@ -1,8 +1,7 @@
 //! What each action does, and when it makes sense.
 
 use crate::app::action::Action;
-use crate::app::layout::Pane;
-use crate::app::mixer::Mix;
+use crate::app::layout::{Pane, Workspace};
 use crate::app::model::lasso::Lasso;
 use crate::app::pick::Pick;
 use crate::app::picture::compare::Mode;
@@ -27,8 +26,7 @@ fn goes_by_object(action: Action) -> bool {
             | Action::SwitchLamp
             | Action::ResetMaterial
             | Action::ResetEdits
-            | Action::KeepMix
-            | Action::ResetMix
+            | Action::ResetLights
             | Action::SolveOn
             | Action::Save
             | Action::Export
@@ -56,7 +54,7 @@ impl App {
             Action::CutOut => self.can_regroup(),
             Action::SolveOn => !self.edits.known().is_empty(),
             Action::ResetEdits => !self.edits.is_empty(),
-            Action::KeepMix | Action::ResetMix => !self.mixer.mix.is_neutral(),
+            Action::ResetLights => self.lights_are_changed(),
             Action::SaveLayers => self.view().is_some_and(|view| view.layers.is_some()),
             Action::Place | Action::Duplicate | Action::Delete => self.insertions.chosen.is_some(),
             Action::MeasureTrade => self.trade.doing().is_some() || self.can_measure(),
@@ -72,7 +70,9 @@ impl App {
             | Action::InsertObject
             | Action::Lights
             | Action::Material
-            | Action::CompareRelit
+            | Action::BeforeAfter
+            | Action::WipeRender
+            | Action::WipeNaiveOurs
             | Action::RunPause
             | Action::Step
             | Action::Reset
@@ -121,17 +121,10 @@ impl App {
             Action::NaiveBesideOurs => {
                 self.compare_pictures(Mode::SideBySide, Quantity::Naive, Quantity::Composite);
             }
-            Action::WipeNaiveOurs => {
-                self.compare_pictures(Mode::Wipe, Quantity::Naive, Quantity::Composite);
-            }
-            Action::BeforeAfter => {
-                self.compare_pictures(Mode::Wipe, Quantity::Photograph, Quantity::Composite);
-            }
+            Action::WipeNaiveOurs => self.wipe_against(Quantity::Naive),
+            Action::BeforeAfter => self.wipe_against(Quantity::Photograph),
+            Action::WipeRender => self.wipe_against(Quantity::Render),
             Action::Lights => self.bring_forward = Some(Pane::Lights),
-            Action::CompareRelit => {
-                self.compare_pictures(Mode::Wipe, Quantity::Render, Quantity::Relit);
-            }
-            Action::KeepMix => self.keep_mix(),
             Action::Material => self.bring_forward = Some(Pane::Material),
             Action::SwitchLamp => self.switch_lamp(),
             Action::ResetMaterial => self.reset_material(),
@@ -145,7 +138,7 @@ impl App {
                 self.grouping.naming = true;
             }
             Action::ResetEdits => self.edits = Edits::default(),
-            Action::ResetMix => self.mixer.mix = Mix::default(),
+            Action::ResetLights => self.reset_lights(),
             Action::Deselect => {
                 // What covers the panes goes first.
                 let open = !matches!(self.sheet, Sheet::Closed);
@@ -196,6 +189,8 @@ impl App {
             Action::JumpToFrame => self.jump_to_frame(self.frame),
             Action::RenderFromHere => self.render_from_here(),
 
+            Action::Compose => self.preferences.workspace = Workspace::Compose,
+            Action::Inspect => self.preferences.workspace = Workspace::Inspect,
             Action::Thumbnails => self.preferences.thumbnails = !self.preferences.thumbnails,
             Action::ResetLayout => self.reset_layout = true,
             Action::Larger => self.resize(ctx, Some(1.0)),
@@ -257,6 +252,15 @@ impl App {
         self.compare.left = left;
         self.compare.right = right;
         self.bring_forward = Some(Pane::Compare);
+    }
+
+    /// Puts a picture beside the changed photograph under a wipe, or takes it away where it is there.
+    fn wipe_against(&mut self, quantity: Quantity) {
+        let shown = self.preferences.workspace == Workspace::Compose;
+        let again = shown && self.against == Some(quantity);
+        self.against = (!again).then_some(quantity);
+        self.preferences.workspace = Workspace::Compose;
+        self.bring_forward = Some(Pane::Picture(Quantity::Composite));
     }
 
     fn capture_name(&self) -> &str {

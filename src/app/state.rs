@@ -6,13 +6,13 @@ use crate::app::document::Document;
 use crate::app::grouping::Grouping;
 use crate::app::insertion::Insertions;
 use crate::app::layout::Pane;
-use crate::app::mixer::Mixer;
 use crate::app::model::view::ModelView;
 use crate::app::panels::objects::ObjectsTable;
 use crate::app::pick::Pick;
 use crate::app::picture::compare::Compare;
 use crate::app::picture::irradiance::Irradiance;
 use crate::app::picture::look::Look;
+use crate::app::picture::quantity::Quantity;
 use crate::app::picture::ramp;
 use crate::app::preferences::Preferences;
 use crate::app::shell::dialogs::{Ask, Dialogs};
@@ -24,6 +24,7 @@ use crate::app::shell::status::Memory;
 use crate::app::shell::thumbnails::Thumbnails;
 use crate::app::trade::TradeView;
 use crate::app::undo::History;
+use crate::capture::camera::Intrinsics;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::scene::camera::Camera;
@@ -55,6 +56,8 @@ pub struct App {
     pub look: Look,
     /// The two pictures compared.
     pub compare: Compare,
+    /// What is beside the photograph as it was changed, under a wipe.
+    pub against: Option<Quantity>,
     /// The chosen photograph.
     pub frame: usize,
     /// Whether pictures are of that photograph or of the 3D view.
@@ -63,8 +66,6 @@ pub struct App {
     pub selected: Option<u32>,
     /// The inserted objects.
     pub insertions: Insertions,
-    /// The light mixer.
-    pub mixer: Mixer,
     /// Which faces are one object.
     pub grouping: Grouping,
     /// Changes made by hand to what was found.
@@ -115,6 +116,8 @@ pub struct App {
     pub thumbnails: Thumbnails,
     /// The most pixels a pane showed along a side in this pass.
     pub pixels_needed: f32,
+    /// Whether a pane showed the photograph as it was changed in this pass.
+    pub composite_needed: bool,
     /// Whether a pane showed the light of each lamp apart in this pass.
     pub layers_needed: bool,
     /// Whether a pane showed the irradiance in this pass.
@@ -124,7 +127,7 @@ pub struct App {
     photograph: Option<(usize, Arc<Picture>)>,
     pending: VecDeque<Command>,
     opening: Option<Source>,
-    pub(super) sent_view: Option<(Option<usize>, u64, u32, bool)>,
+    pub(super) sent_view: Option<(Option<usize>, u64, u32, u32, bool)>,
     pub(super) sent_insertions: Vec<Placement>,
     sent_finish: bool,
     pub(super) sent_edits: Edits,
@@ -144,11 +147,11 @@ impl App {
             settings: Settings::default(),
             look,
             compare: Compare::default(),
+            against: None,
             frame: 0,
             shown: Shown::Frame,
             selected: None,
             insertions: Insertions::default(),
-            mixer: Mixer::default(),
             grouping: Grouping::default(),
             edits: Edits::default(),
             estimate: Arc::default(),
@@ -175,6 +178,7 @@ impl App {
             thumbnails: Thumbnails::default(),
             photograph: None,
             pixels_needed: 0.0,
+            composite_needed: false,
             layers_needed: false,
             irradiance_needed: false,
             irradiance: Irradiance::default(),
@@ -273,7 +277,7 @@ impl App {
             self.settle();
         }
         self.convert_photograph();
-        self.mix_light();
+        self.find_irradiance();
         self.take_trade();
         self.take_batch();
         self.take_models(ctx);
@@ -314,7 +318,6 @@ impl App {
         self.sent_view = None;
         self.photograph = None;
         self.insertions.take_up(&self.snapshot.inserted);
-        self.mixer = Mixer::default();
         self.grouping = Grouping::of(self.capture().map(Arc::as_ref));
         self.take_edits();
         self.sent_insertions = self.insertions.placements();
@@ -330,9 +333,7 @@ impl App {
         self.trade_of_capture();
     }
 
-    fn mix_light(&mut self) {
-        let layers = self.view().and_then(|view| view.layers.clone());
-        self.mixer.update(layers.as_ref());
+    fn find_irradiance(&mut self) {
         let view = self.view().filter(|_| self.irradiance_needed).cloned();
         self.irradiance.update(view.as_deref());
     }
@@ -376,15 +377,20 @@ impl App {
         let Some(camera) = self.camera() else {
             return;
         };
-        let long_side = render_size(camera, self.pixels_needed);
+        let side = |camera: &Intrinsics| camera.width.max(camera.height);
+        let long_side = render_size(side(&camera.intrinsics), self.pixels_needed);
+        let file = (self.capture())
+            .and_then(|open| open.capture.frames.get(self.frame))
+            .filter(|_| self.composite_needed);
+        let composite = file.map_or(0, |f| render_size(side(&f.intrinsics), self.pixels_needed));
         let layers = self.layers_needed;
         let (key, view) = match &self.shown {
             Shown::Frame => (
-                (Some(self.frame), 0, long_side, layers),
+                (Some(self.frame), 0, long_side, composite, layers),
                 ViewCamera::Frame(self.frame),
             ),
             Shown::Free(camera, count) => (
-                (None, *count, long_side, layers),
+                (None, *count, long_side, composite, layers),
                 ViewCamera::Free(camera.clone()),
             ),
         };
@@ -392,6 +398,7 @@ impl App {
             let request = ViewRequest {
                 camera: view,
                 long_side,
+                composite,
                 layers,
             };
             if self.connection.send(Command::View(request)) {
@@ -485,9 +492,8 @@ impl App {
     }
 }
 
-/// The smallest of a few sizes that fills the panes, and no more than the photograph has.
-fn render_size(camera: &Camera, needed: f32) -> u32 {
-    let full = camera.intrinsics.width.max(camera.intrinsics.height);
+/// The smallest of a few sizes that fills the panes, and no more than there is.
+fn render_size(full: u32, needed: f32) -> u32 {
     [256, 384, 512, 768, 1024, 1536, 2048]
         .into_iter()
         .find(|&size| size as f32 >= needed)

@@ -101,6 +101,8 @@ pub struct ViewRequest {
     pub camera: ViewCamera,
     /// Long side of the picture in pixels, at most the photograph's.
     pub long_side: u32,
+    /// Long side in pixels of the frame's photograph as it was changed, at most its file's; 0 where nobody looks at it.
+    pub composite: u32,
     /// Whether the light of each lamp is kept apart.
     pub layers: bool,
 }
@@ -121,8 +123,6 @@ pub struct ExportRequest {
     pub format: ExportFormat,
     /// Where.
     pub path: PathBuf,
-    /// The changes made by hand to write it with, where they are others than those sent before.
-    pub edits: Option<Edits>,
 }
 
 /// How a capture is read.

@@ -185,6 +185,7 @@ mod tests {
         Command::View(ViewRequest {
             camera: ViewCamera::Frame(frame),
             long_side: 64,
+            composite: 0,
             layers: false,
         })
     }

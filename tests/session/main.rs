@@ -137,6 +137,7 @@ impl Rig {
         assert!(self.session.send(Command::View(ViewRequest {
             camera,
             long_side,
+            composite: long_side,
             layers: false
         })));
     }
@@ -405,7 +406,10 @@ fn edits_show_at_once_are_saved_and_come_back_while_the_estimate_stays() {
     assert!(saved.to_rgb32f().pixels().all(|p| p.0 == [0.0; 3]));
     assert!(rig.session.send(Command::Edit(Edits::default())));
     rig.until("light again", |s| {
-        light(s).is_some_and(|l| l > 0.0) && s.insertion.is_none()
+        light(s).is_some_and(|l| l > 0.0)
+            && s.insertion
+                .as_ref()
+                .is_some_and(|i| i.samples.is_none() && i.composite == i.photograph)
     });
     assert!(rig.session.send(Command::Resume(out)));
     let resumed = rig.until("the edits again", |s| {
@@ -422,6 +426,7 @@ fn layers_are_shown_when_asked_for_and_add_up_to_the_render() {
     assert!(rig.session.send(Command::View(ViewRequest {
         camera: ViewCamera::Frame(0),
         long_side: 32,
+        composite: 0,
         layers: true,
     })));
     let shown = rig.until("layers", |s| {

@@ -234,10 +234,11 @@ pub fn insertion(frame: usize) -> Insertion {
     Insertion {
         sequence: 1,
         frame,
+        photograph: flat(0.5),
         composite: flat(0.9),
         naive: flat(0.6),
         naive_estimate: flat(0.7),
-        samples: 16,
+        samples: Some(16),
         seconds: 0.4,
     }
 }

@@ -217,10 +217,4 @@ fn results(ui: &mut Ui, app: &mut App) {
     .on_hover_text(
         "Makes objects as soft and as grainy as the 8-bit photograph that they are put into",
     );
-    if let Some(insertion) = &app.snapshot.insertion {
-        ui.weak(format!(
-            "{} samples a pixel, {:.1} s after the last change",
-            insertion.samples, insertion.seconds
-        ));
-    }
 }

@@ -45,11 +45,12 @@ impl App {
             matches!(self.shown, Shown::Frame) && insertion.frame == self.frame
         });
         let picture = match quantity {
-            Quantity::Photograph => view
-                .and_then(|view| view.photograph.clone())
+            // At the size at which it is looked at, where that is known.
+            Quantity::Photograph => (insertion.filter(|_| self.composite_needed))
+                .map(|insertion| insertion.photograph.clone())
+                .or_else(|| view.and_then(|view| view.photograph.clone()))
                 .or_else(|| self.photograph()),
             Quantity::Render => view.and_then(|view| view.render.clone()),
-            Quantity::Relit => self.mixer.picture(),
             Quantity::Albedo => view.and_then(|view| view.albedo.clone()),
             Quantity::Emission => view.and_then(|view| view.emission.clone()),
             Quantity::Irradiance => self.irradiance.picture(),
@@ -57,7 +58,9 @@ impl App {
             Quantity::StandardError => view.and_then(|view| view.stderr.clone()),
             Quantity::Naive => insertion.map(|insertion| insertion.naive.clone()),
             Quantity::NaiveEstimate => insertion.map(|insertion| insertion.naive_estimate.clone()),
-            Quantity::Composite => insertion.map(|insertion| insertion.composite.clone()),
+            Quantity::Composite => insertion
+                .map(|insertion| insertion.composite.clone())
+                .or_else(|| self.photograph()),
         }?;
         let range = match quantity.shading() {
             Shading::Signed | Shading::Positive => ramp::range(&picture),
@@ -113,18 +116,10 @@ pub fn missing(ui: &mut Ui, app: &App, quantity: Quantity) {
         Quantity::Error if !matches!(app.shown, Shown::Frame) => {
             "No photograph was taken from here"
         }
-        Quantity::Naive | Quantity::NaiveEstimate | Quantity::Composite => {
-            if !matches!(app.shown, Shown::Frame) {
-                "No photograph was taken from here"
-            } else if app.insertions.visible().is_empty() && app.edits.is_empty() {
-                "Insert an object, or change a lamp or a material, to see the composite"
-            } else if app.edits.is_empty() && app.insertions.none_can_be_read() {
-                "No inserted object can be read; the log says why"
-            } else {
-                "Compositing…"
-            }
+        Quantity::Composite if !matches!(app.shown, Shown::Frame) => {
+            "No photograph was taken from here"
         }
-        Quantity::Relit => "Tracing the light of each lamp…",
+        Quantity::Naive | Quantity::NaiveEstimate => "Compositing…",
         _ => "Waiting for the first picture…",
     };
     let surround = theme::tokens(ui).surround;
@@ -211,7 +206,10 @@ fn on_screen(camera: &Camera, placement: Rect, point: glam::Vec3) -> Option<Pos2
 impl App {
     /// Notes that a picture is shown, for what has to be made for it.
     pub fn need(&mut self, quantity: Quantity) {
-        self.layers_needed |= quantity == Quantity::Relit;
+        self.composite_needed |= matches!(
+            quantity,
+            Quantity::Composite | Quantity::Naive | Quantity::NaiveEstimate
+        );
         self.irradiance_needed |= quantity == Quantity::Irradiance;
     }
 

@@ -32,8 +32,6 @@ pub enum Sheet {
         format: usize,
         /// Where a probe is taken, in the capture's coordinates.
         at: DVec3,
-        /// Whether the light mixer counts.
-        mixed: bool,
     },
     /// Saving photographs.
     Photographs(Wanted),
@@ -115,7 +113,6 @@ impl Sheet {
             file: format!("{}.{}", file_name(name), FORMATS[0].ending()),
             format: 0,
             at,
-            mixed: true,
         }
     }
 
@@ -126,7 +123,6 @@ impl Sheet {
             file: format!("{}-light.{}", file_name(name), FORMATS[last].ending()),
             format: last,
             at,
-            mixed: true,
         }
     }
 
@@ -173,12 +169,7 @@ pub fn show(ctx: &egui::Context, app: &mut App) {
             Sheet::Closed => true,
             Sheet::Save { folder } => save(ui, app, folder),
             Sheet::Layers { file } => layers(ui, app, file),
-            Sheet::Export {
-                file,
-                format,
-                at,
-                mixed,
-            } => export(ui, app, file, format, at, mixed),
+            Sheet::Export { file, format, at } => export(ui, app, file, format, at),
             Sheet::Length { found, metres } => length(ui, app, *found, metres),
             Sheet::Photographs(wanted) => photographs::sheet(ui, app, wanted),
         };
@@ -193,11 +184,6 @@ pub fn show(ctx: &egui::Context, app: &mut App) {
 fn save(ui: &mut Ui, app: &mut App, folder: &mut String) -> bool {
     ui.heading("Save results");
     ui.label("Estimate, report, loss, scene and pictures, as `relit solve` writes them.");
-    if !app.mixer.mix.is_neutral() {
-        ui.weak(
-            "The light mixer is saved once “Give lamps this light” has made it the lamps’ own.",
-        );
-    }
     let entered = path_field(ui, app, "Folder", folder, Ask::SaveFolder);
     let (clicked, cancel) = buttons(ui, "Save", !folder.trim().is_empty());
     let go = (clicked || entered) && !folder.trim().is_empty();
@@ -229,7 +215,6 @@ fn export(
     file: &mut String,
     chosen: &mut usize,
     at: &mut DVec3,
-    with_mix: &mut bool,
 ) -> bool {
     ui.heading("Export");
     ui.horizontal_wrapped(|ui| {
@@ -251,7 +236,6 @@ fn export(
     if matches!(format.format, ExportFormat::Probe { .. }) {
         probe_point(ui, app, at);
     }
-    mixed(ui, app, with_mix);
     let entered = path_field(ui, app, "File", file, Ask::ExportFile);
     let (clicked, cancel) = buttons(ui, "Export", !file.trim().is_empty());
     let go = (clicked || entered) && !file.trim().is_empty();
@@ -260,24 +244,12 @@ fn export(
             ExportFormat::Probe { .. } => ExportFormat::Probe { at: *at },
             other => other,
         };
-        let edits = with_mix.then(|| app.mixed_edits());
         app.send(Command::Export(ExportRequest {
             format,
-            edits: edits.filter(|edits| *edits != app.edits),
             path: PathBuf::from(file.trim()),
         }));
     }
     go || cancel
-}
-
-/// Offers to write in the light of the mixer, where that is another than the lamps' own.
-pub(super) fn mixed(ui: &mut Ui, app: &App, mixed: &mut bool) {
-    if !app.mixer.mix.is_neutral() {
-        ui.checkbox(mixed, "In the light of the mixer")
-            .on_hover_text(
-                "As the pane Lights sets the lamps; the lamps themselves stay as they are",
-            );
-    }
 }
 
 /// Draws the sheet for a length; true when it is to close.

@@ -258,7 +258,7 @@ fn difference(render: &Picture, photograph: &Picture) -> Picture {
 }
 
 /// Whether two estimates look different: a colour by more than 1 % of its range.
-fn differs(a: &Estimate, b: &Estimate) -> bool {
+pub fn differs(a: &Estimate, b: &Estimate) -> bool {
     if a.objects.len() != b.objects.len() || a.outside != b.outside {
         return true;
     }

@@ -14,7 +14,6 @@ use crate::session::view::sized::box_filter;
 use crate::session::worker::state::Worker;
 use crate::session::worker::work::{Begin, Next};
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Duration;
 
 /// How long views have more of the solver's time after another one was asked for …
@@ -106,9 +105,11 @@ impl Worker {
             Command::Set(settings) => self.settings = *settings,
             Command::View(request) => {
                 self.answer_for(LOOKED);
-                if let ViewCamera::Frame(frame) = request.camera {
-                    self.inserting.look(frame);
-                }
+                let frame = match request.camera {
+                    ViewCamera::Frame(frame) => frame,
+                    ViewCamera::Free(_) => self.inserting.frame(),
+                };
+                self.inserting.look(frame, request.composite);
                 self.views.look(request);
             }
             Command::Insert(placements) => {
@@ -238,10 +239,7 @@ impl Worker {
             return;
         };
         let path = &request.path;
-        let estimate = match &request.edits {
-            Some(edits) => Arc::new(edits.apply(&self.estimate)),
-            None => self.edited(),
-        };
+        let estimate = self.edited();
         match scene::write(&capture.scene, &estimate, request.format, path) {
             Ok(()) => {
                 self.say(Level::Info, format!("exported to {}", path.display()));

@@ -91,6 +91,7 @@ impl Worker {
         self.inserting.place(held.inserted.clone());
         self.inserted = Arc::new(held.inserted);
         self.frame = held.frame;
+        self.inserting.turn_to(held.frame);
         self.edits = earlier.edits;
         self.estimate = Arc::new(earlier.estimate);
         self.settings = earlier.saved.settings;

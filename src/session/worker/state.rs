@@ -154,7 +154,8 @@ impl Worker {
         let light = Light::new(self.estimate.clone(), self.edited(), &self.settings);
         let estimate = &light.edited;
         // Views and composites share what there is.
-        let composites = !estimate.objects.is_empty() && self.inserting.is_busy();
+        self.inserting.follow(&light);
+        let composites = self.inserting.is_busy();
         let share = match composites && share < 1.0 {
             true => share * 0.5,
             false => share,

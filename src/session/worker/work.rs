@@ -261,6 +261,7 @@ impl Worker {
         let frame = self.inserting.frame();
         self.adopt(capture);
         self.frame = frame;
+        self.inserting.turn_to(frame);
         self.inserting.place(inserted.clone());
         self.inserted = Arc::new(inserted);
         self.keeper.touch();
@@ -316,7 +317,6 @@ impl Worker {
                 self.keeper.touch();
                 let edited = self.edited();
                 self.views.refresh(&edited);
-                self.inserting.update();
             }
             Ok(Err(error)) => {
                 self.phase = Phase::Failed;
