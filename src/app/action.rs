@@ -174,8 +174,9 @@ impl Action {
 /// The actions whose keys were pressed this frame, taken out of the input.
 ///
 /// Plain keys are left to a focused text field.
-pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
-    let typing = ctx.text_edit_focused();
+pub fn pressed(ctx: &egui::Context, start_page: bool) -> Vec<Action> {
+    // On the start page every letter belongs to the path.
+    let typing = start_page || ctx.text_edit_focused();
     let mut actions = Vec::new();
     // Longer combinations first, so that Ctrl+Shift+Z is not taken for Ctrl+Z.
     let mut by_length: Vec<Action> = Action::ALL.to_vec();

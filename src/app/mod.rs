@@ -9,6 +9,7 @@ pub mod insertion;
 pub mod layout;
 pub mod lights;
 pub mod model;
+pub mod opening;
 pub mod pace;
 pub mod panels;
 mod perform;

@@ -7,13 +7,14 @@ use crate::app::grouping::Grouping;
 use crate::app::insertion::Insertions;
 use crate::app::layout::Pane;
 use crate::app::model::view::ModelView;
+use crate::app::opening::Importing;
 use crate::app::panels::objects::ObjectsTable;
 use crate::app::pick::Pick;
 use crate::app::picture::compare::Compare;
 use crate::app::picture::irradiance::Irradiance;
 use crate::app::picture::look::Look;
 use crate::app::picture::quantity::Quantity;
-use crate::app::picture::ramp;
+use crate::app::picture::ramp::{self, Scales};
 use crate::app::preferences::Preferences;
 use crate::app::shell::dialogs::{Ask, Dialogs};
 use crate::app::shell::files::Sheet;
@@ -31,6 +32,7 @@ use crate::scene::camera::Camera;
 use crate::session::command::{Command, Placement, Source, ViewCamera, ViewRequest};
 use crate::session::edits::{Edited, Edits};
 use crate::session::snapshot::{Level, OpenCapture, Phase, Picture, Snapshot};
+use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -56,6 +58,8 @@ pub struct App {
     pub look: Look,
     /// The two pictures compared.
     pub compare: Compare,
+    /// The ends of the scales of false colours.
+    pub scales: RefCell<Scales>,
     /// What is beside the photograph as it was changed, under a wipe.
     pub against: Option<Quantity>,
     /// The chosen photograph.
@@ -100,6 +104,10 @@ pub struct App {
     pub start_page: bool,
     /// The capture's path as typed.
     pub path: String,
+    /// Why nothing was opened, with the remedy.
+    pub trouble: Option<String>,
+    /// A scan that is being imported.
+    pub importing: Option<Importing>,
     /// What is remembered between runs.
     pub preferences: Preferences,
     /// How large everything was made, once it was.
@@ -147,6 +155,7 @@ impl App {
             settings: Settings::default(),
             look,
             compare: Compare::default(),
+            scales: RefCell::default(),
             against: None,
             frame: 0,
             shown: Shown::Frame,
@@ -169,6 +178,8 @@ impl App {
             keys: false,
             start_page: false,
             path: String::new(),
+            trouble: None,
+            importing: None,
             preferences,
             size: None,
             grows: false,
@@ -206,6 +217,7 @@ impl App {
     /// Opens a capture.
     pub fn open(&mut self, source: Source) {
         self.start_page = false;
+        self.trouble = None;
         self.opening = Some(source.clone());
         self.send(Command::Open(source));
     }
@@ -213,14 +225,6 @@ impl App {
     /// Notes what the session was started with.
     pub fn opened_with(&mut self, source: Option<Source>) {
         self.opening = source;
-    }
-
-    /// Opens the folder whose path was typed.
-    pub fn open_typed(&mut self) {
-        let path = self.path.trim();
-        if !path.is_empty() {
-            self.open(Source::Folder(PathBuf::from(path)));
-        }
     }
 
     /// What is open.
@@ -234,6 +238,27 @@ impl App {
             || (self.capture().is_none()
                 && matches!(self.snapshot.phase, Phase::Idle | Phase::Failed)
                 && self.opening.is_none())
+    }
+
+    /// Why nothing is open, in words.
+    pub fn nothing_open(&self) -> &'static str {
+        match self.snapshot.phase {
+            Phase::Loading => "Reading the capture…",
+            _ if self.opening.is_some() => "Reading the capture…",
+            _ => "No capture is open",
+        }
+    }
+
+    /// The unit of radiance: relative where photographs of 8 or 16 bits leave the scale open.
+    pub fn radiance_unit(&self) -> &'static str {
+        let relative = |capture: &Arc<OpenCapture>| {
+            let mut photographs = capture.photographs.iter();
+            photographs.any(|photograph| photograph.saturation.is_finite())
+        };
+        match self.capture().is_some_and(relative) {
+            true => "relative units",
+            false => "W/(sr·m²)",
+        }
     }
 
     /// Number of photographs.
@@ -271,7 +296,7 @@ impl App {
             self.take(snapshot);
         }
         while let Some((ask, answer)) = self.dialogs.take() {
-            self.answered(ask, answer);
+            self.answered(ask, answer, ctx);
         }
         if !ctx.input(|input| input.pointer.any_down()) {
             self.settle();
@@ -280,6 +305,7 @@ impl App {
         self.find_irradiance();
         self.take_trade();
         self.take_batch();
+        self.take_import();
         self.take_models(ctx);
         self.request();
         self.send_grouping();
@@ -302,7 +328,11 @@ impl App {
             self.settings = self.snapshot.settings.clone();
         }
         if self.snapshot.phase == Phase::Failed {
-            self.opening = None;
+            // Said where the person looks.
+            if self.opening.take().is_some() && self.capture().is_none() {
+                let errors = events.iter().rev().filter(|e| e.level == Level::Error);
+                self.trouble = errors.map(|event| event.message.clone()).next();
+            }
         }
         if !self.take_grouping(&before) && other_capture {
             self.capture_changed();
@@ -323,6 +353,7 @@ impl App {
         self.sent_insertions = self.insertions.placements();
         self.model = ModelView::default();
         self.look.fit();
+        self.scales = RefCell::default();
         if self.capture().is_some() {
             if let Some(Source::Folder(folder)) = self.opening.take() {
                 self.preferences.opened(&folder);
@@ -426,7 +457,7 @@ impl App {
         }
     }
 
-    fn answered(&mut self, ask: Ask, answer: Option<PathBuf>) {
+    fn answered(&mut self, ask: Ask, answer: Option<PathBuf>, ctx: &egui::Context) {
         let Some(path) = answer else {
             self.notices.say(
                 Level::Info,
@@ -440,57 +471,80 @@ impl App {
             return;
         };
         match ask {
-            Ask::Capture => self.open(Source::Folder(path)),
+            Ask::Capture => self.open_path(&path, ctx),
             Ask::SaveFolder | Ask::ExportFile => self.sheet.chosen(ask, path),
             Ask::Object => self.insert(path),
         }
     }
 
-    /// Adds an object, at first where the middle of the view meets the scene.
+    /// Adds an object once its file is read; one that cannot be read is said and joins nothing.
     pub fn insert(&mut self, file: PathBuf) {
-        let below_middle = egui::pos2(0.5, 0.65);
-        let at = self.surface_at(below_middle).map(|at| at.point);
-        self.insertions.add(file, at);
+        self.insertions.trouble = None;
+        if crate::app::insertion::is_object(&file) {
+            self.insertions.wanted.push(file);
+        } else {
+            let problem = "is no object that can be inserted; save it as GLB, glTF or OBJ";
+            self.insertions.trouble = Some(format!("{}: {problem}", file.display()));
+        }
     }
 
-    /// Takes in the shapes of inserted objects, and scales down what is larger than the scene as modelled.
+    /// Where an added object stands at first: on what lies level in the shown view, as near to its middle as can be.
+    fn free_place(&self) -> Option<glam::DVec3> {
+        let up = self.capture()?.scene.up.as_dvec3();
+        let columns = [0.5, 0.4, 0.6, 0.3, 0.7];
+        let rows = (0..9).map(|row| 0.55 + 0.05 * row as f32);
+        let places = rows.flat_map(|y| columns.map(|x| egui::pos2(x, y)));
+        let seen: Vec<_> = places.filter_map(|at| self.surface_at(at)).collect();
+        let level = seen.iter().filter(|at| at.normal.dot(up) > LEVEL);
+        // The lowest of them is the floor, within a step of the scene's size.
+        let step = f64::from(self.capture()?.scene.diameter) * 0.01;
+        let lowest = (level.clone().map(|at| at.point.dot(up))).fold(f64::INFINITY, f64::min);
+        let floor = level.clone().find(|at| at.point.dot(up) < lowest + step);
+        floor.or(seen.first()).map(|at| at.point)
+    }
+
+    /// Takes in the shapes of objects' files: those that were waited for join, scaled down where larger than the scene.
     fn take_models(&mut self, ctx: &egui::Context) {
         let Some(capture) = self.capture().cloned() else {
             return;
         };
-        for file in self.insertions.models.update(ctx, &self.insertions.objects) {
-            let Some(scale) = self.insertions.models.fitting_scale(&file, &capture.scene) else {
-                continue;
-            };
-            for object in &mut self.insertions.objects {
-                if object.placement.file == file && object.placement.scale == 1.0 {
-                    object.placement.scale = scale;
-                    let message = format!(
-                        "{} is larger than the scene, so it was scaled by {scale}",
-                        object.name()
-                    );
-                    self.notices.say(Level::Info, message);
+        let insertions = &mut self.insertions;
+        let mut ready: Vec<PathBuf> = Vec::new();
+        for (file, read) in insertions.models.update(ctx, &insertions.objects) {
+            match read {
+                Ok(()) => {}
+                Err(why) if insertions.wanted.contains(&file) => {
+                    insertions.wanted.retain(|wanted| *wanted != file);
+                    insertions.trouble = Some(why);
                 }
+                // The worker says why, and takes it away.
+                Err(_) => {}
+            }
+        }
+        let wanted = std::mem::take(&mut insertions.wanted);
+        for file in wanted {
+            match insertions.models.ask(ctx, &file) {
+                true => ready.push(file),
+                false => insertions.wanted.push(file),
+            }
+        }
+        for file in ready {
+            let at = self.free_place();
+            self.insertions.add(file.clone(), at);
+            let scale = self.insertions.models.fitting_scale(&file, &capture.scene);
+            if let Some((scale, object)) = scale.zip(self.insertions.chosen()) {
+                object.placement.scale = scale;
+                let name = object.name();
+                let message =
+                    format!("{name} is larger than the scene, so it was scaled by {scale}");
+                self.notices.say(Level::Info, message);
             }
         }
     }
-
-    /// Opens a dropped folder, or inserts a dropped object.
-    pub fn dropped(&mut self, path: PathBuf) {
-        if crate::app::insertion::is_object(&path) {
-            self.insert(path);
-            self.bring_forward = Some(Pane::Insert);
-            return;
-        }
-        // The folder of a dropped transforms.json is the capture.
-        let folder = if path.is_file() {
-            path.parent().map_or(path.clone(), PathBuf::from)
-        } else {
-            path
-        };
-        self.open(Source::Folder(folder));
-    }
 }
+
+/// The cosine of the steepest surface that an object is put on.
+const LEVEL: f64 = 0.9;
 
 /// The smallest of a few sizes that fills the panes, and no more than there is.
 fn render_size(full: u32, needed: f32) -> u32 {

@@ -167,13 +167,13 @@ impl eframe::App for Window {
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
         if self.app.palette.is_none() {
-            for action in action::pressed(&ctx) {
+            for action in action::pressed(&ctx, self.app.shows_start_page()) {
                 self.app.perform(action, &ctx);
             }
         }
         let dropped = ctx.input(|input| input.raw.dropped_files.clone());
         for path in dropped.iter().map(|file| file.path().to_owned()) {
-            self.app.dropped(path);
+            self.app.open_path(&path, &ctx);
         }
         if !ctx.input(|input| input.pointer.has_pointer()) {
             self.app.look.cursor = None;

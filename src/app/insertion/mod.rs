@@ -40,6 +40,10 @@ pub struct Insertions {
     pub finish: bool,
     /// The path as typed.
     pub path: String,
+    /// Files that are read before they join the objects.
+    pub wanted: Vec<PathBuf>,
+    /// Why the last file did not join them.
+    pub trouble: Option<String>,
     /// The shapes of the objects' files.
     pub models: Models,
 }
@@ -53,6 +57,8 @@ impl Default for Insertions {
             dragged: None,
             finish: true,
             path: String::new(),
+            wanted: Vec::new(),
+            trouble: None,
             models: Models::default(),
         }
     }
@@ -144,13 +150,6 @@ impl Insertions {
         let mut visible = self.placements();
         visible.retain(|placement| !placement.hidden);
         visible
-    }
-
-    /// Whether objects are shown, and the file of each was tried in vain.
-    pub fn none_can_be_read(&self) -> bool {
-        let shown = self.visible();
-        let unreadable = |placement: &Placement| self.models.is_unreadable(&placement.file);
-        !shown.is_empty() && shown.iter().all(unreadable)
     }
 
     /// Replaces all objects, as undo does.

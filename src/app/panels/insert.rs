@@ -11,11 +11,14 @@ use std::path::PathBuf;
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, app: &mut App) {
     let Some(capture) = app.capture().cloned() else {
-        ui.weak("No capture is open");
+        ui.weak(app.nothing_open());
         return;
     };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         add(ui, app);
+        if let Some(trouble) = &app.insertions.trouble {
+            ui.colored_label(theme::tokens(ui).error, trouble);
+        }
         if app.insertions.objects.is_empty() {
             ui.add_space(theme::GAP);
             ui.weak("OBJ and GLB files can also be dropped on the window. Then click where the object should stand.");
@@ -26,6 +29,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         ui.separator();
         actions(ui, app);
         edit(ui, app, f64::from(capture.scene.diameter));
+        size(ui, app);
         ui.separator();
         results(ui, app);
     });
@@ -190,6 +194,20 @@ fn edit(ui: &mut Ui, app: &mut App, diameter: f64) {
             ui.end_row();
         }
     });
+}
+
+/// How large the chosen object is.
+fn size(ui: &mut Ui, app: &mut App) {
+    let Some(object) = app.insertions.chosen().cloned() else {
+        return;
+    };
+    let placement = &object.placement;
+    if let Some(size) = app.insertions.models.size(&placement.file) {
+        let [width, height, depth] = (size * placement.scale).to_array();
+        ui.weak(format!(
+            "{width:.2} m wide, {height:.2} m high, {depth:.2} m deep"
+        ));
+    }
 }
 
 /// The ways to look at what came out.

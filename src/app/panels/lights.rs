@@ -21,7 +21,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         return;
     }
     let Some(capture) = app.capture().cloned() else {
-        ui.weak("No capture is open");
+        ui.weak(app.nothing_open());
         return;
     };
     app.layers_needed = true;

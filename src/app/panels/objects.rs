@@ -33,7 +33,7 @@ const COLUMNS: [(SortBy, &str, &str); 5] = [
         "±",
         "Standard error of the albedo, mean over RGB",
     ),
-    (SortBy::Emission, "Emission", "Emitted radiance, W/(sr·m²)"),
+    (SortBy::Emission, "Emission", "Emitted radiance"),
     (
         SortBy::Pixels,
         "Pixels",
@@ -101,10 +101,10 @@ impl ObjectsTable {
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, app: &mut App) {
     let Some(capture) = app.capture().cloned() else {
-        ui.weak("No capture is open");
+        ui.weak(app.nothing_open());
         return;
     };
-    let estimate = app.estimate.clone();
+    let (estimate, unit) = (app.estimate.clone(), app.radiance_unit());
     let names: Vec<&str> = capture
         .scene
         .objects
@@ -166,7 +166,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
                 if response.clicked() {
                     clicked = Some(object as u32);
                 }
-                response.on_hover_ui(|ui| details(ui, names[object], found));
+                response.on_hover_ui(|ui| details(ui, names[object], found, unit));
             });
         });
     if let Some(object) = clicked {
@@ -292,7 +292,7 @@ fn cells(row: &mut egui_extras::TableRow<'_, '_>, name: &str, object: &ObjectEst
     });
 }
 
-fn details(ui: &mut Ui, name: &str, object: &ObjectEstimate) {
+fn details(ui: &mut Ui, name: &str, object: &ObjectEstimate, unit: &str) {
     ui.strong(name);
     ui.label(format!(
         "albedo {} ± {}",
@@ -300,7 +300,7 @@ fn details(ui: &mut Ui, name: &str, object: &ObjectEstimate) {
         triple(object.albedo_stderr)
     ));
     ui.label(format!(
-        "emission {} ± {} W/(sr·m²)",
+        "emission {} ± {} {unit}",
         triple(object.emission),
         triple(object.emission_stderr)
     ));

@@ -63,7 +63,10 @@ impl App {
                 .or_else(|| self.photograph()),
         }?;
         let range = match quantity.shading() {
-            Shading::Signed | Shading::Positive => ramp::range(&picture),
+            Shading::Signed | Shading::Positive => {
+                let now = ramp::range(&picture, quantity.shading());
+                self.scales.borrow_mut().follow(quantity, now)
+            }
             _ => 1.0,
         };
         let objects = view
@@ -111,7 +114,7 @@ pub fn pane(ui: &mut Ui, app: &mut App, quantity: Quantity) {
 /// Says why there is no picture.
 pub fn missing(ui: &mut Ui, app: &App, quantity: Quantity) {
     let text = match quantity {
-        _ if app.capture().is_none() => "No capture is open",
+        _ if app.capture().is_none() => app.nothing_open(),
         Quantity::Photograph => "No photograph was taken from here",
         Quantity::Error if !matches!(app.shown, Shown::Frame) => {
             "No photograph was taken from here"

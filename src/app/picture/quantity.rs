@@ -93,12 +93,12 @@ impl Quantity {
         }
     }
 
-    /// Unit of its numbers, or empty.
-    pub fn unit(self) -> &'static str {
-        match self {
-            Self::Albedo | Self::StandardError => "",
-            Self::Irradiance => "W/m²",
-            _ => "W/(sr·m²)",
+    /// Unit of its numbers, or empty, where radiance is measured in a unit.
+    pub fn unit(self, radiance: &'static str) -> &'static str {
+        match (self, radiance) {
+            (Self::Albedo | Self::StandardError, _) => "",
+            (Self::Irradiance, "W/(sr·m²)") => "W/m²",
+            _ => radiance,
         }
     }
 

@@ -49,7 +49,7 @@ pub fn sheet(ui: &mut Ui, app: &mut App, wanted: &mut Wanted) -> bool {
     ui.horizontal(|ui| {
         let count = app.frames();
         ui.radio_value(&mut wanted.all, true, format!("All {count} photographs"));
-        let shown = format!("Photograph {} alone", app.frame + 1);
+        let shown = format!("Photograph {} alone, as {:03}", app.frame + 1, app.frame);
         ui.radio_value(&mut wanted.all, false, shown);
     });
     ui.horizontal(|ui| {

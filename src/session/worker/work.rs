@@ -312,7 +312,13 @@ impl Worker {
                 // A solve that another command ends is not at its end: a session goes on with it.
                 self.phase = match solution.termination {
                     Termination::Cancelled if !matches!(next, Next::Wait) => held,
-                    ended => Phase::Finished(ended),
+                    ended => {
+                        let seconds = self.progress.seconds;
+                        let said =
+                            format!("the solve ended after {seconds:.1} s: {}", ended.word());
+                        self.say(Level::Info, said);
+                        Phase::Finished(ended)
+                    }
                 };
                 self.keeper.touch();
                 let edited = self.edited();
