@@ -93,6 +93,7 @@ const fn ctrl_shift(key: Key) -> Option<KeyboardShortcut> {
 actions! {
     OpenFolder, File, "Open capture…", "Chooses a capture's folder with a file dialog", ctrl(Key::O);
     OpenRoom, File, "Open built-in room", "Opens the room that is built into the program", ctrl_shift(Key::O);
+    Sessions, File, "Sessions…", "Lists all sessions that are kept, to go on with one", None;
     StartPage, File, "Start page", "Shows recent captures and the field for a typed path", ctrl(Key::N);
     Save, File, "Save results…", "Writes estimate, report and pictures into a folder", ctrl(Key::S);
     Export, File, "Export…", "Writes one file for another program", ctrl(Key::E);

@@ -3,6 +3,7 @@
 pub mod action;
 pub mod batch;
 pub mod connection;
+pub mod describe;
 pub mod document;
 pub mod grouping;
 pub mod insertion;

@@ -95,6 +95,7 @@ impl App {
         match action {
             Action::OpenFolder => self.ask(Ask::Capture, ctx),
             Action::OpenRoom => self.open(Source::BuiltInRoom),
+            Action::Sessions => self.sheet = Sheet::Sessions,
             Action::StartPage => self.start_page = !self.start_page,
             Action::Save => self.sheet = Sheet::save(self.capture_name()),
             Action::Export => self.sheet = Sheet::export(self.capture_name(), self.probe_point()),

@@ -126,6 +126,8 @@ pub struct App {
     pub pixels_needed: f32,
     /// Whether a pane showed the photograph as it was changed in this pass.
     pub composite_needed: bool,
+    /// Whether a pane showed the re-render, or what is made of it, in this pass.
+    pub render_needed: bool,
     /// Whether a pane showed the light of each lamp apart in this pass.
     pub layers_needed: bool,
     /// Whether a pane showed the irradiance in this pass.
@@ -135,7 +137,7 @@ pub struct App {
     photograph: Option<(usize, Arc<Picture>)>,
     pending: VecDeque<Command>,
     opening: Option<Source>,
-    pub(super) sent_view: Option<(Option<usize>, u64, u32, u32, bool)>,
+    pub(super) sent_view: Option<(Option<usize>, u64, u32, u32, bool, bool)>,
     pub(super) sent_insertions: Vec<Placement>,
     sent_finish: bool,
     pub(super) sent_edits: Edits,
@@ -190,6 +192,7 @@ impl App {
             photograph: None,
             pixels_needed: 0.0,
             composite_needed: false,
+            render_needed: false,
             layers_needed: false,
             irradiance_needed: false,
             irradiance: Irradiance::default(),
@@ -414,14 +417,14 @@ impl App {
             .and_then(|open| open.capture.frames.get(self.frame))
             .filter(|_| self.composite_needed);
         let composite = file.map_or(0, |f| render_size(side(&f.intrinsics), self.pixels_needed));
-        let layers = self.layers_needed;
+        let (render, layers) = (self.render_needed, self.layers_needed);
         let (key, view) = match &self.shown {
             Shown::Frame => (
-                (Some(self.frame), 0, long_side, composite, layers),
+                (Some(self.frame), 0, long_side, composite, render, layers),
                 ViewCamera::Frame(self.frame),
             ),
             Shown::Free(camera, count) => (
-                (None, *count, long_side, composite, layers),
+                (None, *count, long_side, composite, render, layers),
                 ViewCamera::Free(camera.clone()),
             ),
         };
@@ -430,6 +433,7 @@ impl App {
                 camera: view,
                 long_side,
                 composite,
+                render,
                 layers,
             };
             if self.connection.send(Command::View(request)) {
@@ -476,75 +480,7 @@ impl App {
             Ask::Object => self.insert(path),
         }
     }
-
-    /// Adds an object once its file is read; one that cannot be read is said and joins nothing.
-    pub fn insert(&mut self, file: PathBuf) {
-        self.insertions.trouble = None;
-        if crate::app::insertion::is_object(&file) {
-            self.insertions.wanted.push(file);
-        } else {
-            let problem = "is no object that can be inserted; save it as GLB, glTF or OBJ";
-            self.insertions.trouble = Some(format!("{}: {problem}", file.display()));
-        }
-    }
-
-    /// Where an added object stands at first: on what lies level in the shown view, as near to its middle as can be.
-    fn free_place(&self) -> Option<glam::DVec3> {
-        let up = self.capture()?.scene.up.as_dvec3();
-        let columns = [0.5, 0.4, 0.6, 0.3, 0.7];
-        let rows = (0..9).map(|row| 0.55 + 0.05 * row as f32);
-        let places = rows.flat_map(|y| columns.map(|x| egui::pos2(x, y)));
-        let seen: Vec<_> = places.filter_map(|at| self.surface_at(at)).collect();
-        let level = seen.iter().filter(|at| at.normal.dot(up) > LEVEL);
-        // The lowest of them is the floor, within a step of the scene's size.
-        let step = f64::from(self.capture()?.scene.diameter) * 0.01;
-        let lowest = (level.clone().map(|at| at.point.dot(up))).fold(f64::INFINITY, f64::min);
-        let floor = level.clone().find(|at| at.point.dot(up) < lowest + step);
-        floor.or(seen.first()).map(|at| at.point)
-    }
-
-    /// Takes in the shapes of objects' files: those that were waited for join, scaled down where larger than the scene.
-    fn take_models(&mut self, ctx: &egui::Context) {
-        let Some(capture) = self.capture().cloned() else {
-            return;
-        };
-        let insertions = &mut self.insertions;
-        let mut ready: Vec<PathBuf> = Vec::new();
-        for (file, read) in insertions.models.update(ctx, &insertions.objects) {
-            match read {
-                Ok(()) => {}
-                Err(why) if insertions.wanted.contains(&file) => {
-                    insertions.wanted.retain(|wanted| *wanted != file);
-                    insertions.trouble = Some(why);
-                }
-                // The worker says why, and takes it away.
-                Err(_) => {}
-            }
-        }
-        let wanted = std::mem::take(&mut insertions.wanted);
-        for file in wanted {
-            match insertions.models.ask(ctx, &file) {
-                true => ready.push(file),
-                false => insertions.wanted.push(file),
-            }
-        }
-        for file in ready {
-            let at = self.free_place();
-            self.insertions.add(file.clone(), at);
-            let scale = self.insertions.models.fitting_scale(&file, &capture.scene);
-            if let Some((scale, object)) = scale.zip(self.insertions.chosen()) {
-                object.placement.scale = scale;
-                let name = object.name();
-                let message =
-                    format!("{name} is larger than the scene, so it was scaled by {scale}");
-                self.notices.say(Level::Info, message);
-            }
-        }
-    }
 }
-
-/// The cosine of the steepest surface that an object is put on.
-const LEVEL: f64 = 0.9;
 
 /// The smallest of a few sizes that fills the panes, and no more than there is.
 fn render_size(full: u32, needed: f32) -> u32 {

@@ -118,6 +118,7 @@ impl Window {
                 }
                 self.app.pixels_needed = 0.0;
                 self.app.composite_needed = false;
+                self.app.render_needed = false;
                 self.app.layers_needed = false;
                 self.app.irradiance_needed = false;
                 let mut panes = Panes {

@@ -103,6 +103,8 @@ pub struct ViewRequest {
     pub long_side: u32,
     /// Long side in pixels of the frame's photograph as it was changed, at most its file's; 0 where nobody looks at it.
     pub composite: u32,
+    /// Whether anybody looks at the re-render; without it there is a coarse one alone.
+    pub render: bool,
     /// Whether the light of each lamp is kept apart.
     pub layers: bool,
 }

@@ -186,6 +186,7 @@ mod tests {
             camera: ViewCamera::Frame(frame),
             long_side: 64,
             composite: 0,
+            render: true,
             layers: false,
         })
     }

@@ -50,6 +50,7 @@ fn opening_goes_on_with_the_last_session_and_its_changes_objects_and_photograph(
         camera: ViewCamera::Frame(1),
         long_side: 16,
         composite: 16,
+        render: true,
         layers: false,
     })));
     assert!(rig.session.send(Command::Edit(edits.clone())));

@@ -138,6 +138,7 @@ impl Rig {
             camera,
             long_side,
             composite: long_side,
+            render: true,
             layers: false
         })));
     }
@@ -427,6 +428,7 @@ fn layers_are_shown_when_asked_for_and_add_up_to_the_render() {
         camera: ViewCamera::Frame(0),
         long_side: 32,
         composite: 0,
+        render: true,
         layers: true,
     })));
     let shown = rig.until("layers", |s| {

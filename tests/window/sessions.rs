@@ -42,7 +42,7 @@ fn a_session_that_is_gone_on_with_is_said_and_can_be_started_over() {
     recorder.sent();
     click(&mut harness, "Start over");
     assert!(matches!(recorder.sent()[..], [Command::StartOver]));
-    click(&mut harness, "Close");
+    click(&mut harness, "Hide");
     assert!(
         harness
             .query_by_label_contains("This goes on with")
@@ -59,7 +59,7 @@ fn sessions_are_listed_under_file_gone_on_with_and_removed_by_a_second_click_alo
     harness.run_steps(3);
     let open = |harness: &mut Harness<'_, _>| {
         click(harness, "File");
-        click(harness, "Sessions");
+        click(harness, "Sessions…");
     };
     open(&mut harness);
     harness.get_by_label("Go on with small room, session 2");

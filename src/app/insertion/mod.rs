@@ -1,5 +1,6 @@
 //! The inserted objects as the window edits them: placed, moved, duplicated, hidden.
 
+mod adding;
 pub mod handles;
 pub mod models;
 

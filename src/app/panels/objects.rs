@@ -1,6 +1,7 @@
 //! The table of objects: swatches, errors, pixels seen; sortable, with a filter, linked to the views.
 
 use crate::app::action::Action;
+use crate::app::describe::described;
 use crate::app::picture::inspect::{number, triple};
 use crate::app::state::App;
 use crate::app::theme;
@@ -105,19 +106,21 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         return;
     };
     let (estimate, unit) = (app.estimate.clone(), app.radiance_unit());
-    let names: Vec<&str> = capture
-        .scene
-        .objects
-        .iter()
-        .map(|o| o.name.as_str())
+    let objects = &capture.scene.objects;
+    let area: f64 = objects.iter().map(|object| object.area).sum();
+    let told = |index: usize| estimate.objects.get(index).map(|found| found.albedo);
+    let described: Vec<String> = (objects.iter().enumerate())
+        .map(|(index, object)| described(object, area, told(index)))
         .collect();
+    let names: Vec<&str> = described.iter().map(String::as_str).collect();
     ui.horizontal(|ui| {
         let label = ui.label("Filter");
         ui.add(TextEdit::singleline(&mut app.objects.filter).desired_width(120.0))
             .labelled_by(label.id);
         ui.weak(format!("{} objects", names.len()));
     });
-    changes(ui, app, &names);
+    let own: Vec<&str> = objects.iter().map(|o| o.name.as_str()).collect();
+    changes(ui, app, &own);
     let rows = app.objects.rows(&names, &estimate.objects);
     let selected_row = app
         .selected

@@ -213,6 +213,10 @@ impl App {
             quantity,
             Quantity::Composite | Quantity::Naive | Quantity::NaiveEstimate
         );
+        self.render_needed |= matches!(
+            quantity,
+            Quantity::Render | Quantity::Error | Quantity::Irradiance
+        );
         self.irradiance_needed |= quantity == Quantity::Irradiance;
     }
 
@@ -230,6 +234,7 @@ pub fn paint(ui: &Ui, app: &App, rect: Rect, drawn: &Drawn, slot: egui::Id) {
         objects: drawn.objects.clone(),
         shading: drawn.quantity.shading(),
         range: drawn.range,
+        smooth: drawn.quantity.shading() == Shading::Radiance,
         selected: app.selected,
         ..PicturePaint::new(slot, drawn.picture.clone(), rect, &app.look, tokens)
     };

@@ -46,7 +46,10 @@ fn controls(ui: &mut Ui, app: &mut App) {
             .and_then(|i| i.samples);
         ui.weak(samples.map_or_else(
             || "as taken".to_owned(),
-            |samples| format!("{samples} samples a pixel"),
+            |samples| match samples {
+                0 => "a first look".to_owned(),
+                samples => format!("{samples} samples a pixel"),
+            },
         ));
     });
 }

@@ -14,7 +14,8 @@ struct View {
     range: f32,
     // Object to outline, or -1.
     selected: f32,
-    padding: f32,
+    // Above 0: pixels are blended into each other.
+    smoothed: f32,
     surround: vec4f,
     outline: vec4f,
     ramp: array<vec4f, 7>,
@@ -71,6 +72,10 @@ fn colored(value: vec3f, position: vec2f) -> vec3f {
     }
 }
 
+fn radiance_at(pixel: vec2i, size: vec2i) -> vec3f {
+    return textureLoad(picture, clamp(pixel, vec2i(0), size - 1), 0).rgb;
+}
+
 fn object_at(pixel: vec2i, size: vec2i) -> f32 {
     return textureLoad(picture, clamp(pixel, vec2i(0), size - 1), 0).a;
 }
@@ -93,7 +98,18 @@ fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
             sum += textureLoad(picture, clamp(pixel, vec2i(0), size - 1), 0).rgb;
         }
     }
-    var color = colored(sum / f32(taps.x * taps.y), position.xy);
+    var mean = sum / f32(taps.x * taps.y);
+    if view.smoothed > 0.0 {
+        let low = floor(at - 0.5);
+        let share = at - 0.5 - low;
+        let corner = vec2i(low);
+        mean = mix(
+            mix(radiance_at(corner, size), radiance_at(corner + vec2i(1, 0), size), share.x),
+            mix(radiance_at(corner + vec2i(0, 1), size), radiance_at(corner + 1, size), share.x),
+            share.y,
+        );
+    }
+    var color = colored(mean, position.xy);
 
     // The selected object's edge, two screen pixels wide.
     if view.selected >= 0.0 {

@@ -2,6 +2,7 @@
 
 use crate::app::shell::dialogs::Ask;
 use crate::app::shell::photographs::{self, Wanted};
+use crate::app::shell::sessions;
 use crate::app::state::App;
 use crate::session::command::{Command, ExportFormat, ExportRequest};
 use egui::{DragValue, Id, Key, Modal, Role, TextEdit, Ui, WidgetInfo};
@@ -14,6 +15,8 @@ pub enum Sheet {
     /// It is closed.
     #[default]
     Closed,
+    /// The sessions that are kept.
+    Sessions,
     /// Saving results into a folder.
     Save {
         /// The folder as typed.
@@ -167,6 +170,7 @@ pub fn show(ctx: &egui::Context, app: &mut App) {
         let mut sheet = app.sheet.clone();
         let close = match &mut sheet {
             Sheet::Closed => true,
+            Sheet::Sessions => sessions::sheet(ui, app),
             Sheet::Save { folder } => save(ui, app, folder),
             Sheet::Layers { file } => layers(ui, app, file),
             Sheet::Export { file, format, at } => export(ui, app, file, format, at),

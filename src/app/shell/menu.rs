@@ -2,7 +2,6 @@
 
 use crate::app::action::{Action, Menu};
 use crate::app::layout::{self, Pane, Workspace};
-use crate::app::shell::sessions;
 use crate::app::state::App;
 use egui::{Button, Ui};
 use egui_tiles::Tree;
@@ -19,13 +18,6 @@ pub fn bar(ui: &mut Ui, app: &mut App, tree: &mut Tree<Pane>) {
                         app.perform(action, &ctx);
                         ui.close();
                     }
-                }
-                if menu == Menu::File {
-                    ui.menu_button("Sessions", |ui| {
-                        if sessions::list(ui, app, usize::MAX) {
-                            ui.close();
-                        }
-                    });
                 }
                 if menu == Menu::Window {
                     ui.separator();

@@ -40,9 +40,16 @@ pub fn line(ui: &mut Ui, app: &mut App) {
         if over.on_hover_text(Action::StartOver.help()).clicked() {
             app.perform(Action::StartOver, &ui.ctx().clone());
         }
-        let close = ui.button("Close").on_hover_text("Hides this line");
+        let close = ui.button("Hide").on_hover_text("Hides this line");
         app.sessions.closed |= close.clicked();
     });
+}
+
+/// Draws the sheet of all sessions; true when it is to close.
+pub fn sheet(ui: &mut Ui, app: &mut App) -> bool {
+    ui.heading("Sessions");
+    let chosen = list(ui, app, usize::MAX);
+    chosen || ui.button("Cancel").clicked()
 }
 
 /// Draws the newest sessions, at most so many; true when one is chosen.

@@ -40,6 +40,8 @@ pub struct Target {
     render: Progressive,
     /// The newest complete render, and its samples a pixel.
     rendered: Option<(Arc<Picture>, u32)>,
+    /// Whether anybody looks at the render.
+    watched: bool,
     /// Samples that a render must have before it takes the place of that.
     hold: u32,
     /// What each pixel sees, by which noise is smoothed.
@@ -89,6 +91,7 @@ impl Target {
             render: Progressive::new(&camera, split),
             world,
             rendered: None,
+            watched: request.render || request.layers,
             hold: 0,
             guides: None,
             layers: None,
@@ -143,12 +146,13 @@ impl Target {
 
     /// Whether there is nothing left to draw.
     pub fn is_done(&self) -> bool {
-        self.coarse.is_none() && !self.stale && self.render.samples() >= ENOUGH
+        let sharp = !self.watched || self.render.samples() >= ENOUGH;
+        self.coarse.is_none() && !self.stale && sharp
     }
 
     /// Whether the first complete picture is still to come.
     pub fn is_rough(&self) -> bool {
-        self.hits.is_none() || self.render.samples() == 0
+        self.hits.is_none() || (self.watched && self.render.samples() == 0)
     }
 
     /// Draws the next slice; the pictures, if one of them is new.
@@ -164,9 +168,7 @@ impl Target {
             self.map(&hits, &self.camera.clone());
             self.objects = Some(Arc::new(hits.objects(&self.scene)));
             self.hits = Some(hits);
-        } else if self.render.samples() >= ENOUGH
-            || !self.render.add(&self.world, &self.camera, options)
-        {
+        } else if self.is_done() || !self.render.add(&self.world, &self.camera, options) {
             return None;
         } else {
             let samples = self.render.samples();
