@@ -177,7 +177,9 @@ impl Action {
 /// Plain keys are left to a focused text field.
 pub fn pressed(ctx: &egui::Context, start_page: bool) -> Vec<Action> {
     // On the start page every letter belongs to the path.
-    let typing = start_page || ctx.text_edit_focused();
+    // What comes together with a click belongs to the field that was clicked.
+    let clicked = ctx.input(|input| input.pointer.any_pressed() || input.pointer.any_released());
+    let typing = start_page || clicked || ctx.text_edit_focused();
     let mut actions = Vec::new();
     // Longer combinations first, so that Ctrl+Shift+Z is not taken for Ctrl+Z.
     let mut by_length: Vec<Action> = Action::ALL.to_vec();

@@ -55,13 +55,13 @@ impl App {
             Action::SolveOn => !self.edits.known().is_empty(),
             Action::ResetEdits => !self.edits.is_empty(),
             Action::ResetLights => self.lights_are_changed(),
-            Action::SaveLayers => self.view().is_some_and(|view| view.layers.is_some()),
             Action::Place | Action::Duplicate | Action::Delete => self.insertions.chosen.is_some(),
             Action::MeasureTrade => self.trade.doing().is_some() || self.can_measure(),
             Action::Finish => matches!(self.snapshot.phase, Phase::Solving | Phase::Paused),
             Action::SavePhotographs => self.can_write_photographs(),
             Action::CancelPhotographs => self.batch.is_some(),
             Action::Save
+            | Action::SaveLayers
             | Action::Export
             | Action::Probe
             | Action::SetScale
@@ -115,7 +115,10 @@ impl App {
             Action::Undo => self.undo(),
             Action::Redo => self.redo(),
             Action::CopyPicture => self.copy_picture(ctx),
-            Action::InsertObject => self.bring_forward = Some(Pane::Insert),
+            Action::InsertObject => {
+                self.bring_forward = Some(Pane::Insert);
+                self.insertions.typing = true;
+            }
             Action::Place => self.insertions.placing = !self.insertions.placing,
             Action::Duplicate => self.duplicate(),
             Action::Delete => self.insertions.delete(),

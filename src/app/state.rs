@@ -128,7 +128,7 @@ pub struct App {
     pub composite_needed: bool,
     /// Whether a pane showed the re-render, or what is made of it, in this pass.
     pub render_needed: bool,
-    /// Whether a pane showed the light of each lamp apart in this pass.
+    /// Whether the light of each lamp was asked for apart in this pass.
     pub layers_needed: bool,
     /// Whether a pane showed the irradiance in this pass.
     pub irradiance_needed: bool,

@@ -1,7 +1,8 @@
 //! Nothing is lost: what the window says of sessions, and how it takes them up.
 
 use crate::connection::{solve, solving};
-use crate::input::click;
+use crate::input::{click, press, type_into};
+use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use relit::inverse::solver::Termination;
@@ -51,15 +52,16 @@ fn a_session_that_is_gone_on_with_is_said_and_can_be_started_over() {
 }
 
 #[test]
-fn sessions_are_listed_under_file_gone_on_with_and_removed_by_a_second_click_alone() {
+fn sessions_are_listed_gone_on_with_and_removed_by_a_second_click_alone() {
     let (mut harness, recorder) = solving(Harness::builder());
     recorder.show(|snapshot| {
         snapshot.kept = Arc::new(vec![kept("session 2"), kept("session 1")]);
     });
     harness.run_steps(3);
     let open = |harness: &mut Harness<'_, _>| {
-        click(harness, "File");
-        click(harness, "Sessions…");
+        press(harness, Modifiers::COMMAND, Key::P);
+        type_into(harness, "Command", "sessions");
+        press(harness, Modifiers::NONE, Key::Enter);
     };
     open(&mut harness);
     harness.get_by_label("Go on with small room, session 2");

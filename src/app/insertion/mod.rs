@@ -41,6 +41,8 @@ pub struct Insertions {
     pub finish: bool,
     /// The path as typed.
     pub path: String,
+    /// Whether the field for a path is to take the keys.
+    pub typing: bool,
     /// Files that are read before they join the objects.
     pub wanted: Vec<PathBuf>,
     /// Why the last file did not join them.
@@ -58,6 +60,7 @@ impl Default for Insertions {
             dragged: None,
             finish: true,
             path: String::new(),
+            typing: false,
             wanted: Vec::new(),
             trouble: None,
             models: Models::default(),

@@ -43,6 +43,9 @@ fn add(ui: &mut Ui, app: &mut App) {
             .hint_text("chair.glb")
             .desired_width(width);
         let response = ui.add(field).labelled_by(label.id);
+        if std::mem::take(&mut app.insertions.typing) {
+            response.request_focus();
+        }
         let entered =
             response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
         let add = ui

@@ -24,7 +24,6 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         ui.weak(app.nothing_open());
         return;
     };
-    app.layers_needed = true;
     let ctx = ui.ctx().clone();
     let lamps = app.lamps();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {

@@ -108,7 +108,12 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
     let (estimate, unit) = (app.estimate.clone(), app.radiance_unit());
     let objects = &capture.scene.objects;
     let area: f64 = objects.iter().map(|object| object.area).sum();
-    let told = |index: usize| estimate.objects.get(index).map(|found| found.albedo);
+    let told = |index: usize| {
+        let found = estimate.objects.get(index);
+        found
+            .filter(|o| o.identifiable && o.albedo_identifiable)
+            .map(|found| found.albedo)
+    };
     let described: Vec<String> = (objects.iter().enumerate())
         .map(|(index, object)| described(object, area, told(index)))
         .collect();

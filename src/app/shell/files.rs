@@ -200,12 +200,17 @@ fn save(ui: &mut Ui, app: &mut App, folder: &mut String) -> bool {
 /// Draws the sheet for layers of light; true when it is to close.
 fn layers(ui: &mut Ui, app: &mut App, file: &mut String) -> bool {
     ui.heading("Save light layers");
-    ui.label(
-        "One OpenEXR file with the light of each lamp as found, as the shown view has it so far.",
-    );
+    ui.label("One OpenEXR file with the light of each lamp, as the shown view has it so far.");
+    app.layers_needed = true;
+    let layers = app.view().and_then(|view| view.layers.as_ref());
+    ui.weak(layers.map_or_else(
+        || "Tracing the light of each lamp…".to_owned(),
+        |layers| format!("{} samples a pixel so far", layers.samples),
+    ));
+    let ready = layers.is_some() && !file.trim().is_empty();
     let entered = path_field(ui, app, "File", file, Ask::ExportFile);
-    let (clicked, cancel) = buttons(ui, "Save", !file.trim().is_empty());
-    let go = (clicked || entered) && !file.trim().is_empty();
+    let (clicked, cancel) = buttons(ui, "Save", ready);
+    let go = (clicked || entered) && ready;
     if go {
         app.send(Command::SaveLayers(PathBuf::from(file.trim())));
     }

@@ -257,7 +257,7 @@ impl Worker {
         let Some((capture, layers)) = self.capture.clone().zip(layers) else {
             self.say(
                 Level::Error,
-                "layers: none are there; open the pane Lights and wait for its first picture",
+                "layers: none are traced yet; wait for the first picture",
             );
             return;
         };
