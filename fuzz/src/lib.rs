@@ -239,10 +239,10 @@ pub fn truth(bytes: &[u8]) {
     }
 }
 
-/// The objects that were inserted in a session that saved by itself.
+/// What a session that saved by itself holds beside its estimate.
 pub fn session(bytes: &[u8]) {
-    if let Ok(folder) = results_with("inserted.json", bytes) {
-        let _ = keep::inserted(folder.path());
+    if let Ok(folder) = results_with("session.json", bytes) {
+        let _ = keep::held(folder.path());
     }
 }
 

@@ -93,7 +93,7 @@ const fn ctrl_shift(key: Key) -> Option<KeyboardShortcut> {
 actions! {
     OpenFolder, File, "Open capture…", "Chooses a capture's folder with a file dialog", ctrl(Key::O);
     OpenRoom, File, "Open built-in room", "Opens the room that is built into the program", ctrl_shift(Key::O);
-    TakeUp, File, "Take up the last session", "Goes on from what was kept of the last session of this capture, with its changes and objects", None;
+    Sessions, File, "Sessions…", "Lists all sessions that are kept, to go on with one", None;
     StartPage, File, "Start page", "Shows recent captures and the field for a typed path", ctrl(Key::N);
     Save, File, "Save results…", "Writes estimate, report and pictures into a folder", ctrl(Key::S);
     Export, File, "Export…", "Writes one file for another program", ctrl(Key::E);
@@ -115,11 +115,10 @@ actions! {
     Delete, Edit, "Delete object", "Takes the chosen inserted object away", key(Key::Delete);
     NaiveBesideOurs, Edit, "Naive beside ours", "Shows the naive composite and ours side by side", None;
     WipeNaiveOurs, Edit, "Wipe naive and ours", "Shows the naive composite and ours under a wipe", ctrl(Key::W);
-    BeforeAfter, Edit, "Before and after", "Shows the photograph and the composite under a wipe", ctrl(Key::B);
-    Lights, Edit, "Light mixer", "Shows a switch, a strength and a colour for the light of each lamp", key(Key::L);
-    CompareRelit, Edit, "Before and after relighting", "Shows the re-render and the mixed light under a wipe", key(Key::B);
-    ResetMix, Edit, "Reset the light mixer", "Puts all lamps back to the light that was found", None;
-    KeepMix, Edit, "Give lamps this light", "Makes the mixed light the lamps' own emission, for exports and composites", None;
+    BeforeAfter, Edit, "Before and after", "Shows the photograph as taken and as it was changed under a wipe", key(Key::B);
+    WipeRender, Edit, "Wipe with the re-render", "Shows the re-render and the changed photograph under a wipe", ctrl(Key::B);
+    Lights, Edit, "Lights", "Shows a switch, a strength and a colour for the light of each lamp", key(Key::L);
+    ResetLights, Edit, "Reset all lights", "Puts all lamps and the light from outside back to what was found", None;
     Material, Edit, "Material", "Shows albedo, emission and gloss of the selected object, to be changed", key(Key::M);
     SwitchLamp, Edit, "Switch lamp off / on", "Switches the selected lamp off, or on again", key(Key::K);
     SolveOn, Solve, "Solve on with pinned values", "Holds the pinned values and solves the rest on from the last stage", ctrl_shift(Key::R);
@@ -133,11 +132,9 @@ actions! {
     RunPause, Solve, "Run / Pause", "Starts, holds or goes on with the solve", key(Key::Space);
     Step, Solve, "Step", "One iteration, then pause", key(Key::Period);
     Finish, Solve, "Finish", "Ends the solve and keeps the estimate", None;
-    Reset, Solve, "Reset", "Forgets the estimate and starts over", ctrl(Key::R);
+    Reset, Solve, "Reset", "Solves anew, with changes and objects as they are; the session so far is kept under File > Sessions", ctrl(Key::R);
+    StartOver, Solve, "Start over", "Solves as if nothing had been done; the session so far is kept under File > Sessions", None;
     MeasureTrade, Solve, "Measure / cancel the trade", "Measures what exactness costs in seconds on this capture, or ends the measurement", ctrl(Key::M);
-
-    Studies, Solve, "Studies", "Shows the paper's experiments, to be run and plotted here", None;
-    RunStudy, Solve, "Start / cancel the study", "Runs the chosen experiment and writes its files, or ends it", None;
 
     PreviousFrame, View, "Previous photograph", "Steps to the photograph before", key(Key::OpenBracket);
     NextFrame, View, "Next photograph", "Steps to the next photograph", key(Key::CloseBracket);
@@ -153,6 +150,8 @@ actions! {
     JumpToFrame, View, "View from photograph", "Puts the 3D view's camera where the photograph was taken", key(Key::J);
     RenderFromHere, View, "Re-render from 3D view", "Re-renders from the 3D view's camera instead of the photograph's", key(Key::R);
 
+    Compose, Window, "Compose", "Shows the photograph as you change it, large", ctrl(Key::Num1);
+    Inspect, Window, "Inspect", "Shows all pictures of the view in a grid", ctrl(Key::Num2);
     Thumbnails, Window, "Thumbnails", "Shows or hides the strip of photographs", ctrl(Key::T);
     ResetLayout, Window, "Reset layout", "Puts all panes back where they were at first", None;
     Larger, Window, "Larger interface", "Makes everything in the window larger", ctrl(Key::Plus);
@@ -176,8 +175,11 @@ impl Action {
 /// The actions whose keys were pressed this frame, taken out of the input.
 ///
 /// Plain keys are left to a focused text field.
-pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
-    let typing = ctx.text_edit_focused();
+pub fn pressed(ctx: &egui::Context, start_page: bool) -> Vec<Action> {
+    // On the start page every letter belongs to the path.
+    // What comes together with a click belongs to the field that was clicked.
+    let clicked = ctx.input(|input| input.pointer.any_pressed() || input.pointer.any_released());
+    let typing = start_page || clicked || ctx.text_edit_focused();
     let mut actions = Vec::new();
     // Longer combinations first, so that Ctrl+Shift+Z is not taken for Ctrl+Z.
     let mut by_length: Vec<Action> = Action::ALL.to_vec();

@@ -109,8 +109,7 @@ impl Course {
 impl App {
     /// Whether there is anything to make of photographs: an object to put in, or light to change.
     pub fn can_write_photographs(&self) -> bool {
-        let relit = !self.edits.is_empty() || !self.mixer.mix.is_neutral();
-        let changed = relit || !self.insertions.visible().is_empty();
+        let changed = !self.edits.is_empty() || !self.insertions.visible().is_empty();
         self.capture().is_some() && self.batch.is_none() && changed
     }
 

@@ -1,21 +1,17 @@
 //! Everything that is edited by hand, with one history for all of it.
 
 use crate::app::insertion::Inserted;
-use crate::app::mixer::Mix;
 use crate::app::state::App;
 use crate::app::undo::History;
 use crate::capture::regroup::Regroup;
 use crate::session::command::Command;
 use crate::session::edits::{Edits, ObjectEdit};
-use crate::session::snapshot::LightSource;
-use crate::transport::layers::Split;
 use glam::Vec3;
 
 /// What undo and redo go back and forth in.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Document {
     inserted: Vec<Inserted>,
-    mix: Mix,
     objects: Vec<Regroup>,
     edits: Edits,
 }
@@ -24,7 +20,6 @@ impl App {
     fn document(&self) -> Document {
         Document {
             inserted: self.insertions.objects.clone(),
-            mix: self.mixer.mix.clone(),
             objects: self.grouping.changes.clone(),
             edits: self.edits.clone(),
         }
@@ -32,7 +27,6 @@ impl App {
 
     fn restore(&mut self, document: Document) {
         self.insertions.replace(document.inserted);
-        self.mixer.mix = document.mix;
         self.grouping.changes = document.objects;
         self.edits = document.edits;
     }
@@ -109,31 +103,5 @@ impl App {
         if let Some(object) = self.selected_object() {
             self.edits.set(object, ObjectEdit::default());
         }
-    }
-
-    /// The changes with the mixed light as the lamps' own; those there are while nothing is mixed.
-    pub fn mixed_edits(&self) -> Edits {
-        let mut edits = self.edits.clone();
-        let Some(capture) = self.capture().filter(|_| !self.mixer.mix.is_neutral()) else {
-            return edits;
-        };
-        let factor = |source| self.mixer.mix.gain(source).factor();
-        let split = Split::new(&self.estimate.lit(&capture.scene));
-        for (index, object) in self.estimate.objects.iter().enumerate() {
-            let source = split.source_of(index as u32);
-            if let Some(factor) = source.map(factor).filter(|&factor| factor != Vec3::ONE) {
-                let mut edit = edits.object(index);
-                edit.emission = Some(object.emission * factor);
-                edits.set(index, edit);
-            }
-        }
-        edits.set_outside(edits.outside() * factor(LightSource::Outside));
-        edits
-    }
-
-    /// Makes the mixed light the lamps' own, and the mix neutral.
-    pub fn keep_mix(&mut self) {
-        self.edits = self.mixed_edits();
-        self.mixer.mix = Mix::default();
     }
 }

@@ -1,6 +1,5 @@
 //! Which faces are one object, changed by hand: objects joined, named anew, and cut out.
 
-use crate::app::mixer::Mix;
 use crate::app::state::App;
 use crate::capture::mesh::Mesh;
 use crate::capture::regroup::{Regroup, regroup, same_objects};
@@ -162,7 +161,6 @@ impl App {
             Ok(()) => {
                 let same = same_objects(&before.object_of, &after.object_of, before.objects.len());
                 self.edits = self.edits.moved(&same);
-                self.mixer.mix = Mix::default();
                 self.grouping.changes.push(change);
             }
         }

@@ -19,7 +19,7 @@ pub enum Pane {
     Objects,
     /// Colour and light of the selected object.
     Material,
-    /// The light mixer.
+    /// The light of each lamp.
     Lights,
     /// Inserting objects.
     Insert,
@@ -33,8 +33,6 @@ pub enum Pane {
     Stages,
     /// Error over seconds, and where to stop.
     Trade,
-    /// The paper's experiments.
-    Studies,
     /// What happened.
     Log,
 }
@@ -55,7 +53,6 @@ impl Pane {
             Self::Loss,
             Self::Stages,
             Self::Trade,
-            Self::Studies,
             Self::Log,
         ];
         pictures.chain(rest).collect()
@@ -76,14 +73,58 @@ impl Pane {
             Self::Loss => "Loss",
             Self::Stages => "Stages",
             Self::Trade => "Trade",
-            Self::Studies => "Studies",
             Self::Log => "Log",
         }
     }
 }
 
-/// The layout of the first start; made for 1280 × 800 and up.
-pub fn first_layout() -> Tree<Pane> {
+/// What the panes are arranged for.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Workspace {
+    /// Changing a photograph: it is large.
+    #[default]
+    Compose,
+    /// Looking into what was found: all pictures in a grid.
+    Inspect,
+}
+
+impl Workspace {
+    /// Its layout of the first start; made for 1280 × 800 and up.
+    pub fn first_layout(self) -> Tree<Pane> {
+        match self {
+            Self::Compose => compose(),
+            Self::Inspect => inspect(),
+        }
+    }
+}
+
+fn compose() -> Tree<Pane> {
+    let mut tiles = Tiles::default();
+    let mut tabs = |panes: &[Pane]| {
+        let children: Vec<TileId> = panes.iter().map(|&pane| tiles.insert_pane(pane)).collect();
+        tiles.insert_tab_tile(children)
+    };
+    let hero = tabs(&[
+        Pane::Picture(Quantity::Composite),
+        Pane::Model,
+        Pane::Compare,
+    ]);
+    let side = tabs(&[Pane::Objects, Pane::Lights, Pane::Insert]);
+    let course = tabs(&[
+        Pane::Material,
+        Pane::Loss,
+        Pane::Stages,
+        Pane::Settings,
+        Pane::Log,
+    ]);
+    let right = tiles.insert_vertical_tile(vec![side, course]);
+    let root = tiles.insert_horizontal_tile(vec![hero, right]);
+    share(&mut tiles, root, &[(hero, 0.69), (right, 0.31)]);
+    share(&mut tiles, right, &[(side, 0.6), (course, 0.4)]);
+    Tree::new(egui::Id::unique("compose"), root, tiles)
+}
+
+fn inspect() -> Tree<Pane> {
     let mut tiles = Tiles::default();
     let mut tabs = |panes: &[Pane]| {
         let children: Vec<TileId> = panes.iter().map(|&pane| tiles.insert_pane(pane)).collect();
@@ -91,11 +132,7 @@ pub fn first_layout() -> Tree<Pane> {
     };
     let picture = Pane::Picture;
     let photograph = tabs(&[picture(Quantity::Photograph), Pane::Compare]);
-    let render = tabs(&[
-        picture(Quantity::Render),
-        picture(Quantity::Relit),
-        picture(Quantity::Composite),
-    ]);
+    let render = tabs(&[picture(Quantity::Render), picture(Quantity::Composite)]);
     let model = tabs(&[Pane::Model]);
     let albedo = tabs(&[
         picture(Quantity::Albedo),
@@ -109,7 +146,6 @@ pub fn first_layout() -> Tree<Pane> {
         Pane::Insert,
         Pane::Settings,
         Pane::Trade,
-        Pane::Studies,
     ]);
     let course = tabs(&[
         Pane::Loss,
@@ -126,7 +162,7 @@ pub fn first_layout() -> Tree<Pane> {
     share(&mut tiles, root, &[(views, 0.69), (right, 0.31)]);
     share(&mut tiles, views, &[(upper, 0.53), (lower, 0.47)]);
     share(&mut tiles, right, &[(side, 0.62), (course, 0.38)]);
-    Tree::new(egui::Id::unique("panes"), root, tiles)
+    Tree::new(egui::Id::unique("inspect"), root, tiles)
 }
 
 fn share(tiles: &mut Tiles<Pane>, parent: TileId, shares: &[(TileId, f32)]) {
@@ -198,6 +234,7 @@ impl Behavior<Pane> for Panes<'_> {
     fn pane_ui(&mut self, ui: &mut egui::Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
         // What fills itself needs no ground: on a software renderer every layer counts.
         match *pane {
+            Pane::Picture(Quantity::Composite) => picture::hero::pane(ui, self.app),
             Pane::Picture(quantity) => picture::canvas::pane(ui, self.app, quantity),
             Pane::Compare => picture::compare::pane(ui, self.app),
             Pane::Model => model::pane::pane(ui, self.app),
@@ -216,7 +253,6 @@ impl Behavior<Pane> for Panes<'_> {
                         Pane::Loss => panels::loss::pane(ui, self.app),
                         Pane::Stages => panels::stages::pane(ui, self.app),
                         Pane::Trade => panels::trade::pane(ui, self.app),
-                        Pane::Studies => panels::studies::pane(ui, self.app),
                         _ => panels::log::pane(ui, self.app),
                     }
                 });
@@ -288,17 +324,19 @@ mod tests {
 
     #[test]
     fn every_pane_can_be_closed_and_brought_back() {
-        let mut tree = first_layout();
-        for pane in Pane::all() {
-            close(&mut tree, pane);
-            assert!(!is_open(&tree, pane), "{pane:?}");
-            show(&mut tree, pane);
-            assert!(is_open(&tree, pane), "{pane:?}");
+        for workspace in [Workspace::Compose, Workspace::Inspect] {
+            let mut tree = workspace.first_layout();
+            for pane in Pane::all() {
+                close(&mut tree, pane);
+                assert!(!is_open(&tree, pane), "{pane:?}");
+                show(&mut tree, pane);
+                assert!(is_open(&tree, pane), "{pane:?}");
+            }
+            for pane in Pane::all() {
+                close(&mut tree, pane);
+            }
+            show(&mut tree, Pane::Loss);
+            assert!(is_open(&tree, Pane::Loss));
         }
-        for pane in Pane::all() {
-            close(&mut tree, pane);
-        }
-        show(&mut tree, Pane::Loss);
-        assert!(is_open(&tree, Pane::Loss));
     }
 }

@@ -1,8 +1,7 @@
 //! What each action does, and when it makes sense.
 
 use crate::app::action::Action;
-use crate::app::layout::Pane;
-use crate::app::mixer::Mix;
+use crate::app::layout::{Pane, Workspace};
 use crate::app::model::lasso::Lasso;
 use crate::app::pick::Pick;
 use crate::app::picture::compare::Mode;
@@ -27,8 +26,7 @@ fn goes_by_object(action: Action) -> bool {
             | Action::SwitchLamp
             | Action::ResetMaterial
             | Action::ResetEdits
-            | Action::KeepMix
-            | Action::ResetMix
+            | Action::ResetLights
             | Action::SolveOn
             | Action::Save
             | Action::Export
@@ -51,21 +49,19 @@ impl App {
             Action::Redo => self.history.can_redo(),
             Action::SwitchLamp => self.can_switch_lamp(),
             Action::ResetMaterial => self.can_reset_material(),
-            Action::TakeUp => self.snapshot.earlier.is_some(),
             Action::JoinObjects => self.can_regroup() && self.chosen_objects().len() > 1,
             Action::RenameObject => self.can_regroup() && self.selected.is_some(),
             Action::CutOut => self.can_regroup(),
             Action::SolveOn => !self.edits.known().is_empty(),
             Action::ResetEdits => !self.edits.is_empty(),
-            Action::KeepMix | Action::ResetMix => !self.mixer.mix.is_neutral(),
-            Action::SaveLayers => self.view().is_some_and(|view| view.layers.is_some()),
+            Action::ResetLights => self.lights_are_changed(),
             Action::Place | Action::Duplicate | Action::Delete => self.insertions.chosen.is_some(),
             Action::MeasureTrade => self.trade.doing().is_some() || self.can_measure(),
-            Action::RunStudy => self.can_run_study(),
             Action::Finish => matches!(self.snapshot.phase, Phase::Solving | Phase::Paused),
             Action::SavePhotographs => self.can_write_photographs(),
             Action::CancelPhotographs => self.batch.is_some(),
             Action::Save
+            | Action::SaveLayers
             | Action::Export
             | Action::Probe
             | Action::SetScale
@@ -74,10 +70,13 @@ impl App {
             | Action::InsertObject
             | Action::Lights
             | Action::Material
-            | Action::CompareRelit
+            | Action::BeforeAfter
+            | Action::WipeRender
+            | Action::WipeNaiveOurs
             | Action::RunPause
             | Action::Step
             | Action::Reset
+            | Action::StartOver
             | Action::PreviousFrame
             | Action::NextFrame
             | Action::FrameSelection
@@ -96,11 +95,7 @@ impl App {
         match action {
             Action::OpenFolder => self.ask(Ask::Capture, ctx),
             Action::OpenRoom => self.open(Source::BuiltInRoom),
-            Action::TakeUp => {
-                if let Some(folder) = self.snapshot.earlier.clone() {
-                    self.send(Command::Resume(folder));
-                }
-            }
+            Action::Sessions => self.sheet = Sheet::Sessions,
             Action::StartPage => self.start_page = !self.start_page,
             Action::Save => self.sheet = Sheet::save(self.capture_name()),
             Action::Export => self.sheet = Sheet::export(self.capture_name(), self.probe_point()),
@@ -120,24 +115,20 @@ impl App {
             Action::Undo => self.undo(),
             Action::Redo => self.redo(),
             Action::CopyPicture => self.copy_picture(ctx),
-            Action::InsertObject => self.bring_forward = Some(Pane::Insert),
+            Action::InsertObject => {
+                self.bring_forward = Some(Pane::Insert);
+                self.insertions.typing = true;
+            }
             Action::Place => self.insertions.placing = !self.insertions.placing,
             Action::Duplicate => self.duplicate(),
             Action::Delete => self.insertions.delete(),
             Action::NaiveBesideOurs => {
                 self.compare_pictures(Mode::SideBySide, Quantity::Naive, Quantity::Composite);
             }
-            Action::WipeNaiveOurs => {
-                self.compare_pictures(Mode::Wipe, Quantity::Naive, Quantity::Composite);
-            }
-            Action::BeforeAfter => {
-                self.compare_pictures(Mode::Wipe, Quantity::Photograph, Quantity::Composite);
-            }
+            Action::WipeNaiveOurs => self.wipe_against(Quantity::Naive),
+            Action::BeforeAfter => self.wipe_against(Quantity::Photograph),
+            Action::WipeRender => self.wipe_against(Quantity::Render),
             Action::Lights => self.bring_forward = Some(Pane::Lights),
-            Action::CompareRelit => {
-                self.compare_pictures(Mode::Wipe, Quantity::Render, Quantity::Relit);
-            }
-            Action::KeepMix => self.keep_mix(),
             Action::Material => self.bring_forward = Some(Pane::Material),
             Action::SwitchLamp => self.switch_lamp(),
             Action::ResetMaterial => self.reset_material(),
@@ -151,7 +142,7 @@ impl App {
                 self.grouping.naming = true;
             }
             Action::ResetEdits => self.edits = Edits::default(),
-            Action::ResetMix => self.mixer.mix = Mix::default(),
+            Action::ResetLights => self.reset_lights(),
             Action::Deselect => {
                 // What covers the panes goes first.
                 let open = !matches!(self.sheet, Sheet::Closed);
@@ -171,6 +162,7 @@ impl App {
             Action::Step => self.send(Command::Step),
             Action::Finish => self.send(Command::Finish),
             Action::Reset => self.send(Command::Reset),
+            Action::StartOver => self.send(Command::StartOver),
             Action::SolveOn => {
                 self.send_edits();
                 self.send(Command::SolveOn);
@@ -179,12 +171,6 @@ impl App {
             Action::MeasureTrade => {
                 self.bring_forward = Some(Pane::Trade);
                 self.measure_or_cancel(ctx);
-            }
-
-            Action::Studies => self.bring_forward = Some(Pane::Studies),
-            Action::RunStudy => {
-                self.bring_forward = Some(Pane::Studies);
-                self.run_or_cancel_study(ctx);
             }
 
             Action::PreviousFrame => self.step_frame(-1),
@@ -207,6 +193,8 @@ impl App {
             Action::JumpToFrame => self.jump_to_frame(self.frame),
             Action::RenderFromHere => self.render_from_here(),
 
+            Action::Compose => self.preferences.workspace = Workspace::Compose,
+            Action::Inspect => self.preferences.workspace = Workspace::Inspect,
             Action::Thumbnails => self.preferences.thumbnails = !self.preferences.thumbnails,
             Action::ResetLayout => self.reset_layout = true,
             Action::Larger => self.resize(ctx, Some(1.0)),
@@ -268,6 +256,15 @@ impl App {
         self.compare.left = left;
         self.compare.right = right;
         self.bring_forward = Some(Pane::Compare);
+    }
+
+    /// Puts a picture beside the changed photograph under a wipe, or takes it away where it is there.
+    fn wipe_against(&mut self, quantity: Quantity) {
+        let shown = self.preferences.workspace == Workspace::Compose;
+        let again = shown && self.against == Some(quantity);
+        self.against = (!again).then_some(quantity);
+        self.preferences.workspace = Workspace::Compose;
+        self.bring_forward = Some(Pane::Picture(Quantity::Composite));
     }
 
     fn capture_name(&self) -> &str {

@@ -1,6 +1,6 @@
 //! What the window remembers between runs: theme, recent captures, tone curve and layout, as one JSON file.
 
-use crate::app::layout::Pane;
+use crate::app::layout::{Pane, Workspace};
 use crate::app::picture::look::ToneCurve;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -19,8 +19,12 @@ pub struct Preferences {
     pub thumbnails: bool,
     /// Captures opened before, the newest first.
     pub recent: Vec<PathBuf>,
-    /// Where the panes are; `None` is the layout of the first start.
-    pub layout: Option<egui_tiles::Tree<Pane>>,
+    /// What the panes are arranged for.
+    pub workspace: Workspace,
+    /// Where the panes are in *Compose*; `None` as at the first start.
+    pub compose: Option<egui_tiles::Tree<Pane>>,
+    /// Where the panes are in *Inspect*.
+    pub inspect: Option<egui_tiles::Tree<Pane>>,
 }
 
 impl Default for Preferences {
@@ -31,7 +35,9 @@ impl Default for Preferences {
             tone: ToneCurve::None,
             thumbnails: true,
             recent: Vec::new(),
-            layout: None,
+            workspace: Workspace::Compose,
+            compose: None,
+            inspect: None,
         }
     }
 }
@@ -46,6 +52,14 @@ impl Preferences {
             .ok()
             .and_then(|bytes| serde_json::from_slice(&bytes).ok())
             .unwrap_or_default()
+    }
+
+    /// The layout of a workspace.
+    pub fn layout(&mut self, workspace: Workspace) -> &mut Option<egui_tiles::Tree<Pane>> {
+        match workspace {
+            Workspace::Compose => &mut self.compose,
+            Workspace::Inspect => &mut self.inspect,
+        }
     }
 
     /// Writes the file through a temporary one beside it, so that a kill leaves the old or the new.
@@ -105,7 +119,7 @@ mod tests {
         let path = folder.path().join("deep/window.json");
         let mut preferences = Preferences {
             light: true,
-            layout: Some(crate::app::layout::first_layout()),
+            compose: Some(Workspace::Compose.first_layout()),
             ..Preferences::default()
         };
         for name in ["a", "b", "a"] {

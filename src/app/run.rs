@@ -7,7 +7,8 @@ use crate::app::window::Window;
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
 use crate::session::Session;
-use crate::session::command::{Command, OpenOptions, Source};
+use crate::session::command::{OpenOptions, Source};
+use crate::session::worker::Backend;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -94,11 +95,11 @@ fn window(
     if let Some(path) = &kept {
         preferences_of_user = Preferences::load(path);
     }
-    let session = Session::spawn(source.clone(), settings.clone(), wake)?;
-    if let Some(folder) = preferences::sessions() {
-        // The queue is empty yet.
-        session.send(Command::Keep(folder));
-    }
+    let backend = Backend {
+        sessions: preferences::sessions(),
+        ..Backend::default()
+    };
+    let session = Session::spawn_with(source.clone(), settings.clone(), wake, backend)?;
     let mut app = App::new(Box::new(session), preferences_of_user);
     app.settings = settings;
     app.opened_with(source.map(|(source, _)| source));

@@ -6,30 +6,33 @@ use crate::app::document::Document;
 use crate::app::grouping::Grouping;
 use crate::app::insertion::Insertions;
 use crate::app::layout::Pane;
-use crate::app::mixer::Mixer;
 use crate::app::model::view::ModelView;
+use crate::app::opening::Importing;
 use crate::app::panels::objects::ObjectsTable;
 use crate::app::pick::Pick;
 use crate::app::picture::compare::Compare;
 use crate::app::picture::irradiance::Irradiance;
 use crate::app::picture::look::Look;
-use crate::app::picture::ramp;
+use crate::app::picture::quantity::Quantity;
+use crate::app::picture::ramp::{self, Scales};
 use crate::app::preferences::Preferences;
 use crate::app::shell::dialogs::{Ask, Dialogs};
 use crate::app::shell::files::Sheet;
 use crate::app::shell::notices::Notices;
 use crate::app::shell::palette::Palette;
+use crate::app::shell::sessions::Sessions;
 use crate::app::shell::status::Memory;
 use crate::app::shell::thumbnails::Thumbnails;
-use crate::app::studies::StudiesView;
 use crate::app::trade::TradeView;
 use crate::app::undo::History;
+use crate::capture::camera::Intrinsics;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::scene::camera::Camera;
 use crate::session::command::{Command, Placement, Source, ViewCamera, ViewRequest};
 use crate::session::edits::{Edited, Edits};
 use crate::session::snapshot::{Level, OpenCapture, Phase, Picture, Snapshot};
+use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -55,6 +58,10 @@ pub struct App {
     pub look: Look,
     /// The two pictures compared.
     pub compare: Compare,
+    /// The ends of the scales of false colours.
+    pub scales: RefCell<Scales>,
+    /// What is beside the photograph as it was changed, under a wipe.
+    pub against: Option<Quantity>,
     /// The chosen photograph.
     pub frame: usize,
     /// Whether pictures are of that photograph or of the 3D view.
@@ -63,8 +70,6 @@ pub struct App {
     pub selected: Option<u32>,
     /// The inserted objects.
     pub insertions: Insertions,
-    /// The light mixer.
-    pub mixer: Mixer,
     /// Which faces are one object.
     pub grouping: Grouping,
     /// Changes made by hand to what was found.
@@ -79,8 +84,6 @@ pub struct App {
     pub objects: ObjectsTable,
     /// The trade of speed for exactness.
     pub trade: TradeView,
-    /// The paper's experiments.
-    pub studies: StudiesView,
     /// What the next click in a view is asked for.
     pub picking: Option<Pick>,
     /// Photographs that are being written.
@@ -91,6 +94,8 @@ pub struct App {
     pub dialogs: Dialogs,
     /// Saving and exporting.
     pub sheet: Sheet,
+    /// The list of sessions.
+    pub sessions: Sessions,
     /// The command palette, while it is open.
     pub palette: Option<Palette>,
     /// Whether the window of keys is open.
@@ -99,6 +104,10 @@ pub struct App {
     pub start_page: bool,
     /// The capture's path as typed.
     pub path: String,
+    /// Why nothing was opened, with the remedy.
+    pub trouble: Option<String>,
+    /// A scan that is being imported.
+    pub importing: Option<Importing>,
     /// What is remembered between runs.
     pub preferences: Preferences,
     /// How large everything was made, once it was.
@@ -115,7 +124,11 @@ pub struct App {
     pub thumbnails: Thumbnails,
     /// The most pixels a pane showed along a side in this pass.
     pub pixels_needed: f32,
-    /// Whether a pane showed the light of each lamp apart in this pass.
+    /// Whether a pane showed the photograph as it was changed in this pass.
+    pub composite_needed: bool,
+    /// Whether a pane showed the re-render, or what is made of it, in this pass.
+    pub render_needed: bool,
+    /// Whether the light of each lamp was asked for apart in this pass.
     pub layers_needed: bool,
     /// Whether a pane showed the irradiance in this pass.
     pub irradiance_needed: bool,
@@ -124,7 +137,7 @@ pub struct App {
     photograph: Option<(usize, Arc<Picture>)>,
     pending: VecDeque<Command>,
     opening: Option<Source>,
-    pub(super) sent_view: Option<(Option<usize>, u64, u32, bool)>,
+    pub(super) sent_view: Option<(Option<usize>, u64, u32, u32, bool, bool)>,
     pub(super) sent_insertions: Vec<Placement>,
     sent_finish: bool,
     pub(super) sent_edits: Edits,
@@ -144,11 +157,12 @@ impl App {
             settings: Settings::default(),
             look,
             compare: Compare::default(),
+            scales: RefCell::default(),
+            against: None,
             frame: 0,
             shown: Shown::Frame,
             selected: None,
             insertions: Insertions::default(),
-            mixer: Mixer::default(),
             grouping: Grouping::default(),
             edits: Edits::default(),
             estimate: Arc::default(),
@@ -156,16 +170,18 @@ impl App {
             model: ModelView::default(),
             objects: ObjectsTable::default(),
             trade: TradeView::default(),
-            studies: StudiesView::default(),
             picking: None,
             batch: None,
             notices: Notices::default(),
             dialogs: Dialogs::default(),
             sheet: Sheet::default(),
+            sessions: Sessions::default(),
             palette: None,
             keys: false,
             start_page: false,
             path: String::new(),
+            trouble: None,
+            importing: None,
             preferences,
             size: None,
             grows: false,
@@ -175,6 +191,8 @@ impl App {
             thumbnails: Thumbnails::default(),
             photograph: None,
             pixels_needed: 0.0,
+            composite_needed: false,
+            render_needed: false,
             layers_needed: false,
             irradiance_needed: false,
             irradiance: Irradiance::default(),
@@ -202,6 +220,7 @@ impl App {
     /// Opens a capture.
     pub fn open(&mut self, source: Source) {
         self.start_page = false;
+        self.trouble = None;
         self.opening = Some(source.clone());
         self.send(Command::Open(source));
     }
@@ -209,14 +228,6 @@ impl App {
     /// Notes what the session was started with.
     pub fn opened_with(&mut self, source: Option<Source>) {
         self.opening = source;
-    }
-
-    /// Opens the folder whose path was typed.
-    pub fn open_typed(&mut self) {
-        let path = self.path.trim();
-        if !path.is_empty() {
-            self.open(Source::Folder(PathBuf::from(path)));
-        }
     }
 
     /// What is open.
@@ -230,6 +241,27 @@ impl App {
             || (self.capture().is_none()
                 && matches!(self.snapshot.phase, Phase::Idle | Phase::Failed)
                 && self.opening.is_none())
+    }
+
+    /// Why nothing is open, in words.
+    pub fn nothing_open(&self) -> &'static str {
+        match self.snapshot.phase {
+            Phase::Loading => "Reading the capture…",
+            _ if self.opening.is_some() => "Reading the capture…",
+            _ => "No capture is open",
+        }
+    }
+
+    /// The unit of radiance: relative where photographs of 8 or 16 bits leave the scale open.
+    pub fn radiance_unit(&self) -> &'static str {
+        let relative = |capture: &Arc<OpenCapture>| {
+            let mut photographs = capture.photographs.iter();
+            photographs.any(|photograph| photograph.saturation.is_finite())
+        };
+        match self.capture().is_some_and(relative) {
+            true => "relative units",
+            false => "W/(sr·m²)",
+        }
     }
 
     /// Number of photographs.
@@ -267,16 +299,16 @@ impl App {
             self.take(snapshot);
         }
         while let Some((ask, answer)) = self.dialogs.take() {
-            self.answered(ask, answer);
+            self.answered(ask, answer, ctx);
         }
         if !ctx.input(|input| input.pointer.any_down()) {
             self.settle();
         }
         self.convert_photograph();
-        self.mix_light();
+        self.find_irradiance();
         self.take_trade();
-        self.take_study();
         self.take_batch();
+        self.take_import();
         self.take_models(ctx);
         self.request();
         self.send_grouping();
@@ -299,7 +331,11 @@ impl App {
             self.settings = self.snapshot.settings.clone();
         }
         if self.snapshot.phase == Phase::Failed {
-            self.opening = None;
+            // Said where the person looks.
+            if self.opening.take().is_some() && self.capture().is_none() {
+                let errors = events.iter().rev().filter(|e| e.level == Level::Error);
+                self.trouble = errors.map(|event| event.message.clone()).next();
+            }
         }
         if !self.take_grouping(&before) && other_capture {
             self.capture_changed();
@@ -307,19 +343,20 @@ impl App {
     }
 
     fn capture_changed(&mut self) {
-        self.frame = 0;
+        self.frame = self.snapshot.frame.min(self.frames().saturating_sub(1));
+        self.sessions.closed = false;
         self.shown = Shown::Frame;
         self.selected = None;
         self.picking = None;
         self.sent_view = None;
         self.photograph = None;
         self.insertions.take_up(&self.snapshot.inserted);
-        self.mixer = Mixer::default();
         self.grouping = Grouping::of(self.capture().map(Arc::as_ref));
         self.take_edits();
         self.sent_insertions = self.insertions.placements();
         self.model = ModelView::default();
         self.look.fit();
+        self.scales = RefCell::default();
         if self.capture().is_some() {
             if let Some(Source::Folder(folder)) = self.opening.take() {
                 self.preferences.opened(&folder);
@@ -330,9 +367,7 @@ impl App {
         self.trade_of_capture();
     }
 
-    fn mix_light(&mut self) {
-        let layers = self.view().and_then(|view| view.layers.clone());
-        self.mixer.update(layers.as_ref());
+    fn find_irradiance(&mut self) {
         let view = self.view().filter(|_| self.irradiance_needed).cloned();
         self.irradiance.update(view.as_deref());
     }
@@ -376,15 +411,20 @@ impl App {
         let Some(camera) = self.camera() else {
             return;
         };
-        let long_side = render_size(camera, self.pixels_needed);
-        let layers = self.layers_needed;
+        let side = |camera: &Intrinsics| camera.width.max(camera.height);
+        let long_side = render_size(side(&camera.intrinsics), self.pixels_needed);
+        let file = (self.capture())
+            .and_then(|open| open.capture.frames.get(self.frame))
+            .filter(|_| self.composite_needed);
+        let composite = file.map_or(0, |f| render_size(side(&f.intrinsics), self.pixels_needed));
+        let (render, layers) = (self.render_needed, self.layers_needed);
         let (key, view) = match &self.shown {
             Shown::Frame => (
-                (Some(self.frame), 0, long_side, layers),
+                (Some(self.frame), 0, long_side, composite, render, layers),
                 ViewCamera::Frame(self.frame),
             ),
             Shown::Free(camera, count) => (
-                (None, *count, long_side, layers),
+                (None, *count, long_side, composite, render, layers),
                 ViewCamera::Free(camera.clone()),
             ),
         };
@@ -392,6 +432,8 @@ impl App {
             let request = ViewRequest {
                 camera: view,
                 long_side,
+                composite,
+                render,
                 layers,
             };
             if self.connection.send(Command::View(request)) {
@@ -419,7 +461,7 @@ impl App {
         }
     }
 
-    fn answered(&mut self, ask: Ask, answer: Option<PathBuf>) {
+    fn answered(&mut self, ask: Ask, answer: Option<PathBuf>, ctx: &egui::Context) {
         let Some(path) = answer else {
             self.notices.say(
                 Level::Info,
@@ -433,61 +475,15 @@ impl App {
             return;
         };
         match ask {
-            Ask::Capture => self.open(Source::Folder(path)),
+            Ask::Capture => self.open_path(&path, ctx),
             Ask::SaveFolder | Ask::ExportFile => self.sheet.chosen(ask, path),
             Ask::Object => self.insert(path),
         }
     }
-
-    /// Adds an object, at first where the middle of the view meets the scene.
-    pub fn insert(&mut self, file: PathBuf) {
-        let below_middle = egui::pos2(0.5, 0.65);
-        let at = self.surface_at(below_middle).map(|at| at.point);
-        self.insertions.add(file, at);
-    }
-
-    /// Takes in the shapes of inserted objects, and scales down what is larger than the scene as modelled.
-    fn take_models(&mut self, ctx: &egui::Context) {
-        let Some(capture) = self.capture().cloned() else {
-            return;
-        };
-        for file in self.insertions.models.update(ctx, &self.insertions.objects) {
-            let Some(scale) = self.insertions.models.fitting_scale(&file, &capture.scene) else {
-                continue;
-            };
-            for object in &mut self.insertions.objects {
-                if object.placement.file == file && object.placement.scale == 1.0 {
-                    object.placement.scale = scale;
-                    let message = format!(
-                        "{} is larger than the scene, so it was scaled by {scale}",
-                        object.name()
-                    );
-                    self.notices.say(Level::Info, message);
-                }
-            }
-        }
-    }
-
-    /// Opens a dropped folder, or inserts a dropped object.
-    pub fn dropped(&mut self, path: PathBuf) {
-        if crate::app::insertion::is_object(&path) {
-            self.insert(path);
-            self.bring_forward = Some(Pane::Insert);
-            return;
-        }
-        // The folder of a dropped transforms.json is the capture.
-        let folder = if path.is_file() {
-            path.parent().map_or(path.clone(), PathBuf::from)
-        } else {
-            path
-        };
-        self.open(Source::Folder(folder));
-    }
 }
 
-/// The smallest of a few sizes that fills the panes, and no more than the photograph has.
-fn render_size(camera: &Camera, needed: f32) -> u32 {
-    let full = camera.intrinsics.width.max(camera.intrinsics.height);
+/// The smallest of a few sizes that fills the panes, and no more than there is.
+fn render_size(full: u32, needed: f32) -> u32 {
     [256, 384, 512, 768, 1024, 1536, 2048]
         .into_iter()
         .find(|&size| size as f32 >= needed)

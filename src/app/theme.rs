@@ -36,8 +36,6 @@ pub struct Tokens {
     pub train: Color32,
     /// The loss over held-out pixels.
     pub held_out: Color32,
-    /// Curves of a plot with many, apart for most eyes (after Okabe and Ito 2008).
-    pub series: [Color32; 7],
     /// Around pictures, where no pixel is.
     pub surround: Color32,
     /// Camera outlines in the 3D view.
@@ -63,15 +61,6 @@ pub const DARK: Tokens = Tokens {
     error: Color32::from_rgb(242, 109, 97),
     train: Color32::from_rgb(110, 173, 236),
     held_out: Color32::from_rgb(255, 170, 61),
-    series: [
-        Color32::from_rgb(86, 180, 233),
-        Color32::from_rgb(240, 130, 50),
-        Color32::from_rgb(40, 190, 140),
-        Color32::from_rgb(214, 140, 184),
-        Color32::from_rgb(230, 190, 60),
-        Color32::from_rgb(120, 150, 255),
-        Color32::from_rgb(170, 174, 182),
-    ],
     surround: Color32::from_rgb(14, 15, 17),
     camera: Color32::from_rgb(110, 173, 236),
     inserted: Color32::from_rgb(116, 216, 168),
@@ -94,15 +83,6 @@ pub const LIGHT: Tokens = Tokens {
     error: Color32::from_rgb(188, 38, 28),
     train: Color32::from_rgb(21, 98, 176),
     held_out: Color32::from_rgb(172, 85, 0),
-    series: [
-        Color32::from_rgb(0, 114, 178),
-        Color32::from_rgb(213, 94, 0),
-        Color32::from_rgb(0, 130, 95),
-        Color32::from_rgb(170, 80, 135),
-        Color32::from_rgb(160, 110, 0),
-        Color32::from_rgb(60, 80, 190),
-        Color32::from_rgb(80, 80, 80),
-    ],
     surround: Color32::from_rgb(214, 215, 218),
     camera: Color32::from_rgb(21, 98, 176),
     inserted: Color32::from_rgb(0, 120, 78),

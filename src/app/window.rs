@@ -1,11 +1,11 @@
 //! The window as eframe sees it: one pass draws bars, panes and what floats over them.
 
-use crate::app::layout::{self, Pane, Panes};
+use crate::app::layout::{self, Pane, Panes, Workspace};
 use crate::app::pace::Pace;
 use crate::app::picture::inspect;
 use crate::app::preferences::Preferences;
 use crate::app::shell::{
-    alignment, files, keys, menu, palette, start, status, thumbnails, toolbar,
+    alignment, files, keys, menu, palette, sessions, start, status, thumbnails, toolbar,
 };
 use crate::app::state::App;
 use crate::app::{action, model, picture, theme};
@@ -21,6 +21,8 @@ pub struct Window {
     pub app: App,
     /// Where its panes are.
     pub tree: Tree<Pane>,
+    /// What they are arranged for.
+    workspace: Workspace,
     kept: Option<PathBuf>,
     saved: Preferences,
     pace: Option<Arc<Pace>>,
@@ -28,23 +30,20 @@ pub struct Window {
 
 impl Window {
     /// A window; `kept` is where its preferences are written.
-    pub fn new(cc: &eframe::CreationContext<'_>, app: App, kept: Option<PathBuf>) -> Self {
+    pub fn new(cc: &eframe::CreationContext<'_>, mut app: App, kept: Option<PathBuf>) -> Self {
         theme::install(&cc.egui_ctx);
         app.apply_theme(&cc.egui_ctx);
         if let Some(render_state) = &cc.wgpu_render_state {
             picture::gpu::install(render_state);
             model::gpu::install(render_state);
         }
-        let tree = app
-            .preferences
-            .layout
-            .clone()
-            .filter(|tree| !tree.is_empty())
-            .unwrap_or_else(layout::first_layout);
+        let workspace = app.preferences.workspace;
+        let tree = arranged(&mut app.preferences, workspace);
         let saved = app.preferences.clone();
         Self {
             app,
             tree,
+            workspace,
             kept,
             saved,
             pace: None,
@@ -70,6 +69,12 @@ impl Window {
         Panel::top("tools")
             .frame(frame(ui, 8, 4))
             .show(ui, |ui| toolbar::bar(ui, app));
+        if sessions::has_line(app) {
+            Panel::top("session")
+                .exact_size(sessions::LINE)
+                .frame(frame(ui, 8, 4))
+                .show(ui, |ui| sessions::line(ui, app));
+        }
         Panel::bottom("status")
             .exact_size(24.0)
             .frame(frame(ui, 8, 2))
@@ -90,8 +95,15 @@ impl Window {
     }
 
     fn panes(&mut self, ui: &mut Ui) {
+        let wanted = self.app.preferences.workspace;
+        if wanted != self.workspace {
+            let before = std::mem::replace(&mut self.workspace, wanted);
+            let tree = arranged(&mut self.app.preferences, wanted);
+            let tree = std::mem::replace(&mut self.tree, tree);
+            *self.app.preferences.layout(before) = Some(tree);
+        }
         if std::mem::take(&mut self.app.reset_layout) {
-            self.tree = layout::first_layout();
+            self.tree = wanted.first_layout();
         }
         if let Some(pane) = self.app.bring_forward.take() {
             layout::show(&mut self.tree, pane);
@@ -105,6 +117,8 @@ impl Window {
                     return;
                 }
                 self.app.pixels_needed = 0.0;
+                self.app.composite_needed = false;
+                self.app.render_needed = false;
                 self.app.layers_needed = false;
                 self.app.irradiance_needed = false;
                 let mut panes = Panes {
@@ -117,7 +131,7 @@ impl Window {
 
     /// Writes the preferences where they differ from what was written last.
     fn save(&mut self) {
-        self.app.preferences.layout = Some(self.tree.clone());
+        *self.app.preferences.layout(self.workspace) = Some(self.tree.clone());
         if self.app.preferences == self.saved {
             return;
         }
@@ -131,6 +145,13 @@ impl Window {
             ));
         }
     }
+}
+
+/// The remembered layout of a workspace, or its first.
+fn arranged(preferences: &mut Preferences, workspace: Workspace) -> Tree<Pane> {
+    let kept = preferences.layout(workspace).clone();
+    let kept = kept.filter(|tree| !tree.is_empty());
+    kept.unwrap_or_else(|| workspace.first_layout())
 }
 
 impl eframe::App for Window {
@@ -147,13 +168,13 @@ impl eframe::App for Window {
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
         if self.app.palette.is_none() {
-            for action in action::pressed(&ctx) {
+            for action in action::pressed(&ctx, self.app.shows_start_page()) {
                 self.app.perform(action, &ctx);
             }
         }
         let dropped = ctx.input(|input| input.raw.dropped_files.clone());
         for path in dropped.iter().map(|file| file.path().to_owned()) {
-            self.app.dropped(path);
+            self.app.open_path(&path, &ctx);
         }
         if !ctx.input(|input| input.pointer.has_pointer()) {
             self.app.look.cursor = None;

@@ -165,7 +165,9 @@ impl Backdrop {
         let exposure = self.exposure_at(pixel);
         let (over, under) = (over * exposure, under * exposure);
         let behind = self.behind(pixel, under);
-        let light = over * alpha + (behind + over - under) * (1.0 - alpha);
+        // A shadow that the estimate takes for deeper than the photograph is bright leaves nothing.
+        let beside = (behind + over - under).max(Vec3::ZERO);
+        let light = over * alpha + beside * (1.0 - alpha);
         if !self.saturation.is_finite() {
             return light;
         }
@@ -185,29 +187,7 @@ mod tests {
 
     /// A square object, with a shadow right of it, before a grey photograph with some finish.
     fn composite(finish: Finish) -> Vec<f32> {
-        let intrinsics = Intrinsics {
-            width: SIDE,
-            height: SIDE,
-            fx: 40.0,
-            fy: 40.0,
-            cx: 20.0,
-            cy: 20.0,
-            distortion: [0.0; 4],
-        };
-        let pose = Pose {
-            rotation: DMat3::IDENTITY,
-            center: DVec3::ZERO,
-        };
-        let photograph = Picture::from_fn(SIDE, SIDE, |_, _| Vec3::splat(LEVEL));
-        let backdrop = Backdrop {
-            frame: 4,
-            camera: Camera::new(&intrinsics, &pose, DVec3::ZERO),
-            photograph: Arc::new(photograph),
-            exposure: Exposure::default(),
-            saturation: Vec3::ONE,
-            finish,
-            shown_at: 1.0,
-        };
+        let backdrop = backdrop(finish, Vec3::ONE);
         let layers: Vec<Mixed> = (0..SIDE * SIDE)
             .map(|pixel| {
                 let (x, y) = (pixel % SIDE, pixel / SIDE);
@@ -224,6 +204,33 @@ mod tests {
             .collect();
         let composite = backdrop.composite(&layers);
         composite.pixels.iter().map(|p| p.x).collect()
+    }
+
+    /// A grey photograph that saturates at a value.
+    fn backdrop(finish: Finish, saturation: Vec3) -> Backdrop {
+        let intrinsics = Intrinsics {
+            width: SIDE,
+            height: SIDE,
+            fx: 40.0,
+            fy: 40.0,
+            cx: 20.0,
+            cy: 20.0,
+            distortion: [0.0; 4],
+        };
+        let pose = Pose {
+            rotation: DMat3::IDENTITY,
+            center: DVec3::ZERO,
+        };
+        let photograph = Picture::from_fn(SIDE, SIDE, |_, _| Vec3::splat(LEVEL));
+        Backdrop {
+            frame: 4,
+            camera: Camera::new(&intrinsics, &pose, DVec3::ZERO),
+            photograph: Arc::new(photograph),
+            exposure: Exposure::default(),
+            saturation,
+            finish,
+            shown_at: 1.0,
+        }
     }
 
     fn at(pixels: &[f32], x: u32, y: u32) -> f32 {
@@ -247,6 +254,14 @@ mod tests {
         assert!((total(&soft) / total(&exact) - 1.0).abs() < 1e-5);
         assert!((at(&soft, 16, 17) - OBJECT).abs() < 1e-3);
         assert_eq!(at(&soft, 5, 17), LEVEL);
+    }
+
+    #[test]
+    fn a_shadow_is_never_darker_than_black() {
+        let shadow = backdrop(Finish::default(), Vec3::INFINITY);
+        let [over, under] = [0.0, LEVEL * 2.0].map(Vec3::splat);
+        assert_eq!(shadow.blend(0, 0.0, over, under), Vec3::ZERO);
+        assert_eq!(shadow.blend(0, 0.0, under, under), Vec3::splat(LEVEL));
     }
 
     #[test]

@@ -110,6 +110,22 @@ impl Insertion {
         insertion
     }
 
+    /// The same insertion by other random numbers, with nothing traced yet.
+    pub fn beside(&self, seed: u64) -> Self {
+        Self {
+            backdrop: self.backdrop.clone(),
+            lit: self.lit.clone(),
+            objects: self.objects.clone(),
+            options: self.options,
+            seed,
+            pixels: vec![PixelSums::default(); self.pixels.len()],
+            row_samples: vec![0; self.row_samples.len()],
+            next_row: 0,
+            rays: 0,
+            rejected: 0,
+        }
+    }
+
     /// Adds `samples` paths to every pixel, in parallel. Any split into calls, on any number of threads, gives the
     /// same bits.
     pub fn pass(&mut self, samples: u32) {

@@ -6,8 +6,8 @@ use crate::export::picture::write_png_bytes;
 use crate::export::scale::Scale;
 use crate::inverse::solver::{LossPoint, Stage};
 use plotters::prelude::{
-    BLACK, BitMapBackend, ChartBuilder, Circle, Color, IntoDrawingArea, IntoFont, LineSeries,
-    PathElement, Polygon, RGBColor, Rectangle, SeriesLabelPosition, Text, WHITE,
+    BLACK, BitMapBackend, ChartBuilder, Circle, Color, EmptyElement, IntoDrawingArea, IntoFont,
+    LineSeries, PathElement, Polygon, RGBColor, Rectangle, SeriesLabelPosition, Text, WHITE,
 };
 use plotters::style::TextStyle;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -26,6 +26,8 @@ const COLORS: [RGBColor; 7] = [
 
 /// Width and height of a plot in pixels.
 const SIZE: (u32, u32) = (960, 600);
+/// Room that a letter of the name of a line needs, in pixels.
+const LETTER: i32 = 8;
 /// Room that the name of a point needs, in pixels.
 const LABEL: i32 = 100;
 
@@ -80,6 +82,16 @@ pub struct Plot {
     pub labels: Vec<([f64; 2], String)>,
 }
 
+/// The first row in which a name that begins at a pixel lies on no other; `rows` holds where the last name of each ends.
+fn row_for(rows: &mut Vec<i32>, left: i32, name: &str) -> i32 {
+    let row = (rows.iter().position(|&end| end <= left)).unwrap_or_else(|| {
+        rows.push(0);
+        rows.len() - 1
+    });
+    rows[row] = left + LETTER * (name.chars().count() as i32 + 2);
+    row as i32
+}
+
 impl Plot {
     /// Draws the plot and writes it as a PNG. Points that are not finite are left out.
     ///
@@ -124,11 +136,15 @@ impl Plot {
             .draw()?;
 
         // Marks lie below the curves.
+        let mut rows: Vec<i32> = Vec::new();
         for (x, name) in self.marks.iter().filter(|(x, _)| self.x.shows(*x)) {
             let line = vec![(*x, bottom), (*x, top)];
             chart.draw_series([PathElement::new(line, RGBColor(150, 150, 150))])?;
+            let (left, _) = chart.backend_coord(&(*x, top));
+            let row = row_for(&mut rows, left, name);
             let style = (FONT, 14).into_font().color(&RGBColor(110, 110, 110));
-            chart.draw_series([Text::new(format!(" {name}"), (*x, top), style)])?;
+            let text = Text::new(format!(" {name}"), (0, 16 * row), style);
+            chart.draw_series([EmptyElement::at((*x, top)) + text])?;
         }
 
         // Bands, curves, and points where there are few.
@@ -290,6 +306,14 @@ mod tests {
             .collect();
         assert!(!rows.is_empty(), "the curve is drawn there");
         rows.iter().sum::<f64>() / rows.len() as f64
+    }
+
+    #[test]
+    fn names_of_near_lines_lie_in_rows_of_their_own() {
+        let mut rows = Vec::new();
+        let lefts = [100, 105, 110, 400];
+        let found = lefts.map(|left| row_for(&mut rows, left, "materials"));
+        assert_eq!(found, [0, 1, 2, 0]);
     }
 
     #[test]

@@ -39,15 +39,17 @@ impl Source {
 /// A request to the worker, taken between iterations.
 #[derive(Debug, Clone)]
 pub enum Command {
-    /// Loads a capture and starts solving it.
+    /// Loads a capture and goes on with its last session; without one it is solved.
     Open(Source),
+    /// Reads the open capture anew and solves it as if it had never been open; the session so far is kept.
+    StartOver,
     /// Starts or goes on.
     Run,
     /// Stops between two iterations and keeps everything.
     Pause,
     /// One iteration, then pause.
     Step,
-    /// Forgets the estimate and starts over.
+    /// Solves anew, with the changes made by hand and the inserted objects; the session so far is kept.
     Reset,
     /// Ends the solve, keeping the estimate.
     Finish,
@@ -69,10 +71,10 @@ pub enum Command {
     Export(ExportRequest),
     /// Writes the layers of the shown view's light as one OpenEXR file, as `relit render --layers` does.
     SaveLayers(PathBuf),
-    /// Saves the session by itself from now on, under a folder for those of all captures.
-    Keep(PathBuf),
-    /// Takes up the estimate of a folder that `Save` or `relit solve` wrote.
+    /// Goes on with a session that is kept, or with what `Save` or `relit solve` wrote into a folder.
     Resume(PathBuf),
+    /// Removes a session that is kept, for good.
+    Remove(PathBuf),
     /// Reads the open capture again with other options, keeping what was found and changed.
     Reframe(Box<OpenOptions>),
     /// Changes the objects of the open capture. What was found is forgotten, and the solve starts over.
@@ -99,6 +101,10 @@ pub struct ViewRequest {
     pub camera: ViewCamera,
     /// Long side of the picture in pixels, at most the photograph's.
     pub long_side: u32,
+    /// Long side in pixels of the frame's photograph as it was changed, at most its file's; 0 where nobody looks at it.
+    pub composite: u32,
+    /// Whether anybody looks at the re-render; without it there is a coarse one alone.
+    pub render: bool,
     /// Whether the light of each lamp is kept apart.
     pub layers: bool,
 }
@@ -119,8 +125,6 @@ pub struct ExportRequest {
     pub format: ExportFormat,
     /// Where.
     pub path: PathBuf,
-    /// The changes made by hand to write it with, where they are others than those sent before.
-    pub edits: Option<Edits>,
 }
 
 /// How a capture is read.

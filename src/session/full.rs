@@ -21,6 +21,43 @@ impl OpenCapture {
         pair.ok_or_else(|| self.no_frame(index))
     }
 
+    /// A frame's camera and photograph with a long side of at most so many pixels: from its file, where that has more of them than
+    /// the working resolution.
+    ///
+    /// # Errors
+    /// The frame does not exist, or the file cannot be read again.
+    pub fn frame_at(&self, index: usize, long_side: u32) -> Result<(Camera, Arc<Photograph>)> {
+        let size = |camera: &Camera| camera.intrinsics.width.max(camera.intrinsics.height);
+        let (camera, photograph) = self.frame(index)?;
+        let (mut camera, mut photograph) = (camera.clone(), photograph.clone());
+        if long_side > size(&camera) {
+            let full = self.full_camera(index)?;
+            if size(&full) > size(&camera) {
+                (camera, photograph) = (full, self.full_photograph(index)?);
+            }
+        }
+        let camera = camera.shrunk(long_side);
+        let k = &camera.intrinsics;
+        if (photograph.width, photograph.height) == (k.width, k.height) {
+            return Ok((camera, photograph));
+        }
+        let whole = Picture {
+            width: photograph.width,
+            height: photograph.height,
+            pixels: photograph.pixels.clone(),
+        };
+        let sized = Photograph {
+            width: k.width,
+            height: k.height,
+            pixels: box_filter(&whole, k.width, k.height).pixels,
+            usable: Vec::new(),
+            limits: Vec::new(),
+            encoding: photograph.encoding,
+            saturation: photograph.saturation,
+        };
+        Ok((camera, Arc::new(sized)))
+    }
+
     /// A frame's camera at the size of its photograph's file.
     ///
     /// # Errors

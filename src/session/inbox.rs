@@ -185,6 +185,8 @@ mod tests {
         Command::View(ViewRequest {
             camera: ViewCamera::Frame(frame),
             long_side: 64,
+            composite: 0,
+            render: true,
             layers: false,
         })
     }

@@ -7,6 +7,7 @@ pub mod inbox;
 pub mod insertion;
 mod judge;
 pub mod keep;
+pub mod library;
 pub mod light;
 pub mod open;
 pub mod photographs;

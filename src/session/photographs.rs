@@ -11,7 +11,7 @@ use crate::compose::write::{write_insertion, write_relit};
 use crate::error::Result;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
-use crate::session::insertion::{Inserted, Library};
+use crate::session::library::{Inserted, Library};
 use crate::session::light::path_options;
 use crate::session::snapshot::OpenCapture;
 use crate::transport::lit::Lit;

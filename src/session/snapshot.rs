@@ -10,9 +10,9 @@ use crate::inverse::solver::{Progress, Termination};
 use crate::scene::Scene;
 use crate::session::command::{OpenOptions, Source};
 use crate::session::edits::Edits;
+use crate::session::keep::Kept;
 use crate::transport::layers;
 use glam::Vec3;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 pub use crate::math::picture::Picture;
@@ -45,11 +45,15 @@ pub struct Snapshot {
     pub regroupings: u64,
     /// The inserted objects that the open capture came with, as a session that was taken up.
     pub inserted: Arc<Vec<Placement>>,
-    /// The folder of the capture's last session, where it was kept and not taken up.
-    pub earlier: Option<PathBuf>,
+    /// The photograph that was shown when the open capture's session was saved.
+    pub frame: usize,
+    /// Which session the open capture goes on with, in words; `None` where a new one began.
+    pub continued: Option<String>,
+    /// All sessions that are kept, the newest first.
+    pub kept: Arc<Vec<Kept>>,
     /// Pictures of the requested view.
     pub view: Option<Arc<View>>,
-    /// Composites of the requested frame, where objects are inserted or anything was changed by hand.
+    /// The requested frame's photograph as it was changed, once that was looked at.
     pub insertion: Option<Arc<Insertion>>,
     /// Events since the session began, oldest first.
     pub events: Arc<Vec<Event>>,
@@ -149,14 +153,17 @@ pub struct Insertion {
     pub sequence: u64,
     /// The frame.
     pub frame: usize,
-    /// The photograph with the objects, lit and shadowed by the estimate.
+    /// The photograph as it was taken.
+    pub photograph: Arc<Picture>,
+    /// The same in the changed light, with the objects lit and shadowed by the estimate.
     pub composite: Arc<Picture>,
     /// Pasted, lit by harmonics of the photographs alone.
     pub naive: Arc<Picture>,
     /// Pasted, lit by harmonics of the estimate.
     pub naive_estimate: Arc<Picture>,
-    /// Samples a pixel in `composite`, of the changed light or of the objects, whichever are fewer.
-    pub samples: u32,
+    /// Samples a pixel in `composite`, of the changed light or of the objects, whichever are fewer; `None` where it is the
+    /// photograph as taken.
+    pub samples: Option<u32>,
     /// Seconds from the request to this picture.
     pub seconds: f64,
 }

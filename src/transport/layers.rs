@@ -3,6 +3,7 @@
 use crate::math::color::luminance;
 use crate::math::picture::Picture;
 use crate::math::rng::Stream;
+use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::geometry::Ray;
 use crate::transport::lit::Lit;
@@ -40,11 +41,15 @@ impl Split {
     /// One layer for each of the [`MOST_LAMPS`] lamps with the largest area × luminance, in the scene's order, one for
     /// all others, and one for light from outside; only those that there are.
     pub fn new(lit: &Lit) -> Self {
-        let power = |object: usize| {
-            let emission = lit.materials.get(object).map_or(Vec3::ZERO, |m| m.emission);
-            lit.scene.objects[object].area * f64::from(luminance(emission))
-        };
-        let objects = lit.scene.objects.len();
+        let emission = |object: usize| lit.materials.get(object).map_or(Vec3::ZERO, |m| m.emission);
+        Self::of(&lit.scene, emission, lit.outside.is_some())
+    }
+
+    /// [`Split::new`] of a scene whose objects have these emissions, with light from outside or without.
+    pub fn of(scene: &Scene, emission: impl Fn(usize) -> Vec3, outside_light: bool) -> Self {
+        let power =
+            |object: usize| scene.objects[object].area * f64::from(luminance(emission(object)));
+        let objects = scene.objects.len();
         let mut lamps: Vec<usize> = (0..objects).filter(|&o| power(o) > 0.0).collect();
         lamps.sort_by(|&a, &b| power(b).total_cmp(&power(a)).then(a.cmp(&b)));
         let others = lamps.split_off(lamps.len().min(MOST_LAMPS));
@@ -63,7 +68,7 @@ impl Split {
             sources.push(LightSource::OtherLamps);
         }
         let outside = sources.len() as u32;
-        if lit.outside.is_some() {
+        if outside_light {
             sources.push(LightSource::Outside);
         }
         Self {

@@ -190,11 +190,9 @@ fn sound_seeds_are_read() {
             "{what}"
         );
     }
-    let folder = targets::results_with("inserted.json", &seed("session/block.json")).unwrap();
-    assert_eq!(
-        relit::session::keep::inserted(folder.path()).unwrap().len(),
-        2
-    );
+    let folder = targets::results_with("session.json", &seed("session/block.json")).unwrap();
+    let held = relit::session::keep::held(folder.path()).unwrap();
+    assert_eq!(held.unwrap().inserted.len(), 2);
 }
 
 /// What a person is told of the most brazen claims, and how soon.

@@ -235,7 +235,6 @@ fn the_window_is_refused_the_same() {
         assert!(session.send(Command::Export(ExportRequest {
             format: ExportFormat::Obj,
             path: place.path(file),
-            edits: None,
         })));
         refusals(count);
     }

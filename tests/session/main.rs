@@ -2,6 +2,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod keeping;
 mod recut;
 mod regroup;
 
@@ -14,10 +15,11 @@ use relit::inverse::solver::{
     Checkpoint, Control, LossPoint, Observer, Problem, Solution, Termination,
 };
 use relit::session::Session;
-use relit::session::command::{Command, OpenOptions, Placement, Source, ViewCamera, ViewRequest};
+use relit::session::command::{Command, OpenOptions, Source, ViewCamera, ViewRequest};
 use relit::session::edits::{Edits, ObjectEdit};
 use relit::session::snapshot::{Level, OpenCapture, Phase, Picture, Snapshot};
 use relit::session::worker::Backend;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
@@ -70,18 +72,25 @@ struct Rig {
 impl Rig {
     /// A session on the tiny room whose first solve panics at a step, if one is given.
     fn new(panic_at: Option<u64>) -> Self {
-        Self::spawn(|_| Ok(ROOM.clone()), panic_at, false)
+        Self::spawn(|_| Ok(ROOM.clone()), panic_at, false, None)
     }
 
     /// A session whose solves can be gone on with after their end.
     fn resumable() -> Self {
-        Self::spawn(|_| Ok(ROOM.clone()), None, true)
+        Self::spawn(|_| Ok(ROOM.clone()), None, true, None)
+    }
+
+    /// The same, keeping its sessions under a folder.
+    fn keeping(sessions: &Path) -> Self {
+        let sessions = Some(sessions.to_owned());
+        Self::spawn(|_| Ok(ROOM.clone()), None, true, sessions)
     }
 
     fn spawn(
         read: impl Fn(&OpenOptions) -> Result<Capture> + Send + 'static,
         panic_at: Option<u64>,
         resumable: bool,
+        sessions: Option<PathBuf>,
     ) -> Self {
         let steps = Arc::new(AtomicU64::new(0));
         let shared = steps.clone();
@@ -90,6 +99,7 @@ impl Rig {
             open: Box::new(move |source, options| {
                 OpenCapture::new(source.clone(), options.clone(), read(options)?)
             }),
+            sessions,
             solve: Box::new(move |_: &Problem, _: &Settings, resume, observer| {
                 Ok(count_up(observer, &shared, fault.take(), resume, resumable))
             }),
@@ -127,6 +137,8 @@ impl Rig {
         assert!(self.session.send(Command::View(ViewRequest {
             camera,
             long_side,
+            composite: long_side,
+            render: true,
             layers: false
         })));
     }
@@ -290,64 +302,6 @@ fn a_save_during_a_solve_holds_the_solvers_state_and_a_resume_goes_on_from_it() 
 }
 
 #[test]
-fn a_session_saves_by_itself_and_is_taken_up_with_its_changes_and_objects() {
-    let base = tempfile::tempdir().expect("a temporary folder");
-    let keep = || Command::Keep(base.path().join("sessions"));
-    let file = base.path().join("block.obj");
-    std::fs::write(&file, "v 0 0 0\nv 0.2 0 0\nv 0 0.2 0.2\nf 1 2 3\n").expect("written");
-    let block = Placement {
-        file,
-        at: Some(glam::DVec3::new(0.1, 0.0, -0.3)),
-        scale: 1.5,
-        rotate: 30.0,
-        hidden: false,
-    };
-    let hidden = Placement {
-        hidden: true,
-        ..block.clone()
-    };
-    let inserted = vec![block, hidden];
-    let mut edits = Edits::default();
-    let off = ObjectEdit {
-        off: true,
-        ..ObjectEdit::default()
-    };
-    edits.set(3, off);
-
-    let rig = Rig::resumable();
-    assert!(rig.session.send(keep()));
-    rig.until("some steps", |s| iterations(s) > 50);
-    assert!(rig.session.send(Command::Edit(edits.clone())));
-    assert!(rig.session.send(Command::Insert(inserted.clone())));
-    rig.until("the edit", |s| s.edits == edits);
-    assert!(rig.session.send(Command::Pause));
-    let paused = rig.until("the pause", |s| s.phase == Phase::Paused);
-    // What came after the last save is saved at the worker's end.
-    rig.session.join();
-
-    let other = Rig::resumable();
-    assert!(other.session.send(keep()));
-    let found = other.until("the last session", |s| s.earlier.is_some());
-    assert!(found.edits.is_empty() && found.inserted.is_empty());
-    let folder = found.earlier.clone().expect("a folder");
-    assert!(other.session.send(Command::Resume(folder)));
-    let resumed = other.until("the changes", |s| s.edits == edits);
-    assert_eq!(*resumed.inserted, inserted);
-    other.until("going on", |s| iterations(s) >= iterations(&paused));
-    assert_eq!(resumed.earlier, None);
-    other.session.join();
-
-    // What goes on is kept in turn.
-    let third = Rig::resumable();
-    assert!(third.session.send(keep()));
-    let again = third.until("the last session", |s| s.earlier.is_some());
-    let saved = again.earlier.clone().expect("a folder");
-    let saved = relit::session::save::load(&saved).expect("reads");
-    let checkpoint = saved.checkpoint.as_ref().expect("a checkpoint");
-    assert!(checkpoint.progress.iterations >= iterations(&paused));
-}
-
-#[test]
 fn pinned_values_are_handed_to_the_solver_which_goes_on_from_its_checkpoint() {
     let rig = Rig::new(None);
     rig.until("some steps", |s| iterations(s) > 100);
@@ -453,7 +407,10 @@ fn edits_show_at_once_are_saved_and_come_back_while_the_estimate_stays() {
     assert!(saved.to_rgb32f().pixels().all(|p| p.0 == [0.0; 3]));
     assert!(rig.session.send(Command::Edit(Edits::default())));
     rig.until("light again", |s| {
-        light(s).is_some_and(|l| l > 0.0) && s.insertion.is_none()
+        light(s).is_some_and(|l| l > 0.0)
+            && s.insertion
+                .as_ref()
+                .is_some_and(|i| i.samples.is_none() && i.composite == i.photograph)
     });
     assert!(rig.session.send(Command::Resume(out)));
     let resumed = rig.until("the edits again", |s| {
@@ -470,6 +427,8 @@ fn layers_are_shown_when_asked_for_and_add_up_to_the_render() {
     assert!(rig.session.send(Command::View(ViewRequest {
         camera: ViewCamera::Frame(0),
         long_side: 32,
+        composite: 0,
+        render: true,
         layers: true,
     })));
     let shown = rig.until("layers", |s| {

@@ -31,7 +31,7 @@ fn held_out() -> Settings {
 
 #[test]
 fn a_new_start_cuts_the_mesh_again_only_where_other_pixels_are_held_out() {
-    let rig = Rig::spawn(|_| Ok(whole()), None, true);
+    let rig = Rig::spawn(|_| Ok(whole()), None, true, None);
     let started = rig.until("some steps", |s| iterations(s) > 50);
     let first = started.capture.clone().expect("open");
     assert_eq!(first.options.hold_out, HoldOut::default());
@@ -75,6 +75,7 @@ fn a_capture_that_cannot_be_read_again_is_said_and_solved_with_the_segments_it_h
         },
         None,
         true,
+        None,
     );
     let started = rig.until("some steps", |s| iterations(s) > 50);
     let first = started.capture.clone().expect("open");

@@ -3,6 +3,7 @@
 use egui_kittest::Harness;
 use glam::{DMat3, DVec3, Vec3};
 use relit::app::connection::Connection;
+use relit::app::layout::Workspace;
 use relit::app::preferences::Preferences;
 use relit::app::state::App;
 use relit::app::window::Window;
@@ -68,7 +69,7 @@ impl Recorder {
     }
 }
 
-/// A window of 1280 × 800 on an idle session.
+/// A window of 1280 × 800 with the grid of pictures on an idle session.
 pub fn idle(builder: egui_kittest::HarnessBuilder<Window>) -> (Harness<'static, Window>, Recorder) {
     let recorder = Recorder::default();
     let connection = recorder.clone();
@@ -76,7 +77,11 @@ pub fn idle(builder: egui_kittest::HarnessBuilder<Window>) -> (Harness<'static, 
         .with_size(egui::vec2(1280.0, 800.0))
         .with_max_steps(20)
         .build_eframe(move |cc| {
-            let app = App::new(Box::new(connection), Preferences::default());
+            let preferences = Preferences {
+                workspace: Workspace::Inspect,
+                ..Preferences::default()
+            };
+            let app = App::new(Box::new(connection), preferences);
             Window::new(cc, app, None)
         });
     (harness, recorder)
@@ -234,10 +239,11 @@ pub fn insertion(frame: usize) -> Insertion {
     Insertion {
         sequence: 1,
         frame,
+        photograph: flat(0.5),
         composite: flat(0.9),
         naive: flat(0.6),
         naive_estimate: flat(0.7),
-        samples: 16,
+        samples: Some(16),
         seconds: 0.4,
     }
 }

@@ -1,7 +1,7 @@
 //! Flows without a graphics adapter.
 
 use crate::connection::{Recorder, idle, insertion, solve, solving, view};
-use crate::input::{click, press, type_into};
+use crate::input::{block, click, insert, press, retype, type_into};
 use egui::{Key, Modifiers, Role};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
@@ -9,6 +9,7 @@ use relit::app::layout::{Pane, is_open};
 use relit::app::panels::objects::SortBy;
 use relit::app::picture::quantity::Quantity;
 use relit::app::window::Window;
+use relit::inverse::solver::Termination;
 use relit::session::command::{Command, ExportFormat, Source, ViewCamera};
 use relit::session::snapshot::{Event, Level, Phase};
 use std::path::PathBuf;
@@ -33,10 +34,16 @@ fn the_start_page_opens_the_room_and_a_typed_path() {
     ));
 
     let (mut harness, recorder) = idle(Harness::builder());
-    type_into(&mut harness, "Capture folder", "/captures/office");
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("transforms.json"), "{}").expect("written");
+    type_into(
+        &mut harness,
+        "Capture folder",
+        &folder.path().to_string_lossy(),
+    );
     click(&mut harness, "Open");
     let sent = recorder.sent();
-    let folder = PathBuf::from("/captures/office");
+    let folder = folder.path().to_owned();
     assert!(matches!(&sent[..], [Command::Open(Source::Folder(path))] if *path == folder));
     recorder.show(solve);
     harness.run_steps(3);
@@ -45,20 +52,68 @@ fn the_start_page_opens_the_room_and_a_typed_path() {
 }
 
 #[test]
-fn a_failed_open_is_said_and_leads_back_to_the_start_page() {
+fn a_failed_open_is_said_where_it_was_typed_and_letters_typed_after_it_do_nothing_else() {
     let (mut harness, recorder) = idle(Harness::builder());
     type_into(&mut harness, "Capture folder", "/nowhere");
+    click(&mut harness, "Open");
+    harness.get_by_label("/nowhere: there is nothing; check the path");
+    assert!(recorder.sent().is_empty());
+
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("transforms.json"), "{}").expect("written");
+    retype(
+        &mut harness,
+        "Capture folder",
+        &folder.path().to_string_lossy(),
+    );
     click(&mut harness, "Open");
     recorder.show(|snapshot| {
         snapshot.phase = Phase::Failed;
         snapshot.events = Arc::new(vec![Event {
             level: Level::Error,
-            message: "/nowhere: no such folder; check the path".into(),
+            message: "transforms.json: no frames; name a capture that has some".into(),
         }]);
     });
     harness.run_steps(3);
-    harness.get_by_label("/nowhere: no such folder; check the path");
+    // In the page and as a notice.
+    let said = "transforms.json: no frames; name a capture that has some";
+    assert_eq!(harness.query_all_by_label(said).count(), 2);
     harness.get_by_label("Open the built-in room");
+    // T would change the tone curve, L show the lights.
+    let (tone, path) = (
+        harness.state().app.look.tone,
+        harness.state().app.path.clone(),
+    );
+    for key in [Key::T, Key::L] {
+        press(&mut harness, Modifiers::NONE, key);
+    }
+    assert_eq!(harness.state().app.look.tone, tone);
+    harness.event(egui::Event::Text("x".into()));
+    harness.run_steps(2);
+    assert_ne!(harness.state().app.path, path);
+}
+
+#[test]
+fn a_folder_that_is_neither_capture_nor_scan_says_what_to_choose() {
+    let (mut harness, _recorder) = idle(Harness::builder());
+    let folder = tempfile::tempdir().expect("a folder");
+    type_into(
+        &mut harness,
+        "Capture folder",
+        &folder.path().to_string_lossy(),
+    );
+    click(&mut harness, "Open");
+    for _ in 0..400 {
+        harness.run_steps(1);
+        if harness
+            .query_by_label_contains("no known layout is recognised")
+            .is_some()
+        {
+            return;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    panic!("{:?}", harness.state().app.trouble);
 }
 
 #[test]
@@ -106,7 +161,7 @@ fn photographs_are_stepped_through_around_the_ends() {
     click(&mut harness, "Next photograph");
     harness.get_by_label("photograph 1 of 3");
     assert_eq!(asked(&recorder), Some(0));
-    click(&mut harness, "Photograph 1");
+    click(&mut harness, "Photograph 2");
     assert_eq!(asked(&recorder), Some(1));
     // The photograph is there at once, the re-render when the worker has sent it.
     let app = &harness.state().app;
@@ -199,29 +254,54 @@ fn two_pictures_are_wiped_flipped_and_shown_side_by_side() {
 }
 
 #[test]
-fn where_no_inserted_object_can_be_read_the_composite_says_so() {
-    let (mut harness, _recorder) = solving(Harness::builder());
+fn a_file_that_is_no_object_is_said_where_it_was_typed_and_joins_nothing() {
+    let (mut harness, recorder) = solving(Harness::builder());
+    let folder = tempfile::tempdir().expect("a folder");
+    let broken = folder.path().join("broken.glb");
+    std::fs::write(&broken, "glTF, but not really").expect("written");
     click(&mut harness, "Insert");
-    type_into(&mut harness, "Object file", "/nowhere/chair.glb");
-    click(&mut harness, "Add");
-    click(&mut harness, "Naive beside ours");
-    for _ in 0..200 {
-        harness.run_steps(1);
-        let text = "No inserted object can be read; the log says why";
-        if harness.query_all_by_label(text).count() == 2 {
-            return;
+    for (file, word) in [
+        ("/nowhere/chair.glb".to_owned(), "/nowhere/chair.glb"),
+        (broken.display().to_string(), "broken.glb"),
+        (
+            "/objects/chair.fbx".to_owned(),
+            "save it as GLB, glTF or OBJ",
+        ),
+    ] {
+        retype(&mut harness, "Object file", &file);
+        click(&mut harness, "Add");
+        for _ in 0..200 {
+            harness.run_steps(1);
+            if harness.query_by_label_contains(word).is_some() {
+                break;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(5));
         }
-        std::thread::sleep(std::time::Duration::from_millis(5));
+        let trouble = harness.state().app.insertions.trouble.clone();
+        assert!(trouble.is_some_and(|line| line.contains(word)), "{file}");
+        harness.get_by_label_contains(word);
+        assert!(harness.state().app.insertions.objects.is_empty());
     }
-    panic!("it waits for a composite that never comes");
+    assert_eq!(placements(&recorder), None);
+}
+
+#[test]
+fn an_added_object_stands_on_the_floor_in_view_and_says_its_size() {
+    let (mut harness, _recorder) = solving(Harness::builder());
+    let folder = tempfile::tempdir().expect("a folder");
+    insert(&mut harness, &block(folder.path()));
+    let at = harness.state().app.insertions.objects[0].placement.at;
+    let at = at.expect("a place");
+    assert!(at.y.abs() < 1e-5 && at.x.abs() < 0.5, "{at}");
+    harness.get_by_label("0.50 m wide, 0.50 m high, 0.50 m deep");
 }
 
 #[test]
 fn objects_are_inserted_moved_duplicated_deleted_and_brought_back() {
     let (mut harness, recorder) = solving(Harness::builder());
-    click(&mut harness, "Insert");
-    type_into(&mut harness, "Object file", "/objects/chair.glb");
-    click(&mut harness, "Add");
+    let folder = tempfile::tempdir().expect("a folder");
+    insert(&mut harness, &block(folder.path()));
+    harness.run_steps(2);
     assert_eq!(placements(&recorder), Some(1));
     assert!(harness.state().app.insertions.placing);
 
@@ -252,7 +332,7 @@ fn objects_are_inserted_moved_duplicated_deleted_and_brought_back() {
     press(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
     assert_eq!(placements(&recorder), Some(0));
     press(&mut harness, Modifiers::COMMAND, Key::Z);
-    click(&mut harness, "Show chair 1");
+    click(&mut harness, "Show block 1");
     assert_eq!(placements(&recorder), Some(0));
 
     recorder.show(|snapshot| snapshot.insertion = Some(Arc::new(insertion(0))));
@@ -269,9 +349,8 @@ fn objects_are_inserted_moved_duplicated_deleted_and_brought_back() {
 #[test]
 fn a_drag_is_one_step_of_undo() {
     let (mut harness, recorder) = solving(Harness::builder());
-    click(&mut harness, "Insert");
-    type_into(&mut harness, "Object file", "chair.obj");
-    click(&mut harness, "Add");
+    let folder = tempfile::tempdir().expect("a folder");
+    insert(&mut harness, &block(folder.path()));
     let turn = harness
         .get_by_role_and_label(Role::SpinButton, "Turn")
         .rect()
@@ -382,4 +461,55 @@ fn the_layout_is_reset() {
     harness.state_mut().app.reset_layout = true;
     harness.run_steps(2);
     assert!(is_open(&harness.state().tree, Pane::Model));
+}
+
+#[test]
+fn states_do_not_contradict_each_other() {
+    let (mut harness, recorder) = solving(Harness::builder());
+    recorder.show(|snapshot| snapshot.phase = Phase::Finished(Termination::Cancelled));
+    harness.run_steps(2);
+    harness.get_by_label("Stopped");
+    assert!(harness.query_by_label_contains("cancelled").is_none());
+    click(&mut harness, "Settings");
+    assert!(harness.query_by_label_contains("0.000000").is_none());
+
+    let (mut harness, recorder) = idle(Harness::builder());
+    recorder.show(|snapshot| snapshot.phase = Phase::Loading);
+    harness.run_steps(3);
+    assert!(harness.query_by_label("No capture is open").is_none());
+    assert!(harness.query_all_by_label("Reading the capture…").count() > 0);
+}
+
+#[test]
+fn the_photograph_as_changed_is_the_largest_picture_and_grids_are_a_workspace_of_their_own() {
+    let (mut harness, recorder) = solving(Harness::builder());
+    press(&mut harness, Modifiers::COMMAND, Key::Num1);
+    let hero = harness.get_by_label("Composite picture").rect();
+    assert!(hero.area() > 0.35 * 1280.0 * 800.0, "{hero}");
+    assert!(harness.query_by_label("Albedo picture").is_none());
+    // It is the photograph while nothing is changed, and what the worker makes of it then.
+    let pixel = |harness: &Harness<'_, Window>| {
+        let drawn = harness.state().app.drawn(Quantity::Composite);
+        drawn.expect("a picture").picture.pixels[0].x
+    };
+    assert_eq!(pixel(&harness), 0.0);
+    recorder.show(|snapshot| snapshot.insertion = Some(Arc::new(insertion(0))));
+    harness.run_steps(2);
+    assert_eq!(pixel(&harness), 0.9);
+    harness.get_by_label("16 samples a pixel");
+    // It is asked for at the size at which it is shown, up to that of its file.
+    let asked = recorder
+        .sent()
+        .into_iter()
+        .rev()
+        .find_map(|command| match command {
+            Command::View(request) => Some(request.composite),
+            _ => None,
+        });
+    assert_eq!(asked, Some(64));
+    press(&mut harness, Modifiers::COMMAND, Key::B);
+    assert_eq!(harness.state().app.against, Some(Quantity::Render));
+    harness.get_by_label("Wipe position");
+    click(&mut harness, "Inspect");
+    harness.get_by_label("Albedo picture");
 }

@@ -1,16 +1,17 @@
-//! Mixing the light of lamps, and changing lamps and materials by hand.
+//! Changing lamps and materials by hand.
 
-use crate::connection::{solving, view};
+use crate::connection::solving;
 use crate::input::{click, press};
 use egui::{Key, Modifiers, Role};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use glam::Vec3;
+use relit::app::lights::{Gain, place};
 use relit::app::picture::quantity::Quantity;
 use relit::app::window::Window;
+use relit::inverse::estimate::Outside;
 use relit::session::command::Command;
 use relit::session::edits::Edits;
-use relit::session::snapshot::LightSource;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -29,71 +30,66 @@ fn slide(harness: &mut Harness<'_, Window>, label: &str, to: f32) {
     harness.run_steps(3);
 }
 
-/// The value of the mixed picture.
-fn relit(harness: &Harness<'_, Window>) -> Vec3 {
-    let drawn = harness.state().app.drawn(Quantity::Relit);
-    drawn.expect("a mixed picture").picture.pixels[0]
-}
-
-fn near(value: Vec3, expected: f32) -> bool {
-    (value - Vec3::splat(expected)).abs().max_element() < 1e-6
+/// What is made of the lamp's light.
+fn gain(harness: &Harness<'_, Window>) -> Gain {
+    harness.state().app.gain(&[2])
 }
 
 #[test]
-fn lamps_are_mixed_without_the_worker_and_each_drag_is_undone_in_one_step() {
+fn a_lamp_is_dimmed_and_switched_off_stays_in_the_list_and_each_drag_is_undone_in_one_step() {
     let (mut harness, recorder) = solving(Harness::builder());
     press(&mut harness, Modifiers::NONE, Key::L);
-    // Only now is the light asked for apart.
-    let sent = recorder.sent();
-    let asked = sent.iter().rev().find_map(|command| match command {
-        Command::View(request) => Some(request.layers),
-        _ => None,
-    });
-    assert_eq!(asked, Some(true), "{sent:?}");
-    assert!(near(relit(&harness), 0.25));
-
-    slide(&mut harness, "Strength of lamp", -0.2);
-    let gain =
-        |harness: &Harness<'_, Window>| harness.state().app.mixer.mix.gain(LightSource::Lamp(2));
-    assert_eq!(gain(&harness).strength, 0.0);
-    assert!(near(relit(&harness), 0.05), "{}", relit(&harness));
-    click(&mut harness, "outside light is lit");
-    assert!(near(relit(&harness), 0.0));
-    assert!(recorder.sent().is_empty(), "the worker has nothing to do");
-
-    press(&mut harness, Modifiers::COMMAND, Key::Z);
-    assert!(near(relit(&harness), 0.05));
-    press(&mut harness, Modifiers::COMMAND, Key::Z);
-    assert!(near(relit(&harness), 0.25));
-    press(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
-    assert!(near(relit(&harness), 0.05));
-    click(&mut harness, "Reset mix");
-    assert!(near(relit(&harness), 0.25));
-}
-
-#[test]
-fn a_mix_goes_along_to_the_next_photograph_and_ends_with_the_pane() {
-    let (mut harness, recorder) = solving(Harness::builder());
-    press(&mut harness, Modifiers::NONE, Key::L);
-    click(&mut harness, "lamp is lit");
-    assert!(near(relit(&harness), 0.05));
-    press(&mut harness, Modifiers::NONE, Key::CloseBracket);
-    assert!(harness.state().app.drawn(Quantity::Relit).is_none());
-    recorder.show(|snapshot| {
-        let capture = snapshot.capture.clone().expect("open");
-        snapshot.view = Some(Arc::new(view(&capture, 1)));
-    });
-    harness.run_steps(3);
-    assert!(near(relit(&harness), 0.05));
-
     recorder.sent();
-    click(&mut harness, "Objects");
-    harness.run_steps(3);
-    let sent = recorder.sent();
-    assert!(
-        matches!(&sent[..], [Command::View(request)] if !request.layers),
-        "{sent:?}"
-    );
+    slide(&mut harness, "Strength of lamp", 0.125);
+    let strength = gain(&harness).strength;
+    assert!(strength > 0.0 && strength < 0.9, "{strength}");
+    // The photograph is asked for in this light, at once.
+    let sent = edits(&recorder.sent()).expect("sent").object(2);
+    let emission = sent.emission.expect("an emission");
+    assert!((emission - 9.0 * strength).abs().max_element() < 1e-3);
+    click(&mut harness, "lamp is lit");
+    assert!(edits(&recorder.sent()).expect("sent").object(2).off);
+    assert!(!gain(&harness).on && gain(&harness).strength == strength);
+    harness.get_by_role_and_label(Role::Slider, "Strength of lamp");
+
+    press(&mut harness, Modifiers::COMMAND, Key::Z);
+    assert!(gain(&harness).on);
+    press(&mut harness, Modifiers::COMMAND, Key::Z);
+    assert_eq!(gain(&harness).strength, 1.0);
+    assert!(edits(&recorder.sent()).expect("sent").is_empty());
+    press(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
+    assert_eq!(gain(&harness).strength, strength);
+    click(&mut harness, "Reset lights");
+    assert!(edits(&recorder.sent()).expect("sent").is_empty());
+}
+
+#[test]
+fn light_from_outside_is_switched_off_and_on() {
+    let (mut harness, recorder) = solving(Harness::builder());
+    recorder.show(|snapshot| {
+        Arc::make_mut(&mut snapshot.estimate).outside = Some(Outside {
+            width: 1,
+            height: 1,
+            pixels: vec![Vec3::ONE],
+        });
+    });
+    press(&mut harness, Modifiers::NONE, Key::L);
+    recorder.sent();
+    click(&mut harness, "outside light is lit");
+    let sent = edits(&recorder.sent()).expect("sent");
+    assert_eq!(sent.outside(), Vec3::ZERO);
+    click(&mut harness, "outside light is lit");
+    assert!(edits(&recorder.sent()).expect("sent").is_empty());
+}
+
+#[test]
+fn a_lamp_of_a_scan_is_named_by_where_it_is() {
+    let capture = crate::connection::room();
+    let camera = &capture.scene.cameras[1];
+    let place = |object| place(&capture.scene, object, camera);
+    assert_eq!(place(1).as_deref(), Some("high middle"));
+    assert_eq!(place(2).as_deref(), Some("above, out of view"));
+    assert_eq!(place(9), None);
 }
 
 #[test]
@@ -101,15 +97,14 @@ fn a_lamp_is_selected_compared_and_its_light_saved() {
     let (mut harness, recorder) = solving(Harness::builder());
     press(&mut harness, Modifiers::NONE, Key::L);
     harness.get_by_label("Colour of lamp");
-    click(&mut harness, "lamp");
+    harness.get_by_role_and_label(Role::Button, "lamp").click();
+    harness.run_steps(3);
     assert_eq!(harness.state().app.selected, Some(2));
     press(&mut harness, Modifiers::NONE, Key::B);
-    let compare = &harness.state().app.compare;
-    assert_eq!(
-        (compare.left, compare.right),
-        (Quantity::Render, Quantity::Relit)
-    );
+    assert_eq!(harness.state().app.against, Some(Quantity::Photograph));
     harness.get_by_label("wiped pictures");
+    press(&mut harness, Modifiers::NONE, Key::B);
+    harness.get_by_label("Composite picture");
 
     recorder.sent();
     press(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::S);
@@ -239,7 +234,7 @@ fn a_drag_of_a_material_is_one_step_of_undo() {
 }
 
 #[test]
-fn a_lamp_is_switched_off_and_on_and_takes_up_the_mixed_light() {
+fn a_lamp_is_switched_off_and_on_by_its_key() {
     let (mut harness, recorder) = solving(Harness::builder());
     press(&mut harness, Modifiers::NONE, Key::K);
     assert!(edits(&recorder.sent()).is_none(), "nothing is selected");
@@ -249,58 +244,4 @@ fn a_lamp_is_switched_off_and_on_and_takes_up_the_mixed_light() {
     assert_eq!(harness.state().app.estimate.objects[2].emission, Vec3::ZERO);
     press(&mut harness, Modifiers::NONE, Key::K);
     assert!(edits(&recorder.sent()).expect("sent").is_empty());
-
-    press(&mut harness, Modifiers::NONE, Key::L);
-    slide(&mut harness, "Strength of lamp", -0.2);
-    click(&mut harness, "Give lamps this light");
-    let sent = edits(&recorder.sent()).expect("sent");
-    assert_eq!(sent.object(2).emission, Some(Vec3::ZERO));
-    assert!(harness.state().app.mixer.mix.is_neutral());
-    // One step brings back both the lamp and the mix.
-    press(&mut harness, Modifiers::COMMAND, Key::Z);
-    assert!(edits(&recorder.sent()).expect("sent").is_empty());
-    assert!(!harness.state().app.mixer.mix.is_neutral());
-}
-
-#[test]
-fn files_are_written_in_the_mixed_light_unless_that_is_declined() {
-    let (mut harness, recorder) = solving(Harness::builder());
-    press(&mut harness, Modifiers::NONE, Key::L);
-    slide(&mut harness, "Strength of lamp", -0.2);
-    let exported = |recorder: &crate::connection::Recorder| {
-        let sent = recorder.sent();
-        sent.iter().rev().find_map(|command| match command {
-            Command::Export(request) => Some(request.edits.clone()),
-            _ => None,
-        })
-    };
-    press(&mut harness, Modifiers::COMMAND, Key::E);
-    harness
-        .get_by_role_and_label(Role::Button, "Export")
-        .click();
-    harness.run_steps(3);
-    let edits = exported(&recorder).expect("an export").expect("the mix");
-    assert_eq!(edits.object(2).emission, Some(Vec3::ZERO));
-    assert!(harness.state().app.edits.is_empty(), "the lamp stays");
-    press(&mut harness, Modifiers::COMMAND, Key::E);
-    click(&mut harness, "In the light of the mixer");
-    harness
-        .get_by_role_and_label(Role::Button, "Export")
-        .click();
-    harness.run_steps(3);
-    assert_eq!(exported(&recorder).expect("an export"), None);
-
-    press(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::E);
-    harness.get_by_label("At full size, in the light as you changed it.");
-    click(&mut harness, "In the light of the mixer");
-    harness.get_by_label("Insert an object, or change a lamp or a material first.");
-    // Reset, there is nothing to decline.
-    press(&mut harness, Modifiers::NONE, Key::Escape);
-    click(&mut harness, "Reset mix");
-    press(&mut harness, Modifiers::COMMAND, Key::E);
-    assert!(
-        harness
-            .query_by_label("In the light of the mixer")
-            .is_none()
-    );
 }

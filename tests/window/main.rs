@@ -10,5 +10,5 @@ mod light;
 mod names;
 mod photographs;
 mod rendering;
-mod studies;
+mod sessions;
 mod trade;

@@ -1,7 +1,7 @@
 //! Copying pictures, writing photographs in one go, light probes by click, and the handles of inserted objects.
 
 use crate::connection::{Recorder, solving};
-use crate::input::{click, press, retype};
+use crate::input::{block, click, insert, press, retype};
 use egui::{Key, Modifiers, Pos2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
@@ -49,12 +49,7 @@ fn drag(harness: &mut Harness<'_, Window>, from: Pos2, to: Pos2) {
 
 /// Inserts a block of half a metre in the middle of the floor, and waits for its shape.
 pub fn insert_block(harness: &mut Harness<'_, Window>, folder: &Path) {
-    let file = folder.join("block.obj");
-    let text = "v -0.25 0 -0.25\nv 0.25 0 0.25\nv 0.25 0.5 0.25\nf 1 2 3\n";
-    std::fs::write(&file, text).expect("written");
-    click(harness, "Insert");
-    retype(harness, "Object file", &file.to_string_lossy());
-    click(harness, "Add");
+    insert(harness, &block(folder));
     let at = point(harness, "Photograph picture", egui::vec2(0.5, 0.8));
     tap(harness, at);
     for _ in 0..200 {
@@ -173,7 +168,7 @@ fn one_photograph_is_written_alone_and_a_batch_is_cancelled() {
     press(&mut harness, Modifiers::NONE, Key::CloseBracket);
     let [one, many] = ["one", "many"].map(|name| folder.path().join(name));
     palette(&mut harness, "save photographs");
-    click(&mut harness, "Photograph 2 alone");
+    click(&mut harness, "Photograph 2 alone, as 001");
     retype(&mut harness, "Samples a pixel", "2");
     retype(&mut harness, "Folder", &one.to_string_lossy());
     press(&mut harness, Modifiers::NONE, Key::Enter);

@@ -1,5 +1,6 @@
 //! The inserted objects as the window edits them: placed, moved, duplicated, hidden.
 
+mod adding;
 pub mod handles;
 pub mod models;
 
@@ -40,6 +41,12 @@ pub struct Insertions {
     pub finish: bool,
     /// The path as typed.
     pub path: String,
+    /// Whether the field for a path is to take the keys.
+    pub typing: bool,
+    /// Files that are read before they join the objects.
+    pub wanted: Vec<PathBuf>,
+    /// Why the last file did not join them.
+    pub trouble: Option<String>,
     /// The shapes of the objects' files.
     pub models: Models,
 }
@@ -53,6 +60,9 @@ impl Default for Insertions {
             dragged: None,
             finish: true,
             path: String::new(),
+            typing: false,
+            wanted: Vec::new(),
+            trouble: None,
             models: Models::default(),
         }
     }
@@ -144,13 +154,6 @@ impl Insertions {
         let mut visible = self.placements();
         visible.retain(|placement| !placement.hidden);
         visible
-    }
-
-    /// Whether objects are shown, and the file of each was tried in vain.
-    pub fn none_can_be_read(&self) -> bool {
-        let shown = self.visible();
-        let unreadable = |placement: &Placement| self.models.is_unreadable(&placement.file);
-        !shown.is_empty() && shown.iter().all(unreadable)
     }
 
     /// Replaces all objects, as undo does.

@@ -3,6 +3,7 @@
 use crate::app::insertion::Inserted;
 use crate::compose::object::ObjectModel;
 use crate::compose::object::surface::Surface;
+use crate::error::Result;
 use crate::scene::Scene;
 use crate::session::command::Placement;
 use egui::{Color32, Painter, Pos2, Stroke};
@@ -11,21 +12,20 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-/// An object's file, and its shape unless it cannot be read (the worker says why).
-type Read = (PathBuf, Option<ObjectModel>);
+/// An object's file, and its shape or why it cannot be read.
+pub type Read = (PathBuf, std::result::Result<(), String>);
 
 /// What is known of an object's file.
 enum Shape {
     Reading,
-    Unreadable,
     Read(ObjectModel),
 }
 
 /// Shapes by file.
 pub struct Models {
     known: HashMap<PathBuf, Shape>,
-    sender: Sender<Read>,
-    receiver: Receiver<Read>,
+    sender: Sender<(PathBuf, Result<ObjectModel>)>,
+    receiver: Receiver<(PathBuf, Result<ObjectModel>)>,
 }
 
 impl Default for Models {
@@ -41,47 +41,53 @@ impl Default for Models {
 
 impl Models {
     /// Starts reading what is not known yet; gives the files that have been read since the last call.
-    pub fn update(&mut self, ctx: &egui::Context, objects: &[Inserted]) -> Vec<PathBuf> {
+    pub fn update(&mut self, ctx: &egui::Context, objects: &[Inserted]) -> Vec<Read> {
         for object in objects {
-            let file = &object.placement.file;
-            if !self.known.contains_key(file) {
-                self.known.insert(file.clone(), Shape::Reading);
-                self.read(ctx, file.clone());
-            }
+            self.ask(ctx, &object.placement.file);
         }
         let mut read = Vec::new();
         while let Ok((file, model)) = self.receiver.try_recv() {
-            let shape = model.map_or(Shape::Unreadable, Shape::Read);
-            self.known.insert(file.clone(), shape);
-            read.push(file);
+            let known = model.map(|model| {
+                self.known.insert(file.clone(), Shape::Read(model));
+            });
+            // What cannot be read is tried again when it is asked for again.
+            if known.is_err() {
+                self.known.remove(&file);
+            }
+            read.push((file, known.map_err(|error| error.to_string())));
         }
         read
     }
 
-    fn read(&self, ctx: &egui::Context, file: PathBuf) {
-        let (sender, ctx) = (self.sender.clone(), ctx.clone());
+    /// Starts reading a file unless it is known; true where it is read already.
+    pub fn ask(&mut self, ctx: &egui::Context, file: &Path) -> bool {
+        if let Some(known) = self.known.get(file) {
+            return matches!(known, Shape::Read(_));
+        }
+        self.known.insert(file.to_owned(), Shape::Reading);
+        let (sender, ctx, file) = (self.sender.clone(), ctx.clone(), file.to_owned());
         // Without a thread there is no box, and nothing else is lost.
         let _ = std::thread::Builder::new()
             .name("object".to_owned())
             .spawn(move || {
-                let model = ObjectModel::read(&file)
-                    .ok()
-                    .and_then(|model| extent(&model));
+                let model = ObjectModel::read(&file).and_then(|model| extent(&model));
                 if sender.send((file, model)).is_ok() {
                     ctx.request_repaint();
                 }
             });
+        false
     }
 
-    /// Whether a file was tried and cannot be read.
-    pub fn is_unreadable(&self, file: &Path) -> bool {
-        matches!(self.known.get(file), Some(Shape::Unreadable))
+    /// Width, height and depth of an object as modelled.
+    pub fn size(&self, file: &Path) -> Option<DVec3> {
+        let (low, high) = self.shape(file)?.bounds();
+        Some(high - low)
     }
 
     fn shape(&self, file: &Path) -> Option<&ObjectModel> {
         match self.known.get(file)? {
             Shape::Read(model) => Some(model),
-            Shape::Reading | Shape::Unreadable => None,
+            Shape::Reading => None,
         }
     }
 
@@ -115,11 +121,11 @@ impl Models {
 }
 
 /// The least model that has the bounds of another, since those of a large one take a while.
-fn extent(model: &ObjectModel) -> Option<ObjectModel> {
+fn extent(model: &ObjectModel) -> Result<ObjectModel> {
     let (low, high) = model.bounds();
     let corners = vec![[low, high, DVec3::new(low.x, high.y, low.z)]];
     let material = Surface::diffuse(Vec3::ZERO).material(None);
-    ObjectModel::from_corners(&model.name, corners, material).ok()
+    ObjectModel::from_corners(&model.name, corners, material)
 }
 
 /// Draws the edges of a box.

@@ -25,7 +25,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
     let tokens = theme::tokens(ui);
     let Some(capture) = app.capture().cloned() else {
         ui.painter().rect_filled(rect, 0.0, tokens.surround);
-        ui.centered_and_justified(|ui| ui.weak("No capture is open"));
+        ui.centered_and_justified(|ui| ui.weak(app.nothing_open()));
         return;
     };
     let scene = &capture.scene;

@@ -8,7 +8,7 @@ use egui::{RichText, ScrollArea, Ui};
 pub fn pane(ui: &mut Ui, app: &mut App) {
     let tokens = theme::tokens(ui);
     let Some(capture) = app.capture() else {
-        ui.weak("No capture is open");
+        ui.weak(app.nothing_open());
         return;
     };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {

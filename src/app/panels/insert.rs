@@ -11,11 +11,14 @@ use std::path::PathBuf;
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, app: &mut App) {
     let Some(capture) = app.capture().cloned() else {
-        ui.weak("No capture is open");
+        ui.weak(app.nothing_open());
         return;
     };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         add(ui, app);
+        if let Some(trouble) = &app.insertions.trouble {
+            ui.colored_label(theme::tokens(ui).error, trouble);
+        }
         if app.insertions.objects.is_empty() {
             ui.add_space(theme::GAP);
             ui.weak("OBJ and GLB files can also be dropped on the window. Then click where the object should stand.");
@@ -26,6 +29,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         ui.separator();
         actions(ui, app);
         edit(ui, app, f64::from(capture.scene.diameter));
+        size(ui, app);
         ui.separator();
         results(ui, app);
     });
@@ -39,6 +43,9 @@ fn add(ui: &mut Ui, app: &mut App) {
             .hint_text("chair.glb")
             .desired_width(width);
         let response = ui.add(field).labelled_by(label.id);
+        if std::mem::take(&mut app.insertions.typing) {
+            response.request_focus();
+        }
         let entered =
             response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
         let add = ui
@@ -192,6 +199,20 @@ fn edit(ui: &mut Ui, app: &mut App, diameter: f64) {
     });
 }
 
+/// How large the chosen object is.
+fn size(ui: &mut Ui, app: &mut App) {
+    let Some(object) = app.insertions.chosen().cloned() else {
+        return;
+    };
+    let placement = &object.placement;
+    if let Some(size) = app.insertions.models.size(&placement.file) {
+        let [width, height, depth] = (size * placement.scale).to_array();
+        ui.weak(format!(
+            "{width:.2} m wide, {height:.2} m high, {depth:.2} m deep"
+        ));
+    }
+}
+
 /// The ways to look at what came out.
 fn results(ui: &mut Ui, app: &mut App) {
     let ctx = ui.ctx().clone();
@@ -217,10 +238,4 @@ fn results(ui: &mut Ui, app: &mut App) {
     .on_hover_text(
         "Makes objects as soft and as grainy as the 8-bit photograph that they are put into",
     );
-    if let Some(insertion) = &app.snapshot.insertion {
-        ui.weak(format!(
-            "{} samples a pixel, {:.1} s after the last change",
-            insertion.samples, insertion.seconds
-        ));
-    }
 }

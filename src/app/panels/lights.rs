@@ -1,16 +1,18 @@
-//! The light mixer: a switch, a strength and a colour for every lamp, on layers of light already traced.
+//! A switch, a strength and a colour for every lamp.
 
 use crate::app::action::Action;
-use crate::app::mixer::Gain;
+use crate::app::lights::{Gain, place};
 use crate::app::panels::color;
 use crate::app::state::App;
-use crate::app::theme;
 use crate::export::light_layers;
+use crate::scene::Scene;
 use crate::session::snapshot::LightSource;
-use egui::{Button, Checkbox, DragValue, Grid, Role, ScrollArea, Slider, Ui, WidgetInfo};
+use egui::{
+    Button, Checkbox, DragValue, Grid, Role, ScrollArea, Slider, SliderClamping, Ui, WidgetInfo,
+};
 
-/// The largest strength that can be set.
-const MOST: f32 = 4.0;
+/// The strength at the end of a slider; a larger one can be typed.
+const MAX: f32 = 4.0;
 
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, app: &mut App) {
@@ -19,26 +21,20 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         return;
     }
     let Some(capture) = app.capture().cloned() else {
-        ui.weak("No capture is open");
+        ui.weak(app.nothing_open());
         return;
     };
-    app.layers_needed = true;
     let ctx = ui.ctx().clone();
-    let layers = app.view().and_then(|view| view.layers.clone());
+    let lamps = app.lamps();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        let Some(layers) = layers else {
-            ui.weak("Tracing the light of each lamp…");
-            return;
-        };
-        if layers.layers.is_empty() {
-            ui.weak("Nothing emits light in this estimate.");
+        if lamps.is_empty() {
+            ui.weak("Nothing emits light in this estimate yet.");
             return;
         }
         ui.horizontal_wrapped(|ui| {
             for (action, text) in [
-                (Action::CompareRelit, "Before and after"),
-                (Action::KeepMix, "Give lamps this light"),
-                (Action::ResetMix, "Reset mix"),
+                (Action::BeforeAfter, "Before and after"),
+                (Action::ResetLights, "Reset lights"),
                 (Action::SaveLayers, "Save layers…"),
                 (Action::Undo, "Undo"),
                 (Action::Redo, "Redo"),
@@ -54,23 +50,30 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
             .num_columns(5)
             .striped(true)
             .show(ui, |ui| {
-                for (source, _) in &layers.layers {
-                    let name = light_layers::name(*source, &capture.scene);
-                    row(ui, app, *source, name);
+                for (source, objects) in &lamps {
+                    let name = named(app, *source, &capture.scene);
+                    row(ui, app, *source, objects, &name);
                     ui.end_row();
                 }
             });
-        ui.add_space(theme::GAP);
-        ui.weak(format!(
-            "{} samples a pixel. The picture Relit shows the mix; changes cast no new rays.",
-            layers.samples
-        ));
     });
 }
 
+/// A lamp's name; that of a segment says where it is.
+fn named(app: &App, source: LightSource, scene: &Scene) -> String {
+    let name = light_layers::name(source, scene);
+    let place = match (source, app.camera()) {
+        (LightSource::Lamp(object), Some(camera)) if name.starts_with("segment ") => {
+            place(scene, object, camera)
+        }
+        _ => None,
+    };
+    place.map_or_else(|| name.to_owned(), |place| format!("{name}, {place}"))
+}
+
 /// One lamp.
-fn row(ui: &mut Ui, app: &mut App, source: LightSource, name: &str) {
-    let before = app.mixer.mix.gain(source);
+fn row(ui: &mut Ui, app: &mut App, source: LightSource, objects: &[usize], name: &str) {
+    let before = app.gain(objects);
     let mut gain: Gain = before;
     let on = ui
         .add(Checkbox::without_text(&mut gain.on))
@@ -85,7 +88,9 @@ fn row(ui: &mut Ui, app: &mut App, source: LightSource, name: &str) {
         &mut gain.color,
     );
     let help = "Factor on this light: 0 takes it away, 1 × is what was found";
-    let slider = Slider::new(&mut gain.strength, 0.0..=MOST).show_value(false);
+    let slider = Slider::new(&mut gain.strength, 0.0..=MAX)
+        .clamping(SliderClamping::Never)
+        .show_value(false);
     let strength = ui.add(slider).on_hover_text(help);
     strength.widget_info(|| {
         WidgetInfo::slider(
@@ -95,7 +100,7 @@ fn row(ui: &mut Ui, app: &mut App, source: LightSource, name: &str) {
         )
     });
     let number = DragValue::new(&mut gain.strength)
-        .range(0.0..=MOST)
+        .range(0.0..=f32::MAX)
         .speed(0.01)
         .max_decimals(2)
         .suffix(" ×")
@@ -116,7 +121,7 @@ fn row(ui: &mut Ui, app: &mut App, source: LightSource, name: &str) {
         app.select(lamp, false);
     }
     if gain != before {
-        app.mixer.mix.set(source, gain);
+        app.set_gain(objects, gain);
         ui.ctx().request_repaint();
     }
 }

@@ -7,7 +7,7 @@ use egui::{Label, ScrollArea, Ui};
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, app: &mut App) {
     if app.notices.log.is_empty() {
-        ui.weak("Nothing has happened yet");
+        ui.weak("No messages yet");
         return;
     }
     ScrollArea::vertical()

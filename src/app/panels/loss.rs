@@ -30,7 +30,8 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
     Plot::new("loss")
         .legend(
             Legend::default()
-                .position(Corner::RightTop)
+                // Falling curves leave this corner free.
+                .position(Corner::LeftBottom)
                 .background_alpha(0.6),
         )
         .y_axis_formatter(|mark, _| power_of_ten(mark.value))

@@ -21,7 +21,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         return;
     }
     let Some(capture) = app.capture().cloned() else {
-        ui.weak("No capture is open");
+        ui.weak(app.nothing_open());
         return;
     };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
@@ -75,9 +75,10 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
             None => "no gloss".to_owned(),
         };
         ui.weak(format!(
-            "found: albedo {}, emission {} W/(sr·m²), {gloss}",
+            "found: albedo {}, emission {} {}, {gloss}",
             triple(found.albedo),
-            triple(found.emission)
+            triple(found.emission),
+            app.radiance_unit()
         ));
     });
 }

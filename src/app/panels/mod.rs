@@ -11,5 +11,4 @@ pub mod objects;
 pub mod plot;
 pub mod settings;
 pub mod stages;
-pub mod studies;
 pub mod trade;

@@ -1,6 +1,7 @@
 //! The table of objects: swatches, errors, pixels seen; sortable, with a filter, linked to the views.
 
 use crate::app::action::Action;
+use crate::app::describe::described;
 use crate::app::picture::inspect::{number, triple};
 use crate::app::state::App;
 use crate::app::theme;
@@ -33,7 +34,7 @@ const COLUMNS: [(SortBy, &str, &str); 5] = [
         "±",
         "Standard error of the albedo, mean over RGB",
     ),
-    (SortBy::Emission, "Emission", "Emitted radiance, W/(sr·m²)"),
+    (SortBy::Emission, "Emission", "Emitted radiance"),
     (
         SortBy::Pixels,
         "Pixels",
@@ -101,23 +102,30 @@ impl ObjectsTable {
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, app: &mut App) {
     let Some(capture) = app.capture().cloned() else {
-        ui.weak("No capture is open");
+        ui.weak(app.nothing_open());
         return;
     };
-    let estimate = app.estimate.clone();
-    let names: Vec<&str> = capture
-        .scene
-        .objects
-        .iter()
-        .map(|o| o.name.as_str())
+    let (estimate, unit) = (app.estimate.clone(), app.radiance_unit());
+    let objects = &capture.scene.objects;
+    let area: f64 = objects.iter().map(|object| object.area).sum();
+    let told = |index: usize| {
+        let found = estimate.objects.get(index);
+        found
+            .filter(|o| o.identifiable && o.albedo_identifiable)
+            .map(|found| found.albedo)
+    };
+    let described: Vec<String> = (objects.iter().enumerate())
+        .map(|(index, object)| described(object, area, told(index)))
         .collect();
+    let names: Vec<&str> = described.iter().map(String::as_str).collect();
     ui.horizontal(|ui| {
         let label = ui.label("Filter");
         ui.add(TextEdit::singleline(&mut app.objects.filter).desired_width(120.0))
             .labelled_by(label.id);
         ui.weak(format!("{} objects", names.len()));
     });
-    changes(ui, app, &names);
+    let own: Vec<&str> = objects.iter().map(|o| o.name.as_str()).collect();
+    changes(ui, app, &own);
     let rows = app.objects.rows(&names, &estimate.objects);
     let selected_row = app
         .selected
@@ -166,7 +174,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
                 if response.clicked() {
                     clicked = Some(object as u32);
                 }
-                response.on_hover_ui(|ui| details(ui, names[object], found));
+                response.on_hover_ui(|ui| details(ui, names[object], found, unit));
             });
         });
     if let Some(object) = clicked {
@@ -292,7 +300,7 @@ fn cells(row: &mut egui_extras::TableRow<'_, '_>, name: &str, object: &ObjectEst
     });
 }
 
-fn details(ui: &mut Ui, name: &str, object: &ObjectEstimate) {
+fn details(ui: &mut Ui, name: &str, object: &ObjectEstimate, unit: &str) {
     ui.strong(name);
     ui.label(format!(
         "albedo {} ± {}",
@@ -300,7 +308,7 @@ fn details(ui: &mut Ui, name: &str, object: &ObjectEstimate) {
         triple(object.albedo_stderr)
     ));
     ui.label(format!(
-        "emission {} ± {} W/(sr·m²)",
+        "emission {} ± {} {unit}",
         triple(object.emission),
         triple(object.emission_stderr)
     ));

@@ -75,7 +75,8 @@ fn widget(ui: &mut Ui, parameter: &Parameter, title: &str, value: &mut Value) {
             name(response, egui::Role::CheckBox);
         }
         (Kind::Whole { min, max }, Value::Whole(n)) => {
-            let response = ui.add(DragValue::new(n).range(min..=max).speed(0.1));
+            let drag = DragValue::new(n).range(min..=max).speed(0.1);
+            let response = ui.add(automatic(drag, parameter));
             name(response, egui::Role::SpinButton);
         }
         (
@@ -91,12 +92,8 @@ fn widget(ui: &mut Ui, parameter: &Parameter, title: &str, value: &mut Value) {
             } else {
                 (max - min) * 1e-3
             };
-            let response = ui.add(
-                DragValue::new(x)
-                    .range(min..=max)
-                    .speed(speed)
-                    .max_decimals(6),
-            );
+            let drag = DragValue::new(x).range(min..=max).speed(speed);
+            let response = ui.add(automatic(drag.max_decimals(6), parameter));
             name(response, egui::Role::SpinButton);
         }
         (Kind::Choice(words), Value::Choice(word)) => {
@@ -115,4 +112,26 @@ fn widget(ui: &mut Ui, parameter: &Parameter, title: &str, value: &mut Value) {
             ui.label(format!("{value:?}"));
         }
     }
+}
+
+/// Says in words what 0 stands for, where that is no amount.
+fn automatic<'a>(drag: DragValue<'a>, parameter: &Parameter) -> DragValue<'a> {
+    let words = match parameter.help {
+        help if help.contains("0 sets no limit") || help.contains("0 goes on") => "no limit",
+        help if help.contains("0 leaves")
+            || help.contains("0 chooses")
+            || help.contains("0 takes") =>
+        {
+            "automatic"
+        }
+        _ => return drag,
+    };
+    drag.custom_formatter(move |value, _| match value == 0.0 {
+        true => words.to_owned(),
+        false => value.to_string(),
+    })
+    .custom_parser(move |text| match text.trim() {
+        text if text == words => Some(0.0),
+        text => text.parse().ok(),
+    })
 }

@@ -45,11 +45,12 @@ impl App {
             matches!(self.shown, Shown::Frame) && insertion.frame == self.frame
         });
         let picture = match quantity {
-            Quantity::Photograph => view
-                .and_then(|view| view.photograph.clone())
+            // At the size at which it is looked at, where that is known.
+            Quantity::Photograph => (insertion.filter(|_| self.composite_needed))
+                .map(|insertion| insertion.photograph.clone())
+                .or_else(|| view.and_then(|view| view.photograph.clone()))
                 .or_else(|| self.photograph()),
             Quantity::Render => view.and_then(|view| view.render.clone()),
-            Quantity::Relit => self.mixer.picture(),
             Quantity::Albedo => view.and_then(|view| view.albedo.clone()),
             Quantity::Emission => view.and_then(|view| view.emission.clone()),
             Quantity::Irradiance => self.irradiance.picture(),
@@ -57,10 +58,15 @@ impl App {
             Quantity::StandardError => view.and_then(|view| view.stderr.clone()),
             Quantity::Naive => insertion.map(|insertion| insertion.naive.clone()),
             Quantity::NaiveEstimate => insertion.map(|insertion| insertion.naive_estimate.clone()),
-            Quantity::Composite => insertion.map(|insertion| insertion.composite.clone()),
+            Quantity::Composite => insertion
+                .map(|insertion| insertion.composite.clone())
+                .or_else(|| self.photograph()),
         }?;
         let range = match quantity.shading() {
-            Shading::Signed | Shading::Positive => ramp::range(&picture),
+            Shading::Signed | Shading::Positive => {
+                let now = ramp::range(&picture, quantity.shading());
+                self.scales.borrow_mut().follow(quantity, now)
+            }
             _ => 1.0,
         };
         let objects = view
@@ -108,23 +114,15 @@ pub fn pane(ui: &mut Ui, app: &mut App, quantity: Quantity) {
 /// Says why there is no picture.
 pub fn missing(ui: &mut Ui, app: &App, quantity: Quantity) {
     let text = match quantity {
-        _ if app.capture().is_none() => "No capture is open",
+        _ if app.capture().is_none() => app.nothing_open(),
         Quantity::Photograph => "No photograph was taken from here",
         Quantity::Error if !matches!(app.shown, Shown::Frame) => {
             "No photograph was taken from here"
         }
-        Quantity::Naive | Quantity::NaiveEstimate | Quantity::Composite => {
-            if !matches!(app.shown, Shown::Frame) {
-                "No photograph was taken from here"
-            } else if app.insertions.visible().is_empty() && app.edits.is_empty() {
-                "Insert an object, or change a lamp or a material, to see the composite"
-            } else if app.edits.is_empty() && app.insertions.none_can_be_read() {
-                "No inserted object can be read; the log says why"
-            } else {
-                "Compositing…"
-            }
+        Quantity::Composite if !matches!(app.shown, Shown::Frame) => {
+            "No photograph was taken from here"
         }
-        Quantity::Relit => "Tracing the light of each lamp…",
+        Quantity::Naive | Quantity::NaiveEstimate => "Compositing…",
         _ => "Waiting for the first picture…",
     };
     let surround = theme::tokens(ui).surround;
@@ -211,7 +209,14 @@ fn on_screen(camera: &Camera, placement: Rect, point: glam::Vec3) -> Option<Pos2
 impl App {
     /// Notes that a picture is shown, for what has to be made for it.
     pub fn need(&mut self, quantity: Quantity) {
-        self.layers_needed |= quantity == Quantity::Relit;
+        self.composite_needed |= matches!(
+            quantity,
+            Quantity::Composite | Quantity::Naive | Quantity::NaiveEstimate
+        );
+        self.render_needed |= matches!(
+            quantity,
+            Quantity::Render | Quantity::Error | Quantity::Irradiance
+        );
         self.irradiance_needed |= quantity == Quantity::Irradiance;
     }
 
@@ -229,6 +234,7 @@ pub fn paint(ui: &Ui, app: &App, rect: Rect, drawn: &Drawn, slot: egui::Id) {
         objects: drawn.objects.clone(),
         shading: drawn.quantity.shading(),
         range: drawn.range,
+        smooth: drawn.quantity.shading() == Shading::Radiance,
         selected: app.selected,
         ..PicturePaint::new(slot, drawn.picture.clone(), rect, &app.look, tokens)
     };

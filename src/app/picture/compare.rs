@@ -96,7 +96,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
             );
             one(ui, app, b, app.compare.right, "second picture");
         }
-        Mode::Wipe => wipe(ui, app, rect, left),
+        Mode::Wipe => wipe(ui, app, rect, left, app.compare.right),
     }
 }
 
@@ -146,8 +146,8 @@ fn one(ui: &mut Ui, app: &mut App, rect: Rect, quantity: Quantity, name: &str) {
     }
 }
 
-fn wipe(ui: &mut Ui, app: &mut App, rect: Rect, left: Quantity) {
-    let right = app.compare.right;
+/// Draws two pictures under a line that can be dragged.
+pub fn wipe(ui: &mut Ui, app: &mut App, rect: Rect, left: Quantity, right: Quantity) {
     let (Some(a), Some(b)) = (app.drawn(left), app.drawn(right)) else {
         let absent = if app.drawn(left).is_none() {
             left

@@ -49,6 +49,7 @@ fn color(value: Vec3, shading: Shading, range: f32, look: &Look) -> [u8; 3] {
     match shading {
         Shading::Reflectance => to_srgb8(value, 1.0),
         Shading::Signed => ramp(0.5 + 0.5 * mean / range),
+        Shading::Positive if mean < 0.0 => [136; 3],
         Shading::Positive => ramp(mean / range),
         Shading::Radiance => {
             let x = value.max(Vec3::ZERO) * look.exposure.exp2();

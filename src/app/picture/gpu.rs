@@ -11,6 +11,9 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use wgpu::util::DeviceExt;
 
+/// Pixels of a picture that a point of the screen shows at least, where they are blended; larger ones are shown as they are.
+const SMOOTH_STEP: f32 = 1.0 / 12.0;
+
 /// The uniform block of `picture.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -23,7 +26,7 @@ struct ViewUniform {
     shading: u32,
     range: f32,
     selected: f32,
-    padding: f32,
+    smooth: f32,
     surround: [f32; 4],
     outline: [f32; 4],
     ramp: [[f32; 4]; ramp::STOPS],
@@ -49,6 +52,8 @@ pub struct PicturePaint {
     pub exposure: f32,
     /// Tone curve of radiance.
     pub tone: ToneCurve,
+    /// Whether enlarged pixels are blended into each other, as long as they are small.
+    pub smooth: bool,
     /// Object to outline.
     pub selected: Option<u32>,
     /// Colours.
@@ -75,6 +80,7 @@ impl PicturePaint {
             range: 1.0,
             exposure: look.exposure.exp2(),
             tone: look.tone,
+            smooth: false,
             selected: None,
             tokens,
         }
@@ -103,7 +109,9 @@ impl PicturePaint {
             },
             range: self.range,
             selected: self.selected.map_or(-1.0, |object| object as f32),
-            padding: 0.0,
+            smooth: f32::from(u8::from(
+                self.smooth && step.x > SMOOTH_STEP && step.x < 1.0,
+            )),
             surround: rgba(self.tokens.surround),
             outline: rgba(self.tokens.accent),
             ramp: ramp::stops(self.shading).map(|[r, g, b]| [r, g, b, 1.0]),

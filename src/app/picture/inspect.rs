@@ -74,7 +74,14 @@ pub fn bar(ui: &mut Ui, app: &App) {
     part("", &format!("({x}, {y})"));
     part(
         cursor.over.name(),
-        &format!("{} {}", triple(value), cursor.over.unit()),
+        &match cursor.over.shading() == Shading::Positive && value.x < 0.0 {
+            true => "not known".to_owned(),
+            false => format!(
+                "{} {}",
+                triple(value),
+                cursor.over.unit(app.radiance_unit())
+            ),
+        },
     );
     if cursor.over.shading() == Shading::Radiance {
         let shown = (value * app.look.exposure.exp2())

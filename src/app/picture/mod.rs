@@ -4,6 +4,7 @@ pub mod canvas;
 pub mod compare;
 pub mod copy;
 pub mod gpu;
+pub mod hero;
 pub mod inspect;
 pub mod irradiance;
 pub mod look;

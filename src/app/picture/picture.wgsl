@@ -14,7 +14,8 @@ struct View {
     range: f32,
     // Object to outline, or -1.
     selected: f32,
-    padding: f32,
+    // Above 0: pixels are blended into each other.
+    smoothed: f32,
     surround: vec4f,
     outline: vec4f,
     ramp: array<vec4f, 7>,
@@ -51,7 +52,13 @@ fn false_color(t: f32) -> vec3f {
     return mix(view.ramp[below].rgb, view.ramp[below + 1u].rgb, x - f32(below));
 }
 
-fn colored(value: vec3f) -> vec3f {
+// Where nothing is known.
+fn hatched(position: vec2f) -> vec3f {
+    let stripe = fract((position.x + position.y) / 10.0) < 0.5;
+    return select(vec3f(0.22), vec3f(0.32), stripe);
+}
+
+fn colored(value: vec3f, position: vec2f) -> vec3f {
     // What is not a number becomes magenta, so that it shows.
     if !all(abs(value) < vec3f(3.0e38)) {
         return vec3f(1.0, 0.0, 1.0);
@@ -60,9 +67,13 @@ fn colored(value: vec3f) -> vec3f {
     switch view.shading {
         case 1u: { return srgb(value); }
         case 2u: { return false_color(0.5 + 0.5 * mean / view.range); }
-        case 3u: { return false_color(mean / view.range); }
+        case 3u: { return select(false_color(mean / view.range), hatched(position), mean < 0.0); }
         default: { return srgb(toned(max(value, vec3f(0.0)) * view.exposure)); }
     }
+}
+
+fn radiance_at(pixel: vec2i, size: vec2i) -> vec3f {
+    return textureLoad(picture, clamp(pixel, vec2i(0), size - 1), 0).rgb;
 }
 
 fn object_at(pixel: vec2i, size: vec2i) -> f32 {
@@ -87,7 +98,18 @@ fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
             sum += textureLoad(picture, clamp(pixel, vec2i(0), size - 1), 0).rgb;
         }
     }
-    var color = colored(sum / f32(taps.x * taps.y));
+    var mean = sum / f32(taps.x * taps.y);
+    if view.smoothed > 0.0 {
+        let low = floor(at - 0.5);
+        let share = at - 0.5 - low;
+        let corner = vec2i(low);
+        mean = mix(
+            mix(radiance_at(corner, size), radiance_at(corner + vec2i(1, 0), size), share.x),
+            mix(radiance_at(corner + vec2i(0, 1), size), radiance_at(corner + 1, size), share.x),
+            share.y,
+        );
+    }
+    var color = colored(mean, position.xy);
 
     // The selected object's edge, two screen pixels wide.
     if view.selected >= 0.0 {

@@ -9,8 +9,6 @@ pub enum Quantity {
     Photograph,
     /// What the estimate predicts, radiance.
     Render,
-    /// The re-render with its lamps mixed anew, radiance.
-    Relit,
     /// Diffuse reflectance.
     Albedo,
     /// Emitted radiance.
@@ -44,10 +42,9 @@ pub enum Shading {
 
 impl Quantity {
     /// All, in the order in which menus show them.
-    pub const ALL: [Quantity; 11] = [
+    pub const ALL: [Quantity; 10] = [
         Self::Photograph,
         Self::Render,
-        Self::Relit,
         Self::Albedo,
         Self::Emission,
         Self::Irradiance,
@@ -63,7 +60,6 @@ impl Quantity {
         match self {
             Self::Photograph => "Photograph",
             Self::Render => "Re-render",
-            Self::Relit => "Relit",
             Self::Albedo => "Albedo",
             Self::Emission => "Emission",
             Self::Irradiance => "Irradiance",
@@ -80,7 +76,6 @@ impl Quantity {
         match self {
             Self::Photograph => "Radiance that the camera measured",
             Self::Render => "Radiance that the estimate predicts for this view",
-            Self::Relit => "The re-render with each lamp as the pane Lights sets it",
             Self::Albedo => "Estimated diffuse reflectance; 1 is white",
             Self::Emission => "Estimated emitted radiance",
             Self::Irradiance => {
@@ -98,12 +93,12 @@ impl Quantity {
         }
     }
 
-    /// Unit of its numbers, or empty.
-    pub fn unit(self) -> &'static str {
-        match self {
-            Self::Albedo | Self::StandardError => "",
-            Self::Irradiance => "W/m²",
-            _ => "W/(sr·m²)",
+    /// Unit of its numbers, or empty, where radiance is measured in a unit.
+    pub fn unit(self, radiance: &'static str) -> &'static str {
+        match (self, radiance) {
+            (Self::Albedo | Self::StandardError, _) => "",
+            (Self::Irradiance, "W/(sr·m²)") => "W/m²",
+            _ => radiance,
         }
     }
 

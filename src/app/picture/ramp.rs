@@ -1,8 +1,9 @@
 //! False colours: the stops that the shader and the legends share, and the range that a picture needs.
 
-use crate::app::picture::quantity::Shading;
+use crate::app::picture::quantity::{Quantity, Shading};
 use crate::session::snapshot::Picture;
 use glam::Vec3;
+use std::collections::HashMap;
 
 /// Number of evenly spaced stops of a ramp.
 pub const STOPS: usize = 7;
@@ -46,19 +47,37 @@ pub fn color(shading: Shading, t: f32) -> [f32; 3] {
     std::array::from_fn(|c| stops[below][c] * (1.0 - mix) + stops[below + 1][c] * mix)
 }
 
-/// The magnitude that 98 of 100 pixels stay below, rounded up to 1, 2 or 5 times a power of ten.
+/// The magnitude that 98 of 100 pixels stay below, rounded up to 1, 2 or 5 times a power of ten. A picture of positive values
+/// marks what is not known by negative ones, which do not count.
 ///
 /// Looks at no more than about 4096 pixels. At least the smallest positive step, so that it may be divided by.
-pub fn range(picture: &Picture) -> f32 {
+pub fn range(picture: &Picture, shading: Shading) -> f32 {
     let stride = (picture.pixels.len() / 4096).max(1);
     let mut magnitudes: Vec<f32> = picture
         .pixels
         .iter()
         .step_by(stride)
-        .map(|p| (p.element_sum() / 3.0).abs())
+        .map(|p| p.element_sum() / 3.0)
+        .filter(|mean| shading == Shading::Signed || *mean >= 0.0)
+        .map(f32::abs)
         .filter(|m| m.is_finite())
         .collect();
     round_up(percentile(&mut magnitudes, 0.98))
+}
+
+/// The ends of scales, which stay while pictures fit them about.
+#[derive(Debug, Default)]
+pub struct Scales(HashMap<Quantity, f32>);
+
+impl Scales {
+    /// The end of a quantity's scale, whose newest picture needs `range`: it grows at once, and shrinks by four at least.
+    pub fn follow(&mut self, quantity: Quantity, range: f32) -> f32 {
+        let end = self.0.entry(quantity).or_insert(range);
+        if range > *end || range * 4.0 <= *end {
+            *end = range;
+        }
+        *end
+    }
 }
 
 /// Stops of exposure that put the 99th percentile of a picture's brightest channel at 1.
@@ -109,7 +128,14 @@ mod tests {
             height: 1,
             pixels,
         };
-        assert_eq!(range(&picture), 1.0);
+        assert_eq!(range(&picture, Shading::Positive), 1.0);
+    }
+
+    #[test]
+    fn a_scale_stays_until_it_is_four_times_too_long() {
+        let mut scales = Scales::default();
+        let ends = [0.2, 0.1, 0.05, 0.02, 0.5].map(|range| scales.follow(Quantity::Error, range));
+        assert_eq!(ends, [0.2, 0.2, 0.05, 0.05, 0.5]);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use crate::app::shell::dialogs::Ask;
 use crate::app::shell::photographs::{self, Wanted};
+use crate::app::shell::sessions;
 use crate::app::state::App;
 use crate::session::command::{Command, ExportFormat, ExportRequest};
 use egui::{DragValue, Id, Key, Modal, Role, TextEdit, Ui, WidgetInfo};
@@ -14,6 +15,8 @@ pub enum Sheet {
     /// It is closed.
     #[default]
     Closed,
+    /// The sessions that are kept.
+    Sessions,
     /// Saving results into a folder.
     Save {
         /// The folder as typed.
@@ -32,8 +35,6 @@ pub enum Sheet {
         format: usize,
         /// Where a probe is taken, in the capture's coordinates.
         at: DVec3,
-        /// Whether the light mixer counts.
-        mixed: bool,
     },
     /// Saving photographs.
     Photographs(Wanted),
@@ -115,7 +116,6 @@ impl Sheet {
             file: format!("{}.{}", file_name(name), FORMATS[0].ending()),
             format: 0,
             at,
-            mixed: true,
         }
     }
 
@@ -126,7 +126,6 @@ impl Sheet {
             file: format!("{}-light.{}", file_name(name), FORMATS[last].ending()),
             format: last,
             at,
-            mixed: true,
         }
     }
 
@@ -171,14 +170,10 @@ pub fn show(ctx: &egui::Context, app: &mut App) {
         let mut sheet = app.sheet.clone();
         let close = match &mut sheet {
             Sheet::Closed => true,
+            Sheet::Sessions => sessions::sheet(ui, app),
             Sheet::Save { folder } => save(ui, app, folder),
             Sheet::Layers { file } => layers(ui, app, file),
-            Sheet::Export {
-                file,
-                format,
-                at,
-                mixed,
-            } => export(ui, app, file, format, at, mixed),
+            Sheet::Export { file, format, at } => export(ui, app, file, format, at),
             Sheet::Length { found, metres } => length(ui, app, *found, metres),
             Sheet::Photographs(wanted) => photographs::sheet(ui, app, wanted),
         };
@@ -193,11 +188,6 @@ pub fn show(ctx: &egui::Context, app: &mut App) {
 fn save(ui: &mut Ui, app: &mut App, folder: &mut String) -> bool {
     ui.heading("Save results");
     ui.label("Estimate, report, loss, scene and pictures, as `relit solve` writes them.");
-    if !app.mixer.mix.is_neutral() {
-        ui.weak(
-            "The light mixer is saved once “Give lamps this light” has made it the lamps’ own.",
-        );
-    }
     let entered = path_field(ui, app, "Folder", folder, Ask::SaveFolder);
     let (clicked, cancel) = buttons(ui, "Save", !folder.trim().is_empty());
     let go = (clicked || entered) && !folder.trim().is_empty();
@@ -210,12 +200,17 @@ fn save(ui: &mut Ui, app: &mut App, folder: &mut String) -> bool {
 /// Draws the sheet for layers of light; true when it is to close.
 fn layers(ui: &mut Ui, app: &mut App, file: &mut String) -> bool {
     ui.heading("Save light layers");
-    ui.label(
-        "One OpenEXR file with the light of each lamp as found, as the shown view has it so far.",
-    );
+    ui.label("One OpenEXR file with the light of each lamp, as the shown view has it so far.");
+    app.layers_needed = true;
+    let layers = app.view().and_then(|view| view.layers.as_ref());
+    ui.weak(layers.map_or_else(
+        || "Tracing the light of each lamp…".to_owned(),
+        |layers| format!("{} samples a pixel so far", layers.samples),
+    ));
+    let ready = layers.is_some() && !file.trim().is_empty();
     let entered = path_field(ui, app, "File", file, Ask::ExportFile);
-    let (clicked, cancel) = buttons(ui, "Save", !file.trim().is_empty());
-    let go = (clicked || entered) && !file.trim().is_empty();
+    let (clicked, cancel) = buttons(ui, "Save", ready);
+    let go = (clicked || entered) && ready;
     if go {
         app.send(Command::SaveLayers(PathBuf::from(file.trim())));
     }
@@ -229,7 +224,6 @@ fn export(
     file: &mut String,
     chosen: &mut usize,
     at: &mut DVec3,
-    with_mix: &mut bool,
 ) -> bool {
     ui.heading("Export");
     ui.horizontal_wrapped(|ui| {
@@ -251,7 +245,6 @@ fn export(
     if matches!(format.format, ExportFormat::Probe { .. }) {
         probe_point(ui, app, at);
     }
-    mixed(ui, app, with_mix);
     let entered = path_field(ui, app, "File", file, Ask::ExportFile);
     let (clicked, cancel) = buttons(ui, "Export", !file.trim().is_empty());
     let go = (clicked || entered) && !file.trim().is_empty();
@@ -260,24 +253,12 @@ fn export(
             ExportFormat::Probe { .. } => ExportFormat::Probe { at: *at },
             other => other,
         };
-        let edits = with_mix.then(|| app.mixed_edits());
         app.send(Command::Export(ExportRequest {
             format,
-            edits: edits.filter(|edits| *edits != app.edits),
             path: PathBuf::from(file.trim()),
         }));
     }
     go || cancel
-}
-
-/// Offers to write in the light of the mixer, where that is another than the lamps' own.
-pub(super) fn mixed(ui: &mut Ui, app: &App, mixed: &mut bool) {
-    if !app.mixer.mix.is_neutral() {
-        ui.checkbox(mixed, "In the light of the mixer")
-            .on_hover_text(
-                "As the pane Lights sets the lamps; the lamps themselves stay as they are",
-            );
-    }
 }
 
 /// Draws the sheet for a length; true when it is to close.

@@ -1,7 +1,7 @@
 //! The menu bar, made from the table of actions.
 
 use crate::app::action::{Action, Menu};
-use crate::app::layout::{self, Pane};
+use crate::app::layout::{self, Pane, Workspace};
 use crate::app::state::App;
 use egui::{Button, Ui};
 use egui_tiles::Tree;
@@ -25,11 +25,22 @@ pub fn bar(ui: &mut Ui, app: &mut App, tree: &mut Tree<Pane>) {
                 }
             });
         }
-        if let Some(capture) = app.capture() {
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            for (workspace, action) in [
+                (Workspace::Inspect, Action::Inspect),
+                (Workspace::Compose, Action::Compose),
+            ] {
+                let shown = app.preferences.workspace == workspace;
+                let tab = ui.selectable_label(shown, action.text());
+                if tab.on_hover_text(action.help()).clicked() {
+                    app.perform(action, &ui.ctx().clone());
+                }
+            }
+            ui.separator();
+            if let Some(capture) = app.capture() {
                 ui.weak(&capture.name);
-            });
-        }
+            }
+        });
     });
 }
 

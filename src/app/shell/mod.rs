@@ -8,6 +8,7 @@ pub mod menu;
 pub mod notices;
 pub mod palette;
 pub mod photographs;
+pub mod sessions;
 pub mod start;
 pub mod status;
 pub mod thumbnails;

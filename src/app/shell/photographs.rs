@@ -2,7 +2,7 @@
 
 use crate::app::action::Action;
 use crate::app::shell::dialogs::Ask;
-use crate::app::shell::files::{buttons, file_name, mixed, path_field};
+use crate::app::shell::files::{buttons, file_name, path_field};
 use crate::app::state::App;
 use egui::{Button, DragValue, ProgressBar, Ui};
 use std::path::PathBuf;
@@ -18,8 +18,6 @@ pub struct Wanted {
     pub samples: u32,
     /// Whether noise is smoothed.
     pub denoise: bool,
-    /// Whether the light mixer counts.
-    pub mixed: bool,
 }
 
 impl Wanted {
@@ -30,7 +28,6 @@ impl Wanted {
             all: true,
             samples: 64,
             denoise: true,
-            mixed: true,
         }
     }
 }
@@ -39,10 +36,7 @@ impl Wanted {
 pub fn sheet(ui: &mut Ui, app: &mut App, wanted: &mut Wanted) -> bool {
     ui.heading("Save photographs");
     let objects = app.insertions.visible().len();
-    let edits = match wanted.mixed {
-        true => app.mixed_edits(),
-        false => app.edits.clone(),
-    };
+    let edits = app.edits.clone();
     ui.label(match (objects, edits.is_empty()) {
         (0, true) => "Insert an object, or change a lamp or a material first.",
         (0, false) => "At full size, in the light as you changed it.",
@@ -52,11 +46,10 @@ pub fn sheet(ui: &mut Ui, app: &mut App, wanted: &mut Wanted) -> bool {
              layers beside them."
         }
     });
-    mixed(ui, app, &mut wanted.mixed);
     ui.horizontal(|ui| {
         let count = app.frames();
         ui.radio_value(&mut wanted.all, true, format!("All {count} photographs"));
-        let shown = format!("Photograph {} alone", app.frame + 1);
+        let shown = format!("Photograph {} alone, as {:03}", app.frame + 1, app.frame);
         ui.radio_value(&mut wanted.all, false, shown);
     });
     ui.horizontal(|ui| {

@@ -1,6 +1,7 @@
 //! The start page: the built-in room, a typed path, recent captures, and where to drop a folder.
 
 use crate::app::action::Action;
+use crate::app::shell::sessions;
 use crate::app::state::App;
 use crate::app::theme;
 use crate::session::command::Source;
@@ -24,10 +25,16 @@ pub fn page(ui: &mut Ui, app: &mut App) {
         }
         ui.add_space(14.0);
         typed_path(ui, app);
+        trouble(ui, app);
         ui.add_space(10.0);
         drop_area(ui);
         ui.add_space(10.0);
         recent(ui, app);
+        if !app.snapshot.kept.is_empty() {
+            ui.add_space(10.0);
+            ui.weak("Sessions");
+            sessions::list(ui, app, 4);
+        }
     });
 }
 
@@ -38,14 +45,18 @@ fn typed_path(ui: &mut Ui, app: &mut App) {
         |ui| {
             let label = ui.label("Capture folder");
             let field = TextEdit::singleline(&mut app.path)
-                .hint_text("a folder with transforms.json")
+                .hint_text("a folder with transforms.json, results or a scan")
                 .desired_width(300.0);
             let response = ui.add(field).labelled_by(label.id);
+            // What is typed belongs here.
+            if ui.memory(|memory| memory.focused().is_none()) && app.palette.is_none() {
+                response.request_focus();
+            }
             let entered =
                 response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
             let open = ui.add_enabled(!app.path.trim().is_empty(), Button::new("Open"));
             if entered || open.clicked() {
-                app.open_typed();
+                app.open_typed(&ui.ctx().clone());
             }
             if ui
                 .button("Browse…")
@@ -56,6 +67,25 @@ fn typed_path(ui: &mut Ui, app: &mut App) {
             }
         },
     );
+}
+
+/// Why nothing was opened, or how far an import is.
+fn trouble(ui: &mut Ui, app: &mut App) {
+    if let Some(importing) = &app.importing {
+        let doing = importing.doing();
+        let mut cancel = false;
+        ui.horizontal(|ui| {
+            ui.spinner();
+            ui.label(format!("Importing the scan: {doing}"));
+            cancel = ui.button("Cancel import").clicked();
+        });
+        if cancel {
+            app.cancel_import();
+        }
+    }
+    if let Some(trouble) = &app.trouble {
+        ui.colored_label(theme::tokens(ui).error, trouble);
+    }
 }
 
 fn drop_area(ui: &mut Ui) {
@@ -73,7 +103,9 @@ fn drop_area(ui: &mut Ui) {
         .inner_margin(18)
         .show(ui, |ui| {
             ui.set_width(504.0);
-            ui.vertical_centered(|ui| ui.weak("Drop a capture's folder here"));
+            ui.vertical_centered(|ui| {
+                ui.weak("Drop the folder of a capture, of results or of a scan here")
+            });
         });
 }
 

@@ -4,6 +4,7 @@ use crate::app::picture::inspect::number;
 use crate::app::shell::photographs;
 use crate::app::state::App;
 use crate::app::theme;
+use crate::inverse::solver::Termination;
 use crate::session::snapshot::Phase;
 use egui::{ProgressBar, RichText, Ui};
 use std::time::{Duration, Instant};
@@ -53,8 +54,20 @@ pub fn phase_word(phase: &Phase) -> String {
         Phase::Loading => "Loading".to_owned(),
         Phase::Solving => "Solving".to_owned(),
         Phase::Paused => "Paused".to_owned(),
-        Phase::Finished(why) => format!("Finished: {}", why.word()),
+        Phase::Finished(why) => ending(*why).to_owned(),
         Phase::Failed => "Failed".to_owned(),
+    }
+}
+
+/// How a solve ended, in words.
+pub fn ending(why: Termination) -> &'static str {
+    match why {
+        Termination::Converged => "Finished: converged",
+        Termination::Target => "Finished: as exact as asked",
+        Termination::Time => "Finished: the time is up",
+        Termination::Steps => "Finished: all steps done",
+        Termination::Cancelled => "Stopped",
+        Termination::Diverged => "Stopped: diverged",
     }
 }
 
@@ -65,6 +78,8 @@ pub fn bar(ui: &mut Ui, app: &mut App) {
     let snapshot = app.snapshot.clone();
     let color = match snapshot.phase {
         Phase::Solving | Phase::Loading => tokens.accent,
+        Phase::Finished(Termination::Cancelled) => tokens.weak,
+        Phase::Finished(Termination::Diverged) => tokens.error,
         Phase::Finished(_) => tokens.good,
         Phase::Failed => tokens.error,
         Phase::Paused | Phase::Idle => tokens.weak,

@@ -72,7 +72,7 @@ pub fn strip(ui: &mut Ui, app: &mut App) {
                     egui::WidgetInfo::labeled(
                         egui::Role::Button,
                         true,
-                        format!("Photograph {frame}"),
+                        format!("Photograph {}", frame + 1),
                     )
                 });
                 let current = frame == app.frame && matches!(app.shown, Shown::Frame);
@@ -94,9 +94,7 @@ pub fn strip(ui: &mut Ui, app: &mut App) {
                         .rect_stroke(rect, 0.0, (2.0, color), egui::StrokeKind::Inside);
                 }
                 if response
-                    .on_hover_text(format!(
-                        "Photograph {frame:03}; double click to look through its camera"
-                    ))
+                    .on_hover_text(format!("Photograph {}, in files {frame:03}", frame + 1))
                     .clicked()
                 {
                     chosen = Some(frame);

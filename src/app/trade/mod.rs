@@ -75,9 +75,9 @@ impl TradeView {
 }
 
 impl App {
-    /// Whether a measurement could begin: something is open, and neither a solve nor a study runs.
+    /// Whether a measurement could begin: something is open and no solve runs.
     pub fn can_measure(&self) -> bool {
-        self.capture().is_some() && !self.is_running() && self.studies.doing().is_none()
+        self.capture().is_some() && !self.is_running()
     }
 
     /// Begins to measure the open capture's trade, or ends it, keeping what is measured.

@@ -64,6 +64,17 @@ impl Hits {
         })
     }
 
+    /// The same picture with −1 where no photograph tells anything: past the mesh, and where nothing was seen.
+    pub fn told(&self, mut picture: Picture, scene: &Scene, estimate: &Estimate) -> Picture {
+        let seen = self.seen(scene, estimate);
+        for (pixel, seen) in picture.pixels.iter_mut().zip(&seen.pixels) {
+            if seen.x == 0.0 {
+                *pixel = Vec3::NEG_ONE;
+            }
+        }
+        picture
+    }
+
     /// Standard error of the albedo.
     pub fn stderr(&self, scene: &Scene, estimate: &Estimate) -> Picture {
         self.paint(scene, |object, hit| {

@@ -13,6 +13,8 @@ use std::sync::Arc;
 use std::time::Instant;
 use target::Target;
 
+pub use target::differs;
+
 /// Long side in pixels of the first picture after a camera move.
 const FIRST_LONG_SIDE: u32 = 96;
 /// Drawing time, in seconds, that may be saved up while the solver is busy.

@@ -26,6 +26,12 @@ pub struct Progressive {
     split: Option<Arc<Split>>,
     /// Row by row, all layers of a pixel together.
     sums: Vec<DVec3>,
+    /// The sums of every other pass alone, where no split is given: with the rest they tell the noise.
+    half: Vec<DVec3>,
+    /// Samples that `half` stands for.
+    half_weight: f64,
+    /// Whether earlier samples are to count for less once the pass is complete.
+    fades: bool,
     /// Samples that `sums` stand for, in whole passes.
     weight: f64,
     pass: u32,
@@ -38,7 +44,15 @@ impl Progressive {
     pub fn new(camera: &Camera, split: Option<Arc<Split>>) -> Self {
         let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
         let layers = split.as_ref().map_or(1, |split| split.sources().len());
+        let halved = if split.is_none() {
+            width as usize * height as usize
+        } else {
+            0
+        };
         Self {
+            half: vec![DVec3::ZERO; halved],
+            half_weight: 0.0,
+            fades: false,
             width: width as usize,
             height: height as usize,
             split,
@@ -60,19 +74,14 @@ impl Progressive {
         self.split.as_ref().map_or(1, |split| split.sources().len())
     }
 
-    /// Lets earlier samples count for a few at most, because the light has changed a little.
+    /// Lets earlier samples count for a few at most, because the light has changed a little; from the end of the pass under way.
     pub fn fade(&mut self) {
-        if self.weight > MEMORY {
+        self.fades = self.row > 0;
+        if self.row == 0 && self.weight > MEMORY {
             let factor = MEMORY / self.weight;
-            let row_of = (self.width * self.layers()).max(1);
-            for (row, sums) in self.sums.chunks_mut(row_of).enumerate() {
-                // Rows of the pass under way hold one sample more than the rest.
-                let factor = match row < self.row {
-                    true => (MEMORY + 1.0) / (self.weight + 1.0),
-                    false => factor,
-                };
-                sums.iter_mut().for_each(|sum| *sum *= factor);
-            }
+            let sums = self.sums.iter_mut().chain(&mut self.half);
+            sums.for_each(|sum| *sum *= factor);
+            self.half_weight *= factor;
             self.weight = MEMORY;
         }
     }
@@ -80,7 +89,8 @@ impl Progressive {
     /// Forgets all samples.
     pub fn clear(&mut self) {
         self.sums.fill(DVec3::ZERO);
-        self.weight = 0.0;
+        self.half.fill(DVec3::ZERO);
+        (self.weight, self.half_weight) = (0.0, 0.0);
         self.row = 0;
     }
 
@@ -98,10 +108,20 @@ impl Progressive {
         let wanted = ((self.rows_a_second * SLICE) as usize).max(rayon::current_num_threads());
         let last = (self.row + wanted).min(height);
         let (row, pass) = (self.row, u64::from(self.pass));
+        let other = pass % 2 == 1 && split.is_none();
+        let mut none = vec![Vec::new(); if other { 0 } else { last - row }];
+        let halves: Vec<&mut [DVec3]> = match other {
+            true => {
+                let rows = &mut self.half[row * width..last * width];
+                rows.chunks_mut(width.max(1)).collect()
+            }
+            false => none.iter_mut().map(Vec::as_mut_slice).collect(),
+        };
         self.sums[row * row_of..last * row_of]
             .par_chunks_mut(row_of.max(1))
+            .zip(halves)
             .enumerate()
-            .for_each(|(i, sums)| {
+            .for_each(|(i, (sums, half))| {
                 let mut parts = Parts::new();
                 for (x, sums) in sums.chunks_mut(layers).enumerate() {
                     let y = row + i;
@@ -115,6 +135,9 @@ impl Progressive {
                         None => {
                             let sample = radiance(world, &ray, &mut stream, options);
                             sums[0] += sample.radiance.as_dvec3();
+                            if let Some(half) = half.get_mut(x) {
+                                *half += sample.radiance.as_dvec3();
+                            }
                         }
                     }
                 }
@@ -126,8 +149,12 @@ impl Progressive {
             return false;
         }
         self.row = 0;
+        self.half_weight += if other { 1.0 } else { 0.0 };
         self.pass += 1;
         self.weight += 1.0;
+        if std::mem::take(&mut self.fades) {
+            self.fade();
+        }
         true
     }
 
@@ -141,6 +168,21 @@ impl Progressive {
                 .collect(),
         };
         sized(camera, pixels)
+    }
+
+    /// The means of two independent halves; `None` where there are none yet.
+    pub fn halves(&self, camera: &Camera) -> Option<[Picture; 2]> {
+        let rest = self.weight - self.half_weight;
+        if self.half.is_empty() || self.half_weight <= 0.0 || rest <= 0.0 {
+            return None;
+        }
+        let one = self
+            .half
+            .iter()
+            .map(|sum| (*sum / self.half_weight).as_vec3());
+        let other = self.sums.iter().zip(&self.half);
+        let other = other.map(|(sum, half)| ((*sum - *half) / rest).as_vec3());
+        Some([sized(camera, one.collect()), sized(camera, other.collect())])
     }
 
     /// Mean radiance of each layer; only between passes.

@@ -9,6 +9,7 @@ use crate::session::snapshot::{LightLayers, OpenCapture, Picture, View};
 use crate::session::view::hits::Hits;
 use crate::session::view::progressive::{ENOUGH, Progressive};
 use crate::session::view::sized::box_filter;
+use crate::transport::denoise::{Guide, denoise, guides};
 use crate::transport::layers::Split;
 use crate::transport::lit::Lit;
 use crate::transport::path::PathOptions;
@@ -17,6 +18,8 @@ use std::sync::Arc;
 
 /// A change of a colour by less than this share does not show.
 const VISIBLE: f32 = 0.01;
+/// Samples that a render with the final estimate has before it is shown, where the one before it had as many.
+const HOLD: u32 = 8;
 /// Longest side in pixels of a view whose light is kept apart by lamp, for the memory that the layers take.
 const LAYERED_LONG_SIDE: u32 = 768;
 
@@ -37,6 +40,12 @@ pub struct Target {
     render: Progressive,
     /// The newest complete render, and its samples a pixel.
     rendered: Option<(Arc<Picture>, u32)>,
+    /// Whether anybody looks at the render.
+    watched: bool,
+    /// Samples that a render must have before it takes the place of that.
+    hold: u32,
+    /// What each pixel sees, by which noise is smoothed.
+    guides: Option<Vec<Option<Guide>>>,
     /// The same render by lamp, where that was asked for.
     layers: Option<Arc<LightLayers>>,
     /// Pictures of albedo, emission and standard error, in this order.
@@ -82,6 +91,9 @@ impl Target {
             render: Progressive::new(&camera, split),
             world,
             rendered: None,
+            watched: request.render || request.layers,
+            hold: 0,
+            guides: None,
             layers: None,
             maps: [const { None }; 3],
             objects: None,
@@ -105,15 +117,23 @@ impl Target {
         }
     }
 
-    /// Takes up another estimate and forgets the samples of the last; its render is shown until a new one is there.
+    /// Takes up another estimate and forgets the samples of the last; its render is shown until the new one is as good.
     pub fn start_over(&mut self, estimate: &Arc<Estimate>) {
         self.adopt(estimate);
         self.render.clear();
+        self.wait_for(HOLD);
+    }
+
+    /// Shows a new render once it has so many samples, or as many as the one that is shown.
+    fn wait_for(&mut self, samples: u32) {
+        let shown = self.rendered.as_ref().map_or(0, |(_, samples)| *samples);
+        self.hold = samples.min(shown);
     }
 
     fn adopt(&mut self, estimate: &Arc<Estimate>) {
         self.estimate = estimate.clone();
         self.world = estimate.lit(&self.scene);
+        self.guides = None;
         self.stale = true;
         // Other lamps have other layers.
         if let Some(split) = self.render.split() {
@@ -126,12 +146,13 @@ impl Target {
 
     /// Whether there is nothing left to draw.
     pub fn is_done(&self) -> bool {
-        self.coarse.is_none() && !self.stale && self.render.samples() >= ENOUGH
+        let sharp = !self.watched || self.render.samples() >= ENOUGH;
+        self.coarse.is_none() && !self.stale && sharp
     }
 
     /// Whether the first complete picture is still to come.
     pub fn is_rough(&self) -> bool {
-        self.hits.is_none() || self.render.samples() == 0
+        self.hits.is_none() || (self.watched && self.render.samples() == 0)
     }
 
     /// Draws the next slice; the pictures, if one of them is new.
@@ -147,17 +168,32 @@ impl Target {
             self.map(&hits, &self.camera.clone());
             self.objects = Some(Arc::new(hits.objects(&self.scene)));
             self.hits = Some(hits);
-        } else if self.render.samples() >= ENOUGH
-            || !self.render.add(&self.world, &self.camera, options)
-        {
+        } else if self.is_done() || !self.render.add(&self.world, &self.camera, options) {
             return None;
         } else {
-            let (render, camera) = (&self.render, &self.camera);
-            let picture = self.exposed(render.picture(camera));
-            self.layers = self.layers_of(render, camera);
-            self.rendered = Some((Arc::new(picture), self.render.samples()));
+            let samples = self.render.samples();
+            // Smoothing takes longer than a sample: it is done whenever there are twice as many.
+            let split = self.render.split().is_some();
+            let doubled = samples.is_power_of_two() && samples > 1;
+            if samples < self.hold || !(split || doubled) {
+                return None;
+            }
+            self.hold = 0;
+            let smoothed = self.smoothed();
+            let picture = self.exposed(smoothed);
+            self.layers = self.layers_of(&self.render, &self.camera);
+            self.rendered = Some((Arc::new(picture), samples));
         }
         Some(self.view(sequence))
+    }
+
+    /// The mean of all samples, its noise smoothed where two halves tell it.
+    fn smoothed(&mut self) -> Picture {
+        let Some([a, b]) = self.render.halves(&self.camera) else {
+            return self.render.picture(&self.camera);
+        };
+        let seen = || guides(&self.world, &self.camera);
+        denoise(&a, &b, self.guides.get_or_insert_with(seen))
     }
 
     /// All pictures at once, coarsely.
@@ -183,10 +219,11 @@ impl Target {
     }
 
     fn map(&mut self, hits: &Hits, camera: &Camera) {
+        let stderr = hits.stderr(&self.scene, &self.estimate);
         let maps = [
             hits.albedo(&self.scene, &self.world.materials),
             hits.emission(&self.scene, camera, &self.estimate),
-            hits.stderr(&self.scene, &self.estimate),
+            hits.told(stderr, &self.scene, &self.estimate),
         ];
         self.maps = maps.map(|picture| Some(self.enlarged(picture)));
     }
@@ -258,7 +295,7 @@ fn difference(render: &Picture, photograph: &Picture) -> Picture {
 }
 
 /// Whether two estimates look different: a colour by more than 1 % of its range.
-fn differs(a: &Estimate, b: &Estimate) -> bool {
+pub fn differs(a: &Estimate, b: &Estimate) -> bool {
     if a.objects.len() != b.objects.len() || a.outside != b.outside {
         return true;
     }

@@ -1,21 +1,27 @@
 //! What each command does.
 
+use crate::capture::place::Coordinates;
+use crate::export::picture::shown_at;
 use crate::export::{light_layers, scene};
 use crate::inverse::held_out::HoldOut;
+use crate::math::picture::Picture;
 use crate::session::command::{Command, ExportRequest, OpenOptions, ViewCamera};
+use crate::session::keep::{Held, State};
 use crate::session::save::pictures::Frames;
 use crate::session::save::{self, Results};
 use crate::session::snapshot::{Level, Phase};
+use crate::session::view::sized::box_filter;
 use crate::session::worker::state::Worker;
-use crate::session::worker::work::Next;
+use crate::session::worker::work::{Begin, Next};
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Duration;
 
 /// How long views have more of the solver's time after another one was asked for …
 const LOOKED: Duration = Duration::from_secs(2);
 /// … and after lamps, materials or inserted objects were changed, whose pictures a person waits for.
 const CHANGED: Duration = Duration::from_secs(15);
+/// Long side in pixels of the picture by which a session is listed.
+const THUMBNAIL: u32 = 120;
 
 impl Worker {
     /// Carries out a command. What cannot be done beside a running solve is returned: the solve ends first.
@@ -28,10 +34,29 @@ impl Worker {
                     check_alignment: true,
                     ..OpenOptions::default()
                 };
-                return Some(Next::Open(source, options));
+                return Some(Next::Open(source, options, Begin::GoingOn));
+            }
+            Command::StartOver => {
+                let open = self.capture.as_ref()?;
+                // As a person would open it, without the objects and the coordinates that were made by hand.
+                let options = OpenOptions {
+                    objects: Vec::new(),
+                    coordinates: Coordinates::default(),
+                    ..open.options.clone()
+                };
+                let source = open.source.clone();
+                return Some(Next::Open(source, options, Begin::Anew));
             }
             Command::Resume(folder) => return Some(Next::Resume(folder)),
+            Command::Remove(folder) => {
+                if let Err(error) = self.keeper.remove(&folder) {
+                    self.fail(&error);
+                }
+            }
             Command::Reset => {
+                self.keep(true);
+                self.keeper.begin_anew();
+                self.continued = None;
                 self.paused = false;
                 self.step = false;
                 let open = self.capture.as_ref()?;
@@ -80,9 +105,11 @@ impl Worker {
             Command::Set(settings) => self.settings = *settings,
             Command::View(request) => {
                 self.answer_for(LOOKED);
-                if let ViewCamera::Frame(frame) = request.camera {
-                    self.inserting.look(frame);
-                }
+                let frame = match request.camera {
+                    ViewCamera::Frame(frame) => frame,
+                    ViewCamera::Free(_) => self.inserting.frame(),
+                };
+                self.inserting.look(frame, request.composite);
                 self.views.look(request);
             }
             Command::Insert(placements) => {
@@ -99,10 +126,6 @@ impl Worker {
                     self.views.look_again();
                     self.inserting.update();
                 }
-            }
-            Command::Keep(base) => {
-                self.keeper.begin(base);
-                self.set_aside();
             }
             Command::Save(folder) => self.save(&folder),
             Command::Export(request) => self.export(&request),
@@ -144,30 +167,56 @@ impl Worker {
         })
     }
 
-    /// Sets the last session of the open capture aside, and says that it is there.
-    pub(super) fn set_aside(&mut self) {
-        let Some(capture) = self.capture.clone() else {
-            return;
-        };
-        if let Err(error) = self.keeper.opened(&capture.hash) {
-            self.fail(&error);
-        } else if self.keeper.earlier.is_some() {
-            let said = "the last session of this capture is kept; File > Take up the last session";
-            self.say(Level::Info, said);
-        }
-    }
-
     /// Saves the session where that is due.
     pub(super) fn keep(&mut self, now: bool) {
         if !self.keeper.is_due(now) || self.estimate.objects.is_empty() {
             return;
         }
-        if let Some(results) = self.results()
-            && let Err(error) = (self.keeper).write(&results, self.inserting.placements())
-        {
+        let Some(results) = self.results() else {
+            return;
+        };
+        let held = Held {
+            capture: results.capture.name.clone(),
+            state: match self.phase {
+                Phase::Finished(why) => State::Finished(why),
+                Phase::Paused | Phase::Failed => State::Paused,
+                _ => State::Solving,
+            },
+            precious: matches!(self.phase, Phase::Finished(_))
+                || !self.edits.is_empty()
+                || !self.inserting.placements().is_empty()
+                || !results.capture.options.objects.is_empty(),
+            frame: self.inserting.frame(),
+            inserted: self.inserting.placements().to_vec(),
+            progress: Some(self.progress.as_ref().clone()),
+        };
+        if let Err(error) = self.keeper.write(&results, held, self.thumbnail()) {
             let said = format!("the session is not kept any longer: {error}");
             self.say(Level::Warning, said);
         }
+    }
+
+    /// The shown photograph, as it was changed, in few pixels, and the exposure to show it at.
+    fn thumbnail(&self) -> Option<(Picture, f32)> {
+        let capture = self.capture.as_ref()?;
+        let frame = self.inserting.frame();
+        let (_, taken) = capture.frame(frame).ok()?;
+        let composite = self.inserting.shown().filter(|shown| shown.frame == frame);
+        let picture = composite.map_or_else(
+            || Picture {
+                width: taken.width,
+                height: taken.height,
+                pixels: taken.pixels.clone(),
+            },
+            |shown| shown.composite.as_ref().clone(),
+        );
+        let (width, height) = (picture.width, picture.height);
+        let scale = (f64::from(THUMBNAIL) / f64::from(width.max(height).max(1))).min(1.0);
+        let [width, height] =
+            [width, height].map(|side| (f64::from(side) * scale).round().max(1.0) as u32);
+        let small = box_filter(&picture, width, height);
+        let exposure = shown_at(taken.saturation, &small.pixels);
+        Some((small, exposure))
     }
 
     fn save(&mut self, folder: &Path) {
@@ -190,10 +239,7 @@ impl Worker {
             return;
         };
         let path = &request.path;
-        let estimate = match &request.edits {
-            Some(edits) => Arc::new(edits.apply(&self.estimate)),
-            None => self.edited(),
-        };
+        let estimate = self.edited();
         match scene::write(&capture.scene, &estimate, request.format, path) {
             Ok(()) => {
                 self.say(Level::Info, format!("exported to {}", path.display()));
@@ -211,7 +257,7 @@ impl Worker {
         let Some((capture, layers)) = self.capture.clone().zip(layers) else {
             self.say(
                 Level::Error,
-                "layers: none are there; open the pane Lights and wait for its first picture",
+                "layers: none are traced yet; wait for the first picture",
             );
             return;
         };

@@ -1,6 +1,7 @@
 //! The worker: a named thread that owns the estimate, solves, and serves views, saves and exports at any time.
 
 mod commands;
+mod earlier;
 mod state;
 mod steering;
 mod work;
@@ -13,9 +14,10 @@ use crate::session::inbox::{self, Outbox};
 use crate::session::slot::Slot;
 use crate::session::snapshot::{OpenCapture, Snapshot};
 use state::Worker;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
-use work::Next;
+use work::{Begin, Next};
 
 /// Called by the worker after a new snapshot, at most about 30 times a second.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
@@ -33,6 +35,8 @@ pub struct Backend {
     pub open: Box<Opener>,
     /// Runs a solver.
     pub solve: Box<Solver>,
+    /// The folder that sessions save themselves into; none where they do not.
+    pub sessions: Option<PathBuf>,
 }
 
 impl Default for Backend {
@@ -40,6 +44,7 @@ impl Default for Backend {
         Self {
             open: Box::new(crate::session::open::open),
             solve: Box::new(crate::inverse::solver::solve),
+            sessions: None,
         }
     }
 }
@@ -77,7 +82,9 @@ impl Session {
         let (outbox, inbox) = inbox::queue();
         let slot = Arc::new(Slot::default());
         let shared = slot.clone();
-        let first = source.map_or(Next::Wait, |(source, options)| Next::Open(source, options));
+        let first = source.map_or(Next::Wait, |(source, options)| {
+            Next::Open(source, options, Begin::GoingOn)
+        });
         let thread = std::thread::Builder::new()
             .name("relit-worker".to_owned())
             .spawn(move || Worker::new(inbox, shared, settings, wake, backend).run(first))

@@ -49,6 +49,12 @@ pub(super) struct Worker {
     pub keeper: Keeper,
     /// The inserted objects that the open capture came with.
     pub inserted: Arc<Vec<Placement>>,
+    /// The photograph that it is to be shown by at first.
+    pub frame: usize,
+    /// Which session it goes on with, in words.
+    pub continued: Option<String>,
+    /// Whether the parameters were asked for when the program began, rather than those of a session.
+    pub asked: bool,
     /// Until when what was asked for has a larger share of the time.
     pub answer_until: Option<Instant>,
     /// Answers to requests for other objects.
@@ -71,8 +77,6 @@ impl Worker {
             inbox,
             slot,
             wake,
-            backend,
-            settings,
             capture: None,
             estimate: Arc::default(),
             edits: Edits::default(),
@@ -88,14 +92,19 @@ impl Worker {
             step: false,
             seconds_load: 0.0,
             started: Instant::now(),
-            keeper: Keeper::default(),
+            keeper: Keeper::new(backend.sessions.clone()),
             inserted: Arc::default(),
+            frame: 0,
+            continued: None,
+            asked: settings != Settings::default(),
             answer_until: None,
             regroupings: 0,
             edited: Edited::default(),
             sequence: 0,
             changed: true,
             published: Instant::now(),
+            backend,
+            settings,
         }
     }
 
@@ -145,7 +154,8 @@ impl Worker {
         let light = Light::new(self.estimate.clone(), self.edited(), &self.settings);
         let estimate = &light.edited;
         // Views and composites share what there is.
-        let composites = !estimate.objects.is_empty() && self.inserting.is_busy();
+        self.inserting.follow(&light);
+        let composites = self.inserting.is_busy();
         let share = match composites && share < 1.0 {
             true => share * 0.5,
             false => share,
@@ -189,7 +199,9 @@ impl Worker {
             edits: self.edits.clone(),
             regroupings: self.regroupings,
             inserted: self.inserted.clone(),
-            earlier: self.keeper.earlier.clone(),
+            frame: self.frame,
+            continued: self.continued.clone(),
+            kept: self.keeper.kept(),
             view: self.views.shown(),
             insertion: self.inserting.shown(),
             events: self.events.clone(),

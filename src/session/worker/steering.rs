@@ -103,7 +103,8 @@ impl Observer for Steering<'_> {
             }
             if !self.worker.paused {
                 let fresh = (self.worker.answer_until).is_some_and(|end| Instant::now() < end);
-                let answer = fresh || self.worker.views.is_rough();
+                let rough = self.worker.views.is_rough() || self.worker.inserting.is_rough();
+                let answer = fresh || rough;
                 self.worker
                     .draw(if answer { ANSWER_SHARE } else { VIEW_SHARE });
                 self.worker.publish(false);

@@ -2,18 +2,16 @@
 
 use crate::error::Error;
 use crate::inverse::held_out::HoldOut;
-use crate::inverse::solver::{Checkpoint, Problem};
+use crate::inverse::solver::{Checkpoint, Problem, Termination};
 use crate::session::command::{OpenOptions, Regrouping, Source};
 use crate::session::edits::Edits;
 use crate::session::inbox::Mail;
-use crate::session::keep;
-use crate::session::save;
 use crate::session::snapshot::{Level, OpenCapture, Phase};
 use crate::session::worker::state::Worker;
 use crate::session::worker::steering::Steering;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -21,9 +19,9 @@ use std::time::Instant;
 pub(super) enum Next {
     /// Serve commands.
     Wait,
-    /// Read a capture, then solve it.
-    Open(Source, OpenOptions),
-    /// Read what an earlier run wrote, then go on from it.
+    /// Read a capture, then go on with its last session or solve it.
+    Open(Source, OpenOptions, Begin),
+    /// Read what an earlier run wrote, then go on with it.
     Resume(PathBuf),
     /// Solve what is open, from the start or from a checkpoint.
     Solve(Option<Checkpoint>),
@@ -35,6 +33,15 @@ pub(super) enum Next {
     Regroup(Box<Regrouping>, bool),
     /// End.
     Quit,
+}
+
+/// What a capture that is opened begins with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Begin {
+    /// Its last session, where there is one.
+    GoingOn,
+    /// Nothing.
+    Anew,
 }
 
 impl Worker {
@@ -57,7 +64,7 @@ impl Worker {
     fn take(&mut self, next: Next) -> Next {
         match next {
             Next::Wait => self.wait(),
-            Next::Open(source, options) => self.open(&source, &options),
+            Next::Open(source, options, begin) => self.open(&source, &options, begin),
             Next::Resume(folder) => self.resume(&folder),
             Next::Solve(checkpoint) => self.solve(checkpoint.as_ref()),
             Next::Recut(hold_out) => self.recut(hold_out),
@@ -110,42 +117,60 @@ impl Worker {
         }
     }
 
-    fn open(&mut self, source: &Source, options: &OpenOptions) -> Next {
+    fn open(&mut self, source: &Source, options: &OpenOptions, begin: Begin) -> Next {
+        self.keep(true);
         self.started = Instant::now();
         let before = std::mem::replace(&mut self.phase, Phase::Loading);
         self.publish(true);
+        let asked = std::mem::take(&mut self.asked);
         match (self.backend.open)(source, options) {
             Ok(capture) => {
                 self.seconds_load = self.started.elapsed().as_secs_f64();
-                self.keep(true);
+                let earlier = match begin {
+                    Begin::GoingOn => self.last_session(&capture, asked),
+                    Begin::Anew => None,
+                };
+                if let Some(earlier) = earlier {
+                    return self.go_on_with(earlier, capture);
+                }
                 let suspect = capture.other_reading().is_some();
+                self.keeper.begin(&capture.hash);
                 self.adopt(capture);
-                self.set_aside();
                 if suspect {
                     self.phase = Phase::Paused;
                     return Next::Wait;
                 }
                 Next::Solve(None)
             }
-            // What was open stays open.
             Err(error) => {
-                self.phase = if self.capture.is_some() {
-                    before
-                } else {
-                    Phase::Failed
-                };
                 self.fail(&error);
-                Next::Wait
+                self.back_to(before)
             }
         }
     }
 
-    fn adopt(&mut self, capture: OpenCapture) {
+    /// After a failure what was open stays open, and a solve that was under way goes on.
+    pub(super) fn back_to(&mut self, before: Phase) -> Next {
+        self.phase = match before {
+            Phase::Solving | Phase::Paused if self.checkpoint.is_some() => {
+                self.paused = before == Phase::Paused;
+                return Next::Solve(self.checkpoint.clone());
+            }
+            Phase::Solving => Phase::Finished(Termination::Cancelled),
+            _ if self.capture.is_none() => Phase::Failed,
+            before => before,
+        };
+        Next::Wait
+    }
+
+    pub(super) fn adopt(&mut self, capture: OpenCapture) {
         for warning in &capture.warnings {
             self.say(Level::Warning, warning.clone());
         }
         self.capture = Some(Arc::new(capture));
         self.inserted = Arc::default();
+        self.continued = None;
+        self.frame = 0;
         self.inbox.forget_changes();
         self.forget();
         self.edits = Edits::default();
@@ -197,7 +222,9 @@ impl Worker {
             ..old.options.clone()
         };
         self.regroupings += 1;
+        self.keep(true);
         if self.reopen(&options) {
+            self.keeper.begin_anew();
             self.edits = wanted.edits;
             return Next::Solve(None);
         }
@@ -228,50 +255,17 @@ impl Worker {
             let files = placement.at.map(|at| from.undo(at, up));
             placement.at = files.map(|at| to.apply(at, new_up));
         }
+        if capture.hash != old.hash {
+            self.keeper.begin_anew();
+        }
+        let frame = self.inserting.frame();
         self.adopt(capture);
+        self.frame = frame;
+        self.inserting.turn_to(frame);
         self.inserting.place(inserted.clone());
         self.inserted = Arc::new(inserted);
         self.keeper.touch();
         true
-    }
-
-    fn resume(&mut self, folder: &Path) -> Next {
-        let before = std::mem::replace(&mut self.phase, Phase::Loading);
-        self.publish(true);
-        let loaded = save::load(folder).and_then(|saved| {
-            let capture = (self.backend.open)(&saved.source, &saved.options)?;
-            let estimate = saved.estimate_for(&capture)?;
-            let edits = saved.edits_for(&capture)?;
-            let inserted = keep::inserted(folder)?;
-            Ok((capture, estimate, edits, inserted, saved))
-        });
-        match loaded {
-            Ok((capture, estimate, edits, inserted, saved)) => {
-                self.keep(true);
-                self.keeper.resumed(&capture.hash);
-                self.adopt(capture);
-                self.inserting.place(inserted.clone());
-                self.inserted = Arc::new(inserted);
-                self.edits = edits;
-                self.estimate = Arc::new(estimate);
-                self.settings = saved.settings;
-                match saved.checkpoint {
-                    Some(checkpoint) => {
-                        self.progress = Arc::new(checkpoint.progress.clone());
-                        Next::Solve(Some(checkpoint))
-                    }
-                    None => {
-                        self.phase = Phase::Finished(saved.termination);
-                        Next::Wait
-                    }
-                }
-            }
-            Err(error) => {
-                self.phase = before;
-                self.fail(&error);
-                Next::Wait
-            }
-        }
     }
 
     fn solve(&mut self, checkpoint: Option<&Checkpoint>) -> Next {
@@ -304,6 +298,7 @@ impl Worker {
             solver(&problem, &settings, checkpoint, &mut steering)
         }));
         let next = steering.next();
+        let held = self.phase.clone();
         self.backend.solve = solver;
         self.solving = false;
         self.paused = false;
@@ -314,11 +309,20 @@ impl Worker {
                 self.estimate = Arc::new(capture.in_doubt(solution.estimate));
                 self.progress = Arc::new(solution.progress);
                 self.checkpoint = solution.checkpoint;
-                self.phase = Phase::Finished(solution.termination);
+                // A solve that another command ends is not at its end: a session goes on with it.
+                self.phase = match solution.termination {
+                    Termination::Cancelled if !matches!(next, Next::Wait) => held,
+                    ended => {
+                        let seconds = self.progress.seconds;
+                        let said =
+                            format!("the solve ended after {seconds:.1} s: {}", ended.word());
+                        self.say(Level::Info, said);
+                        Phase::Finished(ended)
+                    }
+                };
                 self.keeper.touch();
                 let edited = self.edited();
                 self.views.refresh(&edited);
-                self.inserting.update();
             }
             Ok(Err(error)) => {
                 self.phase = Phase::Failed;

@@ -1,0 +1,98 @@
+//! Segments in words, so that people find them again: how large, of which colour.
+
+use crate::math::color::linear_to_srgb;
+use crate::scene::Object;
+use glam::Vec3;
+
+/// The name of an object; that of a segment says how large it is, of the scene's area, and of which colour.
+pub fn described(object: &Object, area: f64, albedo: Option<Vec3>) -> String {
+    if !object.name.starts_with("segment ") {
+        return object.name.clone();
+    }
+    let size = match object.area / area {
+        share if share > 0.05 => " large",
+        share if share < 0.003 => " small",
+        _ => "",
+    };
+    let color = albedo.map_or(String::new(), |albedo| format!(" {}", color_word(albedo)));
+    match (size, color.as_str()) {
+        ("", "") => object.name.clone(),
+        _ => format!("{},{size}{color}", object.name),
+    }
+}
+
+/// The word of a linear colour.
+fn color_word(albedo: Vec3) -> &'static str {
+    let [r, g, b] = albedo
+        .clamp(Vec3::ZERO, Vec3::ONE)
+        .to_array()
+        .map(linear_to_srgb);
+    let (high, low) = (r.max(g).max(b), r.min(g).min(b));
+    if high < 0.2 {
+        return "black";
+    }
+    let spread = high - low;
+    let saturation = spread / high;
+    if saturation < 0.15 {
+        return match high {
+            v if v < 0.45 => "dark grey",
+            v if v < 0.75 => "grey",
+            v if v < 0.9 => "light grey",
+            _ => "white",
+        };
+    }
+    let sixth = match high {
+        v if v == r => (g - b) / spread,
+        v if v == g => 2.0 + (b - r) / spread,
+        _ => 4.0 + (r - g) / spread,
+    };
+    match (sixth * 60.0).rem_euclid(360.0) {
+        20.0..70.0 if high < 0.6 => "brown",
+        20.0..70.0 if saturation < 0.45 => "beige",
+        20.0..45.0 => "orange",
+        45.0..70.0 => "yellow",
+        70.0..165.0 => "green",
+        165.0..195.0 => "cyan",
+        195.0..255.0 => "blue",
+        255.0..290.0 => "purple",
+        290.0..340.0 => "pink",
+        _ => "red",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn object(name: &str, area: f64) -> Object {
+        Object {
+            name: name.to_owned(),
+            triangles: Vec::new(),
+            area,
+        }
+    }
+
+    #[test]
+    fn segments_are_told_by_size_and_colour_and_named_objects_by_their_names() {
+        let of = |name, area, albedo: [f32; 3]| {
+            described(&object(name, area), 100.0, Some(Vec3::from_array(albedo)))
+        };
+        assert_eq!(
+            of("segment 004", 20.0, [0.8; 3]),
+            "segment 004, large white"
+        );
+        assert_eq!(
+            of("segment 040", 0.1, [0.3, 0.02, 0.02]),
+            "segment 040, small red"
+        );
+        assert_eq!(
+            of("segment 041", 1.0, [0.05, 0.1, 0.4]),
+            "segment 041, blue"
+        );
+        assert_eq!(of("wall", 20.0, [0.8; 3]), "wall");
+        assert_eq!(
+            described(&object("segment 9", 1.0), 100.0, None),
+            "segment 9"
+        );
+    }
+}

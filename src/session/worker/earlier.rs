@@ -1,0 +1,129 @@
+//! Going on with a session that is kept, or with results of an earlier run.
+
+use crate::capture::place::Coordinates;
+use crate::error::Result;
+use crate::inverse::estimate::Estimate;
+use crate::session::edits::Edits;
+use crate::session::keep::{self, Held, State};
+use crate::session::save::{self, Saved};
+use crate::session::snapshot::{Level, OpenCapture, Phase};
+use crate::session::worker::state::Worker;
+use crate::session::worker::work::Next;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What an earlier run left of a capture.
+pub(super) struct Earlier {
+    folder: PathBuf,
+    saved: Saved,
+    held: Option<Held>,
+    estimate: Estimate,
+    edits: Edits,
+    /// The capture as it was read then, where that is another way than now.
+    capture: Option<OpenCapture>,
+}
+
+impl Worker {
+    /// What is kept of a capture's last session; `None` where there is none, or other options or parameters are asked for now.
+    pub(super) fn last_session(&mut self, capture: &OpenCapture, asked: bool) -> Option<Earlier> {
+        let folder = self.keeper.last(&capture.hash)?;
+        self.session_in(&folder, capture, asked)
+            .unwrap_or_else(|error| {
+                let said =
+                    format!("a new session begins, as the last cannot be gone on with: {error}");
+                self.say(Level::Warning, said);
+                None
+            })
+    }
+
+    fn session_in(
+        &self,
+        folder: &Path,
+        capture: &OpenCapture,
+        asked: bool,
+    ) -> Result<Option<Earlier>> {
+        let mut saved = save::load(folder)?;
+        let (now, then) = (&capture.options, &mut saved.options);
+        let other = (now.up.is_some() && now.up != then.up)
+            || (now.segments.is_some() && now.segments != then.segments)
+            || (!now.reading.is_default() && now.reading != then.reading)
+            || (now.coordinates != Coordinates::default() && now.coordinates != then.coordinates);
+        if other || (asked && saved.settings != self.settings) {
+            return Ok(None);
+        }
+        then.check_alignment = now.check_alignment;
+        then.allow_outside = now.allow_outside;
+        let otherwise = *then != *now;
+        let reread = otherwise.then(|| (self.backend.open)(&capture.source, then));
+        let reread = reread.transpose()?;
+        Earlier::new(folder, saved, reread.as_ref().unwrap_or(capture)).map(|earlier| {
+            Some(Earlier {
+                capture: reread,
+                ..earlier
+            })
+        })
+    }
+
+    /// Opens what lies in a folder of results or of a session.
+    pub(super) fn resume(&mut self, folder: &Path) -> Next {
+        self.keep(true);
+        let before = std::mem::replace(&mut self.phase, Phase::Loading);
+        self.publish(true);
+        let loaded = save::load(folder).and_then(|saved| {
+            let capture = (self.backend.open)(&saved.source, &saved.options)?;
+            Ok((Earlier::new(folder, saved, &capture)?, capture))
+        });
+        match loaded {
+            Ok((earlier, capture)) => self.go_on_with(earlier, capture),
+            Err(error) => {
+                self.fail(&error);
+                self.back_to(before)
+            }
+        }
+    }
+
+    /// Opens a capture as an earlier run left it. What had ended is not solved again.
+    pub(super) fn go_on_with(&mut self, earlier: Earlier, capture: OpenCapture) -> Next {
+        let capture = earlier.capture.unwrap_or(capture);
+        let held = earlier.held.clone().unwrap_or_default();
+        self.keeper.go_on(&capture.hash, &earlier.folder, &held);
+        self.adopt(capture);
+        self.inserting.place(held.inserted.clone());
+        self.inserted = Arc::new(held.inserted);
+        self.frame = held.frame;
+        self.inserting.turn_to(held.frame);
+        self.edits = earlier.edits;
+        self.estimate = Arc::new(earlier.estimate);
+        self.settings = earlier.saved.settings;
+        self.checkpoint = earlier.saved.checkpoint;
+        let reached = self.checkpoint.as_ref().map(|c| c.progress.clone());
+        self.progress = Arc::new(held.progress.or(reached).unwrap_or_default());
+        let name = earlier.folder.file_name().unwrap_or_default();
+        self.continued = Some(name.to_string_lossy().into_owned());
+        self.touch();
+        self.paused = false;
+        match (earlier.held.map(|held| held.state), &self.checkpoint) {
+            (Some(State::Finished(why)), _) => self.phase = Phase::Finished(why),
+            (None, None) => self.phase = Phase::Finished(earlier.saved.termination),
+            (state, _) => {
+                self.paused = state == Some(State::Paused);
+                return Next::Solve(self.checkpoint.clone());
+            }
+        }
+        Next::Wait
+    }
+}
+
+impl Earlier {
+    /// What lies in a folder of a capture.
+    fn new(folder: &Path, saved: Saved, capture: &OpenCapture) -> Result<Self> {
+        Ok(Self {
+            estimate: saved.estimate_for(capture)?,
+            edits: saved.edits_for(capture)?,
+            held: keep::held(folder)?,
+            folder: folder.to_owned(),
+            saved,
+            capture: None,
+        })
+    }
+}
