@@ -304,9 +304,11 @@ mod tests {
         let command = Arguments::command();
         let mut numbers = 0;
         for command in command.get_subcommands() {
-            let options = command
-                .get_arguments()
-                .filter(|a| a.get_action().takes_values());
+            let takes_one = |argument: &&Arg| {
+                let none = argument.get_num_args().is_some_and(|n| !n.takes_values());
+                argument.get_action().takes_values() && !none
+            };
+            let options = command.get_arguments().filter(takes_one);
             for option in options.filter_map(|argument| argument.get_long()) {
                 let option = format!("--{option}");
                 for value in ["-1", "a"] {
