@@ -33,7 +33,7 @@ fn color_word(albedo: Vec3) -> &'static str {
     }
     let spread = high - low;
     let saturation = spread / high;
-    if saturation < 0.15 {
+    if saturation < 0.2 {
         return match high {
             v if v < 0.45 => "dark grey",
             v if v < 0.75 => "grey",
@@ -56,6 +56,7 @@ fn color_word(albedo: Vec3) -> &'static str {
         195.0..255.0 => "blue",
         255.0..290.0 => "purple",
         290.0..340.0 => "pink",
+        _ if saturation < 0.5 => "brown",
         _ => "red",
     }
 }

@@ -10,6 +10,7 @@ use crate::app::model::view::ModelView;
 use crate::app::opening::Importing;
 use crate::app::panels::objects::ObjectsTable;
 use crate::app::pick::Pick;
+use crate::app::picture::canvas::Resized;
 use crate::app::picture::compare::Compare;
 use crate::app::picture::irradiance::Irradiance;
 use crate::app::picture::look::Look;
@@ -58,6 +59,8 @@ pub struct App {
     pub look: Look,
     /// The two pictures compared.
     pub compare: Compare,
+    /// The objects of the shown view, in the size of another picture of it.
+    pub resized: RefCell<Resized>,
     /// The ends of the scales of false colours.
     pub scales: RefCell<Scales>,
     /// What is beside the photograph as it was changed, under a wipe.
@@ -157,6 +160,7 @@ impl App {
             settings: Settings::default(),
             look,
             compare: Compare::default(),
+            resized: RefCell::default(),
             scales: RefCell::default(),
             against: None,
             frame: 0,

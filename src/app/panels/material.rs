@@ -122,7 +122,7 @@ fn pin(ui: &mut Ui, name: &str, known: &mut bool) -> bool {
 
 /// Strength and colour of its light.
 fn emission(ui: &mut Ui, app: &App, found: &ObjectEstimate, edit: &mut ObjectEdit) {
-    let help = "Emitted radiance of the strongest channel, W/(sr·m²)";
+    let help = "Emitted radiance of the strongest channel";
     ui.label("Emission").on_hover_text(help);
     ui.horizontal(|ui| {
         let mut strength = edit.emission(found.emission).max_element();
@@ -145,7 +145,7 @@ fn emission(ui: &mut Ui, app: &App, found: &ObjectEstimate, edit: &mut ObjectEdi
             .range(0.0..=1e12)
             .speed(speed)
             .max_decimals(4)
-            .suffix(" W/(sr·m²)")
+            .suffix(format!(" {}", app.radiance_unit()))
             .update_while_editing(false);
         let response = ui.add(drag).on_hover_text(help);
         response.widget_info(|| WidgetInfo::labeled(Role::SpinButton, true, "Emission strength"));

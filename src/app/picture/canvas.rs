@@ -25,6 +25,34 @@ pub struct Drawn {
     pub range: f32,
 }
 
+/// The objects that the pixels of a view show, for a picture of the same view in another size; made once for each view.
+#[derive(Debug, Default)]
+pub struct Resized(Option<(Arc<Vec<u32>>, [u32; 2], Arc<Vec<u32>>)>);
+
+impl Resized {
+    fn of(
+        &mut self,
+        objects: &Arc<Vec<u32>>,
+        from: [u32; 2],
+        to: [u32; 2],
+    ) -> Option<Arc<Vec<u32>>> {
+        if objects.len() as u64 != u64::from(from[0]) * u64::from(from[1]) {
+            return None;
+        }
+        let known = self.0.as_ref();
+        if let Some((_, _, made)) = known.filter(|k| Arc::ptr_eq(&k.0, objects) && k.1 == to) {
+            return Some(made.clone());
+        }
+        let at = |i: u32, axis: usize| {
+            (u64::from(i) * u64::from(from[axis]) / u64::from(to[axis].max(1))) as usize
+        };
+        let row = |y: u32| (0..to[0]).map(move |x| objects[at(y, 1) * from[0] as usize + at(x, 0)]);
+        let made = Arc::new((0..to[1]).flat_map(row).collect::<Vec<u32>>());
+        self.0 = Some((objects.clone(), to, made.clone()));
+        Some(made)
+    }
+}
+
 impl App {
     /// The pictures of the shown view, once the worker has sent them.
     pub fn view(&self) -> Option<&Arc<View>> {
@@ -69,9 +97,15 @@ impl App {
             }
             _ => 1.0,
         };
-        let objects = view
-            .and_then(|view| view.objects.clone())
-            .filter(|objects| objects.len() == picture.pixels.len());
+        let objects = view.and_then(|view| {
+            let (objects, seen) = (view.objects.as_ref()?, view.albedo.as_ref()?);
+            let from = [seen.width, seen.height];
+            let to = [picture.width, picture.height];
+            match from == to {
+                true => Some(objects.clone()),
+                false => self.resized.borrow_mut().of(objects, from, to),
+            }
+        });
         Some(Drawn {
             quantity,
             picture,
@@ -336,5 +370,21 @@ fn anchors(ui: &Ui, app: &App, rect: Rect, placement: Rect) {
             boxed,
             |point| on_screen(camera, placement, point),
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn objects_are_told_in_a_picture_of_another_size() {
+        let objects = Arc::new(vec![0, 1, 2, 3]);
+        let mut resized = Resized::default();
+        let large = resized.of(&objects, [2, 2], [4, 2]).expect("made");
+        assert_eq!(*large, [0, 0, 1, 1, 2, 2, 3, 3]);
+        let again = resized.of(&objects, [2, 2], [4, 2]).expect("made");
+        assert!(Arc::ptr_eq(&large, &again));
+        assert!(resized.of(&objects, [3, 2], [4, 2]).is_none());
     }
 }
