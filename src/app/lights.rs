@@ -182,7 +182,7 @@ mod tests {
             ..ObjectEdit::default()
         };
         let gain = Gain::of(&edit, found);
-        assert_eq!(gain.on, false);
+        assert!(!gain.on);
         assert_eq!((gain.strength, gain.color), (0.5, Vec3::new(1.0, 0.5, 1.0)));
         assert_eq!(found * gain.factor(), Vec3::new(2.0, 0.5, 0.0));
         let none = Gain::of(&ObjectEdit::default(), found);

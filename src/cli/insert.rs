@@ -166,6 +166,7 @@ impl Args for Objects {
                     "DEG",
                     "Turn about the up axis, counter-clockwise from above [default: 0]",
                 )
+                .allow_hyphen_values(true)
                 .value_parser(degrees),
             )
             .arg(

@@ -171,7 +171,7 @@ fn beside_a_lamp(albedo: f32, chosen: Preset) -> [usize; 2] {
             continue;
         }
         known[0] += usize::from(o.albedo_identifiable);
-        let told = o.albedo_stderr.max_element() < 0.02;
+        let told = o.albedo_stderr.max_element() < 0.03;
         assert!(told || !o.albedo_identifiable, "{o:?}");
         let error = (o.albedo - albedo).abs();
         let allowed = (o.albedo_stderr * 4.5).max(Vec3::splat(1e-3));
