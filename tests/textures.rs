@@ -174,8 +174,12 @@ fn rounds_go_on_after_textures_and_take_them_along() {
     let estimate = &solution.estimate;
     let texels = estimate.texels.as_ref().expect("the poster was found");
     assert_eq!(texels.textured.iter().filter(|t| **t).count(), 1);
-    let lamp = estimate.objects[LAMP].emission / Vec3::new(12.0, 11.0, 10.0);
-    assert!((lamp - Vec3::ONE).abs().max_element() < 0.02, "{lamp}");
+    // Albedos of walls that no photograph sees are open, and with them the lamp's brightness.
+    let (lamp, truth) = (&estimate.objects[LAMP], Vec3::new(12.0, 11.0, 10.0));
+    let off = (lamp.emission - truth).abs();
+    println!("{} ± {}", lamp.emission, lamp.emission_stderr);
+    assert!(off.cmple(lamp.emission_stderr * 3.0).all(), "{lamp:?}");
+    assert!((off / truth).max_element() < 0.1, "{lamp:?}");
     let back = &estimate.objects[BACK].albedo;
     let truth = REFINED
         .means

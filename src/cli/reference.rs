@@ -11,8 +11,8 @@ const INTRODUCTION: &str = "\
 
 <!-- Made from the program by `RELIT_WRITE_DOCS=1 cargo test --test docs`; changes by hand are lost. -->
 
-Nearly all that [the window](window.md) does can be done by commands too. Joining and cutting objects and the light mixer are the
-window's alone; importing scans is the command line's alone.
+Nearly all that [the window](window.md) does can be done by commands too. Joining and cutting objects are the window's
+alone; the choices of an import are the command line's alone.
 
 * `relit COMMAND --help` prints what stands below.
 * What was found and written goes to standard output. Progress, warnings and errors go to standard error.

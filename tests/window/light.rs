@@ -109,7 +109,9 @@ fn a_lamp_is_selected_compared_and_its_light_saved() {
     recorder.sent();
     press(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::S);
     press(&mut harness, Modifiers::NONE, Key::Enter);
-    let sent = recorder.sent();
+    let mut sent = recorder.sent();
+    // Pictures are asked for meanwhile.
+    sent.retain(|command| !matches!(command, Command::View(_)));
     let file = PathBuf::from("small-room-lights.exr");
     assert!(
         matches!(&sent[..], [Command::SaveLayers(path)] if *path == file),

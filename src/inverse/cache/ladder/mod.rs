@@ -245,7 +245,7 @@ impl Ladder<'_, '_> {
     /// Records what was found out about exposures.
     fn tell_exposures(&mut self, exposures: &Exposures, started: f64) {
         let (least, most) = exposures.range();
-        let share = exposures.gain * 100.0;
+        let share = exposures.gain.max(0.0) * 100.0;
         let mut why = if exposures.differ {
             format!(
                 "exposure and white balance of each photograph, {least:.2} to {most:.2} times their median, explain {share:.0} % of \
@@ -353,7 +353,8 @@ impl Ladder<'_, '_> {
         let objects = &self.problem.scene.objects;
         match self.survey.seen.get(k) {
             None => false,
-            Some(0) if self.stages == 0 => false,
+            // What a lamp out of sight reflects cannot be told from its own light.
+            Some(0) if self.stages == 0 || self.roles[k] == Role::Unseen => false,
             Some(0) => objects[k].area > UNSEEN_AREA * objects.iter().map(|o| o.area).sum::<f64>(),
             Some(_) => true,
         }
