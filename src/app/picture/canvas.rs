@@ -27,15 +27,13 @@ pub struct Drawn {
 
 /// The objects that the pixels of a view show, for a picture of the same view in another size; made once for each view.
 #[derive(Debug, Default)]
-pub struct Resized(Option<(Arc<Vec<u32>>, [u32; 2], Arc<Vec<u32>>)>);
+pub struct Resized(Option<(Indices, [u32; 2], Indices)>);
+
+/// An object's index for each pixel of a picture.
+type Indices = Arc<Vec<u32>>;
 
 impl Resized {
-    fn of(
-        &mut self,
-        objects: &Arc<Vec<u32>>,
-        from: [u32; 2],
-        to: [u32; 2],
-    ) -> Option<Arc<Vec<u32>>> {
+    fn of(&mut self, objects: &Indices, from: [u32; 2], to: [u32; 2]) -> Option<Indices> {
         if objects.len() as u64 != u64::from(from[0]) * u64::from(from[1]) {
             return None;
         }
