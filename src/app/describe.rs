@@ -2,6 +2,7 @@
 
 use crate::math::color::linear_to_srgb;
 use crate::scene::Object;
+use egui::ecolor::Hsva;
 use glam::Vec3;
 
 /// The name of an object; that of a segment says how large it is, of the scene's area, and of which colour.
@@ -23,32 +24,22 @@ pub fn described(object: &Object, area: f64, albedo: Option<Vec3>) -> String {
 
 /// The word of a linear colour.
 fn color_word(albedo: Vec3) -> &'static str {
-    let [r, g, b] = albedo
-        .clamp(Vec3::ZERO, Vec3::ONE)
-        .to_array()
-        .map(linear_to_srgb);
-    let (high, low) = (r.max(g).max(b), r.min(g).min(b));
-    if high < 0.2 {
+    let srgb = albedo.clamp(Vec3::ZERO, Vec3::ONE).to_array();
+    let Hsva { h, s, v, .. } = Hsva::from_rgb(srgb.map(linear_to_srgb));
+    if v < 0.2 {
         return "black";
     }
-    let spread = high - low;
-    let saturation = spread / high;
-    if saturation < 0.2 {
-        return match high {
+    if s < 0.2 {
+        return match v {
             v if v < 0.45 => "dark grey",
             v if v < 0.75 => "grey",
             v if v < 0.9 => "light grey",
             _ => "white",
         };
     }
-    let sixth = match high {
-        v if v == r => (g - b) / spread,
-        v if v == g => 2.0 + (b - r) / spread,
-        _ => 4.0 + (r - g) / spread,
-    };
-    match (sixth * 60.0).rem_euclid(360.0) {
-        20.0..70.0 if high < 0.6 => "brown",
-        20.0..70.0 if saturation < 0.45 => "beige",
+    match h * 360.0 {
+        20.0..70.0 if v < 0.6 => "brown",
+        20.0..70.0 if s < 0.45 => "beige",
         20.0..45.0 => "orange",
         45.0..70.0 => "yellow",
         70.0..165.0 => "green",
@@ -56,7 +47,7 @@ fn color_word(albedo: Vec3) -> &'static str {
         195.0..255.0 => "blue",
         255.0..290.0 => "purple",
         290.0..340.0 => "pink",
-        _ if saturation < 0.5 => "brown",
+        _ if s < 0.5 => "brown",
         _ => "red",
     }
 }

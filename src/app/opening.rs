@@ -2,19 +2,16 @@
 
 use crate::app::insertion::is_object;
 use crate::app::layout::Pane;
-use crate::app::shell::files::file_name;
 use crate::app::state::App;
 use crate::app::task::{Course, Task};
 use crate::capture::import::{self, ImportOptions};
+use crate::capture::read::CAMERAS;
 use crate::error::{Error, Result};
 use crate::export;
 use crate::session::command::{Command, Source};
 use crate::session::save::{CHECKPOINT, ESTIMATE};
 use crate::session::snapshot::Level;
 use std::path::{Path, PathBuf};
-
-/// What makes a folder a capture.
-const CAPTURE: &str = "transforms.json";
 
 /// A scan being imported; it ends with what was found and guessed.
 pub struct Importing {
@@ -37,10 +34,10 @@ impl App {
         if is_object(path) && self.capture().is_some() {
             self.insert(path.to_owned());
             self.bring_forward = Some(Pane::Insert);
-        } else if path.file_name().is_some_and(|name| name == CAPTURE) {
+        } else if path.file_name().is_some_and(|name| name == CAMERAS) {
             let folder = path.parent().unwrap_or(Path::new("."));
             self.open(Source::Folder(folder.to_owned()));
-        } else if holds(CAPTURE) {
+        } else if holds(CAMERAS) {
             self.open(Source::Folder(path.to_owned()));
         } else if holds(ESTIMATE) || holds(CHECKPOINT) {
             self.start_page = false;
@@ -70,11 +67,9 @@ impl App {
 
     /// Begins to import a scan beside the results; one that was imported before is opened.
     fn import(&mut self, source: &Path, ctx: &egui::Context) {
-        let name = std::path::absolute(source).ok();
-        let name = name.as_deref().and_then(Path::file_name);
-        let name = file_name(&name.unwrap_or_default().to_string_lossy());
-        let out = Path::new("relit-out").join(name).join("capture");
-        if out.join(CAPTURE).exists() {
+        let results = Source::Folder(source.to_owned()).default_out();
+        let out = results.join("capture");
+        if out.join(CAMERAS).exists() {
             let said = format!("the scan was imported into {} before", out.display());
             self.notices.say(Level::Info, said);
             self.open(Source::Folder(out));

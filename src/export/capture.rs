@@ -3,6 +3,7 @@
 use crate::capture::Capture;
 use crate::capture::camera::{Intrinsics, Pose};
 use crate::capture::mesh::Mesh;
+use crate::capture::read::CAMERAS;
 use crate::error::Result;
 use crate::export::atomic::{WriteError, write_atomically, write_bytes};
 use crate::export::exr::{Precision, write_rgb};
@@ -59,7 +60,7 @@ pub fn write_transforms(
     };
     let entries: Vec<Entry> = cameras.enumerate().map(entry).collect();
     let text = format!("{:#}\n", transforms(&entries, "mesh.obj", Some(up)));
-    write_bytes(&folder.join("transforms.json"), text.as_bytes())
+    write_bytes(&folder.join(CAMERAS), text.as_bytes())
 }
 
 /// Writes truth.json (as [`crate::capture::truth::Truth`] reads it) and truth/albedo_NNN.exr, one picture a frame.

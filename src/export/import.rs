@@ -3,7 +3,7 @@
 use crate::capture::import::{DepthImage, Import, ImportedFrame, Lens};
 use crate::capture::orientation::Orientation;
 use crate::capture::photograph::Photograph;
-use crate::capture::read::image;
+use crate::capture::read::{CAMERAS, image};
 use crate::error::{Error, Result};
 use crate::export::atomic::write_bytes;
 use crate::export::capture::{Entry, transforms};
@@ -34,7 +34,7 @@ pub fn write(folder: &Path, import: &Import) -> Result<()> {
     )?;
     let file = transforms(&entries?, "mesh.ply", import.up);
     write_bytes(
-        &staging.path().join("transforms.json"),
+        &staging.path().join(CAMERAS),
         format!("{file:#}\n").as_bytes(),
     )?;
     staging.take_its_place()

@@ -1,5 +1,6 @@
 //! Folders that appear whole or not at all.
 
+use crate::capture::read::CAMERAS;
 use crate::error::{Error, Result};
 use crate::export::atomic::temporary_names;
 use crate::export::overwrite;
@@ -7,9 +8,6 @@ use std::fs;
 use std::io::ErrorKind::NotFound;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
-
-/// The file that comes last: a folder that has it is complete.
-const LAST: &str = "transforms.json";
 
 /// A folder beside the one wanted, which takes its place when it is complete and vanishes otherwise.
 #[derive(Debug)]
@@ -32,7 +30,7 @@ impl NewFolder {
         if !is_empty && !overwrite::is_permitted() {
             return Err(Error::file(
                 place,
-                match place.join(LAST).exists() {
+                match place.join(CAMERAS).exists() {
                     true => "holds a capture",
                     false => "is not empty",
                 },
@@ -84,7 +82,8 @@ fn merge(from: &Path, to: &Path) -> Result<()> {
     for entry in fs::read_dir(from).map_err(io(from))? {
         names.push(entry.map_err(io(from))?.file_name());
     }
-    names.sort_by_key(|name| (name == LAST, name.clone()));
+    // A folder that has them is complete.
+    names.sort_by_key(|name| (name == CAMERAS, name.clone()));
     for name in names {
         let (source, target) = (from.join(&name), to.join(&name));
         if source.is_dir() {

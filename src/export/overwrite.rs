@@ -14,6 +14,7 @@
 //! [`permit`] lifts all of it, where a person says `--overwrite`.
 
 use crate::capture::inputs;
+use crate::capture::read::{CAMERAS, MESHES};
 use crate::error::{Error, Result};
 use serde::Deserialize;
 use serde_json::Value;
@@ -32,10 +33,6 @@ pub const CHECKPOINT: &str = "checkpoint.json";
 pub const VIEWS: &str = "views";
 /// What else is written beside an estimate, besides its maps.
 const BESIDE: [&str; 5] = [REPORT, "loss.csv", "loss.png", "scene.glb", VIEWS];
-/// What a capture's cameras are called.
-const CAMERAS: &str = "transforms.json";
-/// The meshes that its reader looks for where the cameras name none.
-const MESHES: [&str; 3] = ["mesh.glb", "mesh.ply", "mesh.obj"];
 
 static PERMITTED: AtomicBool = AtomicBool::new(false);
 

@@ -167,11 +167,11 @@ impl Keeper {
             Some(folder) => write(&folder, results, &held, seen),
             None => Ok(()),
         });
-        match written {
-            Ok(()) => self.prune(),
-            Err(_) => self.base = None,
+        if written.is_err() {
+            self.base = None;
         }
         self.list();
+        self.prune();
         written
     }
 
@@ -230,13 +230,14 @@ impl Keeper {
 
     /// Removes the oldest of those that never ended and were not changed by hand.
     fn prune(&mut self) {
-        self.list();
         let unfinished = self.kept.iter().filter(|kept| !kept.precious);
+        let mut removed = false;
         for kept in unfinished.skip(MAX_UNFINISHED) {
-            if lock(&kept.folder).is_some() {
-                // What cannot be removed now is tried again at the next save.
-                let _ = fs::remove_dir_all(&kept.folder);
-            }
+            // What cannot be removed now is tried again at the next save.
+            removed |= lock(&kept.folder).is_some() && fs::remove_dir_all(&kept.folder).is_ok();
+        }
+        if removed {
+            self.list();
         }
     }
 }
@@ -342,7 +343,6 @@ mod tests {
         let mut keeper = Keeper::new(Some(base.path().to_owned()));
         assert_eq!(keeper.kept().len(), MAX_UNFINISHED + 4);
         keeper.prune();
-        keeper.list();
         assert_eq!(keeper.kept().len(), MAX_UNFINISHED + 1);
         assert!(finished.exists());
         assert!(

@@ -93,6 +93,20 @@ fn what_comes_after_some_bounces_is_the_rest_of_the_series() {
     }
 }
 
+/// What a solve says of a face.
+fn print(chosen: Preset, albedo: f32, face: usize, o: &ObjectEstimate) {
+    println!(
+        "{chosen:?} albedo {albedo} face {face}: {} ± {}, emission {} ± {}, identifiable {} {}: {}",
+        o.albedo.x,
+        o.albedo_stderr.x,
+        o.emission.x,
+        o.emission_stderr.x,
+        o.identifiable,
+        o.albedo_identifiable,
+        o.note
+    );
+}
+
 /// Where walls both emit and reflect alike, photographs show one colour, which any pair of emission and albedo
 /// explains: the solver must say so, or be right within 4.5 of its standard errors.
 #[test]
@@ -118,16 +132,7 @@ fn a_furnace_seen_in_photographs_is_recovered_or_said_to_be_unknown() {
             for (k, o) in estimate.objects.iter().enumerate() {
                 let error = (o.albedo - albedo).abs();
                 let honest = error.cmple(o.albedo_stderr * 4.5).all();
-                println!(
-                    "{chosen:?} albedo {albedo} face {k}: {} ± {}, emission {} ± {}, identifiable {} {}: {}",
-                    o.albedo.x,
-                    o.albedo_stderr.x,
-                    o.emission.x,
-                    o.emission_stderr.x,
-                    o.identifiable,
-                    o.albedo_identifiable,
-                    o.note
-                );
+                print(chosen, albedo, k, o);
                 assert!(
                     !o.albedo_identifiable || honest,
                     "{chosen:?}, albedo {albedo}, face {k}: {o:?}"
@@ -151,16 +156,7 @@ fn beside_a_lamp(albedo: f32, chosen: Preset) -> [usize; 2] {
     let solution = run(&problem, &preset(chosen));
     let mut known = [0; 2];
     for (k, o) in solution.estimate.objects.iter().enumerate() {
-        println!(
-            "{chosen:?} albedo {albedo} face {k}: {} ± {}, emission {} ± {}, identifiable {} {}: {}",
-            o.albedo.x,
-            o.albedo_stderr.x,
-            o.emission.x,
-            o.emission_stderr.x,
-            o.identifiable,
-            o.albedo_identifiable,
-            o.note
-        );
+        print(chosen, albedo, k, o);
         if k == 3 {
             known[1] += usize::from(o.identifiable);
             let found = (o.emission - 2.0).abs().max_element() < 0.02;

@@ -5,7 +5,7 @@
 
 use crate::calibrate::alignment::edges::{Edges, edges};
 use crate::calibrate::alignment::score::levels;
-use crate::calibrate::alignment::{AGREES, LONG_SIDE, MAX_FRAMES, PLAINLY, Views};
+use crate::calibrate::alignment::{AGREES, LONG_SIDE, MAX_FRAMES, Views, plainly_better};
 use crate::capture::orientation::Orientation;
 use crate::math::stats::quantile;
 
@@ -47,8 +47,7 @@ pub(super) fn astray(views: &Views, scores: &[f64]) -> Vec<Astray> {
         .collect();
     let why = |i: usize| {
         let others = || (0..frames.len()).filter(|&k| k != i);
-        let plainly_above =
-            |score: f64| score >= AGREES && (score - scores[i]) / f64::sqrt(2.0) >= PLAINLY;
+        let plainly_above = |score: f64| plainly_better(&[score], &[scores[i]]);
         let shown = others()
             .map(|k| (k, score_at(views, frames[i], frames[k], &seen[k])))
             .max_by(|a, b| a.1.total_cmp(&b.1))

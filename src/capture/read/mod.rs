@@ -37,6 +37,10 @@ use confine::Confine;
 use glam::DVec3;
 use std::path::Path;
 
+/// The file that makes a folder a capture: its cameras and the names of all else.
+pub const CAMERAS: &str = "transforms.json";
+/// The mesh, where `mesh_path` does not name one, in this order.
+pub const MESHES: [&str; 3] = ["mesh.glb", "mesh.ply", "mesh.obj"];
 /// A mesh whose only object has more triangles than this is taken for a scan without objects.
 const MAX_TRIANGLES_OF_ONE_OBJECT: usize = 5000;
 

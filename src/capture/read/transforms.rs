@@ -5,7 +5,7 @@ use crate::capture::orientation::Orientation;
 use crate::capture::photograph::PhotographSource;
 use crate::capture::read::confine::Confine;
 use crate::capture::read::fields::{Fields, without_mark};
-use crate::capture::read::{exposure, image, lens, pose};
+use crate::capture::read::{CAMERAS, MESHES, exposure, image, lens, pose};
 use crate::error::{Error, Result};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -15,8 +15,6 @@ use std::path::PathBuf;
 
 /// Longest transforms.json that is read.
 const MAX_BYTES: u64 = 1 << 28;
-/// The mesh, where `mesh_path` does not name one, in this order.
-const MESH_NAMES: [&str; 3] = ["mesh.glb", "mesh.ply", "mesh.obj"];
 /// Metres per unit of a depth image where the file does not say (16-bit millimetres).
 const DEPTH_UNIT: f64 = 0.001;
 
@@ -41,9 +39,9 @@ pub fn read(
     orientation: Orientation,
     warnings: &mut Vec<String>,
 ) -> Result<Transforms> {
-    let path = confine.folder().join("transforms.json");
+    let path = confine.folder().join(CAMERAS);
     let place = path.display().to_string();
-    let file = confine.file(&place, "transforms.json")?;
+    let file = confine.file(&place, CAMERAS)?;
     let length = file.metadata().map_err(|e| Error::io(&file, &e))?.len();
     if length > MAX_BYTES {
         return Err(Error::file(
@@ -229,7 +227,7 @@ fn find_mesh(confine: &Confine, shared: &Fields) -> Result<PathBuf> {
     if let Some(name) = shared.text("mesh_path")? {
         return confine.file(&place, name);
     }
-    match MESH_NAMES.iter().find(|name| confine.holds(name)) {
+    match MESHES.iter().find(|name| confine.holds(name)) {
         Some(name) => confine.file(&place, name),
         None => Err(Error::new(
             place,

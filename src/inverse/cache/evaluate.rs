@@ -77,6 +77,11 @@ impl PathCache {
             .collect()
     }
 
+    /// Every cluster's residuals for some unknowns, without derivatives.
+    pub fn residuals(&self, unknowns: &Unknowns) -> Vec<Linearised> {
+        self.linearise(unknowns, &vec![usize::MAX; 2 * unknowns.surfaces()], &[])
+    }
+
     /// By how much textures change the radiance of each cluster: the mean of the difference path by path.
     pub fn texture_offsets(&self, unknowns: &Unknowns, texels: &[Vec3]) -> Vec<DVec3> {
         let clusters = self.clusters.par_iter();

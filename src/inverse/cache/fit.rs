@@ -270,7 +270,10 @@ mod tests {
             clusters,
             ..PathCache::default()
         };
-        let (even, free) = (Trust::even(roles.len()), roles::free(roles, |_| true));
+        let (even, free) = (
+            Trust::even(roles.len()),
+            roles::free(roles, |k| roles[k] != Role::Emitter),
+        );
         let prior = Prior::new(roles.len(), roles.len(), Vec3::ONE);
         let between = |_: &Unknowns| Ok::<_, ()>(());
         fit(&cache, start, &free, &even, &prior, 30, between).expect("nothing ends it")

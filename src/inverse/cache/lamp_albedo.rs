@@ -8,14 +8,9 @@
 
 use super::evaluate::Linearised;
 use super::prior::Prior;
-use super::roles::{Role, free_with};
+use super::roles::Role;
 use crate::inverse::parameters::Unknowns;
 use glam::{DVec3, Vec3};
-
-/// The parameters that are fitted under some roles, the albedos of lamps among them: indices into albedos, then emissions.
-pub fn free(roles: &[Role], has_albedo: impl Fn(usize) -> bool) -> Vec<usize> {
-    free_with(roles, has_albedo)
-}
 
 /// The same beliefs with nothing expected of the albedos of lamps.
 pub fn beliefs(prior: &Prior, roles: &[Role]) -> Prior {
@@ -137,12 +132,12 @@ mod tests {
                 clusters.collect(),
                 &about,
                 &about,
-                &roles::free(&roles, |_| true),
+                &roles::free(&roles, |k| roles[k] != Role::Emitter),
                 &prior,
             )
             .unknowns
         };
-        let free = free(&roles, |_| true);
+        let free = roles::free(&roles, |_| true);
         let mut clusters = room(albedo, seen);
         hold_exitance(&mut clusters, &roles, &roles::places(&free, 3));
         let mut found = descend(clusters, &about, &about, &free, &beliefs(&prior, &roles)).unknowns;

@@ -51,7 +51,7 @@ impl ExpectedAlbedo {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
     surfaces: usize,
-    albedo: Option<ExpectedAlbedo>,
+    albedo: ExpectedAlbedo,
     /// First of the surfaces that stand for directions outside.
     outside: usize,
     /// Mean and standard deviation of each of those.
@@ -68,7 +68,7 @@ impl Prior {
     pub fn new(surfaces: usize, outside: usize, photographed: Vec3) -> Self {
         Self {
             surfaces,
-            albedo: None,
+            albedo: ExpectedAlbedo::unknown(surfaces, &[]),
             outside,
             directions: vec![(Vec3::ZERO, photographed * OUTSIDE_DEVIATION); surfaces - outside],
             deviation: photographed * OUTSIDE_DEVIATION,
@@ -89,22 +89,20 @@ impl Prior {
     }
 
     /// The same with what to expect of each surface's albedo.
-    pub fn with_albedo(mut self, albedo: Option<ExpectedAlbedo>) -> Self {
+    pub fn with_albedo(mut self, albedo: ExpectedAlbedo) -> Self {
         self.albedo = albedo;
         self
     }
 
     /// Forgets what was expected of a surface's albedo.
     pub fn forget_albedo(&mut self, surface: usize) {
-        if let Some(expected) = &mut self.albedo {
-            expected.mean[surface] = Vec3::splat(ALBEDO_MEAN);
-            expected.deviation[surface] = Vec3::splat(ALBEDO_DEVIATION);
-        }
+        self.albedo.mean[surface] = Vec3::splat(ALBEDO_MEAN);
+        self.albedo.deviation[surface] = Vec3::splat(ALBEDO_DEVIATION);
     }
 
-    /// What is expected of the albedos, if anything was found.
-    pub fn albedo(&self) -> Option<&ExpectedAlbedo> {
-        self.albedo.as_ref()
+    /// What is expected of the albedos.
+    pub fn albedo(&self) -> &ExpectedAlbedo {
+        &self.albedo
     }
 
     /// The same with what to expect of each of those surfaces, from what was seen outside.
@@ -163,10 +161,10 @@ impl Prior {
             return (value.as_dvec3(), precision);
         }
         let (mean, deviation) = match parameter.checked_sub(self.surfaces) {
-            None => match &self.albedo {
-                Some(expected) => (expected.mean[parameter], expected.deviation[parameter]),
-                None => (Vec3::splat(ALBEDO_MEAN), Vec3::splat(ALBEDO_DEVIATION)),
-            },
+            None => (
+                self.albedo.mean[parameter],
+                self.albedo.deviation[parameter],
+            ),
             Some(emitter) if emitter >= self.outside => self.directions[emitter - self.outside],
             Some(_) => return (DVec3::ZERO, DVec3::ZERO),
         };
@@ -200,7 +198,7 @@ mod tests {
             mean: vec![Vec3::new(0.2, 0.3, 0.4)],
             deviation: vec![Vec3::new(0.1, 0.01, 0.5)],
         };
-        let prior = Prior::new(1, 1, Vec3::ONE).with_albedo(Some(expected));
+        let prior = Prior::new(1, 1, Vec3::ONE).with_albedo(expected);
         let (mean, precision) = prior.of(0, DVec3::ONE);
         assert!((mean - DVec3::new(0.2, 0.3, 0.4)).length() < 1e-6, "{mean}");
         let wanted = DVec3::new(100.0, 1e4, 4.0);
@@ -208,7 +206,7 @@ mod tests {
             (precision / wanted - DVec3::ONE).length() < 1e-5,
             "{precision}"
         );
-        let nothing = prior.with_albedo(None).of(0, DVec3::ONE);
+        let nothing = Prior::new(1, 1, Vec3::ONE).of(0, DVec3::ONE);
         assert_eq!(nothing, (DVec3::splat(0.5), DVec3::splat(4.0)));
     }
 

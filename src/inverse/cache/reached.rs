@@ -52,7 +52,7 @@ impl Reached {
         Self {
             stages,
             open,
-            expected: prior.albedo().cloned(),
+            expected: Some(prior.albedo().clone()),
             directions: prior.directions().to_vec(),
             roles: roles.to_vec(),
             unknowns: unknowns.clone(),

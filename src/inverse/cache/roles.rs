@@ -38,14 +38,9 @@ pub fn places(free: &[usize], surfaces: usize) -> Vec<usize> {
     places
 }
 
-/// The parameters that are fitted under some roles: indices into albedos, then emissions. An emitter's albedo is held, as are
-/// those of which `has_albedo` says no.
+/// The parameters that are fitted under some roles: indices into albedos, of the surfaces of which `has_albedo` says so, then into
+/// emissions.
 pub fn free(roles: &[Role], has_albedo: impl Fn(usize) -> bool) -> Vec<usize> {
-    free_with(roles, |k| roles[k] != Role::Emitter && has_albedo(k))
-}
-
-/// The same with the albedos of emitters, wherever `has_albedo` says so.
-pub fn free_with(roles: &[Role], has_albedo: impl Fn(usize) -> bool) -> Vec<usize> {
     let albedo = (0..roles.len()).filter(|&k| has_albedo(k));
     let emission = (0..roles.len())
         .filter(|&k| roles[k].emits())

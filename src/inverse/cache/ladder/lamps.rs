@@ -158,29 +158,39 @@ impl Ladder<'_, '_> {
 
     /// Emitters as they are known now, drawn by area × luminance.
     pub(super) fn lights(&self) -> Emitters {
-        let scene = &self.problem.scene;
-        let weights: Vec<f64> = (scene.objects.iter().zip(&self.unknowns.emission))
-            .map(|(object, emission)| object.area * f64::from(luminance(*emission)))
-            .collect();
-        Emitters::new(scene, &weights)
+        Emitters::new(&self.problem.scene, &self.light_weights())
+    }
+
+    /// Area × luminance of each object, as it is known now.
+    pub(super) fn light_weights(&self) -> Vec<f64> {
+        (self
+            .problem
+            .scene
+            .objects
+            .iter()
+            .zip(&self.unknowns.emission))
+        .map(|(object, emission)| object.area * f64::from(luminance(*emission)))
+        .collect()
     }
 
     /// Weights with a share spread over all objects that have an area.
-    pub(super) fn explore(&self, weights: &[f64]) -> Vec<f64> {
+    pub(super) fn explore(&self, weights: Vec<f64>) -> Vec<f64> {
         let objects = &self.problem.scene.objects;
+        let extended: Vec<usize> = (0..objects.len())
+            .filter(|&k| objects[k].area > 0.0)
+            .collect();
+        self.spread(weights, &extended, EXPLORATION)
+    }
+
+    /// Weights with this part of their sum added to some objects that have an area: half by area, half by number.
+    pub(super) fn spread(&self, mut weights: Vec<f64>, over: &[usize], part: f64) -> Vec<f64> {
+        let area = |k: usize| self.problem.scene.objects[k].area;
         let total: f64 = weights.iter().sum();
-        let area: f64 = objects.iter().map(|o| o.area).sum();
-        let extended = objects.iter().filter(|o| o.area > 0.0).count();
-        let share = if total > 0.0 {
-            total * EXPLORATION
-        } else {
-            1.0
-        };
-        (weights.iter().zip(objects))
-            .map(|(weight, object)| match object.area > 0.0 {
-                true => weight + share * 0.5 * (object.area / area + 1.0 / extended as f64),
-                false => *weight,
-            })
-            .collect()
+        let added = if total > 0.0 { total * part } else { 1.0 };
+        let all: f64 = over.iter().map(|&k| area(k)).sum();
+        for &k in over {
+            weights[k] += added * 0.5 * (area(k) / all + 1.0 / over.len() as f64);
+        }
+        weights
     }
 }

@@ -43,7 +43,7 @@ impl Ladder<'_, '_> {
                 mean.map_or(0.0, |m| object.area * f64::from(luminance(m)).powi(2))
             })
             .collect();
-        let lights = Emitters::new(scene, &self.explore(&bright));
+        let lights = Emitters::new(scene, &self.explore(bright));
         let paths = self.budget.light_field_paths;
         let (cache, limit) = self.stored(&lights, Some(&measured), 0, paths)?;
 
@@ -82,7 +82,7 @@ impl Ladder<'_, '_> {
                 expected.mean[k] = self.unknowns.albedo[k];
             }
         }
-        self.prior = (self.prior.clone()).with_albedo(Some(expected));
+        self.prior = (self.prior.clone()).with_albedo(expected);
     }
 
     /// Fits all seen objects as reflectors, then those that plainly give light as emitters; light from outside is

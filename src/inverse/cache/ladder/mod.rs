@@ -2,6 +2,7 @@
 
 mod depth;
 mod detail;
+mod exposures;
 mod known;
 mod lamps;
 mod light_field;
@@ -35,7 +36,7 @@ use crate::inverse::solver::{Checkpoint, Problem, Solution, Stage, Termination};
 use crate::inverse::survey::Survey;
 use crate::transport::material::Lobe;
 use detail::Detail;
-use glam::{DVec2, Vec3};
+use glam::Vec3;
 use rounds::Summed;
 
 /// Gauss–Newton steps at most in one fit.
@@ -61,6 +62,8 @@ pub struct Ladder<'a, 'o> {
     survey: Survey,
     clusters: Vec<Cluster>,
     widths: Vec<u32>,
+    /// In square metres.
+    mesh_area: f64,
     losses: LossProbe,
     max_bounces: u32,
     outside: OutsideGrid,
@@ -139,7 +142,9 @@ pub fn solve(
     let problem = undone.as_ref().unwrap_or(problem);
     let max_bounces = settings.max_bounces().min(MOST_BOUNCES);
     let clusters = cluster(problem, &survey, budget.pixels);
-    let prior = Prior::new(surfaces, objects, mean_radiance(&clusters)).with_known(&monitor.known);
+    let prior = Prior::new(surfaces, objects, mean_radiance(&clusters))
+        .with_known(&monitor.known)
+        .with_albedo(ExpectedAlbedo::unknown(surfaces, &survey.seen));
     let start = match resume {
         Some(checkpoint) => {
             checkpoint.state(|reached: &Reached| reached.fits(surfaces, outside.surfaces()))?
@@ -162,9 +167,8 @@ pub fn solve(
     let sky = (start.open)
         .then(|| MeasuredOutside::new(problem, &survey))
         .flatten();
-    let expected =
-        (start.expected.clone()).unwrap_or_else(|| ExpectedAlbedo::unknown(surfaces, &survey.seen));
-    let prior = (prior.with_albedo(Some(expected))).with_directions(start.directions.clone());
+    let expected = (start.expected.clone()).unwrap_or_else(|| prior.albedo().clone());
+    let prior = (prior.with_albedo(expected)).with_directions(start.directions.clone());
     let mut ladder = Ladder {
         problem,
         budget,
@@ -177,6 +181,7 @@ pub fn solve(
         clusters,
         survey,
         widths: problem.photographs.iter().map(|p| p.width).collect(),
+        mesh_area: problem.scene.objects.iter().map(|o| o.area).sum(),
         max_bounces,
         outside,
         errors: start.errors(),
@@ -242,55 +247,6 @@ impl Ladder<'_, '_> {
             .report(&self.estimate, &|_| self.checkpoint.clone())
     }
 
-    /// Records what was found out about exposures.
-    fn tell_exposures(&mut self, exposures: &Exposures, started: f64) {
-        let (least, most) = exposures.range();
-        let share = exposures.gain.max(0.0) * 100.0;
-        let mut why = if exposures.differ {
-            format!(
-                "exposure and white balance of each photograph, {least:.2} to {most:.2} times their median, explain {share:.0} % of \
-                 how they disagree about surfaces that they share"
-            )
-        } else {
-            format!(
-                "exposures would explain {share:.0} % of how the photographs disagree: they agree"
-            )
-        };
-        if let Some((vignetting, camera)) =
-            exposures.vignetting.zip(self.problem.scene.cameras.first())
-        {
-            let corner = vignetting.factor(&camera.intrinsics, DVec2::ZERO);
-            why.push_str(&format!(
-                "; a lens that lets {:.0} % through in the corners explains {:.0} % of the rest",
-                corner.element_sum() / 3.0 * 100.0,
-                exposures.vignetting_gain * 100.0
-            ));
-        }
-        if let Some(response) = exposures.response {
-            let [half, full] =
-                [0.5, 1.0].map(|value| response.light(Vec3::splat(value), Vec3::ONE));
-            let of_half = half / full * 100.0;
-            why.push_str(&format!(
-                "; a response other than the files' own curve, by which half of the greatest value is {:.0} %, {:.0} % and {:.0} % of the \
-                 greatest light (red, green, blue), explains {:.0} % of what is left",
-                of_half.x,
-                of_half.y,
-                of_half.z,
-                exposures.response_gain * 100.0
-            ));
-        }
-        let stage = Stage {
-            name: "exposures".to_owned(),
-            seconds: self.monitor.seconds() - started,
-            iterations: 0,
-            train_loss: None,
-            held_out_loss: None,
-            kept: exposures.needed(),
-            why,
-        };
-        self.monitor.stage(stage);
-    }
-
     /// Takes what was seen of the outside for what to expect of the rest of it.
     fn expect_of_outside(&mut self) {
         if let Some(sky) = &self.sky {
@@ -309,25 +265,14 @@ impl Ladder<'_, '_> {
     fn objects(&mut self) -> Result<(), Termination> {
         let started = self.monitor.seconds();
         self.search_anew()?;
-        let mut stored = None;
-        for _ in 0..MAX_SEARCHES {
+        let (mut cache, mut limit) = self.fit_full_paths()?;
+        for _ in 1..MAX_SEARCHES {
             // Albedos that a lamp put right may show another.
-            if stored.is_some() && !self.search_unseen(false)? {
+            if !self.search_unseen(false)? {
                 break;
             }
-            self.monitor.phase("tracing paths to the lamps");
-            let lights = self.lights();
-            let (cache, limit) = self.stored(&lights, None, 1, self.budget.round_paths)?;
-            self.monitor.phase("fitting albedo and emission");
-            // Tests of roles weigh all alike: whatever the residuals of a wrong role say is no measure of trust.
-            self.trust = Trust::even(self.roles.len());
-            let fitted = self.fit(&cache)?;
-            self.settle_roles(&cache, fitted)?;
-            stored = Some((cache, limit));
+            (cache, limit) = self.fit_full_paths()?;
         }
-        let Some((cache, limit)) = stored else {
-            return Ok(());
-        };
         let added = self.test_glow(&cache)?;
         self.weigh(&cache)?;
         let why = match added.as_slice() {
@@ -341,21 +286,34 @@ impl Ladder<'_, '_> {
         Ok(())
     }
 
+    /// Paths to the lamps as they are known, stored, with all roles settled on them; and what is to be said of their number.
+    fn fit_full_paths(&mut self) -> Result<(PathCache, String), Termination> {
+        self.monitor.phase("tracing paths to the lamps");
+        let lights = self.lights();
+        let (cache, limit) = self.stored(&lights, None, 1, self.budget.round_paths)?;
+        self.monitor.phase("fitting albedo and emission");
+        // Tests of roles weigh all alike: whatever the residuals of a wrong role say is no measure of trust.
+        self.trust = Trust::even(self.roles.len());
+        let fitted = self.fit(&cache)?;
+        self.settle_roles(&cache, fitted)?;
+        Ok((cache, limit))
+    }
+
     /// The parameters that are fitted. What leaves a surface out of sight is one unknown to the light field, however much of it
     /// is reflected; paths that go all the way tell the albedo.
     fn free(&self) -> Vec<usize> {
-        roles::free(&self.roles, |k| self.has_free_albedo(k))
+        let has_albedo = |k| self.roles[k] != Role::Emitter && self.has_free_albedo(k);
+        roles::free(&self.roles, has_albedo)
     }
 
     /// Whether a surface's albedo is fitted, if it is no lamp: where photographs see it, or where so much of it is out of sight
     /// that what it reflects counts.
     fn has_free_albedo(&self, k: usize) -> bool {
-        let objects = &self.problem.scene.objects;
         match self.survey.seen.get(k) {
             None => false,
             // What a lamp out of sight reflects cannot be told from its own light.
             Some(0) if self.stages == 0 || self.roles[k] == Role::Unseen => false,
-            Some(0) => objects[k].area > UNSEEN_AREA * objects.iter().map(|o| o.area).sum::<f64>(),
+            Some(0) => self.problem.scene.objects[k].area > UNSEEN_AREA * self.mesh_area,
             Some(_) => true,
         }
     }
@@ -380,8 +338,7 @@ impl Ladder<'_, '_> {
 
     /// Weighs the clusters by the residuals that the last fit left, and fits again.
     fn weigh(&mut self, cache: &PathCache) -> Result<(), Termination> {
-        let residuals =
-            cache.linearise(&self.unknowns, &vec![usize::MAX; 2 * self.roles.len()], &[]);
+        let residuals = cache.residuals(&self.unknowns);
         self.tell_model_error(&residuals);
         self.trust = Trust::from_residuals(&residuals, self.roles.len());
         let fitted = self.fit(cache)?;

@@ -115,7 +115,8 @@ impl Ladder<'_, '_> {
             self.roles.len(),
             self.budget.round_paths,
         );
-        let free = lamp_albedo::free(&self.roles, |k| self.has_free_albedo(k));
+        // The albedos of lamps among them.
+        let free = roles::free(&self.roles, |k| self.has_free_albedo(k));
         Ok(Rounds {
             lights,
             places: roles::places(&free, self.roles.len()),
@@ -189,7 +190,7 @@ impl Ladder<'_, '_> {
 
     /// Fits all that is free, the lamps' own albedos among it, to clusters linearised about `about`, and takes what was found.
     pub(super) fn descend(&mut self, clusters: Vec<Linearised>, about: &Unknowns) -> Descended {
-        let free = lamp_albedo::free(&self.roles, |k| self.has_free_albedo(k));
+        let free = roles::free(&self.roles, |k| self.has_free_albedo(k));
         let prior = lamp_albedo::beliefs(&self.prior, &self.roles);
         let found = descend(clusters, about, &self.unknowns, &free, &prior);
         let equations = jackknifed(

@@ -15,7 +15,6 @@ use crate::inverse::cache::roles::Role;
 use crate::inverse::cache::trust::Trust;
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::solver::Termination;
-use crate::math::color::luminance;
 use crate::math::stats::Moments;
 use crate::transport::emitters::Emitters;
 use glam::Vec3;
@@ -76,8 +75,7 @@ impl Ladder<'_, '_> {
         Ok(())
     }
 
-    /// Looks for lamps out of sight; says whether one was found.
-    /// `anew` as long as nothing is known of them.
+    /// Looks for lamps out of sight, `anew` as long as nothing is known of them; says whether one was found.
     pub(super) fn search_unseen(&mut self, anew: bool) -> Result<bool, Termination> {
         let dark = |k: usize| self.roles[k] == Role::Dark && !self.emission_is_known(k);
         let mut candidates: Vec<usize> = (0..self.problem.scene.objects.len())
@@ -88,7 +86,9 @@ impl Ladder<'_, '_> {
         }
         self.monitor.phase("looking for lamps out of sight");
         let paths = self.budget.round_paths / PART;
-        let lights = self.lights_and(&candidates);
+        // As many light samples for candidates as for lamps: a bulb would else get none.
+        let weights = self.spread(self.light_weights(), &candidates, 1.0);
+        let lights = Emitters::new(&self.problem.scene, &weights);
         let (explored, _) = self.stored(&lights, None, 5, paths)?;
         self.trust = Trust::even(self.roles.len());
         let is_dark = self.unknowns.emission.iter().all(|&e| e == Vec3::ZERO);
@@ -183,8 +183,7 @@ impl Ladder<'_, '_> {
         let lights = self.lights();
         let (cache, _) = self.stored(&lights, None, 6, paths)?;
         let fitted = self.fit(&cache)?;
-        let held = vec![usize::MAX; 2 * self.roles.len()];
-        let left = cache.linearise(&fitted.unknowns, &held, &[]);
+        let left = cache.residuals(&fitted.unknowns);
         let size = |cluster: &Linearised| {
             let weight = cluster.weight_now();
             (weight.powf(0.5) * cluster.residual().abs()).element_sum()
@@ -194,22 +193,5 @@ impl Ladder<'_, '_> {
             cache,
             fitted,
         })
-    }
-
-    /// Emitters as they are known now, and as many light samples again for candidates, half by area, half by number, or a bulb
-    /// would get none.
-    fn lights_and(&self, candidates: &[usize]) -> Emitters {
-        let scene = &self.problem.scene;
-        let mut weights: Vec<f64> = (scene.objects.iter().zip(&self.unknowns.emission))
-            .map(|(object, emission)| object.area * f64::from(luminance(*emission)))
-            .collect();
-        let total: f64 = weights.iter().sum();
-        let share = if total > 0.0 { total } else { 1.0 };
-        let area: f64 = candidates.iter().map(|&k| scene.objects[k].area).sum();
-        for &k in candidates {
-            let own = scene.objects[k].area / area + 1.0 / candidates.len() as f64;
-            weights[k] += 0.5 * share * own;
-        }
-        Emitters::new(scene, &weights)
     }
 }
