@@ -13,6 +13,7 @@ use relit::inverse::survey::Survey;
 use relit::scene::Scene;
 use relit::transport::environment::Environment;
 use relit::transport::material::Material;
+use relit::transport::surroundings::Surroundings;
 use scenes::View;
 use std::sync::Arc;
 
@@ -102,7 +103,7 @@ fn a_room_lit_through_its_window_keeps_its_walls_dark() {
     let [width, height] = [outside.width, outside.height].map(|side| side as usize);
     let found = Environment::new(width, height, outside.pixels.clone());
     let upwards = Vec3::new(0.1, 0.3, 1.0).normalize();
-    let ratio = found.expect("a map").radiance(upwards) / sky().radiance(upwards);
+    let ratio = found.expect("a map").of_map(upwards) / sky().of_map(upwards);
     println!("the sky is found at {ratio} of its radiance");
     assert!((ratio - 1.0).abs().max_element() < 0.1, "{ratio}");
     // 0.0076 and 0.065 are seen.
@@ -139,7 +140,7 @@ fn a_saturated_sky_is_a_bound_only_where_nothing_measured_it() {
     };
     let [once, both, bounds] = [once, both, bounds].map(|problem| {
         let survey = Survey::new(&problem, &settings, usize::MAX);
-        MeasuredOutside::new(&problem, &survey).expect("the sky is seen")
+        MeasuredOutside::new(&problem, &survey, Surroundings::Far).expect("the sky is seen")
     });
     let upwards = Vec3::new(0.1, 0.3, 1.0).normalize();
     let [measured, of_both, bound] = [&once, &both, &bounds].map(|m| m.at(upwards));

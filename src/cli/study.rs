@@ -1,15 +1,19 @@
 //! `relit study`: the paper's experiments.
 
 use crate::cli::arguments::{ReadOptions, Replace};
-use crate::cli::numbers::{seeds, threads};
+use crate::cli::numbers::{from_one, seeds, threads};
 use crate::cli::solve::use_threads;
 use crate::cli::trade::time;
+use crate::error::Error;
 use crate::error::Result;
-use crate::inverse::settings::Settings;
+use crate::inverse::settings::{Preset, Settings};
+use crate::room::generated::Family;
 use crate::say;
 use crate::session::command::Source;
 use crate::session::open::open;
 use crate::study::experiments::{Bench, STUDIES, Study};
+use crate::study::families::{Plan, Verdict, composite, table};
+use crate::study::trade::rooms::SIZE;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use std::path::PathBuf;
@@ -42,6 +46,16 @@ pub struct StudyArguments {
     /// on its twin, a room with its mesh, its views and the colours and lamps found in it, whose truth is known
     #[arg(long, value_name = "CAPTURE")]
     capture: Option<PathBuf>,
+    /// `insertion` in N generated rooms of a family instead: a chair put into two photographs of each, compared with the chair truly
+    /// there
+    #[arg(long, value_name = "N", requires = "family", conflicts_with = "capture", value_parser = from_one::<u32>)]
+    rooms: Option<u32>,
+    /// The family of the generated rooms
+    #[arg(long, value_name = "NAME", requires = "rooms", value_parser = PossibleValuesParser::new(Family::NAMES))]
+    family: Option<String>,
+    /// The preset that generated rooms are solved with
+    #[arg(long, value_name = "PRESET", requires = "rooms", default_value = "balanced", value_parser = PossibleValuesParser::new(Preset::WORDS))]
+    preset: String,
     /// Threads to work with [default: one a core]
     #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<u16>,
@@ -65,6 +79,9 @@ fn names() -> PossibleValuesParser {
 pub fn study(arguments: &StudyArguments) -> Result<()> {
     arguments.replace.apply();
     use_threads(arguments.threads)?;
+    if let Some((rooms, family)) = arguments.rooms.zip(arguments.family.as_deref()) {
+        return insertions(arguments, rooms, family);
+    }
     let wanted: Vec<&Study> = STUDIES
         .iter()
         .filter(|study| arguments.name == ALL || study.name == arguments.name)
@@ -101,5 +118,42 @@ pub fn study(arguments: &StudyArguments) -> Result<()> {
             say::line(sentence);
         }
     }
+    Ok(())
+}
+
+/// `insertion` over generated rooms: writes insertion-FAMILY.csv and prints what holds over them.
+///
+/// # Errors
+/// A room cannot be drawn or solved, or the table cannot be written.
+fn insertions(arguments: &StudyArguments, rooms: u32, family: &str) -> Result<()> {
+    let known = Family::of_name(family).zip(Preset::ALL.iter().copied().find(|p| p.word() == arguments.preset));
+    let Some((family, preset)) = known.filter(|_| arguments.name == "insertion") else {
+        let problem = format!("`{}` is not run over generated rooms", arguments.name);
+        return Err(Error::usage("--rooms", problem, "name the study insertion"));
+    };
+    let seeds: Vec<u64> = (1..=u64::from(rooms)).collect();
+    let plan = Plan {
+        families: vec![family],
+        seeds: seeds.clone(),
+        size: SIZE,
+        preset,
+    };
+    let mut rows = Vec::new();
+    let file = arguments
+        .out
+        .join(format!("insertion-{}.csv", family.name()));
+    for seed in seeds {
+        say::aside(format_args!("{} room {seed} …", family.name()));
+        match composite(family, seed, &plan)? {
+            Some(row) => {
+                say::aside(row.words());
+                rows.push(row);
+                table(&rows).write(&file)?;
+            }
+            None => say::aside("  no free place on its floor that photographs see"),
+        }
+    }
+    say::line(Verdict::of(&rows).words());
+    say::line(file.display());
     Ok(())
 }

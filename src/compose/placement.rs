@@ -28,6 +28,17 @@ pub struct Placement {
 }
 
 impl Placement {
+    /// An object of a name where its own coordinates say.
+    pub fn as_modelled(file: &str) -> Self {
+        Self {
+            file: PathBuf::from(file),
+            at: None,
+            scale: 1.0,
+            rotate: 0.0,
+            hidden: false,
+        }
+    }
+
     /// The map from the file's coordinates to the capture's, whose unit up vector is `up`.
     ///
     /// With `at` the file's +y is first turned to `up` by the shortest way. As modelled, nothing is but what `scale`

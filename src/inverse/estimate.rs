@@ -8,6 +8,7 @@ use crate::scene::Scene;
 use crate::transport::environment::Environment;
 use crate::transport::lit::Lit;
 use crate::transport::material::{Albedo, Lobe, Material, TexelColors};
+use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -163,12 +164,14 @@ impl TexelEstimate {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outside {
     /// Equirectangular map of incoming radiance by direction of travel reversed; row 0 is straight up (world +y
-    /// before `up` is applied), columns run around.
+    /// before `up` is applied), columns run around. Around a box the directions are those from its middle.
     pub width: u32,
     /// Rows.
     pub height: u32,
     /// Radiance, row by row.
     pub pixels: Vec<Vec3>,
+    /// How far away the light comes from.
+    pub surroundings: Surroundings,
 }
 
 /// Size over RGB of an error of an albedo, relative to that albedo.
@@ -207,7 +210,8 @@ impl Estimate {
         );
         let outside = self.outside.as_ref().and_then(|outside| {
             let (width, height) = (outside.width as usize, outside.height as usize);
-            Environment::new(width, height, outside.pixels.clone())
+            let map = Environment::new(width, height, outside.pixels.clone())?;
+            Some(map.around(outside.surroundings))
         });
         Lit::new(scene.clone(), materials, outside.map(Arc::new))
     }

@@ -1,11 +1,12 @@
 //! Light from outside the mesh, as the photographs measured it: pixels that look past the mesh, by direction.
 //!
-//! What lies there is taken to be far away, so that it looks the same from everywhere in the room: a sky, or for scans
-//! with holes the nearest stand-in for what is missing.
+//! What lies there is far away, as a sky, and looks the same from everywhere in the room; or it is what a scan lacks, and
+//! lies on a box around the mesh.
 
 use crate::inverse::solver::Problem;
 use crate::inverse::survey::Survey;
 use crate::transport::environment::{Environment, direction_of, pixel_of};
+use crate::transport::surroundings::Surroundings;
 use glam::{DVec3, Vec2, Vec3};
 use std::f64::consts::PI;
 
@@ -31,7 +32,7 @@ pub struct MeasuredOutside {
 
 impl MeasuredOutside {
     /// Gathers the pixels in the fit that see nothing of the mesh; `None` where there are none.
-    pub fn new(problem: &Problem, survey: &Survey) -> Option<Self> {
+    pub fn new(problem: &Problem, survey: &Survey, surroundings: Surroundings) -> Option<Self> {
         // Cells a little wider than the pixels.
         let scene = &problem.scene;
         let camera = scene.cameras.first()?;
@@ -52,9 +53,11 @@ impl MeasuredOutside {
                 pixel.pixel / photograph.width,
             ];
             let at = Vec2::from(place.map(|x| x as f32 + 0.5));
-            let direction = scene.cameras[pixel.frame as usize].ray(at).direction;
+            let ray = scene.cameras[pixel.frame as usize].ray(at);
+            let direction = ray.direction.normalize_or_zero();
+            let looked_up = surroundings.looked_up(ray.origin, direction);
             let bound = usize::from(photograph.is_saturated(pixel.pixel as usize));
-            let sum = &mut sums[pixel_of(width, height, direction.normalize_or_zero())][bound];
+            let sum = &mut sums[pixel_of(width, height, looked_up)][bound];
             sum.0 += photograph.pixels[pixel.pixel as usize].as_dvec3();
             sum.1 += 1;
         }
@@ -90,7 +93,7 @@ impl MeasuredOutside {
                 }
             }
         }
-        let map = Environment::new(width, height, pixels)?;
+        let map = Environment::new(width, height, pixels)?.around(surroundings);
         Some(Self {
             width,
             height,
@@ -101,17 +104,17 @@ impl MeasuredOutside {
         })
     }
 
-    /// Radiance that arrives from a unit direction, or a bound that it exceeds; `None` where no photograph tells.
+    /// Radiance that arrives from a unit direction of the map, or a bound that it exceeds; `None` where no photograph tells.
     #[inline]
-    pub fn at(&self, direction: Vec3) -> Option<Vec3> {
-        self.known[pixel_of(self.width, self.height, direction)]
-            .then(|| self.map.radiance(direction))
+    pub fn at(&self, looked_up: Vec3) -> Option<Vec3> {
+        self.known[pixel_of(self.width, self.height, looked_up)].then(|| self.map.of_map(looked_up))
     }
 
-    /// Whether no photograph tells more of a unit direction than that it is at least so bright: all are saturated there.
+    /// Whether no photograph tells more of a unit direction of the map than that it is at least so bright: all are saturated
+    /// there.
     #[inline]
-    pub fn is_bound(&self, direction: Vec3) -> bool {
-        self.at_least[pixel_of(self.width, self.height, direction)]
+    pub fn is_bound(&self, looked_up: Vec3) -> bool {
+        self.at_least[pixel_of(self.width, self.height, looked_up)]
     }
 
     /// The map, for drawing directions from.
@@ -119,7 +122,7 @@ impl MeasuredOutside {
         &self.map
     }
 
-    /// What to expect from a direction that no photograph looks in: the mean of what was seen at its height above the
+    /// What to expect from a direction of the map that no photograph looks in: the mean of what was seen at its height above the
     /// horizon, within a band as high as `band` radians, or of all that was seen.
     pub fn expected(&self, direction: Vec3, band: f64) -> Vec3 {
         let height_of = |d: Vec3| f64::from(d.dot(self.up).clamp(-1.0, 1.0)).asin();
@@ -128,7 +131,7 @@ impl MeasuredOutside {
         for cell in (0..self.known.len()).filter(|&cell| self.known[cell]) {
             let seen = direction_of(self.width, self.height, cell);
             let solid_angle = f64::from(1.0 - seen.y * seen.y).max(0.0).sqrt();
-            let radiance = self.map.radiance(seen).as_dvec3() * solid_angle;
+            let radiance = self.map.of_map(seen).as_dvec3() * solid_angle;
             all = (all.0 + radiance, all.1 + solid_angle);
             if (height_of(seen) - height).abs() < 0.5 * band {
                 near = (near.0 + radiance, near.1 + solid_angle);
@@ -144,7 +147,7 @@ impl MeasuredOutside {
         let sum: DVec3 = cells()
             .map(|cell| {
                 let direction = direction_of(self.width, self.height, cell);
-                self.map.radiance(direction).as_dvec3()
+                self.map.of_map(direction).as_dvec3()
             })
             .sum();
         (sum / cells().count().max(1) as f64).as_vec3()

@@ -255,6 +255,7 @@ impl Edited {
 mod tests {
     use super::*;
     use crate::inverse::estimate::{ObjectEstimate, Outside};
+    use crate::transport::surroundings::Surroundings;
 
     fn estimate() -> Arc<Estimate> {
         let object = |albedo: f32, emission: f32| ObjectEstimate {
@@ -268,6 +269,7 @@ mod tests {
                 width: 1,
                 height: 1,
                 pixels: vec![Vec3::splat(2.0)],
+                surroundings: Surroundings::Far,
             }),
             ..Estimate::default()
         })

@@ -1,12 +1,14 @@
-//! Light that arrives from outside the mesh, as a map of directions.
+//! Light that arrives from outside the mesh, as a map of directions, from far away or from a box around the mesh.
 
 use crate::math::color::luminance;
+use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
 use std::f32::consts::PI;
 
 /// An equirectangular map of incoming radiance, drawn in proportion to luminance × solid angle.
 ///
-/// Directions are the scene's (towards the light); the map's pole is the scene's y axis, whatever `up` is.
+/// Directions are the scene's (towards the light); the map's pole is the scene's y axis, whatever `up` is. Around a box they are
+/// directions from its middle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Environment {
     width: usize,
@@ -14,6 +16,8 @@ pub struct Environment {
     pixels: Vec<Vec3>,
     /// Cumulative luminance × solid angle over pixels, row by row.
     cumulative: Vec<f64>,
+    /// How far away the light comes from.
+    surroundings: Surroundings,
 }
 
 impl Environment {
@@ -42,16 +46,35 @@ impl Environment {
             height,
             pixels,
             cumulative,
+            surroundings: Surroundings::Far,
         })
     }
 
-    /// Radiance from a unit direction.
-    pub fn radiance(&self, direction: Vec3) -> Vec3 {
-        self.pixels[self.pixel(direction)]
+    /// The same map, around something else than what is infinitely far.
+    pub fn around(self, surroundings: Surroundings) -> Self {
+        Self {
+            surroundings,
+            ..self
+        }
     }
 
-    /// Draws a direction; returns it with its density per solid angle. `None` where the map is black.
-    pub fn sample(&self, choice: f64, u: [f32; 2]) -> Option<(Vec3, f32)> {
+    /// How far away the light comes from.
+    pub fn surroundings(&self) -> Surroundings {
+        self.surroundings
+    }
+
+    /// Radiance that a ray finds.
+    pub fn radiance(&self, origin: Vec3, direction: Vec3) -> Vec3 {
+        self.pixels[self.pixel(origin, direction)]
+    }
+
+    /// Radiance in a direction of the map.
+    pub fn of_map(&self, direction: Vec3) -> Vec3 {
+        self.pixels[pixel_of(self.width, self.height, direction)]
+    }
+
+    /// Draws a direction from a point; returns it with its density per solid angle. `None` where the map is black.
+    pub fn sample(&self, origin: Vec3, choice: f64, u: [f32; 2]) -> Option<(Vec3, f32)> {
         let total = *self.cumulative.last()?;
         if total <= 0.0 {
             return None;
@@ -67,13 +90,16 @@ impl Environment {
         let y = (top + (bottom - top) * f64::from(u[0])) as f32;
         let phi = 2.0 * PI * (column as f32 + u[1]) / self.width as f32;
         let r = (1.0 - y * y).max(0.0).sqrt();
-        let direction = Vec3::new(r * phi.cos(), y, r * phi.sin());
-        Some((direction, self.pixel_pdf(index)))
+        let looked_up = Vec3::new(r * phi.cos(), y, r * phi.sin());
+        let direction = self.surroundings.seen_from(origin, looked_up);
+        let ratio = self.surroundings.density_ratio(origin, direction);
+        Some((direction, self.pixel_pdf(index) * ratio))
     }
 
-    /// Density per solid angle with which [`Environment::sample`] draws a direction.
-    pub fn pdf(&self, direction: Vec3) -> f32 {
-        self.pixel_pdf(self.pixel(direction))
+    /// Density per solid angle with which [`Environment::sample`] draws a direction from a point.
+    pub fn pdf(&self, origin: Vec3, direction: Vec3) -> f32 {
+        let ratio = self.surroundings.density_ratio(origin, direction);
+        self.pixel_pdf(self.pixel(origin, direction)) * ratio
     }
 
     /// Total luminance × solid angle.
@@ -81,8 +107,9 @@ impl Environment {
         self.cumulative.last().copied().unwrap_or(0.0)
     }
 
-    fn pixel(&self, direction: Vec3) -> usize {
-        pixel_of(self.width, self.height, direction)
+    fn pixel(&self, origin: Vec3, direction: Vec3) -> usize {
+        let looked_up = self.surroundings.looked_up(origin, direction);
+        pixel_of(self.width, self.height, looked_up)
     }
 
     fn pixel_pdf(&self, index: usize) -> f32 {
@@ -153,11 +180,11 @@ mod tests {
         let (mut sum, mut missing) = (0.0f64, 0);
         for _ in 0..n {
             let (direction, pdf) = map
-                .sample(stream.uniform_f64(), stream.uniform2())
+                .sample(Vec3::ONE, stream.uniform_f64(), stream.uniform2())
                 .expect("not black");
             assert!((direction.length() - 1.0).abs() < 1e-5);
-            missing += u32::from((map.pdf(direction) - pdf).abs() > 1e-4 * pdf);
-            sum += f64::from(luminance(map.radiance(direction)) / pdf);
+            missing += u32::from((map.pdf(Vec3::ONE, direction) - pdf).abs() > 1e-4 * pdf);
+            sum += f64::from(luminance(map.of_map(direction)) / pdf);
         }
         // Directions on a pixel's edge may round into its neighbour.
         assert!(missing < 5, "{missing}");
@@ -168,7 +195,7 @@ mod tests {
         assert!(
             Environment::new(1, 1, vec![Vec3::ZERO])
                 .expect("sizes fit")
-                .sample(0.5, [0.5; 2])
+                .sample(Vec3::ONE, 0.5, [0.5; 2])
                 .is_none()
         );
     }

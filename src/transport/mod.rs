@@ -11,4 +11,5 @@ pub mod lit;
 pub mod material;
 pub mod microfacet;
 pub mod path;
+pub mod surroundings;
 pub mod world;

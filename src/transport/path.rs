@@ -202,10 +202,12 @@ pub(super) fn follow(
             if let Some(environment) = world.environment() {
                 let direction = ray.direction.normalize_or_zero();
                 let weight = match bsdf_pdf {
-                    Some(pdf) => emission_weight(pdf, environment_pdf(world, direction), options),
+                    Some(pdf) => {
+                        emission_weight(pdf, environment_pdf(world, ray.origin, direction), options)
+                    }
                     None => 1.0,
                 };
-                let light = throughput * environment.radiance(direction) * weight;
+                let light = throughput * environment.radiance(ray.origin, direction) * weight;
                 add(Origin::Outside, light);
             }
             break;
@@ -336,10 +338,10 @@ pub(super) fn draw_light(
     let leave = |wi| offset_origin(surface.point, surface.normal, &surface.corners, wi);
     if pick >= share {
         let drawn = world.environment().and_then(|environment| {
-            let (wi, pdf) = environment.sample(choice, u)?;
+            let (wi, pdf) = environment.sample(surface.point, choice, u)?;
             Some(LightSample {
                 wi,
-                radiance: environment.radiance(wi),
+                radiance: environment.radiance(surface.point, wi),
                 pdf: pdf * (1.0 - share),
                 ray: Ray::new(leave(wi), wi),
             })
@@ -377,10 +379,10 @@ fn emitter_share(world: &impl World) -> f32 {
 }
 
 /// Density per solid angle with which a direction towards outside is drawn by light sampling.
-fn environment_pdf(world: &impl World, direction: Vec3) -> f32 {
-    world
-        .environment()
-        .map_or(0.0, |e| e.pdf(direction) * (1.0 - emitter_share(world)))
+fn environment_pdf(world: &impl World, origin: Vec3, direction: Vec3) -> f32 {
+    world.environment().map_or(0.0, |e| {
+        e.pdf(origin, direction) * (1.0 - emitter_share(world))
+    })
 }
 
 /// MIS weight of emission met by BSDF sampling.

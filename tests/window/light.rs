@@ -12,6 +12,7 @@ use relit::app::window::Window;
 use relit::inverse::estimate::Outside;
 use relit::session::command::Command;
 use relit::session::edits::Edits;
+use relit::transport::surroundings::Surroundings;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -71,6 +72,7 @@ fn light_from_outside_is_switched_off_and_on() {
             width: 1,
             height: 1,
             pixels: vec![Vec3::ONE],
+            surroundings: Surroundings::Far,
         });
     });
     press(&mut harness, Modifiers::NONE, Key::L);

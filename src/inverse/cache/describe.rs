@@ -100,6 +100,7 @@ pub fn estimate(
             object
         })
         .collect();
+    let surroundings = outside.surroundings;
     let (size, pixels) = match sky {
         Some(sky) => {
             let elsewhere = |direction| unknowns.emission[outside.surface(direction) as usize];
@@ -115,6 +116,7 @@ pub fn estimate(
         width: size[0] as u32,
         height: size[1] as u32,
         pixels,
+        surroundings,
     });
     Estimate {
         objects,

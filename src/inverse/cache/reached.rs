@@ -5,6 +5,7 @@ use super::prior::{ExpectedAlbedo, Prior};
 use super::roles::Role;
 use crate::inverse::parameters::Unknowns;
 use crate::transport::material::Lobe;
+use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -15,6 +16,9 @@ pub struct Reached {
     pub stages: u32,
     /// Whether light comes from outside.
     pub open: bool,
+    /// How far away it comes from.
+    #[serde(default)]
+    pub surroundings: Surroundings,
     /// What the light field said of the albedos, where that still counts.
     #[serde(default)]
     pub expected: Option<ExpectedAlbedo>,
@@ -52,6 +56,7 @@ impl Reached {
         Self {
             stages,
             open,
+            surroundings: Surroundings::Far,
             expected: Some(prior.albedo().clone()),
             directions: prior.directions().to_vec(),
             roles: roles.to_vec(),

@@ -20,6 +20,7 @@ use crate::transport::emitters::Emitters;
 use crate::transport::environment::{direction_of, pixel_of};
 use crate::transport::material::Lobe;
 use crate::transport::path::power_heuristic;
+use crate::transport::surroundings::Surroundings;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
@@ -84,6 +85,8 @@ pub struct OutsideGrid {
     pub width: usize,
     /// Rows.
     pub height: usize,
+    /// How far away the light comes from.
+    pub surroundings: Surroundings,
 }
 
 impl OutsideGrid {
@@ -102,16 +105,17 @@ impl OutsideGrid {
         direction_of(self.width, self.height, (surface - self.first) as usize)
     }
 
-    /// The surface of a unit direction.
-    pub fn surface(&self, direction: Vec3) -> u32 {
-        self.first + pixel_of(self.width, self.height, direction) as u32
+    /// The surface of a unit direction of the map.
+    pub fn surface(&self, looked_up: Vec3) -> u32 {
+        self.first + pixel_of(self.width, self.height, looked_up) as u32
     }
 
-    /// The vertex at which a path ends that leaves in a unit direction.
-    fn vertex(&self, direction: Vec3, weight: f32) -> Vertex {
+    /// The vertex at which a path ends that leaves along a ray.
+    fn vertex(&self, origin: Vec3, direction: Vec3, weight: f32) -> Vertex {
+        let looked_up = self.surroundings.looked_up(origin, direction);
         Vertex {
             emission_weight: weight,
-            ..Vertex::on(self.surface(direction))
+            ..Vertex::on(self.surface(looked_up))
         }
     }
 }
@@ -195,7 +199,7 @@ impl Tracer<'_> {
         let Some(mut hit) = self.scene.intersect(camera_ray) else {
             vertices.extend(
                 self.outside
-                    .map(|grid| grid.vertex(camera_ray.direction, 1.0)),
+                    .map(|grid| grid.vertex(camera_ray.origin, camera_ray.direction, 1.0)),
             );
             return rays;
         };
@@ -268,12 +272,14 @@ impl Tracer<'_> {
             rays += 1;
             let next = self.scene.intersect(&Ray::new(origin, wi));
             let Some(next) = next else {
-                if let Some((sky, radiance)) = self.sky.and_then(|s| Some((s, s.at(wi)?))) {
-                    let sky_pdf = sky.map().pdf(wi) * self.sky_share();
+                let looked_up = |s: &MeasuredOutside| s.map().surroundings().looked_up(origin, wi);
+                if let Some((sky, radiance)) = self.sky.and_then(|s| Some((s, s.at(looked_up(s))?)))
+                {
+                    let sky_pdf = sky.map().pdf(origin, wi) * self.sky_share();
                     let weight = self.met_weight(bsdf_pdf, sky_pdf);
                     vertex.known += radiance * (weight * scale);
                     vertices.push(vertex);
-                    let excess = self.outside.filter(|_| sky.is_bound(wi));
+                    let excess = self.outside.filter(|_| sky.is_bound(looked_up(sky)));
                     vertices.extend(excess.map(|grid| Vertex {
                         emission_weight: weight * scale,
                         ..Vertex::on(grid.excess())
@@ -281,7 +287,7 @@ impl Tracer<'_> {
                 } else {
                     vertices.push(vertex);
                     // Where nothing is known no light samples go, so what is met has the whole weight.
-                    vertices.extend(self.outside.map(|grid| grid.vertex(wi, scale)));
+                    vertices.extend(self.outside.map(|grid| grid.vertex(origin, wi, scale)));
                 }
                 return rays;
             };
@@ -368,7 +374,9 @@ impl Tracer<'_> {
         u: [f32; 2],
         vertex: &mut Vertex,
     ) -> u64 {
-        let Some((sky, (wi, pdf))) = self.sky.and_then(|s| Some((s, s.map().sample(choice, u)?)))
+        let point = surface.seen.point;
+        let Some((sky, (wi, pdf))) =
+            (self.sky).and_then(|s| Some((s, s.map().sample(point, choice, u)?)))
         else {
             return 0;
         };
@@ -381,8 +389,9 @@ impl Tracer<'_> {
             return 1;
         }
         let weight = self.drawn_weight(pdf * self.sky_share(), surface.value(lobed, wi)) * scale;
-        vertex.known += sky.map().radiance(wi) * weight;
-        if let Some(grid) = self.outside.filter(|_| sky.is_bound(wi)) {
+        vertex.known += sky.map().radiance(point, wi) * weight;
+        let looked_up = sky.map().surroundings().looked_up(point, wi);
+        if let Some(grid) = self.outside.filter(|_| sky.is_bound(looked_up)) {
             (vertex.lamp, vertex.lamp_weight) = (grid.excess(), weight);
         }
         1

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::inverse::estimate::{Estimate, Outside, TexelEstimate};
 use crate::scene::texels::TexelLayout;
 use crate::transport::material::TexelColors;
+use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use std::path::Path;
@@ -58,6 +59,14 @@ pub fn encode(estimate: &Estimate) -> Result<Option<Vec<u8>>> {
     if let Some(outside) = &estimate.outside {
         let shape = vec![outside.height as usize, outside.width as usize, 3];
         tensors.push(("outside", Dtype::F32, shape, color_bytes(&outside.pixels)));
+        if let Surroundings::Box { min, max } = outside.surroundings {
+            tensors.push((
+                "outside_box",
+                Dtype::F32,
+                vec![2, 3],
+                color_bytes(&[min, max]),
+            ));
+        }
     }
     if tensors.is_empty() {
         return Ok(None);
@@ -99,6 +108,15 @@ pub fn decode(path: &Path, bytes: &[u8]) -> Result<Maps> {
                 width: width as u32,
                 height: height as u32,
                 pixels: colors(map.data()),
+                surroundings: match read.optional("outside_box", Dtype::F32)? {
+                    None => Surroundings::Far,
+                    Some(corners) => match *colors(corners.data()) {
+                        [min, max] if min.cmplt(max).all() && (max - min).is_finite() => {
+                            Surroundings::Box { min, max }
+                        }
+                        _ => return Err(read.misfit("outside_box")),
+                    },
+                },
             }),
             _ => return Err(read.misfit("outside")),
         },
@@ -214,6 +232,10 @@ mod tests {
                 width: 2,
                 height: 1,
                 pixels: vec![Vec3::ONE, Vec3::new(1e-20, 1e20, 3.0)],
+                surroundings: Surroundings::Box {
+                    min: Vec3::new(-1.0, -2.0, -3.0),
+                    max: Vec3::new(1.0, 2.0, 3.5),
+                },
             }),
             ..Default::default()
         }

@@ -17,7 +17,6 @@ use crate::transport::lit::Lit;
 use crate::transport::material::{Albedo, Material};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use std::cmp::Reverse;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 /// The chairs: name, albedo, place on the floor, and turn in radians. They stand between the red wall and the rug.
@@ -202,13 +201,7 @@ fn furnish(
         lit,
         furnished: room.lit(size)?,
         models,
-        placement: Placement {
-            file: PathBuf::from("chairs"),
-            at: None,
-            scale: 1.0,
-            rotate: 0.0,
-            hidden: false,
-        },
+        placement: Placement::as_modelled("chairs"),
     })
 }
 

@@ -32,7 +32,9 @@ mod table1;
 mod textures;
 mod twin;
 
+pub use chair::chair;
 pub use findings::{Findings, Grid, Summary};
+pub use standing::{Cylinder, places, up};
 pub use subject::Subject;
 
 use crate::error::{Error, Result};

@@ -3,6 +3,7 @@
 //! Each room is a row of rooms.csv, written as soon as it is solved; rows that are there are not solved again. From all rows of one
 //! program, preset and size come rooms.json and rooms.png.
 
+mod composite;
 mod lamps;
 mod plot;
 mod row;
@@ -10,6 +11,7 @@ mod score;
 mod segments;
 mod summary;
 
+pub use composite::{CompositeRow, Verdict, composite, table};
 pub use plot::plot;
 pub use row::{Row, Rows};
 pub use score::measure;

@@ -1,13 +1,14 @@
 //! One room, solved and compared with its truth.
 
+use crate::capture::Capture;
 use crate::capture::working::load_working;
 use crate::error::Result;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::faces::cut_up;
 use crate::inverse::held_out::HoldOut;
 use crate::inverse::settings::Settings;
-use crate::inverse::solver::{Control, Observer, Problem, Progress, solve};
-use crate::room::generated::Family;
+use crate::inverse::solver::{Control, Observer, Problem, Progress, Solution, solve};
+use crate::room::generated::{Family, Generated};
 use crate::scene::Scene;
 use crate::scene::prepare::prepare;
 use crate::study::albedo_pictures;
@@ -15,11 +16,23 @@ use crate::study::evaluate::{ObjectErrors, Reference};
 use crate::study::families::{Plan, Row, lamps, segments};
 use std::sync::Arc;
 
-/// Draws a room, solves it as `relit solve` solves a capture, and compares.
+/// A room and its solution.
+pub struct Solved {
+    /// The room.
+    pub room: Generated,
+    /// What was solved: cut into segments where it is a scan.
+    pub capture: Capture,
+    /// Scene and photographs.
+    pub problem: Problem,
+    /// The outcome.
+    pub solution: Solution,
+}
+
+/// Draws a room and solves it as `relit solve` solves a capture.
 ///
 /// # Errors
 /// The room cannot be drawn or solved.
-pub fn measure(family: Family, seed: u64, plan: &Plan) -> Result<Row> {
+pub fn solved(family: Family, seed: u64, plan: &Plan) -> Result<Solved> {
     let settings = Settings {
         preset: plan.preset,
         seed,
@@ -37,17 +50,34 @@ pub fn measure(family: Family, seed: u64, plan: &Plan) -> Result<Row> {
         photographs: prepared.photographs,
     };
     let solution = solve(&problem, &settings, None, &mut Unwatched)?;
+    Ok(Solved {
+        room,
+        capture: prepared.capture,
+        problem,
+        solution,
+    })
+}
 
+/// Solves a room and compares what was found with what is true.
+///
+/// # Errors
+/// The room cannot be drawn or solved.
+pub fn measure(family: Family, seed: u64, plan: &Plan) -> Result<Row> {
+    let Solved {
+        room,
+        capture,
+        problem,
+        solution,
+    } = solved(family, seed, plan)?;
     let (scene, estimate) = (&problem.scene, &solution.estimate);
     let truth = match room.capture.cut {
         Some(_) => segments::truth(&room, scene),
         None => room.truth(),
     };
-    let pictures =
-        albedo_pictures::compare(&prepared.capture, scene, estimate, &truth, |frame, _| {
-            Ok(Some(room.albedo(frame).pixels))
-        })?;
-    let reference = Reference::new(truth, &prepared.capture, scene, &problem.photographs);
+    let pictures = albedo_pictures::compare(&capture, scene, estimate, &truth, |frame, _| {
+        Ok(Some(room.albedo(frame).pixels))
+    })?;
+    let reference = Reference::new(truth, &capture, scene, &problem.photographs);
     let errors = reference.errors(scene, estimate);
     let lamps = lamps::count(&errors.per_object, room.lit.outside.as_deref());
     let coverage = Coverage::of(scene, estimate, &errors.per_object);

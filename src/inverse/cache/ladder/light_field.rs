@@ -4,9 +4,10 @@ use super::Ladder;
 use crate::inverse::cache::PathCache;
 use crate::inverse::cache::clusters::mean_radiance;
 use crate::inverse::cache::equations::NormalEquations;
+use crate::inverse::cache::errors::StandardErrors;
 use crate::inverse::cache::evaluate::Linearised;
 use crate::inverse::cache::fit::{LEAST_DAMPING, propose};
-use crate::inverse::cache::prior::ExpectedAlbedo;
+use crate::inverse::cache::prior::{ExpectedAlbedo, Prior};
 use crate::inverse::cache::roles::{self, Role};
 use crate::inverse::cache::trust::Trust;
 use crate::inverse::loss::Losses;
@@ -16,6 +17,7 @@ use crate::inverse::parameters::Unknowns;
 use crate::inverse::solver::Termination;
 use crate::math::color::luminance;
 use crate::transport::emitters::Emitters;
+use crate::transport::surroundings::Surroundings;
 use glam::{DVec3, Vec3};
 
 /// Share of paths that must leave the mesh before light from outside is tried.
@@ -27,6 +29,29 @@ const OUTSIDE_GAIN: f64 = 0.03;
 const LIGHT_FIELD_BIAS: f32 = 0.01;
 /// No albedo is held closer than this.
 const LEAST_DEVIATION: f32 = 1e-3;
+
+/// The outcome of a trial of light from outside.
+struct Found {
+    roles: Vec<Role>,
+    unknowns: Unknowns,
+    errors: StandardErrors,
+    trust: Trust,
+    prior: Prior,
+    surroundings: Surroundings,
+    open: bool,
+    sky: Option<MeasuredOutside>,
+}
+
+/// The part of the loss that is gone after a change: of held-out pixels, or where there are none, of those of the fit.
+fn fall(before: Losses, after: Losses) -> f64 {
+    match (
+        before.held_out.zip(after.held_out),
+        before.train.zip(after.train),
+    ) {
+        (Some((before, after)), _) | (None, Some((before, after))) => 1.0 - after / before,
+        (None, None) => 0.0,
+    }
+}
 
 impl Ladder<'_, '_> {
     /// First stage: paths end where a photograph measured the radiance, so each object is nearly a linear fit of its
@@ -113,7 +138,8 @@ impl Ladder<'_, '_> {
         Ok(())
     }
 
-    /// Tries light from outside the mesh, and keeps it only if pixels held out of the fit get better.
+    /// Tries light from outside the mesh, from far away and from a box around the mesh, and keeps what predicts pixels held out of
+    /// the fit better than the model without it.
     fn light_from_outside(
         &mut self,
         cache: &PathCache,
@@ -124,63 +150,97 @@ impl Ladder<'_, '_> {
     ) -> Result<(), Termination> {
         let started = self.monitor.seconds();
         self.monitor.phase("trying light from outside");
+        let leave = format!("{:.1} % of the paths leave the mesh", escaping * 100.0);
         // A linear step tells about what could be gained, at a small part of the cost of a trial.
         let gain = self.outside_gain(cache);
         if gain < OUTSIDE_GAIN {
             let why = format!(
-                "{:.1} % of the paths leave the mesh; light from there would change the squared error by {:.1} %, so it is \
-                 not called for",
-                escaping * 100.0,
+                "{leave}; light from there would change the squared error by {:.1} %, so it is not called for",
                 -gain * 100.0,
             );
             self.record("outside light", started, false, why)?;
             return Ok(());
         }
-        let before = (
-            self.roles.clone(),
-            self.unknowns.clone(),
-            self.errors.clone(),
-            self.trust.clone(),
-        );
+        let mut best = (closed, self.found());
+        let scene = &self.problem.scene;
+        let cameras = scene.cameras.iter().map(|camera| camera.center);
+        let places = scene.positions.iter().copied().chain(cameras);
+        for surroundings in [Some(Surroundings::Far), Surroundings::around(places)] {
+            let Some(surroundings) = surroundings else {
+                continue;
+            };
+            let losses = self.fit_open(surroundings, cache, lights, measured)?;
+            if fall(best.0, losses) > OUTSIDE_GAIN {
+                best = (losses, self.found());
+            }
+        }
+        self.go_back_to(best.1);
+        self.describe();
+        let comes = match (self.open, self.outside.surroundings) {
+            (false, _) => "is not called for".to_owned(),
+            (true, from) => format!(
+                "changes the held-out loss by {:.1} % and comes from {}",
+                -fall(closed, best.0) * 100.0,
+                match from {
+                    Surroundings::Far => "far away",
+                    Surroundings::Box { .. } => "a box around the mesh",
+                }
+            ),
+        };
+        let why = format!("{leave}; light from there {comes}");
+        self.record("outside light", started, self.open, why)?;
+        Ok(())
+    }
+
+    /// Fits everything with light from outside; the losses after it.
+    fn fit_open(
+        &mut self,
+        surroundings: Surroundings,
+        cache: &PathCache,
+        lights: &Emitters,
+        measured: &MeasuredRadiance,
+    ) -> Result<Losses, Termination> {
         self.open = true;
-        self.sky = MeasuredOutside::new(self.problem, &self.survey);
+        self.outside.surroundings = surroundings;
+        self.sky = MeasuredOutside::new(self.problem, &self.survey, surroundings);
         self.expect_of_outside();
         let paths = self.budget.light_field_paths;
-        let towards_it = match self.sky {
-            Some(_) => Some(self.stored(lights, Some(measured), 0, paths)?.0),
-            None => None,
+        let as_stored = self.sky.is_none() && surroundings == Surroundings::Far;
+        let towards_it = match as_stored {
+            true => None,
+            false => Some(self.stored(lights, Some(measured), 0, paths)?.0),
         };
         let cache = towards_it.as_ref().unwrap_or(cache);
         self.tell_lamps(cache, Role::Unseen)?;
         self.expect_colors_of_outside();
         self.weigh(cache)?;
-        let open = self.measure();
-        // Held-out pixels decide; where there are none, those of the fit must do.
-        let gain = match (
-            closed.held_out.zip(open.held_out),
-            closed.train.zip(open.train),
-        ) {
-            (Some((before, after)), _) | (None, Some((before, after))) => 1.0 - after / before,
-            (None, None) => 0.0,
-        };
-        let kept = gain > OUTSIDE_GAIN;
-        if !kept {
-            (self.roles, self.unknowns, self.errors, self.trust) = before;
-            (self.open, self.sky) = (false, None);
-            self.describe();
+        Ok(self.measure())
+    }
+
+    /// What a trial of light from outside changes.
+    fn found(&self) -> Found {
+        Found {
+            roles: self.roles.clone(),
+            unknowns: self.unknowns.clone(),
+            errors: self.errors.clone(),
+            trust: self.trust.clone(),
+            prior: self.prior.clone(),
+            surroundings: self.outside.surroundings,
+            open: self.open,
+            sky: self.sky.clone(),
         }
-        let why = format!(
-            "{:.1} % of the paths leave the mesh; light from there changes the held-out loss by {:.1} %{}",
-            escaping * 100.0,
-            -gain * 100.0,
-            if kept {
-                ""
-            } else {
-                ", so it is not called for"
-            }
-        );
-        self.record("outside light", started, kept, why)?;
-        Ok(())
+    }
+
+    /// Goes back to what was found.
+    fn go_back_to(&mut self, found: Found) {
+        self.roles = found.roles;
+        self.unknowns = found.unknowns;
+        self.errors = found.errors;
+        self.trust = found.trust;
+        self.prior = found.prior;
+        self.outside.surroundings = found.surroundings;
+        self.open = found.open;
+        self.sky = found.sky;
     }
 
     /// From now on light from outside is held near the colours that are expected of it, at the brightness found.

@@ -35,6 +35,7 @@ use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Problem, Solution, Stage, Termination};
 use crate::inverse::survey::Survey;
 use crate::transport::material::Lobe;
+use crate::transport::surroundings::Surroundings;
 use detail::Detail;
 use glam::Vec3;
 use rounds::Summed;
@@ -115,6 +116,7 @@ pub fn solve(
         first: objects as u32,
         width: OUTSIDE_WIDTH,
         height: OUTSIDE_HEIGHT,
+        surroundings: Surroundings::Far,
     };
     let surfaces = objects + outside.surfaces();
     monitor.phase("looking through the pixels");
@@ -165,7 +167,7 @@ pub fn solve(
     let mut lobes = start.lobes();
     lobes.resize(objects, None);
     let sky = (start.open)
-        .then(|| MeasuredOutside::new(problem, &survey))
+        .then(|| MeasuredOutside::new(problem, &survey, start.surroundings))
         .flatten();
     let expected = (start.expected.clone()).unwrap_or_else(|| prior.albedo().clone());
     let prior = (prior.with_albedo(expected)).with_directions(start.directions.clone());
@@ -183,7 +185,10 @@ pub fn solve(
         widths: problem.photographs.iter().map(|p| p.width).collect(),
         mesh_area: problem.scene.objects.iter().map(|o| o.area).sum(),
         max_bounces,
-        outside,
+        outside: OutsideGrid {
+            surroundings: start.surroundings,
+            ..outside
+        },
         errors: start.errors(),
         model_variance: start.model_variance,
         roles: start.roles,
@@ -454,6 +459,7 @@ impl Ladder<'_, '_> {
             &self.lobes,
         );
         reached.model_variance = self.model_variance;
+        reached.surroundings = self.outside.surroundings;
         self.checkpoint = Checkpoint::new(&self.monitor.progress, &reached);
     }
 

@@ -1,0 +1,183 @@
+//! Where light from outside the mesh comes from: far away, as a sky, or from a box around the mesh, as what a scan lacks.
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+/// Width of the gap between the mesh and a box around it, relative to the mesh's diagonal: light samples on the box are
+/// the noisier the nearer it comes to a surface.
+const GAP: f32 = 0.02;
+
+/// The place that a map of directions is looked up by.
+///
+/// A map around a box is a cube map with parallax correction: a ray finds the direction from the middle of the box to the
+/// point where it leaves the box.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub enum Surroundings {
+    /// Infinitely far: the light depends on the direction alone.
+    #[default]
+    Far,
+    /// The surface of a box, scene coordinates; each point sends the same radiance in all directions.
+    Box {
+        /// Smallest coordinates.
+        min: Vec3,
+        /// Largest coordinates.
+        max: Vec3,
+    },
+}
+
+impl Surroundings {
+    /// A box around some points, with a gap. `None` where there are none, or they are not finite.
+    pub fn around(points: impl Iterator<Item = Vec3>) -> Option<Self> {
+        let start = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let (min, max) = points.fold(start, |(min, max), p| (min.min(p), max.max(p)));
+        let gap = Vec3::splat((max - min).length() * GAP);
+        let found = min.is_finite() && max.is_finite() && gap.x > 0.0;
+        found.then_some(Self::Box {
+            min: min - gap,
+            max: max + gap,
+        })
+    }
+
+    /// The direction in the map that a ray finds: unit vectors.
+    pub fn looked_up(&self, origin: Vec3, direction: Vec3) -> Vec3 {
+        match self.left_at(origin, direction) {
+            Some(left) => (left.point - left.middle).normalize_or_zero(),
+            None => direction,
+        }
+    }
+
+    /// The unit direction in which a point sees what the map holds in a direction.
+    pub fn seen_from(&self, origin: Vec3, looked_up: Vec3) -> Vec3 {
+        let Self::Box { min, max } = *self else {
+            return looked_up;
+        };
+        let middle = (min + max) * 0.5;
+        match self.left_at(middle, looked_up) {
+            Some(left) => (left.point - origin).normalize_or_zero(),
+            None => looked_up,
+        }
+    }
+
+    /// Density per solid angle around the origin over density per solid angle around the middle of the map, along a ray.
+    pub fn density_ratio(&self, origin: Vec3, direction: Vec3) -> f32 {
+        let Some(left) = self.left_at(origin, direction) else {
+            return 1.0;
+        };
+        let from_middle = left.point - left.middle;
+        // dA = r² dω / cosθ, on the same face for both.
+        let r2_middle = from_middle.length_squared();
+        let cos_middle = from_middle[left.axis].abs() / r2_middle.sqrt();
+        let cos_origin = direction[left.axis].abs();
+        (cos_middle / r2_middle) * (left.distance * left.distance / cos_origin)
+    }
+
+    /// Where a ray leaves the box; `None` where there is none, or the ray starts outside and leads away.
+    fn left_at(&self, origin: Vec3, direction: Vec3) -> Option<Left> {
+        let Self::Box { min, max } = *self else {
+            return None;
+        };
+        let ahead = Vec3::select(direction.cmpgt(Vec3::ZERO), max, min) - origin;
+        let (mut axis, mut distance) = (0, f32::INFINITY);
+        for side in (0..3).filter(|&side| direction[side] != 0.0) {
+            let t = ahead[side] / direction[side];
+            if t < distance {
+                (axis, distance) = (side, t);
+            }
+        }
+        (distance > 0.0 && distance.is_finite()).then(|| Left {
+            point: origin + direction * distance,
+            middle: (min + max) * 0.5,
+            axis,
+            distance,
+        })
+    }
+}
+
+/// Where a ray leaves a box.
+struct Left {
+    point: Vec3,
+    /// Of the box.
+    middle: Vec3,
+    /// Which the face is perpendicular to.
+    axis: usize,
+    distance: f32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::rng::Stream;
+
+    fn unit_box() -> Surroundings {
+        let corners = [Vec3::new(-1.0, -2.0, -3.0), Vec3::new(3.0, 2.0, 1.0)];
+        Surroundings::around(corners.into_iter()).expect("points")
+    }
+
+    #[test]
+    fn a_box_looks_the_same_from_its_middle_as_the_sky_and_moves_from_elsewhere() {
+        let surroundings = unit_box();
+        let middle = Vec3::new(1.0, 0.0, -1.0);
+        let mut stream = Stream::new(3, 0, 0, 0);
+        for _ in 0..200 {
+            let direction = sphere(&mut stream);
+            let same = surroundings.looked_up(middle, direction);
+            assert!((same - direction).length() < 1e-5);
+            assert!((surroundings.density_ratio(middle, direction) - 1.0).abs() < 1e-4);
+            // There and back from any other point.
+            let origin = Vec3::new(0.3, -1.5, -2.0);
+            let seen = surroundings.seen_from(origin, direction);
+            let back = surroundings.looked_up(origin, seen);
+            assert!((back - direction).length() < 1e-4, "{direction} {back}");
+            assert_eq!(Surroundings::Far.looked_up(origin, direction), direction);
+        }
+        let moved = surroundings.looked_up(Vec3::new(2.0, 0.0, -1.0), Vec3::Y);
+        assert!(moved.x > 0.1 && moved.y < 0.99);
+    }
+
+    #[test]
+    fn directions_drawn_around_the_middle_have_the_density_stated_around_any_point() {
+        let surroundings = unit_box();
+        let origin = Vec3::new(2.5, -1.5, 0.5);
+        let mut stream = Stream::new(7, 0, 0, 0);
+        let n = 200_000;
+        // Estimates of ∫ f dω around the origin, f = 1 and (1 + z)².
+        let mut sums = [0.0f64; 2];
+        for _ in 0..n {
+            let looked_up = sphere(&mut stream);
+            let wi = surroundings.seen_from(origin, looked_up);
+            let pdf = surroundings.density_ratio(origin, wi) / (4.0 * std::f32::consts::PI);
+            sums[0] += f64::from(1.0 / pdf);
+            sums[1] += f64::from((1.0 + wi.z).powi(2) / pdf);
+        }
+        let exact = [
+            4.0 * std::f64::consts::PI,
+            4.0 * std::f64::consts::PI * (1.0 + 1.0 / 3.0),
+        ];
+        for (sum, exact) in sums.iter().zip(exact) {
+            let found = sum / f64::from(n);
+            assert!((found / exact - 1.0).abs() < 0.02, "{found} {exact}");
+        }
+    }
+
+    #[test]
+    fn no_points_and_one_point_have_no_box_and_rays_that_lead_away_find_their_direction() {
+        assert_eq!(Surroundings::around(std::iter::empty()), None);
+        assert_eq!(Surroundings::around([Vec3::ONE].into_iter()), None);
+        assert_eq!(
+            Surroundings::around([Vec3::NAN, Vec3::ONE].into_iter()),
+            None
+        );
+        let away = unit_box().looked_up(Vec3::new(9.0, 0.0, 0.0), Vec3::X);
+        assert_eq!(away, Vec3::X);
+    }
+
+    fn sphere(stream: &mut Stream) -> Vec3 {
+        let [u, _] = stream.uniform2();
+        let up = if u < 0.5 { 1.0 } else { -1.0 };
+        // Uniform over the upper half, turned over half of the time.
+        let [a, b] = stream.uniform2();
+        let r = (1.0 - a * a).sqrt();
+        let phi = 2.0 * std::f32::consts::PI * b;
+        Vec3::new(r * phi.cos(), r * phi.sin(), up * a)
+    }
+}
