@@ -20,7 +20,7 @@ use crate::inverse::held_out::HoldOut;
 use crate::inverse::settings::Settings;
 use crate::session::command::OpenOptions;
 use crate::session::save::pictures::Frames;
-use clap::{Arg, Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{Arg, Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use glam::{DVec3, Vec3};
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -340,4 +340,15 @@ mod tests {
             );
         }
     }
+}
+
+/// Whether pictures are smoothed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Denoise {
+    /// Pictures that people look at are, measurements are not
+    Auto,
+    /// Always, by relit's own denoiser
+    Builtin,
+    /// Never
+    None,
 }

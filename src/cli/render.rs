@@ -1,7 +1,7 @@
 //! `relit render`: a picture of the room in its estimated light, from a photograph's camera or any other.
 
 use crate::capture::read::camera_file;
-use crate::cli::arguments::Replace;
+use crate::cli::arguments::{Denoise, Replace};
 use crate::cli::numbers::{from_one, whole};
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
@@ -40,9 +40,9 @@ pub struct RenderArguments {
     /// Samples a pixel
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = from_one::<u32>)]
     spp: u32,
-    /// Smooths the noise, guided by what each pixel sees
-    #[arg(long, conflicts_with = "layers")]
-    denoise: bool,
+    /// Smooths the noise, guided by what each pixel sees; `auto` does in .png and leaves radiance in .exr as it was rendered
+    #[arg(long, value_name = "HOW", default_value = "auto", default_missing_value = "builtin", num_args = 0..=1, conflicts_with = "layers")]
+    denoise: Denoise,
     /// Writes the light of each lamp apart, as named layers of one .exr that add up to the picture
     #[arg(long)]
     layers: bool,
@@ -122,7 +122,11 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
             pixels: film.mean(),
         }
     };
-    let mut picture = if arguments.denoise {
+    let smooth = match (arguments.denoise, &format) {
+        (Denoise::None, _) | (Denoise::Auto, Format::Exr) => false,
+        (Denoise::Builtin, _) | (Denoise::Auto, Format::Png) => true,
+    };
+    let mut picture = if smooth {
         // Two independent halves tell the noise.
         let half = spp.div_ceil(2);
         let [a, b] = [seed, seed.wrapping_add(1)].map(|seed| rendered(seed, half));

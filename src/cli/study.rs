@@ -126,7 +126,12 @@ pub fn study(arguments: &StudyArguments) -> Result<()> {
 /// # Errors
 /// A room cannot be drawn or solved, or the table cannot be written.
 fn insertions(arguments: &StudyArguments, rooms: u32, family: &str) -> Result<()> {
-    let known = Family::of_name(family).zip(Preset::ALL.iter().copied().find(|p| p.word() == arguments.preset));
+    let known = Family::of_name(family).zip(
+        Preset::ALL
+            .iter()
+            .copied()
+            .find(|p| p.word() == arguments.preset),
+    );
     let Some((family, preset)) = known.filter(|_| arguments.name == "insertion") else {
         let problem = format!("`{}` is not run over generated rooms", arguments.name);
         return Err(Error::usage("--rooms", problem, "name the study insertion"));

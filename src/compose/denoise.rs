@@ -4,7 +4,7 @@ use crate::compose::backdrop::Mixed;
 use crate::compose::insert::{Insertion, Layers};
 use crate::compose::world::FurnishedScene;
 use crate::math::picture::Picture;
-use crate::transport::denoise::{Guide, denoise, guides};
+use crate::transport::denoise::{Guide, denoise, guides, guides_where};
 use glam::Vec3;
 
 /// The composite and its layers, from two independent insertions of the same objects into the same photograph.
@@ -13,18 +13,29 @@ use glam::Vec3;
 pub fn denoised(halves: [&Insertion; 2]) -> (Picture, Layers) {
     let [a, b] = halves.map(Insertion::layers);
     let (backdrop, lit) = (halves[0].backdrop(), halves[0].lit());
-    let world = FurnishedScene::new(lit, halves[0].objects());
+    let camera = &backdrop.camera;
     let halved = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a + b) * 0.5).collect();
     let alpha: Vec<f32> = halved(&a.alpha, &b.alpha);
-    // At their outlines objects and what is behind them are mixed: those pixels stay as they are.
-    let mut seen = guides(&world, &backdrop.camera);
-    for (guide, alpha) in seen.iter_mut().zip(&alpha) {
-        if *alpha > 0.0 && *alpha < 1.0 {
-            *guide = None;
+
+    // The objects by themselves, on their outlines too.
+    let world = FurnishedScene::new(lit, halves[0].objects());
+    let objects = guides_where(&world, camera, |pixel, ray| {
+        alpha[pixel] > 0.0 && world.sees_object(ray)
+    });
+    let [mut over_a, mut over_b] = halves.map(Insertion::covers);
+    for pixel in 0..alpha.len() {
+        // What one half alone has met stands for both.
+        match (a.alpha[pixel] > 0.0, b.alpha[pixel] > 0.0) {
+            (true, false) => over_b.pixels[pixel] = over_a.pixels[pixel],
+            (false, true) => over_a.pixels[pixel] = over_b.pixels[pixel],
+            _ => {}
         }
     }
-    // A difference holds no light of lamps, which is the same with and without.
-    let dark: Vec<Option<Guide>> = (seen.iter())
+    let over = denoise(&over_a, &over_b, &objects);
+
+    // What is behind them, and how they change it. A difference holds no light of lamps, which is the same with and without.
+    let behind = guides(&**lit, camera);
+    let dark: Vec<Option<Guide>> = (behind.iter())
         .map(|guide| {
             guide.map(|guide| Guide {
                 emission: Vec3::ZERO,
@@ -32,19 +43,24 @@ pub fn denoised(halves: [&Insertion; 2]) -> (Picture, Layers) {
             })
         })
         .collect();
-    let with = denoise(&a.with, &b.with, &seen);
-    let delta = denoise(&a.delta, &b.delta, &dark);
+    let [beside_a, beside_b] = halves.map(Insertion::beside_them);
+    let beside = denoise(&beside_a, &beside_b, &dark);
+    let without = denoise(&a.without, &b.without, &behind);
     let each = |value: &dyn Fn(usize) -> Vec3| Picture {
         pixels: (0..alpha.len()).map(value).collect(),
         ..*backdrop.photograph
     };
-    let without = each(&|pixel| with.pixels[pixel] - delta.pixels[pixel]);
+    let with = each(&|pixel| {
+        let free = without.pixels[pixel] + beside.pixels[pixel];
+        free.lerp(over.pixels[pixel], alpha[pixel])
+    });
+    let delta = each(&|pixel| with.pixels[pixel] - without.pixels[pixel]);
     let mixed: Vec<Mixed> = (alpha.iter().enumerate())
         .map(|(pixel, &alpha)| Mixed {
             alpha,
             over: with.pixels[pixel],
             under: without.pixels[pixel],
-            changed: alpha != 0.0 || delta.pixels[pixel] != Vec3::ZERO,
+            changed: alpha != 0.0 || beside.pixels[pixel] != Vec3::ZERO,
         })
         .collect();
     let composite = backdrop.composite(&mixed);

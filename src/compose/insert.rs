@@ -40,6 +40,9 @@ pub struct Insertion {
 struct PixelSums {
     with: DVec3,
     without: DVec3,
+    /// The same of the samples that saw an object first.
+    covered_with: DVec3,
+    covered_without: DVec3,
     /// Samples that saw an object first.
     covered: u32,
     /// Whether any sample differed.
@@ -169,6 +172,25 @@ impl Insertion {
         self.backdrop.composite(&layers)
     }
 
+    /// Radiance of the objects where they cover a pixel, as a picture; black where none does.
+    pub fn covers(&self) -> Picture {
+        self.picture(|pixel| {
+            let sums = &self.pixels[pixel];
+            (sums.covered_with / f64::from(sums.covered.max(1))).as_vec3()
+        })
+    }
+
+    /// Radiance that the objects add or take away where they do not cover a pixel; black where they cover all of it.
+    pub fn beside_them(&self) -> Picture {
+        self.picture(|pixel| {
+            let sums = &self.pixels[pixel];
+            let free = self.row_samples[pixel / self.width()].max(1) - sums.covered;
+            let with = sums.with - sums.covered_with;
+            let without = sums.without - sums.covered_without;
+            ((with - without) / f64::from(free.max(1))).as_vec3()
+        })
+    }
+
     /// What the composite is made from.
     pub fn layers(&self) -> Layers {
         let world = FurnishedScene::new(&self.lit, &self.objects);
@@ -295,9 +317,12 @@ impl Insertion {
                 sample.radiance.as_dvec3()
             }
         };
+        let of_covered = |value: DVec3| if covered { value } else { DVec3::ZERO };
         PixelSums {
             with: keep(with),
             without: keep(without),
+            covered_with: of_covered(keep(with)),
+            covered_without: of_covered(keep(without)),
             covered: u32::from(covered),
             changed: covered || keep(with) != keep(without),
             rays: with.rays + without.rays,
@@ -326,6 +351,8 @@ impl Insertion {
                 }
                 sums.with += pair.with;
                 sums.without += pair.without;
+                sums.covered_with += pair.covered_with;
+                sums.covered_without += pair.covered_without;
                 sums.covered += pair.covered;
                 sums.changed |= pair.changed;
                 self.rays += u64::from(pair.rays);

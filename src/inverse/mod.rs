@@ -11,6 +11,7 @@ pub mod loss;
 pub mod measured;
 pub mod monitor;
 pub mod outside;
+pub mod overexposed;
 pub mod paper;
 pub mod parameters;
 pub mod settings;

@@ -7,6 +7,7 @@
 use crate::math::color::luminance;
 use crate::math::picture::Picture;
 use crate::scene::camera::Camera;
+use crate::scene::geometry::Ray;
 use crate::transport::world::World;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -43,12 +44,48 @@ pub struct Guide {
     pub object: u32,
 }
 
-/// What the pixels of a camera see. Albedo is the mean over a pixel's part of the object at its centre.
+/// Offsets in a pixel that are tried for what it sees: its centre, then a ring.
+const OFFSETS: [[f32; 2]; 9] = [
+    [0.5, 0.5],
+    [0.25, 0.25],
+    [0.75, 0.75],
+    [0.75, 0.25],
+    [0.25, 0.75],
+    [0.5, 0.1],
+    [0.5, 0.9],
+    [0.1, 0.5],
+    [0.9, 0.5],
+];
+
+/// What the pixels of a camera see at their centres. Albedo is the mean over a pixel's part of the object there.
 pub fn guides(world: &impl World, camera: &Camera) -> Vec<Option<Guide>> {
+    let center = OFFSETS[0];
+    guides_of(world, camera, |_, ray_at| Some(ray_at(center)))
+}
+
+/// The same, at the first of a few points of each pixel whose ray is wanted.
+pub fn guides_where(
+    world: &impl World,
+    camera: &Camera,
+    wanted: impl Fn(usize, &Ray) -> bool + Sync,
+) -> Vec<Option<Guide>> {
+    guides_of(world, camera, |pixel, ray_at| {
+        let mut rays = OFFSETS.into_iter().map(ray_at);
+        rays.find(|ray| wanted(pixel, ray))
+    })
+}
+
+/// What the pixels of a camera see along a ray through each.
+fn guides_of(
+    world: &impl World,
+    camera: &Camera,
+    choose: impl Fn(usize, &dyn Fn([f32; 2]) -> Ray) -> Option<Ray> + Sync,
+) -> Vec<Option<Guide>> {
     let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
     let guide = |pixel: u32| {
         let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
-        let ray = camera.ray(corner + 0.5);
+        let ray_at = |offset: [f32; 2]| camera.ray(corner + Vec2::from(offset));
+        let ray = choose(pixel as usize, &ray_at)?;
         let seen = world.intersect(&ray)?;
         let towards = -ray.direction.normalize_or_zero();
         let front = seen.normal.dot(towards) > 0.0;

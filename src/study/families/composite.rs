@@ -336,7 +336,9 @@ fn scores(
         .filter(|&i| layers.alpha[i] > 0.95)
         .collect();
     let beside: Vec<usize> = (0..shows.len())
-        .filter(|&i| layers.alpha[i] == 0.0 && change_at(i).abs().max_element() > CHANGED)
+        .filter(|&i| {
+            layers.alpha[i] == 0.0 && told[i] && change_at(i).abs().max_element() > CHANGED
+        })
         .collect();
     let psnr =
         |pixels: &[usize], picture: &dyn Fn(usize) -> Vec3, truth: &dyn Fn(usize) -> Vec3| {

@@ -30,6 +30,7 @@ use crate::inverse::exposure::{Agreement, Exposures, Sights};
 use crate::inverse::loss::{LossProbe, Losses};
 use crate::inverse::monitor::Monitor;
 use crate::inverse::outside::MeasuredOutside;
+use crate::inverse::overexposed;
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Problem, Solution, Stage, Termination};
@@ -142,6 +143,8 @@ pub fn solve(
     let needed = exposures.as_ref().filter(|e| e.needed());
     let undone = needed.map(|exposures| exposures.undone(problem));
     let problem = undone.as_ref().unwrap_or(problem);
+    let bounded = overexposed::bounded(problem, &survey);
+    let problem = bounded.as_ref().unwrap_or(problem);
     let max_bounces = settings.max_bounces().min(MOST_BOUNCES);
     let clusters = cluster(problem, &survey, budget.pixels);
     let prior = Prior::new(surfaces, objects, mean_radiance(&clusters))
