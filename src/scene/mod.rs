@@ -41,6 +41,8 @@ pub struct Scene {
     pub up: Vec3,
     /// Diagonal of the bounding box in metres.
     pub diameter: f32,
+    /// Whether the mesh has no objects of its own, as fused scans have none: what it lacks may lie near by.
+    pub scanned: bool,
     /// Closest-hit and any-hit queries.
     pub bvh: Bvh,
     ids: OnceLock<IdBuffers>,
@@ -130,6 +132,7 @@ impl Scene {
             cameras,
             up: capture.up.as_vec3(),
             diameter: (high - low).length() as f32,
+            scanned: capture.cut.is_some(),
             bvh,
             ids: OnceLock::new(),
         })

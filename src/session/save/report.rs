@@ -9,6 +9,7 @@ use crate::math::nullable::{Rgb, rgb};
 use crate::session::save::memory::peak_memory_bytes;
 use crate::session::save::named::Named;
 use crate::session::snapshot::OpenCapture;
+use crate::transport::surroundings::Surroundings;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -75,7 +76,7 @@ pub struct Counts {
 }
 
 /// Light from outside, in short; the map itself lies beside `estimate.json`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OutsideSummary {
     /// Columns of the map.
     pub width: u32,
@@ -85,6 +86,9 @@ pub struct OutsideSummary {
     pub mean: Rgb,
     /// Greatest luminance.
     pub brightest: Option<f32>,
+    /// How far away it comes from.
+    #[serde(default)]
+    pub from: String,
 }
 
 /// Where the time went.
@@ -156,6 +160,11 @@ impl Report {
                     height: outside.height,
                     mean: rgb(mean.as_vec3()),
                     brightest: brightest.reduce(f32::max).filter(|v| v.is_finite()),
+                    from: match outside.surroundings {
+                        Surroundings::Far => "far away",
+                        Surroundings::Box { .. } => "a box around the mesh",
+                    }
+                    .to_owned(),
                 }
             }),
             exposures: estimate

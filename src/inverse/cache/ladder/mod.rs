@@ -295,7 +295,7 @@ impl Ladder<'_, '_> {
     }
 
     /// Paths to the lamps as they are known, stored, with all roles settled on them; and what is to be said of their number.
-    fn fit_full_paths(&mut self) -> Result<(PathCache, String), Termination> {
+    pub(super) fn fit_full_paths(&mut self) -> Result<(PathCache, String), Termination> {
         self.monitor.phase("tracing paths to the lamps");
         let lights = self.lights();
         let (cache, limit) = self.stored(&lights, None, 1, self.budget.round_paths)?;
