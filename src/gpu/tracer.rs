@@ -122,11 +122,6 @@ impl Tracer {
         })
     }
 
-    /// The card.
-    pub fn card(&self) -> &Card {
-        &self.card
-    }
-
     /// Adds `samples` paths to every pixel of a film, keyed as [`Film::add`] keys them; after an error it is as it was.
     ///
     /// # Errors

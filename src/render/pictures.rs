@@ -23,11 +23,6 @@ impl<'a> Pictures<'a> {
         }
     }
 
-    /// The card's name, while it renders.
-    pub fn card(&self) -> Option<&str> {
-        self.tracer.as_ref().map(|tracer| tracer.card().name())
-    }
-
     /// A picture from `samples` paths a pixel, keyed by (seed, frame). A card that fails costs a line, and the processor renders the
     /// picture and all later ones.
     pub fn film(

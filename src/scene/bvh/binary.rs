@@ -89,7 +89,7 @@ fn grow(primitives: &mut [Primitive], first: usize, grain: Grain, nodes: &mut Ve
 }
 
 /// Makes a node that was added as a leaf an inner one, where its children, the second of them at `second`, cost less.
-fn join(node: usize, second: usize, largest_leaf: usize, nodes: &mut Vec<Binary>) {
+fn join(node: usize, second: usize, largest_leaf: usize, nodes: &mut [Binary]) {
     let (half_area, leaf) = (nodes[node].bounds.half_area(), nodes[node].costs[0]);
     // Visiting a node costs as much as testing a group.
     let cost = |slots: usize| best_share(&nodes[node + 1], &nodes[second], slots).1;
