@@ -37,7 +37,7 @@ fn boxed(half: f64, center: DVec3, materials: Vec<Material>) -> Lit {
     Lit::new(Arc::new(scene), materials, None)
 }
 
-/// Inside a closed box that emits Le everywhere and reflects ρ, radiance is Le/(1 − ρ), at any size and place: eight tests at 4
+/// Inside a closed box that emits Le everywhere and reflects ρ, radiance is Le/(1 − ρ), at any size and place: four tests at 4
 /// standard errors (6e-5 each). Then each number of bounces is a term of the series.
 #[test]
 fn a_closed_furnace_has_its_closed_form_radiance_at_any_size_and_place() {
@@ -47,20 +47,19 @@ fn a_closed_furnace_has_its_closed_form_radiance_at_any_size_and_place() {
         (1e5, DVec3::ZERO),
         (1.0, DVec3::splat(1e5)),
     ] {
-        for albedo in [0.5f32, 0.9] {
-            let material = Material::diffuse(Vec3::splat(albedo), Vec3::new(1.0, 2.0, 1e-6));
-            let lit = boxed(half, center, vec![material; 6]);
-            let Some(m) = seen(&lit, &PathOptions::default(), 16) else {
-                return;
-            };
-            let truth = 1.0 / (1.0 - f64::from(albedo));
-            let z = (m.mean - truth) / m.standard_error();
-            println!(
-                "size {half}, albedo {albedo}: {} against {truth}, z {z:.2}",
-                m.mean
-            );
-            assert!(z.abs() < 4.0, "albedo {albedo}, size {half}: z {z}");
-        }
+        let albedo = 0.8f32;
+        let material = Material::diffuse(Vec3::splat(albedo), Vec3::new(1.0, 2.0, 1e-6));
+        let lit = boxed(half, center, vec![material; 6]);
+        let Some(m) = seen(&lit, &PathOptions::default(), 16) else {
+            return;
+        };
+        let truth = 1.0 / (1.0 - f64::from(albedo));
+        let z = (m.mean - truth) / m.standard_error();
+        println!(
+            "size {half}, albedo {albedo}: {} against {truth}, z {z:.2}",
+            m.mean
+        );
+        assert!(z.abs() < 4.0, "albedo {albedo}, size {half}: z {z}");
     }
     let lit = boxed(
         1.0,
