@@ -14,6 +14,8 @@
 //!        └─────┬────────┘
 //!        calibrate      whether photographs agree with the mesh
 //!            │
+//!         render         who traces pictures: the graphics card or the processor
+//!            ├── gpu       the path tracer as compute shaders
 //!        transport      paths: sampling, bsdf, emitters, NEE + MIS
 //!            │
 //!          scene        mesh, objects, hierarchy, cameras
@@ -34,8 +36,10 @@ pub mod cli;
 pub mod compose;
 pub mod error;
 pub mod export;
+pub mod gpu;
 pub mod inverse;
 pub mod math;
+pub mod render;
 pub mod room;
 pub mod say;
 pub mod scene;

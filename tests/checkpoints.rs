@@ -6,6 +6,7 @@ use glam::Vec3;
 use relit::inverse::estimate::{Estimate, ObjectEstimate, TexelEstimate};
 use relit::inverse::settings::Settings;
 use relit::inverse::solver::{Checkpoint, Progress};
+use relit::render::Renderer;
 use relit::scene::texels::TexelLayout;
 use relit::session::command::{OpenOptions, Source};
 use relit::session::edits::Edits;
@@ -48,6 +49,7 @@ fn results(albedo: f32) -> Results {
         progress,
         stopped_because: None,
         views: Frames::AtMost(0),
+        renderer: Renderer::processor(),
         started: Instant::now(),
         seconds_load: 0.0,
     }

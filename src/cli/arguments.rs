@@ -15,9 +15,12 @@ use crate::cli::parameters::{Parameters, duration};
 use crate::cli::render::RenderArguments;
 use crate::cli::study::StudyArguments;
 use crate::cli::trade::TradeArguments;
+use crate::error::Result;
 use crate::export::overwrite;
 use crate::inverse::held_out::HoldOut;
 use crate::inverse::settings::Settings;
+use crate::render::{Device, Renderer};
+use crate::say;
 use crate::session::command::OpenOptions;
 use crate::session::save::pictures::Frames;
 use clap::{Arg, Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
@@ -103,6 +106,30 @@ pub struct SolveArguments {
     pub solve: SolveOptions,
     #[command(flatten)]
     pub known: KnownValues,
+}
+
+/// What traces the paths of pictures.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct DeviceOptions {
+    /// What traces paths: a graphics card where there is one and else the processor, the processor, or any graphics adapter
+    #[arg(long, value_name = "auto|cpu|gpu", default_value = "auto", value_parser = str::parse::<Device>)]
+    pub device: Device,
+}
+
+impl DeviceOptions {
+    /// Finds it, and says what was found where a person asked or a card is used.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn renderer(self) -> Result<Renderer> {
+        let renderer = Renderer::find(self.device)?;
+        match (renderer.card(), self.device) {
+            (Some(card), _) => say::aside(format_args!("paths traced by {card}")),
+            (None, Device::Cpu) => say::aside("paths traced by the processor"),
+            (None, _) => {}
+        }
+        Ok(renderer)
+    }
 }
 
 /// What is known beforehand.

@@ -1,6 +1,6 @@
 //! `relit edit`: lamps off, walls recoloured, surfaces polished.
 
-use crate::cli::arguments::{Denoise, Replace};
+use crate::cli::arguments::{Denoise, DeviceOptions, Replace};
 use crate::cli::numbers::from_one;
 use crate::cli::object_values::{ObjectValues, named_color, named_number};
 use crate::cli::photographs::write_with_progress;
@@ -47,6 +47,8 @@ pub struct EditArguments {
     /// Smooths the noise of the light in photographs
     #[arg(long, value_name = "HOW", default_value = "auto", default_missing_value = "builtin", num_args = 0..=1)]
     denoise: Denoise,
+    #[command(flatten)]
+    device: DeviceOptions,
     /// Folder to write into
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -71,6 +73,7 @@ pub fn edit(arguments: &EditArguments) -> Result<i32> {
     }
     // Neither is what another solve found.
     overwrite::check(&arguments.out.join(save::REPORT))?;
+    let renderer = arguments.device.renderer()?;
     let Loaded {
         saved,
         capture,
@@ -107,6 +110,7 @@ pub fn edit(arguments: &EditArguments) -> Result<i32> {
         stopped_because: Some(saved.termination),
         checkpoint: None,
         views: arguments.views.unwrap_or_default(),
+        renderer: renderer.clone(),
         started: Instant::now(),
         seconds_load: 0.0,
     };
@@ -115,7 +119,7 @@ pub fn edit(arguments: &EditArguments) -> Result<i32> {
     if let Some(photographs) = &photographs {
         let folder = arguments.out.join("photographs");
         std::fs::create_dir_all(&folder).map_err(|error| Error::io(&folder, &error))?;
-        code = write_with_progress(photographs, &[], &|frame| {
+        code = write_with_progress(photographs, &renderer, &[], &|frame| {
             folder.join(format!("{frame:03}"))
         })?;
     }

@@ -1,6 +1,6 @@
 //! `relit insert`: objects into a photograph, naively and by differential rendering.
 
-use crate::cli::arguments::{Denoise, Replace};
+use crate::cli::arguments::{Denoise, DeviceOptions, Replace};
 use crate::cli::numbers::{above_zero, degrees, from_one, triple};
 use crate::cli::photographs::write_with_progress;
 use crate::cli::saved::{Loaded, SavedOptions};
@@ -33,6 +33,8 @@ pub struct InsertArguments {
     /// Whether objects take the blur and the grain of 8-bit photographs
     #[arg(long, value_name = "BOOL", default_value_t = true, action = ArgAction::Set)]
     finish: bool,
+    #[command(flatten)]
+    device: DeviceOptions,
     /// Beginning of the names of the files to write
     #[arg(long, value_name = "PREFIX")]
     out: PathBuf,
@@ -46,6 +48,7 @@ pub struct InsertArguments {
 /// The results or an object cannot be read, the frame does not exist, or a file cannot be written.
 pub fn insert(arguments: &InsertArguments) -> Result<i32> {
     arguments.replace.apply();
+    let renderer = arguments.device.renderer()?;
     let Loaded {
         saved,
         capture,
@@ -69,14 +72,19 @@ pub fn insert(arguments: &InsertArguments) -> Result<i32> {
         denoise: arguments.denoise != Denoise::None,
         finish: arguments.finish,
     };
-    write_with_progress(&work, &materials, &|frame| match arguments.frame {
-        Which::One(_) => arguments.out.clone(),
-        Which::All => {
-            let mut name = OsString::from(&arguments.out);
-            name.push(format!(".{frame:03}"));
-            PathBuf::from(name)
-        }
-    })
+    write_with_progress(
+        &work,
+        &renderer,
+        &materials,
+        &|frame| match arguments.frame {
+            Which::One(_) => arguments.out.clone(),
+            Which::All => {
+                let mut name = OsString::from(&arguments.out);
+                name.push(format!(".{frame:03}"));
+                PathBuf::from(name)
+            }
+        },
+    )
 }
 
 /// Which photographs.

@@ -3,6 +3,7 @@
 use crate::cli::interrupt::Interrupt;
 use crate::compose::object::surface::Surface;
 use crate::error::Result;
+use crate::render::Renderer;
 use crate::say;
 use crate::session::photographs::Photographs;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -18,6 +19,7 @@ const LENGTH: u64 = 1000;
 /// Something cannot be read or written.
 pub fn write_with_progress(
     work: &Photographs,
+    renderer: &Renderer,
     materials: &[Option<Surface>],
     prefix: &dyn Fn(usize) -> PathBuf,
 ) -> Result<i32> {
@@ -30,7 +32,7 @@ pub fn write_with_progress(
     let style = ProgressStyle::with_template("{bar:24} photograph {msg}, {eta} left");
     let bar = ProgressBar::with_draw_target(Some(LENGTH), target)
         .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    let written = work.write_made_of(materials, prefix, &|doing| {
+    let written = work.write_made_of(renderer, materials, prefix, &|doing| {
         bar.set_position((f64::from(doing.share) * LENGTH as f64) as u64);
         bar.set_message(format!("{:03}", doing.frame));
         !interrupt.asked()

@@ -1,7 +1,7 @@
 //! `relit render`: a picture of the room in its estimated light, from a photograph's camera or any other.
 
 use crate::capture::read::camera_file;
-use crate::cli::arguments::{Denoise, Replace};
+use crate::cli::arguments::{Denoise, DeviceOptions, Replace};
 use crate::cli::numbers::{from_one, whole};
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
@@ -10,11 +10,11 @@ use crate::export::light_layers;
 use crate::export::overwrite;
 use crate::export::picture::{shown_at, write_png};
 use crate::math::picture::Picture;
+use crate::render::{Device, Pictures, Renderer};
 use crate::say;
 use crate::scene::camera::Camera;
 use crate::session::light::path_options;
 use crate::transport::denoise::{denoise, guides};
-use crate::transport::film::Film;
 use crate::transport::layers::Split;
 use clap::Args;
 use glam::Vec3;
@@ -46,6 +46,8 @@ pub struct RenderArguments {
     /// Writes the light of each lamp apart, as named layers of one .exr that add up to the picture
     #[arg(long)]
     layers: bool,
+    #[command(flatten)]
+    device: DeviceOptions,
     /// Picture to write, .exr (radiance) or .png
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -83,8 +85,20 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
             "choose .exr with --layers",
         ));
     }
+    if arguments.layers && arguments.device.device == Device::Gpu {
+        return Err(Error::usage(
+            "--device gpu",
+            "the light of each lamp apart is traced by the processor",
+            "leave out one of --layers and --device",
+        ));
+    }
     arguments.replace.apply();
     overwrite::check(&arguments.out)?;
+    // Light apart by lamps is the processor's work.
+    let renderer = match arguments.layers {
+        true => Renderer::processor(),
+        false => arguments.device.renderer()?,
+    };
     let Loaded {
         saved,
         capture,
@@ -113,9 +127,9 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
         let named = split.sources().iter().copied().zip(&layers);
         return light_layers::write(&arguments.out, &capture.scene, named);
     }
-    let rendered = |seed, samples| {
-        let mut film = Film::new(&camera);
-        film.add(&lit, &camera, &options, seed, frame, samples);
+    let mut pictures = Pictures::new(&renderer, &lit);
+    let mut rendered = |seed, samples| {
+        let film = pictures.film(&camera, &options, (seed, frame), samples);
         Picture {
             width: film.width,
             height: film.height,

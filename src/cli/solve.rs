@@ -11,6 +11,7 @@ use crate::inverse::estimate::Estimate;
 use crate::inverse::known::Known;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{self, Checkpoint, Control, Observer, Problem, Progress};
+use crate::render::Renderer;
 use crate::say;
 use crate::session::command::Source;
 use crate::session::edits::Edits;
@@ -105,6 +106,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
             stopped_because: None,
             checkpoint: checkpoint.cloned(),
             views: options.views.unwrap_or_default(),
+            renderer: Renderer::processor(),
             started,
             seconds_load,
         },

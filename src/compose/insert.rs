@@ -6,6 +6,8 @@
 use crate::compose::backdrop::{Backdrop, Mixed};
 use crate::compose::placement::PlacedObject;
 use crate::compose::world::FurnishedScene;
+use crate::error::Result;
+use crate::gpu::{PairSums, Tracer, View};
 use crate::math::picture::Picture;
 use crate::math::rng::Stream;
 use crate::scene::geometry::Ray;
@@ -14,6 +16,7 @@ use crate::transport::path::{PathOptions, PathSample, radiance};
 use crate::transport::world::World;
 use glam::{BVec3, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Blocks of pixels that the first, coarse result is made of, at most.
@@ -148,10 +151,73 @@ impl Insertion {
                 return false;
             }
             let rows = band.min(height - self.next_row);
-            self.add_rows(self.next_row, rows);
+            // The card may have been here already.
+            let taken = &self.row_samples[self.next_row..self.next_row + rows];
+            if taken.iter().any(|&taken| taken < samples) {
+                self.add_rows(self.next_row, rows);
+            }
             self.next_row = (self.next_row + rows) % height;
         }
         true
+    }
+
+    /// [`Insertion::refine_to`] on a graphics card that holds the scene and the objects. After an error some rows have more paths
+    /// than others; [`Insertion::refine_to`] fills up the rest.
+    ///
+    /// # Errors
+    /// The card failed.
+    pub fn refine_on(
+        &mut self,
+        tracer: &mut Tracer,
+        samples: u32,
+        go_on: impl Fn() -> bool,
+    ) -> Result<bool> {
+        /// Pixels between two questions whether to go on, at most, but for a row.
+        const BAND: usize = 1 << 18;
+        let (width, height) = (self.width(), self.row_samples.len());
+        if self.objects.is_empty() || width == 0 {
+            return Ok(true);
+        }
+        let band = (BAND / width).max(1);
+        for first in (0..height).step_by(band) {
+            if !go_on() {
+                return Ok(false);
+            }
+            let rows = first..(first + band).min(height);
+            let taken = self.row_samples[rows.clone()].iter().copied().min();
+            let from = taken.unwrap_or(samples);
+            let pixels = (first * width) as u32..(rows.end * width) as u32;
+            let view = View {
+                camera: &self.backdrop.camera,
+                options: &self.options,
+                seed: self.seed,
+                frame: self.backdrop.frame,
+            };
+            let added = tracer.pairs(&view, pixels, from..samples)?;
+            self.take(rows, samples.saturating_sub(from), &added);
+        }
+        Ok(true)
+    }
+
+    /// Adds what the card found in some rows, in so many samples.
+    fn take(&mut self, rows: Range<usize>, samples: u32, added: &[PairSums]) {
+        let width = self.width();
+        for (row, added) in rows.zip(added.chunks(width)) {
+            for (sums, pair) in self.pixels[row * width..].iter_mut().zip(added) {
+                if self.row_samples[row] == 0 {
+                    *sums = PixelSums::default();
+                }
+                sums.with += pair.with;
+                sums.without += pair.without;
+                sums.covered_with += pair.covered_with;
+                sums.covered_without += pair.covered_without;
+                sums.covered += pair.covered;
+                sums.changed |= pair.changed;
+                self.rays += u64::from(pair.rays);
+                self.rejected += u64::from(pair.rejected);
+            }
+            self.row_samples[row] += samples;
+        }
     }
 
     /// The photograph with the objects, in the photograph's values.

@@ -2,6 +2,7 @@
 
 use crate::compose::object::ObjectModel;
 use crate::error::{Error, Result};
+use crate::gpu::Inserted;
 use crate::scene::Scene;
 use crate::scene::bvh::Bvh;
 use crate::scene::geometry::{Hit, Ray};
@@ -143,6 +144,18 @@ impl PlacedObject {
             center: (low + high) * 0.5,
             radius: (high - low).length() * 0.5,
         })
+    }
+
+    /// The object as a graphics card takes it.
+    pub fn for_card(&self) -> Inserted<'_> {
+        Inserted {
+            corners: &self.corners,
+            normals: &self.normals,
+            corner_normals: &self.corner_normals,
+            corner_colors: &self.model.corner_colors,
+            material_of: &self.model.material_of,
+            materials: &self.model.materials,
+        }
     }
 
     /// Whether a ray, widened by an angle in radians, could meet the object.

@@ -2,6 +2,8 @@
 //! keeps all that the estimate does not model.
 
 use crate::compose::backdrop::Backdrop;
+use crate::error::Result;
+use crate::gpu::{Tracer, View};
 use crate::math::picture::Picture;
 use crate::transport::denoise::{Guide, denoise, guides};
 use crate::transport::film::Film;
@@ -112,7 +114,10 @@ impl Relighting {
                 return false;
             }
             let rows = self.next_row..(self.next_row + band).min(height);
-            let part = self.samples() as usize % self.pairs.len();
+            // The first of those with the fewest samples.
+            let parts = 0..self.pairs.len();
+            let part = parts.min_by_key(|&p| self.pairs[p][1].samples);
+            let part = part.unwrap_or(0);
             let key = (self.seed.wrapping_add(part as u64), self.backdrop.frame);
             for (film, lit) in self.pairs[part].iter_mut().zip(&self.lights) {
                 let camera = &self.backdrop.camera;
@@ -121,6 +126,40 @@ impl Relighting {
             self.next_row = rows.end % height.max(1);
         }
         true
+    }
+
+    /// [`Relighting::refine_to`] on a graphics card that holds the scene in both lights; only between passes. After an error all is as
+    /// it was, or one of two parts is ahead, and [`Relighting::refine_to`] takes up the work.
+    ///
+    /// # Errors
+    /// The card failed.
+    pub fn refine_on(
+        &mut self,
+        tracers: &mut [Tracer; 2],
+        samples: u32,
+        go_on: impl Fn() -> bool,
+    ) -> Result<bool> {
+        let parts = self.pairs.len() as u32;
+        for (part, pair) in (0..).zip(&mut self.pairs) {
+            if !go_on() {
+                return Ok(false);
+            }
+            // The first part takes the odd sample.
+            let wanted = (samples + parts - 1 - part) / parts;
+            let missing = wanted.saturating_sub(pair[1].samples);
+            let view = View {
+                camera: &self.backdrop.camera,
+                options: &self.options,
+                seed: self.seed.wrapping_add(u64::from(part)),
+                frame: self.backdrop.frame,
+            };
+            let mut refined = pair.clone();
+            for (film, tracer) in refined.iter_mut().zip(tracers.iter_mut()) {
+                tracer.add(film, &view, missing)?;
+            }
+            *pair = refined;
+        }
+        Ok(true)
     }
 
     /// The photograph in the other light, by the samples taken so far; only between passes.

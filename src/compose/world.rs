@@ -4,7 +4,7 @@ use crate::compose::placement::{PlacedObject, interpolate};
 use crate::scene::geometry::{Hit, Ray};
 use crate::transport::environment::Environment;
 use crate::transport::lit::Lit;
-use crate::transport::world::{EmitterSample, SurfacePoint, World};
+use crate::transport::world::{EmitterSample, SurfacePoint, World, towards_viewer};
 use glam::Vec3;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -81,18 +81,6 @@ impl<'a> FurnishedScene<'a> {
             t: hit.t,
         }
     }
-}
-
-/// The shading normal, bent just far enough that `wo` sees its front where it sees the geometric normal's.
-fn towards_viewer(shading: Vec3, geometric: Vec3, wo: Vec3) -> Vec3 {
-    /// Sine of the angle that the bent normal keeps above the view's horizon.
-    const MARGIN: f32 = 0.01;
-    let side = if geometric.dot(wo) < 0.0 { -wo } else { wo };
-    let cos = shading.dot(side);
-    if cos >= MARGIN {
-        return shading;
-    }
-    (shading + side * (MARGIN - cos)).normalize_or(geometric)
 }
 
 impl World for FurnishedScene<'_> {

@@ -52,16 +52,18 @@ pub struct Hit {
     pub b2: f32,
 }
 
+/// Relative error of a point from its corners and of the intersection test that follows, in units of the coordinates.
+pub const OFFSET_GAMMA: f32 = 16.0 * (f32::EPSILON * 0.5);
+
 /// Moves a surface point off its triangle, to the side of `w`, by the rounding error of the point.
 ///
 /// The bound is pbrt's for a point interpolated from `corners` (Pharr et al., PBR 4ed, section 6.8.4), with the
 /// error of a following intersection test added; it scales with the coordinates, so a room may be of any size.
 #[inline]
 pub fn offset_origin(point: Vec3, normal: Vec3, corners: &[Vec3; 3], w: Vec3) -> Vec3 {
-    const GAMMA: f32 = 16.0 * (f32::EPSILON * 0.5);
     let magnitude = corners[0].abs().max(corners[1].abs()).max(corners[2].abs());
     let distance = 2.0
-        * GAMMA
+        * OFFSET_GAMMA
         * magnitude
             .dot(normal.abs())
             .max(magnitude.max_element() * 0.25);

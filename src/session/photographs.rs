@@ -9,8 +9,10 @@ use crate::compose::placement::{PlacedObject, Placement};
 use crate::compose::relight::Relighting;
 use crate::compose::write::{write_insertion, write_relit};
 use crate::error::Result;
+use crate::gpu::{self, Tracer};
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
+use crate::render::{Renderer, went_wrong};
 use crate::session::library::{Inserted, Library};
 use crate::session::light::path_options;
 use crate::session::snapshot::OpenCapture;
@@ -74,16 +76,17 @@ impl Photographs {
         prefix: &dyn Fn(usize) -> PathBuf,
         tell: &dyn Fn(Doing) -> bool,
     ) -> Result<Written> {
-        self.write_made_of(&[], prefix, tell)
+        self.write_made_of(&Renderer::processor(), &[], prefix, tell)
     }
 
-    /// [`Photographs::write`] with materials that replace all those of an object's file: one a placement, in their order;
-    /// `None`, or none at all, leaves the file's own.
+    /// [`Photographs::write`] with light traced by a renderer, and with materials that replace all those of an object's file: one a
+    /// placement, in their order; `None`, or none at all, leaves the file's own.
     ///
     /// # Errors
     /// As [`Photographs::write`].
     pub fn write_made_of(
         &self,
+        renderer: &Renderer,
         materials: &[Option<Surface>],
         prefix: &dyn Fn(usize) -> PathBuf,
         tell: &dyn Fn(Doing) -> bool,
@@ -103,6 +106,14 @@ impl Photographs {
         let scene = &self.capture.scene;
         let lights =
             (self.relight).then(|| [&self.found, &self.edited].map(|e| Arc::new(e.lit(scene))));
+        let mut tracer = if objects.is_empty() {
+            None
+        } else {
+            self.tracer(renderer, &objects)
+        };
+        let mut relighters = lights.as_ref().and_then(|[before, after]| {
+            Some([renderer.tracer(before, &[])?, renderer.tracer(after, &[])?])
+        });
         let parts = u8::from(lights.is_some()) + u8::from(!objects.is_empty());
         let mut unseen = !objects.is_empty() && !self.frames.is_empty();
         for (index, &frame) in self.frames.iter().enumerate() {
@@ -112,7 +123,9 @@ impl Photographs {
                 tell(Doing { frame, share })
             };
             let prefix = prefix(frame);
-            let Some(backdrop) = self.backdrop(frame, lights.as_ref(), &|s| share(0, s))? else {
+            let lights = lights.as_ref();
+            let go_on = |s| share(0, s);
+            let Some(backdrop) = self.backdrop(frame, lights, &mut relighters, &go_on)? else {
                 return Ok(written);
             };
             if lights.is_some() {
@@ -123,8 +136,14 @@ impl Photographs {
                 if !go_on(0.0) {
                     return Ok(written);
                 }
-                let Some((files, is_seen)) =
-                    self.composite(&mut library, backdrop, &objects, &prefix, &go_on)?
+                let Some((files, is_seen)) = self.composite(
+                    &mut library,
+                    backdrop,
+                    &objects,
+                    &mut tracer,
+                    &prefix,
+                    &go_on,
+                )?
                 else {
                     return Ok(written);
                 };
@@ -140,11 +159,18 @@ impl Photographs {
         Ok(written)
     }
 
+    /// The scene with the objects on the renderer's card.
+    fn tracer(&self, renderer: &Renderer, objects: &[Arc<PlacedObject>]) -> Option<Tracer> {
+        let inserted: Vec<gpu::Inserted<'_>> = objects.iter().map(|o| o.for_card()).collect();
+        renderer.tracer(&self.edited.lit(&self.capture.scene), &inserted)
+    }
+
     /// The photograph, relit where there are two lights; `None` if that was ended.
     fn backdrop(
         &self,
         frame: usize,
         lights: Option<&[Arc<Lit>; 2]>,
+        tracers: &mut Option<[Tracer; 2]>,
         go_on: &dyn Fn(f32) -> bool,
     ) -> Result<Option<Backdrop>> {
         let camera = self.capture.full_camera(frame)?;
@@ -160,9 +186,14 @@ impl Photographs {
             let mut relighting =
                 Relighting::new(taken, lights.clone(), options, seed, self.denoise);
             let samples = self.in_parts();
-            for pass in 1..=samples {
-                let done = (pass - 1) as f32 / samples as f32;
-                if !relighting.refine_to(pass, || go_on(done)) {
+            let step = step(tracers.is_some());
+            for before in (0..samples).step_by(step as usize) {
+                let pass = (before + step).min(samples);
+                let go_on = || go_on(before as f32 / samples as f32);
+                let whole =
+                    |r: &mut Relighting, card: &mut [Tracer; 2]| r.refine_on(card, pass, go_on);
+                let done = on_card(&mut relighting, tracers, whole);
+                if !done.unwrap_or_else(|| relighting.refine_to(pass, go_on)) {
                     return Ok(None);
                 }
             }
@@ -182,6 +213,7 @@ impl Photographs {
         library: &mut Library,
         backdrop: Backdrop,
         objects: &[Arc<PlacedObject>],
+        tracer: &mut Option<Tracer>,
         prefix: &Path,
         go_on: &dyn Fn(f32) -> bool,
     ) -> Result<Option<(Vec<PathBuf>, bool)>> {
@@ -198,10 +230,14 @@ impl Photographs {
                 &path_options(&self.settings),
                 self.settings.seed.wrapping_add(u64::from(part)),
             );
-            for pass in 1..=samples {
-                let done = part as f32 + (pass - 1) as f32 / samples as f32;
+            let step = step(tracer.is_some());
+            for before in (0..samples).step_by(step as usize) {
+                let pass = (before + step).min(samples);
+                let done = part as f32 + before as f32 / samples as f32;
                 let go_on = || go_on(done / parts as f32);
-                if !inserted.composite.refine_to(pass, go_on) {
+                let composite = &mut inserted.composite;
+                let done = on_card(composite, tracer, |c, card| c.refine_on(card, pass, go_on));
+                if !done.unwrap_or_else(|| composite.refine_to(pass, go_on)) {
                     return Ok(None);
                 }
             }
@@ -219,4 +255,23 @@ impl Photographs {
         let files = write_insertion(prefix, &backdrop, results, &naive, &naive_estimate)?;
         Ok(Some((files, is_seen)))
     }
+}
+
+/// Samples between two questions whether to go on: a card is kept busy by more than one.
+fn step(has_card: bool) -> u32 {
+    if has_card { 16 } else { 1 }
+}
+
+/// Work done on the card while there is one; `None` where there is none, or where it failed, which is said.
+fn on_card<W, C>(
+    work: &mut W,
+    card: &mut Option<C>,
+    refine: impl FnOnce(&mut W, &mut C) -> Result<bool>,
+) -> Option<bool> {
+    let done = refine(work, card.as_mut()?);
+    if let Err(error) = &done {
+        went_wrong(error);
+        *card = None;
+    }
+    done.ok()
 }

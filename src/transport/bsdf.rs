@@ -158,7 +158,7 @@ impl Lobe {
 }
 
 /// Slope of [`reflected`]; 1 would be Schlick's curve itself.
-const COUPLING_SLOPE: f64 = 0.85;
+pub const COUPLING_SLOPE: f64 = 0.85;
 
 /// Upper bound, over all roughnesses, of the share of light that a lobe with no reflectance at normal incidence
 /// reflects: Schlick's (1 − cosθ)⁵, flattened because rough lobes reflect more than that near the normal.
@@ -173,12 +173,21 @@ fn reflected(cos_theta: f64) -> f64 {
 /// the rest is normalised, so that the base returns albedo × (1 − specular) × (1 − reflected(θo)) in all.
 #[inline]
 pub fn coupling(wo: Vec3, wi: Vec3) -> f64 {
+    let (cos_o, cos_i) = (f64::from(wo.z), f64::from(wi.z));
+    FRAC_1_PI * cos_i * (1.0 - reflected(cos_o)) * (1.0 - reflected(cos_i)) / unreflected_mean()
+}
+
+/// Cosine-weighted mean over the hemisphere of what is not [`reflected`].
+#[inline]
+fn unreflected_mean() -> f64 {
     const A: f64 = COUPLING_SLOPE;
     let rest = 1.0 - A;
-    // Cosine-weighted mean of `reflected` over the hemisphere.
-    let mean = (1.0 - rest.powi(6) * (1.0 + 6.0 * A)) / (21.0 * A * A);
-    let (cos_o, cos_i) = (f64::from(wo.z), f64::from(wi.z));
-    FRAC_1_PI * cos_i * (1.0 - reflected(cos_o)) * (1.0 - reflected(cos_i)) / (1.0 - mean)
+    1.0 - (1.0 - rest.powi(6) * (1.0 + 6.0 * A)) / (21.0 * A * A)
+}
+
+/// The constant factor of [`coupling`].
+pub fn coupling_scale() -> f64 {
+    FRAC_1_PI / unreflected_mean()
 }
 
 /// What the base below any lobe sends at an angle of this cosine to the normal, over what it sends along the normal: the same

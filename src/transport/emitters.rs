@@ -176,6 +176,11 @@ impl Emitters {
         self.tree.total() <= 0.0
     }
 
+    /// Probability of drawing an object.
+    pub fn probability(&self, object: usize) -> f64 {
+        self.tree.probability(object)
+    }
+
     /// Density per square metre of drawing a point of an object, the choice of object included.
     #[inline]
     pub fn pdf(&self, object: u32) -> f32 {

@@ -102,6 +102,21 @@ impl Environment {
         self.pixel_pdf(self.pixel(origin, direction)) * ratio
     }
 
+    /// Width and height of the map.
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+
+    /// Radiance of each pixel, row by row.
+    pub fn pixels(&self) -> &[Vec3] {
+        &self.pixels
+    }
+
+    /// Luminance × solid angle up to and including each pixel.
+    pub fn cumulative(&self) -> &[f64] {
+        &self.cumulative
+    }
+
     /// Total luminance × solid angle.
     pub fn power(&self) -> f64 {
         self.cumulative.last().copied().unwrap_or(0.0)
@@ -112,7 +127,8 @@ impl Environment {
         pixel_of(self.width, self.height, looked_up)
     }
 
-    fn pixel_pdf(&self, index: usize) -> f32 {
+    /// Density per solid angle with which directions within a pixel are drawn.
+    pub fn pixel_pdf(&self, index: usize) -> f32 {
         let total = self.power();
         if total <= 0.0 {
             return 0.0;
@@ -148,7 +164,7 @@ pub fn direction_of(width: usize, height: usize, pixel: usize) -> Vec3 {
 }
 
 /// Cosines of the upper and lower edge of a row.
-fn row_cosines(row: usize, height: usize) -> (f64, f64) {
+pub fn row_cosines(row: usize, height: usize) -> (f64, f64) {
     let angle = |r: usize| (std::f64::consts::PI * r as f64 / height as f64).cos();
     (angle(row), angle(row + 1))
 }

@@ -9,7 +9,7 @@ use glam::Vec3;
 
 /// Paths are never kept with a higher chance than this. Where all albedos are ρ, variance is finite only above ρ², since
 /// weights grow by ρ over the chance at each bounce.
-const MOST_SURVIVAL: f32 = 0.9999;
+pub const MOST_SURVIVAL: f32 = 0.9999;
 
 /// How paths are traced.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -370,7 +370,7 @@ pub(super) fn draw_light(
 }
 
 /// Probability of sampling an emitter of the mesh rather than the light from outside.
-fn emitter_share(world: &impl World) -> f32 {
+pub fn emitter_share(world: &impl World) -> f32 {
     match (world.environment(), world.has_emitters()) {
         (None, _) => 1.0,
         (Some(_), false) => 0.0,

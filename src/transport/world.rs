@@ -47,6 +47,19 @@ pub struct EmitterSample {
     pub object: u32,
 }
 
+/// Sine of the angle that a bent shading normal keeps above the view's horizon.
+pub const NORMAL_MARGIN: f32 = 0.01;
+
+/// The shading normal, bent just far enough that `wo` sees its front where it sees the geometric normal's.
+pub fn towards_viewer(shading: Vec3, geometric: Vec3, wo: Vec3) -> Vec3 {
+    let side = if geometric.dot(wo) < 0.0 { -wo } else { wo };
+    let cos = shading.dot(side);
+    if cos >= NORMAL_MARGIN {
+        return shading;
+    }
+    (shading + side * (NORMAL_MARGIN - cos)).normalize_or(geometric)
+}
+
 /// Geometry, materials and emitters: all that the path tracer needs to know.
 pub trait World: Sync {
     /// The nearest surface along a ray.

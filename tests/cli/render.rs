@@ -61,10 +61,82 @@ fn edits_beside_an_estimate_are_applied(place: &Place) {
     fs::write(place.path("out/estimate.json"), &found).expect("writes");
 }
 
+/// The mean of a picture, over all its numbers.
+fn mean(place: &Place, name: &str) -> f64 {
+    let image = image::open(place.path(name)).expect("an image").to_rgb32f();
+    let sum: f64 = image.as_raw().iter().map(|&v| f64::from(v)).sum();
+    sum / image.as_raw().len() as f64
+}
+
+/// The processor gives the same bits, named or not where there is no card; an adapter gives the same picture up to rounding.
+fn what_traces_is_chosen_and_named(place: &Place) {
+    let render = |device: &str, out: &str| {
+        let words = ["render", "out", "--frame", "0", "--spp", "16"];
+        place.relit(&[&words[..], &["--device", device, "--out", out]].concat())
+    };
+    let by_processor = render("cpu", "cpu.exr");
+    done(&by_processor);
+    assert!(String::from_utf8_lossy(&by_processor.stderr).contains("traced by the processor"));
+    refused(
+        &render("tpu", "tpu.exr"),
+        2,
+        &["--device", "tpu", "auto, cpu or gpu"],
+    );
+    let auto = render("auto", "auto.exr");
+    done(&auto);
+    if !String::from_utf8_lossy(&auto.stderr).contains("traced by") {
+        let [cpu, auto] = ["cpu.exr", "auto.exr"].map(|name| fs::read(place.path(name)));
+        assert_eq!(cpu.expect("reads"), auto.expect("reads"));
+    }
+    let by_adapter = render("gpu", "gpu.exr");
+    if by_adapter.status.code() == Some(1) {
+        refused(&by_adapter, 1, &["--device gpu", "no graphics adapter"]);
+        let demanded = std::env::var_os("RELIT_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
+        assert!(!demanded, "no graphics adapter, but one is demanded");
+        println!("skipped: no graphics adapter");
+        return;
+    }
+    done(&by_adapter);
+    assert!(String::from_utf8_lossy(&by_adapter.stderr).contains("traced by"));
+    let [cpu, gpu] = ["cpu.exr", "gpu.exr"].map(|name| mean(place, name));
+    assert!((gpu / cpu - 1.0).abs() < 1e-3, "{gpu} against {cpu}");
+    let edit = [
+        "edit",
+        "out",
+        "--albedo",
+        "floor=0.5,0.1,0.1",
+        "--views",
+        "1",
+        "--photographs",
+        "--spp",
+        "2",
+    ];
+    for device in ["cpu", "gpu"] {
+        done(
+            &place.relit(
+                &[
+                    &edit[..],
+                    &["--device", device, "--out", &format!("edited-{device}")],
+                ]
+                .concat(),
+            ),
+        );
+    }
+    for picture in ["views/000.render.exr", "photographs/001.relit.exr"] {
+        let [cpu, gpu] =
+            ["cpu", "gpu"].map(|device| mean(place, &format!("edited-{device}/{picture}")));
+        assert!(
+            (gpu / cpu - 1.0).abs() < 2e-3,
+            "{picture}: {gpu} against {cpu}"
+        );
+    }
+}
+
 #[test]
 fn results_are_rendered_edited_and_moved() {
     let place = Place::new();
     done(&place.relit(&solve(&["--views", "none", "--out", "out"])));
+    what_traces_is_chosen_and_named(&place);
     done(&place.relit(&[
         "render", "out", "--frame", "1", "--spp", "4", "--out", "a.exr",
     ]));

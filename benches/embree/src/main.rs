@@ -2,38 +2,16 @@
 //!
 //! `cargo run --release [-- RUNS [EMBREE_CONFIG [SCENE]]]`; the figures are medians over paired, alternating runs.
 
+mod clock;
 mod embree;
 mod scenes;
 
+use clock::paired;
 use embree::{Embree, Quality};
 use relit::scene::bvh::{Bvh, InstructionSet};
 use relit::scene::geometry::Ray;
 use scenes::Scene;
-use std::hint::black_box;
 use std::time::Instant;
-
-/// Struct timespec of 64-bit systems.
-#[repr(C)]
-struct TimeSpec {
-    seconds: i64,
-    nanoseconds: i64,
-}
-
-unsafe extern "C" {
-    fn clock_gettime(clock: i32, time: *mut TimeSpec) -> i32;
-}
-
-/// Seconds that this thread has run, so that other work on the machine counts less.
-fn thread_seconds() -> f64 {
-    const CLOCK_THREAD_CPUTIME_ID: i32 = 3;
-    let mut time = TimeSpec {
-        seconds: 0,
-        nanoseconds: 0,
-    };
-    // SAFETY: the struct has the system's layout.
-    unsafe { clock_gettime(CLOCK_THREAD_CPUTIME_ID, &mut time) };
-    time.seconds as f64 + time.nanoseconds as f64 * 1e-9
-}
 
 /// Rays a run.
 const RAYS: usize = 200_000;
@@ -137,50 +115,6 @@ fn compare(scene: &Scene, runs: usize, config: &str) {
             ),
         );
     }
-}
-
-/// Least, median and most of ours and theirs in million rays a second, and of the ratio pair by pair.
-fn paired(
-    runs: usize,
-    rays: &[Ray],
-    ours: impl Fn(&Ray) -> f32,
-    theirs: impl Fn(&Ray) -> f32,
-) -> [[f64; 3]; 3] {
-    let speed = |f: &dyn Fn() -> f32| {
-        let start = thread_seconds();
-        black_box(f());
-        rays.len() as f64 / (thread_seconds() - start) * 1e-6
-    };
-    let run_ours = || rays.iter().map(&ours).sum();
-    let run_theirs = || rays.iter().map(&theirs).sum();
-    let mut pairs = Vec::new();
-    for run in 0..=runs {
-        // The first pair only warms up; who goes first alternates.
-        let pair = if run % 2 == 0 {
-            let a = speed(&run_ours);
-            [a, speed(&run_theirs)]
-        } else {
-            let b = speed(&run_theirs);
-            [speed(&run_ours), b]
-        };
-        if run > 0 {
-            pairs.push(pair);
-        }
-    }
-    let spread = |f: &dyn Fn(&[f64; 2]) -> f64| {
-        let mut values: Vec<f64> = pairs.iter().map(f).collect();
-        values.sort_by(f64::total_cmp);
-        [
-            values[0],
-            values[values.len() / 2],
-            values[values.len() - 1],
-        ]
-    };
-    [
-        spread(&|p| p[0]),
-        spread(&|p| p[1]),
-        spread(&|p| p[0] / p[1]),
-    ]
 }
 
 /// Says how many rays the two disagree on by more than rounding.

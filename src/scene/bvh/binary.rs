@@ -1,10 +1,10 @@
 //! A binary hierarchy, top-down by the surface area heuristic, and the cheapest way to open it eight wide.
 
 use super::split::{Bounds, Primitive, Split};
-use super::{GROUP, WIDTH};
+use super::{GROUP, Tree, WIDTH};
 
 /// Leaves hold at most this many triangles.
-const LARGEST_LEAF: usize = 4 * GROUP;
+pub(super) const LARGEST_LEAF: usize = 4 * GROUP;
 
 /// A node of the binary hierarchy; the left child follows it in the list.
 pub(super) struct Binary {
@@ -20,45 +20,57 @@ pub(super) struct Binary {
 }
 
 impl Binary {
+    fn leaf(bounds: Bounds, first: usize, count: usize) -> Self {
+        Self {
+            bounds,
+            first: first as u32,
+            count: count as u32,
+            right: 0,
+            costs: [bounds.half_area() * count.div_ceil(GROUP) as f32; WIDTH - 1],
+        }
+    }
+
     pub fn is_leaf(&self) -> bool {
         self.right == 0
     }
 }
 
-/// The hierarchy over primitives, which it reorders; ranges of more than `alone` are built side by side.
-pub(super) fn build(primitives: &mut [Primitive], alone: usize) -> Vec<Binary> {
+/// How far a hierarchy is built.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Grain {
+    /// Ranges of more primitives are built side by side.
+    pub alone: usize,
+    /// Leaves hold at most this many triangles, or one group.
+    pub largest_leaf: usize,
+}
+
+/// The hierarchy over primitives, which it reorders.
+pub(super) fn build(primitives: &mut [Primitive], grain: Grain) -> Vec<Binary> {
     let mut nodes = Vec::new();
-    grow(primitives, 0, alone, &mut nodes);
+    grow(primitives, 0, grain, &mut nodes);
     nodes
 }
 
-fn grow(primitives: &mut [Primitive], first: usize, alone: usize, nodes: &mut Vec<Binary>) {
+fn grow(primitives: &mut [Primitive], first: usize, grain: Grain, nodes: &mut Vec<Binary>) {
     let bounds = Bounds::of(primitives);
     let count = primitives.len();
     let node = nodes.len();
-    let leaf = bounds.half_area() * count.div_ceil(GROUP) as f32;
-    nodes.push(Binary {
-        bounds,
-        first: first as u32,
-        count: count as u32,
-        right: 0,
-        costs: [leaf; WIDTH - 1],
-    });
+    nodes.push(Binary::leaf(bounds, first, count));
     if count <= GROUP {
         return;
     }
     let middle = Split::best(primitives).partition(primitives);
     let (left, right) = primitives.split_at_mut(middle);
-    let second = if count > alone {
+    let second = if count > grain.alone {
         let (left, right) = rayon::join(
             || {
                 let mut nodes = Vec::new();
-                grow(left, first, alone, &mut nodes);
+                grow(left, first, grain, &mut nodes);
                 nodes
             },
             || {
                 let mut nodes = Vec::new();
-                grow(right, first + middle, alone, &mut nodes);
+                grow(right, first + middle, grain, &mut nodes);
                 nodes
             },
         );
@@ -67,16 +79,22 @@ fn grow(primitives: &mut [Primitive], first: usize, alone: usize, nodes: &mut Ve
         nodes.extend(right);
         second
     } else {
-        grow(left, first, alone, nodes);
+        grow(left, first, grain, nodes);
         let second = nodes.len();
-        grow(right, first + middle, alone, nodes);
+        grow(right, first + middle, grain, nodes);
         second
     };
 
+    join(node, second, grain.largest_leaf, nodes);
+}
+
+/// Makes a node that was added as a leaf an inner one, where its children, the second of them at `second`, cost less.
+fn join(node: usize, second: usize, largest_leaf: usize, nodes: &mut [Binary]) {
+    let (half_area, leaf) = (nodes[node].bounds.half_area(), nodes[node].costs[0]);
     // Visiting a node costs as much as testing a group.
     let cost = |slots: usize| best_share(&nodes[node + 1], &nodes[second], slots).1;
-    let inner = bounds.half_area() + cost(WIDTH);
-    if count <= LARGEST_LEAF && leaf <= inner {
+    let inner = half_area + cost(WIDTH);
+    if nodes[node].count as usize <= largest_leaf && leaf <= inner {
         return;
     }
     let mut costs = [inner; WIDTH - 1];
@@ -85,6 +103,51 @@ fn grow(primitives: &mut [Primitive], first: usize, alone: usize, nodes: &mut Ve
     }
     nodes[node].right = (second - node) as u32;
     nodes[node].costs = costs;
+}
+
+/// The same from another builder's tree, with the primitives in the order of its leaves; `boxed` is a triangle as a primitive.
+pub(super) fn adopt(
+    tree: &Tree,
+    boxed: &impl Fn(u32) -> Primitive,
+) -> (Vec<Primitive>, Vec<Binary>) {
+    let (mut primitives, mut nodes) = (Vec::new(), Vec::new());
+    if !tree.nodes.is_empty() {
+        take(tree, 0, boxed, &mut primitives, &mut nodes);
+    }
+    (primitives, nodes)
+}
+
+fn take(
+    tree: &Tree,
+    index: usize,
+    boxed: &impl Fn(u32) -> Primitive,
+    primitives: &mut Vec<Primitive>,
+    nodes: &mut Vec<Binary>,
+) {
+    let from = &tree.nodes[index];
+    let bounds = Bounds {
+        low: from.low.into(),
+        high: from.high.into(),
+    };
+    let (node, first) = (nodes.len(), primitives.len());
+    let below = from.first as usize;
+    if from.count > 0 {
+        let triangles = &tree.order[below..below + from.count as usize];
+        primitives.extend(triangles.iter().map(|&t| boxed(t)));
+        nodes.push(Binary::leaf(bounds, first, primitives.len() - first));
+        return;
+    }
+    nodes.push(Binary::leaf(bounds, first, 0));
+    take(tree, below, boxed, primitives, nodes);
+    let second = nodes.len();
+    take(tree, below + 1, boxed, primitives, nodes);
+    let count = primitives.len() - first;
+    nodes[node] = Binary::leaf(bounds, first, count);
+    if count > GROUP {
+        join(node, second, LARGEST_LEAF, nodes);
+    } else {
+        nodes.truncate(node + 1);
+    }
 }
 
 /// How many of the slots the left child gets at least cost, and the cost.

@@ -1,10 +1,10 @@
 //! From the binary hierarchy to nodes of eight children and groups of four triangles.
 
-use super::binary::{self, Binary};
+use super::binary::{self, Binary, Grain, LARGEST_LEAF};
 use super::pages::Pages;
 use super::split::{Bounds, Primitive};
-use super::{Bvh, Child, GROUP, Group, InstructionSet, Node, WIDTH};
-use glam::{Vec3, Vec3A};
+use super::{Bvh, Child, GROUP, Group, InstructionSet, Node, Tree, WIDTH};
+use glam::Vec3;
 use rayon::prelude::*;
 use std::cmp::Reverse;
 
@@ -15,40 +15,65 @@ const SHARES: usize = 64;
 
 pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Bvh {
     let corners = |triangle: u32| triangles[triangle as usize].map(|i| positions[i as usize]);
-    // Leave out what can never be hit and would spoil the boxes.
-    let mut primitives: Vec<Primitive> = (0..triangles.len() as u32)
+    let mut primitives = primitives(triangles.len(), corners);
+    let grain = Grain {
+        alone: alone(primitives.len()),
+        largest_leaf: LARGEST_LEAF,
+    };
+    let binary = if primitives.is_empty() {
+        Vec::new()
+    } else {
+        binary::build(&mut primitives, grain)
+    };
+    lay_out(&corners, &primitives, &binary, triangles.len())
+}
+
+/// [`Bvh::from_tree`].
+pub(super) fn adopt(positions: &[Vec3], triangles: &[[u32; 3]], tree: &Tree) -> Bvh {
+    let corners = |triangle: u32| triangles[triangle as usize].map(|i| positions[i as usize]);
+    let (primitives, binary) = binary::adopt(tree, &|t| Primitive::of(t, corners(t)));
+    lay_out(&corners, &primitives, &binary, triangles.len())
+}
+
+/// The boxes of triangles, without what can never be hit and would spoil them.
+pub(super) fn primitives(count: usize, corners: impl Fn(u32) -> [Vec3; 3]) -> Vec<Primitive> {
+    (0..count as u32)
         .map(|triangle| (triangle, corners(triangle)))
         .filter(|(_, c)| c.iter().all(|v| v.is_finite()))
-        .map(|(triangle, c)| {
-            let [a, b, c] = c.map(Vec3A::from);
-            Primitive {
-                low: a.min(b).min(c),
-                high: a.max(b).max(c),
-                triangle,
-            }
-        })
-        .collect();
+        .map(|(triangle, c)| Primitive::of(triangle, c))
+        .collect()
+}
+
+/// Size from which a subtree is worth a task of its own.
+pub(super) fn alone(primitives: usize) -> usize {
+    ALONE.max(primitives / SHARES)
+}
+
+fn lay_out<C: Fn(u32) -> [Vec3; 3] + Sync>(
+    corners: &C,
+    primitives: &[Primitive],
+    binary: &[Binary],
+    triangles: usize,
+) -> Bvh {
     let mut bvh = Bvh {
         nodes: Pages::new(Vec::new()),
         groups: Pages::new(Vec::new()),
         stack_size: 0,
-        triangles: triangles.len(),
+        triangles,
         instructions: InstructionSet::widest(),
     };
-    if primitives.is_empty() {
+    if binary.is_empty() {
         return bvh;
     }
-    let alone = ALONE.max(primitives.len() / SHARES);
-    let binary = binary::build(&mut primitives, alone);
     // Boxes grow by the rounding of the largest coordinate, so that rays within their faces meet them.
     let bounds = binary[0].bounds;
     let largest = bounds.low.abs().max(bounds.high.abs()).max_element();
     let layout = Layout {
-        corners: &corners,
-        primitives: &primitives,
-        binary: &binary,
+        corners,
+        primitives,
+        binary,
         margin: largest * 2.0 * f32::EPSILON,
-        alone: alone as u32,
+        alone: alone(primitives.len()) as u32,
     };
     let tree = layout.subtree(0);
     bvh.nodes = Pages::new(tree.nodes);

@@ -18,11 +18,14 @@ mod shear;
 mod slabs;
 mod split;
 mod traverse;
+mod tree;
 
 use crate::scene::geometry::{Hit, Ray};
 use glam::Vec3;
 use pages::Pages;
 use std::hint::select_unpredictable;
+
+pub use tree::{Tree, TreeNode};
 
 /// Children of a node.
 const WIDTH: usize = 8;
@@ -161,6 +164,12 @@ impl Bvh {
     /// Builds the hierarchy of a mesh. Triangles with corners that are not finite are never hit.
     pub fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         build::build(positions, triangles)
+    }
+
+    /// The hierarchy of a mesh by another builder's binary tree: its leaves are joined and its nodes opened eight wide at least
+    /// cost. A triangle may be in several leaves.
+    pub fn from_tree(positions: &[Vec3], triangles: &[[u32; 3]], tree: &Tree) -> Self {
+        build::adopt(positions, triangles, tree)
     }
 
     /// The same hierarchy, traversed with another instruction set (which the processor must have; else portable).

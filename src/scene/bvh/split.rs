@@ -1,7 +1,7 @@
 //! Where a set of boxes is best split in two: binned surface area heuristic (Wald 2007).
 
 use super::GROUP;
-use glam::{UVec3, Vec3A};
+use glam::{UVec3, Vec3, Vec3A};
 
 /// A triangle's box.
 #[derive(Clone, Copy)]
@@ -12,6 +12,15 @@ pub(super) struct Primitive {
 }
 
 impl Primitive {
+    pub fn of(triangle: u32, corners: [Vec3; 3]) -> Self {
+        let [a, b, c] = corners.map(Vec3A::from);
+        Self {
+            low: a.min(b).min(c),
+            high: a.max(b).max(c),
+            triangle,
+        }
+    }
+
     /// Twice the box's centre.
     #[inline(always)]
     fn center(&self) -> Vec3A {

@@ -18,6 +18,7 @@ use crate::export::overwrite::CaptureId;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Progress, Termination};
+use crate::render::Renderer;
 use crate::session::command::Source;
 use crate::session::edits::{Edited, Edits};
 use crate::session::snapshot::OpenCapture;
@@ -46,6 +47,8 @@ pub struct Results {
     pub checkpoint: Option<Checkpoint>,
     /// Which frames get pictures.
     pub views: Frames,
+    /// What traces their paths.
+    pub renderer: Renderer,
     /// When the work began.
     pub started: Instant,
     /// Seconds spent reading the capture.

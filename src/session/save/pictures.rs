@@ -6,12 +6,12 @@ use crate::export::falsecolor::{write_magnitude, write_signed};
 use crate::export::picture::{percentile_exposure, write_png};
 use crate::inverse::estimate::Estimate;
 use crate::math::picture::Picture;
+use crate::render::Pictures;
 use crate::scene::camera::Camera;
 use crate::session::light::path_options;
 use crate::session::save::Results;
 use crate::session::save::staging::Staging;
 use crate::session::view::hits::Hits;
-use crate::transport::film::Film;
 use crate::transport::lit::Lit;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -82,43 +82,41 @@ pub fn write(staging: &mut Staging, results: &Results) -> Result<()> {
     let samples = (PATHS / pixels.max(1)).clamp(SAMPLES.0, SAMPLES.1) as u32;
     let estimate = results.edited();
     let lit = estimate.lit(&capture.scene);
-    let shown = Shown { estimate, lit };
+    let mut shown = Shown {
+        renders: Pictures::new(&results.renderer, &lit),
+        estimate,
+        lit: &lit,
+    };
     for (index, camera) in &cameras {
-        frame(staging, results, &shown, *index, camera, samples)?;
+        frame(staging, results, &mut shown, *index, camera, samples)?;
     }
     Ok(())
 }
 
 /// What the pictures show: the estimate as it was changed by hand.
-struct Shown {
+struct Shown<'a> {
     estimate: Arc<Estimate>,
-    lit: Lit,
+    lit: &'a Lit,
+    renders: Pictures<'a>,
 }
 
 fn frame(
     staging: &mut Staging,
     results: &Results,
-    shown: &Shown,
+    shown: &mut Shown<'_>,
     index: usize,
     camera: &Camera,
     samples: u32,
 ) -> Result<()> {
     let capture = &results.capture;
-    let Shown { estimate, lit } = shown;
+    let (estimate, lit) = (&shown.estimate, shown.lit);
     let scene = &capture.scene;
     let (photograph, shown_at) = capture.sized_photograph(index, camera)?;
 
     // The render in the photograph's values, so that the two can be subtracted.
-    let mut film = Film::new(camera);
     let options = path_options(&results.settings);
-    film.add(
-        lit,
-        camera,
-        &options,
-        results.settings.seed,
-        index as u64,
-        samples,
-    );
+    let key = (results.settings.seed, index as u64);
+    let film = shown.renders.film(camera, &options, key, samples);
     let mut render = Picture {
         pixels: film.mean(),
         ..photograph.clone()

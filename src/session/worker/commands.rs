@@ -5,6 +5,7 @@ use crate::export::picture::shown_at;
 use crate::export::{light_layers, scene};
 use crate::inverse::held_out::HoldOut;
 use crate::math::picture::Picture;
+use crate::render::Renderer;
 use crate::session::command::{Command, ExportRequest, OpenOptions, ViewCamera};
 use crate::session::keep::{Held, State};
 use crate::session::save::pictures::Frames;
@@ -162,6 +163,7 @@ impl Worker {
             },
             checkpoint: self.checkpoint.clone(),
             views: Frames::default(),
+            renderer: Renderer::processor(),
             started: self.started,
             seconds_load: self.seconds_load,
         })

@@ -1,0 +1,183 @@
+//! What processor and card share: structs laid out once, and the constants of the shader.
+
+use bytemuck::{Pod, Zeroable};
+use std::fmt::Write;
+
+/// Threads of a workgroup.
+pub(super) const WORKGROUP: u32 = 64;
+/// No triangle, no table.
+pub(super) const NONE: u32 = u32::MAX;
+/// Words of four that hold a triangle: three corners and the normal.
+pub(super) const TRIANGLE_WORDS: usize = 4;
+/// How an albedo is stored.
+pub(super) const ALBEDO_CONSTANT: u32 = 0;
+/// One colour a texel.
+pub(super) const ALBEDO_TEXELS: u32 = 1;
+/// An image times a constant.
+pub(super) const ALBEDO_IMAGE: u32 = 2;
+
+/// A field that has the same bytes on both sides.
+trait Shared {
+    const WGSL: &'static str;
+    /// What WGSL aligns it to.
+    const ALIGNMENT: usize;
+}
+
+impl Shared for [f32; 4] {
+    const WGSL: &'static str = "vec4<f32>";
+    const ALIGNMENT: usize = 16;
+}
+
+impl Shared for [u32; 4] {
+    const WGSL: &'static str = "vec4<u32>";
+    const ALIGNMENT: usize = 16;
+}
+
+/// Defines structs for both sides; their fields lie where WGSL puts them, or it does not compile.
+macro_rules! shared {
+    ($($(#[$about:meta])* struct $name:ident { $($(#[$field_about:meta])* $field:ident: $kind:ty,)* })*) => {
+        $(
+            $(#[$about])*
+            #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+            #[repr(C, align(16))]
+            pub(super) struct $name {
+                $($(#[$field_about])* pub $field: $kind,)*
+            }
+            $(const _: () = assert!(
+                std::mem::offset_of!($name, $field) % <$kind as Shared>::ALIGNMENT == 0
+            );)*
+        )*
+
+        /// The structs as WGSL.
+        fn structs() -> String {
+            let mut text = String::new();
+            $(
+                text += concat!("struct ", stringify!($name), " {\n");
+                $(text += &format!("    {}: {},\n", stringify!($field), <$kind as Shared>::WGSL);)*
+                text += "}\n\n";
+            )*
+            text
+        }
+    };
+}
+
+shared! {
+    /// What a dispatch is to trace.
+    struct Dispatch {
+        /// The camera's centre.
+        center: [f32; 4],
+        /// The camera's axis to the right.
+        axis_x: [f32; 4],
+        /// The camera's axis upwards.
+        axis_y: [f32; 4],
+        /// The camera's axis backwards.
+        axis_z: [f32; 4],
+        /// Focal lengths and principal point in pixels.
+        lens: [f32; 4],
+        /// Radial k1, k2, tangential p1, p2.
+        distortion: [f32; 4],
+        /// Hash of seed and frame, the low word first.
+        key: [u32; 4],
+        /// Width of the picture, first pixel, end of the pixels, first sample.
+        slice: [u32; 4],
+        /// Samples, most bounces, bounces before Russian roulette, the pixel that the film begins with.
+        paths: [u32; 4],
+        /// Emitting objects, unused, width and height of the light from outside (0 where there is none).
+        lights: [u32; 4],
+        /// Chance of sampling an emitter of the mesh rather than the light from outside.
+        share: [f32; 4],
+    }
+
+    /// What a triangle is made of.
+    struct Material {
+        /// Constant albedo, or factor on the image.
+        albedo: [f32; 4],
+        /// Emitted radiance, and the density per square metre of light sampling.
+        emission: [f32; 4],
+        /// Specular reflectance at normal incidence, and the roughness (negative without a lobe).
+        specular: [f32; 4],
+        /// How the albedo is stored, and where: texel table and colours, or image and corner coordinates.
+        kind: [u32; 4],
+        /// Size of the image, and the index of the first triangle that the tables know.
+        image: [u32; 4],
+        /// Where normals and colours of the corners are stored, or [`NONE`].
+        corners: [u32; 4],
+    }
+
+    /// What was found for one pixel.
+    struct Pixel {
+        /// Sum of radiance, and samples that see an inserted object first.
+        over: [f32; 4],
+        /// Sum of radiance without the inserted objects.
+        under: [f32; 4],
+        /// Sum of radiance of the samples that see an inserted object first.
+        covered: [f32; 4],
+        /// The same without the inserted objects.
+        covered_under: [f32; 4],
+        /// Rays, rejected samples, unused, samples that the objects change.
+        counts: [u32; 4],
+    }
+}
+
+/// The head of the shader: constants, structs and bindings. `stack_size` entries bound the hierarchy's depth.
+pub(super) fn head(stack_size: u32) -> String {
+    use crate::scene::geometry::OFFSET_GAMMA;
+    use crate::transport::bsdf::{COUPLING_SLOPE, coupling_scale};
+    use crate::transport::path::MOST_SURVIVAL;
+    // Three roundings of a slab, as on the processor.
+    let widen = 1.0 + 8.0 * f32::EPSILON;
+    // Two products and a difference, each off by half an epsilon.
+    let rounding = 2.0 * f32::EPSILON;
+    let mut text = String::new();
+    for (name, value) in [
+        ("WIDEN", widen),
+        ("ROUNDING", rounding),
+        ("OFFSET_GAMMA", OFFSET_GAMMA),
+        ("FAR", f32::MAX),
+        ("SMALLEST", f32::MIN_POSITIVE),
+        ("PI", std::f32::consts::PI),
+        ("COUPLING_SLOPE", COUPLING_SLOPE as f32),
+        ("COUPLING_SCALE", coupling_scale() as f32),
+        ("NORMAL_MARGIN", crate::transport::world::NORMAL_MARGIN),
+        ("MAX_SURVIVAL", MOST_SURVIVAL),
+    ] {
+        let _ = writeln!(text, "const {name} = {value:e}f;");
+    }
+    for (name, value) in [
+        ("WORKGROUP", WORKGROUP),
+        ("NONE", NONE),
+        ("TRIANGLE_WORDS", TRIANGLE_WORDS as u32),
+        ("ALBEDO_TEXELS", ALBEDO_TEXELS),
+        ("ALBEDO_IMAGE", ALBEDO_IMAGE),
+        ("STACK_SIZE", stack_size),
+    ] {
+        let _ = writeln!(text, "const {name} = {value}u;");
+    }
+    text += "\n";
+    text += &structs();
+    text += "@group(0) @binding(0) var<uniform> dispatch: Dispatch;\n";
+    for (index, (name, kind)) in BINDINGS.iter().enumerate() {
+        let access = if *name == FILM { "read_write" } else { "read" };
+        let _ = writeln!(
+            text,
+            "@group(0) @binding({}) var<storage, {access}> {name}: array<{kind}>;",
+            index + 1
+        );
+    }
+    text
+}
+
+/// The binding that is written.
+pub(super) const FILM: &str = "film";
+
+/// The storage bindings behind the uniform one, with their elements. Eight are what WebGPU grants everywhere.
+pub(super) const BINDINGS: [(&str, &str); 8] = [
+    ("nodes", "vec4<u32>"),
+    ("triangles", "vec4<u32>"),
+    ("materials", "Material"),
+    ("data", "u32"),
+    ("emitters", "vec4<u32>"),
+    ("environment", "vec4<u32>"),
+    ("rays", "vec4<f32>"),
+    (FILM, "Pixel"),
+];

@@ -1,0 +1,93 @@
+//! Emitters and light from outside as tables of cumulative chances in whole numbers, which the shader compares exactly.
+
+use super::layout::NONE;
+use crate::transport::environment::{Environment, row_cosines};
+use crate::transport::lit::Lit;
+
+/// Bits of the number that chooses an object or a pixel of the light from outside.
+const CHOICE_BITS: i32 = 53;
+/// Bits of the number that chooses a triangle.
+const TRIANGLE_BITS: i32 = 48;
+
+/// Objects that can be drawn, then their triangles: (low word, high word, first entry or slot, number of entries).
+#[derive(Debug, Default)]
+pub(super) struct Emitters {
+    /// The entries.
+    pub entries: Vec<[u32; 4]>,
+    /// How many of them are objects.
+    pub objects: u32,
+}
+
+impl Emitters {
+    /// The emitters of a scene whose triangles lie at `slot_of` ([`NONE`] where one can never be hit).
+    pub fn new(lit: &Lit, slot_of: &[u32]) -> Self {
+        let chance = |object: usize| lit.emitters.probability(object);
+        let drawn: Vec<usize> = (0..lit.scene.objects.len())
+            .filter(|&object| chance(object) > 0.0 && lit.emitters.pdf(object as u32) > 0.0)
+            .collect();
+        let chances: Vec<f64> = drawn.iter().map(|&object| chance(object)).collect();
+        let chosen = thresholds(&chances, CHOICE_BITS);
+        let mut entries = vec![[0; 4]; drawn.len()];
+        for (index, (&object, threshold)) in drawn.iter().zip(chosen).enumerate() {
+            let first = entries.len() as u32;
+            let triangles: Vec<u32> = lit.scene.objects[object]
+                .triangles
+                .iter()
+                .copied()
+                .filter(|&t| slot_of[t as usize] != NONE)
+                .collect();
+            let areas: Vec<f64> = triangles
+                .iter()
+                .map(|&t| f64::from(lit.scene.areas[t as usize]))
+                .collect();
+            let drawn = thresholds(&areas, TRIANGLE_BITS);
+            for (threshold, &t) in drawn.into_iter().zip(&triangles) {
+                entries.push(entry(threshold, slot_of[t as usize], 0));
+            }
+            entries[index] = entry(threshold, first, triangles.len() as u32);
+        }
+        Self {
+            entries,
+            objects: drawn.len() as u32,
+        }
+    }
+}
+
+/// The light from outside: radiances with densities, cumulative chances, cosines of the rows' edges.
+pub(super) fn environment(map: &Environment) -> Vec<[u32; 4]> {
+    let [width, height] = map.size();
+    let mut words: Vec<[u32; 4]> = (map.pixels().iter().enumerate())
+        .map(|(pixel, radiance)| {
+            let light = radiance.extend(map.pixel_pdf(pixel));
+            light.to_array().map(f32::to_bits)
+        })
+        .collect();
+    let before = std::iter::once(0.0).chain(map.cumulative().iter().copied());
+    let chances: Vec<f64> = (map.cumulative().iter().zip(before))
+        .map(|(sum, before)| sum - before)
+        .collect();
+    let drawn = thresholds(&chances, CHOICE_BITS);
+    words.extend(drawn.into_iter().map(|threshold| entry(threshold, 0, 0)));
+    words.extend((0..height).map(|row| {
+        let (top, bottom) = row_cosines(row, height);
+        [(top as f32).to_bits(), (bottom as f32).to_bits(), 0, 0]
+    }));
+    debug_assert_eq!(words.len(), 2 * width * height + height);
+    words
+}
+
+/// Cumulative chances in units of 2^-bits; the last is 1 where there is any chance.
+fn thresholds(chances: &[f64], bits: i32) -> Vec<u64> {
+    let total: f64 = chances.iter().sum();
+    let scale = 2f64.powi(bits);
+    let mut sum = 0.0;
+    let mut threshold = |chance: &f64| {
+        sum += chance;
+        (sum / total * scale).ceil() as u64
+    };
+    chances.iter().map(&mut threshold).collect()
+}
+
+fn entry(threshold: u64, third: u32, fourth: u32) -> [u32; 4] {
+    [threshold as u32, (threshold >> 32) as u32, third, fourth]
+}

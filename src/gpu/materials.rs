@@ -1,0 +1,108 @@
+//! Materials and their tables as the shader reads them.
+
+use super::layout::{ALBEDO_CONSTANT, ALBEDO_IMAGE, ALBEDO_TEXELS, Material as Shared, NONE};
+use super::scene::Inserted;
+use crate::transport::bsdf::MIN_ROUGHNESS;
+use crate::transport::lit::Lit;
+use crate::transport::material::{Albedo, Material};
+use glam::Vec3;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// Materials, and the words that they point into.
+#[derive(Debug, Default)]
+pub(super) struct Materials {
+    /// One an object of the scene, then those of each inserted object.
+    pub materials: Vec<Shared>,
+    /// Tables of colours, texels, coordinates and normals.
+    pub data: Vec<u32>,
+    /// Where tables that several materials share are stored, by their address.
+    stored: HashMap<usize, u32>,
+}
+
+impl Materials {
+    /// The materials of a scene, each with the density of light sampling.
+    pub fn new(lit: &Lit) -> Self {
+        let mut all = Self::default();
+        for (object, material) in lit.materials.iter().enumerate() {
+            let mut shared = all.shared(material, 0);
+            let density = lit.emitters.pdf(object as u32);
+            shared.emission = with(material.emission, density);
+            all.materials.push(shared);
+        }
+        all
+    }
+
+    /// Adds those of an inserted object, whose triangles follow `first` others; returns the index of the first one.
+    pub fn insert(&mut self, object: &Inserted<'_>, first: u32) -> u32 {
+        let index = self.materials.len() as u32;
+        let normals = self.corners(object.corner_normals);
+        let colors = self.corners(object.corner_colors);
+        for material in object.materials {
+            let shared = self.shared(material, first);
+            self.materials.push(Shared {
+                corners: [normals, colors, 0, 0],
+                ..shared
+            });
+        }
+        index
+    }
+
+    /// A material without emission.
+    fn shared(&mut self, material: &Material, first: u32) -> Shared {
+        let (albedo, kind, size) = match &material.albedo {
+            Albedo::Constant(color) => (*color, [ALBEDO_CONSTANT, 0, 0, 0], [0; 2]),
+            Albedo::Texels(texels) => {
+                let first = self.table(&texels.layout.first, |word| [*word]);
+                let colors = self.table(&texels.colors, |color| color.to_array().map(f32::to_bits));
+                (Vec3::ONE, [ALBEDO_TEXELS, first, colors, 0], [0; 2])
+            }
+            Albedo::Image(texture, tint) => {
+                let pixels =
+                    self.table(&texture.pixels, |color| color.to_array().map(f32::to_bits));
+                let corners: &Arc<Vec<_>> = &texture.corner_uvs;
+                let uvs = self.table(corners, |[a, b, c]: &[glam::Vec2; 3]| {
+                    [a.x, a.y, b.x, b.y, c.x, c.y].map(f32::to_bits)
+                });
+                let size = [texture.width, texture.height];
+                (*tint, [ALBEDO_IMAGE, pixels, uvs, 0], size)
+            }
+        };
+        let lobe = material.lobe;
+        let roughness = lobe.map_or(-1.0, |lobe| lobe.roughness.max(MIN_ROUGHNESS));
+        let specular = lobe.map_or(Vec3::ZERO, |lobe| lobe.specular);
+        Shared {
+            albedo: with(albedo, 0.0),
+            emission: [0.0; 4],
+            specular: with(specular, roughness),
+            kind,
+            image: [size[0], size[1], first, 0],
+            corners: [NONE, NONE, 0, 0],
+        }
+    }
+
+    /// Values at the corners of triangles; [`NONE`] where there are none.
+    fn corners(&mut self, values: &[[Vec3; 3]]) -> u32 {
+        if values.is_empty() {
+            return NONE;
+        }
+        let place = self.data.len() as u32;
+        let numbers = values.iter().flatten().flat_map(|v| v.to_array());
+        self.data.extend(numbers.map(f32::to_bits));
+        place
+    }
+
+    /// Stores a table once and returns where.
+    fn table<T, const N: usize>(&mut self, items: &[T], words: impl Fn(&T) -> [u32; N]) -> u32 {
+        let place = self.data.len() as u32;
+        let stored = *self.stored.entry(items.as_ptr() as usize).or_insert(place);
+        if stored == place {
+            self.data.extend(items.iter().flat_map(words));
+        }
+        stored
+    }
+}
+
+fn with(v: Vec3, w: f32) -> [f32; 4] {
+    v.extend(w).to_array()
+}

@@ -1,0 +1,96 @@
+//! A lit scene with inserted objects as the shader reads it: triangles in the order of the hierarchy, materials, lights.
+
+use super::hierarchy::Hierarchy;
+use super::layout::{Dispatch, Material as Shared, NONE};
+use super::lights::{Emitters, environment};
+use super::materials::Materials;
+use crate::transport::lit::Lit;
+use crate::transport::material::Material;
+use crate::transport::path::emitter_share;
+use glam::Vec3;
+
+/// An object put into a scene, in the scene's coordinates.
+#[derive(Debug, Clone, Copy)]
+pub struct Inserted<'a> {
+    /// Corners of each triangle.
+    pub corners: &'a [[Vec3; 3]],
+    /// Unit geometric normal of each triangle's front.
+    pub normals: &'a [Vec3],
+    /// Unit shading normals at the corners; empty where there are none.
+    pub corner_normals: &'a [[Vec3; 3]],
+    /// Factors on the albedo at the corners; empty where there are none.
+    pub corner_colors: &'a [[Vec3; 3]],
+    /// For each triangle, an index into `materials`.
+    pub material_of: &'a [u32],
+    /// What it is made of; emission does not count.
+    pub materials: &'a [Material],
+}
+
+/// All storage buffers of a scene, on the processor's side.
+#[derive(Debug)]
+pub(super) struct Packed {
+    pub nodes: Vec<[u32; 4]>,
+    pub triangles: Vec<[u32; 4]>,
+    pub materials: Vec<Shared>,
+    pub data: Vec<u32>,
+    pub emitters: Vec<[u32; 4]>,
+    pub environment: Vec<[u32; 4]>,
+    /// Entries of a traversal's stack.
+    pub stack_size: u32,
+    /// What a dispatch says of the scene; the rest is zero.
+    pub dispatch: Dispatch,
+}
+
+impl Packed {
+    pub fn new(lit: &Lit, objects: &[Inserted<'_>]) -> Self {
+        let scene = &lit.scene;
+        let own = scene.triangles.len();
+        let mut corners: Vec<[Vec3; 3]> = (0..own as u32).map(|t| scene.corners(t)).collect();
+        let mut normals = scene.normals.clone();
+        let mut material_of = scene.object_of.clone();
+        let mut materials = Materials::new(lit);
+        for object in objects {
+            let first = materials.insert(object, corners.len() as u32);
+            corners.extend(object.corners);
+            normals.extend(object.normals);
+            material_of.extend(object.material_of.iter().map(|m| first + m));
+        }
+
+        let hierarchy = Hierarchy::new(&corners);
+        let mut slot_of = vec![NONE; corners.len()];
+        let mut triangles = Vec::with_capacity(4 * corners.len());
+        for (slot, &index) in hierarchy.order.iter().enumerate() {
+            let t = index as usize;
+            slot_of[t] = slot as u32;
+            let [a, b, c] = corners[t];
+            triangles.push(word(a, index));
+            triangles.push(word(b, material_of[t]));
+            triangles.push(word(c, u32::from(t >= own)));
+            triangles.push(word(normals[t], 0));
+        }
+
+        let emitters = Emitters::new(lit, &slot_of);
+        let outside = lit.outside.as_deref();
+        let [width, height] = outside.map_or([0; 2], |map| map.size().map(|n| n as u32));
+        let dispatch = Dispatch {
+            lights: [emitters.objects, 0, width, height],
+            share: [emitter_share(lit), 0.0, 0.0, 0.0],
+            ..Dispatch::default()
+        };
+        Self {
+            nodes: hierarchy.nodes,
+            triangles,
+            materials: materials.materials,
+            data: materials.data,
+            emitters: emitters.entries,
+            environment: outside.map(environment).unwrap_or_default(),
+            stack_size: hierarchy.stack_size,
+            dispatch,
+        }
+    }
+}
+
+fn word(v: Vec3, w: u32) -> [u32; 4] {
+    let [x, y, z] = v.to_array().map(f32::to_bits);
+    [x, y, z, w]
+}

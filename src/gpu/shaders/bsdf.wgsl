@@ -1,0 +1,87 @@
+// Scattering at a surface point: a diffuse base, and over it a rough specular lobe where there is one. Directions are local:
+// their z axis is the normal on the side of `wo`.
+
+struct BsdfSample {
+    wi: vec3<f32>,
+    // f(wo, wi) cosθi / pdf.
+    weight: vec3<f32>,
+    // Density per solid angle; zero where the sample carries nothing.
+    pdf: f32,
+}
+
+// Cosine and sine of a share of the full turn; arguments stay within ±π, where their precision is specified.
+fn circle(share: f32) -> vec2<f32> {
+    let angle = 2.0 * PI * (share - select(0.0, 1.0, share > 0.5));
+    return vec2<f32>(cos(angle), sin(angle));
+}
+
+// Unit disk, uniform in area (Shirley and Chiu 1997, concentric).
+fn concentric_disk(u: vec2<f32>) -> vec2<f32> {
+    let p = 2.0 * u - 1.0;
+    if p.x == 0.0 && p.y == 0.0 {
+        return vec2<f32>(0.0);
+    }
+    if abs(p.x) > abs(p.y) {
+        let angle = 0.25 * PI * (p.y / p.x);
+        return p.x * vec2<f32>(cos(angle), sin(angle));
+    }
+    let angle = 0.5 * PI - 0.25 * PI * (p.x / p.y);
+    return p.y * vec2<f32>(cos(angle), sin(angle));
+}
+
+// Density cosθ/π per solid angle.
+fn cosine_hemisphere(u: vec2<f32>) -> vec3<f32> {
+    let disk = concentric_disk(u);
+    return vec3<f32>(disk, sqrt(max(1.0 - dot(disk, disk), 0.0)));
+}
+
+// Upper bound of the share of light that a lobe with no reflectance at normal incidence reflects.
+fn reflected(cosine: f32) -> f32 {
+    return fifth(1.0 - COUPLING_SLOPE * cosine);
+}
+
+// The base's f cosθi for unit albedo, before the factor (1 − specular reflectance at normal incidence).
+fn coupling(wo: vec3<f32>, wi: vec3<f32>) -> f32 {
+    return COUPLING_SCALE * wi.z * (1.0 - reflected(wo.z)) * (1.0 - reflected(wi.z));
+}
+
+// At least the share of light that the lobe reflects to `wo`, mean over the channels.
+fn lobe_share(surface: Surface, wo: vec3<f32>) -> f32 {
+    let specular = (surface.specular.x + surface.specular.y + surface.specular.z) / 3.0;
+    return specular + (1.0 - specular) * reflected(wo.z);
+}
+
+// f(wo, wi) cosθi and, as w, the density with which `bsdf_sample` draws `wi`; zero at or below the horizon.
+fn bsdf_eval(surface: Surface, wo: vec3<f32>, wi: vec3<f32>) -> vec4<f32> {
+    if wo.z <= 0.0 || wi.z <= 0.0 {
+        return vec4<f32>(0.0);
+    }
+    let base = wi.z / PI;
+    if surface.roughness < 0.0 {
+        return vec4<f32>(surface.albedo * base, base);
+    }
+    let m = microfacet(surface.roughness, wo, wi);
+    let fresnel = surface.specular + (1.0 - surface.specular) * m.schlick;
+    let value = surface.albedo * (1.0 - surface.specular) * coupling(wo, wi) + fresnel * microfacet_eval(m);
+    let share = lobe_share(surface, wo);
+    return vec4<f32>(value, share * microfacet_pdf(m) + (1.0 - share) * base);
+}
+
+// Draws a direction: `choice` decides between lobe and base, `u` the direction.
+fn bsdf_sample(surface: Surface, wo: vec3<f32>, choice: f32, u: vec2<f32>) -> BsdfSample {
+    if wo.z <= 0.0 {
+        return BsdfSample(vec3<f32>(0.0), vec3<f32>(0.0), 0.0);
+    }
+    var wi: vec3<f32>;
+    if surface.roughness >= 0.0 && choice < lobe_share(surface, wo) {
+        wi = reflect_on_visible_normal(surface.roughness, wo, u);
+    } else {
+        wi = cosine_hemisphere(u);
+    }
+    let value = bsdf_eval(surface, wo, wi);
+    if !(value.w > 0.0 && value.w < FAR) {
+        return BsdfSample(wi, vec3<f32>(0.0), 0.0);
+    }
+    let weight = select(surface.albedo, value.xyz / value.w, surface.roughness >= 0.0);
+    return BsdfSample(wi, weight, value.w);
+}

@@ -1,0 +1,98 @@
+// Pictures from paths: a slice of pixels and samples a dispatch, each thread the samples of one pixel.
+
+// The ray through a point of the image plane, in pixels from the top-left corner (`scene::camera`).
+fn camera_ray(pixel: vec2<f32>) -> Ray {
+    let distorted = (pixel - dispatch.lens.zw) / dispatch.lens.xy;
+    let p = undistorted(distorted);
+    let direction = dispatch.axis_x.xyz * p.x - dispatch.axis_y.xyz * p.y - dispatch.axis_z.xyz;
+    return Ray(dispatch.center.xyz, normal_or(direction, vec3<f32>(0.0)), FAR);
+}
+
+// Undistorted image coordinates, by fixed-point iteration (`capture::camera`).
+fn undistorted(image: vec2<f32>) -> vec2<f32> {
+    let k = dispatch.distortion;
+    var p = image;
+    if all(k == vec4<f32>(0.0)) {
+        return p;
+    }
+    for (var i = 0; i < 20; i += 1) {
+        let r2 = dot(p, p);
+        if 1.0 + 3.0 * k.x * r2 + 5.0 * k.y * r2 * r2 <= 0.0 {
+            break;
+        }
+        let tangential = vec2<f32>(
+            2.0 * k.z * p.x * p.y + k.w * (r2 + 2.0 * p.x * p.x),
+            k.z * (r2 + 2.0 * p.y * p.y) + 2.0 * k.w * p.x * p.y,
+        );
+        p += image - (p * (1.0 + k.x * r2 + k.y * r2 * r2) + tangential);
+    }
+    return p;
+}
+
+// The pixel of a thread; NONE where it has none.
+fn pixel_of(thread: u32) -> u32 {
+    let pixel = dispatch.slice.y + thread;
+    return select(NONE, pixel, pixel < dispatch.slice.z);
+}
+
+fn begin_sample(pixel: u32, sample: u32) -> Ray {
+    begin_stream(pixel, sample);
+    let corner = vec2<f32>(f32(pixel % dispatch.slice.x), f32(pixel / dispatch.slice.x));
+    return camera_ray(corner + uniform2());
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn render(@builtin(global_invocation_id) id: vec3<u32>) {
+    let pixel = pixel_of(id.x);
+    if pixel == NONE {
+        return;
+    }
+    furnished = true;
+    for (var i = 0u; i < dispatch.paths.x; i += 1u) {
+        let path = radiance(begin_sample(pixel, dispatch.slice.w + i));
+        film[pixel - dispatch.paths.w].over += vec4<f32>(path.radiance, 0.0);
+        film[pixel - dispatch.paths.w].counts += vec4<u32>(path.rays, u32(path.rejected), 0u, 0u);
+    }
+}
+
+// Pairs of paths with and without the inserted objects, from the same random numbers (`compose::insert`).
+@compute @workgroup_size(WORKGROUP)
+fn insert(@builtin(global_invocation_id) id: vec3<u32>) {
+    let pixel = pixel_of(id.x);
+    if pixel == NONE {
+        return;
+    }
+    for (var i = 0u; i < dispatch.paths.x; i += 1u) {
+        let ray = begin_sample(pixel, dispatch.slice.w + i);
+        let state = stream_state;
+        furnished = true;
+        let first = traverse(ray, false);
+        var covered = false;
+        if first.slot != NONE {
+            covered = is_inserted(first.slot);
+        }
+        touched = false;
+        let with_objects = radiance(ray);
+        // A path that met no object would be the same without them.
+        var without = with_objects;
+        without.rays = 0u;
+        if touched {
+            stream_state = state;
+            furnished = false;
+            without = radiance(ray);
+        }
+        // A pair is dropped as a whole, or the difference would be biased.
+        let rejected = with_objects.rejected || without.rejected;
+        let keep = select(1.0, 0.0, rejected);
+        let over = with_objects.radiance * keep;
+        let under = without.radiance * keep;
+        film[pixel - dispatch.paths.w].over += vec4<f32>(over, f32(covered));
+        film[pixel - dispatch.paths.w].under += vec4<f32>(under, 0.0);
+        if covered {
+            film[pixel - dispatch.paths.w].covered += vec4<f32>(over, 0.0);
+            film[pixel - dispatch.paths.w].covered_under += vec4<f32>(under, 0.0);
+        }
+        let changed = covered || any(over != under);
+        film[pixel - dispatch.paths.w].counts += vec4<u32>(with_objects.rays + without.rays, u32(rejected), 0u, u32(changed));
+    }
+}

@@ -1,0 +1,147 @@
+// The unidirectional path tracer with next-event estimation and multiple importance sampling (`transport::path`).
+
+struct Frame {
+    s: vec3<f32>,
+    t: vec3<f32>,
+    n: vec3<f32>,
+}
+
+// What one path found.
+struct PathSample {
+    radiance: vec3<f32>,
+    rays: u32,
+    rejected: bool,
+}
+
+// The frame around a unit vector (Duff et al. 2017).
+fn frame_around(n: vec3<f32>) -> Frame {
+    let side = select(1.0, -1.0, (bitcast<u32>(n.z) & 0x80000000u) != 0u);
+    let a = -1.0 / (side + n.z);
+    let b = n.x * n.y * a;
+    return Frame(
+        vec3<f32>(1.0 + side * n.x * n.x * a, side * b, -side * n.x),
+        vec3<f32>(b, side + n.y * n.y * a, -n.y),
+        n,
+    );
+}
+
+fn to_local(f: Frame, v: vec3<f32>) -> vec3<f32> {
+    return vec3<f32>(dot(v, f.s), dot(v, f.t), dot(v, f.n));
+}
+
+fn to_world(f: Frame, v: vec3<f32>) -> vec3<f32> {
+    return f.s * v.x + f.t * v.y + f.n * v.z;
+}
+
+// Weight of a sample drawn with density `a` where `b` could have drawn it too: power heuristic, β = 2.
+fn power_heuristic(a: f32, b: f32) -> f32 {
+    if a <= 0.0 {
+        return 0.0;
+    }
+    let ratio = min(b / a, 1e18);
+    return 1.0 / (1.0 + ratio * ratio);
+}
+
+fn is_finite(v: vec3<f32>) -> bool {
+    let exponents = bitcast<vec3<u32>>(v) & vec3<u32>(0x7f800000u);
+    return all(exponents != vec3<u32>(0x7f800000u));
+}
+
+fn largest(v: vec3<f32>) -> f32 {
+    return max(max(v.x, v.y), v.z);
+}
+
+// Light that reaches a surface straight from an emitter or from outside and is scattered towards `wo`: one light sample.
+fn direct_light(surface: Surface, local: Frame, wo: vec3<f32>, rays: ptr<function, u32>) -> vec3<f32> {
+    let pick = uniform1();
+    let choice = uniform53();
+    let u = uniform2();
+    var light = no_light();
+    if pick < dispatch.share.x {
+        if dispatch.lights.x > 0u {
+            light = sample_emitter(surface, choice, u);
+        }
+    } else if dispatch.lights.z > 0u {
+        light = sample_environment(surface, choice, u);
+    }
+    if light.pdf <= 0.0 {
+        return vec3<f32>(0.0);
+    }
+    let scattered = bsdf_eval(surface, wo, to_local(local, light.wi));
+    if all(scattered.xyz == vec3<f32>(0.0)) {
+        return vec3<f32>(0.0);
+    }
+    *rays += 1u;
+    if occluded(light.ray) {
+        return vec3<f32>(0.0);
+    }
+    return scattered.xyz * light.radiance / light.pdf * power_heuristic(light.pdf, scattered.w);
+}
+
+// Radiance that arrives against a ray, estimated by one path.
+fn radiance(camera_ray: Ray) -> PathSample {
+    var ray = camera_ray;
+    var throughput = vec3<f32>(1.0);
+    var total = vec3<f32>(0.0);
+    var rays = 0u;
+    var bounce = 0u;
+    // Negative on the camera ray, which no light sample competes with.
+    var bsdf_pdf = -1.0;
+    loop {
+        // Find the next vertex.
+        rays += 1u;
+        let hit = traverse(ray, false);
+        if hit.slot == NONE {
+            if dispatch.lights.z > 0u {
+                let light = environment_at(environment_pixel(normal_or(ray.direction, vec3<f32>(0.0))));
+                let weight = select(power_heuristic(bsdf_pdf, light.w * (1.0 - dispatch.share.x)), 1.0, bsdf_pdf < 0.0);
+                total += throughput * light.xyz * weight;
+            }
+            break;
+        }
+        let surface = surface_at(hit, ray);
+
+        // Add what it emits towards us.
+        let wo = -normal_or(ray.direction, vec3<f32>(0.0));
+        let cos_emitter = dot(surface.normal, wo);
+        if cos_emitter > 0.0 && any(surface.emission != vec3<f32>(0.0)) {
+            let along = ray.direction * surface.t;
+            let light_pdf = dispatch.share.x * surface.emitter_pdf * dot(along, along) / cos_emitter;
+            let weight = select(power_heuristic(bsdf_pdf, light_pdf), 1.0, bsdf_pdf < 0.0);
+            total += throughput * surface.emission * weight;
+        }
+        if bounce >= dispatch.paths.y {
+            break;
+        }
+
+        // Sample light from emitters directly.
+        let local = frame_around(surface.shading_normal * select(1.0, -1.0, cos_emitter < 0.0));
+        let local_wo = to_local(local, wo);
+        total += throughput * direct_light(surface, local, local_wo, &rays);
+
+        // Continue the path by sampling the BSDF.
+        let choice = uniform1();
+        let next = bsdf_sample(surface, local_wo, choice, uniform2());
+        if next.pdf <= 0.0 {
+            break;
+        }
+        throughput *= next.weight;
+        let wi = to_world(local, next.wi);
+        ray = Ray(offset_origin(surface.point, surface.normal, surface.slot, wi), wi, FAR);
+        bsdf_pdf = next.pdf;
+        bounce += 1u;
+
+        // End paths that carry little, without bias.
+        if bounce > dispatch.paths.z {
+            let survival = min(largest(throughput), MAX_SURVIVAL);
+            if survival <= 0.0 || uniform1() >= survival {
+                break;
+            }
+            throughput /= survival;
+        } else if largest(throughput) <= 0.0 {
+            break;
+        }
+    }
+    let rejected = !is_finite(total);
+    return PathSample(select(total, vec3<f32>(0.0), rejected), rays, rejected);
+}

@@ -1,0 +1,15 @@
+// Rays on their own: (origin, t_max) and (direction, any) in, (t, b1, b2) and the triangle's index out.
+
+@compute @workgroup_size(WORKGROUP)
+fn trace(@builtin(global_invocation_id) id: vec3<u32>) {
+    let index = pixel_of(id.x);
+    if index == NONE {
+        return;
+    }
+    furnished = true;
+    let start = rays[2u * index];
+    let along = rays[2u * index + 1u];
+    let hit = traverse(Ray(start.xyz, along.xyz, start.w), along.w != 0.0);
+    film[index - dispatch.paths.w].over = vec4<f32>(hit.t, hit.b1, hit.b2, 0.0);
+    film[index - dispatch.paths.w].counts = vec4<u32>(hit.index, 0u, 0u, 0u);
+}

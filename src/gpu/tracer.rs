@@ -1,0 +1,468 @@
+//! A scene on the card: pictures, pairs of pictures with and without inserted objects, single rays.
+
+use super::card::Card;
+use super::layout::{BINDINGS, Dispatch, FILM, Pixel, WORKGROUP};
+use super::pace::Pace;
+use super::scene::{Inserted, Packed};
+use super::shader::{Kernel, source};
+use crate::error::Result;
+use crate::math::rng::splitmix64;
+use crate::scene::camera::Camera;
+use crate::scene::geometry::{Hit, Ray};
+use crate::transport::film::Film;
+use crate::transport::lit::Lit;
+use crate::transport::path::PathOptions;
+use crate::transport::surroundings::Surroundings;
+use bytemuck::Zeroable;
+use glam::{DVec3, Vec3};
+use std::ops::Range;
+use std::time::Instant;
+
+/// Samples that are summed in single precision before the sums are taken over in double.
+const CHUNK: u32 = 16;
+
+/// What is looked at, and how paths are traced.
+#[derive(Debug, Clone, Copy)]
+pub struct View<'a> {
+    /// The camera.
+    pub camera: &'a Camera,
+    /// Depth of paths; emitters and the BSDF are both sampled.
+    pub options: &'a PathOptions,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// The frame, which keys them too.
+    pub frame: u64,
+}
+
+/// What pairs of paths through one pixel found, with the inserted objects and without them.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct PairSums {
+    /// Sum of radiance with the objects.
+    pub with: DVec3,
+    /// Sum of radiance without them.
+    pub without: DVec3,
+    /// The same of the samples that saw an object first.
+    pub covered_with: DVec3,
+    /// Without them.
+    pub covered_without: DVec3,
+    /// Samples that saw an object first.
+    pub covered: u32,
+    /// Whether any sample differed.
+    pub changed: bool,
+    /// Rays cast.
+    pub rays: u32,
+    /// Samples dropped because they came out non-finite.
+    pub rejected: u32,
+}
+
+/// A scene on the card.
+#[derive(Debug)]
+pub struct Tracer {
+    card: Card,
+    scene: Vec<wgpu::Buffer>,
+    dispatch: wgpu::Buffer,
+    description: Dispatch,
+    layout: wgpu::BindGroupLayout,
+    shader: wgpu::ShaderModule,
+    pipelines: Vec<(Kernel, wgpu::ComputePipeline)>,
+    pace: Pace,
+}
+
+impl Tracer {
+    /// Takes a scene with inserted objects onto the card.
+    ///
+    /// # Errors
+    /// The scene does not fit, or the card failed.
+    pub fn new(card: &Card, lit: &Lit, objects: &[Inserted<'_>]) -> Result<Self> {
+        if (lit.outside.as_ref()).is_some_and(|map| map.surroundings() != Surroundings::Far) {
+            return Err(
+                card.failed("light from a box around the mesh is the processor's alone".to_owned())
+            );
+        }
+        let packed = Packed::new(lit, objects);
+        let contents: [&[u8]; 7] = [
+            bytemuck::cast_slice(&packed.nodes),
+            bytemuck::cast_slice(&packed.triangles),
+            bytemuck::cast_slice(&packed.materials),
+            bytemuck::cast_slice(&packed.data),
+            bytemuck::cast_slice(&packed.emitters),
+            bytemuck::cast_slice(&packed.environment),
+            // No rays yet.
+            &[],
+        ];
+        let device = &card.device;
+        for (bytes, (name, _)) in contents.iter().zip(BINDINGS) {
+            if bytes.len() as u64 > card.max_buffer() {
+                let size = bytes.len() >> 20;
+                let most = card.max_buffer() >> 20;
+                return Err(card.failed(format!(
+                    "the scene's {name} take {size} MiB, of which it grants {most}"
+                )));
+            }
+        }
+        let mut scene = Vec::with_capacity(contents.len());
+        for bytes in contents {
+            scene.push(storage(card, bytes)?);
+        }
+        let (layout, shader) = card.attempt(|| {
+            let text = source(packed.stack_size);
+            let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some("paths"),
+                source: wgpu::ShaderSource::Wgsl(text.into()),
+            });
+            (bind_group_layout(device), shader)
+        })?;
+        let dispatch = card.attempt(|| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("dispatch"),
+                size: size_of::<Dispatch>() as u64,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        })?;
+        Ok(Self {
+            card: card.clone(),
+            scene,
+            dispatch,
+            description: packed.dispatch,
+            layout,
+            shader,
+            pipelines: Vec::new(),
+            pace: Pace::default(),
+        })
+    }
+
+    /// Adds `samples` paths to every pixel of a film, keyed as [`Film::add`] keys them; after an error it is as it was.
+    ///
+    /// # Errors
+    /// The card failed.
+    pub fn add(&mut self, film: &mut Film, view: &View<'_>, samples: u32) -> Result<()> {
+        let mut added = Film::new(view.camera);
+        let pixels = 0..added.sums.len() as u32;
+        let range = film.samples..film.samples + samples;
+        self.accumulate(Kernel::Render, view, pixels, range, |pixel, found| {
+            let [r, g, b, _] = found.over;
+            added.sums[pixel as usize] += Vec3::new(r, g, b).as_dvec3();
+            added.rays += u64::from(found.counts[0]);
+            added.rejected += u64::from(found.counts[1]);
+        })?;
+        for (sum, added) in film.sums.iter_mut().zip(added.sums) {
+            *sum += added;
+        }
+        film.rays += added.rays;
+        film.rejected += added.rejected;
+        film.samples += samples;
+        Ok(())
+    }
+
+    /// A picture from `samples` paths a pixel.
+    ///
+    /// # Errors
+    /// The card failed.
+    pub fn film(&mut self, view: &View<'_>, samples: u32) -> Result<Film> {
+        let mut film = Film::new(view.camera);
+        self.add(&mut film, view, samples)?;
+        Ok(film)
+    }
+
+    /// Pairs of paths with and without the inserted objects through each pixel of a range, for a range of samples.
+    ///
+    /// # Errors
+    /// The card failed.
+    pub fn pairs(
+        &mut self,
+        view: &View<'_>,
+        pixels: Range<u32>,
+        samples: Range<u32>,
+    ) -> Result<Vec<PairSums>> {
+        let first = pixels.start;
+        let mut sums = vec![PairSums::default(); pixels.len()];
+        self.accumulate(Kernel::Insert, view, pixels, samples, |pixel, found| {
+            let sum = &mut sums[(pixel - first) as usize];
+            let color = |[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b).as_dvec3();
+            sum.with += color(found.over);
+            sum.without += color(found.under);
+            sum.covered_with += color(found.covered);
+            sum.covered_without += color(found.covered_under);
+            sum.covered += found.over[3] as u32;
+            sum.changed |= found.counts[3] > 0;
+            sum.rays += found.counts[0];
+            sum.rejected += found.counts[1];
+        })?;
+        Ok(sums)
+    }
+
+    /// The nearest hit of each ray, inserted objects' triangles counted behind the scene's; with `any`, some hit. Rays start at 0.
+    ///
+    /// # Errors
+    /// The rays do not fit, or the card failed.
+    pub fn trace(&mut self, rays: &[Ray], any: bool) -> Result<Vec<Option<Hit>>> {
+        let words: Vec<[f32; 4]> = rays
+            .iter()
+            .flat_map(|ray| {
+                let flag = f32::from(u8::from(any));
+                let end = ray.t_max.min(f32::MAX);
+                [
+                    ray.origin.extend(end).to_array(),
+                    ray.direction.extend(flag).to_array(),
+                ]
+            })
+            .collect();
+        let bytes: &[u8] = bytemuck::cast_slice(&words);
+        if bytes.len() as u64 > self.card.max_buffer() {
+            return Err(self.card.failed("too many rays at once".to_owned()));
+        }
+        let buffer = storage(&self.card, bytes)?;
+        if let Some(place) = self.scene.last_mut() {
+            *place = buffer;
+        }
+        let mut hits = vec![None; rays.len()];
+        let mut description = self.description;
+        description.slice[0] = rays.len().max(1) as u32;
+        let all = 0..rays.len() as u32;
+        self.dispatch_all(Kernel::Trace, description, all, 0..1, |ray, found| {
+            let [t, b1, b2, _] = found.over;
+            let triangle = found.counts[0];
+            hits[ray as usize] = (triangle != super::layout::NONE).then_some(Hit {
+                t,
+                triangle,
+                b1,
+                b2,
+            });
+        })?;
+        Ok(hits)
+    }
+
+    fn accumulate(
+        &mut self,
+        kernel: Kernel,
+        view: &View<'_>,
+        pixels: Range<u32>,
+        samples: Range<u32>,
+        add: impl FnMut(u32, &Pixel),
+    ) -> Result<()> {
+        let description = described(self.description, view);
+        self.dispatch_all(kernel, description, pixels, samples, add)
+    }
+
+    /// Traces samples of pixels, slice by slice; `add` hears the sums of up to [`CHUNK`] samples of each pixel.
+    fn dispatch_all(
+        &mut self,
+        kernel: Kernel,
+        mut description: Dispatch,
+        pixels: Range<u32>,
+        samples: Range<u32>,
+        mut add: impl FnMut(u32, &Pixel),
+    ) -> Result<()> {
+        let pipeline = self.pipeline(kernel)?;
+        let fit = (self.card.max_buffer() / size_of::<Pixel>() as u64).min(u64::from(u32::MAX));
+        let band = (fit as u32).min(pixels.len() as u32).max(1);
+        let card = self.card.clone();
+        let (film, read) = card.attempt(|| film_buffers(&card.device, band))?;
+        let group = card.attempt(|| self.bind_group(&film))?;
+        for first in pixels.clone().step_by(band as usize) {
+            let band = first..first.saturating_add(band).min(pixels.end);
+            for chunk in samples.clone().step_by(CHUNK as usize) {
+                let end = chunk.saturating_add(CHUNK).min(samples.end);
+                clear(&card, &film);
+                description.paths[3] = band.start;
+                self.slices(&pipeline, &group, description, band.clone(), chunk..end)?;
+                for (pixel, found) in band.clone().zip(self.read(&film, &read, band.len())?) {
+                    add(pixel, &found);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Dispatches that add some samples to the film.
+    fn slices(
+        &mut self,
+        pipeline: &wgpu::ComputePipeline,
+        group: &wgpu::BindGroup,
+        mut description: Dispatch,
+        band: Range<u32>,
+        samples: Range<u32>,
+    ) -> Result<()> {
+        let (mut pixel, mut sample) = (band.start, samples.start);
+        while sample < samples.end && !band.is_empty() {
+            let left = samples.end - sample;
+            let [count, taken] = if pixel == band.start {
+                self.pace.slice(band.len() as u32, left)
+            } else {
+                [self.pace.slice(band.len() as u32, left)[0], 1]
+            };
+            let end = pixel.saturating_add(count).min(band.end);
+            (description.slice[1], description.slice[2]) = (pixel, end);
+            (description.slice[3], description.paths[0]) = (sample, taken);
+            let card = &self.card;
+            card.queue
+                .write_buffer(&self.dispatch, 0, bytemuck::bytes_of(&description));
+            let mut encoder = card.device.create_command_encoder(&Default::default());
+            {
+                let mut pass = encoder.begin_compute_pass(&Default::default());
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(0, group, &[]);
+                pass.dispatch_workgroups((end - pixel).div_ceil(WORKGROUP), 1, 1);
+            }
+            let start = Instant::now();
+            let submission = card.queue.submit([encoder.finish()]);
+            card.wait(submission)?;
+            self.pace.took((end - pixel) * taken, start.elapsed());
+            pixel = end;
+            if pixel == band.end {
+                (pixel, sample) = (band.start, sample + taken);
+            }
+        }
+        Ok(())
+    }
+
+    fn read(&self, film: &wgpu::Buffer, read: &wgpu::Buffer, pixels: usize) -> Result<Vec<Pixel>> {
+        let bytes = (pixels * size_of::<Pixel>()) as u64;
+        let card = &self.card;
+        let mut encoder = card.device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(film, 0, read, 0, bytes);
+        let submission = card.queue.submit([encoder.finish()]);
+        let (send, receive) = std::sync::mpsc::sync_channel(1);
+        read.map_async(wgpu::MapMode::Read, 0..bytes, move |mapped| {
+            let _ = send.send(mapped.is_ok());
+        });
+        card.wait(submission)?;
+        let failed = || card.failed("what it traced cannot be read back".to_owned());
+        if !receive.try_recv().unwrap_or(false) {
+            return Err(failed());
+        }
+        let view = read.get_mapped_range(0..bytes).map_err(|_| failed())?;
+        let mut found = vec![Pixel::zeroed(); pixels];
+        bytemuck::cast_slice_mut(&mut found).copy_from_slice(&view);
+        drop(view);
+        read.unmap();
+        Ok(found)
+    }
+
+    fn bind_group(&self, film: &wgpu::Buffer) -> wgpu::BindGroup {
+        let buffers = std::iter::once(&self.dispatch).chain(&self.scene);
+        let entries: Vec<wgpu::BindGroupEntry<'_>> = (0..)
+            .zip(buffers.chain([film]))
+            .map(|(binding, buffer)| wgpu::BindGroupEntry {
+                binding,
+                resource: buffer.as_entire_binding(),
+            })
+            .collect();
+        self.card
+            .device
+            .create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("scene"),
+                layout: &self.layout,
+                entries: &entries,
+            })
+    }
+
+    /// The pipeline of a kernel, compiled when first asked for.
+    fn pipeline(&mut self, kernel: Kernel) -> Result<wgpu::ComputePipeline> {
+        if let Some((_, pipeline)) = self.pipelines.iter().find(|(k, _)| *k == kernel) {
+            return Ok(pipeline.clone());
+        }
+        let device = &self.card.device;
+        let pipeline = self.card.attempt(|| {
+            let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some("paths"),
+                bind_group_layouts: &[Some(&self.layout)],
+                ..Default::default()
+            });
+            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(kernel.entry()),
+                layout: Some(&layout),
+                module: &self.shader,
+                entry_point: Some(kernel.entry()),
+                compilation_options: Default::default(),
+                cache: None,
+            })
+        })?;
+        self.pipelines.push((kernel, pipeline.clone()));
+        Ok(pipeline)
+    }
+}
+
+/// A dispatch's description with the view in it.
+fn described(scene: Dispatch, view: &View<'_>) -> Dispatch {
+    let k = &view.camera.intrinsics;
+    let axes = view.camera.rotation;
+    let key = splitmix64(splitmix64(view.seed) ^ view.frame);
+    Dispatch {
+        center: view.camera.center.extend(0.0).to_array(),
+        axis_x: axes.x_axis.extend(0.0).to_array(),
+        axis_y: axes.y_axis.extend(0.0).to_array(),
+        axis_z: axes.z_axis.extend(0.0).to_array(),
+        lens: [k.fx, k.fy, k.cx, k.cy].map(|v| v as f32),
+        distortion: k.distortion.map(|v| v as f32),
+        key: [key as u32, (key >> 32) as u32, 0, 0],
+        slice: [k.width, 0, 0, 0],
+        paths: [0, view.options.max_bounces, view.options.roulette_after, 0],
+        ..scene
+    }
+}
+
+/// A buffer that the shader reads: its memory is asked for, then written.
+fn storage(card: &Card, bytes: &[u8]) -> Result<wgpu::Buffer> {
+    /// A binding must hold one element at least.
+    const NOTHING: [u8; size_of::<super::layout::Material>()] =
+        [0; size_of::<super::layout::Material>()];
+    let bytes = if bytes.is_empty() { &NOTHING } else { bytes };
+    let buffer = card.attempt(|| {
+        card.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("scene"),
+            size: bytes.len() as u64,
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    })?;
+    card.attempt(|| card.queue.write_buffer(&buffer, 0, bytes))?;
+    Ok(buffer)
+}
+
+/// The buffer that the shader adds to, and the one that is read.
+fn film_buffers(device: &wgpu::Device, pixels: u32) -> (wgpu::Buffer, wgpu::Buffer) {
+    let buffer = |usage| {
+        device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(FILM),
+            size: u64::from(pixels) * size_of::<Pixel>() as u64,
+            usage,
+            mapped_at_creation: false,
+        })
+    };
+    use wgpu::BufferUsages as Usage;
+    let film = buffer(Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST);
+    (film, buffer(Usage::MAP_READ | Usage::COPY_DST))
+}
+
+fn clear(card: &Card, film: &wgpu::Buffer) {
+    let mut encoder = card.device.create_command_encoder(&Default::default());
+    encoder.clear_buffer(film, 0, None);
+    card.queue.submit([encoder.finish()]);
+}
+
+fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::COMPUTE,
+        ty: wgpu::BindingType::Buffer {
+            ty,
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        },
+        count: None,
+    };
+    let mut entries = vec![entry(0, wgpu::BufferBindingType::Uniform)];
+    for (binding, (name, _)) in (1..).zip(BINDINGS) {
+        let read_only = name != FILM;
+        entries.push(entry(
+            binding,
+            wgpu::BufferBindingType::Storage { read_only },
+        ));
+    }
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("scene"),
+        entries: &entries,
+    })
+}
