@@ -76,6 +76,9 @@ fn assert_same(one: &Solution, other: &Solution) {
     assert_eq!(one.progress.iterations, other.progress.iterations);
 }
 
+/// Steps that end in the stage of triangles, which begins after 220.
+const STEPS: u64 = 223;
+
 fn paper(steps: u64) -> Settings {
     Settings {
         preset: Preset::Paper,
@@ -95,15 +98,15 @@ fn the_papers_descent_goes_on_from_any_checkpoint() {
     assert!(start.state["schedule"].is_object());
     start.state["schedule"] = schedule;
 
-    let (whole, kept) = run(&paper(620), Some(&start), |_| false);
+    let (whole, kept) = run(&paper(STEPS), Some(&start), |_| false);
     assert_eq!(whole.termination, Termination::Steps);
     assert!(whole.estimate.texels.is_some(), "it never left the objects");
-    let grain = |c: &Checkpoint| c.state["descent"]["grain"].clone();
-    let count = |name: &str| kept.iter().filter(|c| grain(c) == name).count();
-    let (coarse, fine) = (count("Objects"), count("Triangles"));
+    let is_coarse = |c: &&Checkpoint| c.state["descent"]["patches"].is_null();
+    let coarse = kept.iter().filter(is_coarse).count();
+    let fine = kept.len() - coarse;
     assert!(coarse > 0 && fine > 0, "{coarse} {fine}");
     for index in [coarse / 2, coarse + fine / 2] {
-        let (resumed, _) = run(&paper(620), Some(&kept[index]), |_| false);
+        let (resumed, _) = run(&paper(STEPS), Some(&kept[index]), |_| false);
         assert_same(&whole, &resumed);
     }
 }
@@ -130,7 +133,7 @@ fn the_transport_cache_goes_on_from_the_last_finished_stage() {
 
 #[test]
 fn a_checkpoint_of_another_solver_or_a_broken_one_is_refused() {
-    let (stopped, _) = run(&paper(620), None, |_| true);
+    let (stopped, _) = run(&paper(STEPS), None, |_| true);
     let checkpoint = stopped.checkpoint.expect("a stopped solve can go on");
     let refused = |settings: &Settings, checkpoint: &Checkpoint| {
         let mut keeper = Keeper {
@@ -145,12 +148,16 @@ fn a_checkpoint_of_another_solver_or_a_broken_one_is_refused() {
     refused(&Settings::default(), &checkpoint);
     for (path, value) in [
         ("/descent/adam/first", serde_json::json!([])),
-        ("/descent/unknowns/albedo/0", serde_json::json!(null)),
-        ("/descent/halvings", serde_json::json!(4_000_000_000u32)),
-        ("/descent/grain", serde_json::json!("Triangles")),
+        ("/descent/albedo/0", serde_json::json!(null)),
+        ("/descent/level", serde_json::json!(4_000_000_000u32)),
+        (
+            "/descent/patches",
+            serde_json::json!({"levels": [], "patch_of": [], "depth": []}),
+        ),
+        ("/descent/believed", serde_json::json!([])),
     ] {
         let mut broken = checkpoint.clone();
         *broken.state.pointer_mut(path).expect("the field is there") = value;
-        refused(&paper(620), &broken);
+        refused(&paper(STEPS), &broken);
     }
 }

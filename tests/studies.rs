@@ -369,21 +369,23 @@ fn low_discrepancy_points_are_less_noisy_and_every_way_to_draw_pixels_descends()
 }
 
 #[test]
-fn textures_of_the_transport_cache_beat_one_colour_an_object_and_triangles_have_more_unknowns() {
+fn textures_of_the_transport_cache_and_patches_of_the_descent_beat_one_colour_an_object() {
     let findings = quick("textures");
     let rows = rows("textures", &findings, "");
     let states = column(&rows, "state");
     let [unknowns, psnr] = ["unknowns", "psnr"].map(|name| numbers(&rows, name));
-    assert_eq!(states.len(), 5, "{states:?}");
+    assert_eq!(states[2], "paper, objects");
+    assert!(states.len() >= 5, "{states:?}");
     assert!(
         unknowns.windows(2).skip(2).all(|pair| pair[0] < pair[1]),
         "{unknowns:?}"
     );
-    // 28.8 dB against 26.7 are seen; the descent's states stand at 13 to 15 dB.
+    // 28.8 dB against 26.7 are seen.
     assert!(psnr[1] > psnr[0] + 1.5, "{psnr:?}");
-    assert!(psnr[2..].iter().all(|p| *p > 12.0), "{psnr:?}");
+    let best = psnr[3..].iter().copied().fold(0.0, f64::max);
+    assert!(best > psnr[2] + 1.0, "{psnr:?}");
     let [(_, grid)] = &findings.pictures[..] else {
         panic!("one grid of pictures");
     };
-    assert_eq!(grid.pictures.len(), 6);
+    assert_eq!(grid.pictures.len(), states.len() + 1);
 }

@@ -94,6 +94,11 @@ impl LossProbe {
         }
     }
 
+    /// Paths that measuring takes.
+    pub fn paths(&self) -> u64 {
+        (self.train.len() + self.held_out.len()) as u64 * self.samples
+    }
+
     /// The same pixels and paths, of at most so many bounces.
     #[must_use]
     pub fn deepened(&self, max_bounces: u32) -> Self {

@@ -1,4 +1,4 @@
-//! ADAM (Kingma and Ba 2015).
+//! ADAM (Kingma and Ba 2015), sparse: each parameter has a clock of its own, which stands still while no path meets it.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -7,12 +7,15 @@ const BETA1: f32 = 0.9;
 const BETA2: f32 = 0.999;
 const EPSILON: f32 = 1e-8;
 
-/// First and second moments of each parameter's gradient, three channels each.
+/// First and second moments of each parameter's gradient, three channels each, and how often it was stepped.
+///
+/// Moments decay when their own parameter is stepped, and their bias is corrected by their own count. With one clock for
+/// all, what a batch meets rarely would take steps by moments that have decayed, corrected as if they had not.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Adam {
     first: Vec<Vec3>,
     second: Vec<Vec3>,
-    steps: u64,
+    steps: Vec<u32>,
 }
 
 impl Adam {
@@ -21,26 +24,24 @@ impl Adam {
         Self {
             first: vec![Vec3::ZERO; parameters],
             second: vec![Vec3::ZERO; parameters],
-            steps: 0,
+            steps: vec![0; parameters],
         }
     }
 
-    /// Number of parameters; `None` where the moments of a broken file differ in number.
+    /// Number of parameters; `None` where the entries of a broken file differ in number.
     pub fn parameters(&self) -> Option<usize> {
-        (self.first.len() == self.second.len()).then_some(self.first.len())
-    }
-
-    /// Begins the next step: moments of all parameters decay. Call [`Adam::step`] for each parameter after it.
-    pub fn begin(&mut self) {
-        self.steps += 1;
+        let count = self.first.len();
+        (self.second.len() == count && self.steps.len() == count).then_some(count)
     }
 
     /// The change of one parameter for its gradient.
     pub fn step(&mut self, index: usize, gradient: Vec3, learning_rate: f32) -> Vec3 {
+        self.steps[index] = self.steps[index].saturating_add(1);
+        let steps = self.steps[index].min(1 << 30) as i32;
         let (m, v) = (&mut self.first[index], &mut self.second[index]);
         *m = *m * BETA1 + gradient * (1.0 - BETA1);
         *v = *v * BETA2 + gradient * gradient * (1.0 - BETA2);
-        let correct = |beta: f32| 1.0 - f64::from(beta).powi(self.steps.min(1 << 30) as i32) as f32;
+        let correct = |beta: f32| 1.0 - f64::from(beta).powi(steps) as f32;
         let (m, v) = (*m / correct(BETA1), *v / correct(BETA2));
         -learning_rate * m / (v.powf(0.5) + EPSILON)
     }
@@ -53,7 +54,6 @@ mod tests {
     #[test]
     fn the_first_step_is_the_learning_rate_against_the_gradient() {
         let mut adam = Adam::new(1);
-        adam.begin();
         let step = adam.step(0, Vec3::new(3.0, -0.01, 0.0), 0.1);
         assert!((step - Vec3::new(-0.1, 0.1, 0.0)).length() < 1e-5, "{step}");
     }
@@ -62,9 +62,7 @@ mod tests {
     #[test]
     fn later_steps_follow_the_published_update() {
         let mut adam = Adam::new(1);
-        adam.begin();
         adam.step(0, Vec3::ONE, 1.0);
-        adam.begin();
         let step = adam.step(0, Vec3::splat(0.5), 1.0);
         let m = (0.9 * 0.1 + 0.1 * 0.5) / (1.0 - 0.81);
         let v: f32 = (0.999 * 0.001 + 0.001 * 0.25) / (1.0 - 0.998_001);
@@ -73,5 +71,18 @@ mod tests {
             "{step} {}",
             m / v.sqrt()
         );
+    }
+
+    /// A parameter that is met once in a thousand steps of another takes the steps that it would take alone.
+    #[test]
+    fn what_is_met_rarely_is_stepped_as_if_it_were_alone() {
+        let (mut shared, mut alone) = (Adam::new(2), Adam::new(1));
+        for round in 0..5 {
+            for _ in 0..1000 {
+                shared.step(0, Vec3::ONE, 0.1);
+            }
+            let gradient = Vec3::splat(0.5 + round as f32);
+            assert_eq!(shared.step(1, gradient, 0.1), alone.step(0, gradient, 0.1));
+        }
     }
 }

@@ -3,10 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Paths between two measurements: some forty times as many as a measurement takes.
-const MEASURE_EVERY: u64 = 500_000;
-/// The loss stands still when the mean of this many measurements is no better than that of as many before, by a share.
-const WINDOW: usize = 4;
+/// The loss stands still when the mean of the last measurements is no better than that of as many before, by a share.
 const STANDSTILL: f64 = 0.01;
 
 /// Losses since the last change of the learning rate, and the work until the next.
@@ -27,15 +24,15 @@ impl Schedule {
         self.until_measured = self.until_measured.saturating_sub(paths);
     }
 
-    /// Takes note of a loss; whether it stands still.
-    pub fn measured(&mut self, loss: Option<f64>) -> bool {
-        self.until_measured = MEASURE_EVERY;
+    /// Takes note of a loss, the next to be measured after so many paths; whether the mean of `window` of them stands still.
+    pub fn measured(&mut self, loss: Option<f64>, next: u64, window: usize) -> bool {
+        self.until_measured = next;
         self.losses.extend(loss);
-        if self.losses.len() < 2 * WINDOW {
+        if self.losses.len() < 2 * window {
             return false;
         }
         let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
-        let (before, last) = self.losses[self.losses.len() - 2 * WINDOW..].split_at(WINDOW);
+        let (before, last) = self.losses[self.losses.len() - 2 * window..].split_at(window);
         mean(last) > mean(before) * (1.0 - STANDSTILL)
     }
 
@@ -52,23 +49,23 @@ mod tests {
     #[test]
     fn a_falling_loss_goes_on_and_a_level_one_stands_still_after_two_windows() {
         let mut falling = Schedule::default();
-        assert!((0..20).all(|i| !falling.measured(Some(0.9f64.powi(i)))));
+        assert!((0..20).all(|i| !falling.measured(Some(0.9f64.powi(i)), 1, 4)));
         let mut level = Schedule::default();
-        let still: Vec<bool> = (0..8).map(|_| level.measured(Some(1.0))).collect();
+        let still: Vec<bool> = (0..8).map(|_| level.measured(Some(1.0), 1, 4)).collect();
         assert_eq!(
             still,
             [false, false, false, false, false, false, false, true]
         );
         level.start_over();
-        assert!(!level.measured(Some(1.0)));
+        assert!(!level.measured(Some(1.0), 1, 4));
     }
 
     #[test]
     fn a_measurement_is_due_at_first_and_after_enough_paths() {
         let mut schedule = Schedule::default();
         assert!(schedule.due());
-        schedule.measured(None);
-        schedule.traced(MEASURE_EVERY - 1);
+        schedule.measured(None, 1000, 4);
+        schedule.traced(999);
         assert!(!schedule.due());
         schedule.traced(16);
         assert!(schedule.due());

@@ -4,7 +4,7 @@
 use crate::error::Result;
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::inverse::loss::LossProbe;
-use crate::inverse::paper::descent::{Descent, Grain, StepOutcome};
+use crate::inverse::paper::descent::{Descent, StepOutcome};
 use crate::inverse::settings::{Preset, Settings};
 use crate::inverse::solver::{Problem, Solution};
 use crate::study::experiments::{Bench, Limits, Subject};
@@ -114,7 +114,7 @@ impl<'a> Gauge<'a> {
 pub fn descend(bench: &Bench, gauge: &Gauge, settings: &Settings, limits: Limits) -> Vec<Mark> {
     let problem = &gauge.subject.problem;
     let mut step = |descent: &mut Descent| descent.step(problem, settings, settings.max_bounces());
-    let start = Descent::new(problem, Grain::Objects).with_lobes(gauge.lobes.clone());
+    let start = Descent::new(problem).with_lobes(gauge.lobes.clone());
     descend_by(bench, gauge, start, limits, &mut step)
 }
 
@@ -169,7 +169,7 @@ fn mark_at(rays: u64) -> Option<u32> {
 
 /// Where a descent per object stands, as an estimate.
 pub fn estimate(descent: &Descent) -> Estimate {
-    let values = descent.unknowns.albedo.iter().zip(&descent.lights);
+    let values = descent.albedo.iter().zip(&descent.emission);
     Estimate {
         objects: (values.enumerate())
             .map(|(object, (&albedo, &emission))| ObjectEstimate {

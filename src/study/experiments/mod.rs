@@ -13,7 +13,6 @@ mod courses;
 mod estimators;
 mod evenness;
 mod findings;
-mod finer;
 mod furnished;
 mod gradient;
 mod insertion;

@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::export::plot::{Axis, Plot, Series};
 use crate::export::table::Table;
-use crate::inverse::paper::descent::{Descent, Grain};
+use crate::inverse::paper::descent::Descent;
 use crate::inverse::settings::Settings;
 use crate::study::experiments::course::{
     Gauge, Mark, descend, descend_by, estimate, paper_settings, rays_at,
@@ -143,7 +143,7 @@ fn descent(
         outcome.cast.rays += rays;
         outcome
     };
-    let start = Descent::new(problem, Grain::Objects);
+    let start = Descent::new(problem);
     descend_by(bench, gauge, start, limits, &mut step)
 }
 

@@ -1,7 +1,7 @@
 //! Other ways to draw the pixels of a batch than uniformly.
 
 use crate::inverse::held_out::is_held_out;
-use crate::inverse::paper::descent::Drawn;
+use crate::inverse::paper::pixel::Drawn;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::Problem;
 use crate::math::rng::Stream;

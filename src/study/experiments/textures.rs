@@ -5,21 +5,17 @@ use crate::export::plot::{Axis, Plot, Series};
 use crate::export::table::Table;
 use crate::inverse::estimate::{Estimate, TexelEstimate};
 use crate::inverse::loss::LossProbe;
-use crate::inverse::paper::descent::{Descent, Grain};
 use crate::inverse::settings::{Preset, Settings};
-use crate::inverse::solver::Problem;
+use crate::inverse::solver::{Control, Observer, Problem, Progress, Termination, solve};
 use crate::math::picture::Picture;
 use crate::room::truth::albedo_picture;
-use crate::scene::texels::TexelLayout;
 use crate::study::experiments::course::{cache_settings, paper_settings, solved};
 use crate::study::experiments::findings::{Grid, brief};
 use crate::study::experiments::furnished::built_in;
-use crate::study::experiments::{Bench, Findings, Limits, Study, Subject, Summary, finer};
+use crate::study::experiments::{Bench, Findings, Study, Subject, Summary};
 use crate::transport::lit::Lit;
-use crate::transport::material::TexelColors;
 use glam::Vec3;
 use std::sync::Arc;
-use std::time::Instant;
 
 /// The study.
 pub const STUDY: Study = Study {
@@ -30,10 +26,8 @@ pub const STUDY: Study = Study {
     run,
 };
 
-/// Subdivisions after the mesh's own triangles.
-const CUTS: usize = 2;
-/// Triangles seen by so many pixels are cut.
-const PIXELS: u64 = 16;
+/// Bounces of the descent here: the photographs hold all light, and what two bounces cut off goes into albedos.
+const BOUNCES: u64 = 8;
 /// The photograph whose albedo is shown.
 const SHOWN: usize = 0;
 
@@ -69,10 +63,8 @@ fn run(bench: &Bench) -> Result<Findings> {
         (None, None) => return Ok(Findings::default()),
     };
     let measure = Measure::new(subject, room.as_ref().map(|room| &room.lit));
-    let limits = bench.limits(1 + CUTS);
 
     // The transport cache, with one colour an object and with textures.
-    bench.begin("transport cache")?;
     let own_light = room.is_some();
     let of_objects = Settings {
         exposures: !own_light,
@@ -85,7 +77,6 @@ fn run(bench: &Bench) -> Result<Findings> {
         ..of_objects.clone()
     };
     let mut states = Vec::new();
-    let mut objects = Estimate::default();
     for (name, settings) in [
         ("cache, one colour an object", &of_objects),
         ("cache, textures", &with_textures),
@@ -93,20 +84,25 @@ fn run(bench: &Bench) -> Result<Findings> {
         bench.begin(name)?;
         let solution = solved(bench, subject, settings)?;
         let (seconds, rays) = (solution.progress.seconds, solution.progress.rays);
-        let estimate = solution.estimate;
-        let cells = |t: &Arc<TexelEstimate>| t.seen.iter().filter(|&&n| n > 0).count();
-        let unknowns = estimate
-            .texels
-            .as_ref()
-            .map_or(estimate.objects.len(), cells);
-        states.push(measure.state(name, &subject.problem, &estimate, unknowns, seconds, rays));
+        states.push(measure.state(name, &subject.problem, &solution.estimate, seconds, rays));
         (bench.show)(plot(&states, measure.truth.is_some()));
-        if objects.objects.is_empty() {
-            objects = estimate;
-        }
     }
-    let problem = &subject.problem;
-    descents(bench, &measure, problem, &objects, limits, &mut states)?;
+
+    // The paper's descent, stage after stage.
+    bench.begin("the paper's descent")?;
+    let settings = descent_settings(bench);
+    let mut stages = Stages {
+        bench,
+        ended: Vec::new(),
+    };
+    let solution = solve(&subject.problem, &settings, None, &mut stages)?;
+    bench.go_on()?;
+    if solution.progress.stages.len() > stages.ended.len() {
+        stages.take(&solution.progress, &solution.estimate);
+    }
+    for (estimate, seconds, rays, name) in &stages.ended {
+        states.push(measure.state(name, &subject.problem, estimate, *seconds, *rays));
+    }
     let judged = match measure.truth {
         Some(_) => {
             "albedo pictures of all photographs against the true ones (peak 1, lamps left out), and held-out loss"
@@ -115,80 +111,93 @@ fn run(bench: &Bench) -> Result<Findings> {
     };
     let how = format!(
         "{}: {judged}, rendered with all bounces. The transport cache is run without lobes and without the test for \
-         photographs that disagree, and with exposures and light from outside on captures alone. The paper's descent does not \
-         start from zero but from the transport cache's lamps and one colour an object; it keeps the lamps and fits, with two \
-         bounces and batches of {} as published and nothing annealed, for {} on the \
-         mesh's own triangles and as long after each of {CUTS} subdivisions, where every triangle is cut into four that {PIXELS} \
-         pixels or more see (the paper cuts by error). Its seconds and rays are counted from there.",
+         photographs that disagree, and with exposures and light from outside on captures alone. The paper's descent is preset \
+         `paper` with {BOUNCES} bounces (the paper's two cut off light that these photographs hold), from zero, one stage after \
+         the other: {}. It {}. Seconds are those of this machine and whatever else ran on it.",
         subject.name,
-        paper_settings(1).batch,
-        limits.words(),
+        (solution.progress.stages.iter())
+            .map(|stage| format!("{} ({})", stage.name, stage.why))
+            .collect::<Vec<_>>()
+            .join("; "),
+        match solution.termination {
+            Termination::Converged => "ended by itself".to_owned(),
+            _ => format!("was ended after {:.0} s", solution.progress.seconds),
+        },
     );
     Ok(findings(how, states, measure.truth))
 }
 
-/// Adds the paper's descent per triangle, on finer and finer triangles.
-fn descents(
-    bench: &Bench,
-    measure: &Measure,
-    problem: &Problem,
-    start: &Estimate,
-    limits: Limits,
-    states: &mut Vec<State>,
-) -> Result<()> {
-    let settings = paper_settings(1);
-    let mut descent = Descent::new(problem, Grain::Objects);
-    for (index, object) in start.objects.iter().enumerate() {
-        descent.unknowns.albedo[index] = object.albedo;
-        descent.unknowns.emission[index] = object.emission;
-        descent.lights[index] = object.emission;
+/// The paper's solver as the program runs it, but for the bounces; in the quick form nothing is annealed and steps are long.
+fn descent_settings(bench: &Bench) -> Settings {
+    let settings = Settings {
+        bounces: BOUNCES,
+        ..paper_settings(1)
+    };
+    match bench.quick {
+        true => Settings {
+            bounces: 3,
+            learning_rate: 2e-2,
+            anneal: false,
+            steps: 100_000,
+            ..settings
+        },
+        false => Settings {
+            time: bench.time.as_secs_f64(),
+            ..settings
+        },
     }
-    let mut problem = problem.clone();
-    let mut descent = descent.refine(&problem);
-    let (mut seconds, mut rays) = (0.0, 0);
-    for cuts in 0..=CUTS {
-        let name = match cuts {
-            0 => "paper, triangles".to_owned(),
-            cuts => format!("paper, cut {cuts} ×"),
-        };
-        bench.begin(&name)?;
-        if cuts > 0 {
-            let (finer, parents) = finer::cut(&problem, PIXELS)?;
-            descent = descent.refine_by(&parents);
-            problem = finer;
-        }
-        let (begun, goal) = (Instant::now(), rays + limits.rays.min(u64::MAX / 8));
-        while rays < goal && begun.elapsed().as_secs_f64() < limits.seconds {
-            let outcome = descent.step(&problem, &settings, settings.max_bounces());
-            rays += outcome.cast.rays;
-            if !outcome.finite || outcome.cast.rays == 0 || (bench.stopped)() {
-                break;
-            }
-        }
-        seconds += begun.elapsed().as_secs_f64();
-        let estimate = of_triangles(&problem, start, &descent);
-        let unknowns = problem.scene.triangles.len();
-        states.push(measure.state(&name, &problem, &estimate, unknowns, seconds, rays));
-        (bench.show)(plot(states, measure.truth.is_some()));
-    }
-    bench.go_on()
 }
 
-/// An estimate with the descent's albedo of each triangle.
-fn of_triangles(problem: &Problem, start: &Estimate, descent: &Descent) -> Estimate {
-    let count = problem.scene.triangles.len();
-    Estimate {
-        texels: Some(Arc::new(TexelEstimate {
-            colors: Arc::new(TexelColors {
-                layout: TexelLayout::new(vec![0; count]),
-                colors: descent.unknowns.albedo.clone(),
-            }),
-            stderr: vec![Vec3::ONE; count],
-            seen: vec![0; count],
-            textured: vec![true; start.objects.len()],
-        })),
-        ..start.clone()
+/// Keeps what the stages of a solve leave: estimate, seconds, rays and name.
+struct Stages<'a, 'b> {
+    bench: &'a Bench<'b>,
+    ended: Vec<(Estimate, f64, u64, String)>,
+}
+
+impl Stages<'_, '_> {
+    fn take(&mut self, progress: &Progress, estimate: &Estimate) {
+        let name = progress.stages.last().map_or("", |stage| &stage.name);
+        let name = format!("paper, {name}");
+        let (seconds, rays) = (progress.seconds, progress.rays);
+        self.ended.push((estimate.clone(), seconds, rays, name));
     }
+}
+
+impl Observer for Stages<'_, '_> {
+    fn observe(&mut self, progress: &Progress, estimate: &Estimate) -> Control {
+        if progress.stages.len() > self.ended.len() {
+            self.take(progress, estimate);
+            let why = progress.stages.last().map_or("", |stage| &stage.why);
+            (self.bench.say)(why);
+        }
+        match (self.bench.stopped)() {
+            true => Control::Stop,
+            false => Control::Continue,
+        }
+    }
+}
+
+/// Unknown albedos of an estimate: of objects, or of patches or cells that a pixel saw.
+fn unknowns(estimate: &Estimate) -> usize {
+    let cells = |texels: &Arc<TexelEstimate>| {
+        // Texels of one patch hold the same colour.
+        let layout = &texels.colors.layout;
+        let mut count = 0;
+        for triangle in layout.first.windows(2) {
+            let own = triangle[0] as usize..triangle[1] as usize;
+            let mut colors: Vec<[u32; 3]> = (own.filter(|&t| texels.seen[t] > 0))
+                .map(|t| texels.colors.colors[t].to_array().map(f32::to_bits))
+                .collect();
+            colors.sort_unstable();
+            colors.dedup();
+            count += colors.len();
+        }
+        count
+    };
+    estimate
+        .texels
+        .as_ref()
+        .map_or(estimate.objects.len(), cells)
 }
 
 impl Measure {
@@ -223,7 +232,6 @@ impl Measure {
         name: &str,
         problem: &Problem,
         estimate: &Estimate,
-        unknowns: usize,
         seconds: f64,
         rays: u64,
     ) -> State {
@@ -243,7 +251,7 @@ impl Measure {
         });
         State {
             name: name.to_owned(),
-            unknowns,
+            unknowns: unknowns(estimate),
             psnr,
             loss: self.probe.held_out(problem, estimate).0,
             seconds,
@@ -349,34 +357,33 @@ fn seen(states: &[State]) -> Vec<String> {
             .unwrap_or(f64::NAN)
     };
     let mut seen = vec![format!("{}.", course.join("; "))];
-    if let [objects, textures, triangles @ ..] = states {
-        let best = triangles
-            .iter()
-            .max_by(|a, b| value(a).total_cmp(&value(b)));
-        if let Some(best) = best {
-            let is_better = value(best) > value(objects);
-            let gains = (triangles.windows(2)).all(|pair| value(&pair[1]) > value(&pair[0]));
-            seen.push(format!(
-                "The paper's coarse-to-fine descent is at best {} than one colour an object (\"{}\"), and {}: what the paper \
-                 says of it was {}seen in this time.",
-                if is_better { "better" } else { "no better" },
-                best.name,
-                if gains {
-                    "each subdivision gains"
-                } else {
-                    "not every subdivision gains"
-                },
-                if is_better && gains { "" } else { "not " },
-            ));
-            seen.push(format!(
-                "The transport cache's textures stand at {} after {:.1} million rays, the descent's best at {} after {:.1}.",
-                score(textures),
-                textures.rays as f64 * 1e-6,
-                score(best),
-                best.rays as f64 * 1e-6,
-            ));
-        }
-    }
+    let [objects, textures, start, ..] = states else {
+        return seen;
+    };
+    let best = (states[2..].iter()).max_by(|a, b| value(a).total_cmp(&value(b)));
+    let Some(best) = best else {
+        return seen;
+    };
+    let gain = |from: &State| match (best.psnr, from.psnr) {
+        (Some(best), Some(from)) => format!("{:+.1} dB", best - from),
+        _ => format!("{} against {}", score(best), score(from)),
+    };
+    let is_better = value(best) > value(objects).max(value(start));
+    seen.push(format!(
+        "The paper's coarse-to-fine descent is at best at \"{}\": {} from its own one colour an object, {} from the transport \
+         cache's. What the paper says of it was {}seen.",
+        best.name,
+        gain(start),
+        gain(objects),
+        if is_better { "" } else { "not " },
+    ));
+    seen.push(format!(
+        "The transport cache's textures stand at {} after {:.1} million rays, the descent's best at {} after {:.1}.",
+        score(textures),
+        textures.rays as f64 * 1e-6,
+        score(best),
+        best.rays as f64 * 1e-6,
+    ));
     seen
 }
 
@@ -385,7 +392,13 @@ mod tests {
     use super::*;
 
     fn said(scores: [f64; 5]) -> String {
-        let names = ["cache", "cache, textures", "paper", "cut 1 ×", "cut 2 ×"];
+        let names = [
+            "cache",
+            "cache, textures",
+            "paper, objects",
+            "triangles",
+            "cut 1",
+        ];
         let states: Vec<State> = (names.iter().zip(scores))
             .map(|(name, psnr)| State {
                 name: (*name).to_owned(),
@@ -401,13 +414,13 @@ mod tests {
     }
 
     #[test]
-    fn the_paper_s_gain_is_seen_where_every_subdivision_gains_over_one_colour_alone() {
-        let gains = said([24.0, 37.0, 25.0, 26.0, 27.0]);
-        assert!(gains.contains("at best better") && gains.contains("of it was seen"));
-        // The finest is best, but a cut before it lost.
-        let lost = said([24.0, 37.0, 26.0, 25.0, 27.0]);
-        assert!(lost.contains("not every subdivision") && lost.contains("was not seen"));
-        let worse = said([24.0, 37.0, 12.0, 13.0, 14.0]);
-        assert!(worse.contains("at best no better") && worse.contains("was not seen"));
+    fn the_paper_s_gain_is_seen_where_patches_are_better_than_one_colour_of_both_solvers() {
+        let gains = said([24.0, 37.0, 23.5, 26.0, 30.0]);
+        assert!(
+            gains.contains("\"cut 1\": +6.5 dB from its own") && gains.contains("of it was seen")
+        );
+        assert!(gains.contains("+6.0 dB from the transport"));
+        let worse = said([24.0, 37.0, 20.0, 22.0, 23.0]);
+        assert!(worse.contains("+3.0 dB from its own") && worse.contains("was not seen"));
     }
 }

@@ -1,0 +1,174 @@
+//! Which pixels each patch covers, how far off they are, and which patches are to be cut.
+
+use super::descent::Descent;
+use super::patches::{MAX_DEPTH, Patches};
+use super::pixel::{Drawn, Path};
+use crate::inverse::held_out::is_held_out;
+use crate::inverse::settings::Settings;
+use crate::inverse::solver::Problem;
+use crate::math::rng::Stream;
+use crate::scene::geometry::Hit;
+use crate::transport::arrival::Cast;
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+/// Pixels that are looked at, at most: each n-th of all.
+const MAX_PIXELS: usize = 400_000;
+/// Pixels that a patch must cover to be cut: four for each of its parts.
+const MIN_COVERED: u64 = 16;
+/// The worst patches are cut, until they cover this share of the pixels of all that may be.
+const CUT: f64 = 0.5;
+/// Paths of each of two independent colours of a pixel.
+const SAMPLES: u64 = 2;
+/// First of the sample keys of these paths, far from those of the descent.
+const KEY: u64 = 1 << 63;
+
+/// The pixels in the fit and what their centres see.
+pub struct Cover {
+    pixels: Vec<(u32, u32, Hit)>,
+    /// Each stands for so many.
+    stride: u64,
+}
+
+impl Cover {
+    /// Looks through the pixels.
+    pub fn new(problem: &Problem, settings: &Settings) -> Self {
+        let scene = &problem.scene;
+        let total: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
+        let stride = total.div_ceil(MAX_PIXELS).max(1);
+        let mut pixels = Vec::new();
+        let mut before = 0;
+        for (frame, photograph) in problem.photographs.iter().enumerate() {
+            let count = photograph.pixels.len();
+            let camera = &scene.cameras[frame];
+            let seen: Vec<(u32, u32, Hit)> = (0..count)
+                .into_par_iter()
+                .filter(|pixel| (before + pixel).is_multiple_of(stride))
+                .filter(|&pixel| {
+                    let held = is_held_out(settings, frame as u32, pixel as u32);
+                    photograph.is_usable(pixel) && !held
+                })
+                .filter_map(|pixel| {
+                    let width = photograph.width as usize;
+                    let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+                    let hit = scene.intersect(&camera.ray(corner + 0.5))?;
+                    Some((frame as u32, pixel as u32, hit))
+                })
+                .collect();
+            pixels.extend(seen);
+            before += count;
+        }
+        Self {
+            pixels,
+            stride: stride as u64,
+        }
+    }
+
+    /// How many pixels each patch covers.
+    pub fn counts(&self, patches: &Patches) -> Vec<u64> {
+        let mut counts = vec![0; patches.len()];
+        for (_, _, hit) in &self.pixels {
+            counts[patches.of_texel(patches.layout().texel(hit))] += self.stride;
+        }
+        counts
+    }
+
+    /// Which patches are to be cut by the mean ℓ2 error of the pixels that they cover, and what looking took.
+    pub fn to_cut(
+        &self,
+        problem: &Problem,
+        settings: &Settings,
+        bounces: u32,
+        descent: &mut Descent,
+    ) -> (Vec<bool>, Cast) {
+        let (errors, cast) = self.errors(problem, settings, bounces, descent);
+        let Some(patches) = &descent.patches else {
+            return (Vec::new(), cast);
+        };
+        let mut sums = vec![(0.0, 0u64); patches.len()];
+        for ((_, _, hit), error) in self.pixels.iter().zip(errors) {
+            let sum = &mut sums[patches.of_texel(patches.layout().texel(hit))];
+            sum.0 += error;
+            sum.1 += self.stride;
+        }
+        (worst(&sums, patches.depth()), cast)
+    }
+
+    /// The squared residual of each pixel over the channels: that of two independent colours multiplied, which is free of
+    /// their noise in the mean.
+    fn errors(
+        &self,
+        problem: &Problem,
+        settings: &Settings,
+        bounces: u32,
+        descent: &mut Descent,
+    ) -> (Vec<f64>, Cast) {
+        let each: Vec<(f64, Cast)> = descent.render(problem, settings, bounces, |rendering| {
+            let error = |&(frame, pixel, _): &(u32, u32, Hit)| {
+                let (frame_key, pixel_key) = (u64::from(frame), u64::from(pixel));
+                let mut stream = Stream::new(settings.seed, frame_key, pixel_key, KEY);
+                let (mut path, mut cast) = (Path::default(), Cast::default());
+                let drawn = Drawn {
+                    frame,
+                    pixel,
+                    weight: 1.0,
+                };
+                let photograph = &problem.photographs[frame as usize];
+                let at_least = photograph.saturated(pixel as usize);
+                let mut residual = || {
+                    let colour =
+                        rendering.colour(drawn, SAMPLES, &mut stream, &mut path, &mut cast);
+                    let residual = colour - photograph.pixels[pixel as usize];
+                    Vec3::select(at_least, residual.min(Vec3::ZERO), residual)
+                };
+                let [a, b] = [residual(), residual()];
+                (f64::from(a.dot(b)), cast)
+            };
+            self.pixels.par_iter().map(error).collect()
+        });
+        let cast = each.iter().map(|e| e.1).sum();
+        (each.into_iter().map(|e| e.0).collect(), cast)
+    }
+}
+
+/// The patches of greatest mean error that cover a share of the pixels of all that may be cut, given each patch's sum of
+/// errors with its pixels, and its depth.
+fn worst(sums: &[(f64, u64)], depth: &[u8]) -> Vec<bool> {
+    let may_be_cut = |&p: &usize| sums[p].1 >= MIN_COVERED && depth[p] < MAX_DEPTH;
+    let mut order: Vec<usize> = (0..sums.len()).filter(may_be_cut).collect();
+    let mean = |p: usize| sums[p].0 / sums[p].1 as f64;
+    order.sort_by(|&p, &q| mean(q).total_cmp(&mean(p)));
+    let all: u64 = order.iter().map(|&p| sums[p].1).sum();
+    let mut which = vec![false; sums.len()];
+    let mut covered = 0;
+    for p in order {
+        if covered as f64 >= CUT * all as f64 {
+            break;
+        }
+        covered += sums[p].1;
+        which[p] = true;
+    }
+    which
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_worst_are_cut_and_what_is_small_or_fine_is_not() {
+        let sums = [
+            (100.0, 100),
+            (900.0, 100),
+            (500.0, 15),
+            (50.0, 100),
+            (0.0, 0),
+        ];
+        let depth = [0, 0, 0, 0, 0];
+        let which = worst(&sums, &depth);
+        assert_eq!(which, [true, true, false, false, false]);
+        let which = worst(&sums, &[0, MAX_DEPTH, 0, 0, 0]);
+        assert_eq!(which, [true, false, false, false, false]);
+        assert_eq!(worst(&sums[4..], &depth[4..]), [false]);
+    }
+}

@@ -1,0 +1,100 @@
+//! Where a descent stands, as an estimate.
+
+use super::descent::Descent;
+use crate::inverse::estimate::{Estimate, ObjectEstimate, TexelEstimate};
+use crate::inverse::solver::Problem;
+use crate::inverse::survey::Survey;
+use crate::scene::Scene;
+use crate::transport::material::TexelColors;
+use glam::{DVec3, Vec3};
+use std::sync::Arc;
+
+/// For each object why the photographs tell nothing of it; empty where they do.
+pub fn untold(problem: &Problem, survey: &Survey) -> Vec<&'static str> {
+    let mut lit = false;
+    let mut measured = vec![false; problem.scene.objects.len()];
+    for pixel in survey.pixels.iter().filter(|p| !p.held_out) {
+        let photograph = &problem.photographs[pixel.frame as usize];
+        let radiance = photograph.pixels[pixel.pixel as usize];
+        lit |= radiance.max_element() > 0.0;
+        if let Some(measured) = measured.get_mut(pixel.object as usize) {
+            *measured |= !photograph.is_saturated(pixel.pixel as usize);
+        }
+    }
+    (survey.seen.iter().zip(measured))
+        .map(|(&seen, measured)| match (seen, measured) {
+            (0, _) => "no photograph sees it",
+            (_, false) => "all of its pixels are saturated or held out",
+            _ if !lit => "the photographs show no light",
+            _ => "",
+        })
+        .collect()
+}
+
+/// The estimate of the present parameters, given for each patch how many pixels it covers. The paper's descent knows no
+/// errors: they are reported as the width of the range, and nothing is claimed to be unidentifiable but what `notes` say.
+pub fn describe(
+    problem: &Problem,
+    survey: &Survey,
+    notes: &[&str],
+    descent: &Descent,
+    covered: &[u64],
+) -> Estimate {
+    let scene = &problem.scene;
+    let own = &descent.albedo[scene.objects.len()..];
+    let texels = descent.patches.as_ref().map(|patches| TexelEstimate {
+        colors: Arc::new(TexelColors {
+            layout: patches.layout().clone(),
+            colors: patches.spread(own),
+        }),
+        stderr: vec![Vec3::ONE; patches.layout().len()],
+        seen: (patches.spread(covered).into_iter())
+            .map(|pixels| u32::try_from(pixels).unwrap_or(u32::MAX))
+            .collect(),
+        textured: vec![true; scene.objects.len()],
+    });
+    let objects = (0..scene.objects.len())
+        .map(|k| {
+            let albedo = match &texels {
+                None => descent.albedo[k],
+                Some(texels) => mean_albedo(scene, k, &texels.colors),
+            };
+            let emission = descent.emission[k];
+            ObjectEstimate {
+                albedo,
+                albedo_stderr: Vec3::ONE,
+                emission,
+                emission_stderr: emission.max(Vec3::splat(emission.max_element())),
+                seen_pixels: survey.seen[k],
+                identifiable: notes[k].is_empty(),
+                albedo_identifiable: notes[k].is_empty(),
+                note: notes[k].to_owned(),
+                ..Default::default()
+            }
+        })
+        .collect();
+    Estimate {
+        objects,
+        texels: texels.map(Arc::new),
+        ..Default::default()
+    }
+}
+
+/// Area-weighted mean over an object's texels.
+fn mean_albedo(scene: &Scene, object: usize, texels: &TexelColors) -> Vec3 {
+    let object = &scene.objects[object];
+    let mut sum = DVec3::ZERO;
+    for &triangle in &object.triangles {
+        let triangle = triangle as usize;
+        let [first, end] = [0, 1].map(|i| texels.layout.first[triangle + i] as usize);
+        let colors: DVec3 = (texels.colors[first..end].iter())
+            .map(|color| color.as_dvec3())
+            .sum();
+        sum += colors / (end - first) as f64 * f64::from(scene.areas[triangle]);
+    }
+    if object.area > 0.0 {
+        (sum / object.area).as_vec3()
+    } else {
+        Vec3::ZERO
+    }
+}
