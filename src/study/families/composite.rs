@@ -343,7 +343,7 @@ fn scores(
     let psnr =
         |pixels: &[usize], picture: &dyn Fn(usize) -> Vec3, truth: &dyn Fn(usize) -> Vec3| {
             let off = pixels.iter().map(|&i| {
-                let display = |v: Vec3| shown(v).map(|c| linear_to_srgb(c));
+                let display = |v: Vec3| shown(v).map(linear_to_srgb);
                 f64::from((display(picture(i)) - display(truth(i))).length_squared()) / 3.0
             });
             -10.0
