@@ -1,4 +1,4 @@
-//! Lamps that photographs show saturated: their other pixels are mixtures.
+//! Lamps that photographs of a scan show saturated: their other pixels are mixtures.
 //!
 //! Where most of what a photograph shows of an object is saturated, the rest is darker because the pixel, the lens or the mesh's
 //! outline mixes the object with what is beside it. Fitted as if it were measured, it would hold a lamp's light at the

@@ -143,7 +143,11 @@ pub fn solve(
     let needed = exposures.as_ref().filter(|e| e.needed());
     let undone = needed.map(|exposures| exposures.undone(problem));
     let problem = undone.as_ref().unwrap_or(problem);
-    let bounded = overexposed::bounded(problem, &survey);
+    // Of a mesh that is no scan the mixtures at outlines are known.
+    let bounded = match problem.scene.scanned {
+        true => overexposed::bounded(problem, &survey),
+        false => None,
+    };
     let problem = bounded.as_ref().unwrap_or(problem);
     let max_bounces = settings.max_bounces().min(MOST_BOUNCES);
     let clusters = cluster(problem, &survey, budget.pixels);
