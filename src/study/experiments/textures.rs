@@ -138,7 +138,7 @@ fn descent_settings(bench: &Bench) -> Settings {
             bounces: 3,
             learning_rate: 2e-2,
             anneal: false,
-            steps: 100_000,
+            steps: 400_000,
             ..settings
         },
         false => Settings {
