@@ -29,11 +29,22 @@ impl Source {
             Self::BuiltInRoom => "built-in-room".into(),
             Self::Folder(folder) => std::path::absolute(folder)
                 .ok()
-                .and_then(|path| Some(path.file_name()?.to_owned()))
+                .and_then(|path| Some(named(&path)?.to_owned()))
                 .unwrap_or_else(|| "capture".into()),
         };
         Path::new("relit-out").join(name)
     }
+}
+
+/// What a capture is called by its folder: an imported one lies in `relit-out/NAME/capture`.
+fn named(folder: &Path) -> Option<&std::ffi::OsStr> {
+    let name = folder.file_name()?;
+    let imported = || {
+        let of_scan = folder.parent()?;
+        let into = of_scan.parent()?.file_name()?;
+        (name == "capture" && into == "relit-out").then(|| of_scan.file_name())?
+    };
+    Some(imported().unwrap_or(name))
 }
 
 /// A request to the worker, taken between iterations.
@@ -153,4 +164,24 @@ pub struct OpenOptions {
     /// Whether paths in the capture may lead out of its folder. Never kept in files, which may be someone else's.
     #[serde(skip)]
     pub allow_outside: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_of_imported_scans_lie_apart() {
+        let out = |folder: &str| Source::Folder(folder.into()).default_out();
+        assert_eq!(
+            out("/a/relit-out/flat/capture"),
+            Path::new("relit-out/flat")
+        );
+        assert_eq!(
+            out("/a/relit-out/attic/capture"),
+            Path::new("relit-out/attic")
+        );
+        assert_eq!(out("/a/scans/capture"), Path::new("relit-out/capture"));
+        assert_eq!(out("/a/room"), Path::new("relit-out/room"));
+    }
 }
