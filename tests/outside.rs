@@ -143,7 +143,7 @@ fn a_saturated_sky_is_a_bound_only_where_nothing_measured_it() {
         MeasuredOutside::new(&problem, &survey, Surroundings::Far).expect("the sky is seen")
     });
     let upwards = Vec3::new(0.1, 0.3, 1.0).normalize();
-    let [measured, of_both, bound] = [&once, &both, &bounds].map(|m| m.at(upwards));
+    let [measured, of_both, bound] = [&once, &both, &bounds].map(|m| m.at(Vec3::ZERO, upwards));
     let measured = measured.expect("seen through the window");
     assert!(measured.min_element() > 1.0, "{measured}");
     assert_eq!(of_both, Some(measured));

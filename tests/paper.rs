@@ -25,14 +25,7 @@ fn room(size: [u32; 2]) -> (Problem, Vec<Material>, Arc<Texture>) {
         .to_vec();
     materials[LAMP].emission = Vec3::new(6.0, 5.5, 5.0);
     materials[BACK].albedo = Albedo::Image(board.clone(), Vec3::ONE);
-    let views = [
-        ([0.1, 0.0, 0.9], [0.0, 0.0, -1.0]),
-        ([-0.6, 0.2, 0.5], [0.3, -0.1, -1.0]),
-        ([0.6, -0.3, 0.5], [-0.3, 0.1, -1.0]),
-        ([0.5, 0.3, -0.5], [-0.5, -0.6, 0.9]),
-    ]
-    .map(|(center, target)| (DVec3::from_array(center), DVec3::from_array(target)));
-    let capture = scenes::capture(mesh, &views, size);
+    let capture = scenes::capture(mesh, &scenes::back_wall_views(), size);
     let problem = scenes::photographed(&capture, &materials, 192, 5);
     (problem, materials, board)
 }

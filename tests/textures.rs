@@ -47,14 +47,7 @@ fn room(size: [u32; 2], samples: u32) -> Room {
         ..Estimate::default()
     };
     materials[BACK].albedo = Albedo::Image(poster.clone(), Vec3::ONE);
-    let views = [
-        ([0.1, 0.0, 0.9], [0.0, 0.0, -1.0]),
-        ([-0.6, 0.2, 0.5], [0.3, -0.1, -1.0]),
-        ([0.6, -0.3, 0.5], [-0.3, 0.1, -1.0]),
-        ([0.5, 0.3, -0.5], [-0.5, -0.6, 0.9]),
-    ]
-    .map(|(center, target)| (DVec3::from_array(center), DVec3::from_array(target)));
-    let capture = scenes::capture(mesh, &views, size);
+    let capture = scenes::capture(mesh, &scenes::back_wall_views(), size);
     Room {
         problem: scenes::photographed(&capture, &materials, samples, 5),
         poster,

@@ -401,11 +401,7 @@ impl App {
             .capture()
             .and_then(|capture| capture.photographs.get(self.frame));
         self.photograph = photograph.map(|photograph| {
-            let picture = Picture {
-                width: photograph.width,
-                height: photograph.height,
-                pixels: photograph.pixels.clone(),
-            };
+            let picture = photograph.picture();
             (self.frame, Arc::new(picture))
         });
     }

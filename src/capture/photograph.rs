@@ -4,6 +4,7 @@ use crate::capture::camera::Intrinsics;
 use crate::capture::orientation::Orientation;
 use crate::capture::read;
 use crate::error::Result;
+use crate::math::picture::Picture;
 use glam::{BVec3, Vec3};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -62,6 +63,15 @@ impl Photograph {
             usable,
             limits,
             ..*self
+        }
+    }
+
+    /// Its values as a picture.
+    pub fn picture(&self) -> Picture {
+        Picture {
+            width: self.width,
+            height: self.height,
+            pixels: self.pixels.clone(),
         }
     }
 

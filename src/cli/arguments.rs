@@ -108,6 +108,36 @@ pub struct SolveArguments {
     pub known: KnownValues,
 }
 
+/// Whether pictures are smoothed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Denoise {
+    /// Pictures that people look at are, measurements are not
+    Auto,
+    /// Always, by relit's own denoiser
+    Builtin,
+    /// Never
+    None,
+}
+
+/// Whether the noise of pictures is smoothed.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct DenoiseOptions {
+    /// Smooths the noise, guided by what each pixel sees; `auto` does in pictures to look at and leaves radiance in .exr as it was rendered
+    #[arg(long, value_name = "HOW", default_value = "auto", default_missing_value = "builtin", num_args = 0..=1)]
+    denoise: Denoise,
+}
+
+impl DenoiseOptions {
+    /// Whether a picture is smoothed that is there to be looked at, or to measure by.
+    pub fn smooths(self, to_look_at: bool) -> bool {
+        match self.denoise {
+            Denoise::Auto => to_look_at,
+            Denoise::Builtin => true,
+            Denoise::None => false,
+        }
+    }
+}
+
 /// What traces the paths of pictures.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct DeviceOptions {
@@ -367,15 +397,4 @@ mod tests {
             );
         }
     }
-}
-
-/// Whether pictures are smoothed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Denoise {
-    /// Pictures that people look at are, measurements are not
-    Auto,
-    /// Always, by relit's own denoiser
-    Builtin,
-    /// Never
-    None,
 }

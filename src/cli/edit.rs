@@ -1,6 +1,6 @@
 //! `relit edit`: lamps off, walls recoloured, surfaces polished.
 
-use crate::cli::arguments::{Denoise, DeviceOptions, Replace};
+use crate::cli::arguments::{DenoiseOptions, DeviceOptions, Replace};
 use crate::cli::numbers::from_one;
 use crate::cli::object_values::{ObjectValues, named_color, named_number};
 use crate::cli::photographs::write_with_progress;
@@ -44,9 +44,8 @@ pub struct EditArguments {
     /// Samples a pixel of the light in photographs
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = from_one::<u32>)]
     spp: u32,
-    /// Smooths the noise of the light in photographs
-    #[arg(long, value_name = "HOW", default_value = "auto", default_missing_value = "builtin", num_args = 0..=1)]
-    denoise: Denoise,
+    #[command(flatten)]
+    denoise: DenoiseOptions,
     #[command(flatten)]
     device: DeviceOptions,
     /// Folder to write into
@@ -98,7 +97,7 @@ pub fn edit(arguments: &EditArguments) -> Result<i32> {
         placements: Vec::new(),
         relight: true,
         samples: arguments.spp,
-        denoise: arguments.denoise != Denoise::None,
+        denoise: arguments.denoise.smooths(true),
         finish: true,
     });
     let results = Results {

@@ -1,6 +1,6 @@
 //! `relit insert`: objects into a photograph, naively and by differential rendering.
 
-use crate::cli::arguments::{Denoise, DeviceOptions, Replace};
+use crate::cli::arguments::{DenoiseOptions, DeviceOptions, Replace};
 use crate::cli::numbers::{above_zero, degrees, from_one, triple};
 use crate::cli::photographs::write_with_progress;
 use crate::cli::saved::{Loaded, SavedOptions};
@@ -27,9 +27,8 @@ pub struct InsertArguments {
     /// Samples a pixel
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = from_one::<u32>)]
     spp: u32,
-    /// Smooths the noise of the light that the objects add and take away
-    #[arg(long, value_name = "HOW", default_value = "auto", default_missing_value = "builtin", num_args = 0..=1)]
-    denoise: Denoise,
+    #[command(flatten)]
+    denoise: DenoiseOptions,
     /// Whether objects take the blur and the grain of 8-bit photographs
     #[arg(long, value_name = "BOOL", default_value_t = true, action = ArgAction::Set)]
     finish: bool,
@@ -69,7 +68,7 @@ pub fn insert(arguments: &InsertArguments) -> Result<i32> {
         placements,
         relight: !edits.is_empty(),
         samples: arguments.spp,
-        denoise: arguments.denoise != Denoise::None,
+        denoise: arguments.denoise.smooths(true),
         finish: arguments.finish,
     };
     write_with_progress(

@@ -1,7 +1,7 @@
 //! `relit render`: a picture of the room in its estimated light, from a photograph's camera or any other.
 
 use crate::capture::read::camera_file;
-use crate::cli::arguments::{Denoise, DeviceOptions, Replace};
+use crate::cli::arguments::{DenoiseOptions, DeviceOptions, Replace};
 use crate::cli::numbers::{from_one, whole};
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
@@ -40,11 +40,10 @@ pub struct RenderArguments {
     /// Samples a pixel
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = from_one::<u32>)]
     spp: u32,
-    /// Smooths the noise, guided by what each pixel sees; `auto` does in .png and leaves radiance in .exr as it was rendered
-    #[arg(long, value_name = "HOW", default_value = "auto", default_missing_value = "builtin", num_args = 0..=1, conflicts_with = "layers")]
-    denoise: Denoise,
+    #[command(flatten)]
+    denoise: DenoiseOptions,
     /// Writes the light of each lamp apart, as named layers of one .exr that add up to the picture
-    #[arg(long)]
+    #[arg(long, conflicts_with = "denoise")]
     layers: bool,
     #[command(flatten)]
     device: DeviceOptions,
@@ -136,11 +135,7 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
             pixels: film.mean(),
         }
     };
-    let smooth = match (arguments.denoise, &format) {
-        (Denoise::None, _) | (Denoise::Auto, Format::Exr) => false,
-        (Denoise::Builtin, _) | (Denoise::Auto, Format::Png) => true,
-    };
-    let mut picture = if smooth {
+    let mut picture = if arguments.denoise.smooths(matches!(format, Format::Png)) {
         // Two independent halves tell the noise.
         let half = spp.div_ceil(2);
         let [a, b] = [seed, seed.wrapping_add(1)].map(|seed| rendered(seed, half));

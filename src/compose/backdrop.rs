@@ -55,11 +55,7 @@ impl Backdrop {
         photograph: &Photograph,
         exposure: Exposure,
     ) -> Result<Self> {
-        let picture = Picture {
-            width: photograph.width,
-            height: photograph.height,
-            pixels: photograph.pixels.clone(),
-        };
+        let picture = photograph.picture();
         let size = (camera.intrinsics.width, camera.intrinsics.height);
         if !picture.is_whole() || size != (picture.width, picture.height) {
             return Err(Error::new(

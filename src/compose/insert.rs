@@ -30,28 +30,12 @@ pub struct Insertion {
     objects: Vec<Arc<PlacedObject>>,
     options: PathOptions,
     seed: u64,
-    pixels: Vec<PixelSums>,
+    pixels: Vec<PairSums>,
     /// Paths of each row's pixels so far.
     row_samples: Vec<u32>,
     next_row: usize,
     rays: u64,
     rejected: u64,
-}
-
-/// What has been found out about one pixel.
-#[derive(Debug, Clone, Copy, Default)]
-struct PixelSums {
-    with: DVec3,
-    without: DVec3,
-    /// The same of the samples that saw an object first.
-    covered_with: DVec3,
-    covered_without: DVec3,
-    /// Samples that saw an object first.
-    covered: u32,
-    /// Whether any sample differed.
-    changed: bool,
-    rays: u32,
-    rejected: u32,
 }
 
 /// Everything that a composite is made from, one entry a pixel.
@@ -104,7 +88,7 @@ impl Insertion {
             objects,
             options,
             seed,
-            pixels: vec![PixelSums::default(); width as usize * height as usize],
+            pixels: vec![PairSums::default(); width as usize * height as usize],
             row_samples: vec![0; height as usize],
             next_row: 0,
             rays: 0,
@@ -124,7 +108,7 @@ impl Insertion {
             objects: self.objects.clone(),
             options: self.options,
             seed,
-            pixels: vec![PixelSums::default(); self.pixels.len()],
+            pixels: vec![PairSums::default(); self.pixels.len()],
             row_samples: vec![0; self.row_samples.len()],
             next_row: 0,
             rays: 0,
@@ -199,13 +183,14 @@ impl Insertion {
         Ok(true)
     }
 
-    /// Adds what the card found in some rows, in so many samples.
+    /// Adds what was found in some rows, in so many samples.
     fn take(&mut self, rows: Range<usize>, samples: u32, added: &[PairSums]) {
         let width = self.width();
         for (row, added) in rows.zip(added.chunks(width)) {
             for (sums, pair) in self.pixels[row * width..].iter_mut().zip(added) {
+                // The first true sample takes the coarse result's place.
                 if self.row_samples[row] == 0 {
-                    *sums = PixelSums::default();
+                    *sums = PairSums::default();
                 }
                 sums.with += pair.with;
                 sums.without += pair.without;
@@ -361,7 +346,7 @@ impl Insertion {
     }
 
     /// One pair of paths through a pixel, both from the same random numbers.
-    fn pair(&self, world: &FurnishedScene<'_>, pixel: usize, sample: u32) -> PixelSums {
+    fn pair(&self, world: &FurnishedScene<'_>, pixel: usize, sample: u32) -> PairSums {
         let mut stream = self.stream(pixel, sample);
         let ray = self.ray(pixel, stream.uniform2());
         let mut again = stream.clone();
@@ -384,7 +369,7 @@ impl Insertion {
             }
         };
         let of_covered = |value: DVec3| if covered { value } else { DVec3::ZERO };
-        PixelSums {
+        PairSums {
             with: keep(with),
             without: keep(without),
             covered_with: of_covered(keep(with)),
@@ -399,7 +384,7 @@ impl Insertion {
     /// Adds one sample to every pixel of some rows.
     fn add_rows(&mut self, first: usize, rows: usize) {
         let width = self.width();
-        let added: Vec<Vec<PixelSums>> = (first..first + rows)
+        let added: Vec<Vec<PairSums>> = (first..first + rows)
             .into_par_iter()
             .map(|row| {
                 let world = FurnishedScene::new(&self.lit, &self.objects);
@@ -409,23 +394,7 @@ impl Insertion {
                     .collect()
             })
             .collect();
-        for (row, added) in (first..).zip(added) {
-            for (sums, pair) in self.pixels[row * width..].iter_mut().zip(added) {
-                // The first true sample takes the coarse result's place.
-                if self.row_samples[row] == 0 {
-                    *sums = PixelSums::default();
-                }
-                sums.with += pair.with;
-                sums.without += pair.without;
-                sums.covered_with += pair.covered_with;
-                sums.covered_without += pair.covered_without;
-                sums.covered += pair.covered;
-                sums.changed |= pair.changed;
-                self.rays += u64::from(pair.rays);
-                self.rejected += u64::from(pair.rejected);
-            }
-            self.row_samples[row] += 1;
-        }
+        self.take(first..first + rows, 1, &added.concat());
     }
 
     /// The coarse result: in each block one pair of paths where an object is seen and one where none is, whose
@@ -435,7 +404,7 @@ impl Insertion {
         let side = (1..)
             .find(|side| width.div_ceil(*side) * height.div_ceil(*side) <= COARSE_BLOCKS)
             .unwrap_or(1);
-        let bands: Vec<(Vec<PixelSums>, Vec<Option<DVec3>>)> = (0..height.div_ceil(side))
+        let bands: Vec<(Vec<PairSums>, Vec<Option<DVec3>>)> = (0..height.div_ceil(side))
             .into_par_iter()
             .map(|band| self.coarse_band(band * side, side))
             .collect();
@@ -452,15 +421,15 @@ impl Insertion {
     }
 
     /// The coarse result's rows from `top` on, and each block's difference where no object is seen.
-    fn coarse_band(&self, top: usize, side: usize) -> (Vec<PixelSums>, Vec<Option<DVec3>>) {
+    fn coarse_band(&self, top: usize, side: usize) -> (Vec<PairSums>, Vec<Option<DVec3>>) {
         let (width, height) = (self.width(), self.row_samples.len());
         let rows = side.min(height - top);
         let world = FurnishedScene::new(&self.lit, &self.objects);
-        let mut band = vec![PixelSums::default(); rows * width];
+        let mut band = vec![PairSums::default(); rows * width];
         let mut deltas = Vec::with_capacity(width.div_ceil(side));
         for left in (0..width).step_by(side) {
             // Indexed by whether an object is seen.
-            let mut found: [Option<PixelSums>; 2] = [None; 2];
+            let mut found: [Option<PairSums>; 2] = [None; 2];
             let columns = side.min(width - left);
             for index in 0..rows * columns {
                 let (row, column) = (index / columns, left + index % columns);
@@ -469,7 +438,7 @@ impl Insertion {
                 let covered = world.sees_object(&self.ray(pixel, offset));
                 let sums = &mut found[usize::from(covered)];
                 band[row * width + column] = match *sums {
-                    Some(known) => PixelSums { rays: 0, ..known },
+                    Some(known) => PairSums { rays: 0, ..known },
                     None => *sums.insert(self.pair(&world, pixel, 0)),
                 };
             }

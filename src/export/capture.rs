@@ -23,11 +23,7 @@ pub fn write(folder: &Path, capture: &Capture, precision: Precision) -> Result<(
     write_mesh(folder, &capture.mesh)?;
     for (index, frame) in capture.frames.iter().enumerate() {
         let photograph = frame.load()?;
-        let picture = Picture {
-            width: photograph.width,
-            height: photograph.height,
-            pixels: photograph.pixels.clone(),
-        };
+        let picture = photograph.picture();
         write_rgb(&folder.join(image_name(index)), &picture, precision)?;
     }
     let cameras = capture.frames.iter().map(|f| (f.intrinsics, f.pose));

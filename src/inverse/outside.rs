@@ -104,17 +104,21 @@ impl MeasuredOutside {
         })
     }
 
-    /// Radiance that arrives from a unit direction of the map, or a bound that it exceeds; `None` where no photograph tells.
+    /// Radiance that a ray finds, or a bound that it exceeds; `None` where no photograph tells.
     #[inline]
-    pub fn at(&self, looked_up: Vec3) -> Option<Vec3> {
-        self.known[pixel_of(self.width, self.height, looked_up)].then(|| self.map.of_map(looked_up))
+    pub fn at(&self, origin: Vec3, direction: Vec3) -> Option<Vec3> {
+        self.known[self.cell(origin, direction)].then(|| self.map.radiance(origin, direction))
     }
 
-    /// Whether no photograph tells more of a unit direction of the map than that it is at least so bright: all are saturated
-    /// there.
+    /// Whether no photograph tells more of what a ray finds than that it is at least so bright: all are saturated there.
     #[inline]
-    pub fn is_bound(&self, looked_up: Vec3) -> bool {
-        self.at_least[pixel_of(self.width, self.height, looked_up)]
+    pub fn is_bound(&self, origin: Vec3, direction: Vec3) -> bool {
+        self.at_least[self.cell(origin, direction)]
+    }
+
+    fn cell(&self, origin: Vec3, direction: Vec3) -> usize {
+        let looked_up = self.map.surroundings().looked_up(origin, direction);
+        pixel_of(self.width, self.height, looked_up)
     }
 
     /// The map, for drawing directions from.
@@ -163,10 +167,10 @@ impl MeasuredOutside {
         (0..self.width * self.height)
             .map(|cell| {
                 let direction = direction_of(self.width, self.height, cell);
-                match self.at(direction) {
-                    Some(bound) if self.is_bound(direction) => bound + excess,
-                    Some(radiance) => radiance,
-                    None => elsewhere(direction),
+                match (self.known[cell], self.at_least[cell]) {
+                    (true, true) => self.map.of_map(direction) + excess,
+                    (true, false) => self.map.of_map(direction),
+                    (false, _) => elsewhere(direction),
                 }
             })
             .collect()

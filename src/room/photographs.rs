@@ -4,7 +4,6 @@ use crate::capture::photograph::{Encoding, Photograph};
 use crate::error::{Error, Result};
 use crate::export::atomic::write_bytes;
 use crate::export::exr::{Precision, write_rgb};
-use crate::math::picture::Picture;
 use crate::room::Room;
 use crate::transport::film::Film;
 use crate::transport::lit::Lit;
@@ -110,11 +109,7 @@ pub fn write_kept(folder: &Path) -> Result<()> {
 /// The folder cannot be written.
 pub fn write(folder: &Path, photographs: &[Photograph]) -> Result<()> {
     for (index, photograph) in photographs.iter().enumerate() {
-        let picture = Picture {
-            width: photograph.width,
-            height: photograph.height,
-            pixels: photograph.pixels.clone(),
-        };
+        let picture = photograph.picture();
         write_rgb(
             &folder.join(format!("{index:03}.exr")),
             &picture,

@@ -41,11 +41,7 @@ impl OpenCapture {
         if (photograph.width, photograph.height) == (k.width, k.height) {
             return Ok((camera, photograph));
         }
-        let whole = Picture {
-            width: photograph.width,
-            height: photograph.height,
-            pixels: photograph.pixels.clone(),
-        };
+        let whole = photograph.picture();
         let sized = Photograph {
             width: k.width,
             height: k.height,
@@ -83,11 +79,7 @@ impl OpenCapture {
     /// As [`OpenCapture::full_photograph`].
     pub fn sized_photograph(&self, index: usize, camera: &Camera) -> Result<(Picture, f32)> {
         let photograph = self.full_photograph(index)?;
-        let whole = Picture {
-            width: photograph.width,
-            height: photograph.height,
-            pixels: photograph.pixels.clone(),
-        };
+        let whole = photograph.picture();
         let k = &camera.intrinsics;
         let picture = box_filter(&whole, k.width, k.height);
         let shown_at = shown_at(photograph.saturation, &picture.pixels);

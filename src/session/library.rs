@@ -142,11 +142,7 @@ fn light_of_photographs(capture: &OpenCapture) -> Harmonics {
     let pictures: Vec<Picture> = capture
         .photographs
         .iter()
-        .map(|photograph| Picture {
-            width: photograph.width,
-            height: photograph.height,
-            pixels: photograph.pixels.clone(),
-        })
+        .map(|photograph| photograph.picture())
         .collect();
     harmonics_of_photographs(capture.scene.cameras.iter().zip(&pictures))
 }

@@ -182,6 +182,17 @@ pub fn without((whole, materials): (Mesh, Vec<Material>), names: &[&str]) -> (Me
 /// A camera's place and the point in the middle of its picture.
 pub type View = (DVec3, DVec3);
 
+/// Three views of the back wall of [`closed_box`], from in front and from both sides, and one of the front.
+pub fn back_wall_views() -> [View; 4] {
+    [
+        ([0.1, 0.0, 0.9], [0.0, 0.0, -1.0]),
+        ([-0.6, 0.2, 0.5], [0.3, -0.1, -1.0]),
+        ([0.6, -0.3, 0.5], [-0.3, 0.1, -1.0]),
+        ([0.5, 0.3, -0.5], [-0.5, -0.6, 0.9]),
+    ]
+    .map(|(center, target)| (DVec3::from_array(center), DVec3::from_array(target)))
+}
+
 /// Six views of [`lamp_room`] that see all of its objects.
 pub fn room_views() -> [View; 6] {
     [

@@ -111,8 +111,8 @@ impl OutsideGrid {
     }
 
     /// The vertex at which a path ends that leaves along a ray.
-    fn vertex(&self, origin: Vec3, direction: Vec3, weight: f32) -> Vertex {
-        let looked_up = self.surroundings.looked_up(origin, direction);
+    fn vertex(&self, ray: &Ray, weight: f32) -> Vertex {
+        let looked_up = self.surroundings.looked_up(ray.origin, ray.direction);
         Vertex {
             emission_weight: weight,
             ..Vertex::on(self.surface(looked_up))
@@ -197,10 +197,7 @@ impl Tracer<'_> {
     ) -> u64 {
         let mut rays = 1;
         let Some(mut hit) = self.scene.intersect(camera_ray) else {
-            vertices.extend(
-                self.outside
-                    .map(|grid| grid.vertex(camera_ray.origin, camera_ray.direction, 1.0)),
-            );
+            vertices.extend(self.outside.map(|grid| grid.vertex(camera_ray, 1.0)));
             return rays;
         };
         let mut wo = -camera_ray.direction;
@@ -270,16 +267,15 @@ impl Tracer<'_> {
             scale *= scattered.weight;
             let origin = surface.leave(wi);
             rays += 1;
-            let next = self.scene.intersect(&Ray::new(origin, wi));
+            let ray = Ray::new(origin, wi);
+            let next = self.scene.intersect(&ray);
             let Some(next) = next else {
-                let looked_up = |s: &MeasuredOutside| s.map().surroundings().looked_up(origin, wi);
-                if let Some((sky, radiance)) = self.sky.and_then(|s| Some((s, s.at(looked_up(s))?)))
-                {
+                if let Some((sky, radiance)) = self.sky.and_then(|s| Some((s, s.at(origin, wi)?))) {
                     let sky_pdf = sky.map().pdf(origin, wi) * self.sky_share();
                     let weight = self.met_weight(bsdf_pdf, sky_pdf);
                     vertex.known += radiance * (weight * scale);
                     vertices.push(vertex);
-                    let excess = self.outside.filter(|_| sky.is_bound(looked_up(sky)));
+                    let excess = self.outside.filter(|_| sky.is_bound(origin, wi));
                     vertices.extend(excess.map(|grid| Vertex {
                         emission_weight: weight * scale,
                         ..Vertex::on(grid.excess())
@@ -287,7 +283,7 @@ impl Tracer<'_> {
                 } else {
                     vertices.push(vertex);
                     // Where nothing is known no light samples go, so what is met has the whole weight.
-                    vertices.extend(self.outside.map(|grid| grid.vertex(origin, wi, scale)));
+                    vertices.extend(self.outside.map(|grid| grid.vertex(&ray, scale)));
                 }
                 return rays;
             };
@@ -390,8 +386,7 @@ impl Tracer<'_> {
         }
         let weight = self.drawn_weight(pdf * self.sky_share(), surface.value(lobed, wi)) * scale;
         vertex.known += sky.map().radiance(point, wi) * weight;
-        let looked_up = sky.map().surroundings().looked_up(point, wi);
-        if let Some(grid) = self.outside.filter(|_| sky.is_bound(looked_up)) {
+        if let Some(grid) = self.outside.filter(|_| sky.is_bound(point, wi)) {
             (vertex.lamp, vertex.lamp_weight) = (grid.excess(), weight);
         }
         1

@@ -75,11 +75,7 @@ impl Target {
         let camera = camera.shrunk(long_side);
         let photograph = frame.and_then(|frame| {
             let photograph = capture.photographs.get(frame)?;
-            let whole = Picture {
-                width: photograph.width,
-                height: photograph.height,
-                pixels: photograph.pixels.clone(),
-            };
+            let whole = photograph.picture();
             let k = &camera.intrinsics;
             Some(Arc::new(box_filter(&whole, k.width, k.height)))
         });

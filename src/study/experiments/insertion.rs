@@ -137,13 +137,7 @@ fn scene(
     let objects = (room.models.iter())
         .map(|model| PlacedObject::new(model.clone(), &room.placement, scene).map(Arc::new))
         .collect::<Result<Vec<_>>>()?;
-    let pictures: Vec<Picture> = (problem.photographs.iter())
-        .map(|p| Picture {
-            width: p.width,
-            height: p.height,
-            pixels: p.pixels.clone(),
-        })
-        .collect();
+    let pictures: Vec<Picture> = (problem.photographs.iter()).map(|p| p.picture()).collect();
     let photographed = harmonics_of_photographs(scene.cameras.iter().zip(&pictures));
     let mut found = Scene {
         name: room.name.clone(),

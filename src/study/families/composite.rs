@@ -57,12 +57,12 @@ pub struct CompositeRow {
     pub naive: f64,
     /// Brightness of the chair over the true one.
     pub brightness: f64,
-    /// PSNR in dB over the shadow and bleed: the composite's.
-    pub shadow: f64,
+    /// PSNR in dB over the shadow and bleed: the composite's; `None` where the chair changes nothing beside itself.
+    pub shadow: Option<f64>,
     /// The untouched photograph's.
-    pub untouched: f64,
+    pub untouched: Option<f64>,
     /// Least-squares slope of the composite's change there on the true one: 1 is right.
-    pub slope: f64,
+    pub slope: Option<f64>,
 }
 
 /// Draws a room, solves it, and puts a chair into the photographs that see most of where it stands; `None` where the floor has no
@@ -82,37 +82,43 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
         &truth.scene,
     )?)];
     let frames = most_seen(&truth, &true_chair);
-    let mut sum = Scores::default();
-    for &frame in &frames {
-        sum.add(&scores(&solved, frame, &truth, &true_chair, &chair)?);
-    }
-    let mean = |of: fn(&Scores) -> f64| of(&sum) / frames.len() as f64;
-    Ok((!frames.is_empty()).then(|| CompositeRow {
+    let scores = (frames.iter())
+        .map(|&frame| scores(&solved, frame, &truth, &true_chair, &chair))
+        .collect::<Result<Vec<_>>>()?;
+    let count = scores.len() as f64;
+    let mean = |of: fn(&Scores) -> f64| scores.iter().map(of).sum::<f64>() / count;
+    let told: Vec<Beside> = scores.iter().filter_map(|s| s.beside).collect();
+    let beside = |of: fn(&Beside) -> f64| {
+        let sum: f64 = told.iter().map(of).sum();
+        (!told.is_empty()).then(|| sum / told.len() as f64)
+    };
+    Ok((!scores.is_empty()).then(|| CompositeRow {
         family,
         seed,
         seconds: solved.solution.progress.seconds,
         chair: mean(|s| s.chair),
         naive: mean(|s| s.naive),
         brightness: mean(|s| s.brightness),
-        shadow: mean(|s| s.shadow),
-        untouched: mean(|s| s.untouched),
-        slope: mean(|s| s.slope),
+        shadow: beside(|b| b.shadow),
+        untouched: beside(|b| b.untouched),
+        slope: beside(|b| b.slope),
     }))
 }
 
 impl CompositeRow {
     /// In a line.
     pub fn words(&self) -> String {
+        let told = self.shadow.zip(self.untouched).zip(self.slope);
+        let beside = told.map_or("none".to_owned(), |((shadow, untouched), slope)| {
+            format!("{shadow:.1} dB (untouched {untouched:.1}), slope {slope:.2}")
+        });
         format!(
-            "{} room {}: chair {:.1} dB (naive {:.1}), brightness {:.2}; shadow {:.1} dB (untouched {:.1}), slope {:.2}; {:.0} s",
+            "{} room {}: chair {:.1} dB (naive {:.1}), brightness {:.2}; shadow {beside}; {:.0} s",
             self.family.name(),
             self.seed,
             self.chair,
             self.naive,
             self.brightness,
-            self.shadow,
-            self.untouched,
-            self.slope,
             self.seconds,
         )
     }
@@ -144,7 +150,7 @@ impl Verdict {
             better: gains.iter().filter(|&&gain| gain > 0.0).count(),
             gain: quantile(&mut gains, 0.5).unwrap_or(f64::NAN),
             bright: count(&|row| (row.brightness - 1.0).abs() <= 0.15),
-            strong: count(&|row| (0.7..=1.3).contains(&row.slope)),
+            strong: count(&|row| row.slope.is_some_and(|slope| (0.7..=1.3).contains(&slope))),
         }
     }
 
@@ -236,26 +242,22 @@ fn most_seen(truth: &Arc<Lit>, chair: &[Arc<PlacedObject>]) -> Vec<usize> {
     frames.into_iter().map(|(_, frame)| frame).collect()
 }
 
-/// Scores of one photograph, or sums of them.
-#[derive(Debug, Clone, Copy, Default)]
+/// Scores of one photograph.
+#[derive(Debug, Clone, Copy)]
 struct Scores {
     chair: f64,
     naive: f64,
     brightness: f64,
+    /// Where the chair changes anything beside itself.
+    beside: Option<Beside>,
+}
+
+/// Scores over the shadow and bleed.
+#[derive(Debug, Clone, Copy)]
+struct Beside {
     shadow: f64,
     untouched: f64,
     slope: f64,
-}
-
-impl Scores {
-    fn add(&mut self, other: &Self) {
-        self.chair += other.chair;
-        self.naive += other.naive;
-        self.brightness += other.brightness;
-        self.shadow += other.shadow;
-        self.untouched += other.untouched;
-        self.slope += other.slope;
-    }
 }
 
 /// Compares the composite, the naive one and the untouched photograph of a frame with the truth.
@@ -319,13 +321,7 @@ fn scores(
     });
     let [a, b] = halves;
     let (ours, _) = denoised([&a?, &b?]);
-    let pictures: Vec<Picture> = (problem.photographs.iter())
-        .map(|p| Picture {
-            width: p.width,
-            height: p.height,
-            pixels: p.pixels.clone(),
-        })
-        .collect();
+    let pictures: Vec<Picture> = (problem.photographs.iter()).map(|p| p.picture()).collect();
     let light = harmonics_of_photographs(scene.cameras.iter().zip(&pictures));
     let plain = backdrop(scene, estimate.exposure(frame))?;
     let naive = Pasted::new(&plain, &lit, &placed, &[light], Exposure::default());
@@ -357,7 +353,7 @@ fn scores(
         pixels.iter().map(|&i| f64::from(of(i))).sum()
     };
     let ours_at = |i: usize| ours.pixels[i];
-    let slope = {
+    let slope = || {
         let ours = |i: usize| (ours_at(i) - shows[i]).dot(change_at(i));
         sum(&ours, &beside) / sum(&|i| change_at(i).length_squared(), &beside)
     };
@@ -366,8 +362,10 @@ fn scores(
         chair: psnr(&on, &ours_at, &truth_at),
         naive: psnr(&on, &|i| naive.pixels[i], &truth_at),
         brightness: bright(&ours_at) / bright(&truth_at),
-        shadow: psnr(&beside, &ours_at, &truly_changed),
-        untouched: psnr(&beside, &|i| shows[i], &truly_changed),
-        slope,
+        beside: (!beside.is_empty()).then(|| Beside {
+            shadow: psnr(&beside, &ours_at, &truly_changed),
+            untouched: psnr(&beside, &|i| shows[i], &truly_changed),
+            slope: slope(),
+        }),
     })
 }
