@@ -406,7 +406,7 @@ fn light_is_composed_on_the_sensor_and_shown_through_the_cameras_curve() {
     backdrop.exposure.response = Some(curve);
     let shown = |light: f32| curve.value(Vec3::splat(light), Vec3::ONE);
     backdrop.photograph = Arc::new(Picture::from_fn(SIDE, SIDE, |_, _| shown(0.4)));
-    // The surface hides a share of the pixel, and takes a tenth of the light that shines past it.
+    // The surface hides a fraction of the pixel, and takes a tenth of the light that shines past it.
     for (alpha, over, under, want) in [
         (1.0, 0.3, 0.4, 0.3),
         (0.0, 0.3, 0.4, 0.3),

@@ -8,7 +8,7 @@ use relit::math::picture::Picture;
 use relit::scene::Scene;
 use relit::transport::environment::Environment;
 use relit::transport::film::Film;
-use relit::transport::layers::{LightSource, MOST_LAMPS, Split, mix};
+use relit::transport::layers::{LightSource, MAX_LAMPS, Split, mix};
 use relit::transport::lit::Lit;
 use relit::transport::material::Material;
 use relit::transport::path::PathOptions;
@@ -136,7 +136,7 @@ fn a_strength_of_zero_takes_away_that_layer_and_nothing_else() {
 #[test]
 fn lamps_beyond_the_most_share_a_layer_and_a_dark_room_has_none() {
     let mut mesh = scenes::closed_box(1.0, DVec3::ZERO);
-    let count = MOST_LAMPS + 4;
+    let count = MAX_LAMPS + 4;
     for lamp in 0..count {
         let x = -0.9 + 1.8 * lamp as f64 / count as f64;
         let at = |dx: f64, z: f64| DVec3::new(x + dx, 0.9, z);
@@ -157,7 +157,7 @@ fn lamps_beyond_the_most_share_a_layer_and_a_dark_room_has_none() {
     materials.extend((0..count).map(glow));
     let lit = Lit::new(scene, materials, None);
     let (split, pictures) = layers(&lit, 2, 4);
-    assert_eq!(split.sources().len(), MOST_LAMPS + 1);
+    assert_eq!(split.sources().len(), MAX_LAMPS + 1);
     assert_eq!(split.source_of(6), Some(LightSource::OtherLamps));
     assert_eq!(split.source_of(10), Some(LightSource::Lamp(10)));
     assert_eq!(split.source_of(0), None);

@@ -6,10 +6,10 @@ use glam::{DVec3, Vec3};
 use relit::capture::mesh::Mesh;
 use relit::capture::photograph::Photograph;
 use relit::inverse::estimate::Estimate;
+use relit::inverse::gbuffer::GBuffer;
 use relit::inverse::outside::MeasuredOutside;
 use relit::inverse::settings::{Preset, Settings};
 use relit::inverse::solver::{Checkpoint, Control, Observer, Problem, Progress, Solution, solve};
-use relit::inverse::survey::Survey;
 use relit::scene::Scene;
 use relit::transport::environment::Environment;
 use relit::transport::material::Material;
@@ -139,8 +139,8 @@ fn a_saturated_sky_is_a_bound_only_where_nothing_measured_it() {
         ..Settings::default()
     };
     let [once, both, bounds] = [once, both, bounds].map(|problem| {
-        let survey = Survey::new(&problem, &settings, usize::MAX);
-        MeasuredOutside::new(&problem, &survey, Surroundings::Far).expect("the sky is seen")
+        let gbuffer = GBuffer::new(&problem, &settings, usize::MAX);
+        MeasuredOutside::new(&problem, &gbuffer, Surroundings::Far).expect("the sky is seen")
     });
     let upwards = Vec3::new(0.1, 0.3, 1.0).normalize();
     let [measured, of_both, bound] = [&once, &both, &bounds].map(|m| m.at(Vec3::ZERO, upwards));

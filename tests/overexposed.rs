@@ -2,10 +2,10 @@
 
 use glam::{BVec3, Vec3};
 use relit::capture::photograph::Photograph;
+use relit::inverse::gbuffer::GBuffer;
 use relit::inverse::overexposed::bounded;
 use relit::inverse::settings::Settings;
 use relit::inverse::solver::Problem;
-use relit::inverse::survey::Survey;
 use relit::room::Room;
 use relit::room::photographs::Rendering;
 use std::sync::Arc;
@@ -39,15 +39,15 @@ fn the_edges_of_a_saturated_lamp_are_bounds_and_a_wall_stays_measured() {
         .collect();
     let plain = problem(&unsaturated);
     let settings = Settings::default();
-    let survey = Survey::new(&plain, &settings, usize::MAX);
-    assert!(bounded(&plain, &survey).is_none());
+    let gbuffer = GBuffer::new(&plain, &settings, usize::MAX);
+    assert!(bounded(&plain, &gbuffer).is_none());
     // Pixels of lamps are at 2 inside, 0.4 at the edge; of all else at 0.3.
     let emits = |object: u32| {
         let material = lit.materials.get(object as usize);
         material.is_some_and(|m| m.emission != Vec3::ZERO)
     };
     let mut painted = photographs;
-    for pixel in &survey.pixels {
+    for pixel in &gbuffer.pixels {
         let value = match (emits(pixel.object), pixel.pure) {
             (true, true) => 1.0,
             (true, false) => 0.4,
@@ -56,9 +56,9 @@ fn the_edges_of_a_saturated_lamp_are_bounds_and_a_wall_stays_measured() {
         painted[pixel.frame as usize].pixels[pixel.pixel as usize] = Vec3::splat(value);
     }
     let given = problem(&painted);
-    let bounded = bounded(&given, &survey).expect("lamps are saturated");
+    let bounded = bounded(&given, &gbuffer).expect("lamps are saturated");
     let mut edges = 0;
-    for pixel in &survey.pixels {
+    for pixel in &gbuffer.pixels {
         let photograph = &bounded.photographs[pixel.frame as usize];
         let bound = photograph.saturated(pixel.pixel as usize);
         let wanted = BVec3::new(emits(pixel.object), emits(pixel.object), false);

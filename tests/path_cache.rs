@@ -9,11 +9,11 @@ use relit::inverse::cache::clusters::Cluster;
 use relit::inverse::cache::lamp_patches::LampPatches;
 use relit::inverse::cache::roles::Role;
 use relit::inverse::cache::trace::Tracer;
+use relit::inverse::gbuffer::GBuffer;
 use relit::inverse::measured::MeasuredRadiance;
 use relit::inverse::parameters::Unknowns;
 use relit::inverse::settings::{LightSampling, Settings};
 use relit::inverse::solver::Problem;
-use relit::inverse::survey::Survey;
 use relit::math::rng::Stream;
 use relit::math::stats::Moments;
 use relit::scene::Scene;
@@ -302,8 +302,8 @@ fn paths_that_end_in_photographed_radiance_hold_one_bounce_and_that_radiance() {
         scene: scene.clone(),
         photographs: vec![photograph; 6],
     };
-    let survey = Survey::new(&problem, &Settings::default(), usize::MAX);
-    let measured = MeasuredRadiance::new(&problem, &survey);
+    let gbuffer = GBuffer::new(&problem, &Settings::default(), usize::MAX);
+    let measured = MeasuredRadiance::new(&problem, &gbuffer);
     let lights = Emitters::new(&scene, &[1.0; 6]);
     let tracer = Tracer {
         texels: None,

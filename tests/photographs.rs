@@ -31,12 +31,12 @@ fn work(edits: &Edits, placements: Vec<Placement>) -> Photographs {
     }
 }
 
-/// The lamp at a share of its strength.
-fn dimmed(share: f32) -> Edits {
+/// The lamp at a fraction of its strength.
+fn dimmed(fraction: f32) -> Edits {
     let lamp = common::OBJECTS.len() - 1;
     let full = Vec3::from_array(common::OBJECTS[lamp].2);
     let mut edits = Edits::default();
-    let emission = Some(full * share);
+    let emission = Some(full * fraction);
     edits.set(
         lamp,
         ObjectEdit {
@@ -72,8 +72,8 @@ fn read(path: &Path) -> Picture {
 #[test]
 fn a_lamp_at_half_its_strength_halves_every_photograph_and_one_that_is_off_darkens_it() {
     let folder = tempfile::tempdir().expect("a folder");
-    for (share, name) in [(0.5, "half"), (0.0, "off")] {
-        let work = work(&dimmed(share), Vec::new());
+    for (fraction, name) in [(0.5, "half"), (0.0, "off")] {
+        let work = work(&dimmed(fraction), Vec::new());
         let prefix = |frame: usize| folder.path().join(format!("{name}{frame}"));
         let written = work.write(&prefix, &|_| true).expect("written");
         assert_eq!((written.photographs, written.files.len()), (2, 4));
@@ -81,7 +81,7 @@ fn a_lamp_at_half_its_strength_halves_every_photograph_and_one_that_is_off_darke
             let relit = read(&folder.path().join(format!("{name}{frame}.relit.exr")));
             let photograph = work.capture.full_photograph(frame).expect("in memory");
             for (relit, photograph) in relit.pixels.iter().zip(&photograph.pixels) {
-                let off = (*relit - *photograph * share).abs().max_element();
+                let off = (*relit - *photograph * fraction).abs().max_element();
                 assert!(
                     off <= 1e-4 * photograph.max_element(),
                     "{relit} {photograph}"
@@ -98,7 +98,7 @@ fn composites_are_made_on_the_relit_photographs() {
     let prefix = |frame: usize| folder.path().join(format!("{frame:03}"));
     let told = AtomicUsize::new(0);
     let written = work.write(&prefix, &|doing| {
-        assert!((0.0..=1.0).contains(&doing.share));
+        assert!((0.0..=1.0).contains(&doing.fraction));
         told.fetch_add(1, Ordering::Relaxed);
         true
     });
@@ -116,8 +116,8 @@ fn composites_are_made_on_the_relit_photographs() {
     let mean = |p: &Picture| p.pixels.iter().map(|c| c.y).sum::<f32>() / all as f32;
     let photograph = work.capture.full_photograph(1).expect("in memory");
     let whole = photograph.pixels.iter().map(|c| c.y).sum::<f32>() / all as f32;
-    let share = mean(&composite) / whole;
-    assert!((0.15..0.3).contains(&share), "{share}");
+    let fraction = mean(&composite) / whole;
+    assert!((0.15..0.3).contains(&fraction), "{fraction}");
 }
 
 #[test]

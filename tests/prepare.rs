@@ -75,7 +75,7 @@ fn prepared(capture: &Capture) -> Prepared {
 }
 
 #[test]
-fn ids_sides_and_the_share_of_the_mesh_are_those_of_the_geometry() {
+fn ids_sides_and_the_fraction_of_the_mesh_are_those_of_the_geometry() {
     // The left half of the view sees rectangle 0, the right half rectangle 1 from behind; rectangle 2 hides behind 0.
     let capture = capture(
         &[
@@ -94,8 +94,8 @@ fn ids_sides_and_the_share_of_the_mesh_are_those_of_the_geometry() {
         prepared.scene.ids().triangles[0][0] < 2
             && prepared.scene.ids().triangles[0][SIZE as usize - 1] >= 2
     );
-    let share = prepared.seen_area_share;
-    assert!((share - 2.0 / 3.0).abs() < 0.02, "{share}");
+    let fraction = prepared.seen_area_fraction;
+    assert!((fraction - 2.0 / 3.0).abs() < 0.02, "{fraction}");
     assert!(prepared.warnings.iter().any(|w| w.contains("rectangle 2")));
     assert_eq!(prepared.summary().len(), 4);
     assert_eq!(prepared.capture.mesh.triangles, capture.mesh.triangles);

@@ -4,7 +4,7 @@
 #[path = "common/beside.rs"]
 mod beside;
 
-use relit::calibrate::alignment::{Astray, Verdict, Why};
+use relit::calibrate::alignment::{Astray, Decision, Why};
 use relit::capture::Capture;
 use relit::capture::read::{ReadOptions, read};
 use relit::inverse::estimate::{Estimate, ObjectEstimate};
@@ -12,7 +12,7 @@ use relit::room;
 use relit::room::generated::generate;
 use relit::session::command::{OpenOptions, Source};
 use relit::session::snapshot::OpenCapture;
-use relit::study::experiments::readings::{judge, mistakes};
+use relit::study::experiments::readings::{decide, mistakes};
 
 #[test]
 fn mistakes_in_the_built_in_room_are_found_with_their_remedies() {
@@ -30,7 +30,7 @@ fn mistakes_in_the_built_in_room_are_found_with_their_remedies() {
     ] {
         let all = mistakes();
         let mistake = all.iter().find(|m| m.name == name).expect("a mistake");
-        let outcome = judge(&capture, Some(mistake)).expect("a capture");
+        let outcome = decide(&capture, Some(mistake)).expect("a capture");
         assert!(outcome.right_remedy, "{name}: {outcome:?}");
     }
 }
@@ -43,10 +43,10 @@ fn sound_rooms_are_taken_for_sound() {
         rooms.push(room.photographed(&rendering).expect("a room"));
     }
     for capture in rooms {
-        let outcome = judge(&capture, None).expect("a capture");
+        let outcome = decide(&capture, None).expect("a capture");
         assert_eq!(
-            outcome.alignment.verdict,
-            Verdict::Sound,
+            outcome.alignment.decision,
+            Decision::Sound,
             "{}",
             capture.name
         );
@@ -62,20 +62,20 @@ fn mistakes_in_a_box_with_five_photographs_are_found() {
         return;
     };
     let capture = read(&folder, &ReadOptions::default()).expect("a capture");
-    let sound = judge(&capture, None).expect("a capture");
-    assert_eq!(sound.alignment.verdict, Verdict::Sound);
+    let sound = decide(&capture, None).expect("a capture");
+    assert_eq!(sound.alignment.decision, Decision::Sound);
     assert_eq!(sound.alignment.astray, []);
     for name in ["mesh with z up, poses with y up", "photographs mirrored"] {
         let all = mistakes();
         let mistake = all.iter().find(|m| m.name == name).expect("a mistake");
-        let outcome = judge(&capture, Some(mistake)).expect("a capture");
+        let outcome = decide(&capture, Some(mistake)).expect("a capture");
         assert!(outcome.right_remedy, "{name}: {outcome:?}");
     }
     // One of the five has the pose of another one, and its own is lost.
     for (frame, other) in [(0, 1), (1, 3), (2, 0), (3, 4), (4, 0)] {
         let wrong = with_pose_of(&capture, frame, other);
-        let outcome = judge(&wrong, None).expect("a capture");
-        let why = Why::Shares(other);
+        let outcome = decide(&wrong, None).expect("a capture");
+        let why = Why::Fractions(other);
         assert_eq!(outcome.alignment.astray, [Astray { frame, why }]);
     }
 }
@@ -101,7 +101,10 @@ fn a_photograph_with_the_pose_of_another_one_is_left_out_and_named() {
     let mut exchanged = sound.clone();
     (exchanged.frames[2].pose, exchanged.frames[9].pose) =
         (sound.frames[9].pose, sound.frames[2].pose);
-    let astray = judge(&exchanged, None).expect("a capture").alignment.astray;
+    let astray = decide(&exchanged, None)
+        .expect("a capture")
+        .alignment
+        .astray;
     let shows = |frame, other| Astray {
         frame,
         why: Why::Shows(other),
@@ -167,8 +170,12 @@ fn photographs_of_nothing_agree_with_nothing() {
             ..(*shown).clone()
         }));
     }
-    let outcome = judge(&capture, None).expect("a capture");
-    assert_eq!(outcome.alignment.verdict, Verdict::Doubtful, "{outcome:?}");
+    let outcome = decide(&capture, None).expect("a capture");
+    assert_eq!(
+        outcome.alignment.decision,
+        Decision::Doubtful,
+        "{outcome:?}"
+    );
 
     // What is solved for is as uncertain as a guess.
     let exact = Estimate {

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use tempfile::TempDir;
 
-/// The share by which an error may exceed README's.
+/// The fraction by which an error may exceed README's.
 const ERROR: f64 = 1.15;
 /// What a picture may be worse than README's, in dB.
 const DECIBEL: f64 = 0.3;

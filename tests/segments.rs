@@ -145,7 +145,10 @@ fn a_flat_wall_comes_apart_by_paint_and_its_lamp_by_saturation_but_not_by_shadin
         segment(&open, &middles, |at| at.x > -0.5 && !lamp(at)),
         segment(&open, &middles, lamp),
     ];
-    assert!(parts.iter().all(|(_, share)| *share > 0.99), "{parts:?}");
+    assert!(
+        parts.iter().all(|(_, fraction)| *fraction > 0.99),
+        "{parts:?}"
+    );
     let different: BTreeSet<u32> = parts.iter().map(|(segment, _)| *segment).collect();
     assert_eq!(different.len(), 3, "{parts:?}");
     let said = open.warnings.iter().any(|w| {
@@ -220,11 +223,11 @@ fn finer(mesh: &Mesh) -> Mesh {
 /// How segments agree with objects, over the area that photographs see.
 #[derive(Debug, Default)]
 struct Agreement {
-    /// Area in the segment's most frequent object, share of all.
+    /// Area in the segment's most frequent object, fraction of all.
     purity: f64,
-    /// Variance of albedo inside segments, share of all.
+    /// Variance of albedo inside segments, fraction of all.
     albedo: f64,
-    /// Area in both an object that saturates and the segment most like it, share of that in either.
+    /// Area in both an object that saturates and the segment most like it, fraction of that in either.
     lamps: Vec<f64>,
 }
 

@@ -5,10 +5,10 @@ mod scenes;
 use glam::{DVec3, Vec3};
 use relit::capture::mesh::Mesh;
 use relit::inverse::estimate::{Estimate, ObjectEstimate};
+use relit::inverse::gbuffer::GBuffer;
 use relit::inverse::settings::Settings;
 use relit::inverse::sharpness::Sharpness;
 use relit::inverse::solver::{Control, Observer, Problem, Progress, Termination, solve};
-use relit::inverse::survey::Survey;
 use relit::inverse::texture::{Refined, Task, refine};
 use relit::transport::material::{Albedo, Material, Texture};
 use std::sync::{Arc, LazyLock};
@@ -65,10 +65,10 @@ static USUAL: Sharpness = Sharpness {
     contrast: Vec::new(),
 };
 
-fn task<'a>(problem: &'a Problem, survey: &'a Survey, paths: u64) -> Task<'a> {
+fn task<'a>(problem: &'a Problem, gbuffer: &'a GBuffer, paths: u64) -> Task<'a> {
     Task {
         problem,
-        survey,
+        gbuffer,
         sharpness: &USUAL,
         settings: &SETTINGS,
         paths,
@@ -77,8 +77,8 @@ fn task<'a>(problem: &'a Problem, survey: &'a Survey, paths: u64) -> Task<'a> {
 }
 
 fn refined(problem: &Problem, estimate: &Estimate, objects: &[usize], paths: u64) -> Refined {
-    let survey = Survey::new(problem, &SETTINGS, usize::MAX);
-    let task = task(problem, &survey, paths);
+    let gbuffer = GBuffer::new(problem, &SETTINGS, usize::MAX);
+    let task = task(problem, &gbuffer, paths);
     let (refined, ended) = refine(&task, estimate, objects, &|_| None, &mut |_, _, _| Ok(()));
     ended.expect("nobody ends it");
     refined
@@ -272,8 +272,8 @@ fn threads_do_not_change_a_bit() {
 
 #[test]
 fn who_ends_it_is_obeyed() {
-    let survey = Survey::new(&ROOM.problem, &SETTINGS, usize::MAX);
-    let task = task(&ROOM.problem, &survey, 10_000);
+    let gbuffer = GBuffer::new(&ROOM.problem, &SETTINGS, usize::MAX);
+    let task = task(&ROOM.problem, &gbuffer, 10_000);
     let ended_after = |most: u32| {
         let mut calls = 0;
         refine(&task, &ROOM.estimate, &[BACK], &|_| None, &mut |_, _, _| {
@@ -298,8 +298,8 @@ fn who_ends_it_is_obeyed() {
 /// Light and texture may fail to agree: what held-out pixels say decides between the states.
 #[test]
 fn states_that_held_out_pixels_speak_against_are_not_kept() {
-    let survey = Survey::new(&ROOM.problem, &SETTINGS, usize::MAX);
-    let task = task(&ROOM.problem, &survey, 10_000);
+    let gbuffer = GBuffer::new(&ROOM.problem, &SETTINGS, usize::MAX);
+    let task = task(&ROOM.problem, &gbuffer, 10_000);
     let judged = |judge: &dyn Fn(&Estimate) -> Option<f64>| {
         let (refined, ended) = refine(&task, &ROOM.estimate, &[BACK], judge, &mut |_, _, _| Ok(()));
         ended.expect("nobody ends it");

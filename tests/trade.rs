@@ -101,7 +101,7 @@ fn one_solve_gives_a_course_of_falling_errors_with_what_it_cost() {
 }
 
 #[test]
-fn no_solve_gets_more_than_its_share_of_the_time_or_an_estimate_after_it() {
+fn no_solve_gets_more_than_its_fraction_of_the_time_or_an_estimate_after_it() {
     let (problem, judge) = rooms::problem(3, TINY).expect("a room");
     let all = runs(&[Preset::Reference]);
     let limit = Duration::from_millis(1);

@@ -98,7 +98,8 @@ impl Course {
     /// Notes how far it is; whether that is worth a look (another photograph, or half a percent).
     fn tell(&self, doing: Doing) -> bool {
         let last = &mut *self.doing.lock().unwrap_or_else(PoisonError::into_inner);
-        let same = last.is_some_and(|l| l.frame == doing.frame && doing.share - l.share < 0.005);
+        let same =
+            last.is_some_and(|l| l.frame == doing.frame && doing.fraction - l.fraction < 0.005);
         if !same {
             *last = Some(doing);
         }

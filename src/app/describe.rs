@@ -11,8 +11,8 @@ pub fn described(object: &Object, area: f64, albedo: Option<Vec3>) -> String {
         return object.name.clone();
     }
     let size = match object.area / area {
-        share if share > 0.05 => " large",
-        share if share < 0.003 => " small",
+        fraction if fraction > 0.05 => " large",
+        fraction if fraction < 0.003 => " small",
         _ => "",
     };
     let color = albedo.map_or(String::new(), |albedo| format!(" {}", color_word(albedo)));

@@ -119,8 +119,8 @@ fn compose() -> Tree<Pane> {
     ]);
     let right = tiles.insert_vertical_tile(vec![side, course]);
     let root = tiles.insert_horizontal_tile(vec![hero, right]);
-    share(&mut tiles, root, &[(hero, 0.69), (right, 0.31)]);
-    share(&mut tiles, right, &[(side, 0.6), (course, 0.4)]);
+    set_sizes(&mut tiles, root, &[(hero, 0.69), (right, 0.31)]);
+    set_sizes(&mut tiles, right, &[(side, 0.6), (course, 0.4)]);
     Tree::new(egui::Id::unique("compose"), root, tiles)
 }
 
@@ -159,18 +159,18 @@ fn inspect() -> Tree<Pane> {
     let views = tiles.insert_vertical_tile(vec![upper, lower]);
     let right = tiles.insert_vertical_tile(vec![side, course]);
     let root = tiles.insert_horizontal_tile(vec![views, right]);
-    share(&mut tiles, root, &[(views, 0.69), (right, 0.31)]);
-    share(&mut tiles, views, &[(upper, 0.53), (lower, 0.47)]);
-    share(&mut tiles, right, &[(side, 0.62), (course, 0.38)]);
+    set_sizes(&mut tiles, root, &[(views, 0.69), (right, 0.31)]);
+    set_sizes(&mut tiles, views, &[(upper, 0.53), (lower, 0.47)]);
+    set_sizes(&mut tiles, right, &[(side, 0.62), (course, 0.38)]);
     Tree::new(egui::Id::unique("inspect"), root, tiles)
 }
 
-fn share(tiles: &mut Tiles<Pane>, parent: TileId, shares: &[(TileId, f32)]) {
+fn set_sizes(tiles: &mut Tiles<Pane>, parent: TileId, fractions: &[(TileId, f32)]) {
     if let Some(egui_tiles::Tile::Container(egui_tiles::Container::Linear(linear))) =
         tiles.get_mut(parent)
     {
-        for &(child, share) in shares {
-            linear.shares.set_share(child, share);
+        for &(child, fraction) in fractions {
+            linear.shares.set_share(child, fraction);
         }
     }
 }

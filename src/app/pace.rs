@@ -11,8 +11,8 @@ const AT_IT: Duration = Duration::from_millis(250);
 const ATTENTION: Duration = Duration::from_secs(3);
 /// Time of one core for a pixel of the window, about, where the processor draws (Mesa's llvmpipe).
 const PIXEL: Duration = Duration::from_nanos(150);
-/// Share of all cores that painting may take from a solve that is only watched.
-const SHARE: f64 = 0.025;
+/// Fraction of all cores that painting may take from a solve that is only watched.
+const FRACTION: f64 = 0.025;
 /// Longest time between two pictures.
 const LONGEST: Duration = Duration::from_secs(8);
 
@@ -65,10 +65,10 @@ impl Pace {
     }
 }
 
-/// Time between two pictures of so many pixels that takes no more than its share of so many cores.
+/// Time between two pictures of so many pixels that takes no more than its fraction of so many cores.
 fn watching(pixels: u64, cores: usize) -> Duration {
     let paint = PIXEL.as_secs_f64() * pixels as f64;
-    let wanted = Duration::from_secs_f64(paint / (SHARE * cores.max(1) as f64));
+    let wanted = Duration::from_secs_f64(paint / (FRACTION * cores.max(1) as f64));
     wanted.clamp(AT_IT, LONGEST)
 }
 

@@ -34,7 +34,7 @@ impl Pick {
     }
 }
 
-/// Distance of a probe from the surface that was clicked, as a share of the scene's diameter.
+/// Distance of a probe from the surface that was clicked, as a fraction of the scene's diameter.
 const OFF_SURFACE: f64 = 0.01;
 
 /// A point of a surface in a view.

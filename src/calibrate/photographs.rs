@@ -82,7 +82,7 @@ pub fn leave_out_astray(capture: &Capture, working: &mut Working, astray: &[Astr
                 "shows what the pose of {} sees, and not what its own does",
                 name(capture, other)
             ),
-            Why::Shares(other) => format!(
+            Why::Fractions(other) => format!(
                 "has the pose of {}, but is another picture and does not fit the mesh from there",
                 name(capture, other)
             ),

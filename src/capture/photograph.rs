@@ -40,7 +40,7 @@ pub struct Photograph {
     pub limits: Vec<Vec3>,
 }
 
-/// Pixels above this share of saturation may have been brighter than they show.
+/// Pixels above this fraction of saturation may have been brighter than they show.
 pub const BELOW_SATURATION: f32 = 0.97;
 
 impl Photograph {

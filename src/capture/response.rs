@@ -11,7 +11,7 @@ const STEPS: usize = 60;
 const STANDING: f64 = 1e-10;
 
 /// A camera's response, as the light that its values stand for: the logarithm of light is y + a y + b (√V − 1) + c (V − 1), where
-/// y is the logarithm of the value V. Values, after the file's own curve (sRGB) is undone, and light are shares of those that
+/// y is the logarithm of the value V. Values, after the file's own curve (sRGB) is undone, and light are fractions of those that
 /// saturate.
 ///
 /// The first term is a power, the others bend the middle and the highlights; in the dark, and above saturation, a power is left.
@@ -111,9 +111,9 @@ impl Response {
 fn each(color: Vec3, saturation: Vec3, change: impl Fn(usize, f64) -> f64) -> Vec3 {
     Vec3::from_array(std::array::from_fn(|channel| {
         let full = f64::from(saturation[channel]);
-        let share = f64::from(color[channel]) / full;
-        if full.is_finite() && share > 0.0 {
-            (change(channel, share.ln()).exp() * full) as f32
+        let fraction = f64::from(color[channel]) / full;
+        if full.is_finite() && fraction > 0.0 {
+            (change(channel, fraction.ln()).exp() * full) as f32
         } else {
             color[channel]
         }

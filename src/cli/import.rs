@@ -37,7 +37,7 @@ pub struct ImportArguments {
     every: Option<u32>,
     /// Take at most N photographs, evenly spaced [default: 200 of a video, else all]
     #[arg(long, value_name = "N", value_parser = from_one::<u32>)]
-    most_frames: Option<u32>,
+    max_frames: Option<u32>,
     /// Up axis of the capture [default: the cameras' mean up]
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
     up: Option<DVec3>,
@@ -85,7 +85,7 @@ pub fn import(arguments: &ImportArguments) -> Result<()> {
         mesh: arguments.mesh.clone(),
         voxel: arguments.voxel,
         every: arguments.every.unwrap_or(0) as usize,
-        most_frames: arguments.most_frames.map(|n| n as usize),
+        max_frames: arguments.max_frames.map(|n| n as usize),
         up: arguments.up,
         intrinsics: arguments.intrinsics.map(|k| k.0),
         applied_transform: match arguments.applied_transform {

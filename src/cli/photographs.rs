@@ -33,7 +33,7 @@ pub fn write_with_progress(
     let bar = ProgressBar::with_draw_target(Some(LENGTH), target)
         .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     let written = work.write_made_of(renderer, materials, prefix, &|doing| {
-        bar.set_position((f64::from(doing.share) * LENGTH as f64) as u64);
+        bar.set_position((f64::from(doing.fraction) * LENGTH as f64) as u64);
         bar.set_message(format!("{:03}", doing.frame));
         !interrupt.asked()
     });

@@ -11,7 +11,7 @@ use crate::say;
 use crate::session::command::Source;
 use crate::session::open::open;
 use crate::study::experiments::{Bench, STUDIES, Study};
-use crate::study::families::{Plan, Verdict, composite, table};
+use crate::study::families::{Decision, Plan, composite, table};
 use crate::study::trade::rooms::SIZE;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
@@ -157,7 +157,7 @@ fn insertions(arguments: &StudyArguments, rooms: u32, family: &str) -> Result<()
             None => say::aside("  no free place on its floor that photographs see"),
         }
     }
-    say::line(Verdict::of(&rows).words());
+    say::line(Decision::of(&rows).words());
     say::line(file.display());
     Ok(())
 }

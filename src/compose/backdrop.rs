@@ -34,7 +34,7 @@ pub struct Backdrop {
 /// A pixel with and without what is put there.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Mixed {
-    /// The share of it that is covered.
+    /// The fraction of it that is covered.
     pub alpha: f32,
     /// Radiance with it.
     pub over: Vec3,
@@ -95,7 +95,7 @@ impl Backdrop {
         self.exposure.value(light, self.saturation)
     }
 
-    /// The photograph with surfaces over a share of its pixels, by the radiance with and without them; as soft and as grainy as it
+    /// The photograph with surfaces over a fraction of its pixels, by the radiance with and without them; as soft and as grainy as it
     /// is itself. Pixels that nothing changes, and none around them either as far as a soft edge reaches, are the photograph's to
     /// the bit.
     pub fn composite(&self, layers: &[Mixed]) -> Picture {

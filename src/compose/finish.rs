@@ -16,14 +16,14 @@ use std::ops::{Div, Mul};
 
 /// Standard deviation in pixels of the blur that edges are compared with.
 const KNOWN_BLUR: f32 = 1.0;
-/// A slope counts as an edge from this share of the local level on, ...
+/// A slope counts as an edge from this fraction of the local level on, ...
 const EDGE: f32 = 0.25;
-/// ... and is across if the other one is smaller than this share of it.
+/// ... and is across if the other one is smaller than this fraction of it.
 const ACROSS: f32 = 0.25;
 /// An edge is so many times the grain.
 const ABOVE_GRAIN: f32 = 6.0;
 /// Edges needed to tell.
-const LEAST_EDGES: usize = 50;
+const MIN_EDGES: usize = 50;
 /// Variance in pixels² of a pixel's own area.
 const PIXEL: f64 = 1.0 / 12.0;
 /// Halvings that find a softness.
@@ -37,8 +37,8 @@ const SOFT: [f32; 2] = [0.3, 4.0];
 /// Steps of brightness, each with as many pixels as any other.
 const STEPS: usize = 8;
 /// Pixels that a step needs.
-const LEAST_PIXELS: usize = 100;
-/// Share of a step's pixels that are taken to be smooth.
+const MIN_PIXELS: usize = 100;
+/// Fraction of a step's pixels that are taken to be smooth.
 const SMOOTH: f64 = 0.3;
 /// Median of the absolute value of a normal number of variance one.
 const NORMAL_MEDIAN: f32 = 0.674_49;
@@ -220,7 +220,7 @@ fn softness(
             (after > 0.0).then(|| f64::from(slope(at, along).abs() / after))
         })
         .collect();
-    if ratios.len() < LEAST_EDGES {
+    if ratios.len() < MIN_EDGES {
         return 0.0;
     }
     let ratio = quantile(&mut ratios, 0.5).unwrap_or(f64::INFINITY);
@@ -275,7 +275,7 @@ fn grain(
         .collect();
     seen.sort_by(|a, b| a.0.total_cmp(&b.0));
     let size = seen.len().div_ceil(STEPS);
-    if size < LEAST_PIXELS {
+    if size < MIN_PIXELS {
         return Vec::new();
     }
     let second = |at: usize| -> Vec3 {

@@ -47,9 +47,9 @@ pub struct Layers {
     pub without: Picture,
     /// Radiance that the objects add or take away.
     pub delta: Picture,
-    /// Share of the light that the objects leave where they shadow it, 0 to 1; 1 where they cover the pixel or lighten it.
+    /// Fraction of the light that the objects leave where they shadow it, 0 to 1; 1 where they cover the pixel or lighten it.
     pub shadow: Picture,
-    /// Share of the pixel that the objects cover, 0 to 1.
+    /// Fraction of the pixel that the objects cover, 0 to 1.
     pub alpha: Vec<f32>,
     /// Depth along the viewing direction at the pixel's centre, in metres; infinite where nothing is met.
     pub depth: Vec<f32>,

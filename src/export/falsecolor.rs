@@ -43,9 +43,9 @@ fn ramp(stops: &[[f32; 3]; 5], position: f32) -> [u8; 3] {
     }
     let scaled = position.clamp(0.0, 1.0) * 4.0;
     let low = (scaled as usize).min(3);
-    let share = scaled - low as f32;
+    let fraction = scaled - low as f32;
     std::array::from_fn(|i| {
-        (stops[low][i] + (stops[low + 1][i] - stops[low][i]) * share + 0.5) as u8
+        (stops[low][i] + (stops[low + 1][i] - stops[low][i]) * fraction + 0.5) as u8
     })
 }
 
@@ -105,13 +105,13 @@ fn write(
     let margin = width / 8;
     let bar = (width - 2 * margin).max(1);
     for x in 0..bar {
-        let share = x as f32 / bar as f32;
+        let fraction = x as f32 / bar as f32;
         canvas.fill(
             margin + x,
             height + 5,
             1,
             10,
-            color_of(low + (high - low) * share),
+            color_of(low + (high - low) * fraction),
         );
     }
     let middle = (low + high) * 0.5;

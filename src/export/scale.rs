@@ -65,8 +65,8 @@ impl Ranged for Scale {
         } else {
             *value
         };
-        let share = ((position - self.low) / (self.high - self.low)).clamp(-1.0, 2.0);
-        limit.0 + (share * f64::from(limit.1 - limit.0)).round() as i32
+        let fraction = ((position - self.low) / (self.high - self.low)).clamp(-1.0, 2.0);
+        limit.0 + (fraction * f64::from(limit.1 - limit.0)).round() as i32
     }
 
     fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
@@ -113,10 +113,10 @@ impl Ranged for Scale {
 
 impl ReversibleRanged for Scale {
     fn unmap(&self, pixel: i32, (min, max): (i32, i32)) -> Option<f64> {
-        let share = f64::from(pixel - min) / f64::from(max - min);
+        let fraction = f64::from(pixel - min) / f64::from(max - min);
         (0.0..=1.0)
-            .contains(&share)
-            .then(|| self.value(self.low + share * (self.high - self.low)))
+            .contains(&fraction)
+            .then(|| self.value(self.low + fraction * (self.high - self.low)))
     }
 }
 

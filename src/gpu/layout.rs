@@ -85,7 +85,7 @@ shared! {
         /// Emitting objects, unused, width and height of the light from outside (0 where there is none).
         lights: [u32; 4],
         /// Chance of sampling an emitter of the mesh rather than the light from outside.
-        share: [f32; 4],
+        fraction: [f32; 4],
     }
 
     /// What a triangle is made of.
@@ -123,7 +123,7 @@ shared! {
 pub(super) fn head(stack_size: u32) -> String {
     use crate::scene::geometry::OFFSET_GAMMA;
     use crate::transport::bsdf::{COUPLING_SLOPE, coupling_scale};
-    use crate::transport::path::MOST_SURVIVAL;
+    use crate::transport::path::MAX_SURVIVAL;
     // Three roundings of a slab, as on the processor.
     let widen = 1.0 + 8.0 * f32::EPSILON;
     // Two products and a difference, each off by half an epsilon.
@@ -139,7 +139,7 @@ pub(super) fn head(stack_size: u32) -> String {
         ("COUPLING_SLOPE", COUPLING_SLOPE as f32),
         ("COUPLING_SCALE", coupling_scale() as f32),
         ("NORMAL_MARGIN", crate::transport::world::NORMAL_MARGIN),
-        ("MAX_SURVIVAL", MOST_SURVIVAL),
+        ("MAX_SURVIVAL", MAX_SURVIVAL),
     ] {
         let _ = writeln!(text, "const {name} = {value:e}f;");
     }

@@ -6,7 +6,7 @@ use super::lights::{Emitters, environment};
 use super::materials::Materials;
 use crate::transport::lit::Lit;
 use crate::transport::material::Material;
-use crate::transport::path::emitter_share;
+use crate::transport::path::emitter_fraction;
 use glam::Vec3;
 
 /// An object put into a scene, in the scene's coordinates.
@@ -74,7 +74,7 @@ impl Packed {
         let [width, height] = outside.map_or([0; 2], |map| map.size().map(|n| n as u32));
         let dispatch = Dispatch {
             lights: [emitters.objects, 0, width, height],
-            share: [emitter_share(lit), 0.0, 0.0, 0.0],
+            fraction: [emitter_fraction(lit), 0.0, 0.0, 0.0],
             ..Dispatch::default()
         };
         Self {

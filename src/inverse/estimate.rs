@@ -103,8 +103,9 @@ impl ObjectEstimate {
 
     /// The first field that holds what no surface has.
     pub fn impossible(&self) -> Option<&'static str> {
-        let reflects = |share: Vec3| share.cmpge(Vec3::ZERO).all() && share.cmple(Vec3::ONE).all();
-        let share = |value: Option<f32>| reflects(Vec3::splat(value.unwrap_or(0.0)));
+        let reflects =
+            |fraction: Vec3| fraction.cmpge(Vec3::ZERO).all() && fraction.cmple(Vec3::ONE).all();
+        let fraction = |value: Option<f32>| reflects(Vec3::splat(value.unwrap_or(0.0)));
         let fields = [
             ("albedo", reflects(self.albedo)),
             (
@@ -113,9 +114,9 @@ impl ObjectEstimate {
             ),
             (
                 "roughness",
-                share(self.roughness) && self.roughness != Some(0.0),
+                fraction(self.roughness) && self.roughness != Some(0.0),
             ),
-            ("specular", share(self.specular)),
+            ("specular", fraction(self.specular)),
         ];
         fields
             .into_iter()

@@ -5,22 +5,22 @@ use crate::capture::segment::{ShownFace, segment};
 use crate::capture::working::Working;
 use crate::capture::{Capture, Cut};
 use crate::error::Result;
-use crate::inverse::exposure::{Exposures, Sights};
+use crate::inverse::exposure::{Exposures, Observations};
+use crate::inverse::gbuffer::GBuffer;
 use crate::inverse::held_out::{HoldOut, is_held_out};
 use crate::inverse::solver::Problem;
-use crate::inverse::survey::Survey;
 use crate::scene::prepare::prepare;
 use glam::DVec3;
 use std::sync::Arc;
 
 /// Pixels that are looked at for the exposures.
-const SURVEY_PIXELS: usize = 100_000;
+const GBUFFER_PIXELS: usize = 100_000;
 
 /// For each face what the pixels show whose centres see it; those that are held out say nothing.
 pub fn shown(problem: &Problem, hold_out: HoldOut) -> Vec<ShownFace> {
     let settings = hold_out.settings();
-    let survey = Survey::new(problem, &settings, SURVEY_PIXELS);
-    let exposures = Exposures::new(problem, &Sights::new(problem, &survey));
+    let gbuffer = GBuffer::new(problem, &settings, GBUFFER_PIXELS);
+    let exposures = Exposures::new(problem, &Observations::new(problem, &gbuffer));
     let undone = (exposures.filter(Exposures::needed)).map(|found| found.undone(problem));
     let alike = undone.as_ref().unwrap_or(problem);
 

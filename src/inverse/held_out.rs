@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct HoldOut {
-    /// Share of the pixels.
+    /// Fraction of the pixels.
     pub held_out: f64,
     /// Every so many frames, instead of single pixels; 0 keeps single pixels.
     pub hold_out: u64,
@@ -41,7 +41,7 @@ impl HoldOut {
     }
 }
 
-/// Whether a pixel is held out: a keyed share of all pixels, or every K-th frame whole (frames 0, K, 2K, …).
+/// Whether a pixel is held out: a keyed fraction of all pixels, or every K-th frame whole (frames 0, K, 2K, …).
 ///
 /// The choice does not depend on the seed, so that solves with different seeds are tested on the same pixels.
 pub fn is_held_out(settings: &Settings, frame: u32, pixel: u32) -> bool {
@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_share_is_as_asked_and_frames_can_be_held_out_whole() {
+    fn the_fraction_is_as_asked_and_frames_can_be_held_out_whole() {
         let mut settings = Settings::default();
         let count = |settings: &Settings| {
             (0..100_000)

@@ -41,9 +41,9 @@ pub struct Losses {
 /// The light that reaches the photographs after a number of bounces.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rest {
-    /// Its share of all light, in the channel in which that is most.
-    pub share: f64,
-    /// Standard error of the share, by how pixels differ.
+    /// Its fraction of all light, in the channel in which that is most.
+    pub fraction: f64,
+    /// Standard error of the fraction, by how pixels differ.
     pub stderr: f64,
     /// What measuring it took.
     pub cast: Cast,
@@ -151,18 +151,18 @@ impl LossProbe {
         let count = each.len() as f64;
         let mean = |of: usize| each.iter().map(|e| e.0[of]).sum::<DVec3>() / count;
         let [all, late] = [mean(0), mean(1)];
-        let shares = late / all;
+        let fractions = late / all;
         let channel = (0..3)
-            .filter(|&c| shares[c].is_finite())
-            .max_by(|&a, &b| shares[a].total_cmp(&shares[b]))?;
+            .filter(|&c| fractions[c].is_finite())
+            .max_by(|&a, &b| fractions[a].total_cmp(&fractions[b]))?;
         // A ratio of means, to first order.
-        let share = shares[channel];
+        let fraction = fractions[channel];
         let mut off = Moments::default();
         for ([all, late], _) in &each {
-            off.push(late[channel] - share * all[channel]);
+            off.push(late[channel] - fraction * all[channel]);
         }
         Some(Rest {
-            share,
+            fraction,
             stderr: off.standard_error() / all[channel],
             cast,
         })

@@ -3,8 +3,8 @@
 //! Diffuse surfaces look the same from everywhere, so a photograph of a surface point is a measurement of the light
 //! that it sends to all others. Paths may end there and need not be traced on to a lamp.
 
+use crate::inverse::gbuffer::{GBuffer, SurfacePoint};
 use crate::inverse::solver::Problem;
-use crate::inverse::survey::{Survey, SurveyPoint};
 use crate::math::rng::splitmix64;
 use glam::{DVec3, Vec3};
 
@@ -78,14 +78,14 @@ impl Table {
 
 impl MeasuredRadiance {
     /// Gathers the pixels that are in the fit.
-    pub fn new(problem: &Problem, survey: &Survey) -> Self {
+    pub fn new(problem: &Problem, gbuffer: &GBuffer) -> Self {
         let mut measured = Self {
-            cell: survey.footprint * CELL_FOOTPRINTS,
+            cell: gbuffer.footprint * CELL_FOOTPRINTS,
             levels: (0..LEVELS).map(|_| Table::new()).collect(),
             object_means: Vec::new(),
         };
         let mut means = vec![(DVec3::ZERO, 0u64); problem.scene.objects.len()];
-        for pixel in survey.pixels.iter().filter(|p| !p.held_out) {
+        for pixel in gbuffer.pixels.iter().filter(|p| !p.held_out) {
             let photograph = &problem.photographs[pixel.frame as usize];
             let radiance = photograph.pixels[pixel.pixel as usize].as_dvec3();
             // Where pixels are saturated they measured nothing: paths go on to what they see.
@@ -117,7 +117,7 @@ impl MeasuredRadiance {
 
     /// Radiance leaving a surface point to the side of `normal`; `None` where no photograph tells.
     #[inline]
-    pub fn at(&self, point: &SurveyPoint) -> Option<Vec3> {
+    pub fn at(&self, point: &SurfacePoint) -> Option<Vec3> {
         if self.cell <= 0.0 {
             return None;
         }
@@ -137,7 +137,7 @@ impl MeasuredRadiance {
 
     /// Key of the cell that a point lies in.
     #[inline]
-    fn key(&self, level: usize, point: &SurveyPoint) -> u64 {
+    fn key(&self, level: usize, point: &SurfacePoint) -> u64 {
         cell_key(self.cell * (1u32 << level) as f32, point)
     }
 }
@@ -145,7 +145,7 @@ impl MeasuredRadiance {
 /// Key of the cell of a given width that a surface point lies in: its place, object, and which way its surface looks;
 /// never zero.
 #[inline]
-pub fn cell_key(size: f32, at: &SurveyPoint) -> u64 {
+pub fn cell_key(size: f32, at: &SurfacePoint) -> u64 {
     let place = (at.point / size).floor();
     let a = at.normal.abs();
     let axis = if a.x >= a.y && a.x >= a.z {

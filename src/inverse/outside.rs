@@ -3,8 +3,8 @@
 //! What lies there is far away, as a sky, and looks the same from everywhere in the room; or it is what a scan lacks, and
 //! lies on a box around the mesh.
 
+use crate::inverse::gbuffer::GBuffer;
 use crate::inverse::solver::Problem;
-use crate::inverse::survey::Survey;
 use crate::transport::environment::{Environment, direction_of, pixel_of};
 use crate::transport::surroundings::Surroundings;
 use glam::{DVec3, Vec2, Vec3};
@@ -32,7 +32,7 @@ pub struct MeasuredOutside {
 
 impl MeasuredOutside {
     /// Gathers the pixels in the fit that see nothing of the mesh; `None` where there are none.
-    pub fn new(problem: &Problem, survey: &Survey, surroundings: Surroundings) -> Option<Self> {
+    pub fn new(problem: &Problem, gbuffer: &GBuffer, surroundings: Surroundings) -> Option<Self> {
         // Cells a little wider than the pixels.
         let scene = &problem.scene;
         let camera = scene.cameras.first()?;
@@ -43,7 +43,7 @@ impl MeasuredOutside {
 
         // Add up what the pixels show, in the finest cells; saturated ones, which are lower bounds, apart.
         let mut sums = vec![[(DVec3::ZERO, 0u32); 2]; width * height];
-        let past_the_mesh = (survey.pixels.iter()).filter(|p| {
+        let past_the_mesh = (gbuffer.pixels.iter()).filter(|p| {
             !p.held_out && p.object == u32::MAX && p.points.iter().all(Option::is_none)
         });
         for pixel in past_the_mesh {

@@ -5,17 +5,17 @@
 //! level of saturation, and make up for the rest by surfaces that are too white.
 
 use crate::capture::photograph::Photograph;
+use crate::inverse::gbuffer::{GBuffer, GBufferPixel};
 use crate::inverse::solver::Problem;
-use crate::inverse::survey::{Survey, SurveyedPixel};
 use glam::{BVec3, Vec3};
 use std::sync::Arc;
 
 /// The problem with lower bounds for such pixels, channel by channel; `None` where there are none.
 ///
 /// Also bounds are the pixels at the edges of such an object in photographs that do not show it saturated.
-pub fn bounded(problem: &Problem, survey: &Survey) -> Option<Problem> {
-    let (frames, objects) = (problem.photographs.len(), survey.seen.len());
-    let counts = Counts::new(problem, survey);
+pub fn bounded(problem: &Problem, gbuffer: &GBuffer) -> Option<Problem> {
+    let (frames, objects) = (problem.photographs.len(), gbuffer.seen.len());
+    let counts = Counts::new(problem, gbuffer);
     let overexposed = |frame: usize, object: usize| counts.mostly_saturated(frame, object);
     let ever: Vec<BVec3> = (0..objects)
         .map(|object| {
@@ -28,7 +28,7 @@ pub fn bounded(problem: &Problem, survey: &Survey) -> Option<Problem> {
         return None;
     }
     let mut limits: Vec<Vec<Vec3>> = vec![Vec::new(); frames];
-    for pixel in &survey.pixels {
+    for pixel in &gbuffer.pixels {
         let Some(&ever) = ever.get(pixel.object as usize).filter(|ever| ever.any()) else {
             continue;
         };
@@ -68,11 +68,11 @@ struct Counts {
 }
 
 impl Counts {
-    fn new(problem: &Problem, survey: &Survey) -> Self {
-        let objects = survey.seen.len();
+    fn new(problem: &Problem, gbuffer: &GBuffer) -> Self {
+        let objects = gbuffer.seen.len();
         let mut counts = vec![[[0; 4]; 2]; problem.photographs.len() * objects];
-        let fitted = |pixel: &&SurveyedPixel| !pixel.held_out && (pixel.object as usize) < objects;
-        for pixel in survey.pixels.iter().filter(fitted) {
+        let fitted = |pixel: &&GBufferPixel| !pixel.held_out && (pixel.object as usize) < objects;
+        for pixel in gbuffer.pixels.iter().filter(fitted) {
             let photograph = &problem.photographs[pixel.frame as usize];
             let saturated = photograph.saturated(pixel.pixel as usize);
             let of = &mut counts[pixel.frame as usize * objects + pixel.object as usize];

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-/// Values of all unknowns. A surface is a set of triangles that share theirs: an object, or a single triangle.
+/// Values of all unknowns. A surface is a set of triangles that fraction theirs: an object, or a single triangle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Unknowns {
     /// Diffuse reflectance of each surface, in [0, 1].

@@ -22,20 +22,20 @@ const PAIRS: usize = 6_000;
 /// Photographs that each is compared with at most.
 const OTHERS: usize = 24;
 /// A step counts from this on, as a logarithm, ...
-const LEAST_STEP: f32 = 0.1;
+const MIN_STEP: f32 = 0.1;
 /// ... and from so many times the usual one on, which is mostly noise.
 const ABOVE_USUAL: f32 = 4.0;
 /// A step counts as no larger than this.
-const MOST_STEP: f32 = 1.0;
+const MAX_STEP: f32 = 1.0;
 /// Steps that two photographs must share, seen from either.
-const LEAST_STEPS: usize = 40;
+const MIN_STEPS: usize = 40;
 /// Photographs that must be compared, for the usual sharpness to say something.
-const LEAST_PHOTOGRAPHS: usize = 4;
+const MIN_PHOTOGRAPHS: usize = 4;
 /// Distances in the other photograph's pixels at which two points are as fine there.
 const AS_FINE: [f32; 2] = [0.75, 1.33];
 /// Depths along a ray that differ by a smaller share are of the same surface.
 const SAME_DEPTH: f32 = 0.02;
-/// Pixels darker than this share of a photograph's median hold mostly noise.
+/// Pixels darker than this fraction of a photograph's median hold mostly noise.
 const ABOVE_NOISE: f64 = 0.1;
 /// Edges with less of the usual contrast are worth a word.
 const BLURRED: f64 = 0.85;
@@ -97,7 +97,7 @@ impl Sharpness {
         for of_frame in &mut steps {
             sizes.append(&mut of_frame.sizes);
         }
-        let least = LEAST_STEP.max(ABOVE_USUAL * middle(&mut sizes));
+        let least = MIN_STEP.max(ABOVE_USUAL * middle(&mut sizes));
         Self {
             contrast: explained(&ratios(&steps, least), frames),
         }
@@ -152,7 +152,7 @@ fn ratios(steps: &[Steps], least: f32) -> Vec<Vec<(usize, f64, usize)>> {
             .filter(|step| step.size() >= least)
             .collect();
         large.sort_by_key(|step| step.other);
-        let energy = |step: f32| f64::from(step.clamp(-MOST_STEP, MOST_STEP)).powi(2);
+        let energy = |step: f32| f64::from(step.clamp(-MAX_STEP, MAX_STEP)).powi(2);
         (large.chunk_by(|a, b| a.other == b.other))
             .map(|of_pair| {
                 let own: f64 = of_pair.iter().map(|s| energy(s.own)).sum();
@@ -181,7 +181,7 @@ fn explained(ratios: &[Vec<(usize, f64, usize)>], frames: usize) -> Vec<Option<f
                 continue;
             };
             let count = count.min(count_back);
-            if count < LEAST_STEPS {
+            if count < MIN_STEPS {
                 continue;
             }
             // Half the difference of energies is that of contrasts; half again the mean of both ways to look.
@@ -201,7 +201,7 @@ fn explained(ratios: &[Vec<(usize, f64, usize)>], frames: usize) -> Vec<Option<f
     let found = factor.solve(&right);
     let told = |frame: &usize| pairs[*frame] > 0;
     let mut known: Vec<f64> = (0..frames).filter(told).map(|frame| found[frame]).collect();
-    if known.len() < LEAST_PHOTOGRAPHS {
+    if known.len() < MIN_PHOTOGRAPHS {
         return none;
     }
     let Some(middle) = quantile(&mut known, 0.5) else {
@@ -251,7 +251,7 @@ fn steps(problem: &Problem, levels: &[Levels], left_out: &[bool], frame: usize) 
                     others,
                 };
                 found.sizes.push(both.size());
-                if both.size() >= LEAST_STEP {
+                if both.size() >= MIN_STEP {
                     found.large.push(both);
                 }
             }

@@ -2,7 +2,7 @@
 
 use crate::capture::photograph::Photograph;
 use crate::error::{Error, Result};
-use crate::inverse::cache::ladder;
+use crate::inverse::cache::pipeline;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::held_out::leaves_some;
 use crate::inverse::known::Known;
@@ -206,7 +206,7 @@ pub fn solve(
     match settings.preset {
         Preset::Paper => paper::solve(problem, settings, resume, monitor),
         Preset::Preview | Preset::Balanced | Preset::Reference => {
-            ladder::solve(problem, settings, resume, monitor)
+            pipeline::solve(problem, settings, resume, monitor)
         }
     }
 }

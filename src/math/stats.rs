@@ -29,9 +29,9 @@ impl Moments {
         }
         let total = self.count + other.count;
         let delta = other.mean - self.mean;
-        let share = other.count as f64 / total as f64;
-        self.mean += delta * share;
-        self.sum_squares += other.sum_squares + delta * delta * self.count as f64 * share;
+        let fraction = other.count as f64 / total as f64;
+        self.mean += delta * fraction;
+        self.sum_squares += other.sum_squares + delta * delta * self.count as f64 * fraction;
         self.count = total;
     }
 

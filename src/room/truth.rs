@@ -158,7 +158,7 @@ fn mean_over_area(
         .into_par_iter()
         .map(|index| {
             let mut stream = Stream::new(0, object as u64, 0, index);
-            // Equal steps along the area, so that every triangle gets its share.
+            // Equal steps along the area, so that every triangle gets its fraction.
             let along = (index as f64 + stream.uniform_f64()) / SAMPLES as f64 * total;
             let chosen = ends
                 .partition_point(|&end| end <= along)

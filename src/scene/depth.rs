@@ -12,10 +12,10 @@ use glam::Vec2;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// A pixel contradicts the mesh beyond so many times the frame's median difference, and this share of its depth.
+/// A pixel contradicts the mesh beyond so many times the frame's median difference, and this fraction of its depth.
 const MEDIANS: f64 = 5.0;
-const SHARE: f64 = 0.02;
-/// Width over height of a depth image and its photograph may differ by this share.
+const FRACTION: f64 = 0.02;
+/// Width over height of a depth image and its photograph may differ by this fraction.
 const SAME_ASPECT: f64 = 0.02;
 
 /// Photographs with the pixels that contradict the mesh marked as unusable, and remarks for the person.
@@ -106,12 +106,12 @@ impl Depth {
         !self.size.contains(&0) && (ratio - 1.0).abs() < SAME_ASPECT
     }
 
-    /// Metres along the viewing direction at a point given in shares of width and height; `None` where nothing was
+    /// Metres along the viewing direction at a point given in fractions of width and height; `None` where nothing was
     /// measured.
-    fn at(&self, share: Vec2) -> Option<f64> {
+    fn at(&self, fraction: Vec2) -> Option<f64> {
         let [width, height] = self.size;
-        let x = ((share.x * width as f32) as u32).min(width - 1);
-        let y = ((share.y * height as f32) as u32).min(height - 1);
+        let x = ((fraction.x * width as f32) as u32).min(width - 1);
+        let y = ((fraction.y * height as f32) as u32).min(height - 1);
         let value = self.values[y as usize * width as usize + x as usize];
         (value > 0).then(|| f64::from(value) * self.unit)
     }
@@ -143,7 +143,7 @@ fn mask(depth: &Depth, scene: &Scene, frame: usize, photograph: &Photograph) -> 
     let mut count = 0;
     for (usable, seen) in masked.usable.iter_mut().zip(&pixels) {
         let contradicts = seen.is_some_and(|(measured, mesh)| {
-            (measured - mesh).abs() > MEDIANS * median + SHARE * measured
+            (measured - mesh).abs() > MEDIANS * median + FRACTION * measured
         });
         count += u64::from(contradicts);
         *usable &= !contradicts;

@@ -6,7 +6,7 @@ use crate::capture::working::Working;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::scene::depth;
-use crate::scene::visibility::seen_area_share;
+use crate::scene::visibility::seen_area_fraction;
 use crate::scene::winding::turn_over;
 use std::sync::Arc;
 
@@ -24,8 +24,8 @@ pub struct Prepared {
     pub scene: Scene,
     /// The photographs at the working resolution, one a camera.
     pub photographs: Vec<Arc<Photograph>>,
-    /// Share of the mesh's area that the photographs see, 0 to 1.
-    pub seen_area_share: f64,
+    /// Fraction of the mesh's area that the photographs see, 0 to 1.
+    pub seen_area_fraction: f64,
     /// Warnings of the reader, the photographs and the scene, each a full sentence.
     pub warnings: Vec<String>,
 }
@@ -59,7 +59,7 @@ pub fn prepare(capture: &Capture, working: &Working) -> Result<Prepared> {
     let compared = depth::compare(&capture, &scene, &working.photographs);
     warnings.extend(compared.warnings);
     Ok(Prepared {
-        seen_area_share: seen_area_share(&scene, AREA_SAMPLES),
+        seen_area_fraction: seen_area_fraction(&scene, AREA_SAMPLES),
         photographs: compared.photographs,
         capture,
         scene,
@@ -91,7 +91,7 @@ impl Prepared {
             format!("{:.4} × {:.4} × {:.4} m", size.x, size.y, size.z),
             format!(
                 "the photographs see {:.0} % of the mesh and {seen_objects} of its objects",
-                self.seen_area_share * 100.0
+                self.seen_area_fraction * 100.0
             ),
         ]
     }

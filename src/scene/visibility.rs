@@ -1,4 +1,4 @@
-//! What the photographs see: a triangle for each pixel, sides and pixels for each object, the share of the mesh.
+//! What the photographs see: a triangle for each pixel, sides and pixels for each object, the fraction of the mesh.
 
 use crate::math::rng::Stream;
 use crate::scene::Scene;
@@ -79,11 +79,11 @@ impl IdBuffers {
     }
 }
 
-/// The share of the mesh's area that at least one camera sees, from either side, estimated from `samples` points.
+/// The fraction of the mesh's area that at least one camera sees, from either side, estimated from `samples` points.
 ///
 /// Points are drawn stratified by area, the same ones for the same scene; the standard error is at most ½ / √samples.
-pub fn seen_area_share(scene: &Scene, samples: u32) -> f64 {
-    // Cumulative areas, to find the triangle at a given share of the area.
+pub fn seen_area_fraction(scene: &Scene, samples: u32) -> f64 {
+    // Cumulative areas, to find the triangle at a given fraction of the area.
     let mut sum = 0.0;
     let cumulative: Vec<f64> = scene
         .areas

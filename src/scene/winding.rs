@@ -18,7 +18,7 @@ use crate::scene::Scene;
 use crate::scene::visibility::{IdBuffers, NOTHING};
 use std::sync::Arc;
 
-/// Share of an object's pixels that must see its back.
+/// Fraction of an object's pixels that must see its back.
 const ONLY_BACK: f64 = 0.99;
 /// Fewer pixels say nothing about an object.
 const ENOUGH_PIXELS: u64 = 16;

@@ -217,11 +217,11 @@ impl Inserting {
         relit.into_iter().chain(placed).min()
     }
 
-    /// Draws for a moment, refining for at most about `share` of the time; whether the pictures changed.
+    /// Draws for a moment, refining for at most about `fraction` of the time; whether the pictures changed.
     ///
     /// # Errors
     /// An object cannot be read or placed, and is taken away; or the frame does not exist, and all are.
-    pub fn draw(&mut self, capture: &OpenCapture, light: &Light, share: f32) -> Result<bool> {
+    pub fn draw(&mut self, capture: &OpenCapture, light: &Light, fraction: f32) -> Result<bool> {
         let started = Instant::now();
         if let Some(asked) = self.stale.take() {
             self.begun = Some(asked);
@@ -238,7 +238,7 @@ impl Inserting {
             };
         }
         let rested = self.slice.is_none_or(|(end, took)| {
-            end.elapsed().as_secs_f32() * share >= took.as_secs_f32() * (1.0 - share)
+            end.elapsed().as_secs_f32() * fraction >= took.as_secs_f32() * (1.0 - fraction)
         });
         let Some(samples) = self.samples().filter(|&s| rested && s < ENOUGH) else {
             return Ok(false);

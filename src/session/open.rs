@@ -1,6 +1,6 @@
 //! From a source to a capture that can be solved and shown.
 
-use crate::calibrate::alignment::{Alignment, Verdict};
+use crate::calibrate::alignment::{Alignment, Decision};
 use crate::calibrate::photographs::{leave_out, leave_out_astray, name, without_hot_pixels};
 use crate::capture::Capture;
 use crate::capture::photograph::{Photograph, PhotographSource};
@@ -89,8 +89,8 @@ impl OpenCapture {
 
     /// The reading with which the photographs agree with the mesh, where they plainly do not as the capture is read now.
     pub fn other_reading(&self) -> Option<Reading> {
-        match self.alignment.as_ref()?.verdict {
-            Verdict::Wrong { reading, .. } => Some(self.options.reading.then(&reading)),
+        match self.alignment.as_ref()?.decision {
+            Decision::Wrong { reading, .. } => Some(self.options.reading.then(&reading)),
             _ => None,
         }
     }
@@ -98,9 +98,9 @@ impl OpenCapture {
     /// An estimate from this capture. Where its photographs may not show the mesh from their poses, or plainly do not, nothing is
     /// determined by them: the standard error of an albedo is at least that of any albedo from 0 to 1 about what was found.
     pub fn in_doubt(&self, mut estimate: Estimate) -> Estimate {
-        match self.alignment.as_ref().map(|alignment| &alignment.verdict) {
-            None | Some(Verdict::Sound) => return estimate,
-            Some(Verdict::Doubtful | Verdict::Wrong { .. }) => {}
+        match self.alignment.as_ref().map(|alignment| &alignment.decision) {
+            None | Some(Decision::Sound) => return estimate,
+            Some(Decision::Doubtful | Decision::Wrong { .. }) => {}
         }
         for object in &mut estimate.objects {
             let off = object.albedo - 0.5;

@@ -50,8 +50,8 @@ pub struct Photographs {
 pub struct Doing {
     /// The photograph's frame.
     pub frame: usize,
-    /// Share of the whole work that is done, 0 to 1.
-    pub share: f32,
+    /// Fraction of the whole work that is done, 0 to 1.
+    pub fraction: f32,
 }
 
 /// What was written.
@@ -117,14 +117,14 @@ impl Photographs {
         let parts = u8::from(lights.is_some()) + u8::from(!objects.is_empty());
         let mut unseen = !objects.is_empty() && !self.frames.is_empty();
         for (index, &frame) in self.frames.iter().enumerate() {
-            let share = |part: u8, share: f32| {
-                let part = (f32::from(part) + share) / f32::from(parts.max(1));
-                let share = (index as f32 + part) / self.frames.len() as f32;
-                tell(Doing { frame, share })
+            let fraction = |part: u8, fraction: f32| {
+                let part = (f32::from(part) + fraction) / f32::from(parts.max(1));
+                let fraction = (index as f32 + part) / self.frames.len() as f32;
+                tell(Doing { frame, fraction })
             };
             let prefix = prefix(frame);
             let lights = lights.as_ref();
-            let go_on = |s| share(0, s);
+            let go_on = |s| fraction(0, s);
             let Some(backdrop) = self.backdrop(frame, lights, &mut relighters, &go_on)? else {
                 return Ok(written);
             };
@@ -132,7 +132,7 @@ impl Photographs {
                 written.files.extend(write_relit(&prefix, &backdrop)?);
             }
             if !objects.is_empty() {
-                let go_on = |s| share(parts - 1, s);
+                let go_on = |s| fraction(parts - 1, s);
                 if !go_on(0.0) {
                     return Ok(written);
                 }

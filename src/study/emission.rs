@@ -7,7 +7,7 @@ use crate::scene::Scene;
 use crate::study::evaluate::mean;
 use glam::DVec3;
 
-/// Share of the brightest luminance above which an object counts as an emitter.
+/// Fraction of the brightest luminance above which an object counts as an emitter.
 const THRESHOLD: f64 = 0.01;
 
 /// Errors over all emitters.

@@ -65,7 +65,7 @@ impl Bsdf {
         }
         let base = warp::cosine_hemisphere_pdf(wi.z);
         let Some(lobe) = self.lobe else { return base };
-        let p = lobe.share(wo);
+        let p = lobe.fraction(wo);
         (p * lobe.pdf(wo, wi) + (1.0 - p) * f64::from(base)) as f32
     }
 
@@ -78,7 +78,7 @@ impl Bsdf {
             return None;
         }
         let wi = match &self.lobe {
-            Some(lobe) if f64::from(choice) < lobe.share(wo) => lobe.sample(wo, u),
+            Some(lobe) if f64::from(choice) < lobe.fraction(wo) => lobe.sample(wo, u),
             _ => warp::cosine_hemisphere(u),
         };
         let pdf = self.pdf(wo, wi);
@@ -149,9 +149,9 @@ impl Lobe {
         reflect_on_visible_normal(alpha(self), wo, u)
     }
 
-    /// At least the share of light that it reflects to `wo`, mean over the channels.
+    /// At least the fraction of light that it reflects to `wo`, mean over the channels.
     #[inline]
-    pub fn share(&self, wo: Vec3) -> f64 {
+    pub fn fraction(&self, wo: Vec3) -> f64 {
         let specular = f64::from(self.specular.element_sum() / 3.0);
         specular + (1.0 - specular) * reflected(f64::from(wo.z))
     }
@@ -160,7 +160,7 @@ impl Lobe {
 /// Slope of [`reflected`]; 1 would be Schlick's curve itself.
 pub const COUPLING_SLOPE: f64 = 0.85;
 
-/// Upper bound, over all roughnesses, of the share of light that a lobe with no reflectance at normal incidence
+/// Upper bound, over all roughnesses, of the fraction of light that a lobe with no reflectance at normal incidence
 /// reflects: Schlick's (1 − cosθ)⁵, flattened because rough lobes reflect more than that near the normal.
 #[inline]
 fn reflected(cos_theta: f64) -> f64 {
@@ -315,19 +315,19 @@ mod tests {
         }
     }
 
-    /// Share of light reflected from `wo`, by a midpoint rule over the unit square of each technique.
+    /// Fraction of light reflected from `wo`, by a midpoint rule over the unit square of each technique.
     fn directional_albedo(bsdf: &Bsdf, wo: Vec3) -> f64 {
         let n = 192;
-        let p = bsdf.lobe.map_or(0.0, |lobe| lobe.share(wo));
+        let p = bsdf.lobe.map_or(0.0, |lobe| lobe.fraction(wo));
         let mut sum = 0.0;
         for i in 0..n * n {
             let u = [
                 ((i / n) as f32 + 0.5) / n as f32,
                 ((i % n) as f32 + 0.5) / n as f32,
             ];
-            for (choice, share) in [(0.0, p), (1.0 - f32::EPSILON, 1.0 - p)] {
-                if let Some(sample) = bsdf.sample(wo, choice, u).filter(|_| share > 1e-6) {
-                    sum += share * f64::from(sample.weight.x);
+            for (choice, fraction) in [(0.0, p), (1.0 - f32::EPSILON, 1.0 - p)] {
+                if let Some(sample) = bsdf.sample(wo, choice, u).filter(|_| fraction > 1e-6) {
+                    sum += fraction * f64::from(sample.weight.x);
                 }
             }
         }

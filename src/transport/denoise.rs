@@ -20,7 +20,7 @@ const SPLINE: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
 const BRIGHTNESS: f32 = 3.0;
 /// How fast weights fall with the angle between normals: the cosine to this power.
 const NORMAL: i32 = 64;
-/// Distance from a pixel's plane, as a share of its depth, at which weights have fallen to 1/e.
+/// Distance from a pixel's plane, as a fraction of its depth, at which weights have fallen to 1/e.
 const PLANE: f32 = 0.01;
 /// Pixels to each side over which the noise is averaged before anything is smoothed.
 const NOISE_REACH: isize = 3;

@@ -217,9 +217,9 @@ impl Emitters {
         } else {
             distribution.cumulative[index - 1]
         };
-        let share = distribution.cumulative[index] - low;
-        let within = if share > 0.0 {
-            ((target - low) / share) as f32
+        let fraction = distribution.cumulative[index] - low;
+        let within = if fraction > 0.0 {
+            ((target - low) / fraction) as f32
         } else {
             0.0
         };
@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn zero_weights_are_never_drawn_and_others_by_their_share() {
+    fn zero_weights_are_never_drawn_and_others_by_their_fraction() {
         for n in [1usize, 2, 3, 7, 8, 9, 100] {
             let weights: Vec<f64> = (0..n)
                 .map(|i| if i % 3 == 1 { 0.0 } else { (i + 1) as f64 })

@@ -12,7 +12,7 @@ use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 /// Lamps with a layer of their own; weaker ones share a layer.
-pub const MOST_LAMPS: usize = 16;
+pub const MAX_LAMPS: usize = 16;
 
 /// What a layer holds the light of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -38,7 +38,7 @@ pub struct Split {
 pub type Parts = Vec<(Origin, Vec3)>;
 
 impl Split {
-    /// One layer for each of the [`MOST_LAMPS`] lamps with the largest area × luminance, in the scene's order, one for
+    /// One layer for each of the [`MAX_LAMPS`] lamps with the largest area × luminance, in the scene's order, one for
     /// all others, and one for light from outside; only those that there are.
     pub fn new(lit: &Lit) -> Self {
         let emission = |object: usize| lit.materials.get(object).map_or(Vec3::ZERO, |m| m.emission);
@@ -52,7 +52,7 @@ impl Split {
         let objects = scene.objects.len();
         let mut lamps: Vec<usize> = (0..objects).filter(|&o| power(o) > 0.0).collect();
         lamps.sort_by(|&a, &b| power(b).total_cmp(&power(a)).then(a.cmp(&b)));
-        let others = lamps.split_off(lamps.len().min(MOST_LAMPS));
+        let others = lamps.split_off(lamps.len().min(MAX_LAMPS));
         lamps.sort_unstable();
 
         let mut sources: Vec<LightSource> =

@@ -9,7 +9,7 @@ use glam::Vec3;
 
 /// Paths are never kept with a higher chance than this. Where all albedos are ρ, variance is finite only above ρ², since
 /// weights grow by ρ over the chance at each bounce.
-pub const MOST_SURVIVAL: f32 = 0.9999;
+pub const MAX_SURVIVAL: f32 = 0.9999;
 
 /// How paths are traced.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -221,7 +221,7 @@ pub(super) fn follow(
                 Some(pdf) => {
                     let distance2 = (ray.direction * surface.t).length_squared();
                     let solid_angle_pdf =
-                        emitter_share(world) * world.emitter_pdf(&surface) * distance2
+                        emitter_fraction(world) * world.emitter_pdf(&surface) * distance2
                             / cos_emitter;
                     emission_weight(pdf, solid_angle_pdf, options)
                 }
@@ -269,7 +269,7 @@ pub(super) fn follow(
 
         // End paths that carry little, without bias.
         if bounce > options.roulette_after {
-            let survival = throughput.max_element().min(MOST_SURVIVAL);
+            let survival = throughput.max_element().min(MAX_SURVIVAL);
             if survival <= 0.0 || stream.uniform() >= survival {
                 break;
             }
@@ -334,15 +334,15 @@ pub(super) fn draw_light(
     stream: &mut Stream,
 ) -> (Origin, Option<LightSample>) {
     let (pick, choice, u) = (stream.uniform(), stream.uniform_f64(), stream.uniform2());
-    let share = emitter_share(world);
+    let fraction = emitter_fraction(world);
     let leave = |wi| offset_origin(surface.point, surface.normal, &surface.corners, wi);
-    if pick >= share {
+    if pick >= fraction {
         let drawn = world.environment().and_then(|environment| {
             let (wi, pdf) = environment.sample(surface.point, choice, u)?;
             Some(LightSample {
                 wi,
                 radiance: environment.radiance(surface.point, wi),
-                pdf: pdf * (1.0 - share),
+                pdf: pdf * (1.0 - fraction),
                 ray: Ray::new(leave(wi), wi),
             })
         });
@@ -363,14 +363,14 @@ pub(super) fn draw_light(
     let drawn = LightSample {
         wi,
         radiance: light.radiance,
-        pdf: share * light.pdf * distance2 / cos_emitter,
+        pdf: fraction * light.pdf * distance2 / cos_emitter,
         ray: Ray::between(leave(wi), to),
     };
     (origin, Some(drawn))
 }
 
 /// Probability of sampling an emitter of the mesh rather than the light from outside.
-pub fn emitter_share(world: &impl World) -> f32 {
+pub fn emitter_fraction(world: &impl World) -> f32 {
     match (world.environment(), world.has_emitters()) {
         (None, _) => 1.0,
         (Some(_), false) => 0.0,
@@ -381,7 +381,7 @@ pub fn emitter_share(world: &impl World) -> f32 {
 /// Density per solid angle with which a direction towards outside is drawn by light sampling.
 fn environment_pdf(world: &impl World, origin: Vec3, direction: Vec3) -> f32 {
     world.environment().map_or(0.0, |e| {
-        e.pdf(origin, direction) * (1.0 - emitter_share(world))
+        e.pdf(origin, direction) * (1.0 - emitter_fraction(world))
     })
 }
 

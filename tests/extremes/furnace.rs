@@ -59,7 +59,7 @@ fn radiance_in_a_closed_furnace_is_its_closed_form() {
     }
 }
 
-/// Where every surface emits and reflects alike, light after k bounces is the rest of a geometric series, its share ρ^(k+1): within
+/// Where every surface emits and reflects alike, light after k bounces is the rest of a geometric series, its fraction ρ^(k+1): within
 /// 4 standard errors (6e-5 each) in nine tests.
 #[test]
 fn what_comes_after_some_bounces_is_the_rest_of_the_series() {
@@ -84,7 +84,7 @@ fn what_comes_after_some_bounces_is_the_rest_of_the_series() {
         for bounces in [0, 1, 5] {
             let rest = probe.beyond(&problem, &estimate, bounces).expect("light");
             let truth = f64::from(albedo).powi(bounces as i32 + 1);
-            let z = (rest.share - truth) / rest.stderr;
+            let z = (rest.fraction - truth) / rest.stderr;
             println!("albedo {albedo}, after {bounces}: {rest:?} against {truth:.4}, z {z:.2}");
             // Three channels, of which the largest share is told, are one here.
             assert!(z.abs() < 4.0, "albedo {albedo}, {bounces} bounces: z {z}");

@@ -206,12 +206,12 @@ fn a_triangle_of_a_billionth_of_its_lamp_is_drawn_by_its_area() {
             .expect("there is a lamp");
         drawn += u32::from(sample.triangle == 14);
     }
-    let share = f64::from(scene.areas[14]) / scene.objects[6].area * 16_777_216.0;
-    let expected = f64::from(draws) * share;
-    let z = (f64::from(drawn) - expected) / (expected * (1.0 - share)).sqrt();
+    let fraction = f64::from(scene.areas[14]) / scene.objects[6].area * 16_777_216.0;
+    let expected = f64::from(draws) * fraction;
+    let z = (f64::from(drawn) - expected) / (expected * (1.0 - fraction)).sqrt();
     println!("{drawn} of {expected:.0} expected, z {z:.2}");
     assert!(
-        (0.01..0.03).contains(&share) && z.abs() < 4.0,
+        (0.01..0.03).contains(&fraction) && z.abs() < 4.0,
         "{drawn} of {expected}, z {z}"
     );
 }
@@ -302,7 +302,7 @@ fn the_tree_of_weights_does_not_drift_in_ten_million_updates() {
 
 /// Weights over 600 decades with zeros among them: at every end of every share, and one step of f64 to either side.
 #[test]
-fn a_zero_weight_is_never_drawn_even_at_the_ends_of_shares() {
+fn a_zero_weight_is_never_drawn_even_at_the_ends_of_fractions() {
     let mut stream = Stream::new(99, 0, 0, 0);
     for n in [1usize, 2, 5, 64, 1000] {
         let mut weights: Vec<f64> = (0..n)

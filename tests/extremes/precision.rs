@@ -8,12 +8,12 @@ use relit::inverse::cache::derivative::{Gradient, differentiate};
 use relit::inverse::cache::errors::standard_errors;
 use relit::inverse::cache::fit::fit;
 use relit::inverse::cache::prior::Prior;
+use relit::inverse::cache::robust_weights::RobustWeights;
 use relit::inverse::cache::trace::Tracer;
-use relit::inverse::cache::trust::Trust;
 use relit::inverse::cache::{CachedCluster, NO_LAMP, PathCache, Vertex};
+use relit::inverse::gbuffer::GBuffer;
 use relit::inverse::parameters::Unknowns;
 use relit::inverse::settings::{LightSampling, Settings};
-use relit::inverse::survey::Survey;
 use relit::transport::emitters::Emitters;
 
 const SURFACES: usize = 8;
@@ -21,8 +21,8 @@ const SURFACES: usize = 8;
 /// Paths to the lamp, and the parameters that are fitted: every albedo but the lamp's, and its emission.
 fn cache() -> (PathCache, Vec<Cluster>, Vec<usize>) {
     let problem = &ROOM.0;
-    let survey = Survey::new(problem, &Settings::default(), 100_000);
-    let mut clusters = cluster(problem, &survey, 100_000);
+    let gbuffer = GBuffer::new(problem, &Settings::default(), 100_000);
+    let mut clusters = cluster(problem, &gbuffer, 100_000);
     clusters.iter_mut().for_each(|c| c.paths = 4);
     let mut weights = vec![0.02; SURFACES];
     weights[LAMP] = 1.0;
@@ -154,10 +154,10 @@ fn fit_in_f64(
 fn the_fit_agrees_with_its_twin_in_f64() {
     let (cache, clusters, free) = cache();
     let prior = Prior::new(SURFACES, SURFACES, mean_radiance(&clusters));
-    let trust = Trust::even(SURFACES);
+    let robust = RobustWeights::even(SURFACES);
     // Taken up again from its own end, so that where a fit is content to stop does not count.
     let again = |start: &Unknowns| {
-        fit(&cache, start, &free, &trust, &prior, 60, |_| {
+        fit(&cache, start, &free, &robust, &prior, 60, |_| {
             Ok::<(), ()>(())
         })
         .expect("goes on")

@@ -13,9 +13,9 @@ use relit::scene::Scene;
 use relit::scene::geometry::{Ray, offset_origin};
 use std::sync::Arc;
 
-/// Rays that pass an edge closer than this share of the room's size may go either way.
+/// Rays that pass an edge closer than this fraction of the room's size may go either way.
 const MARGIN: f64 = 1e-5;
-/// Hit points may be off by this share of the room's size: some sixteen roundings of f32.
+/// Hit points may be off by this fraction of the room's size: some sixteen roundings of f32.
 const POINT: f64 = 1e-6;
 
 /// The room's mesh, `size` times as large and moved by that many of its sizes.

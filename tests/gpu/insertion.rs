@@ -107,17 +107,20 @@ fn an_inserted_object_its_shadow_and_its_colour_are_the_processors() {
     let rays = by_card.rays() as f64 / by_processor.rays() as f64;
     let [found, truth]: [Layers; 2] = [by_card.layers(), by_processor.layers()];
     let covered = |l: &Layers| l.alpha.iter().map(|&a| f64::from(a)).sum::<f64>();
-    let shares = [
+    let fractions = [
         alike(&found.with.pixels, &truth.with.pixels),
         alike(&found.without.pixels, &truth.without.pixels),
         alike(&found.delta.pixels, &truth.delta.pixels),
     ];
     println!(
-        "alike {shares:.3?}, rays {rays:.4}, covered {:.3} of {:.3}",
+        "alike {fractions:.3?}, rays {rays:.4}, covered {:.3} of {:.3}",
         covered(&found),
         covered(&truth)
     );
-    assert!(shares.iter().all(|&share| share > 0.97), "{shares:?}");
+    assert!(
+        fractions.iter().all(|&fraction| fraction > 0.97),
+        "{fractions:?}"
+    );
     assert!(covered(&truth) > 10.0 && (covered(&found) / covered(&truth) - 1.0).abs() < 0.01);
     let untouched = |l: &Layers| l.delta.pixels.iter().filter(|p| **p == Vec3::ZERO).count();
     assert_eq!(untouched(&found), untouched(&truth));

@@ -108,7 +108,7 @@ fn frames_are_chosen_evenly_and_voxels_by_the_rooms_extent() {
     sample(folder.path(), &cameras);
     write(folder.path(), "intrinsics.txt", intrinsics(&cameras[0]));
     let options = ImportOptions {
-        most_frames: Some(5),
+        max_frames: Some(5),
         every: 2,
         up: Some(DVec3::Y),
         ..ImportOptions::default()

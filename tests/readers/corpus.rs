@@ -57,7 +57,7 @@ fn spoil(bytes: &mut Vec<u8>, other: &[u8], stream: &mut Stream) {
 /// Slower than this a reader hangs; these files are of a kilobyte.
 const HANG: Duration = Duration::from_secs(10);
 /// The program, with everything that the tests hold, never needs more than this.
-const MOST_MEMORY: u64 = 1 << 30;
+const MAX_MEMORY: u64 = 1 << 30;
 
 #[test]
 fn spoilt_seeds_neither_panic_nor_hang_nor_fill_the_memory() {
@@ -95,7 +95,7 @@ fn spoilt_seeds_neither_panic_nor_hang_nor_fill_the_memory() {
             cases += 1;
         }
         assert!(
-            peak_memory().is_none_or(|bytes| bytes < MOST_MEMORY),
+            peak_memory().is_none_or(|bytes| bytes < MAX_MEMORY),
             "{name}: {:?}",
             peak_memory()
         );

@@ -5,7 +5,7 @@ use crate::input::click;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use relit::app::window::Window;
-use relit::calibrate::alignment::{Alignment, Verdict};
+use relit::calibrate::alignment::{Alignment, Decision};
 use relit::capture::reading::{Axes, Reading};
 use relit::session::command::Command;
 use relit::session::snapshot::{OpenCapture, Phase};
@@ -20,7 +20,7 @@ fn waiting(before: Reading, found: Reading) -> (Harness<'static, Window>, Record
         capture.options.reading = before;
         capture.alignment = Some(Alignment {
             agreement: 0.4,
-            verdict: Verdict::Wrong {
+            decision: Decision::Wrong {
                 reading: found,
                 agreement: 14.0,
             },

@@ -16,10 +16,10 @@ use relit::transport::surroundings::Surroundings;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Drags a slider from one share of its length to another, in steps.
+/// Drags a slider from one fraction of its length to another, in steps.
 fn slide(harness: &mut Harness<'_, Window>, label: &str, to: f32) {
     let rect = harness.get_by_role_and_label(Role::Slider, label).rect();
-    let at = |share: f32| egui::pos2(rect.left() + share * rect.width(), rect.center().y);
+    let at = |fraction: f32| egui::pos2(rect.left() + fraction * rect.width(), rect.center().y);
     harness.hover_at(at(0.25));
     harness.run_steps(1);
     harness.drag_at(at(0.25));

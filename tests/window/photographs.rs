@@ -72,8 +72,8 @@ pub fn seen(harness: &Harness<'_, Window>, height: f64) -> Pos2 {
     let at = app.insertions.objects[0].placement.at.expect("placed");
     let point_above = at + scene.up.as_dvec3() * height - scene.origin;
     let pixel = (scene.cameras[0].project(point_above.as_vec3())).expect("in view");
-    let share = egui::vec2(pixel.x / 64.0, pixel.y / 48.0);
-    point(harness, "Photograph picture", share)
+    let fraction = egui::vec2(pixel.x / 64.0, pixel.y / 48.0);
+    point(harness, "Photograph picture", fraction)
 }
 
 fn wait_for_batch(harness: &mut Harness<'_, Window>) {

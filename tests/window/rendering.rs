@@ -134,8 +134,8 @@ fn the_mesh_is_drawn_and_its_selected_object_stands_out() {
                 }
             }
         }
-        let share = drawn as f32 / (rect.width() * rect.height());
-        assert!(share > 0.05 && share < 0.9, "{share}");
+        let fraction = drawn as f32 / (rect.width() * rect.height());
+        assert!(fraction > 0.05 && fraction < 0.9, "{fraction}");
         colors.push(sum.map(|s| s / drawn));
     }
     // Grey walls, and a floor in the accent colour once it is selected.

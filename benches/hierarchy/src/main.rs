@@ -160,8 +160,8 @@ fn obvhs_under_ours(scene: &Scene, preset: BvhBuildParams) -> Bvh {
     under_ours(scene, &bvh)
 }
 
-/// relit's binary tree, improved by obvhs's reinsertion of a share of its nodes.
-fn reinserted(scene: &Scene, share: f32) -> Bvh {
+/// relit's binary tree, improved by obvhs's reinsertion of a fraction of its nodes.
+fn reinserted(scene: &Scene, fraction: f32) -> Bvh {
     let corners: Vec<[Vec3; 3]> = scene
         .triangles
         .iter()
@@ -184,7 +184,7 @@ fn reinserted(scene: &Scene, share: f32) -> Bvh {
         children_are_ordered_after_parents: true,
         ..Bvh2::default()
     };
-    ReinsertionOptimizer::default().run(&mut bvh, share, None);
+    ReinsertionOptimizer::default().run(&mut bvh, fraction, None);
     under_ours(scene, &bvh)
 }
 

@@ -149,11 +149,11 @@ impl Orbit {
             (0..3).for_each(|axis| axes[axis].push(corner[axis]));
         }
         let last = (corners.len() - 1) as f32;
-        let mut at = |share: f32, axis: usize| {
-            let index = if share < 0.5 {
-                (last * share).floor()
+        let mut at = |fraction: f32, axis: usize| {
+            let index = if fraction < 0.5 {
+                (last * fraction).floor()
             } else {
-                (last * share).ceil()
+                (last * fraction).ceil()
             };
             *axes[axis]
                 .select_nth_unstable_by(index as usize, f32::total_cmp)

@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3};
 
 /// Faces at most, beyond which large triangles stay whole.
 const FACES: usize = 400_000;
-/// Faces no longer than this share of the scene's diameter.
+/// Faces no longer than this fraction of the scene's diameter.
 const LONGEST: f32 = 1.0 / 56.0;
 
 /// Faces to draw.

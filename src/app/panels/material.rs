@@ -205,7 +205,7 @@ fn gloss(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
     });
 }
 
-/// Radiance a point of dragging: a share of the light itself, or of the brightest lamp where it is dark.
+/// Radiance a point of dragging: a fraction of the light itself, or of the brightest lamp where it is dark.
 fn drag_speed(app: &App, strength: f32) -> f64 {
     let objects = app.snapshot.estimate.objects.iter();
     let brightest = objects

@@ -234,8 +234,8 @@ fn drag(ui: &Ui, app: &mut App, rect: Rect, size: [u32; 2], response: &egui::Res
 fn on_screen(camera: &Camera, placement: Rect, point: glam::Vec3) -> Option<Pos2> {
     let k = &camera.intrinsics;
     let pixel = camera.project(point)?;
-    let share = vec2(pixel.x / k.width as f32, pixel.y / k.height as f32);
-    Some(placement.min + share * placement.size())
+    let fraction = vec2(pixel.x / k.width as f32, pixel.y / k.height as f32);
+    Some(placement.min + fraction * placement.size())
 }
 
 impl App {

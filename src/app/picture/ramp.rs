@@ -93,11 +93,11 @@ pub fn automatic_exposure(pixels: &[Vec3]) -> f32 {
     if high > 0.0 { -high.log2() } else { 0.0 }
 }
 
-fn percentile(values: &mut [f32], share: f32) -> f32 {
+fn percentile(values: &mut [f32], fraction: f32) -> f32 {
     if values.is_empty() {
         return 0.0;
     }
-    let index = ((values.len() - 1) as f32 * share) as usize;
+    let index = ((values.len() - 1) as f32 * fraction) as usize;
     *values.select_nth_unstable_by(index, f32::total_cmp).1
 }
 

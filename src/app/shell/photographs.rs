@@ -100,7 +100,7 @@ pub fn progress(ui: &mut Ui, app: &mut App) {
         app.perform(Action::CancelPhotographs, &ui.ctx().clone());
     }
     if let Some(doing) = doing {
-        let bar = ProgressBar::new(doing.share)
+        let bar = ProgressBar::new(doing.fraction)
             .desired_width(90.0)
             .desired_height(8.0);
         ui.add(bar).on_hover_text(&folder);

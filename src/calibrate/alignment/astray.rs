@@ -28,7 +28,7 @@ pub enum Why {
     /// It shows what the pose of another frame sees.
     Shows(usize),
     /// It has the pose of another frame, whose photograph is another picture and fits the mesh better.
-    Shares(usize),
+    Fractions(usize),
 }
 
 /// The photographs that are astray where most others plainly are not, given the scores of those that are compared.
@@ -62,7 +62,7 @@ pub(super) fn astray(views: &Views, scores: &[f64]) -> Vec<Astray> {
         // What is fitted better where the pose is the same is no other pose.
         match shown.filter(|&(k, _)| !same_pose(views, frames[i], frames[k])) {
             Some((k, _)) => Some(Why::Shows(frames[k])),
-            None => shared().map(|k| Why::Shares(frames[k])),
+            None => shared().map(|k| Why::Fractions(frames[k])),
         }
     };
     (low.into_iter())

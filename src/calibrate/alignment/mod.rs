@@ -46,14 +46,14 @@ pub struct Alignment {
     /// In standard deviations of what chance gives.
     pub agreement: f64,
     /// What follows from it.
-    pub verdict: Verdict,
+    pub decision: Decision,
     /// Single photographs that do not show the mesh from their poses, where the others do.
     pub astray: Vec<Astray>,
 }
 
 /// What follows from an agreement.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Verdict {
+pub enum Decision {
     /// Photographs show the mesh from their poses.
     Sound,
     /// Neither this reading nor another is plainly right: there may be too few edges to tell.
@@ -74,31 +74,31 @@ impl Alignment {
         let given = Reading::default();
         let scores = views.scores(&given, MAX_FRAMES);
         let agreement = total(&scores);
-        let verdict = match agreement >= AGREES && !views.may_be_another() {
-            true => Verdict::Sound,
+        let decision = match agreement >= AGREES && !views.may_be_another() {
+            true => Decision::Sound,
             false => match views.best() {
-                Some((reading, found)) if plainly_better(&found, &scores) => Verdict::Wrong {
+                Some((reading, found)) if plainly_better(&found, &scores) => Decision::Wrong {
                     reading,
                     agreement: total(&found),
                 },
-                _ if agreement >= CHANCE => Verdict::Sound,
-                _ => Verdict::Doubtful,
+                _ if agreement >= CHANCE => Decision::Sound,
+                _ => Decision::Doubtful,
             },
         };
-        let astray = match verdict {
-            Verdict::Sound => astray::astray(&views, &scores),
-            Verdict::Doubtful | Verdict::Wrong { .. } => Vec::new(),
+        let astray = match decision {
+            Decision::Sound => astray::astray(&views, &scores),
+            Decision::Doubtful | Decision::Wrong { .. } => Vec::new(),
         };
         Self {
             agreement,
-            verdict,
+            decision,
             astray,
         }
     }
 
     /// The error of a capture that is plainly read wrongly; `before` is how it is read now.
     pub fn error(&self, name: &str, before: &Reading) -> Option<Error> {
-        let Verdict::Wrong { reading, agreement } = &self.verdict else {
+        let Decision::Wrong { reading, agreement } = &self.decision else {
             return None;
         };
         Some(Error::new(
@@ -118,7 +118,7 @@ impl Alignment {
 
     /// What is to be said of a capture that may be read wrongly.
     pub fn warning(&self) -> Option<String> {
-        (self.verdict == Verdict::Doubtful).then(|| {
+        (self.decision == Decision::Doubtful).then(|| {
             format!(
                 "it cannot be told whether the photographs show the mesh from their poses: edges agree by {:.1} standard \
                  deviations, where 5 are needed to tell; check poses, unit and focal length",

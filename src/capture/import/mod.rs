@@ -45,7 +45,7 @@ pub struct ImportOptions {
     /// Every how many-th frame becomes a photograph; 0 and 1 are all.
     pub every: usize,
     /// At most so many photographs, evenly spaced.
-    pub most_frames: Option<usize>,
+    pub max_frames: Option<usize>,
     /// Up direction, written into the capture.
     pub up: Option<DVec3>,
     /// fx, fy, cx, cy of the colour camera in pixels, pixel centres at whole numbers, for scans that do not say.
@@ -227,8 +227,8 @@ fn choose(
     let total = frames.len();
     let step = options.every.max(1);
     let mut frames: Vec<ImportedFrame> = frames.into_iter().step_by(step).collect();
-    let asked = options.every > 0 || options.most_frames.is_some();
-    let most = match options.most_frames {
+    let asked = options.every > 0 || options.max_frames.is_some();
+    let most = match options.max_frames {
         Some(most) => most.max(1),
         None if is_video && !asked => PHOTOGRAPHS_OF_A_VIDEO,
         None => usize::MAX,

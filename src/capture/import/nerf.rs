@@ -105,12 +105,12 @@ fn undoing(shared: &Fields, options: &ImportOptions, scan: &mut Scan) -> Result<
         return Err(wrong("is singular"));
     }
     // A mesh that the file itself names, and one that is fused, share the poses' coordinates.
-    let shares =
+    let same_coordinates =
         options.mesh.is_none() && (scan.mesh.is_none() || shared.get("mesh_path").is_some());
     let undo = match options.applied_transform {
         AppliedTransform::Undo => true,
         AppliedTransform::Keep => false,
-        AppliedTransform::Guess => !shares,
+        AppliedTransform::Guess => !same_coordinates,
     };
     scan.said.push(if undo {
         "applied_transform is undone: the mesh is taken to have the coordinates from before it; --applied-transform keep overrules".into()

@@ -11,9 +11,9 @@ use std::io::Read;
 use std::path::Path;
 
 /// Longest file in bytes; a camera is some hundred.
-const MOST_BYTES: u64 = 1 << 20;
+const MAX_BYTES: u64 = 1 << 20;
 /// Largest picture in pixels.
-const MOST_PIXELS: u64 = 1 << 28;
+const MAX_PIXELS: u64 = 1 << 28;
 
 /// Reads a camera, with remarks about what had to be guessed.
 ///
@@ -24,8 +24,8 @@ pub fn read(path: &Path) -> Result<(Intrinsics, Pose, Vec<String>)> {
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(failed)?;
     inputs::note(path);
-    (file.take(MOST_BYTES + 1).read_to_end(&mut bytes)).map_err(failed)?;
-    if bytes.len() as u64 > MOST_BYTES {
+    (file.take(MAX_BYTES + 1).read_to_end(&mut bytes)).map_err(failed)?;
+    if bytes.len() as u64 > MAX_BYTES {
         return Err(Error::file(
             path,
             "is too long for a camera",
@@ -50,7 +50,7 @@ pub fn read(path: &Path) -> Result<(Intrinsics, Pose, Vec<String>)> {
         })
     };
     let size = [side("w")?, side("h")?];
-    if size.iter().map(|&side| u64::from(side)).product::<u64>() > MOST_PIXELS {
+    if size.iter().map(|&side| u64::from(side)).product::<u64>() > MAX_PIXELS {
         return Err(Error::new(
             fields.place("w, h"),
             "no size for a picture",

@@ -16,7 +16,7 @@ use std::path::Path;
 /// Photographs of more pixels are refused before anything is allocated (RGB in f32: 3 GiB).
 pub const MAX_PIXELS: u64 = 1 << 28;
 /// An EXR may store pixels beyond the picture's edge, up to this many times those of the picture, ...
-const MOST_STORED: u64 = 16;
+const MAX_STORED: u64 = 16;
 /// ... and any number up to this one; whole rows of what is stored are held while it is decoded.
 const STORED_WITHOUT_QUESTION: u64 = 1 << 20;
 
@@ -174,7 +174,7 @@ fn check_exr_windows(path: &Path) -> Result<()> {
         for size in [stored, shown] {
             check_size(path, size.x() as u64, size.y() as u64)?;
         }
-        let most = (shown.area() as u64 * MOST_STORED).max(STORED_WITHOUT_QUESTION);
+        let most = (shown.area() as u64 * MAX_STORED).max(STORED_WITHOUT_QUESTION);
         if stored.area() as u64 > most {
             return Err(Error::file(
                 path,

@@ -6,9 +6,9 @@ use glam::{DVec3, DVec4, Vec3};
 
 /// A face that more pixels see is hardly smoothed by its neighbours.
 const ENOUGH_PIXELS: f64 = 4.0;
-/// Patches that a smaller share of all pixels see are no lamps, and no holes in lamps.
-const LEAST_SHARE: f64 = 1e-4;
-/// A patch around which the brightest channel, compressed, is a larger share of its own has no edge: it is lit brightly and gives
+/// Patches that a smaller fraction of all pixels see are no lamps, and no holes in lamps.
+const MIN_FRACTION: f64 = 1e-4;
+/// A patch around which the brightest channel, compressed, is a larger fraction of its own has no edge: it is lit brightly and gives
 /// no light.
 const NO_EDGE: f64 = 0.8;
 
@@ -17,7 +17,7 @@ const NO_EDGE: f64 = 0.8;
 pub struct ShownFace {
     /// Mean radiance over its pixels; what saturated ones show is a lower bound.
     pub radiance: Vec3,
-    /// Share of its pixels in which the photograph is saturated in all channels, 0 to 1.
+    /// Fraction of its pixels in which the photograph is saturated in all channels, 0 to 1.
     pub saturated: f32,
     /// Pixels of which it is the mean; zero where no photograph shows it.
     pub pixels: u32,
@@ -50,7 +50,7 @@ pub fn filled(
 /// What is known of a face.
 #[derive(Debug, Clone, Copy, Default)]
 struct Known {
-    /// Compressed colour, and the share of saturated pixels.
+    /// Compressed colour, and the fraction of saturated pixels.
     look: DVec4,
     /// Pixels that tell it; zero where it is not known.
     weight: f64,
@@ -94,8 +94,8 @@ fn smooth(known: &mut [Known], edges: &[[u32; 2]]) {
     for &[a, b] in edges {
         for (own, other) in [(a, b), (b, a)] {
             let (own, other) = (own as usize, &before[other as usize]);
-            let share = ENOUGH_PIXELS / (ENOUGH_PIXELS + before[own].weight);
-            let weight = other.weight.min(ENOUGH_PIXELS) * share;
+            let fraction = ENOUGH_PIXELS / (ENOUGH_PIXELS + before[own].weight);
+            let weight = other.weight.min(ENOUGH_PIXELS) * fraction;
             sums[own].0 += other.look * weight;
             sums[own].1 += weight;
         }
@@ -181,7 +181,7 @@ fn without_specks(
     kind: bool,
 ) -> Vec<bool> {
     let mut sets = patches(&bright, edges);
-    let least = LEAST_SHARE * pixels.iter().sum::<f64>();
+    let least = MIN_FRACTION * pixels.iter().sum::<f64>();
     let mut seen = vec![0.0; bright.len()];
     for (face, pixels) in (0..).zip(pixels) {
         seen[sets.find(face) as usize] += pixels;

@@ -8,7 +8,7 @@ use rstar::primitives::GeomWithData;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-/// Without a number wanted, merging ends where the next merge would add this share of the mesh's area times the
+/// Without a number wanted, merging ends where the next merge would add this fraction of the mesh's area times the
 /// square of a full change of normal or colour.
 const MERGE_LIMIT: f64 = 5e-4;
 /// Without a number wanted, at most so many segments, however complex the mesh.
@@ -16,7 +16,7 @@ const MAX_SEGMENTS: usize = 400;
 
 /// Merges that wait are looked through for outdated ones when they are twice as many as after the last look, and more than
 /// twice this.
-const LEAST_CANDIDATES: usize = 4096;
+const MIN_CANDIDATES: usize = 4096;
 
 /// Area, and area-weighted sums of normal, colour and position.
 #[derive(Debug, Clone, Copy, Default)]
@@ -122,7 +122,7 @@ pub fn merge(graph: &FaceGraph, fine: &[u32], wanted: Option<usize>) -> (Vec<u32
         let after = around.range(a + 1..);
         heap.extend(after.map(|(&b, border)| candidate(&regions, a, b, border)));
     }
-    let mut fresh = heap.len().max(LEAST_CANDIDATES);
+    let mut fresh = heap.len().max(MIN_CANDIDATES);
     let total: f64 = regions.iter().map(|region| region.area).sum();
     let mut sets = Sets::new(regions.len());
     let mut count = regions.iter().filter(|region| !region.saturated).count();
@@ -166,7 +166,7 @@ pub fn merge(graph: &FaceGraph, fine: &[u32], wanted: Option<usize>) -> (Vec<u32
                 let current = |x: u32, version: u32| regions[x as usize].version == version;
                 current(*a, *version_a) && current(*b, *version_b)
             });
-            fresh = heap.len().max(LEAST_CANDIDATES);
+            fresh = heap.len().max(MIN_CANDIDATES);
         }
     }
     number_by_area(&region_of, &regions, &mut sets)

@@ -71,7 +71,7 @@ mod tests {
     use crate::inverse::cache::clusters::Cluster;
     use crate::inverse::cache::equations::{Coupling, NormalEquations};
     use crate::inverse::cache::prior::Prior;
-    use crate::inverse::cache::trust::Trust;
+    use crate::inverse::cache::robust_weights::RobustWeights;
     use crate::inverse::cache::{CachedCluster, NO_LAMP, PathCache, Vertex};
     use crate::inverse::parameters::Unknowns;
     use crate::math::rng::Stream;
@@ -151,7 +151,7 @@ mod tests {
             sums.add(cache.linearise(&unknowns, &place, &[]));
         }
         assert_eq!(sums.rounds(), ROUNDS as u32);
-        let even = Trust::even(SURFACES);
+        let even = RobustWeights::even(SURFACES);
         let prior = Prior::new(SURFACES, SURFACES, Vec3::ONE);
         let found = NormalEquations::new(&sums.mean(), free.len(), &even, &prior);
         let together = cache(|pixel, set| (0..ROUNDS).flat_map(|r| round(r, pixel, set)).collect());

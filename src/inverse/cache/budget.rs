@@ -6,7 +6,7 @@ use crate::inverse::settings::{Preset, Settings};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Budget {
     /// Pixels looked at to find what they see.
-    pub survey_pixels: usize,
+    pub gbuffer_pixels: usize,
     /// Pixels fitted.
     pub pixels: usize,
     /// Paths of the first stage, which end in measured radiance.
@@ -28,17 +28,17 @@ impl Budget {
     pub fn of(settings: &Settings) -> Self {
         let mut budget = Self::of_preset(settings.preset);
         if settings.pixels > 0 {
-            let share = settings.pixels as f64 / budget.pixels as f64;
+            let fraction = settings.pixels as f64 / budget.pixels as f64;
             budget.pixels = usize::try_from(settings.pixels).unwrap_or(usize::MAX);
-            budget.survey_pixels = (budget.survey_pixels as f64 * share).ceil() as usize;
+            budget.gbuffer_pixels = (budget.gbuffer_pixels as f64 * fraction).ceil() as usize;
         }
         if settings.paths > 0 {
             let round = match budget.round_paths {
                 0 => &mut budget.light_field_paths,
                 _ => {
-                    let share = settings.paths as f64 / budget.round_paths as f64;
+                    let fraction = settings.paths as f64 / budget.round_paths as f64;
                     budget.light_field_paths =
-                        (budget.light_field_paths as f64 * share).ceil() as u64;
+                        (budget.light_field_paths as f64 * fraction).ceil() as u64;
                     &mut budget.round_paths
                 }
             };
@@ -51,7 +51,7 @@ impl Budget {
     const fn of_preset(preset: Preset) -> Self {
         match preset {
             Preset::Preview => Self {
-                survey_pixels: 100_000,
+                gbuffer_pixels: 100_000,
                 pixels: 60_000,
                 light_field_paths: 400_000,
                 round_paths: 0,
@@ -61,7 +61,7 @@ impl Budget {
                 tail_error: 0.2,
             },
             Preset::Balanced | Preset::Paper => Self {
-                survey_pixels: 400_000,
+                gbuffer_pixels: 400_000,
                 pixels: 120_000,
                 light_field_paths: 1_000_000,
                 round_paths: 1_500_000,
@@ -71,7 +71,7 @@ impl Budget {
                 tail_error: 0.05,
             },
             Preset::Reference => Self {
-                survey_pixels: 1_500_000,
+                gbuffer_pixels: 1_500_000,
                 pixels: 400_000,
                 light_field_paths: 2_000_000,
                 round_paths: 3_000_000,
@@ -104,7 +104,7 @@ mod tests {
             plain.pixels as u64 * 2,
             plain.round_paths * 3,
         );
-        assert_eq!(more.survey_pixels, plain.survey_pixels * 2);
+        assert_eq!(more.gbuffer_pixels, plain.gbuffer_pixels * 2);
         assert_eq!(more.round_paths, plain.round_paths * 3);
         assert_eq!(more.light_field_paths, plain.light_field_paths * 3);
         // A preset without rounds gets none.

@@ -3,8 +3,8 @@
 //! Light varies little within a cluster, so its mean holds nearly all that its pixels know of the unknowns, while the
 //! noise of photographs and of paths averages out before products are taken.
 
+use crate::inverse::gbuffer::{GBuffer, GBufferPixel};
 use crate::inverse::solver::Problem;
-use crate::inverse::survey::{Survey, SurveyedPixel};
 use glam::{BVec3, DVec3, Vec3};
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ const CLUSTER_PIXELS: f64 = 48.0;
 const ENOUGH: u64 = 48;
 /// Objects seen by fewer pixels than this keep all of theirs, at edges each by itself.
 const SMALL: u64 = 400;
-/// Below this share of a typical photograph's level, pixels weigh no more for being darker.
+/// Below this fraction of a typical photograph's level, pixels weigh no more for being darker.
 const DARK: f32 = 0.5;
 
 /// Neighbouring pixels of one object in one photograph.
@@ -48,11 +48,11 @@ impl Cluster {
     }
 }
 
-/// Gathers the pixels that are in the fit. `most_pixels` bounds how many are used; small objects keep all of theirs.
-pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cluster> {
+/// Gathers the pixels that are in the fit. `max_pixels` bounds how many are used; small objects keep all of theirs.
+pub fn cluster(problem: &Problem, gbuffer: &GBuffer, max_pixels: usize) -> Vec<Cluster> {
     // Usable pixels: away from all edges, or nearer to them on objects that have few.
-    let seen = |object: u32| survey.seen.get(object as usize).copied().unwrap_or(0);
-    let mut usable: Vec<&SurveyedPixel> = survey
+    let seen = |object: u32| gbuffer.seen.get(object as usize).copied().unwrap_or(0);
+    let mut usable: Vec<&GBufferPixel> = gbuffer
         .pixels
         .iter()
         .filter(|p| !p.held_out && p.object != u32::MAX)
@@ -61,11 +61,11 @@ pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cl
         let photograph = &problem.photographs[frame as usize];
         photograph.saturated(pixel as usize)
     };
-    let nearest = nearest_to_edges(&usable, survey.seen.len(), |p| {
+    let nearest = nearest_to_edges(&usable, gbuffer.seen.len(), |p| {
         saturated(p.frame, p.pixel).any()
     });
     usable.retain(|p| Edge::of(p) <= nearest[p.object as usize].0);
-    let thinning = (usable.len() as f64 / most_pixels.max(1) as f64).max(1.0);
+    let thinning = (usable.len() as f64 / max_pixels.max(1) as f64).max(1.0);
     let tile = (CLUSTER_PIXELS * thinning).sqrt().round().max(1.0) as u32;
 
     // Tiles of each photograph, apart for each object, and for what is saturated.
@@ -85,7 +85,7 @@ pub fn cluster(problem: &Problem, survey: &Survey, most_pixels: usize) -> Vec<Cl
     }
 
     // Thin out large objects, evenly over each tile.
-    let dark = typical_level(problem, survey) * DARK;
+    let dark = typical_level(problem, gbuffer) * DARK;
     tiles
         .into_iter()
         .map(|((frame, _, _, object, _), all)| {
@@ -128,7 +128,7 @@ enum Edge {
 }
 
 impl Edge {
-    fn of(pixel: &SurveyedPixel) -> Self {
+    fn of(pixel: &GBufferPixel) -> Self {
         match (pixel.inside, pixel.pure) {
             (true, _) => Self::Far,
             (false, true) => Self::Near,
@@ -138,12 +138,12 @@ impl Edge {
 }
 
 /// How near to its edges each object is fitted, and by how many pixels: as far as there are enough. A sliver of a lamp in
-/// a pixel of the ceiling outshines it, and its share of the pixel is known no better than the photograph's noise and the
+/// a pixel of the ceiling outshines it, and its fraction of the pixel is known no better than the photograph's noise and the
 /// camera's place. Lower bounds do not count.
 fn nearest_to_edges(
-    pixels: &[&SurveyedPixel],
+    pixels: &[&GBufferPixel],
     objects: usize,
-    is_bound: impl Fn(&SurveyedPixel) -> bool,
+    is_bound: impl Fn(&GBufferPixel) -> bool,
 ) -> Vec<(Edge, u64)> {
     let mut counts = vec![[0u64; 3]; objects];
     for pixel in pixels.iter().filter(|p| !is_bound(p)) {
@@ -160,16 +160,16 @@ fn nearest_to_edges(
     counts.into_iter().map(nearest).collect()
 }
 
-/// Side of the tiles of an object that is fitted at its edges: near a lamp each pixel holds light of its own, or a share of
+/// Side of the tiles of an object that is fitted at its edges: near a lamp each pixel holds light of its own, or a fraction of
 /// the lamp of its own, and is known as well as those allow. Gathered with others it would weigh like them.
 fn tile_at_edges(pixels: u64) -> u32 {
     (pixels as f64 / SMALL as f64).sqrt().floor().max(1.0) as u32
 }
 
 /// Median over photographed pixels that are in the fit, per channel; one where all are black.
-fn typical_level(problem: &Problem, survey: &Survey) -> Vec3 {
+fn typical_level(problem: &Problem, gbuffer: &GBuffer) -> Vec3 {
     let channel = |c: usize| {
-        let mut values: Vec<f32> = survey
+        let mut values: Vec<f32> = gbuffer
             .pixels
             .iter()
             .filter(|p| !p.held_out && p.object != u32::MAX)
@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn objects_are_fitted_as_far_from_their_edges_as_there_are_enough_pixels() {
-        let pixel = |object: u32, edge: Edge| SurveyedPixel {
+        let pixel = |object: u32, edge: Edge| GBufferPixel {
             frame: 0,
             pixel: 0,
             object,
@@ -253,11 +253,11 @@ mod tests {
             (edges.into_iter().zip(counts))
                 .flat_map(move |(edge, n)| (0..n).map(move |_| pixel(object, edge)))
         };
-        let pixels: Vec<SurveyedPixel> = of(0, [ENOUGH, 500, 500])
+        let pixels: Vec<GBufferPixel> = of(0, [ENOUGH, 500, 500])
             .chain(of(1, [ENOUGH - 1, 1, 500]))
             .chain(of(2, [10, 20, 5]))
             .collect();
-        let pixels: Vec<&SurveyedPixel> = pixels.iter().collect();
+        let pixels: Vec<&GBufferPixel> = pixels.iter().collect();
         let nearest = nearest_to_edges(&pixels, 4, |_| false);
         let edges: Vec<Edge> = nearest.iter().map(|n| n.0).collect();
         assert_eq!(edges, [Edge::Far, Edge::Near, Edge::On, Edge::On]);

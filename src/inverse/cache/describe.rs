@@ -5,9 +5,9 @@ use super::prior::ALBEDO_DEVIATION;
 use super::roles::Role;
 use super::trace::OutsideGrid;
 use crate::inverse::estimate::{Estimate, ObjectEstimate, Outside};
+use crate::inverse::gbuffer::GBuffer;
 use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::parameters::Unknowns;
-use crate::inverse::survey::Survey;
 use crate::math::color::luminance;
 use crate::scene::Scene;
 use crate::transport::material::Lobe;
@@ -27,7 +27,7 @@ const WHITE: f32 = 0.01;
 #[expect(clippy::too_many_arguments, reason = "all that a solve has found out")]
 pub fn estimate(
     scene: &Scene,
-    survey: &Survey,
+    gbuffer: &GBuffer,
     roles: &[Role],
     unknowns: &Unknowns,
     errors: &StandardErrors,
@@ -40,7 +40,7 @@ pub fn estimate(
     let sourceless = sky.is_none() && unknowns.emission.iter().all(|&e| e == Vec3::ZERO);
     let objects = (0..scene.objects.len())
         .map(|k| {
-            let seen = survey.seen[k];
+            let seen = gbuffer.seen[k];
             let mut object = ObjectEstimate {
                 albedo: unknowns.albedo[k],
                 albedo_stderr: errors.albedo[k],
@@ -161,8 +161,8 @@ fn is_unknown(emission: Vec3, stderr: Vec3) -> bool {
 /// What to take for an albedo that is hardly known: drawn to the room's typical one by what is believed of any albedo.
 fn drawn(albedo: Vec3, stderr: Vec3, typical: Vec3) -> Vec3 {
     let known = stderr * stderr / (ALBEDO_DEVIATION * ALBEDO_DEVIATION);
-    let share = (known + Vec3::ONE).recip();
-    albedo * share + typical * (Vec3::ONE - share)
+    let fraction = (known + Vec3::ONE).recip();
+    albedo * fraction + typical * (Vec3::ONE - fraction)
 }
 
 /// Area-weighted mean of the albedos that are known.

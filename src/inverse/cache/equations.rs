@@ -6,16 +6,16 @@
 use super::PathCache;
 use super::evaluate::Linearised;
 use super::prior::Prior;
+use super::robust_weights::RobustWeights;
 use super::roles::places;
 use super::rows::Rows;
-use super::trust::Trust;
 use crate::inverse::parameters::Unknowns;
 use glam::DVec3;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 /// Up to so many parameters, matrices over pairs of them are kept.
-const MOST_DENSE: usize = 256;
+const MAX_DENSE: usize = 256;
 
 /// Sums over the clusters of the fit for one set of unknowns.
 #[derive(Debug, Clone)]
@@ -62,14 +62,14 @@ impl PathCache {
         &self,
         unknowns: &Unknowns,
         free: &[usize],
-        trust: &Trust,
+        robust: &RobustWeights,
         prior: &Prior,
     ) -> NormalEquations {
         let places = places(free, unknowns.surfaces());
         NormalEquations::new(
             &self.linearise(unknowns, &places, &[]),
             free.len(),
-            trust,
+            robust,
             prior,
         )
     }
@@ -77,20 +77,20 @@ impl PathCache {
 
 impl NormalEquations {
     /// Sums over linearised clusters with `n` free parameters.
-    pub fn new(linearised: &[Linearised], n: usize, trust: &Trust, prior: &Prior) -> Self {
-        let coupling = if n <= MOST_DENSE {
-            Coupling::Dense(Matrices::new(linearised, n, trust))
+    pub fn new(linearised: &[Linearised], n: usize, robust: &RobustWeights, prior: &Prior) -> Self {
+        let coupling = if n <= MAX_DENSE {
+            Coupling::Dense(Matrices::new(linearised, n, robust))
         } else {
-            Coupling::Sparse(Rows::new(linearised, n, trust))
+            Coupling::Sparse(Rows::new(linearised, n, robust))
         };
-        Self::with_coupling(linearised, n, trust, prior, coupling)
+        Self::with_coupling(linearised, n, robust, prior, coupling)
     }
 
     /// The same with the couplings given.
     pub fn with_coupling(
         linearised: &[Linearised],
         n: usize,
-        trust: &Trust,
+        robust: &RobustWeights,
         prior: &Prior,
         coupling: Coupling,
     ) -> Self {
@@ -105,7 +105,7 @@ impl NormalEquations {
             coupling,
         };
         for cluster in linearised {
-            let weight = trust.weight(cluster);
+            let weight = robust.weight(cluster);
             sums.objective += weight * cluster.residuals[0] * cluster.residuals[1];
             for (&(i, a, b), score) in cluster.rows.iter().zip(cluster.scores(weight)) {
                 let mean = (a + b) * 0.5;
@@ -121,20 +121,20 @@ impl NormalEquations {
 
 impl Matrices {
     /// Of linearised clusters with `n` free parameters.
-    pub fn new(linearised: &[Linearised], n: usize, trust: &Trust) -> Self {
+    pub fn new(linearised: &[Linearised], n: usize, robust: &RobustWeights) -> Self {
         let all = vec![DVec3::ONE; linearised.len()];
-        Self::with_residuals_kept(linearised, n, trust, &all)
+        Self::with_residuals_kept(linearised, n, robust, &all)
     }
 
-    /// The same with each cluster's score over the share of its residual that it keeps, in the scatter alone.
+    /// The same with each cluster's score over the fraction of its residual that it keeps, in the scatter alone.
     pub fn with_residuals_kept(
         linearised: &[Linearised],
         n: usize,
-        trust: &Trust,
+        robust: &RobustWeights,
         kept: &[DVec3],
     ) -> Self {
         let terms: Vec<Vec<Term>> = (linearised.par_iter().zip(kept))
-            .map(|(cluster, kept)| Term::of(cluster, trust.weight(cluster), *kept))
+            .map(|(cluster, kept)| Term::of(cluster, robust.weight(cluster), *kept))
             .collect();
         // For each row, the clusters that meet it and the place of its term there.
         let mut where_met: Vec<Vec<(u32, u32)>> = vec![Vec::new(); n];
@@ -180,7 +180,7 @@ struct Term {
     derivative: DVec3,
     /// A quarter of the same times the cluster's weight, so that products are those of means.
     weighted: DVec3,
-    /// Contribution to the descent, over the share of the residual that is kept.
+    /// Contribution to the descent, over the fraction of the residual that is kept.
     score: DVec3,
 }
 

@@ -4,8 +4,8 @@ use super::equations::{Coupling, Matrices, NormalEquations};
 use super::evaluate::Linearised;
 use super::fit::noise;
 use super::prior::ALBEDO_DEVIATION;
+use super::robust_weights::RobustWeights;
 use super::rows::Rows;
-use super::trust::Trust;
 use crate::math::rng::Stream;
 use glam::{DVec3, Vec3};
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -19,13 +19,13 @@ const DRAW_TOLERANCE: f64 = 1e-2;
 /// Key of the draws.
 const KEY: u64 = 0x6d75_6c74;
 /// Parameters that are tested exactly where matrices would be too large.
-const MOST_EXACT: usize = 24;
-/// Share of a curvature that is taken not to be noise at least.
-const LEAST_SIGNAL: f64 = 0.05;
-/// Share of a cluster's residual that it is taken to keep at least when the fit follows it.
-const LEAST_KEPT: f64 = 0.1;
-/// Share of its curvature that a parameter must keep when the others follow it, to be told apart from them.
-const LEAST_OWN: f64 = 1e-9;
+const MAX_EXACT: usize = 24;
+/// Fraction of a curvature that is taken not to be noise at least.
+const MIN_SIGNAL: f64 = 0.05;
+/// Fraction of a cluster's residual that it is taken to keep at least when the fit follows it.
+const MIN_KEPT: f64 = 0.1;
+/// Fraction of its curvature that a parameter must keep when the others follow it, to be told apart from them.
+const MIN_OWN: f64 = 1e-9;
 
 /// Standard errors of all parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,7 +71,7 @@ impl Released {
 /// clusters' scores, so that noise of photographs and of paths both count, whatever their distribution (Huber 1967).
 ///
 /// H holds the square of the derivatives' own noise, which the descent does not: what few paths meet would seem better known
-/// than it is. Errors grow by the share of that noise in the parameter's curvature.
+/// than it is. Errors grow by the fraction of that noise in the parameter's curvature.
 pub fn standard_errors(
     equations: &NormalEquations,
     free: &[usize],
@@ -107,7 +107,7 @@ pub fn standard_errors(
 pub fn jackknifed(
     mut equations: NormalEquations,
     clusters: &[Linearised],
-    trust: &Trust,
+    robust: &RobustWeights,
     free: &[usize],
 ) -> NormalEquations {
     let beliefs = Beliefs::new(&equations, free);
@@ -115,14 +115,14 @@ pub fn jackknifed(
         let inverses = [0, 1, 2].map(|c| inverse(&matrices.hessian[c], &beliefs.added, c));
         let kept: Vec<DVec3> = (clusters.par_iter())
             .map(|cluster| {
-                let weight = trust.weight(cluster);
+                let weight = robust.weight(cluster);
                 DVec3::from_array(std::array::from_fn(|c| {
                     let leverage = (inverses[c].as_ref()).map_or(0.0, |m| along(m, cluster, c));
-                    (1.0 - weight[c] * leverage).max(LEAST_KEPT)
+                    (1.0 - weight[c] * leverage).max(MIN_KEPT)
                 }))
             })
             .collect();
-        *matrices = Matrices::with_residuals_kept(clusters, free.len(), trust, &kept);
+        *matrices = Matrices::with_residuals_kept(clusters, free.len(), robust, &kept);
     }
     equations
 }
@@ -146,7 +146,7 @@ fn along(matrix: &DMatrix<f64>, cluster: &Linearised, channel: usize) -> f64 {
 
 /// The part of a parameter's curvature that is no noise of its derivatives, given its curvature and that across the two sets.
 pub fn signal(diagonal: DVec3, across: DVec3) -> DVec3 {
-    across.max(diagonal * LEAST_SIGNAL)
+    across.max(diagonal * MIN_SIGNAL)
 }
 
 /// What is believed of the free parameters, in the units of the normal equations.
@@ -262,7 +262,7 @@ pub fn release(equations: &NormalEquations, free: &[usize], active: usize) -> Ve
         let (diagonal, score) = (equations.diagonal[row], equations.descent[row]);
         for channel in 0..3 {
             let curvature = tested.curvature[channel];
-            if curvature > LEAST_OWN * diagonal[channel] && curvature > 0.0 {
+            if curvature > MIN_OWN * diagonal[channel] && curvature > 0.0 {
                 result.curvature[channel] = curvature;
                 result.step[channel] = score[channel] / curvature;
                 result.stderr[channel] = tested.variance[channel].max(0.0).sqrt() / curvature;
@@ -342,7 +342,7 @@ fn by_rows(
     let none = vec![DVec3::ZERO; n];
     let mut added = beliefs.added.clone();
     added.resize(n, DVec3::ONE);
-    let exact: Vec<(usize, Tested)> = (standing_out.par_iter().take(MOST_EXACT))
+    let exact: Vec<(usize, Tested)> = (standing_out.par_iter().take(MAX_EXACT))
         .map(|&(_, row)| {
             let mut unit = vec![DVec3::ZERO; n];
             unit[row] = DVec3::ONE;
@@ -396,7 +396,7 @@ mod tests {
                 })
                 .collect();
             let prior = Prior::new(1, 1, Vec3::ONE);
-            let (even, free) = (Trust::even(1), [1]);
+            let (even, free) = (RobustWeights::even(1), [1]);
             let equations = NormalEquations::new(&clusters, 1, &even, &prior);
             let plain = standard_errors(&equations, &free, 1).emission[0].x;
             let kept = jackknifed(equations, &clusters, &even, &free);

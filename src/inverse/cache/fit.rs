@@ -4,18 +4,18 @@ use super::PathCache;
 use super::equations::{Coupling, Matrices, NormalEquations};
 use super::errors::signal;
 use super::prior::Prior;
+use super::robust_weights::RobustWeights;
 use super::rows::Bounded;
 use super::step::Step;
-use super::trust::Trust;
 use crate::inverse::parameters::Unknowns;
 use glam::DVec3;
 use nalgebra::DVector;
 
 /// Damping relative to the diagonal; only keeps the factorisation safe from rounding.
-pub const LEAST_DAMPING: f64 = 1e-10;
+pub const MIN_DAMPING: f64 = 1e-10;
 /// A step below this many standard errors in every parameter ends the fit.
 pub const STEP_TOLERANCE: f64 = 0.1;
-/// A gradient within so many times its noise that keeps more than this share of itself over a step ends the fit as well.
+/// A gradient within so many times its noise that keeps more than this fraction of itself over a step ends the fit as well.
 const WITHIN_NOISE: f64 = 2.0;
 const STALLED: f64 = 0.9;
 /// Values that differ by a few units in the last place of single precision, over [`STEP_TOLERANCE`].
@@ -45,23 +45,23 @@ pub fn fit<E>(
     cache: &PathCache,
     start: &Unknowns,
     free: &[usize],
-    trust: &Trust,
+    robust: &RobustWeights,
     prior: &Prior,
-    most_steps: u64,
+    max_steps: u64,
     mut between: impl FnMut(&Unknowns) -> Result<(), E>,
 ) -> Result<Fit, E> {
     let mut unknowns = start.clone();
-    let mut equations = cache.normal_equations(&unknowns, free, trust, prior);
+    let mut equations = cache.normal_equations(&unknowns, free, robust, prior);
     let mut iterations = 0;
-    let mut damping = LEAST_DAMPING;
+    let mut damping = MIN_DAMPING;
     let mut before = f64::INFINITY;
-    while iterations < most_steps {
+    while iterations < max_steps {
         let pull = pull(&equations, free, &unknowns);
         if is_stalled(before, pull) {
             break;
         }
         let (proposal, length) = propose(&equations, free, &unknowns, damping);
-        let after = cache.normal_equations(&proposal, free, trust, prior);
+        let after = cache.normal_equations(&proposal, free, robust, prior);
         iterations += 1;
         between(&proposal)?;
         // A step from afar may overshoot: the squared error then tells.
@@ -69,7 +69,7 @@ pub fn fit<E>(
             damping = (damping * 100.0).max(1e-3);
             continue;
         }
-        damping = (damping * 0.01).max(LEAST_DAMPING);
+        damping = (damping * 0.01).max(MIN_DAMPING);
         (unknowns, equations, before) = (proposal, after, pull);
         if length.step < STEP_TOLERANCE {
             break;
@@ -271,7 +271,7 @@ mod tests {
             ..PathCache::default()
         };
         let (even, free) = (
-            Trust::even(roles.len()),
+            RobustWeights::even(roles.len()),
             roles::free(roles, |k| roles[k] != Role::Emitter),
         );
         let prior = Prior::new(roles.len(), roles.len(), Vec3::ONE);

@@ -49,7 +49,7 @@ fn derivatives(cluster: &Linearised, rows: [usize; 2]) -> [DVec3; 2] {
 }
 
 /// Radiance that a lamp of albedo one would reflect where it is seen: the regression of what its clusters would reflect on
-/// the share of the lamp in them.
+/// the fraction of the lamp in them.
 fn reflected(clusters: &[Linearised], lamp: usize, rows: [usize; 2]) -> DVec3 {
     let own = clusters.iter().filter(|c| c.object as usize == lamp);
     let (top, bottom) = own.fold((DVec3::ZERO, DVec3::ZERO), |(top, bottom), cluster| {

@@ -75,9 +75,9 @@ impl LampPatches {
         let least = even.clamp(1.0, PATHS[0]);
         let traced: Vec<(Vec3, Cast)> = (self.triangles.par_iter())
             .map(|&triangle| {
-                let share = paths as f64 * area_of(scene, triangle) / area;
+                let fraction = paths as f64 * area_of(scene, triangle) / area;
                 // Lamps without any area have no share; the least is then the most.
-                let count = share.max(least).min(PATHS[1]) as u64;
+                let count = fraction.max(least).min(PATHS[1]) as u64;
                 let (mut sum, mut cast) = (DVec3::ZERO, Cast::default());
                 for path in 0..count {
                     let mut stream = Stream::new(seed, KEY + round, u64::from(triangle), path);

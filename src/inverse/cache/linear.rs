@@ -2,15 +2,15 @@
 
 use super::equations::NormalEquations;
 use super::evaluate::Linearised;
-use super::fit::{LEAST_DAMPING, STEP_TOLERANCE, is_stalled, propose, pull};
+use super::fit::{MIN_DAMPING, STEP_TOLERANCE, is_stalled, propose, pull};
 use super::prior::Prior;
-use super::trust::Trust;
+use super::robust_weights::RobustWeights;
 use crate::inverse::parameters::Unknowns;
 use glam::DVec3;
 use rayon::prelude::*;
 
 /// Steps at most.
-const MOST_STEPS: u32 = 12;
+const MAX_STEPS: u32 = 12;
 
 /// Where the direction of descent vanishes.
 #[derive(Debug)]
@@ -18,7 +18,7 @@ pub struct Descended {
     /// The unknowns.
     pub unknowns: Unknowns,
     /// The weights there.
-    pub trust: Trust,
+    pub robust: RobustWeights,
     /// The normal equations there.
     pub equations: NormalEquations,
     /// The clusters, their residuals those that are left.
@@ -45,14 +45,14 @@ pub fn descend(
     let mut steps = 0;
     let mut before = f64::INFINITY;
     loop {
-        let trust = Trust::from_residuals(&clusters, about.surfaces());
-        let equations = NormalEquations::new(&clusters, free.len(), &trust, prior);
-        let (next, length) = propose(&equations, free, &unknowns, LEAST_DAMPING);
+        let robust = RobustWeights::from_residuals(&clusters, about.surfaces());
+        let equations = NormalEquations::new(&clusters, free.len(), &robust, prior);
+        let (next, length) = propose(&equations, free, &unknowns, MIN_DAMPING);
         let pull = pull(&equations, free, &unknowns);
-        if length.left < STEP_TOLERANCE || is_stalled(before, pull) || steps == MOST_STEPS {
+        if length.left < STEP_TOLERANCE || is_stalled(before, pull) || steps == MAX_STEPS {
             return Descended {
                 unknowns,
-                trust,
+                robust,
                 equations,
                 clusters,
             };
@@ -97,9 +97,9 @@ mod tests {
         about.albedo[0] = Vec3::splat(begun as f32);
         let prior = Prior::new(1, 1, Vec3::ONE);
         let (one, _) = {
-            let trust = Trust::even(1);
-            let equations = NormalEquations::new(&clusters, 1, &trust, &prior);
-            propose(&equations, &[0], &about, LEAST_DAMPING)
+            let robust = RobustWeights::even(1);
+            let equations = NormalEquations::new(&clusters, 1, &robust, &prior);
+            propose(&equations, &[0], &about, MIN_DAMPING)
         };
         assert!(one.albedo[0].x < 0.5, "{}", one.albedo[0]);
         let found = descend(clusters, &about, &about, &[0], &prior);

@@ -5,8 +5,8 @@ use sysinfo::{MemoryRefreshKind, System};
 
 /// Clusters whose paths tell how long paths are.
 pub const PILOT_CLUSTERS: usize = 64;
-/// Share of the machine's memory that stored paths may take.
-const SHARE: u64 = 4;
+/// Fraction of the machine's memory that stored paths may take.
+const FRACTION: u64 = 4;
 /// Memory where the machine's is not known, in bytes.
 const UNKNOWN: u64 = 8 << 30;
 
@@ -21,7 +21,7 @@ pub fn allowed(gibibytes: f64) -> u64 {
         let limit = system.cgroup_limits().map(|limits| limits.total_memory);
         limit.unwrap_or(u64::MAX).min(system.total_memory())
     });
-    known.filter(|&bytes| bytes > 0).unwrap_or(UNKNOWN) / SHARE
+    known.filter(|&bytes| bytes > 0).unwrap_or(UNKNOWN) / FRACTION
 }
 
 /// Whether so many paths of at most so many vertices each, in the mean, fit beyond doubt.

@@ -6,6 +6,7 @@
 
 pub mod accumulate;
 pub mod budget;
+pub mod classify;
 pub mod clusters;
 pub mod derivative;
 mod describe;
@@ -13,22 +14,21 @@ pub mod equations;
 pub mod errors;
 pub mod evaluate;
 pub mod fit;
-pub mod judge;
-pub mod ladder;
 pub mod lamp_albedo;
 pub mod lamp_patches;
 pub mod linear;
 pub mod memory;
 pub mod model_error;
 pub mod path_noise;
+pub mod pipeline;
 pub mod prior;
-mod reached;
+pub mod robust_weights;
 pub mod roles;
 pub mod rows;
 mod scatter;
+mod state;
 pub mod step;
 pub mod trace;
-pub mod trust;
 
 use crate::transport::arrival::Cast;
 use clusters::Cluster;
@@ -109,8 +109,8 @@ impl PathCache {
             .sum()
     }
 
-    /// Share of the paths whose last vertex lies on a surface from `first` on.
-    pub fn share_ending_on(&self, first: u32) -> f64 {
+    /// Fraction of the paths whose last vertex lies on a surface from `first` on.
+    pub fn fraction_ending_on(&self, first: u32) -> f64 {
         let (mut ending, mut all) = (0u64, 0u64);
         for cached in &self.clusters {
             all += cached.ends.len() as u64;

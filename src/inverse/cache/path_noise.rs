@@ -7,8 +7,8 @@ use super::evaluate::Linearised;
 /// Residuals of a few clusters say little: an even mixture of both kinds of noise counts for so many clusters.
 const PRIOR_CLUSTERS: f64 = 2.0;
 
-/// For each object the share of its squared residuals that the paths' noise explains, from 0 to 1.
-pub fn shares(clusters: &[Linearised], objects: usize) -> Vec<f64> {
+/// For each object the fraction of its squared residuals that the paths' noise explains, from 0 to 1.
+pub fn fractions(clusters: &[Linearised], objects: usize) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0, 0.0); objects];
     for cluster in clusters.iter().filter(|c| !c.silent().all()) {
         let [a, b] = cluster.residuals;
@@ -21,9 +21,9 @@ pub fn shares(clusters: &[Linearised], objects: usize) -> Vec<f64> {
     sums.into_iter()
         .map(|(paths, all, count)| {
             let mean = all / f64::max(count, 1.0) * PRIOR_CLUSTERS;
-            let share = (paths + 0.5 * mean) / (all + mean);
-            if share.is_finite() {
-                share.min(1.0)
+            let fraction = (paths + 0.5 * mean) / (all + mean);
+            if fraction.is_finite() {
+                fraction.min(1.0)
             } else {
                 0.0
             }
@@ -33,7 +33,7 @@ pub fn shares(clusters: &[Linearised], objects: usize) -> Vec<f64> {
 
 /// Shares a number of paths out over clusters: to objects in proportion to the square root of their pixels, so that
 /// small ones become known well without starving large ones; at least one path a pixel and set.
-pub fn share_paths(clusters: &mut [Cluster], objects: usize, total: u64) {
+pub fn distribute_paths(clusters: &mut [Cluster], objects: usize, total: u64) {
     let mut pixels = vec![0u64; objects];
     for cluster in clusters.iter() {
         pixels[cluster.object as usize] += cluster.pixels.len() as u64;
@@ -68,7 +68,7 @@ mod tests {
     #[test]
     fn small_objects_get_more_paths_a_pixel_and_all_together_what_was_asked() {
         let mut clusters = vec![pixels(0, 5_000), pixels(0, 5_000), pixels(1, 100)];
-        share_paths(&mut clusters, 2, 1_100_000);
+        distribute_paths(&mut clusters, 2, 1_100_000);
         // Objects share as √10,000 to √100, half of it in each set.
         assert_eq!(clusters[0].paths, 50);
         assert_eq!(clusters[1].paths, 50);
@@ -83,10 +83,10 @@ mod tests {
     fn every_pixel_gets_a_path_however_few_there_are() {
         for total in [0, 1, 1000] {
             let mut clusters = vec![pixels(0, 5_000), pixels(1, 1)];
-            share_paths(&mut clusters, 3, total);
+            distribute_paths(&mut clusters, 3, total);
             assert!(clusters.iter().all(|c| c.paths >= 1));
         }
-        share_paths(&mut [], 3, 100);
+        distribute_paths(&mut [], 3, 100);
     }
 
     fn residuals(object: u32, a: f64, b: f64) -> Linearised {
@@ -110,7 +110,7 @@ mod tests {
                 [residuals(0, sign, sign), residuals(1, sign * 2.0, 0.0)]
             })
             .collect();
-        let found = shares(&all, 3);
+        let found = fractions(&all, 3);
         assert!(found[0] < 0.02, "{found:?}");
         assert!(found[1] > 0.95, "{found:?}");
         assert_eq!(found[2], 0.0);

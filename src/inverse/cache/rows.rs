@@ -2,7 +2,7 @@
 //! cluster's paths meet few of the surfaces. Solved by conjugate gradients, the three channels side by side.
 
 use super::evaluate::Linearised;
-use super::trust::Trust;
+use super::robust_weights::RobustWeights;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -49,7 +49,7 @@ pub struct Bounded<'a> {
 
 impl Rows {
     /// Of linearised clusters with `n` free parameters.
-    pub fn new(linearised: &[Linearised], n: usize, trust: &Trust) -> Self {
+    pub fn new(linearised: &[Linearised], n: usize, robust: &RobustWeights) -> Self {
         let mut this = Self {
             slopes: Vec::new(),
             scores: Vec::new(),
@@ -57,7 +57,7 @@ impl Rows {
             diagonal: vec![DVec3::ZERO; n],
         };
         for cluster in linearised {
-            let weight = trust.weight(cluster);
+            let weight = robust.weight(cluster);
             let root = weight.powf(0.5);
             for (&(place, a, b), score) in cluster.rows.iter().zip(cluster.scores(weight)) {
                 let slope = root * (a + b) * 0.5;
@@ -293,7 +293,7 @@ mod tests {
     fn both() -> [NormalEquations; 2] {
         let linearised = clusters();
         let (even, prior) = (
-            Trust::even(SURFACES),
+            RobustWeights::even(SURFACES),
             Prior::new(SURFACES, SURFACES, Vec3::ONE),
         );
         [

@@ -9,7 +9,7 @@ use crate::transport::material::Lobe;
 use glam::Vec3;
 
 /// Chance of the lobe at least, and of the base.
-const LEAST_CHANCE: f64 = 0.1;
+const MIN_CHANCE: f64 = 0.1;
 
 /// The part that a path takes at a vertex with a lobe.
 pub struct Scattering {
@@ -39,10 +39,10 @@ impl Scattering {
     pub fn new(lobe: Lobe, normal: Vec3, wo: Vec3, albedo: f32, choice: f32) -> Self {
         let frame = Frame::around(normal);
         let wo = frame.to_local(wo.normalize_or_zero());
-        let share = lobe.share(wo);
-        let base = (1.0 - share) * f64::from(albedo);
-        let chance = share / (share + base).max(f64::MIN_POSITIVE);
-        let chance = chance.clamp(LEAST_CHANCE, 1.0 - LEAST_CHANCE);
+        let fraction = lobe.fraction(wo);
+        let base = (1.0 - fraction) * f64::from(albedo);
+        let chance = fraction / (fraction + base).max(f64::MIN_POSITIVE);
+        let chance = chance.clamp(MIN_CHANCE, 1.0 - MIN_CHANCE);
         let specular = f64::from(choice) < chance;
         Self {
             lobe,
@@ -55,11 +55,11 @@ impl Scattering {
 
     /// What is believed to be left of the light after this vertex, its unknown albedo included.
     pub fn believed(&self, albedo: f32) -> f32 {
-        let share = self.lobe.share(self.wo);
+        let fraction = self.lobe.fraction(self.wo);
         let left = if self.specular {
-            share
+            fraction
         } else {
-            (1.0 - share) * f64::from(albedo)
+            (1.0 - fraction) * f64::from(albedo)
         };
         (left / self.chance) as f32
     }

@@ -5,10 +5,10 @@ use super::lamp_patches::LampPatches;
 use super::scatter::{Scattered, Scattering};
 use super::{CachedCluster, NO_PATCH, NO_TEXEL, PathCache, SPECULAR, Vertex};
 use crate::inverse::estimate::TexelEstimate;
+use crate::inverse::gbuffer::SurfacePoint;
 use crate::inverse::measured::MeasuredRadiance;
 use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::settings::LightSampling;
-use crate::inverse::survey::SurveyPoint;
 use crate::math::frame::Frame;
 use crate::math::sequence::{SequencePoint, Uniforms};
 use crate::math::warp;
@@ -28,15 +28,15 @@ use std::f32::consts::FRAC_1_PI;
 /// Bounces before Russian roulette may end a path.
 const ROULETTE_AFTER: u32 = 2;
 /// Paths are never ended with a higher chance than this at one vertex.
-const LEAST_SURVIVAL: f32 = 0.1;
+const MIN_SURVIVAL: f32 = 0.1;
 /// Paths are never continued with a higher chance than this. Their variance is finite while the square of the albedo is
 /// below it.
-const MOST_SURVIVAL: f32 = 0.999;
+const MAX_SURVIVAL: f32 = 0.999;
 
 /// At most so many vertices has a path in the mean where no surface is believed to reflect more than `albedo`.
 pub fn longest_mean_path(albedo: f32) -> f32 {
     // The camera's vertex, one outside, and a geometric number of bounces once the roulette may end it.
-    let survival = albedo.clamp(LEAST_SURVIVAL, MOST_SURVIVAL);
+    let survival = albedo.clamp(MIN_SURVIVAL, MAX_SURVIVAL);
     2.0 + ROULETTE_AFTER as f32 + 1.0 / (1.0 - survival)
 }
 
@@ -234,7 +234,7 @@ impl Tracer<'_> {
             let [choice, u, v, pick] = numbers.four();
             if self.sampling != LightSampling::Bsdf {
                 let choice = numbers.refine(choice);
-                rays += if pick < self.sky_share() {
+                rays += if pick < self.sky_fraction() {
                     self.sky_sample(&surface, &lobed, scale, choice, [u, v], &mut vertex)
                 } else {
                     self.light_sample(&surface, &lobed, scale, choice, [u, v], &mut vertex)
@@ -247,7 +247,7 @@ impl Tracer<'_> {
             let believed_here = believed * left;
             let mut survival = 1.0;
             if bounce >= ROULETTE_AFTER {
-                survival = believed_here.clamp(LEAST_SURVIVAL, MOST_SURVIVAL);
+                survival = believed_here.clamp(MIN_SURVIVAL, MAX_SURVIVAL);
                 if end >= survival {
                     vertices.push(vertex);
                     return rays;
@@ -271,7 +271,7 @@ impl Tracer<'_> {
             let next = self.scene.intersect(&ray);
             let Some(next) = next else {
                 if let Some((sky, radiance)) = self.sky.and_then(|s| Some((s, s.at(origin, wi)?))) {
-                    let sky_pdf = sky.map().pdf(origin, wi) * self.sky_share();
+                    let sky_pdf = sky.map().pdf(origin, wi) * self.sky_fraction();
                     let weight = self.met_weight(bsdf_pdf, sky_pdf);
                     vertex.known += radiance * (weight * scale);
                     vertices.push(vertex);
@@ -344,7 +344,7 @@ impl Tracer<'_> {
         }
         let light_pdf = self.light_pdf(object) * distance2 / cos_light;
         let weight = self.drawn_weight(light_pdf, surface.value(lobed, wi)) * scale;
-        let seen = SurveyPoint {
+        let seen = SurfacePoint {
             point: sample.point,
             normal: light_normal,
             object,
@@ -384,7 +384,7 @@ impl Tracer<'_> {
         if self.scene.occluded(&Ray::new(from, wi)) {
             return 1;
         }
-        let weight = self.drawn_weight(pdf * self.sky_share(), surface.value(lobed, wi)) * scale;
+        let weight = self.drawn_weight(pdf * self.sky_fraction(), surface.value(lobed, wi)) * scale;
         vertex.known += sky.map().radiance(point, wi) * weight;
         if let Some(grid) = self.outside.filter(|_| sky.is_bound(point, wi)) {
             (vertex.lamp, vertex.lamp_weight) = (grid.excess(), weight);
@@ -392,8 +392,8 @@ impl Tracer<'_> {
         1
     }
 
-    /// Share of the light samples that go outside.
-    fn sky_share(&self) -> f32 {
+    /// Fraction of the light samples that go outside.
+    fn sky_fraction(&self) -> f32 {
         match (self.sky.is_some(), self.lights.is_dark()) {
             (false, _) => 0.0,
             (true, true) => 1.0,
@@ -403,17 +403,17 @@ impl Tracer<'_> {
 
     /// Density per square metre with which light samples land on an object of the mesh.
     fn light_pdf(&self, object: u32) -> f32 {
-        self.lights.pdf(object) * (1.0 - self.sky_share())
+        self.lights.pdf(object) * (1.0 - self.sky_fraction())
     }
 
     /// Weight of a light sample: `value` (the BSDF over its albedo, times the cosine) over its density, shared with
     /// BSDF sampling; both densities per solid angle.
     fn drawn_weight(&self, light_pdf: f32, (value, bsdf_pdf): (f32, f32)) -> f32 {
-        let share = match self.sampling {
+        let fraction = match self.sampling {
             LightSampling::Mis => power_heuristic(light_pdf, bsdf_pdf),
             LightSampling::Emitter | LightSampling::Bsdf => 1.0,
         };
-        value / light_pdf * share
+        value / light_pdf * fraction
     }
 
     /// Weight of light met by BSDF sampling against light sampling, given both densities per solid angle.
@@ -446,7 +446,7 @@ impl Tracer<'_> {
         let normal = self.scene.normals[hit.triangle as usize];
         let front = normal.dot(wo) > 0.0;
         Surface {
-            seen: SurveyPoint {
+            seen: SurfacePoint {
                 point: self.scene.point(hit),
                 normal: if front { normal } else { -normal },
                 object: self.scene.object_of[hit.triangle as usize],
@@ -460,7 +460,7 @@ impl Tracer<'_> {
 
 /// A surface point as a path sees it.
 struct Surface {
-    seen: SurveyPoint,
+    seen: SurfacePoint,
     corners: [Vec3; 3],
     /// Index of its unknowns.
     id: u32,

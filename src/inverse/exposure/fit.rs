@@ -1,7 +1,7 @@
 //! Least absolute differences between what photographs show of the same cells.
 
 use super::normal::{Shape, Shapes, levels};
-use super::sights::{Sight, Sights};
+use super::observations::{Observation, Observations};
 use crate::capture::response::{Response, TERMS};
 use crate::math::stats::quantile;
 use glam::{DVec3, Vec3};
@@ -13,7 +13,7 @@ const STANDING: f64 = 1e-3;
 /// Differences of logarithms below this count squared.
 const NEAR: f64 = 0.03;
 /// Cells that a photograph must share with others, for its exposure to be told.
-pub(super) const LEAST_CELLS: usize = 30;
+pub(super) const MIN_CELLS: usize = 30;
 
 /// What of it may differ from one.
 #[derive(Debug, Clone, Copy)]
@@ -45,36 +45,36 @@ impl Logarithms {
     }
 
     /// What its photograph and the lens make of radiance on the way to the sensor.
-    pub fn of(&self, sight: &Sight) -> DVec3 {
-        self.exposures[sight.frame] + self.power * sight.off_axis
+    pub fn of(&self, observation: &Observation) -> DVec3 {
+        self.exposures[observation.frame] + self.power * observation.off_axis
     }
 
-    /// The radiance that a sight shows.
-    pub fn radiance(&self, sight: &Sight) -> DVec3 {
+    /// The radiance that a observation shows.
+    pub fn radiance(&self, observation: &Observation) -> DVec3 {
         let light = match &self.response {
-            None => sight.level,
+            None => observation.level,
             Some(response) => {
-                let value = sight.level - sight.full;
-                sight.full + by_channel(|c| response.log_light(c, value[c])[0])
+                let value = observation.level - observation.full;
+                observation.full + by_channel(|c| response.log_light(c, value[c])[0])
             }
         };
-        light - self.of(sight)
+        light - self.of(observation)
     }
 
-    /// How the radiance that a sight shows grows with its value.
-    pub fn slope(&self, sight: &Sight) -> DVec3 {
+    /// How the radiance that a observation shows grows with its value.
+    pub fn slope(&self, observation: &Observation) -> DVec3 {
         match &self.response {
             None => DVec3::ONE,
             Some(response) => {
-                let value = sight.level - sight.full;
+                let value = observation.level - observation.full;
                 by_channel(|c| response.log_light(c, value[c])[1])
             }
         }
     }
 
-    /// A sight's value over that of a radiance near its own.
-    pub fn residual(&self, sight: &Sight, radiance: DVec3) -> DVec3 {
-        (self.radiance(sight) - radiance) / self.slope(sight)
+    /// A observation's value over that of a radiance near its own.
+    pub fn residual(&self, observation: &Observation, radiance: DVec3) -> DVec3 {
+        (self.radiance(observation) - radiance) / self.slope(observation)
     }
 }
 
@@ -87,20 +87,20 @@ fn by_channel(of: impl Fn(usize) -> f64) -> DVec3 {
 ///
 /// The cells' levels are eliminated and all photographs solved for at once: found in turns, exposures that drift along a walk
 /// through the room, where each photograph shares cells with its neighbours only, would take thousands of them.
-pub(super) fn fit(sights: &[Sight], frames: usize, parts: Parts) -> Logarithms {
+pub(super) fn fit(observations: &[Observation], frames: usize, parts: Parts) -> Logarithms {
     let mut counts = vec![0usize; frames];
-    for sight in sights {
-        counts[sight.frame] += 1;
+    for observation in observations {
+        counts[observation.frame] += 1;
     }
     let mut told: Vec<usize> = (0..frames).collect();
-    told.retain(|&frame| parts.exposures && counts[frame] >= LEAST_CELLS);
+    told.retain(|&frame| parts.exposures && counts[frame] >= MIN_CELLS);
     let shape = Shape::new(told, frames, parts);
     let mut found = Logarithms::zero(frames);
     found.response = parts.response.then_some(Response {
         terms: [Vec3::ZERO; TERMS],
     });
-    let mut weights = vec![DVec3::ONE; sights.len()];
-    let shapes = Shapes::new(sights, parts);
+    let mut weights = vec![DVec3::ONE; observations.len()];
+    let shapes = Shapes::new(observations, parts);
     for _ in 0..REWEIGHTINGS {
         let Some(step) = shapes.solve(&weights, &shape) else {
             break;
@@ -131,10 +131,10 @@ pub(super) fn fit(sights: &[Sight], frames: usize, parts: Parts) -> Logarithms {
             break;
         }
         // Differences count as those of values, which is where the noise is.
-        let left = residuals(sights, &weights, &found);
-        weights = (sights.iter().zip(&left))
-            .map(|(sight, residual)| {
-                let slope = found.slope(sight);
+        let left = residuals(observations, &weights, &found);
+        weights = (observations.iter().zip(&left))
+            .map(|(observation, residual)| {
+                let slope = found.slope(observation);
                 (residual.abs().max(DVec3::splat(NEAR)) * slope * slope).recip()
             })
             .collect();
@@ -144,18 +144,21 @@ pub(super) fn fit(sights: &[Sight], frames: usize, parts: Parts) -> Logarithms {
 
 /// Sets the exposures of photographs that are held out to the median difference from the cells as the others show them, and
 /// gives the differences of each that are left.
-pub(super) fn compare(sights: &Sights, found: &mut Logarithms) -> BTreeMap<usize, Vec<DVec3>> {
-    let levels = cell_levels(&sights.fitted, found);
-    let cells = sights.fitted.iter().map(|s| s.cell);
+pub(super) fn compare(
+    observations: &Observations,
+    found: &mut Logarithms,
+) -> BTreeMap<usize, Vec<DVec3>> {
+    let levels = cell_levels(&observations.fitted, found);
+    let cells = observations.fitted.iter().map(|s| s.cell);
     let level_of: BTreeMap<u64, DVec3> = cells.zip(levels).collect();
     let mut differences: BTreeMap<usize, Vec<DVec3>> = BTreeMap::new();
-    for sight in &sights.held_out {
-        if let Some(level) = level_of.get(&sight.cell) {
-            let of_frame = differences.entry(sight.frame).or_default();
-            of_frame.push(found.radiance(sight) - *level);
+    for observation in &observations.held_out {
+        if let Some(level) = level_of.get(&observation.cell) {
+            let of_frame = differences.entry(observation.frame).or_default();
+            of_frame.push(found.radiance(observation) - *level);
         }
     }
-    differences.retain(|_, of_frame| of_frame.len() >= LEAST_CELLS);
+    differences.retain(|_, of_frame| of_frame.len() >= MIN_CELLS);
     for (&frame, of_frame) in &mut differences {
         let exposure = median(of_frame.iter().copied());
         found.exposures[frame] = exposure;
@@ -164,31 +167,31 @@ pub(super) fn compare(sights: &Sights, found: &mut Logarithms) -> BTreeMap<usize
     differences
 }
 
-/// What is left of each sight after what its photograph does and the weighted mean level of its cell.
-fn residuals(sights: &[Sight], weights: &[DVec3], found: &Logarithms) -> Vec<DVec3> {
-    let levels = levels(sights, weights, found);
-    let both = sights.iter().zip(&levels);
+/// What is left of each observation after what its photograph does and the weighted mean level of its cell.
+fn residuals(observations: &[Observation], weights: &[DVec3], found: &Logarithms) -> Vec<DVec3> {
+    let levels = levels(observations, weights, found);
+    let both = observations.iter().zip(&levels);
     both.map(|(s, level)| found.residual(s, *level)).collect()
 }
 
-/// For each sight, the median level of its cell.
-fn cell_levels(sights: &[Sight], found: &Logarithms) -> Vec<DVec3> {
-    let mut levels = Vec::with_capacity(sights.len());
-    for cell in sights.chunk_by(|a, b| a.cell == b.cell) {
+/// For each observation, the median level of its cell.
+fn cell_levels(observations: &[Observation], found: &Logarithms) -> Vec<DVec3> {
+    let mut levels = Vec::with_capacity(observations.len());
+    for cell in observations.chunk_by(|a, b| a.cell == b.cell) {
         let level = median(cell.iter().map(|s| found.radiance(s)));
         levels.extend(std::iter::repeat_n(level, cell.len()));
     }
     levels
 }
 
-/// For each cell, the absolute differences of logarithms between its sights and their median, summed over sights and channels.
-pub(super) fn disagreements(sights: &[Sight], found: &Logarithms) -> Vec<f64> {
-    let levels = cell_levels(sights, found);
-    let differences: Vec<f64> = (sights.iter().zip(&levels))
+/// For each cell, the absolute differences of logarithms between its observations and their median, summed over observations and channels.
+pub(super) fn disagreements(observations: &[Observation], found: &Logarithms) -> Vec<f64> {
+    let levels = cell_levels(observations, found);
+    let differences: Vec<f64> = (observations.iter().zip(&levels))
         .map(|(s, level)| found.residual(s, *level).abs().element_sum())
         .collect();
     let mut rest = &differences[..];
-    let cells = sights.chunk_by(|a, b| a.cell == b.cell);
+    let cells = observations.chunk_by(|a, b| a.cell == b.cell);
     cells
         .map(|cell| {
             let (own, others) = rest.split_at(cell.len());

@@ -7,10 +7,10 @@
 //! nothing. One common factor stays open; by convention the exposures' median is 1 in each channel, and the lens dims nothing on
 //! its axis. A power of all light stays open too unless the exposures are known: see [`Response`].
 
-mod agreement;
 mod fit;
 mod normal;
-mod sights;
+mod observations;
+mod outlier_frames;
 mod undo;
 
 use crate::capture::exposure::Vignetting;
@@ -18,17 +18,17 @@ use crate::capture::response::Response;
 use crate::inverse::solver::Problem;
 use crate::math::stats::Moments;
 use crate::scene::camera::Camera;
-pub use agreement::Agreement;
 use fit::{Parts, compare, disagreements, fit};
 use glam::{DVec3, Vec3};
-pub use sights::Sights;
-use sights::{Sight, shared};
+pub use observations::Observations;
+use observations::{Observation, shared};
+pub use outlier_frames::OutlierFrames;
 
-/// Share of the disagreement on cells left out of the fit that exposures must explain, next to vignetting and response where
+/// Fraction of the disagreement on cells left out of the fit that exposures must explain, next to vignetting and response where
 /// those are found.
-const LEAST_GAIN: f64 = 0.05;
-/// Share of what they leave that vignetting, and then the response, must explain, and by how many standard errors.
-const LEAST_OF_CAMERA: f64 = 0.01;
+const MIN_GAIN: f64 = 0.05;
+/// Fraction of what they leave that vignetting, and then the response, must explain, and by how many standard errors.
+const MIN_OF_CAMERA: f64 = 0.01;
 const SIGNIFICANT: f64 = 4.0;
 /// Photographs whose focal lengths, in widths of their pictures, differ by more were not taken through one lens.
 const ONE_LENS: f64 = 0.05;
@@ -44,11 +44,11 @@ pub struct Exposures {
     pub vignetting: Option<Vignetting>,
     /// How the values of all photographs follow the light, where that explains enough of what is left then.
     pub response: Option<Response>,
-    /// Share of the disagreement, on surfaces left out of the fit, that exposures explain.
+    /// Fraction of the disagreement, on surfaces left out of the fit, that exposures explain.
     pub gain: f64,
-    /// Share of what exposures leave of it that vignetting explains.
+    /// Fraction of what exposures leave of it that vignetting explains.
     pub vignetting_gain: f64,
-    /// Share of what both leave that the response explains.
+    /// Fraction of what both leave that the response explains.
     pub response_gain: f64,
 }
 
@@ -56,20 +56,20 @@ impl Exposures {
     /// Compares the photographs on the surfaces that they share, held-out pixels left out; `None` where too few are
     /// shared to tell. A photograph that is held out whole is given the exposure at which it fits what the others found, so
     /// that it can test more than that.
-    pub fn new(problem: &Problem, sights: &Sights) -> Option<Self> {
+    pub fn new(problem: &Problem, observations: &Observations) -> Option<Self> {
         let one_lens = one_lens(&problem.scene.cameras);
         let files_bend = (problem.photographs.iter()).all(|p| p.saturation.is_finite());
         let camera = Shared {
             one_lens,
             may_bend: one_lens && files_bend,
         };
-        Self::of(sights, problem.photographs.len(), camera)
+        Self::of(observations, problem.photographs.len(), camera)
     }
 
-    fn of(sights: &Sights, photographs: usize, camera: Shared) -> Option<Self> {
-        let shared = shared(&sights.fitted);
+    fn of(observations: &Observations, photographs: usize, camera: Shared) -> Option<Self> {
+        let shared = shared(&observations.fitted);
         // What is found on one half of the cells is tried on the other.
-        let (fitted, tested): (Vec<Sight>, Vec<Sight>) =
+        let (fitted, tested): (Vec<Observation>, Vec<Observation>) =
             shared.iter().partition(|s| s.cell.is_multiple_of(2));
         if tested.is_empty() {
             return None;
@@ -84,7 +84,7 @@ impl Exposures {
             (disagreements(&tested, &found), found)
         };
         let is_needed = |before: &[f64], after: &[f64]| {
-            explained(before, after) > LEAST_OF_CAMERA && is_significant(before, after)
+            explained(before, after) > MIN_OF_CAMERA && is_significant(before, after)
         };
         let [(exposed, _), (both, found)] =
             [false, true].map(|vignetting| with(true, vignetting, false));
@@ -103,7 +103,7 @@ impl Exposures {
         let mut response_gain = 0.0;
         if camera.may_bend {
             let [bent, both] = [false, true].map(|exposures| with(exposures, dims, true).0);
-            let beside = explained(&bent, &both) > LEAST_GAIN;
+            let beside = explained(&bent, &both) > MIN_GAIN;
             let [before, after] = match beside {
                 true => [&exposed, &both],
                 false => [&alone, &bent],
@@ -114,11 +114,11 @@ impl Exposures {
                 gain = explained(&bent, &both);
             }
         }
-        parts.exposures = gain > LEAST_GAIN;
+        parts.exposures = gain > MIN_GAIN;
 
         let mut found = fit(&shared, photographs, parts);
         if parts.exposures {
-            compare(sights, &mut found);
+            compare(observations, &mut found);
         }
         let factor = |logarithm: &DVec3| logarithm.map(f64::exp).as_vec3();
         Some(Self {
@@ -169,7 +169,7 @@ fn one_lens(cameras: &[Camera]) -> bool {
     most <= least * (1.0 + ONE_LENS)
 }
 
-/// The share of a disagreement that goes where another takes its place.
+/// The fraction of a disagreement that goes where another takes its place.
 fn explained(before: &[f64], after: &[f64]) -> f64 {
     let [before, after] = [before, after].map(|d| d.iter().sum::<f64>());
     if before > 0.0 {
@@ -203,8 +203,8 @@ mod tests {
         may_bend: false,
     };
 
-    fn sight(frame: usize, cell: usize, level: f64) -> Sight {
-        Sight {
+    fn observation(frame: usize, cell: usize, level: f64) -> Observation {
+        Observation {
             frame,
             cell: cell as u64,
             level: DVec3::splat(level),
@@ -214,7 +214,7 @@ mod tests {
     }
 
     /// Cells of random levels seen by random photographs of given exposures, anywhere in them, with some noise and some outliers.
-    fn seen(exposures: &[DVec3], noise: f64) -> Vec<Sight> {
+    fn seen(exposures: &[DVec3], noise: f64) -> Vec<Observation> {
         let mut stream = Stream::new(71, 0, 0, 0);
         (0..400)
             .flat_map(|cell| {
@@ -224,7 +224,7 @@ mod tests {
                     if stream.uniform() < 0.5 {
                         let wrong = if stream.uniform() < 0.1 { 1.5 } else { 0.0 };
                         let error = f64::from(stream.uniform() - 0.5) * noise + wrong;
-                        own.push(Sight {
+                        own.push(Observation {
                             frame,
                             cell,
                             level: level + *exposure + DVec3::splat(error),
@@ -251,10 +251,10 @@ mod tests {
 
     #[test]
     fn a_photograph_that_shares_too_little_keeps_its_exposure() {
-        let mut sights = seen(&[DVec3::splat(0.3), DVec3::splat(-0.3)], 0.0);
-        let cell = sights.last().map_or(0, |s| s.cell as usize);
-        sights.push(sight(2, cell, 9.0));
-        let found = fit(&sights, 3, EXPOSURES).exposures;
+        let mut observations = seen(&[DVec3::splat(0.3), DVec3::splat(-0.3)], 0.0);
+        let cell = observations.last().map_or(0, |s| s.cell as usize);
+        observations.push(observation(2, cell, 9.0));
+        let found = fit(&observations, 3, EXPOSURES).exposures;
         assert_eq!(found[2], DVec3::ZERO);
         assert!((found[0] - found[1] - DVec3::splat(0.6)).length() < 0.01);
     }
@@ -266,16 +266,16 @@ mod tests {
         let frames = 200;
         let truth = |f: usize| (f as f64 / frames as f64 * std::f64::consts::TAU).sin() * 1.5;
         let mut stream = Stream::new(72, 0, 0, 0);
-        let mut sights = Vec::new();
+        let mut observations = Vec::new();
         for cell in 0..40 * (frames - 1) {
             let level = f64::from(stream.uniform());
             for frame in [cell / 40, cell / 40 + 1] {
                 let wrong = if stream.uniform() < 0.05 { 1.0 } else { 0.0 };
                 let error = f64::from(stream.uniform() - 0.5) * 0.05 + wrong;
-                sights.push(sight(frame, cell, level + truth(frame) + error));
+                observations.push(observation(frame, cell, level + truth(frame) + error));
             }
         }
-        let found = fit(&sights, frames, EXPOSURES).exposures;
+        let found = fit(&observations, frames, EXPOSURES).exposures;
         for (frame, found) in found.iter().enumerate() {
             assert!((found.x - truth(frame)).abs() < 0.1, "{frame}: {found}");
         }
@@ -286,17 +286,18 @@ mod tests {
     #[test]
     fn a_photograph_held_out_is_compared_with_the_others_and_they_are_not_with_it() {
         let exposures = [0.4, -0.4, 1.3].map(DVec3::splat);
-        let (mut held_out, mut fitted): (Vec<Sight>, Vec<Sight>) = seen(&exposures, 0.1)
-            .into_iter()
-            .partition(|s| s.frame == 2);
+        let (mut held_out, mut fitted): (Vec<Observation>, Vec<Observation>) =
+            seen(&exposures, 0.1)
+                .into_iter()
+                .partition(|s| s.frame == 2);
         for cell in 1000..1040 {
             let [own, others] =
-                [(3, 1.0), (2, 2.3)].map(|(frame, level)| sight(frame, cell, level));
+                [(3, 1.0), (2, 2.3)].map(|(frame, level)| observation(frame, cell, level));
             fitted.push(own);
             held_out.push(others);
         }
-        let with = Sights { fitted, held_out };
-        let without = Sights {
+        let with = Observations { fitted, held_out };
+        let without = Observations {
             fitted: (with.fitted.iter())
                 .filter(|s| s.frame < 2)
                 .copied()
@@ -315,28 +316,28 @@ mod tests {
         assert_eq!(without.factors[2], Vec3::ONE);
     }
 
-    /// The sights of a lens that dims, those of the last photograph kept out of the fit.
-    fn dimmed(exposures: &[DVec3], power: DVec3) -> Sights {
+    /// The observations of a lens that dims, those of the last photograph kept out of the fit.
+    fn dimmed(exposures: &[DVec3], power: DVec3) -> Observations {
         let mut all = seen(exposures, 0.1);
-        for sight in &mut all {
-            sight.level += power * sight.off_axis;
+        for observation in &mut all {
+            observation.level += power * observation.off_axis;
         }
         let (held_out, fitted) =
-            (all.into_iter()).partition(|sight| sight.frame == exposures.len() - 1);
-        Sights { fitted, held_out }
+            (all.into_iter()).partition(|observation| observation.frame == exposures.len() - 1);
+        Observations { fitted, held_out }
     }
 
     #[test]
     fn a_lens_that_dims_its_corners_is_told_from_exposures() {
         let exposures = [0.5, 0.0, -0.4, 0.9].map(DVec3::splat);
         let power = DVec3::new(1.0, 2.0, 4.0);
-        let sights = dimmed(&exposures, power);
-        let found = Exposures::of(&sights, 4, LENS).expect("cells are shared");
+        let observations = dimmed(&exposures, power);
+        let found = Exposures::of(&observations, 4, LENS).expect("cells are shared");
         assert!(found.differ);
         let vignetting = found.vignetting.expect("a lens that dims");
         let off = vignetting.power.as_dvec3() - power;
         assert!(off.abs().max_element() < 0.1, "{off}");
-        // The one held out too, whose sights are dimmed alike.
+        // The one held out too, whose observations are dimmed alike.
         for (found, truth) in found.factors.iter().zip(&exposures) {
             let off = found.as_dvec3().map(f64::ln) - *truth;
             assert!(off.abs().max_element() < 0.03, "{off}");
@@ -345,22 +346,22 @@ mod tests {
             one_lens: false,
             may_bend: false,
         };
-        let other_lenses = Exposures::of(&sights, 4, DIFFERENT).expect("cells are shared");
+        let other_lenses = Exposures::of(&observations, 4, DIFFERENT).expect("cells are shared");
         assert_eq!(other_lenses.vignetting, None);
     }
 
     #[test]
     fn a_lens_that_dims_needs_no_exposures() {
-        let sights = dimmed(&[DVec3::ZERO; 4], DVec3::splat(4.0));
-        let found = Exposures::of(&sights, 4, LENS).expect("cells are shared");
+        let observations = dimmed(&[DVec3::ZERO; 4], DVec3::splat(4.0));
+        let found = Exposures::of(&observations, 4, LENS).expect("cells are shared");
         assert!(found.vignetting.is_some() && !found.differ && found.needed());
         assert_eq!(found.factors, [Vec3::ONE; 4]);
     }
 
     #[test]
     fn a_lens_that_brightens_its_corners_is_not_believed() {
-        let sights = dimmed(&[DVec3::ZERO; 4], DVec3::splat(-2.0));
-        let found = Exposures::of(&sights, 4, LENS).expect("cells are shared");
+        let observations = dimmed(&[DVec3::ZERO; 4], DVec3::splat(-2.0));
+        let found = Exposures::of(&observations, 4, LENS).expect("cells are shared");
         assert_eq!(found.vignetting, None);
     }
 
@@ -380,17 +381,22 @@ mod tests {
         }
     }
 
-    /// What the sights show through a response, of photographs that were divided by the exposures known of them.
-    fn bent(mut sights: Vec<Sight>, response: &Response, known: impl Fn(usize) -> f64) -> Sights {
-        for sight in &mut sights {
-            sight.full = DVec3::splat(3.4 - known(sight.frame));
-            let light = sight.level - sight.full;
+    /// What the observations show through a response, of photographs that were divided by the exposures known of them.
+    fn bent(
+        mut observations: Vec<Observation>,
+        response: &Response,
+        known: impl Fn(usize) -> f64,
+    ) -> Observations {
+        for observation in &mut observations {
+            observation.full = DVec3::splat(3.4 - known(observation.frame));
+            let light = observation.level - observation.full;
             let value = std::array::from_fn(|c| response.log_value(c, light[c]));
-            sight.level = DVec3::from_array(value) + sight.full;
+            observation.level = DVec3::from_array(value) + observation.full;
         }
-        sights.retain(|sight| (sight.level - sight.full).max_element() < -0.03);
-        Sights {
-            fitted: sights,
+        observations
+            .retain(|observation| (observation.level - observation.full).max_element() < -0.03);
+        Observations {
+            fitted: observations,
             held_out: Vec::new(),
         }
     }
@@ -415,8 +421,8 @@ mod tests {
     fn a_camera_that_bends_values_is_found_up_to_a_power() {
         let exposures = [0.7, 0.2, 0.0, -0.5, -0.9, 0.4].map(DVec3::splat);
         let truth = contrasty();
-        let sights = bent(seen(&exposures, 0.1), &truth, |_| 0.0);
-        let found = Exposures::of(&sights, 6, CAMERA).expect("cells are shared");
+        let observations = bent(seen(&exposures, 0.1), &truth, |_| 0.0);
+        let found = Exposures::of(&observations, 6, CAMERA).expect("cells are shared");
         assert!(found.differ && found.vignetting.is_none());
         let response = found.response.expect("a response");
         for channel in 0..3 {
@@ -442,8 +448,8 @@ mod tests {
         let truth = Response {
             terms: [Vec3::new(-0.25, -0.2, 0.2), Vec3::ZERO, Vec3::ZERO],
         };
-        let sights = bent(seen(&[DVec3::ZERO; 4], 0.1), &truth, known);
-        let found = Exposures::of(&sights, 4, CAMERA).expect("cells are shared");
+        let observations = bent(seen(&[DVec3::ZERO; 4], 0.1), &truth, known);
+        let found = Exposures::of(&observations, 4, CAMERA).expect("cells are shared");
         assert!(!found.differ && found.needed(), "{}", found.gain);
         let response = found.response.expect("a response");
         for channel in 0..3 {
@@ -458,24 +464,24 @@ mod tests {
         let straight = Response {
             terms: [Vec3::ZERO; 3],
         };
-        let sights = bent(seen(&exposures, 0.2), &straight, |_| 0.0);
-        let found = Exposures::of(&sights, 4, CAMERA).expect("cells are shared");
+        let observations = bent(seen(&exposures, 0.2), &straight, |_| 0.0);
+        let found = Exposures::of(&observations, 4, CAMERA).expect("cells are shared");
         assert!(found.differ && found.response.is_none());
         // Nor one whose files are linear, or where no two photographs were taken with one camera.
-        let sights = bent(seen(&exposures, 0.1), &contrasty(), |_| 0.0);
-        let found = Exposures::of(&sights, 4, LENS).expect("cells are shared");
+        let observations = bent(seen(&exposures, 0.1), &contrasty(), |_| 0.0);
+        let found = Exposures::of(&observations, 4, LENS).expect("cells are shared");
         assert_eq!(found.response, None);
     }
 
     #[test]
     fn equal_exposures_explain_nothing() {
-        let sights = Sights {
+        let observations = Observations {
             fitted: seen(&[DVec3::ZERO; 5], 0.2),
             held_out: Vec::new(),
         };
-        let found = Exposures::of(&sights, 5, LENS).expect("cells are shared");
+        let found = Exposures::of(&observations, 5, LENS).expect("cells are shared");
         assert!(found.gain.abs() < 0.02, "{}", found.gain);
         assert!(!found.needed());
-        assert_eq!(Exposures::of(&Sights::default(), 5, LENS), None);
+        assert_eq!(Exposures::of(&Observations::default(), 5, LENS), None);
     }
 }

@@ -1,7 +1,7 @@
 //! The normal equations of what photographs do to the surfaces that they share.
 
 use super::fit::{Logarithms, Parts};
-use super::sights::Sight;
+use super::observations::Observation;
 use crate::capture::response::{Response, TERMS};
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 /// Relative weight that keeps what is open near zero.
 const OPEN: f64 = 1e-9;
-/// Halvings of the interval in which the greatest possible share of a response lies.
+/// Halvings of the interval in which the greatest possible fraction of a response lies.
 const HALVINGS: usize = 12;
 
 /// Where the unknowns stand: the row of each photograph that has one, then vignetting's power, then the response's terms.
@@ -47,26 +47,26 @@ impl Shape {
     }
 }
 
-/// What a camera's response may do to each sight.
+/// What a camera's response may do to each observation.
 pub(super) struct Shapes<'a> {
-    sights: &'a [Sight],
-    /// The response's shapes at the value of each sight; empty where there is no response.
-    of_sights: Vec<[DVec3; TERMS]>,
+    observations: &'a [Observation],
+    /// The response's shapes at the value of each observation; empty where there is no response.
+    of_observations: Vec<[DVec3; TERMS]>,
     /// How much of each of them a power would explain.
     powers: [DVec3; TERMS],
 }
 
 impl<'a> Shapes<'a> {
-    /// Those of the sights.
-    pub fn new(sights: &'a [Sight], parts: Parts) -> Self {
-        let of_sights: Vec<[DVec3; TERMS]> = match parts.response {
-            true => sights.par_iter().map(shapes).collect(),
+    /// Those of the observations.
+    pub fn new(observations: &'a [Observation], parts: Parts) -> Self {
+        let of_observations: Vec<[DVec3; TERMS]> = match parts.response {
+            true => observations.par_iter().map(shapes).collect(),
             false => Vec::new(),
         };
         Self {
-            sights,
-            powers: powers(&of_sights),
-            of_sights,
+            observations,
+            powers: powers(&of_observations),
+            of_observations,
         }
     }
 
@@ -100,20 +100,20 @@ impl<'a> Shapes<'a> {
         })
     }
 
-    /// How what stands for a sight's value grows with each unknown.
+    /// How what stands for a observation's value grows with each unknown.
     fn columns(
         &self,
         shape: &Shape,
         index: usize,
         channel: usize,
     ) -> impl Iterator<Item = (usize, f64)> + use<> {
-        let sight = &self.sights[index];
+        let observation = &self.observations[index];
         let power = shape.told.len();
         let first = power + usize::from(shape.vignetting);
         let skipped = usize::from(shape.response == Some(false));
         let powers = self.powers.map(|of_channel| of_channel[channel]);
         let bends = shape.response.map(|_| {
-            let shapes = self.of_sights[index].map(|of_channel| of_channel[channel]);
+            let shapes = self.of_observations[index].map(|of_channel| of_channel[channel]);
             (skipped..TERMS).map(move |term| {
                 let without = if skipped > 0 {
                     powers[term] * shapes[0]
@@ -123,8 +123,8 @@ impl<'a> Shapes<'a> {
                 (first + term - skipped, without - shapes[term])
             })
         });
-        let exposure = shape.place[sight.frame].map(|row| (row, 1.0));
-        let dimmed = shape.vignetting.then_some((power, sight.off_axis));
+        let exposure = shape.place[observation.frame].map(|row| (row, 1.0));
+        let dimmed = shape.vignetting.then_some((power, observation.off_axis));
         (exposure.into_iter())
             .chain(dimmed)
             .chain(bends.into_iter().flatten())
@@ -137,11 +137,11 @@ impl<'a> Shapes<'a> {
         let mut right = DVector::zeros(rows);
         let mut with_level: Vec<(usize, f64)> = Vec::new();
         let mut first = 0;
-        for cell in self.sights.chunk_by(|a, b| a.cell == b.cell) {
+        for cell in self.observations.chunk_by(|a, b| a.cell == b.cell) {
             with_level.clear();
             let (mut total, mut level) = (0.0, 0.0);
-            for (index, sight) in (first..).zip(cell) {
-                let (weight, target) = (weights[index][channel], sight.level[channel]);
+            for (index, observation) in (first..).zip(cell) {
+                let (weight, target) = (weights[index][channel], observation.level[channel]);
                 total += weight;
                 level += weight * target;
                 for (row, grown) in self.columns(shape, index, channel) {
@@ -186,10 +186,14 @@ struct Normal {
     right: DVector<f64>,
 }
 
-/// For each sight the weighted mean of the radiance that its cell's sights show.
-pub(super) fn levels(sights: &[Sight], weights: &[DVec3], found: &Logarithms) -> Vec<DVec3> {
-    let mut levels = Vec::with_capacity(sights.len());
-    for cell in sights.chunk_by(|a, b| a.cell == b.cell) {
+/// For each observation the weighted mean of the radiance that its cell's observations show.
+pub(super) fn levels(
+    observations: &[Observation],
+    weights: &[DVec3],
+    found: &Logarithms,
+) -> Vec<DVec3> {
+    let mut levels = Vec::with_capacity(observations.len());
+    for cell in observations.chunk_by(|a, b| a.cell == b.cell) {
         let own = cell.iter().zip(&weights[levels.len()..]);
         let (sum, total) = own.fold((DVec3::ZERO, DVec3::ZERO), |(sum, total), (s, w)| {
             (sum + *w * found.radiance(s), total + *w)
@@ -199,15 +203,17 @@ pub(super) fn levels(sights: &[Sight], weights: &[DVec3], found: &Logarithms) ->
     levels
 }
 
-fn shapes(sight: &Sight) -> [DVec3; TERMS] {
-    let of_channels = (sight.level - sight.full).to_array().map(Response::shapes);
+fn shapes(observation: &Observation) -> [DVec3; TERMS] {
+    let of_channels = (observation.level - observation.full)
+        .to_array()
+        .map(Response::shapes);
     std::array::from_fn(|term| DVec3::from_array(of_channels.map(|shape| shape[term][0])))
 }
 
-/// The slope of each shape over the logarithm of the value, over all sights.
-fn powers(of_sights: &[[DVec3; TERMS]]) -> [DVec3; TERMS] {
+/// The slope of each shape over the logarithm of the value, over all observations.
+fn powers(of_observations: &[[DVec3; TERMS]]) -> [DVec3; TERMS] {
     let mean = |of: &dyn Fn(&[DVec3; TERMS]) -> DVec3| {
-        of_sights.iter().map(of).sum::<DVec3>() / of_sights.len().max(1) as f64
+        of_observations.iter().map(of).sum::<DVec3>() / of_observations.len().max(1) as f64
     };
     let value = mean(&|shapes| shapes[0]);
     let variance = mean(&|shapes| (shapes[0] - value) * (shapes[0] - value));
@@ -220,10 +226,10 @@ fn powers(of_sights: &[[DVec3; TERMS]]) -> [DVec3; TERMS] {
 impl Unknowns {
     /// The response of the terms, as far towards it as one is possible.
     pub fn response(&self) -> Response {
-        let share = |share: f64| Response {
-            terms: self.terms.map(|term| (term * share).as_vec3()),
+        let fraction = |fraction: f64| Response {
+            terms: self.terms.map(|term| (term * fraction).as_vec3()),
         };
-        let whole = share(1.0);
+        let whole = fraction(1.0);
         if whole.is_possible() {
             return whole;
         }
@@ -231,12 +237,12 @@ impl Unknowns {
         let [mut least, mut most] = [0.0, 1.0];
         for _ in 0..HALVINGS {
             let middle = 0.5 * (least + most);
-            if share(middle).is_possible() {
+            if fraction(middle).is_possible() {
                 least = middle;
             } else {
                 most = middle;
             }
         }
-        share(least)
+        fraction(least)
     }
 }

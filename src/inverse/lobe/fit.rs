@@ -1,15 +1,15 @@
-//! Least squares over an object's sights: as a diffuse surface, or with a lobe of given roughness.
+//! Least squares over an object's observations: as a diffuse surface, or with a lobe of given roughness.
 //!
-//! With u = albedo (1 − specular), a sight under a lobe shows u·base + specular·(lobe − grazing) + grazing, linear in u
+//! With u = albedo (1 − specular), a observation under a lobe shows u·base + specular·(lobe − grazing) + grazing, linear in u
 //! and specular (variable projection, Golub and Pereyra 1973: roughness is searched outside). Products are taken across
-//! two independent sets of paths, so that their noise biases nothing. What all sights of a spot share may be texture:
+//! two independent sets of paths, so that their noise biases nothing. What all observations of a spot share may be texture:
 //! it counts less the more spots differ (generalised least squares of random effects, Fuller and Battese 1973).
 
 use super::gather::Parts;
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 
-/// What one sight shows, and what it would show of each part in two independent sets; all relative to its spot's level.
+/// What one observation shows, and what it would show of each part in two independent sets; all relative to its spot's level.
 #[derive(Debug, Clone, Copy)]
 pub struct Row {
     /// Index of its spot; rows of a spot lie side by side.
@@ -39,7 +39,7 @@ pub enum Model {
 /// Variances of what a model leaves, of one pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Variances {
-    /// Between sights of a spot.
+    /// Between observations of a spot.
     pub within: f64,
     /// Between spots, beyond that.
     pub between: f64,
@@ -150,7 +150,7 @@ impl Model {
             }
             let bound = |i: usize| match self {
                 Self::Diffuse { .. } if i >= 3 => f64::INFINITY,
-                Self::Lobe if i == 3 => MOST_SPECULAR,
+                Self::Lobe if i == 3 => MAX_SPECULAR,
                 _ => 1.0,
             };
             let mut left = false;
@@ -200,7 +200,7 @@ impl Model {
         } else {
             0.0
         };
-        let within = within.max(LEAST_VARIANCE);
+        let within = within.max(MIN_VARIANCE);
         Variances {
             within,
             between: ((total - within * inverse) / count).max(0.0),
@@ -209,19 +209,19 @@ impl Model {
 }
 
 /// Specular reflectance at most.
-const MOST_SPECULAR: f64 = 0.98;
+const MAX_SPECULAR: f64 = 0.98;
 /// Photographs and meshes are no better than this, squared and relative.
-const LEAST_VARIANCE: f64 = 1e-6;
+const MIN_VARIANCE: f64 = 1e-6;
 
-/// The rows with a share of each spot's mean taken off, so that what is left of them scatters alike and independently: all of it
+/// The rows with a fraction of each spot's mean taken off, so that what is left of them scatters alike and independently: all of it
 /// where spots have any albedo each.
-pub fn freed(rows: &[Row], share: impl Fn(f64) -> f64) -> Vec<Row> {
+pub fn freed(rows: &[Row], fraction: impl Fn(f64) -> f64) -> Vec<Row> {
     let mut all = Vec::with_capacity(rows.len());
     for spot in rows.chunk_by(|a, b| a.spot == b.spot) {
         let weight: f64 = spot.iter().map(|r| r.weight).sum();
-        let share = share(weight);
+        let fraction = fraction(weight);
         let mean = |of: &dyn Fn(&Row) -> DVec3| {
-            spot.iter().map(|r| of(r) * r.weight).sum::<DVec3>() * (share / weight)
+            spot.iter().map(|r| of(r) * r.weight).sum::<DVec3>() * (fraction / weight)
         };
         let (shown, one) = (mean(&|r| r.shown), mean(&|r| r.one));
         let parts = [0, 1].map(|set| {
@@ -229,7 +229,7 @@ pub fn freed(rows: &[Row], share: impl Fn(f64) -> f64) -> Vec<Row> {
             for row in spot {
                 sum += row.sets[set] * row.weight;
             }
-            sum * (share / weight)
+            sum * (fraction / weight)
         });
         all.extend(spot.iter().map(|row| Row {
             shown: row.shown - shown,
@@ -255,7 +255,7 @@ mod tests {
     use super::*;
     use crate::math::rng::Stream;
 
-    /// Two sights of each of 200 spots, each of its own colour, with noise in the photographs and in both sets.
+    /// Two observations of each of 200 spots, each of its own colour, with noise in the photographs and in both sets.
     fn rows(albedo: f64, specular: f64, texture: f64) -> Vec<Row> {
         let mut stream = Stream::new(17, 0, 0, 0);
         let mut uniform = || f64::from(stream.uniform());

@@ -1,6 +1,6 @@
 //! The light that arrives at what pixels see, kept by direction: any lobe's share in it follows with no ray.
 
-use super::sights::Sight;
+use super::observations::SpotObservation;
 use crate::math::frame::Frame;
 use crate::math::rng::Stream;
 use crate::math::warp;
@@ -35,14 +35,14 @@ pub struct Gathering<'a> {
     pub pass: u64,
 }
 
-/// Light that arrives at random points of a sight: one independent set of paths.
+/// Light that arrives at random points of a observation: one independent set of paths.
 #[derive(Debug, Clone, Default)]
 pub struct Gathered {
     arrivals: Vec<(glam::Vec3, Arrival)>,
     points: u32,
 }
 
-/// What a sight shows per unit of each part of a material, per channel.
+/// What a observation shows per unit of each part of a material, per channel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Parts {
     /// A diffuse surface of unit albedo.
@@ -101,13 +101,17 @@ impl Div<DVec3> for Parts {
 }
 
 impl Gathering<'_> {
-    /// Gathers the light that arrives at one sight, in two independent sets.
-    pub fn sight(&self, camera: &Camera, sight: &Sight) -> ([Gathered; 2], Cast) {
+    /// Gathers the light that arrives at one observation, in two independent sets.
+    pub fn observation(
+        &self,
+        camera: &Camera,
+        observation: &SpotObservation,
+    ) -> ([Gathered; 2], Cast) {
         let mut cast = Cast::default();
         let sets = [0, 1].map(|set| {
             let mut gathered = Gathered::default();
             for point in 0..self.points {
-                cast += self.point(camera, sight, set, point, &mut gathered);
+                cast += self.point(camera, observation, set, point, &mut gathered);
             }
             gathered
         });
@@ -117,22 +121,22 @@ impl Gathering<'_> {
     fn point(
         &self,
         camera: &Camera,
-        sight: &Sight,
+        observation: &SpotObservation,
         set: u64,
         point: u32,
         gathered: &mut Gathered,
     ) -> Cast {
         // Points spread over the pixels.
         let index = KEY + (self.pass << 40) + 2 * u64::from(point) + set;
-        let first = u64::from(sight.pixels[0]);
-        let mut stream = Stream::new(self.seed, u64::from(sight.frame), first, index);
-        let count = sight.pixels.len() as u32;
+        let first = u64::from(observation.pixels[0]);
+        let mut stream = Stream::new(self.seed, u64::from(observation.frame), first, index);
+        let count = observation.pixels.len() as u32;
         let place = if self.points < count {
             point * count / self.points + stream.below(1 + (count / self.points) as usize) as u32
         } else {
             point
         };
-        let pixel = sight.pixels[(place % count) as usize];
+        let pixel = observation.pixels[(place % count) as usize];
         let width = camera.intrinsics.width;
         let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
         let ray = camera.ray(corner + Vec2::from_array(stream.uniform2()));
@@ -179,7 +183,7 @@ impl Gathering<'_> {
 }
 
 impl Gathered {
-    /// What the sight would show of each part, for a lobe of GGX roughness α; zero where no point was seen.
+    /// What the observation would show of each part, for a lobe of GGX roughness α; zero where no point was seen.
     pub fn parts(&self, alpha: f64) -> Parts {
         let mut sum = Parts::default();
         for (wo, arrival) in &self.arrivals {

@@ -7,20 +7,20 @@
 
 mod fit;
 mod gather;
+mod observations;
 mod screen;
-mod sights;
 mod trial;
 
 use crate::inverse::estimate::Estimate;
+use crate::inverse::gbuffer::GBuffer;
 use crate::inverse::solver::{Problem, Termination};
-use crate::inverse::survey::Survey;
 use crate::transport::arrival::Cast;
 use crate::transport::lit::Lit;
 use crate::transport::material::Lobe;
 use crate::transport::path::PathOptions;
 use gather::Gathering;
 use glam::{DVec3, Vec3};
-use sights::Spot;
+use observations::Spot;
 pub use trial::Gain;
 use trial::{Evidence, find};
 
@@ -28,15 +28,15 @@ use trial::{Evidence, find};
 const CALLING: f64 = 5.0;
 /// A gain of so many standard errors is no accident.
 const SIGNIFICANT: f64 = 4.0;
-/// Points of a sight in screening, in each of two sets.
+/// Points of a observation in screening, in each of two sets.
 const SCREENED_POINTS: u32 = 2;
 /// Bounces up to which light is followed in screening.
 const SCREENED_BOUNCES: u32 = 2;
-/// Sights of an object in the fit, at most.
-const MOST_SIGHTS: usize = 1200;
+/// Observations of an object in the fit, at most.
+const MAX_SIGHTS: usize = 1200;
 /// Directions at a point in a first fit are drawn by these roughnesses.
 const FIRST_DRAWN: [f64; 2] = [0.08, 0.3];
-/// Points of a sight in each of two sets, at least and at most: in the first fit, in the second, and where a lobe is found anew.
+/// Points of a observation in each of two sets, at least and at most: in the first fit, in the second, and where a lobe is found anew.
 const FIRST_POINTS: (u64, u64) = (8, 48);
 const SECOND_POINTS: (u64, u64) = (12, 96);
 const POINTS_ANEW: (u64, u64) = (12, 384);
@@ -114,9 +114,9 @@ pub struct Lobes<'a> {
 
 impl<'a> Lobes<'a> {
     /// Gathers the spots that pixels see.
-    pub fn new(task: Task<'a>, survey: &Survey) -> Self {
+    pub fn new(task: Task<'a>, gbuffer: &GBuffer) -> Self {
         Self {
-            spots: sights::spots(task.problem, survey),
+            spots: observations::spots(task.problem, gbuffer),
             task,
         }
     }
@@ -163,12 +163,12 @@ impl<'a> Lobes<'a> {
         Ok(all)
     }
 
-    /// Points of each of an object's sights that its paths suffice for, where directions are drawn in so many ways besides
+    /// Points of each of an object's observations that its paths suffice for, where directions are drawn in so many ways besides
     /// evenly.
     fn points(&self, object: usize, ways: usize, (least, most): (u64, u64)) -> u32 {
-        let chosen = sights::choose(&self.spots[object], 1, MOST_SIGHTS);
-        let sights: usize = chosen.iter().map(|spot| spot.len()).sum();
-        let points = self.task.paths / (2 * (1 + ways) * sights.max(1)) as u64;
+        let chosen = observations::choose(&self.spots[object], 1, MAX_SIGHTS);
+        let observations: usize = chosen.iter().map(|spot| spot.len()).sum();
+        let points = self.task.paths / (2 * (1 + ways) * observations.max(1)) as u64;
         points.clamp(least, most) as u32
     }
 
@@ -198,7 +198,7 @@ impl<'a> Lobes<'a> {
                 let mut gathering = self.gathering(lit, object, &FIRST_DRAWN);
                 gathering.points = self.points(object, FIRST_DRAWN.len(), FIRST_POINTS);
                 gathering.pass = 1;
-                let (evidence, cast) = Evidence::new(&gathering, scene, spots, MOST_SIGHTS);
+                let (evidence, cast) = Evidence::new(&gathering, scene, spots, MAX_SIGHTS);
                 tell(cast)?;
                 match find(&evidence, emits, [0.0, 1.0]) {
                     Some(first) => (first.roughness, 2, SECOND_POINTS),
@@ -210,7 +210,7 @@ impl<'a> Lobes<'a> {
         let mut gathering = self.gathering(lit, object, &drawn);
         gathering.points = self.points(object, drawn.len(), points);
         gathering.pass = pass;
-        let (evidence, cast) = Evidence::new(&gathering, scene, spots, MOST_SIGHTS);
+        let (evidence, cast) = Evidence::new(&gathering, scene, spots, MAX_SIGHTS);
         tell(cast)?;
         let near = [roughness / NEAR, roughness * NEAR];
         Ok(find(&evidence, emits, near))

@@ -1,27 +1,27 @@
 //! Which objects are worth a trial: those that look different from different sides, and as a lobe would make them.
 
 use super::gather::{Gathered, Gathering, Parts};
-use super::sights::{Sight, Spot, choose};
+use super::observations::{Spot, SpotObservation, choose};
 use crate::math::stats::quantile;
 use crate::scene::Scene;
 use crate::transport::arrival::Cast;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Sights that are looked at.
-const MOST_SIGHTS: usize = 600;
-/// Sights that an object needs.
-const LEAST_SIGHTS: usize = 12;
+/// Observations that are looked at.
+const MAX_SIGHTS: usize = 600;
+/// Observations that an object needs.
+const MIN_SIGHTS: usize = 12;
 /// GGX roughnesses that are looked for, and the specular reflectance.
 const ROUGHNESSES: [f64; 3] = [0.1, 0.25, 0.6];
 const SPECULAR: f64 = 0.1;
-/// One sight's expected difference counts up to so many times what two of three stay below.
+/// One observation's expected difference counts up to so many times what two of three stay below.
 const CLIP: f64 = 5.0;
 
 /// Directions at a point in screening are drawn by these roughnesses.
 pub const DRAWN: [f64; 2] = [0.15, 0.5];
 
-/// What a lobe would change in a sight, what a diffuse surface shows of its light, and what the photograph shows.
+/// What a lobe would change in a observation, what a diffuse surface shows of its light, and what the photograph shows.
 struct Difference {
     weight: f64,
     expected: DVec3,
@@ -39,20 +39,20 @@ pub fn evidence(
     spots: &[Spot],
     albedo: DVec3,
 ) -> (Option<f64>, Cast) {
-    let chosen = choose(spots, 2, MOST_SIGHTS);
-    let sights: usize = chosen.iter().map(|s| s.len()).sum();
-    if sights < LEAST_SIGHTS {
+    let chosen = choose(spots, 2, MAX_SIGHTS);
+    let observations: usize = chosen.iter().map(|s| s.len()).sum();
+    if observations < MIN_SIGHTS {
         return (None, Cast::default());
     }
-    let gathered: Vec<(Vec<(&Sight, Gathered)>, Cast)> = (chosen.par_iter())
+    let gathered: Vec<(Vec<(&SpotObservation, Gathered)>, Cast)> = (chosen.par_iter())
         .map(|spot| {
             let mut cast = Cast::default();
             let own = (spot.iter().filter(|s| !s.held_out))
-                .map(|sight| {
-                    let camera = &scene.cameras[sight.frame as usize];
-                    let (sets, more) = gathering.sight(camera, sight);
+                .map(|observation| {
+                    let camera = &scene.cameras[observation.frame as usize];
+                    let (sets, more) = gathering.observation(camera, observation);
                     cast += more;
-                    (sight, Gathered::joined(sets))
+                    (observation, Gathered::joined(sets))
                 })
                 .filter(|(_, light)| !light.is_empty())
                 .collect();
@@ -62,8 +62,9 @@ pub fn evidence(
     let cast = gathered.iter().map(|(_, cast)| *cast).sum();
     let strongest = (ROUGHNESSES.iter())
         .filter_map(|&alpha| {
-            let of_spot =
-                |(own, _): &(Vec<(&Sight, Gathered)>, Cast)| differences(own, alpha, albedo);
+            let of_spot = |(own, _): &(Vec<(&SpotObservation, Gathered)>, Cast)| {
+                differences(own, alpha, albedo)
+            };
             let all: Vec<Vec<Difference>> = gathered.par_iter().map(of_spot).collect();
             strength(
                 &all.into_iter().flatten().collect::<Vec<_>>(),
@@ -76,16 +77,16 @@ pub fn evidence(
     (strongest, cast)
 }
 
-/// Of each sight of a spot: what sets it apart from the spot's mean, relative to the spot's level.
-fn differences(own: &[(&Sight, Gathered)], alpha: f64, albedo: DVec3) -> Vec<Difference> {
+/// Of each observation of a spot: what sets it apart from the spot's mean, relative to the spot's level.
+fn differences(own: &[(&SpotObservation, Gathered)], alpha: f64, albedo: DVec3) -> Vec<Difference> {
     let mut all: Vec<Difference> = (own.iter())
-        .map(|(sight, light)| {
+        .map(|(observation, light)| {
             let parts = light.parts(alpha);
             Difference {
-                weight: sight.pixels.len() as f64,
+                weight: observation.pixels.len() as f64,
                 expected: lobed(&parts, albedo) - albedo * parts.diffuse,
                 diffuse: parts.diffuse,
-                shown: sight.measured,
+                shown: observation.measured,
             }
         })
         .collect();
@@ -142,7 +143,7 @@ fn strength(all: &[Difference], spots: usize) -> Option<f64> {
         (xx, xy)
     };
     let explained = if dd > 0.0 { dy * dy / dd } else { 0.0 };
-    // The channels of a sight hardly differ: they count once.
+    // The channels of a observation hardly differ: they count once.
     let freedom = all.len().checked_sub(spots + 2).filter(|&n| n > 0)? as f64;
     let slope = score / own;
     let noise = (yy - explained - slope * score).max(0.0) / freedom;

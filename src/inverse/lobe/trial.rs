@@ -2,7 +2,7 @@
 
 use super::fit::{Model, Row, Variances, freed};
 use super::gather::{Gathered, Gathering, Parts};
-use super::sights::{Sight, Spot, choose};
+use super::observations::{Spot, SpotObservation, choose};
 use crate::inverse::lobe::Found;
 use crate::math::stats::{Moments, quantile};
 use crate::scene::Scene;
@@ -13,14 +13,14 @@ use rayon::prelude::*;
 
 /// Roughnesses that are tried, evenly spaced in their logarithm, and the least of them.
 const TRIED: usize = 15;
-const LEAST_ROUGHNESS: f64 = 0.03;
+const MIN_ROUGHNESS: f64 = 0.03;
 /// Standard deviations of an error that count as part of it.
 const SURE: f64 = 2.0;
 /// Halvings of the step between roughnesses tried.
 const HALVINGS: u32 = 5;
 /// Parts that spots are cut into, each tried on a fit to the others.
 const FOLDS: usize = 4;
-/// Below this share of the median level errors weigh no more.
+/// Below this fraction of the median level errors weigh no more.
 const DARK: f64 = 0.5;
 /// One spot's gain counts up to so many times what two of three stay below.
 const CLIP: f64 = 5.0;
@@ -36,51 +36,60 @@ pub struct Gain {
     pub noise: f64,
 }
 
-/// Light gathered at an object's sights.
+/// Light gathered at an object's observations.
 pub struct Evidence<'a> {
-    /// Sights with the index of their spot, and the light of each.
-    sights: Vec<(usize, &'a Sight, [Gathered; 2])>,
-    /// Level of each sight's spot.
+    /// Observations with the index of their spot, and the light of each.
+    observations: Vec<(usize, &'a SpotObservation, [Gathered; 2])>,
+    /// Level of each observation's spot.
     levels: Vec<DVec3>,
 }
 
 impl<'a> Evidence<'a> {
-    /// Gathers light at up to about `most` sights in the fit, and those held out of the same spots.
+    /// Gathers light at up to about `most` observations in the fit, and those held out of the same spots.
     pub fn new(
         gathering: &Gathering,
         scene: &Scene,
         spots: &'a [Spot],
         most: usize,
     ) -> (Self, Cast) {
-        let chosen: Vec<(usize, &Sight)> = (choose(spots, 1, most).into_iter().enumerate())
-            .flat_map(|(index, spot)| spot.iter().map(move |sight| (index, sight)))
-            .collect();
+        let chosen: Vec<(usize, &SpotObservation)> =
+            (choose(spots, 1, most).into_iter().enumerate())
+                .flat_map(|(index, spot)| spot.iter().map(move |observation| (index, observation)))
+                .collect();
         let gathered: Vec<([Gathered; 2], Cast)> = (chosen.par_iter())
-            .map(|(_, sight)| gathering.sight(&scene.cameras[sight.frame as usize], sight))
+            .map(|(_, observation)| {
+                gathering.observation(&scene.cameras[observation.frame as usize], observation)
+            })
             .collect();
         let cast = gathered.iter().map(|(_, cast)| *cast).sum();
-        let mut sights = Vec::new();
-        for ((spot, sight), (light, _)) in chosen.into_iter().zip(gathered) {
+        let mut observations = Vec::new();
+        for ((spot, observation), (light, _)) in chosen.into_iter().zip(gathered) {
             if !light.iter().any(Gathered::is_empty) {
-                sights.push((spot, sight, light));
+                observations.push((spot, observation, light));
             }
         }
-        let levels = levels(&sights);
-        (Self { sights, levels }, cast)
+        let levels = levels(&observations);
+        (
+            Self {
+                observations,
+                levels,
+            },
+            cast,
+        )
     }
 
     /// The rows in the fit, and those held out, for a lobe of GGX roughness α.
     fn rows(&self, alpha: f64) -> [Vec<Row>; 2] {
-        let rows: Vec<(bool, Row)> = (self.sights.par_iter().zip(&self.levels))
-            .map(|((spot, sight, light), &level)| {
+        let rows: Vec<(bool, Row)> = (self.observations.par_iter().zip(&self.levels))
+            .map(|((spot, observation, light), &level)| {
                 let row = Row {
                     spot: *spot,
-                    weight: sight.pixels.len() as f64,
-                    shown: sight.measured / level,
+                    weight: observation.pixels.len() as f64,
+                    shown: observation.measured / level,
                     one: level.recip(),
                     sets: [0, 1].map(|set| light[set].parts(alpha) / level),
                 };
-                (sight.held_out, row)
+                (observation.held_out, row)
             })
             .collect();
         let of = |held: bool| (rows.iter().filter(|r| r.0 == held)).map(|r| r.1).collect();
@@ -88,10 +97,10 @@ impl<'a> Evidence<'a> {
     }
 }
 
-/// Of each sight, the mean radiance of its spot's sights in the fit, raised where it is dark; the median of all spots where
-/// all its sights are left out of it.
-fn levels(sights: &[(usize, &Sight, [Gathered; 2])]) -> Vec<DVec3> {
-    let spots: Vec<(usize, Option<DVec3>)> = (sights.chunk_by(|a, b| a.0 == b.0))
+/// Of each observation, the mean radiance of its spot's observations in the fit, raised where it is dark; the median of all spots where
+/// all its observations are left out of it.
+fn levels(observations: &[(usize, &SpotObservation, [Gathered; 2])]) -> Vec<DVec3> {
+    let spots: Vec<(usize, Option<DVec3>)> = (observations.chunk_by(|a, b| a.0 == b.0))
         .map(|spot| {
             let fitted = || spot.iter().map(|s| s.1).filter(|s| !s.held_out);
             let weight: f64 = fitted().map(|s| s.pixels.len() as f64).sum();
@@ -123,7 +132,7 @@ struct Tried {
 /// light. `None` where nothing tells.
 pub fn find(evidence: &Evidence, emits: bool, [from, to]: [f64; 2]) -> Option<Found> {
     let diffuse = Model::Diffuse { emits };
-    let from = from.clamp(LEAST_ROUGHNESS, 1.0);
+    let from = from.clamp(MIN_ROUGHNESS, 1.0);
     let to = to.clamp(from, 1.0);
     let ratio = (to / from).powf(1.0 / (TRIED - 1) as f64);
     let tried: Vec<Tried> = (0..TRIED)

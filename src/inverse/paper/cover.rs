@@ -16,7 +16,7 @@ use rayon::prelude::*;
 const MAX_PIXELS: usize = 400_000;
 /// Pixels that a patch must cover to be cut: four for each of its parts.
 const MIN_COVERED: u64 = 16;
-/// The worst patches are cut, until they cover this share of the pixels of all that may be.
+/// The worst patches are cut, until they cover this fraction of the pixels of all that may be.
 const CUT: f64 = 0.5;
 /// Paths of each of two independent colours of a pixel.
 const SAMPLES: u64 = 2;
@@ -131,7 +131,7 @@ impl Cover {
     }
 }
 
-/// The patches of greatest mean error that cover a share of the pixels of all that may be cut, given each patch's sum of
+/// The patches of greatest mean error that cover a fraction of the pixels of all that may be cut, given each patch's sum of
 /// errors with its pixels, and its depth.
 fn worst(sums: &[(f64, u64)], depth: &[u8]) -> Vec<bool> {
     let may_be_cut = |&p: &usize| sums[p].1 >= MIN_COVERED && depth[p] < MAX_DEPTH;

@@ -27,7 +27,7 @@ const BELIEVED_FROM: u32 = 2;
 /// No surface is believed to reflect less, so that paths go on from what is dark now.
 const MIN_BELIEVED: f32 = 0.8;
 
-/// What shines less than this share of the brightest is no lamp once triangles have albedos: the noise of the steps leaves
+/// What shines less than this fraction of the brightest is no lamp once triangles have albedos: the noise of the steps leaves
 /// a little emission everywhere. `evaluate` tells lamps by the same share.
 const DIM: f32 = 0.01;
 

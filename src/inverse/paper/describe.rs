@@ -2,18 +2,18 @@
 
 use super::descent::Descent;
 use crate::inverse::estimate::{Estimate, ObjectEstimate, TexelEstimate};
+use crate::inverse::gbuffer::GBuffer;
 use crate::inverse::solver::Problem;
-use crate::inverse::survey::Survey;
 use crate::scene::Scene;
 use crate::transport::material::TexelColors;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
 /// For each object why the photographs tell nothing of it; empty where they do.
-pub fn untold(problem: &Problem, survey: &Survey) -> Vec<&'static str> {
+pub fn untold(problem: &Problem, gbuffer: &GBuffer) -> Vec<&'static str> {
     let mut lit = false;
     let mut measured = vec![false; problem.scene.objects.len()];
-    for pixel in survey.pixels.iter().filter(|p| !p.held_out) {
+    for pixel in gbuffer.pixels.iter().filter(|p| !p.held_out) {
         let photograph = &problem.photographs[pixel.frame as usize];
         let radiance = photograph.pixels[pixel.pixel as usize];
         lit |= radiance.max_element() > 0.0;
@@ -21,7 +21,7 @@ pub fn untold(problem: &Problem, survey: &Survey) -> Vec<&'static str> {
             *measured |= !photograph.is_saturated(pixel.pixel as usize);
         }
     }
-    (survey.seen.iter().zip(measured))
+    (gbuffer.seen.iter().zip(measured))
         .map(|(&seen, measured)| match (seen, measured) {
             (0, _) => "no photograph sees it",
             (_, false) => "all of its pixels are saturated or held out",
@@ -35,7 +35,7 @@ pub fn untold(problem: &Problem, survey: &Survey) -> Vec<&'static str> {
 /// errors: they are reported as the width of the range, and nothing is claimed to be unidentifiable but what `notes` say.
 pub fn describe(
     problem: &Problem,
-    survey: &Survey,
+    gbuffer: &GBuffer,
     notes: &[&str],
     descent: &Descent,
     covered: &[u64],
@@ -65,7 +65,7 @@ pub fn describe(
                 albedo_stderr: Vec3::ONE,
                 emission,
                 emission_stderr: emission.max(Vec3::splat(emission.max_element())),
-                seen_pixels: survey.seen[k],
+                seen_pixels: gbuffer.seen[k],
                 identifiable: notes[k].is_empty(),
                 albedo_identifiable: notes[k].is_empty(),
                 note: notes[k].to_owned(),

@@ -16,11 +16,11 @@ mod stage;
 
 use crate::error;
 use crate::inverse::estimate::Estimate;
+use crate::inverse::gbuffer::GBuffer;
 use crate::inverse::loss::LossProbe;
 use crate::inverse::monitor::Monitor;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Problem, Solution, Termination};
-use crate::inverse::survey::Survey;
 use cover::Cover;
 use descent::Descent;
 use describe::{describe, untold};
@@ -32,7 +32,7 @@ use std::time::{Duration, Instant};
 
 /// Pixels of each set that the loss is measured on, at most and as one in so many of all, and paths for each.
 const LOSS_PIXELS: usize = 1000;
-const LOSS_SHARE: usize = 32;
+const LOSS_FRACTION: usize = 32;
 const LOSS_SAMPLES: u64 = 32;
 /// Pictures of patches are made anew after so long; they hold a colour a texel.
 const DESCRIBE_EVERY: Duration = Duration::from_millis(200);
@@ -56,7 +56,7 @@ struct State {
 struct Run<'a, 'o> {
     problem: &'a Problem,
     monitor: Monitor<'o>,
-    survey: Survey,
+    gbuffer: GBuffer,
     /// For each object why the photographs tell nothing of it; empty where they do.
     notes: Vec<&'static str>,
     losses: LossProbe,
@@ -79,7 +79,7 @@ pub fn solve(
     resume: Option<&Checkpoint>,
     monitor: Monitor,
 ) -> error::Result<Solution> {
-    let survey = Survey::new(problem, settings, 400_000);
+    let gbuffer = GBuffer::new(problem, settings, 400_000);
     let bounces = settings.max_bounces();
     let mut state = match resume {
         None => State {
@@ -97,19 +97,19 @@ pub fn solve(
             descent.fits(scene) && descent.level <= LEVELS && is_its_own
         })?,
     };
-    let notes = untold(problem, &survey);
+    let notes = untold(problem, &gbuffer);
     state.descent.hold(&problem.scene, &monitor.known);
     let cover = Cover::new(problem, settings);
     let covered = (state.descent.patches.as_ref()).map(|patches| cover.counts(patches));
     let covered = covered.unwrap_or_default();
     let pixels: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
-    let loss_pixels = (pixels / LOSS_SHARE).clamp(1, LOSS_PIXELS);
+    let loss_pixels = (pixels / LOSS_FRACTION).clamp(1, LOSS_PIXELS);
     let mut run = Run {
-        estimate: describe(problem, &survey, &notes, &state.descent, &covered),
+        estimate: describe(problem, &gbuffer, &notes, &state.descent, &covered),
         losses: LossProbe::new(problem, settings, loss_pixels, LOSS_SAMPLES, bounces),
         problem,
         monitor,
-        survey,
+        gbuffer,
         notes,
         bounces,
         cover,
@@ -139,7 +139,7 @@ impl Run<'_, '_> {
     fn describe(&mut self) {
         self.described = Instant::now();
         let (descent, covered) = (&self.state.descent, &self.covered);
-        self.estimate = describe(self.problem, &self.survey, &self.notes, descent, covered);
+        self.estimate = describe(self.problem, &self.gbuffer, &self.notes, descent, covered);
         for (k, pinned) in self.monitor.known.objects() {
             let Some(object) = self.estimate.objects.get_mut(k) else {
                 continue;

@@ -168,16 +168,16 @@ impl Patches {
 mod tests {
     use super::*;
 
-    /// The share of its triangle that each patch covers.
-    fn shares(patches: &Patches) -> Vec<f64> {
-        let mut shares = vec![0.0; patches.len()];
+    /// The fraction of its triangle that each patch covers.
+    fn fractions(patches: &Patches) -> Vec<f64> {
+        let mut fractions = vec![0.0; patches.len()];
         let first = &patches.layout.first;
         for (triangle, &level) in patches.layout.levels.iter().enumerate() {
             for texel in first[triangle]..first[triangle + 1] {
-                shares[patches.of_texel(texel)] += 0.25f64.powi(i32::from(level));
+                fractions[patches.of_texel(texel)] += 0.25f64.powi(i32::from(level));
             }
         }
-        shares
+        fractions
     }
 
     #[test]
@@ -185,14 +185,14 @@ mod tests {
         let whole = Patches::triangles(3);
         let (once, parents) = whole.cut(&[false, true, false]);
         assert_eq!(parents, [0, 1, 1, 1, 1, 2]);
-        assert_eq!(shares(&once), [1.0, 0.25, 0.25, 0.25, 0.25, 1.0]);
+        assert_eq!(fractions(&once), [1.0, 0.25, 0.25, 0.25, 0.25, 1.0]);
         // The second quarter again, beside its coarser neighbours.
         let which: Vec<bool> = (0..6).map(|patch| patch == 2).collect();
         let (twice, parents) = once.cut(&which);
         assert_eq!(twice.len(), 9);
         assert!(twice.fit(3) && !twice.fit(2));
-        for (patch, share) in shares(&twice).into_iter().enumerate() {
-            assert_eq!(share, 0.25f64.powi(i32::from(twice.depth[patch])));
+        for (patch, fraction) in fractions(&twice).into_iter().enumerate() {
+            assert_eq!(fraction, 0.25f64.powi(i32::from(twice.depth[patch])));
         }
         assert_eq!(parents.iter().filter(|&&parent| parent == 2).count(), 4);
         // Every point still lies in what it lay in.

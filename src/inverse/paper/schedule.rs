@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The loss stands still when the mean of the last measurements is no better than that of as many before, by a share.
+/// The loss stands still when the mean of the last measurements is no better than that of as many before, by this fraction.
 const STANDSTILL: f64 = 0.01;
 
 /// Losses since the last change of the learning rate, and the work until the next.

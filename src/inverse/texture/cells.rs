@@ -1,4 +1,4 @@
-//! The cells of an object: parts of its surface that share one unknown albedo, as small as the pixels that see them.
+//! The cells of an object: parts of its surface that fraction one unknown albedo, as small as the pixels that see them.
 //!
 //! Triangles larger than a pixel's footprint are cut into four again and again, where pixels see them finely enough;
 //! triangles much smaller than a footprint share a cell with their neighbours. Either way there are no more cells than
@@ -11,7 +11,7 @@ use glam::Vec3;
 use std::collections::HashMap;
 
 /// A part of a triangle is cut while at least so many pixels land on it.
-const LEAST_PIXELS: usize = 2;
+const MIN_PIXELS: usize = 2;
 /// A part is cut while its longest edge is longer than so many footprints.
 const EDGE_FOOTPRINTS: f32 = 1.25;
 /// Triangles whose longest edge is below this many footprints share cells.
@@ -19,7 +19,7 @@ const SMALL_FOOTPRINTS: f32 = 0.5;
 /// A triangle is cut into at most so many parts for each pixel that it is seen by.
 const TEXELS_PER_PIXEL: usize = 16;
 /// Cuts at most.
-const MOST_CUTS: u8 = 10;
+const MAX_CUTS: u8 = 10;
 
 /// One part of a triangle: its corners in barycentric coordinates (b1, b2) of the whole.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -137,10 +137,10 @@ impl Cells {
         }
 
         // A large one is cut for itself.
-        let most_parts = spots.len() / RAYS as usize * TEXELS_PER_PIXEL;
-        let most_cuts = (most_parts.max(1).ilog2() / 2).min(u32::from(MOST_CUTS)) as u8;
+        let max_parts = spots.len() / RAYS as usize * TEXELS_PER_PIXEL;
+        let max_cuts = (max_parts.max(1).ilog2() / 2).min(u32::from(MAX_CUTS)) as u8;
         self.nodes.push(Node::Leaf(0));
-        let depth = self.cut(node, whole, normal, &mut spots, longest, most_cuts);
+        let depth = self.cut(node, whole, normal, &mut spots, longest, max_cuts);
         self.roots.insert(triangle, Root { node, front, depth });
     }
 
@@ -152,11 +152,11 @@ impl Cells {
         normal: Vec3,
         spots: &mut [Spot],
         longest: f32,
-        most_cuts: u8,
+        max_cuts: u8,
     ) -> u8 {
-        let fine = spots.len() >= LEAST_PIXELS * RAYS as usize
+        let fine = spots.len() >= MIN_PIXELS * RAYS as usize
             && longest > EDGE_FOOTPRINTS * median_footprint(spots);
-        if most_cuts == 0 || !fine {
+        if max_cuts == 0 || !fine {
             self.nodes[node as usize] = Node::Leaf(self.cells.len() as u32);
             self.cells.push(Cell {
                 normal,
@@ -183,7 +183,7 @@ impl Cells {
                 normal,
                 mine,
                 longest * 0.5,
-                most_cuts - 1,
+                max_cuts - 1,
             );
             depth = depth.max(below + 1);
             rest = others;

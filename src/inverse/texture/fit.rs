@@ -18,11 +18,11 @@ const FACTOR: f32 = 0.5;
 const WEAKEST: f32 = 1e-3;
 const PATIENCE: u32 = 3;
 /// Albedos are counted in the object's own luminance, but never in less than this.
-const LEAST_UNIT: f32 = 1e-4;
-/// Below this share of the object's median level, pixels weigh no more for being darker.
+const MIN_UNIT: f32 = 1e-4;
+/// Below this fraction of the object's median level, pixels weigh no more for being darker.
 const DARK: f32 = 0.5;
 /// Light that a channel must receive, in means over the object's pixels.
-const LEAST_LIGHT: f32 = 1e-6;
+const MIN_LIGHT: f32 = 1e-6;
 /// Turns in which one colour and the lower bounds that it keeps are found.
 const BOUND_TURNS: u32 = 3;
 /// Squared residuals count up to so many times their median.
@@ -62,16 +62,16 @@ pub struct Texture {
 impl Measurements {
     /// Of pixels and what their cells would send if they were white.
     pub fn new(pixels: &[&SeenPixel], observations: Observations, white: &[Vec3]) -> Self {
-        let received: Vec<Vec3> = (observations.all_of(white).iter().zip(pixels))
+        let irradiance: Vec<Vec3> = (observations.all_of(white).iter().zip(pixels))
             .map(|(r, pixel)| *r * pixel.base)
             .collect();
         // A channel whose light hardly reached a pixel's cells says nothing there, and weighs nothing.
-        let whites: Vec<f32> = received.iter().map(|r| luminance(*r)).collect();
-        let least = Vec3::splat((LEAST_LIGHT * mean(&whites)).max(f32::MIN_POSITIVE));
-        let received: Vec<Vec3> = (received.iter())
+        let whites: Vec<f32> = irradiance.iter().map(|r| luminance(*r)).collect();
+        let least = Vec3::splat((MIN_LIGHT * mean(&whites)).max(f32::MIN_POSITIVE));
+        let irradiance: Vec<Vec3> = (irradiance.iter())
             .map(|r| Vec3::select(r.cmpge(least), *r, Vec3::ZERO))
             .collect();
-        let albedo: Vec<Vec3> = (pixels.iter().zip(&received))
+        let albedo: Vec<Vec3> = (pixels.iter().zip(&irradiance))
             .map(|(pixel, r)| {
                 let known = r.cmpgt(Vec3::ZERO);
                 Vec3::select(known, (pixel.measured - pixel.gloss) / *r, Vec3::ZERO)
@@ -86,7 +86,7 @@ impl Measurements {
         }));
         let weigh = |constant: Vec3| -> Vec<Vec3> {
             let albedo = luminance(constant);
-            let raw: Vec<Vec3> = (received.iter().zip(pixels))
+            let raw: Vec<Vec3> = (irradiance.iter().zip(pixels))
                 .map(|(r, pixel)| {
                     let level = *r * albedo + pixel.gloss;
                     let variance = level * level + floor * floor;
@@ -96,7 +96,7 @@ impl Measurements {
             let scale = 1.0 / mean_channel(&raw).max(f32::MIN_POSITIVE);
             raw.iter().map(|w| *w * scale).collect()
         };
-        let squares: Vec<Vec3> = received.iter().map(|r| *r * *r).collect();
+        let squares: Vec<Vec3> = irradiance.iter().map(|r| *r * *r).collect();
         let first = weighted_mean(&albedo, &squares);
         let weights = weigh(weighted_mean(&albedo, &weigh(first)));
         let bounds: Vec<bool> = pixels.iter().map(|p| p.saturated).collect();
@@ -127,13 +127,13 @@ impl Measurements {
 
     /// Fits the cells, with the smoothing that predicts pixels left out best, in so many folds at least; bounds that the fit
     /// lies above lose their weight.
-    pub fn fit(&mut self, links: &Links, least_folds: usize) -> Texture {
+    pub fn fit(&mut self, links: &Links, min_folds: usize) -> Texture {
         let unit = self.unit();
         let values: Vec<Vec3> = self.albedo.iter().map(|a| *a / unit).collect();
         let flat = vec![self.constant / unit; self.observations.cells()];
         let levels = vec![1.0; flat.len()];
         let density = mean_channel(&self.observations.diagonal(&self.weights));
-        let folds = (ENOUGH * FOLDS / self.albedo.len().max(1)).clamp(least_folds, FOLDS);
+        let folds = (ENOUGH * FOLDS / self.albedo.len().max(1)).clamp(min_folds, FOLDS);
         let fitted = |weights: &[Vec3], strength: f32, start: &[Vec3]| {
             let problem = Problem {
                 observations: &self.observations,
@@ -198,7 +198,7 @@ impl Measurements {
 
     /// The luminance that albedos are counted in.
     pub fn unit(&self) -> f32 {
-        luminance(self.constant).max(LEAST_UNIT)
+        luminance(self.constant).max(MIN_UNIT)
     }
 
     /// Weights with those of one fold at zero, and of the bounds that some colours lie above.
@@ -265,8 +265,8 @@ impl Measurements {
 
 /// Whether what a surface of some albedo sends lies above a lower bound, given as an albedo too.
 fn is_kept(albedo: Vec3, bound: Vec3, weight: Vec3) -> bool {
-    let received = weight.powf(0.5);
-    luminance(albedo * received) >= luminance(bound * received)
+    let irradiance = weight.powf(0.5);
+    luminance(albedo * irradiance) >= luminance(bound * irradiance)
 }
 
 /// The mean of each channel, within 0 and 1; zero where nothing weighs.

@@ -10,7 +10,7 @@ use super::observations::Observations;
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Differences below this share of the level count as gradients rather than as edges.
+/// Differences below this fraction of the level count as gradients rather than as edges.
 pub const FLAT: f32 = 0.02;
 /// Reweightings at most.
 const REWEIGHTINGS: u32 = 5;

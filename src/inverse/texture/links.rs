@@ -6,7 +6,7 @@ use crate::scene::geometry::{Hit, Ray};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Points along each edge from which to step over it, as shares of its length.
+/// Points along each edge from which to step over it, as fractions of its length.
 const STEPS: [f32; 2] = [0.25, 0.75];
 /// Length of a step in heights of the piece over the edge.
 const STRIDE: f32 = 0.2;
@@ -88,8 +88,8 @@ fn neighbours(scene: &Scene, cells: &Cells, index: u32) -> Vec<(u32, u32, f32)> 
             }
             let stride = STRIDE * double_area / length;
             let out = (to - from).cross(normal).normalize_or_zero() * stride;
-            for share in STEPS {
-                let beyond = from.lerp(to, share) + out;
+            for fraction in STEPS {
+                let beyond = from.lerp(to, fraction) + out;
                 let Some(other) = cell_at(scene, cells, piece.triangle, beyond, cell, stride)
                 else {
                     continue;

@@ -1,8 +1,8 @@
 //! Where the parts of each pixel of an object land on its triangles.
 
+use crate::inverse::gbuffer::GBufferPixel;
 use crate::inverse::sharpness::Sharpness;
 use crate::inverse::solver::Problem;
-use crate::inverse::survey::SurveyedPixel;
 use crate::math::rng::{Stream, splitmix64};
 use crate::scene::geometry::Hit;
 use crate::transport::bsdf::base_by_view;
@@ -74,7 +74,7 @@ impl Landing {
 pub fn look(
     problem: &Problem,
     object: u32,
-    pixels: &[&SurveyedPixel],
+    pixels: &[&GBufferPixel],
     sharpness: &Sharpness,
     glossy: bool,
     seed: u64,
@@ -103,23 +103,23 @@ pub fn look(
 fn look_through(
     problem: &Problem,
     object: u32,
-    surveyed: &SurveyedPixel,
+    pixels_of_frame: &GBufferPixel,
     sharpness: &Sharpness,
     seed: u64,
 ) -> Option<SeenPixel> {
     let scene = &*problem.scene;
-    let photograph = &problem.photographs[surveyed.frame as usize];
-    let measured = photograph.pixels[surveyed.pixel as usize];
-    let camera = &scene.cameras[surveyed.frame as usize];
+    let photograph = &problem.photographs[pixels_of_frame.frame as usize];
+    let measured = photograph.pixels[pixels_of_frame.pixel as usize];
+    let camera = &scene.cameras[pixels_of_frame.frame as usize];
     let corner = Vec2::new(
-        (surveyed.pixel % photograph.width) as f32,
-        (surveyed.pixel / photograph.width) as f32,
+        (pixels_of_frame.pixel % photograph.width) as f32,
+        (pixels_of_frame.pixel / photograph.width) as f32,
     );
     let focal2 = (camera.intrinsics.fx * camera.intrinsics.fy) as f32;
     let mut stream = Stream::new(
         seed,
-        u64::from(surveyed.frame),
-        u64::from(surveyed.pixel),
+        u64::from(pixels_of_frame.frame),
+        u64::from(pixels_of_frame.pixel),
         KEY,
     );
     let mut landings = Vec::with_capacity(RAYS as usize);
@@ -140,13 +140,13 @@ fn look_through(
         });
     }
     Some(SeenPixel {
-        frame: surveyed.frame,
-        pixel: surveyed.pixel,
-        held_out: surveyed.held_out,
+        frame: pixels_of_frame.frame,
+        pixel: pixels_of_frame.pixel,
+        held_out: pixels_of_frame.held_out,
         measured,
-        saturated: photograph.is_saturated(surveyed.pixel as usize),
-        fold: fold(surveyed.frame, surveyed.pixel),
-        weight: sharpness.weight(surveyed.frame as usize),
+        saturated: photograph.is_saturated(pixels_of_frame.pixel as usize),
+        fold: fold(pixels_of_frame.frame, pixels_of_frame.pixel),
+        weight: sharpness.weight(pixels_of_frame.frame as usize),
         base: 1.0,
         gloss: Vec3::ZERO,
         landings,

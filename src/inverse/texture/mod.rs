@@ -1,7 +1,7 @@
 //! Spatial detail: the albedo of an object's cells, where pixels held out of the fit ask for it.
 //!
 //! For a diffuse point, albedo = radiance in the photograph / radiance of a white surface there. The second is traced
-//! by full paths with the lights and albedos found so far and smoothed where it varies slowly ([`received`]). Where there is
+//! by full paths with the lights and albedos found so far and smoothed where it varies slowly ([`irradiance`]). Where there is
 //! a lobe, what it reflects to each pixel is traced and taken out, and the rest is that of the base below it ([`gloss`]). The
 //! first is noisy, so neighbouring cells are pooled as far as pixels left out of the fit ask for ([`fit`]). A texture
 //! is kept where it predicts held-out pixels better than one colour does, by more than their noise ([`trial`]).
@@ -11,19 +11,19 @@ mod errors;
 mod fit;
 mod fuse;
 mod gloss;
+mod irradiance;
 mod links;
 mod look;
 mod observations;
-mod received;
 mod surface;
 mod trial;
 mod whole;
 
 use crate::inverse::estimate::{Estimate, TexelEstimate};
+use crate::inverse::gbuffer::{GBuffer, GBufferPixel};
 use crate::inverse::settings::Settings;
 use crate::inverse::sharpness::Sharpness;
 use crate::inverse::solver::{Problem, Termination};
-use crate::inverse::survey::{Survey, SurveyedPixel};
 use crate::transport::path::PathOptions;
 use glam::Vec3;
 use std::sync::Arc;
@@ -33,9 +33,9 @@ pub use trial::Trial;
 /// A gain on held-out pixels of so many standard errors is no accident.
 const SIGNIFICANT: f64 = 4.0;
 /// Pixels in the fit and held out that an object needs.
-const LEAST_PIXELS: usize = 60;
-const LEAST_HELD_OUT: usize = 10;
-/// Share of the paths, and width of cells in the finest ones', that are enough to see whether an object has a texture.
+const MIN_PIXELS: usize = 60;
+const MIN_HELD_OUT: usize = 10;
+/// Fraction of the paths, and width of cells in the finest ones', that are enough to see whether an object has a texture.
 const FIRST_LOOK: f64 = 0.4;
 const COARSE: f32 = 2.0;
 /// A held-out loss so many times the best one is plainly worse.
@@ -49,7 +49,7 @@ pub struct Task<'a> {
     /// Scene and photographs.
     pub problem: &'a Problem,
     /// What the pixels see.
-    pub survey: &'a Survey,
+    pub gbuffer: &'a GBuffer,
     /// How sharp the photographs are.
     pub sharpness: &'a Sharpness,
     /// Parameters.
@@ -158,7 +158,7 @@ impl Refined {
     }
 }
 
-/// Hears of rays cast, paths dropped and the share of the work that is done; may end the stage.
+/// Hears of rays cast, paths dropped and the fraction of the work that is done; may end the stage.
 pub type Tell<'t> = dyn FnMut(u64, u64, f64) -> Result<(), Termination> + 't;
 
 /// Tries a texture on each of the given objects, keeps those that held-out pixels ask for, and sweeps over them until
@@ -240,15 +240,16 @@ impl Refinement<'_> {
     /// Looks at each candidate in coarse cells, and keeps those that show more than one colour.
     fn look(
         &mut self,
-        candidates: &[(usize, Vec<&SurveyedPixel>)],
+        candidates: &[(usize, Vec<&GBufferPixel>)],
         tell: &mut Tell,
     ) -> Result<(), Termination> {
         let lit = self.estimate.lit(&self.task.problem.scene);
-        let shares: f64 = candidates.iter().map(|c| (c.1.len() as f64).sqrt()).sum();
+        let fractions: f64 = candidates.iter().map(|c| (c.1.len() as f64).sqrt()).sum();
         for (index, (object, pixels)) in candidates.iter().enumerate() {
-            let paths = self.task.paths as f64 * FIRST_LOOK * (pixels.len() as f64).sqrt() / shares;
-            let share = index as f64 / candidates.len() as f64 * 0.6;
-            let mut done = |rays, rejected| tell(rays, rejected, share);
+            let paths =
+                self.task.paths as f64 * FIRST_LOOK * (pixels.len() as f64).sqrt() / fractions;
+            let fraction = index as f64 / candidates.len() as f64 * 0.6;
+            let mut done = |rays, rejected| tell(rays, rejected, fraction);
             done(0, 0)?;
             let glossy = self.estimate.objects[*object].lobe().is_some();
             let Some(mut coarse) = Surface::new(self.task, *object, glossy, pixels, COARSE) else {
@@ -289,14 +290,14 @@ impl Refinement<'_> {
         };
         let lit = textured.lit(&self.task.problem.scene);
         let count = self.kept.len();
-        let shares: f64 = (self.kept.iter())
+        let fractions: f64 = (self.kept.iter())
             .map(|s| (s.pixel_count() as f64).sqrt())
             .sum();
         self.unrest = 0.0;
         for (index, surface) in self.kept.iter_mut().enumerate() {
-            let paths = self.task.paths as f64 * (surface.pixel_count() as f64).sqrt() / shares;
-            let share = (f64::from(sweep - 1) + index as f64 / count as f64) / f64::from(SWEEPS);
-            let mut done = |rays, rejected| tell(rays, rejected, 0.6 + 0.4 * share);
+            let paths = self.task.paths as f64 * (surface.pixel_count() as f64).sqrt() / fractions;
+            let fraction = (f64::from(sweep - 1) + index as f64 / count as f64) / f64::from(SWEEPS);
+            let mut done = |rays, rejected| tell(rays, rejected, 0.6 + 0.4 * fraction);
             let before = surface.mean();
             let known = &self.estimate.objects[surface.object];
             let scale_error = known.albedo_stderr / known.albedo.max(Vec3::splat(1e-3));
@@ -339,21 +340,21 @@ impl Refinement<'_> {
 }
 
 /// The objects that enough pixels see, with those pixels.
-fn candidates<'a>(task: &Task<'a>, objects: &[usize]) -> Vec<(usize, Vec<&'a SurveyedPixel>)> {
+fn candidates<'a>(task: &Task<'a>, objects: &[usize]) -> Vec<(usize, Vec<&'a GBufferPixel>)> {
     let mut of_object = vec![None; task.problem.scene.objects.len()];
     for (place, &object) in objects.iter().enumerate() {
         of_object[object] = Some(place);
     }
-    let mut pixels: Vec<(usize, Vec<&SurveyedPixel>)> =
+    let mut pixels: Vec<(usize, Vec<&GBufferPixel>)> =
         objects.iter().map(|&o| (o, Vec::new())).collect();
-    for pixel in task.survey.pixels.iter().filter(|p| p.pure) {
+    for pixel in task.gbuffer.pixels.iter().filter(|p| p.pure) {
         if let Some(&Some(place)) = of_object.get(pixel.object as usize) {
             pixels[place].1.push(pixel);
         }
     }
     pixels.retain(|(_, pixels)| {
         let held_out = pixels.iter().filter(|p| p.held_out).count();
-        held_out >= LEAST_HELD_OUT && pixels.len() - held_out >= LEAST_PIXELS
+        held_out >= MIN_HELD_OUT && pixels.len() - held_out >= MIN_PIXELS
     });
     pixels
 }

@@ -5,13 +5,13 @@ use super::cells::Cells;
 use super::errors::{standard_errors, with_light};
 use super::fit::{Measurements, Texture};
 use super::gloss::find_gloss;
+use super::irradiance::{Irradiance, trace};
 use super::links::Links;
 use super::look::{FOLDS, RAYS, SeenPixel, look};
 use super::observations::Observations;
-use super::received::{Received, trace};
 use super::trial::{Trial, Untouched, try_out};
+use crate::inverse::gbuffer::GBufferPixel;
 use crate::inverse::solver::Termination;
-use crate::inverse::survey::SurveyedPixel;
 use crate::scene::Scene;
 use crate::transport::lit::Lit;
 use crate::transport::path::PathOptions;
@@ -20,12 +20,12 @@ use glam::{DVec3, Vec3};
 /// Cells traced between two reports.
 const SLICE: usize = 2048;
 /// Paths a cell at most, in each of two sets.
-const MOST_SAMPLES: u64 = 256;
+const MAX_SAMPLES: u64 = 256;
 
 /// What a path from a pixel to what its lobe reflects costs, in paths from a cell; and such paths a pixel at least: one for each
 /// of its rays.
 const GLOSS_COST: u64 = 3;
-const LEAST_GLOSS: u64 = RAYS as u64;
+const MIN_GLOSS: u64 = RAYS as u64;
 
 /// Fewer held-out pixels than this are joined by others.
 const FEW_HELD_OUT: usize = 1_000;
@@ -62,7 +62,7 @@ impl Surface {
         task: &Task,
         object: usize,
         glossy: bool,
-        pixels: &[&SurveyedPixel],
+        pixels: &[&GBufferPixel],
         width: f32,
     ) -> Option<Self> {
         let seed = task.settings.seed;
@@ -135,20 +135,20 @@ impl Surface {
         errors: Option<Vec3>,
         done: &mut Done,
     ) -> Result<(), Termination> {
-        let samples = (paths / (2 * self.cells.count() as u64)).clamp(1, MOST_SAMPLES) as u32;
+        let samples = (paths / (2 * self.cells.count() as u64)).clamp(1, MAX_SAMPLES) as u32;
         let key = (u64::from(sweep) << 32) + self.object as u64;
-        let mut received = Received::default();
+        let mut irradiance = Irradiance::default();
         for start in (0..self.cells.count()).step_by(SLICE) {
             let range = start..(start + SLICE).min(self.cells.count());
             let part = trace(lit, &self.cells, range, samples, options, self.seed, key);
             done(part.rays, part.rejected)?;
-            received.append(part);
+            irradiance.append(part);
         }
-        let light = received.smoothed(&self.links);
+        let light = irradiance.smoothed(&self.links);
         done(0, 0)?;
         if self.glossy {
             let samples = paths / (GLOSS_COST * self.pixels.len() as u64);
-            let samples = samples.clamp(LEAST_GLOSS, MOST_SAMPLES) as u32;
+            let samples = samples.clamp(MIN_GLOSS, MAX_SAMPLES) as u32;
             for pixels in self.pixels.chunks_mut(SLICE) {
                 let cast = find_gloss(lit, pixels, samples, options, self.seed, key);
                 done(cast.rays, cast.rejected)?;
@@ -157,8 +157,8 @@ impl Surface {
         let observations = Observations::new(&self.rows(), self.cells.count());
         let fitted: Vec<&SeenPixel> = self.pixels.iter().filter(|p| !p.held_out).collect();
         let mut measurements = Measurements::new(&fitted, observations, &light.radiance);
-        let least_folds = if self.glossy { FOLDS } else { 1 };
-        self.texture = measurements.fit(&self.links, least_folds);
+        let min_folds = if self.glossy { FOLDS } else { 1 };
+        self.texture = measurements.fit(&self.links, min_folds);
         self.constant = measurements.constant;
         done(0, 0)?;
         if let Some(scale_error) = errors {
@@ -232,9 +232,9 @@ impl Surface {
             (self.cells.cells.iter().zip(&self.texture.colors)).zip(&self.seen)
         {
             if *seen > 0 {
-                let share = f64::from(cell.size * cell.size);
-                sum += color.as_dvec3() * share;
-                area += share;
+                let fraction = f64::from(cell.size * cell.size);
+                sum += color.as_dvec3() * fraction;
+                area += fraction;
             }
         }
         if area > 0.0 {
@@ -244,14 +244,14 @@ impl Surface {
         }
     }
 
-    /// For each pixel in the fit, the cells that it sees and their shares of it.
+    /// For each pixel in the fit, the cells that it sees and their fractions of it.
     fn rows(&self) -> Vec<Vec<(u32, f32)>> {
         (self.pixels.iter().filter(|p| !p.held_out))
             .map(|pixel| {
-                let share = 1.0 / pixel.landings.len() as f32;
+                let fraction = 1.0 / pixel.landings.len() as f32;
                 let mut row: Vec<(u32, f32)> = (pixel.landings.iter())
                     .filter_map(|l| self.cells.locate(&l.hit))
-                    .map(|cell| (cell, share))
+                    .map(|cell| (cell, fraction))
                     .collect();
                 row.sort_by_key(|&(cell, _)| cell);
                 row.dedup_by(|next, kept| {

@@ -20,12 +20,12 @@ const PATHS: usize = 64_000;
 /// Paths a pixel at least and at most, in each set.
 const PATHS_A_PIXEL: (usize, usize) = (32, 512);
 /// Pixels used at most, and how many of them decide whether to go on with the rest.
-const MOST_PIXELS: usize = 2_000;
+const MAX_PIXELS: usize = 2_000;
 const FIRST_PIXELS: usize = 250;
 /// A gain of so many standard errors on the first pixels needs no more of them.
 const PLAIN: f64 = 2.0 * SIGNIFICANT;
 /// Photographs that a standard error over photographs takes.
-const LEAST_PHOTOGRAPHS: f64 = 5.0;
+const MIN_PHOTOGRAPHS: f64 = 5.0;
 /// One pixel's gain counts up to so many times what two of three stay below.
 const CLIP: f64 = 5.0;
 
@@ -71,7 +71,7 @@ pub fn try_out(
     options: &PathOptions,
     seed: u64,
 ) -> Trial {
-    let count = pixels.len().min(MOST_PIXELS);
+    let count = pixels.len().min(MAX_PIXELS);
     let chosen: Vec<Untouched> = (0..count)
         .map(|i| pixels[i * pixels.len() / count])
         .collect();
@@ -227,7 +227,7 @@ fn error_by_frame(mut gains: Vec<(u32, f64)>, mean: f64) -> f64 {
     let sums = (gains.chunk_by(|a, b| a.0 == b.0))
         .map(|frame| frame.iter().map(|(_, gain)| gain - mean).sum::<f64>());
     let (frames, squares) = sums.fold((0.0, 0.0), |(n, s), sum| (n + 1.0, s + sum * sum));
-    if frames < LEAST_PHOTOGRAPHS {
+    if frames < MIN_PHOTOGRAPHS {
         return f64::INFINITY;
     }
     (squares * frames / (frames - 1.0)).sqrt() / gains.len() as f64

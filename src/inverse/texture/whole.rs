@@ -26,17 +26,17 @@ fn surroundings(surface: &Surface, tree: &RTree<Place>, point: Vec3) -> Option<V
     let near = tree
         .nearest_neighbor_iter(point.to_array())
         .take(NEIGHBOURS);
-    let sights = near.map(|place| Sight {
+    let neighbours = near.map(|place| Neighbour {
         distance: Vec3::from(*place.geom()).distance(point),
         size: surface.cells.cells[place.data].size,
         seen: surface.seen[place.data],
         color: surface.texture.colors[place.data],
     });
-    mean_color(sights)
+    mean_color(neighbours)
 }
 
 /// A seen cell from an unseen place.
-struct Sight {
+struct Neighbour {
     distance: f32,
     size: f32,
     /// Pixels that see it.
@@ -44,13 +44,13 @@ struct Sight {
     color: Vec3,
 }
 
-fn mean_color(sights: impl Iterator<Item = Sight>) -> Option<Vec3> {
+fn mean_color(neighbours: impl Iterator<Item = Neighbour>) -> Option<Vec3> {
     let (mut sum, mut total) = (Vec3::ZERO, 0.0);
-    for sight in sights {
+    for neighbour in neighbours {
         // Nearer than its own size a cell gains little.
-        let relative = sight.distance / sight.size.max(f32::MIN_POSITIVE);
-        let weight = sight.seen.min(WELL_SEEN) as f32 / (relative * relative + 1.0);
-        sum += sight.color * weight;
+        let relative = neighbour.distance / neighbour.size.max(f32::MIN_POSITIVE);
+        let weight = neighbour.seen.min(WELL_SEEN) as f32 / (relative * relative + 1.0);
+        sum += neighbour.color * weight;
         total += weight;
     }
     (total > 0.0).then(|| sum / total)
@@ -126,7 +126,7 @@ mod tests {
 
     #[test]
     fn an_unseen_place_goes_by_what_is_near_and_well_seen() {
-        let sight = |distance: f32, seen: u32, color: f32| Sight {
+        let neighbour = |distance: f32, seen: u32, color: f32| Neighbour {
             distance,
             size: 0.01,
             seen,
@@ -134,11 +134,12 @@ mod tests {
         };
         // One stray pixel next to it against the floor around.
         let stray = mean_color(
-            std::iter::once(sight(0.02, 1, 0.0)).chain((0..31).map(|_| sight(0.03, 40, 0.6))),
+            std::iter::once(neighbour(0.02, 1, 0.0))
+                .chain((0..31).map(|_| neighbour(0.03, 40, 0.6))),
         );
         assert!(stray.is_some_and(|c| (c.x - 0.6).abs() < 0.01), "{stray:?}");
         // Of two that are seen alike the nearer one counts.
-        let near = mean_color([sight(0.01, 9, 0.2), sight(0.1, 9, 0.8)].into_iter());
+        let near = mean_color([neighbour(0.01, 9, 0.2), neighbour(0.1, 9, 0.8)].into_iter());
         assert!(near.is_some_and(|c| (c.x - 0.2).abs() < 0.02), "{near:?}");
         assert_eq!(mean_color(std::iter::empty()), None);
     }

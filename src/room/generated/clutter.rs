@@ -105,8 +105,8 @@ fn free(
             _ => f.count(0, supports.len() - 1),
         };
         let reach = supports[which].half - radius;
-        let share = DVec2::from([(); 2].map(|()| f.between(-1.0, 1.0)));
-        let at = reach * share;
+        let fraction = DVec2::from([(); 2].map(|()| f.between(-1.0, 1.0)));
+        let at = reach * fraction;
         let clear = |(center, other): &(DVec2, f64)| at.distance(*center) > radius + other;
         if reach.min_element() > 0.0 && places[which].iter().all(clear) {
             return Some((which, at));

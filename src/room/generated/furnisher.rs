@@ -233,8 +233,8 @@ impl Furnisher {
     pub fn look_around(&mut self, low: usize, high: usize) {
         for _ in 0..self.count(low, high) {
             let eye = self.eye();
-            let share = DVec3::from([(); 3].map(|()| self.between(-0.5, 0.5)));
-            let target = share * self.size + DVec3::Y * self.size.y * 0.5;
+            let fraction = DVec3::from([(); 3].map(|()| self.between(-0.5, 0.5)));
+            let target = fraction * self.size + DVec3::Y * self.size.y * 0.5;
             self.look(eye, target);
         }
     }

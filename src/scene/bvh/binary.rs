@@ -92,7 +92,7 @@ fn grow(primitives: &mut [Primitive], first: usize, grain: Grain, nodes: &mut Ve
 fn join(node: usize, second: usize, largest_leaf: usize, nodes: &mut [Binary]) {
     let (half_area, leaf) = (nodes[node].bounds.half_area(), nodes[node].costs[0]);
     // Visiting a node costs as much as testing a group.
-    let cost = |slots: usize| best_share(&nodes[node + 1], &nodes[second], slots).1;
+    let cost = |slots: usize| best_split(&nodes[node + 1], &nodes[second], slots).1;
     let inner = half_area + cost(WIDTH);
     if nodes[node].count as usize <= largest_leaf && leaf <= inner {
         return;
@@ -151,11 +151,11 @@ fn take(
 }
 
 /// How many of the slots the left child gets at least cost, and the cost.
-fn best_share(left: &Binary, right: &Binary, slots: usize) -> (usize, f32) {
+fn best_split(left: &Binary, right: &Binary, slots: usize) -> (usize, f32) {
     (1..slots)
-        .map(|share| {
-            let cost = left.costs[share - 1] + right.costs[slots - share - 1];
-            (share, cost)
+        .map(|fraction| {
+            let cost = left.costs[fraction - 1] + right.costs[slots - fraction - 1];
+            (fraction, cost)
         })
         .fold((1, f32::INFINITY), |best, next| {
             if next.1 < best.1 { next } else { best }
@@ -168,14 +168,14 @@ pub(super) fn open(nodes: &[Binary], node: usize) -> Vec<usize> {
     if nodes[node].is_leaf() {
         children.push(node);
     } else {
-        share(nodes, node, WIDTH, &mut children);
+        split_slots(nodes, node, WIDTH, &mut children);
     }
     children
 }
 
-fn share(nodes: &[Binary], node: usize, slots: usize, children: &mut Vec<usize>) {
+fn split_slots(nodes: &[Binary], node: usize, slots: usize, children: &mut Vec<usize>) {
     let (left, right) = (node + 1, node + nodes[node].right as usize);
-    let (first, _) = best_share(&nodes[left], &nodes[right], slots);
+    let (first, _) = best_split(&nodes[left], &nodes[right], slots);
     for (child, mut slots) in [(left, first), (right, slots - first)] {
         // More slots than pay are left empty.
         let costs = &nodes[child].costs;
@@ -185,7 +185,7 @@ fn share(nodes: &[Binary], node: usize, slots: usize, children: &mut Vec<usize>)
         if slots == 1 {
             children.push(child);
         } else {
-            share(nodes, child, slots, children);
+            split_slots(nodes, child, slots, children);
         }
     }
 }

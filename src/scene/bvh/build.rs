@@ -8,10 +8,10 @@ use glam::Vec3;
 use rayon::prelude::*;
 use std::cmp::Reverse;
 
-/// Subtrees of more primitives than this, and than a share of all, are built and laid out side by side.
+/// Subtrees of more primitives than this, and than a fraction of all, are built and laid out side by side.
 const ALONE: usize = 8192;
 /// See [`ALONE`].
-const SHARES: usize = 64;
+const FRACTIONS: usize = 64;
 
 pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Bvh {
     let corners = |triangle: u32| triangles[triangle as usize].map(|i| positions[i as usize]);
@@ -46,7 +46,7 @@ pub(super) fn primitives(count: usize, corners: impl Fn(u32) -> [Vec3; 3]) -> Ve
 
 /// Size from which a subtree is worth a task of its own.
 pub(super) fn alone(primitives: usize) -> usize {
-    ALONE.max(primitives / SHARES)
+    ALONE.max(primitives / FRACTIONS)
 }
 
 fn lay_out<C: Fn(u32) -> [Vec3; 3] + Sync>(

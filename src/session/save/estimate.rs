@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 pub const VERSION: u32 = 1;
 
 /// No lens dims by a greater power of the cosine.
-const MOST_POWER: f32 = 100.0;
+const MAX_POWER: f32 = 100.0;
 
 /// The contents of `estimate.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -144,7 +144,7 @@ impl EstimateFile {
         if !exposures.into_iter().all(|&e| e.is_finite() && e > 0.0) {
             return impossible("exposures");
         }
-        let most = Vec3::splat(MOST_POWER);
+        let most = Vec3::splat(MAX_POWER);
         if (self.vignetting()).is_some_and(|v| !v.power.abs().cmple(most).all()) {
             return impossible("vignetting");
         }

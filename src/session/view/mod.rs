@@ -18,7 +18,7 @@ pub use target::differs;
 /// Long side in pixels of the first picture after a camera move.
 const FIRST_LONG_SIDE: u32 = 96;
 /// Drawing time, in seconds, that may be saved up while the solver is busy.
-const MOST_CREDIT: f32 = 0.05;
+const MAX_CREDIT: f32 = 0.05;
 /// Shortest time between two looks at a changing estimate, in seconds.
 const LOOK_AGAIN: f32 = 0.4;
 
@@ -81,21 +81,21 @@ impl Views {
         }
     }
 
-    /// Draws for a moment, taking at most about `share` of the time since the last call, but a new request at once.
+    /// Draws for a moment, taking at most about `fraction` of the time since the last call, but a new request at once.
     /// Returns whether the pictures changed, and whether there is more to draw.
     pub fn draw(
         &mut self,
         capture: &OpenCapture,
         estimate: &Arc<Estimate>,
         options: &PathOptions,
-        share: f32,
+        fraction: f32,
     ) -> (bool, bool) {
         let now = Instant::now();
         let elapsed = self
             .last
             .replace(now)
             .map_or(0.0, |last| (now - last).as_secs_f32());
-        self.credit = (self.credit + share * elapsed).min(MOST_CREDIT);
+        self.credit = (self.credit + fraction * elapsed).min(MAX_CREDIT);
         if self.changed {
             self.changed = false;
             let request = self.request.as_ref();
@@ -104,7 +104,7 @@ impl Views {
             let drawn = self.sharpen(options);
             return (drawn, self.target.is_some());
         }
-        if share < 1.0 && self.credit <= 0.0 {
+        if fraction < 1.0 && self.credit <= 0.0 {
             return (false, self.target.is_some());
         }
         self.follow(estimate, now);

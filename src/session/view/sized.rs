@@ -9,8 +9,8 @@ pub fn box_filter(from: &Picture, width: u32, height: u32) -> Picture {
     if (from.width, from.height) == (width, height) {
         return from.clone();
     }
-    let columns = shares(from.width, width);
-    let rows = shares(from.height, height);
+    let columns = fractions(from.width, width);
+    let rows = fractions(from.height, height);
     let pixels = rows
         .par_iter()
         .flat_map_iter(|row| {
@@ -34,7 +34,7 @@ pub fn box_filter(from: &Picture, width: u32, height: u32) -> Picture {
 }
 
 /// For each of `to` intervals over `from` cells, the cells that it covers with their shares, which sum to 1.
-fn shares(from: u32, to: u32) -> Vec<Vec<(usize, f32)>> {
+fn fractions(from: u32, to: u32) -> Vec<Vec<(usize, f32)>> {
     let step = f64::from(from) / f64::from(to.max(1));
     (0..to)
         .map(|i| {

@@ -16,7 +16,7 @@ use crate::transport::path::PathOptions;
 use glam::Vec3;
 use std::sync::Arc;
 
-/// A change of a colour by less than this share does not show.
+/// A change of a colour by less than this fraction does not show.
 const VISIBLE: f32 = 0.01;
 /// Samples that a render with the final estimate has before it is shown, where the one before it had as many.
 const HOLD: u32 = 8;

@@ -55,7 +55,7 @@ pub(super) struct Worker {
     pub continued: Option<String>,
     /// Whether the parameters were asked for when the program began, rather than those of a session.
     pub asked: bool,
-    /// Until when what was asked for has a larger share of the time.
+    /// Until when what was asked for has a larger fraction of the time.
     pub answer_until: Option<Instant>,
     /// Answers to requests for other objects.
     pub regroupings: u64,
@@ -135,7 +135,7 @@ impl Worker {
         self.changed = true;
     }
 
-    /// Gives what was asked for a larger share of the time for a while.
+    /// Gives what was asked for a larger fraction of the time for a while.
     pub fn answer_for(&mut self, time: Duration) {
         let end = Instant::now() + time;
         self.answer_until = self.answer_until.max(Some(end));
@@ -146,8 +146,8 @@ impl Worker {
         self.changed = true;
     }
 
-    /// Draws a slice of the requested view, taking at most about `share` of the time; whether there is more to draw.
-    pub fn draw(&mut self, share: f32) -> bool {
+    /// Draws a slice of the requested view, taking at most about `fraction` of the time; whether there is more to draw.
+    pub fn draw(&mut self, fraction: f32) -> bool {
         let Some(capture) = self.capture.clone() else {
             return false;
         };
@@ -156,16 +156,18 @@ impl Worker {
         // Views and composites share what there is.
         self.inserting.follow(&light);
         let composites = self.inserting.is_busy();
-        let share = match composites && share < 1.0 {
-            true => share * 0.5,
-            false => share,
+        let fraction = match composites && fraction < 1.0 {
+            true => fraction * 0.5,
+            false => fraction,
         };
-        let (drawn, more) = self.views.draw(&capture, estimate, &light.options, share);
+        let (drawn, more) = self
+            .views
+            .draw(&capture, estimate, &light.options, fraction);
         self.changed |= drawn;
         if !composites {
             return more;
         }
-        match self.inserting.draw(&capture, &light, share) {
+        match self.inserting.draw(&capture, &light, fraction) {
             Ok(drawn) => self.changed |= drawn,
             Err(error) => self.fail(&error),
         }

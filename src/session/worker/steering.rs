@@ -11,10 +11,10 @@ use crate::session::worker::work::Next;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Share of the solver's time that views and composites may take while they are watched …
-const VIEW_SHARE: f32 = 0.03;
+/// Fraction of the solver's time that views and composites may take while they are watched …
+const VIEW_FRACTION: f32 = 0.03;
 /// … and how much more for a while after a request, and until its first complete picture.
-const ANSWER_SHARE: f32 = 0.25;
+const ANSWER_FRACTION: f32 = 0.25;
 /// Time between two checkpoints that are kept in case the solver fails.
 const CHECKPOINT: Duration = Duration::from_secs(8);
 
@@ -105,8 +105,11 @@ impl Observer for Steering<'_> {
                 let fresh = (self.worker.answer_until).is_some_and(|end| Instant::now() < end);
                 let rough = self.worker.views.is_rough() || self.worker.inserting.is_rough();
                 let answer = fresh || rough;
-                self.worker
-                    .draw(if answer { ANSWER_SHARE } else { VIEW_SHARE });
+                self.worker.draw(if answer {
+                    ANSWER_FRACTION
+                } else {
+                    VIEW_FRACTION
+                });
                 self.worker.publish(false);
                 break;
             }

@@ -34,7 +34,7 @@ const KEY: u64 = 0x6573_7469;
 const ALBEDO: f64 = 0.5;
 const LAMP: f64 = 0.25;
 /// Pixels that are rendered at most; the box room's own photographs have fewer.
-const MOST_PIXELS: usize = 12_000;
+const MAX_PIXELS: usize = 12_000;
 /// A bias below this is none.
 const SMALL: f64 = 0.01;
 
@@ -201,7 +201,7 @@ fn render(lit: &Lit, options: &PathOptions, [seed, set]: [u64; 2], samples: u32)
             triangle != NOTHING && !is_lamp(scene.object_of[triangle as usize])
         })
         .collect();
-    let count = pixels.len().min(MOST_PIXELS);
+    let count = pixels.len().min(MAX_PIXELS);
     (0..count)
         .into_par_iter()
         .map(|index| {

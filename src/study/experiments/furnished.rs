@@ -34,11 +34,11 @@ const FRAMES: [usize; 2] = [5, 14];
 /// The chairs' height as modelled, and the radius of a cylinder around one, in metres.
 const HEIGHT: f64 = 0.85;
 const RADIUS: f64 = 0.31;
-/// Height of the chairs in a twin, in shares of the scene's own: the largest of these that finds places for both.
-const SHARES: [f64; 5] = [0.32, 0.24, 0.16, 0.08, 0.04];
-/// Share of a photograph that they may cover.
-const MOST_COVERED: f64 = 0.4;
-/// How far above the ground they stand, in shares of their height, as on a floor that is not quite flat.
+/// Height of the chairs in a twin, in fractions of the scene's own: the largest of these that finds places for both.
+const FRACTIONS: [f64; 5] = [0.32, 0.24, 0.16, 0.08, 0.04];
+/// Fraction of a photograph that they may cover.
+const MAX_COVERED: f64 = 0.4;
+/// How far above the ground they stand, in fractions of their height, as on a floor that is not quite flat.
 const LIFT: f64 = 2e-3;
 /// How the room without textures is photographed; the one with them has photographs in the program.
 const PLAIN: Rendering = Rendering {
@@ -110,8 +110,8 @@ pub fn of_twin(twin: Studied) -> Result<Furnished> {
     let up = up(&scene);
     let levels = || scene.positions.iter().map(|p| p.dot(up));
     let tall = f64::from(levels().fold(f32::MIN, f32::max) - levels().fold(f32::MAX, f32::min));
-    let found = SHARES.iter().find_map(|share| {
-        let height = share * tall;
+    let found = FRACTIONS.iter().find_map(|fraction| {
+        let height = fraction * tall;
         let cylinder = Cylinder {
             radius: (height * RADIUS / HEIGHT) as f32,
             height: height as f32,
@@ -139,7 +139,7 @@ pub fn of_twin(twin: Studied) -> Result<Furnished> {
     };
     let photographs = render(&twin.room, &twin.rendering)?;
     let mut furnished = furnish(twin.room, photographs, [stand(0), stand(1)])?;
-    furnished.frames = most_seen(&furnished);
+    furnished.frames = max_seen(&furnished);
     if furnished.frames.is_empty() {
         return Err(Error::new(
             &furnished.name,
@@ -155,7 +155,7 @@ pub fn of_twin(twin: Studied) -> Result<Furnished> {
 }
 
 /// The photographs that see most of the chairs, two at most; not those that see little else.
-fn most_seen(furnished: &Furnished) -> Vec<usize> {
+fn max_seen(furnished: &Furnished) -> Vec<usize> {
     let scene = &furnished.furnished.scene;
     let first = scene.objects.len() - CHAIRS.len();
     let seen = |frame: &Vec<u32>| {
@@ -167,7 +167,7 @@ fn most_seen(furnished: &Furnished) -> Vec<usize> {
         .enumerate()
         .collect();
     let pixels = scene.ids().triangles.first().map_or(0, Vec::len) as f64;
-    frames.retain(|(_, count)| *count > 0 && *count as f64 <= MOST_COVERED * pixels);
+    frames.retain(|(_, count)| *count > 0 && *count as f64 <= MAX_COVERED * pixels);
     frames.sort_by_key(|&(frame, count)| (Reverse(count), frame));
     let most = frames.into_iter().take(FRAMES.len());
     most.map(|(frame, _)| frame).collect()

@@ -34,7 +34,7 @@ pub const STUDY: Study = Study {
 
 /// Key of the true renderings' noise.
 const TRUTH: u64 = 0x7472_7574;
-/// A pixel beside the objects belongs to their shadow and bleed if they change it by this share.
+/// A pixel beside the objects belongs to their shadow and bleed if they change it by this fraction.
 const CHANGED: f32 = 0.05;
 const WAYS: [&str; 5] = [
     "naive, light of the photographs",

@@ -118,7 +118,7 @@ impl Limits {
 }
 
 impl Bench<'_> {
-    /// The share of one of `runs` solves.
+    /// The fraction of one of `runs` solves.
     fn limits(&self, runs: usize) -> Limits {
         if self.quick {
             return Limits {

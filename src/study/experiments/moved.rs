@@ -8,7 +8,7 @@ use crate::scene::visibility::NOTHING;
 use crate::transport::material::Material;
 use glam::{DVec3, Vec2, Vec3};
 
-/// Share of the rays whose error is below what is reported.
+/// Fraction of the rays whose error is below what is reported.
 const MOST: f64 = 0.99;
 
 /// Changes a room by a value; the changed room and the size of it in which errors are counted.

@@ -1,6 +1,6 @@
 //! How often it is noticed that a capture is read wrongly, and how often a sound one is taken for that.
 
-use crate::calibrate::alignment::{Alignment, Verdict};
+use crate::calibrate::alignment::{Alignment, Decision};
 use crate::calibrate::photographs::leave_out;
 use crate::capture::Capture;
 use crate::capture::orientation::Orientation;
@@ -137,12 +137,12 @@ fn run(bench: &Bench) -> Result<Findings> {
     // Sound captures: the one that is asked for, or the built-in room and rooms of all families.
     let subject = bench.subject.map(|subject| (*subject.capture).clone());
     let mut captures = vec![in_memory(&subject.map_or_else(room::capture, Ok)?)?];
-    let first = judge(&captures[0], None)?;
+    let first = decide(&captures[0], None)?;
     let (mut sound, mut refused, mut doubtful, mut astray) = (0, 0, 0, 0);
     let mut count = |outcome: &Outcome| {
         sound += 1;
         refused += u64::from(outcome.detected);
-        doubtful += u64::from(outcome.alignment.verdict == Verdict::Doubtful);
+        doubtful += u64::from(outcome.alignment.decision == Decision::Doubtful);
         astray += outcome.alignment.astray.len();
     };
     count(&first);
@@ -155,7 +155,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         for seed in bench.seeds() {
             bench.begin(&format!("{} room {seed}, sound", family.name()))?;
             let capture = in_memory(&family.generate(seed, rooms::SIZE)?.capture)?;
-            let outcome = judge(&capture, None)?;
+            let outcome = decide(&capture, None)?;
             count(&outcome);
             row(&capture, "none", &outcome);
             if *family == Family::Plain && captures.len() < MAX_CAPTURES {
@@ -170,7 +170,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         let (mut detected, mut right) = (0, 0);
         for capture in &captures {
             bench.begin(&format!("{}: {}", capture.name, mistake.name))?;
-            let outcome = judge(capture, Some(&mistake))?;
+            let outcome = decide(capture, Some(&mistake))?;
             detected += u64::from(outcome.detected);
             right += u64::from(outcome.right_remedy);
             row(capture, mistake.name, &outcome);
@@ -218,7 +218,7 @@ fn in_memory(capture: &Capture) -> Result<Capture> {
 ///
 /// # Errors
 /// The capture cannot be read.
-pub fn judge(capture: &Capture, mistake: Option<&Mistake>) -> Result<Outcome> {
+pub fn decide(capture: &Capture, mistake: Option<&Mistake>) -> Result<Outcome> {
     let mut capture = capture.clone();
     let made = mistake.map(|mistake| mistake.made);
     match made {
@@ -235,13 +235,13 @@ pub fn judge(capture: &Capture, mistake: Option<&Mistake>) -> Result<Outcome> {
     let scene = Scene::new(&capture.at(&working))?;
     let none_left = leave_out(&capture, &mut working).is_err();
     let alignment = Alignment::new(&scene, &working.photographs);
-    let mended = match (&alignment.verdict, made) {
+    let mended = match (&alignment.decision, made) {
         (_, Some(Made::OnePhotograph)) => none_left,
-        (Verdict::Wrong { reading, .. }, Some(Made::Reading(made))) => undone(&made.then(reading)),
+        (Decision::Wrong { reading, .. }, Some(Made::Reading(made))) => undone(&made.then(reading)),
         _ => false,
     };
     Ok(Outcome {
-        detected: none_left || matches!(alignment.verdict, Verdict::Wrong { .. }),
+        detected: none_left || matches!(alignment.decision, Decision::Wrong { .. }),
         right_remedy: mended,
         alignment,
     })

@@ -11,11 +11,11 @@ use crate::transport::path::{PathOptions, radiance};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-/// Sides of the blocks of pixels that share a residual.
+/// Sides of the blocks of pixels that fraction a residual.
 const BLOCK: u32 = 8;
 /// Paths for each block's residual.
 const PATHS: u64 = 4;
-/// Share of the draws that stay uniform.
+/// Fraction of the draws that stay uniform.
 const UNIFORM: f64 = 0.2;
 
 /// Pixels in groups, each group drawn with a chance of its own.
@@ -86,14 +86,14 @@ impl Groups {
         groups
     }
 
-    /// Gives the groups chances in proportion to `shares`.
-    fn set(&mut self, shares: &[f64]) {
-        let sum: f64 = shares.iter().sum();
+    /// Gives the groups chances in proportion to `fractions`.
+    fn set(&mut self, fractions: &[f64]) {
+        let sum: f64 = fractions.iter().sum();
         let mut end = 0.0;
-        self.ends = shares
+        self.ends = fractions
             .iter()
-            .map(|share| {
-                end += share / sum;
+            .map(|fraction| {
+                end += fraction / sum;
                 end
             })
             .collect();
@@ -147,10 +147,10 @@ impl Groups {
         let sizes = || self.pixels.iter().map(|p| p.len() as f64);
         let each: Vec<f64> = found.iter().zip(sizes()).map(|((r, _), n)| r * n).collect();
         let sum = each.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-        let shares: Vec<f64> = (each.iter().zip(sizes()))
+        let fractions: Vec<f64> = (each.iter().zip(sizes()))
             .map(|(r, n)| UNIFORM * n / self.total as f64 + (1.0 - UNIFORM) * r / sum)
             .collect();
-        self.set(&shares);
+        self.set(&fractions);
         found.iter().map(|(_, rays)| rays).sum()
     }
 }
@@ -178,13 +178,16 @@ mod tests {
             counts[group].1 += f64::from(drawn.weight) / draws as f64;
         }
         for ((chance, weight), pixels) in counts.iter().zip(&groups.pixels) {
-            // Five standard deviations of a binomial share of one in eight.
+            // Five standard deviations of a binomial fraction of one in eight.
             assert!(
                 (chance - 1.0 / objects as f64).abs() < 5.0 * 0.33 / 282.0,
                 "{chance}"
             );
-            let share = pixels.len() as f64 / groups.total as f64;
-            assert!((weight / share - 1.0).abs() < 0.05, "{weight} {share}");
+            let fraction = pixels.len() as f64 / groups.total as f64;
+            assert!(
+                (weight / fraction - 1.0).abs() < 0.05,
+                "{weight} {fraction}"
+            );
         }
     }
 }

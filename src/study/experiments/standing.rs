@@ -15,9 +15,9 @@ const NEARLY_LEVEL: f32 = 0.95;
 const ACROSS: u32 = 24;
 /// Directions in which a place must be free.
 const AROUND: usize = 16;
-/// Heights at which it must be, in shares of the height.
+/// Heights at which it must be, in fractions of the height.
 const HEIGHTS: [f32; 3] = [0.05, 0.5, 1.0];
-/// How far above and below a place the ground around it may lie, in shares of the height.
+/// How far above and below a place the ground around it may lie, in fractions of the height.
 const STEP: f32 = 0.03;
 
 /// An upright cylinder.
@@ -96,8 +96,8 @@ fn is_free(scene: &Scene, up: Vec3, cylinder: Cylinder, place: Vec3) -> bool {
             let angle = TAU * index as f32 / AROUND as f32;
             let outwards = frame.to_world(Vec3::new(angle.cos(), angle.sin(), 0.0));
             let rim = place + outwards * radius;
-            let free = HEIGHTS.iter().all(|share| {
-                let middle = place + up * (share * height);
+            let free = HEIGHTS.iter().all(|fraction| {
+                let middle = place + up * (fraction * height);
                 !scene.occluded(&Ray::between(middle, middle + outwards * radius))
             });
             let above = rim + up * step;

@@ -23,8 +23,8 @@ pub const STUDY: Study = Study {
 
 /// Seeds of the paper's descent, which takes the time of all its solves.
 const PAPER_SEEDS: u64 = 2;
-/// Time of one solve of the descent, in shares of one of the transport cache.
-const PAPER_SHARE: f64 = 2.0;
+/// Time of one solve of the descent, in fractions of one of the transport cache.
+const PAPER_FRACTION: f64 = 2.0;
 
 /// One object, solved with several seeds.
 struct Solved {
@@ -41,7 +41,7 @@ fn run(bench: &Bench) -> Result<Findings> {
             objects::shadowed(bench.quick)?,
         ],
     };
-    let each = bench.seeds as f64 + PAPER_SEEDS as f64 * PAPER_SHARE;
+    let each = bench.seeds as f64 + PAPER_SEEDS as f64 * PAPER_FRACTION;
     let limits = bench.limits((objects.len() as f64 * each) as usize);
     let how: String = (objects.iter())
         .map(|posed| format!("{} ", posed.how))
@@ -72,7 +72,7 @@ fn run(bench: &Bench) -> Result<Findings> {
                 all[last].cache.push(end);
             } else {
                 let longer = Limits {
-                    seconds: limits.seconds * PAPER_SHARE,
+                    seconds: limits.seconds * PAPER_FRACTION,
                     ..limits
                 };
                 let end = descend(bench, &gauge, &paper_settings(seed), longer).pop();
@@ -91,7 +91,7 @@ fn run(bench: &Bench) -> Result<Findings> {
             stopping(bench.quick, &aims, limits),
             bench.seeds,
             Limits {
-                seconds: limits.seconds * PAPER_SHARE,
+                seconds: limits.seconds * PAPER_FRACTION,
                 ..limits
             }
             .words(),

@@ -81,7 +81,7 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
         &Placement::as_modelled("chair"),
         &truth.scene,
     )?)];
-    let frames = most_seen(&truth, &true_chair);
+    let frames = max_seen(&truth, &true_chair);
     let scores = (frames.iter())
         .map(|&frame| scores(&solved, frame, &truth, &true_chair, &chair))
         .collect::<Result<Vec<_>>>()?;
@@ -126,7 +126,7 @@ impl CompositeRow {
 
 /// What holds over rooms.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Verdict {
+pub struct Decision {
     /// Rooms.
     pub rooms: usize,
     /// Those in which the chair is nearer to the truth than the naive one.
@@ -139,7 +139,7 @@ pub struct Verdict {
     pub strong: usize,
 }
 
-impl Verdict {
+impl Decision {
     /// Over some rooms.
     pub fn of(rows: &[CompositeRow]) -> Self {
         let mut gains: Vec<f64> = rows.iter().map(|row| row.chair - row.naive).collect();
@@ -223,7 +223,7 @@ fn standing(truth: &Lit) -> Result<Option<Arc<ObjectModel>>> {
 }
 
 /// The photographs that see most of the chair, but not little else.
-fn most_seen(truth: &Arc<Lit>, chair: &[Arc<PlacedObject>]) -> Vec<usize> {
+fn max_seen(truth: &Arc<Lit>, chair: &[Arc<PlacedObject>]) -> Vec<usize> {
     let world = FurnishedScene::new(truth, chair);
     let seen = |frame: usize| {
         let camera = &truth.scene.cameras[frame];

@@ -11,7 +11,7 @@ mod score;
 mod segments;
 mod summary;
 
-pub use composite::{CompositeRow, Verdict, composite, table};
+pub use composite::{CompositeRow, Decision, composite, table};
 pub use plot::plot;
 pub use row::{Row, Rows};
 pub use score::measure;

@@ -18,7 +18,7 @@ pub enum Heard<'a> {
 }
 
 /// Measures `runs` one after the other in about `limit` of wall time, judging included, until `stopped`; of what is
-/// left each gets a share by its weight, and what one leaves over goes to those after it.
+/// left each gets a fraction by its weight, and what one leaves over goes to those after it.
 ///
 /// # Errors
 /// A solver cannot start.
@@ -39,9 +39,9 @@ pub fn measure(
         let now = Instant::now();
         let weights: f64 = runs[index..].iter().map(|r| r.weight).sum();
         let left = end.saturating_duration_since(now);
-        let share = left.mul_f64((run.weight / weights).clamp(0.0, 1.0));
+        let fraction = left.mul_f64((run.weight / weights).clamp(0.0, 1.0));
         tell(Heard::Begins(run));
-        let (curve, _) = watch(problem, judge, run, now + share, stopped)?;
+        let (curve, _) = watch(problem, judge, run, now + fraction, stopped)?;
         tell(Heard::Ended(&curve));
         curves.push(curve);
     }

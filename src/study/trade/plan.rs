@@ -11,18 +11,18 @@ pub struct Run {
     pub is_preset: bool,
     /// The parameters.
     pub settings: Settings,
-    /// Share of the time that it may take, against the weights of the others.
+    /// Fraction of the time that it may take, against the weights of the others.
     pub weight: f64,
 }
 
-/// The presets with their shares of the time: those that go further get more.
+/// The presets with their fractions of the time: those that go further get more.
 const PRESETS: [(Preset, f64); 4] = [
     (Preset::Preview, 3.0),
     (Preset::Balanced, 6.0),
     (Preset::Reference, 8.0),
     (Preset::Paper, 8.0),
 ];
-/// Share of the time of a solve with one setting changed.
+/// Fraction of the time of a solve with one setting changed.
 const VARIED_WEIGHT: f64 = 2.0;
 
 /// The settings that are changed, with the values tried.
@@ -116,7 +116,7 @@ mod tests {
         }
     }
     #[test]
-    fn around_a_preset_are_it_and_its_variations_with_equal_shares() {
+    fn around_a_preset_are_it_and_its_variations_with_equal_fractions() {
         let base = Settings::default();
         let runs = around("preview", &base);
         assert!(runs[0].is_preset && runs.len() > 1);

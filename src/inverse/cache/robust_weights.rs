@@ -18,9 +18,9 @@ const PRIOR_CLUSTERS: f64 = 2.0;
 /// Error of a pixel, relative to the level that it is weighed by, below which nothing is trusted to be: cameras and meshes
 /// are no better.
 const FLOOR: f64 = 1e-3;
-/// Share of the typical variance below which no object's is trusted to be: what is nearly black in a channel would lead the
+/// Fraction of the typical variance below which no object's is trusted to be: what is nearly black in a channel would lead the
 /// fit by its silence.
-const LEAST_OF_TYPICAL: f64 = 1e-2;
+const MIN_OF_TYPICAL: f64 = 1e-2;
 /// Median of χ² with one degree of freedom.
 const MEDIAN_CHI2: f64 = 0.454_936;
 /// Deviations beyond which a cluster's pull no longer grows. Noise of photographs and of paths at the edges of lamps is
@@ -29,11 +29,11 @@ const FAR_OUT: f64 = 10.0;
 
 /// Factors on the weights of the clusters, per channel.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Trust(Vec<ObjectTrust>);
+pub struct RobustWeights(Vec<ObjectWeights>);
 
 /// What the residuals of an object's clusters say.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct ObjectTrust {
+struct ObjectWeights {
     /// Typical variance over the object's.
     factor: DVec3,
     /// The object's variance, weighted; infinite where nothing is known.
@@ -42,11 +42,11 @@ struct ObjectTrust {
     step: DVec3,
 }
 
-impl Trust {
+impl RobustWeights {
     /// The same for all.
     pub fn even(objects: usize) -> Self {
         Self(vec![
-            ObjectTrust {
+            ObjectWeights {
                 factor: DVec3::ONE,
                 variance: DVec3::INFINITY,
                 step: DVec3::ZERO,
@@ -71,36 +71,36 @@ impl Trust {
             of_object[cluster.object as usize].push(*square);
             floors[cluster.object as usize] += cluster.pixels * (FLOOR * FLOOR);
         }
-        let trust = |((squares, floor), step): ((Vec<DVec3>, f64), DVec3)| {
+        let robust = |((squares, floor), step): ((Vec<DVec3>, f64), DVec3)| {
             let count = squares.len() as f64;
             // Variances lie orders of magnitude apart, so it is their logarithm that is drawn to the typical one's.
-            let share = count / (count + PRIOR_CLUSTERS);
-            let expected = |own: DVec3| own.powf(share) * typical.powf(1.0 - share);
+            let fraction = count / (count + PRIOR_CLUSTERS);
+            let expected = |own: DVec3| own.powf(fraction) * typical.powf(1.0 - fraction);
             // What lies far out counts no more than the farthest of the others.
             let usual = expected(typical_variance(squares.iter().copied()));
             let most = usual * (FAR_OUT * FAR_OUT);
             let sum: DVec3 = squares.iter().map(|s| s.min(most)).sum();
             let [own, least] = [sum, DVec3::splat(floor)].map(|s| s / f64::max(count, 1.0));
-            let variance = expected(own).max(least).max(typical * LEAST_OF_TYPICAL);
+            let variance = expected(own).max(least).max(typical * MIN_OF_TYPICAL);
             // With no residuals at all there is nothing to tell objects apart by.
             let known = typical.cmpgt(DVec3::ZERO);
-            ObjectTrust {
+            ObjectWeights {
                 factor: DVec3::select(known, typical / variance, DVec3::ONE),
                 variance: DVec3::select(known, variance, DVec3::INFINITY),
                 step,
             }
         };
         let all = of_object.into_iter().zip(floors).zip(steps);
-        Self(all.map(trust).collect())
+        Self(all.map(robust).collect())
     }
 
     /// The weight of a cluster in the fit.
     pub fn weight(&self, cluster: &Linearised) -> DVec3 {
-        let trust = &self.0[cluster.object as usize];
-        let most = trust.variance * (FAR_OUT * FAR_OUT);
-        let square = square(cluster, trust.step);
+        let robust = &self.0[cluster.object as usize];
+        let most = robust.variance * (FAR_OUT * FAR_OUT);
+        let square = square(cluster, robust.step);
         let bounded = DVec3::select(square.cmpgt(most), (most / square).powf(0.5), DVec3::ONE);
-        cluster.weight_now() * trust.factor * bounded
+        cluster.weight_now() * robust.factor * bounded
     }
 
     /// The factor of one object.
@@ -186,20 +186,20 @@ mod tests {
             .chain(clusters(1, noise(100, 0.01)))
             .chain(clusters(2, noise(100, 1.0)))
             .collect();
-        let trust = Trust::from_residuals(&all, 4);
-        let ratio = trust.of(1) / trust.of(0);
+        let robust = RobustWeights::from_residuals(&all, 4);
+        let ratio = robust.of(1) / robust.of(0);
         // The typical variance counts for two clusters beside the quiet object's hundred and keeps the ratio below 100.
         assert!(
             ratio.min_element() > 8.0 && ratio.max_element() < 100.0,
             "{ratio}"
         );
-        let ratio = trust.of(0) / trust.of(2);
+        let ratio = robust.of(0) / robust.of(2);
         // The same at the noisy one: 100 to the power of 100 over 102; the typical variance lies a little over the first.
         assert!(
             ratio.min_element() > 90.0 && ratio.max_element() < 95.0,
             "{ratio}"
         );
-        assert_eq!(trust.of(3), trust.of(3).min(DVec3::ONE).max(DVec3::ONE));
+        assert_eq!(robust.of(3), robust.of(3).min(DVec3::ONE).max(DVec3::ONE));
     }
 
     #[test]
@@ -211,7 +211,7 @@ mod tests {
         for cluster in &mut edges[400..401] {
             cluster.residuals = [DVec3::splat(50.0); 2];
         }
-        let [quiet, disturbed] = [&quiet, &edges].map(|c| Trust::from_residuals(c, 2));
+        let [quiet, disturbed] = [&quiet, &edges].map(|c| RobustWeights::from_residuals(c, 2));
         // It counts for ten deviations, of forty clusters; in full it would cost all but a 50,000th.
         assert!((disturbed.of(1) / quiet.of(1)).min_element() > 0.15);
         let pull = |cluster: &Linearised| disturbed.weight(cluster) * cluster.residuals[0];
@@ -220,7 +220,7 @@ mod tests {
         // Ten deviations, which the cluster itself doubles, and not the 500 that it lies off.
         assert!((10.0..30.0).contains(&ratio), "{ratio}");
         // Where nothing is known all weigh what they weigh.
-        assert_eq!(Trust::even(2).weight(&edges[400]), DVec3::ONE);
+        assert_eq!(RobustWeights::even(2).weight(&edges[400]), DVec3::ONE);
     }
 
     #[test]
@@ -234,7 +234,7 @@ mod tests {
                 *residual += cluster.own * 0.8;
             }
         }
-        let [right, wrong] = [right, wrong].map(|c| Trust::from_residuals(&c, 2).of(1));
+        let [right, wrong] = [right, wrong].map(|c| RobustWeights::from_residuals(&c, 2).of(1));
         let gained = wrong / right - DVec3::ONE;
         assert!(gained.abs().max_element() < 0.03, "{gained}");
     }
@@ -250,9 +250,9 @@ mod tests {
         for cluster in all.iter_mut().step_by(50) {
             cluster.residuals = [DVec3::splat(10.0); 2];
         }
-        let trust = Trust::from_residuals(&all, 1);
+        let robust = RobustWeights::from_residuals(&all, 1);
         let (top, bottom) = all.iter().fold((0.0, 0.0), |(top, bottom), cluster| {
-            let weight = trust.weight(cluster).x;
+            let weight = robust.weight(cluster).x;
             (top + weight * cluster.residuals[0].x, bottom + weight)
         });
         // Two deviations of a tenth each by two in a hundred at ten deviations; unbounded it is 0.2.
@@ -265,11 +265,17 @@ mod tests {
         let all: Vec<Linearised> = clusters(0, noise(100, 0.1))
             .chain(clusters(1, noise(1_000_000, 0.0).take(90)))
             .collect();
-        let trust = Trust::from_residuals(&all, 2);
+        let robust = RobustWeights::from_residuals(&all, 2);
         // What is silent leads by a hundred at most.
-        assert!((trust.of(1) - DVec3::splat(100.0)).abs().max_element() < 1e-9);
+        assert!((robust.of(1) - DVec3::splat(100.0)).abs().max_element() < 1e-9);
         let silent: Vec<Linearised> = clusters(0, noise(10, 0.0)).collect();
-        assert_eq!(Trust::from_residuals(&silent, 1), Trust::even(1));
-        assert_eq!(Trust::from_residuals(&[], 2), Trust::even(2));
+        assert_eq!(
+            RobustWeights::from_residuals(&silent, 1),
+            RobustWeights::even(1)
+        );
+        assert_eq!(
+            RobustWeights::from_residuals(&[], 2),
+            RobustWeights::even(2)
+        );
     }
 }

@@ -1,6 +1,6 @@
 //! Albedo that varies over an object, where its pixels show more than one colour.
 
-use super::Ladder;
+use super::Pipeline;
 use crate::inverse::cache::evaluate::Linearised;
 use crate::inverse::cache::roles::Role;
 use crate::inverse::estimate::Estimate;
@@ -42,7 +42,7 @@ impl Detail {
     }
 }
 
-impl Ladder<'_, '_> {
+impl Pipeline<'_, '_> {
     /// Takes what the textures add out of the residuals, where that is known.
     pub(super) fn leave_textures_out(&self, clusters: &mut [Linearised]) {
         let offsets = self.detail.iter().flat_map(|detail| &detail.offsets);
@@ -60,7 +60,7 @@ impl Ladder<'_, '_> {
                 self.roles[k] == Role::Reflector && self.monitor.known.of(k).albedo.is_none()
             })
             .collect();
-        let unfitted = self.survey.unfitted(self.problem.photographs.len());
+        let unfitted = self.gbuffer.unfitted(self.problem.photographs.len());
         let settings = self.monitor.settings.clone();
         let sharpness = Sharpness::new(self.problem, &settings, &unfitted);
         let warnings = &mut self.monitor.progress.warnings;
@@ -71,7 +71,7 @@ impl Ladder<'_, '_> {
         );
         let task = Task {
             problem: self.problem,
-            survey: &self.survey,
+            gbuffer: &self.gbuffer,
             sharpness: &sharpness,
             settings: &settings,
             paths: self.budget.round_paths,
@@ -92,9 +92,9 @@ impl Ladder<'_, '_> {
             estimate,
             &objects,
             &judge,
-            &mut |rays, rejected, share| {
+            &mut |rays, rejected, fraction| {
                 monitor.cast(Cast { rays, rejected });
-                monitor.progress.fraction = Some(share as f32);
+                monitor.progress.fraction = Some(fraction as f32);
                 monitor.tick(estimate, &|_| checkpoint.clone())
             },
         );

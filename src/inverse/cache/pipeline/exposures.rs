@@ -1,23 +1,23 @@
 //! What was found out about the exposures of the photographs, in words.
 
-use super::Ladder;
+use super::Pipeline;
 use crate::inverse::exposure::Exposures;
 use crate::inverse::solver::Stage;
 use glam::{DVec2, Vec3};
 
-impl Ladder<'_, '_> {
+impl Pipeline<'_, '_> {
     /// Records what was found out about exposures.
     pub(super) fn tell_exposures(&mut self, exposures: &Exposures, started: f64) {
         let (least, most) = exposures.range();
-        let share = exposures.gain.max(0.0) * 100.0;
+        let fraction = exposures.gain.max(0.0) * 100.0;
         let mut why = if exposures.differ {
             format!(
-                "exposure and white balance of each photograph, {least:.2} to {most:.2} times their median, explain {share:.0} % of \
+                "exposure and white balance of each photograph, {least:.2} to {most:.2} times their median, explain {fraction:.0} % of \
                  how they disagree about surfaces that they share"
             )
         } else {
             format!(
-                "exposures would explain {share:.0} % of how the photographs disagree: they agree"
+                "exposures would explain {fraction:.0} % of how the photographs disagree: they agree"
             )
         };
         if let Some((vignetting, camera)) =

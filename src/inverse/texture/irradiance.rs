@@ -20,7 +20,7 @@ const KEY: u64 = 5 << 59;
 /// Averagings over neighbours that give the level against which differences count.
 const LEVELLING: u32 = 40;
 /// Least level, in means over the object.
-const LEAST_LEVEL: f32 = 1e-2;
+const MIN_LEVEL: f32 = 1e-2;
 /// Strengths of smoothing that are tried, strongest first.
 const STRENGTHS: [f32; 9] = [8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.12, 0.06, 0.03];
 /// Worse strengths in a row that end the search.
@@ -29,7 +29,7 @@ const PATIENCE: u32 = 2;
 /// What cells would send along their normals if they were white, below their lobe where they have one, as two independent
 /// sets of paths found it.
 #[derive(Debug, Clone, Default)]
-pub struct Received {
+pub struct Irradiance {
     /// One value a cell in each set.
     pub sets: [Vec<Vec3>; 2],
     /// Rays cast.
@@ -56,7 +56,7 @@ pub fn trace(
     options: &PathOptions,
     seed: u64,
     key: u64,
-) -> Received {
+) -> Irradiance {
     let traced: Vec<([Vec3; 2], u64, u64)> = range
         .into_par_iter()
         .map(|cell| {
@@ -78,15 +78,15 @@ pub fn trace(
             (sets, rays, rejected)
         })
         .collect();
-    let mut received = Received::default();
+    let mut irradiance = Irradiance::default();
     for (sets, rays, rejected) in traced {
-        for (all, value) in received.sets.iter_mut().zip(sets) {
+        for (all, value) in irradiance.sets.iter_mut().zip(sets) {
             all.push(value);
         }
-        received.rays += rays;
-        received.rejected += rejected;
+        irradiance.rays += rays;
+        irradiance.rejected += rejected;
     }
-    received
+    irradiance
 }
 
 /// A point uniform in area on a cell, and the normal of its seen side.
@@ -122,7 +122,7 @@ fn point_on(lit: &Lit, cells: &Cells, cell: usize, stream: &mut Stream) -> (Hit,
     (hit, if front { normal } else { -normal })
 }
 
-impl Received {
+impl Irradiance {
     /// Adds the cells that follow.
     pub fn append(&mut self, other: Self) {
         for (all, more) in self.sets.iter_mut().zip(other.sets) {
@@ -206,12 +206,12 @@ fn levelled(values: &[Vec3], links: &Links) -> Vec<Vec3> {
     level
 }
 
-/// Luminance around each cell, nowhere below a small share of the mean over all.
+/// Luminance around each cell, nowhere below a small fraction of the mean over all.
 fn levels(values: &[Vec3], links: &Links) -> Vec<f32> {
     let around: Vec<f32> = levelled(values, links)
         .iter()
         .map(|v| luminance(*v))
         .collect();
-    let least = (mean(&around) * LEAST_LEVEL).max(f32::MIN_POSITIVE.sqrt());
+    let least = (mean(&around) * MIN_LEVEL).max(f32::MIN_POSITIVE.sqrt());
     around.iter().map(|l| l.max(least)).collect()
 }

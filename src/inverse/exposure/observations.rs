@@ -1,21 +1,21 @@
 //! What the photographs show of the surfaces that they share.
 
 use crate::capture::exposure::Vignetting;
+use crate::inverse::gbuffer::{GBuffer, GBufferPixel};
 use crate::inverse::measured::cell_key;
 use crate::inverse::solver::Problem;
-use crate::inverse::survey::{Survey, SurveyedPixel};
 use crate::math::stats::quantile;
 use glam::{DVec2, DVec3};
 use std::collections::BTreeMap;
 
 /// Width of a surface cell in pixel footprints.
 const CELL_FOOTPRINTS: f32 = 4.0;
-/// Pixels darker than this share of the photographs' median level hold mostly noise.
+/// Pixels darker than this fraction of the photographs' median level hold mostly noise.
 const ABOVE_NOISE: f64 = 0.1;
 
 /// The mean logarithm of what one photograph shows of one surface cell.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sight {
+pub(super) struct Observation {
     pub frame: usize,
     /// The cell's key, which is a hash.
     pub cell: u64,
@@ -28,10 +28,10 @@ pub(super) struct Sight {
 
 /// What the photographs show of the cells, in order of cells.
 #[derive(Debug, Default)]
-pub struct Sights {
-    pub(super) fitted: Vec<Sight>,
+pub struct Observations {
+    pub(super) fitted: Vec<Observation>,
     /// Of photographs that are kept out of every fit: these are compared with the others, and the others not with them.
-    pub(super) held_out: Vec<Sight>,
+    pub(super) held_out: Vec<Observation>,
 }
 
 /// Sums over the pixels of a photograph that see a cell.
@@ -42,24 +42,24 @@ struct Sums {
     count: f64,
 }
 
-impl Sights {
+impl Observations {
     /// Compares pixels of one surface, neither saturated nor dark, held-out ones of whole photographs alone.
-    pub fn new(problem: &Problem, survey: &Survey) -> Self {
-        let size = survey.footprint * CELL_FOOTPRINTS;
+    pub fn new(problem: &Problem, gbuffer: &GBuffer) -> Self {
+        let size = gbuffer.footprint * CELL_FOOTPRINTS;
         if size <= 0.0 {
             return Self::default();
         }
-        let held_out = survey.unfitted(problem.photographs.len());
-        let value = |p: &SurveyedPixel| {
+        let held_out = gbuffer.unfitted(problem.photographs.len());
+        let value = |p: &GBufferPixel| {
             problem.photographs[p.frame as usize].pixels[p.pixel as usize].as_dvec3()
         };
-        let usable = |p: &&SurveyedPixel| {
+        let usable = |p: &&GBufferPixel| {
             let photograph = &problem.photographs[p.frame as usize];
             p.pure
                 && p.held_out == held_out[p.frame as usize]
                 && !photograph.is_saturated(p.pixel as usize)
         };
-        let mut levels: Vec<f64> = (survey.pixels.iter().filter(usable))
+        let mut levels: Vec<f64> = (gbuffer.pixels.iter().filter(usable))
             .filter(|p| !p.held_out)
             .map(|p| value(p).max_element())
             .collect();
@@ -67,7 +67,7 @@ impl Sights {
             (quantile(&mut levels, 0.5).unwrap_or(0.0) * ABOVE_NOISE).max(f64::MIN_POSITIVE);
 
         let mut sums: BTreeMap<(u64, u32), Sums> = BTreeMap::new();
-        for pixel in survey.pixels.iter().filter(usable) {
+        for pixel in gbuffer.pixels.iter().filter(usable) {
             let value = value(pixel);
             if value.min_element() < least {
                 continue;
@@ -84,26 +84,28 @@ impl Sights {
                 sum.count += 1.0;
             }
         }
-        let sight = |((cell, frame), sum): ((u64, u32), Sums)| Sight {
+        let observation = |((cell, frame), sum): ((u64, u32), Sums)| Observation {
             frame: frame as usize,
             cell,
             level: (sum.value / sum.count).map(f64::ln),
             off_axis: sum.off_axis / sum.count,
             full: (problem.photographs[frame as usize].saturation.as_dvec3()).map(f64::ln),
         };
-        let (held_out, fitted) = (sums.into_iter().map(sight)).partition(|s| held_out[s.frame]);
+        let (held_out, fitted) =
+            (sums.into_iter().map(observation)).partition(|s| held_out[s.frame]);
         Self { fitted, held_out }
     }
 
     /// Forgets what a photograph shows.
     pub(super) fn forget(&mut self, frame: usize) {
-        self.fitted.retain(|sight| sight.frame != frame);
-        self.held_out.retain(|sight| sight.frame != frame);
+        self.fitted.retain(|observation| observation.frame != frame);
+        self.held_out
+            .retain(|observation| observation.frame != frame);
     }
 }
 
-/// The sights of cells that at least two photographs see.
-pub(super) fn shared(sights: &[Sight]) -> Vec<Sight> {
-    let cells = sights.chunk_by(|a, b| a.cell == b.cell);
+/// The observations of cells that at least two photographs see.
+pub(super) fn shared(observations: &[Observation]) -> Vec<Observation> {
+    let cells = observations.chunk_by(|a, b| a.cell == b.cell);
     (cells.filter(|cell| cell.len() > 1).flatten().copied()).collect()
 }

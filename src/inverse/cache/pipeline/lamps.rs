@@ -1,10 +1,10 @@
 //! Which objects give light: tests on traced paths, and how light samples are shared out.
 
-use super::Ladder;
+use super::Pipeline;
 use crate::inverse::cache::PathCache;
+use crate::inverse::cache::classify::classify;
 use crate::inverse::cache::errors::{Released, release};
 use crate::inverse::cache::fit::Fit;
-use crate::inverse::cache::judge::judge;
 use crate::inverse::cache::roles::Role;
 use crate::inverse::solver::Termination;
 use crate::math::color::luminance;
@@ -14,14 +14,14 @@ use glam::Vec3;
 /// χ² (three channels) above which a light is there, and below which it is not.
 pub(super) const SIGNIFICANT: f64 = 25.0;
 /// Rounds of changing roles at most.
-const MOST_CHANGES: usize = 8;
-/// A glow below this share of an object's photographed radiance is no light but a shortcoming of the model.
+const MAX_CHANGES: usize = 8;
+/// A glow below this fraction of an object's photographed radiance is no light but a shortcoming of the model.
 const FAINT: f32 = 0.1;
-/// Share of the light samples that go to all objects, whatever is known of their light: half by area, half by number, or a bulb
+/// Fraction of the light samples that go to all objects, whatever is known of their light: half by area, half by number, or a bulb
 /// that no photograph sees would get none.
 const EXPLORATION: f64 = 0.05;
 
-impl Ladder<'_, '_> {
+impl Pipeline<'_, '_> {
     /// What the paths say of light from objects that are held dark.
     pub(super) fn test_dark(&mut self, cache: &PathCache) -> Vec<Released> {
         let objects = self.roles.len();
@@ -34,7 +34,7 @@ impl Ladder<'_, '_> {
                 })
                 .map(|k| objects + k),
         );
-        let equations = cache.normal_equations(&self.unknowns, &free, &self.trust, &self.prior);
+        let equations = cache.normal_equations(&self.unknowns, &free, &self.robust, &self.prior);
         let released = release(&equations, &free, active);
         for test in &released {
             self.errors.emission[test.index - objects] =
@@ -80,9 +80,9 @@ impl Ladder<'_, '_> {
     ) -> Result<(), Termination> {
         self.take_values(&fitted);
         let mut returned = vec![false; self.roles.len()];
-        for _ in 0..MOST_CHANGES {
+        for _ in 0..MAX_CHANGES {
             let mut changed = false;
-            for change in judge(cache, &self.unknowns, &self.roles) {
+            for change in classify(cache, &self.unknowns, &self.roles) {
                 let k = change.object;
                 let role = self.allowed(k, change.role);
                 // What has gone both ways is left a reflector; what is known, what it is.
@@ -119,7 +119,7 @@ impl Ladder<'_, '_> {
         let objects = self.roles.len();
         let in_mesh = self.problem.scene.objects.len();
         let mut added = Vec::new();
-        while added.len() < MOST_CHANGES {
+        while added.len() < MAX_CHANGES {
             let tested = self.test_dark(cache);
             let open = |test: &Released| {
                 let k = test.index - objects;
@@ -173,7 +173,7 @@ impl Ladder<'_, '_> {
         .collect()
     }
 
-    /// Weights with a share spread over all objects that have an area.
+    /// Weights with a fraction spread over all objects that have an area.
     pub(super) fn explore(&self, weights: Vec<f64>) -> Vec<f64> {
         let objects = &self.problem.scene.objects;
         let extended: Vec<usize> = (0..objects.len())

@@ -3,9 +3,9 @@
 //! A diffuse spot looks the same from everywhere whatever its colour, so what differs between photographs of one spot
 //! speaks of gloss and never of texture.
 
+use crate::inverse::gbuffer::GBuffer;
 use crate::inverse::measured::cell_key;
 use crate::inverse::solver::Problem;
-use crate::inverse::survey::Survey;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -14,7 +14,7 @@ const SPOT_FOOTPRINTS: f32 = 3.0;
 
 /// The pixels of one photograph that see one spot.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sight {
+pub struct SpotObservation {
     /// Frame index.
     pub frame: u32,
     /// Row by row from the top left.
@@ -25,23 +25,23 @@ pub struct Sight {
     pub held_out: bool,
 }
 
-/// A spot's sights; those in the fit come first.
-pub type Spot = Vec<Sight>;
+/// A spot's observations; those in the fit come first.
+pub type Spot = Vec<SpotObservation>;
 
 /// Photographs in the fit that see a spot.
-pub fn views(spot: &[Sight]) -> usize {
+pub fn views(spot: &[SpotObservation]) -> usize {
     spot.iter().filter(|s| !s.held_out).count()
 }
 
 /// The spots of each object, in an order that has nothing to do with where they lie.
-pub fn spots(problem: &Problem, survey: &Survey) -> Vec<Vec<Spot>> {
+pub fn spots(problem: &Problem, gbuffer: &GBuffer) -> Vec<Vec<Spot>> {
     let mut of_object = vec![Vec::new(); problem.scene.objects.len()];
-    let size = survey.footprint * SPOT_FOOTPRINTS;
+    let size = gbuffer.footprint * SPOT_FOOTPRINTS;
     if size <= 0.0 {
         return of_object;
     }
     let value = |frame: u32, pixel: u32| problem.photographs[frame as usize].pixels[pixel as usize];
-    let mut seen: Vec<(u32, u64, bool, u32, u32)> = (survey.pixels.par_iter())
+    let mut seen: Vec<(u32, u64, bool, u32, u32)> = (gbuffer.pixels.par_iter())
         .filter(|p| p.pure && !problem.photographs[p.frame as usize].is_saturated(p.pixel as usize))
         .filter_map(|p| {
             let point = p.points.iter().flatten().next()?;
@@ -51,11 +51,11 @@ pub fn spots(problem: &Problem, survey: &Survey) -> Vec<Vec<Spot>> {
         .collect();
     seen.par_sort_unstable();
     for spot in seen.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-        let sights = spot.chunk_by(|a, b| (a.2, a.3) == (b.2, b.3)).map(|own| {
+        let observations = spot.chunk_by(|a, b| (a.2, a.3) == (b.2, b.3)).map(|own| {
             let pixels: Vec<u32> = own.iter().map(|s| s.4).collect();
             let frame = own[0].3;
             let sum: DVec3 = (pixels.iter()).map(|&p| value(frame, p).as_dvec3()).sum();
-            Sight {
+            SpotObservation {
                 frame,
                 measured: sum / pixels.len() as f64,
                 pixels,
@@ -63,16 +63,16 @@ pub fn spots(problem: &Problem, survey: &Survey) -> Vec<Vec<Spot>> {
             }
         });
         if let Some(spots) = of_object.get_mut(spot[0].0 as usize) {
-            spots.push(sights.collect());
+            spots.push(observations.collect());
         }
     }
     of_object
 }
 
-/// Spots with up to about `most` sights in the fit, those that several photographs see first.
-pub fn choose(spots: &[Spot], least_views: usize, most: usize) -> Vec<&Spot> {
-    let several = spots.iter().filter(|s| views(s) >= 2.max(least_views));
-    let single = (spots.iter()).filter(|s| views(s) == 1 && least_views <= 1);
+/// Spots with up to about `most` observations in the fit, those that several photographs see first.
+pub fn choose(spots: &[Spot], min_views: usize, most: usize) -> Vec<&Spot> {
+    let several = spots.iter().filter(|s| views(s) >= 2.max(min_views));
+    let single = (spots.iter()).filter(|s| views(s) == 1 && min_views <= 1);
     let mut count = 0;
     several
         .chain(single)

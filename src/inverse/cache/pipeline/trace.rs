@@ -1,11 +1,11 @@
 //! Tracing for the ladder: in slices, between which the observer hears, and within the memory that paths may take.
 
-use super::Ladder;
+use super::Pipeline;
 use crate::inverse::cache::PathCache;
 use crate::inverse::cache::clusters::{Cluster, cluster};
 use crate::inverse::cache::evaluate::Linearised;
 use crate::inverse::cache::memory::{self, PILOT_CLUSTERS};
-use crate::inverse::cache::path_noise::share_paths;
+use crate::inverse::cache::path_noise::distribute_paths;
 use crate::inverse::cache::prior::ALBEDO_MEAN;
 use crate::inverse::cache::roles::Role;
 use crate::inverse::cache::trace::{Tracer, longest_mean_path};
@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 /// Work between two reports to the observer.
 const SLICE: Duration = Duration::from_millis(25);
 /// The paths of one slice take at most this part of the memory that stored ones may.
-const SLICE_SHARE: u64 = 8;
+const SLICE_FRACTION: u64 = 8;
 
 /// Paths of some clusters, both sets.
 fn paths(clusters: &[Cluster]) -> u64 {
@@ -28,7 +28,7 @@ fn paths(clusters: &[Cluster]) -> u64 {
     clusters.iter().map(of).sum()
 }
 
-impl Ladder<'_, '_> {
+impl Pipeline<'_, '_> {
     /// The clusters' paths, kept so that any unknowns can be tried on them: about as many as asked for, fewer where they
     /// would take more memory than they may, and what is to be said of that.
     pub(super) fn stored(
@@ -44,7 +44,7 @@ impl Ladder<'_, '_> {
         let believed = self.believed();
         if !memory::suffices(allowed, paths, longest_mean_path(self.brightest(&believed))) {
             // A few paths of the same kind tell how long they are.
-            share_paths(&mut self.clusters, surfaces, 0);
+            distribute_paths(&mut self.clusters, surfaces, 0);
             let step = self.clusters.len().div_ceil(PILOT_CLUSTERS).max(1);
             let pilot: Vec<_> = self.clusters.iter().step_by(step).cloned().collect();
             let pilot = self
@@ -57,9 +57,9 @@ impl Ladder<'_, '_> {
         if fits < 2 * pixels as u64 {
             // A pixel has a path in each set; there is no room for that.
             let pixels = (fits / 2).min(self.budget.pixels as u64);
-            self.clusters = cluster(self.problem, &self.survey, pixels as usize);
+            self.clusters = cluster(self.problem, &self.gbuffer, pixels as usize);
         }
-        share_paths(&mut self.clusters, surfaces, fits);
+        distribute_paths(&mut self.clusters, surfaces, fits);
         let mut cache = PathCache::default();
         self.slices(lights, measured, stage, 0, |slice| cache.append(slice))?;
         let limit = match fits < paths {
@@ -134,7 +134,7 @@ impl Ladder<'_, '_> {
         mut take: impl FnMut(PathCache),
     ) -> Result<(), Termination> {
         let believed = self.believed();
-        let most = memory::allowed(self.monitor.settings.memory) / SLICE_SHARE;
+        let most = memory::allowed(self.monitor.settings.memory) / SLICE_FRACTION;
         let longest = longest_mean_path(self.brightest(&believed));
         let mut next = 0;
         let mut slice = 16;

@@ -1,13 +1,13 @@
 //! Rounds of independent paths, added up until the reported errors are small enough or no longer the paths'.
 
-use super::Ladder;
+use super::Pipeline;
 use crate::inverse::cache::accumulate::Accumulated;
 use crate::inverse::cache::errors::{StandardErrors, jackknifed, standard_errors};
 use crate::inverse::cache::evaluate::Linearised;
 use crate::inverse::cache::lamp_albedo;
 use crate::inverse::cache::lamp_patches::LampPatches;
 use crate::inverse::cache::linear::{Descended, descend};
-use crate::inverse::cache::path_noise::{self, share_paths};
+use crate::inverse::cache::path_noise::{self, distribute_paths};
 use crate::inverse::cache::roles::{self, Role};
 use crate::inverse::estimate::{ENOUGH_PIXELS, relative_to_albedo};
 use crate::inverse::parameters::Unknowns;
@@ -17,17 +17,17 @@ use crate::transport::emitters::Emitters;
 use crate::transport::path::PathOptions;
 use glam::Vec3;
 
-/// A step asks for linearising anew where its square is more than this share of a standard error.
+/// A step asks for linearising anew where its square is more than this fraction of a standard error.
 const NONLINEAR: f32 = 0.3;
-/// Emissions whose standard error is below this share of them are well known.
+/// Emissions whose standard error is below this fraction of them are well known.
 const WELL_KNOWN: f32 = 0.3;
-/// What the paths add to an error is negligible below this share of it: without them it would be 6 % less.
+/// What the paths add to an error is negligible below this fraction of it: without them it would be 6 % less.
 const NEGLIGIBLE: f64 = 1.0 / 3.0;
 /// Levels that clusters are weighed by take this part of the paths of a round.
 const PREDICTING: u64 = 4;
 /// So many go to each cluster besides, or its part of those of a whole round: by a dozen paths a pixel beside a lamp may seem
 /// dark, and would then weigh more than all others.
-const LEAST_PREDICTING: u64 = 256;
+const MIN_PREDICTING: u64 = 256;
 /// What arrives at lamps takes this part of them.
 const LIGHTING_LAMPS: u64 = 32;
 /// Textures are no worse for light that is no better known than this: a single pixel knows them to some per cent. Small objects
@@ -83,7 +83,7 @@ pub(super) struct Aim {
     pub tail: f64,
 }
 
-impl Ladder<'_, '_> {
+impl Pipeline<'_, '_> {
     /// Third stage: rounds of independent paths, added up until the reported errors are small enough; textures as soon as
     /// errors are small enough for them, or after some rounds, however many more are to come.
     pub(super) fn refine(&mut self) -> Result<Termination, Termination> {
@@ -110,7 +110,7 @@ impl Ladder<'_, '_> {
         let lights = self.lights();
         self.patches = LampPatches::new(&self.problem.scene, &self.roles);
         self.weigh_by_prediction(&lights)?;
-        share_paths(
+        distribute_paths(
             &mut self.clusters,
             self.roles.len(),
             self.budget.round_paths,
@@ -150,8 +150,8 @@ impl Ladder<'_, '_> {
             let mut clusters = rounds.mean(&self.roles);
             self.leave_textures_out(&mut clusters);
             let found = self.descend(clusters, &rounds.about);
-            self.trust = found.trust;
-            self.path_noise = path_noise::shares(&found.clusters, self.roles.len());
+            self.robust = found.robust;
+            self.path_noise = path_noise::fractions(&found.clusters, self.roles.len());
             // Textures stand for what was found about the first point.
             let may_restart = self.detail.is_none() && round < most.min(self.budget.rounds) / 4;
             let far = may_restart && is_nonlinear(&rounds.about, &self.unknowns, &self.errors);
@@ -164,8 +164,8 @@ impl Ladder<'_, '_> {
                 continue;
             }
             let reported = self.reported();
-            let share = (aim.median / reported.all[0]).powi(2);
-            self.monitor.progress.fraction = Some(share.min(1.0) as f32);
+            let fraction = (aim.median / reported.all[0]).powi(2);
+            self.monitor.progress.fraction = Some(fraction.min(1.0) as f32);
             if reported.is_enough([aim.median, aim.tail]) {
                 outcome = Termination::Converged;
                 break;
@@ -196,7 +196,7 @@ impl Ladder<'_, '_> {
         let equations = jackknifed(
             found.equations.clone(),
             &found.clusters,
-            &found.trust,
+            &found.robust,
             &free,
         );
         let errors = standard_errors(&equations, &free, self.roles.len());
@@ -248,9 +248,9 @@ impl Ladder<'_, '_> {
     /// Weighs the clusters by what a few paths of their own predict, of which those of the rounds are independent.
     fn weigh_by_prediction(&mut self, lights: &Emitters) -> Result<(), Termination> {
         let paths = self.budget.round_paths / PREDICTING;
-        share_paths(&mut self.clusters, self.roles.len(), paths);
+        distribute_paths(&mut self.clusters, self.roles.len(), paths);
         let least =
-            (self.budget.round_paths / self.clusters.len().max(1) as u64).min(LEAST_PREDICTING);
+            (self.budget.round_paths / self.clusters.len().max(1) as u64).min(MIN_PREDICTING);
         for cluster in &mut self.clusters {
             let a_pixel = least.div_ceil(2 * cluster.pixels.len() as u64);
             cluster.paths = cluster.paths.max(a_pixel as u32);
@@ -266,7 +266,12 @@ impl Ladder<'_, '_> {
     fn reported(&self) -> Reported {
         let counted: Vec<usize> = (0..self.roles.len())
             .filter(|&k| self.roles[k].reflects())
-            .filter(|&k| self.survey.seen.get(k).is_some_and(|&n| n >= ENOUGH_PIXELS))
+            .filter(|&k| {
+                self.gbuffer
+                    .seen
+                    .get(k)
+                    .is_some_and(|&n| n >= ENOUGH_PIXELS)
+            })
             .collect();
         let quantiles = |error: &dyn Fn(usize) -> f64| {
             let mut errors: Vec<f64> = counted.iter().map(|&k| error(k)).collect();

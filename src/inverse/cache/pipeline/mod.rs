@@ -19,14 +19,15 @@ use super::evaluate::Linearised;
 use super::fit::{Fit, fit};
 use super::lamp_patches::LampPatches;
 use super::prior::{ExpectedAlbedo, Prior};
-use super::reached::Reached;
+use super::robust_weights::RobustWeights;
 use super::roles::{self, Role};
+use super::state::SolverState;
 use super::trace::OutsideGrid;
-use super::trust::Trust;
 use super::{PathCache, describe, model_error};
 use crate::error;
 use crate::inverse::estimate::Estimate;
-use crate::inverse::exposure::{Agreement, Exposures, Sights};
+use crate::inverse::exposure::{Exposures, Observations, OutlierFrames};
+use crate::inverse::gbuffer::GBuffer;
 use crate::inverse::loss::{LossProbe, Losses};
 use crate::inverse::monitor::Monitor;
 use crate::inverse::outside::MeasuredOutside;
@@ -34,7 +35,6 @@ use crate::inverse::overexposed;
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Problem, Solution, Stage, Termination};
-use crate::inverse::survey::Survey;
 use crate::transport::material::Lobe;
 use crate::transport::surroundings::Surroundings;
 use detail::Detail;
@@ -42,12 +42,12 @@ use glam::Vec3;
 use rounds::Summed;
 
 /// Gauss–Newton steps at most in one fit.
-const MOST_STEPS: u64 = 30;
+const MAX_STEPS: u64 = 30;
 /// Columns and rows of the map of light from outside.
 const OUTSIDE_WIDTH: usize = 12;
 const OUTSIDE_HEIGHT: usize = 6;
 /// Longest path in bounces of losses, textures, lobes and of what lamps reflect; those of the fits end by chance alone.
-const MOST_BOUNCES: u32 = 1000;
+const MAX_DEPTH: u32 = 1000;
 /// Searches for lamps out of sight at most.
 const MAX_SEARCHES: usize = 3;
 /// Part of the mesh's area that a surface out of sight must have for its albedo to be fitted: what is smaller changes the light
@@ -57,11 +57,11 @@ const UNSEEN_AREA: f64 = 1e-3;
 const STAGES: u32 = 4;
 
 /// The state of a solve.
-pub struct Ladder<'a, 'o> {
+pub struct Pipeline<'a, 'o> {
     problem: &'a Problem,
     budget: Budget,
     monitor: Monitor<'o>,
-    survey: Survey,
+    gbuffer: GBuffer,
     clusters: Vec<Cluster>,
     widths: Vec<u32>,
     /// In square metres.
@@ -74,11 +74,11 @@ pub struct Ladder<'a, 'o> {
     /// What is known of it from pixels that see it, if light comes from there.
     sky: Option<MeasuredOutside>,
     roles: Vec<Role>,
-    trust: Trust,
+    robust: RobustWeights,
     prior: Prior,
     /// Of the lamps, once all of them are found.
     patches: LampPatches,
-    /// For each surface, the share of the paths' noise in its residuals.
+    /// For each surface, the fraction of the paths' noise in its residuals.
     path_noise: Vec<f64>,
     unknowns: Unknowns,
     errors: StandardErrors,
@@ -122,43 +122,45 @@ pub fn solve(
     let surfaces = objects + outside.surfaces();
     monitor.phase("looking through the pixels");
     let started = monitor.seconds();
-    let mut survey = Survey::new(problem, settings, budget.survey_pixels);
-    monitor.progress.rays += survey.rays;
-    let mut sights =
-        (settings.leave_out || settings.exposures).then(|| Sights::new(problem, &survey));
-    let poor = (sights.as_mut())
+    let mut gbuffer = GBuffer::new(problem, settings, budget.gbuffer_pixels);
+    monitor.progress.rays += gbuffer.rays;
+    let mut observations =
+        (settings.leave_out || settings.exposures).then(|| Observations::new(problem, &gbuffer));
+    let outliers = (observations.as_mut())
         .filter(|_| settings.leave_out)
-        .and_then(|sights| Agreement::new(sights, problem.photographs.len()))
-        .filter(|agreement| !agreement.poor.is_empty());
-    let agreeing = poor.as_ref().map(|poor| poor.without_poor(problem));
+        .and_then(|observations| OutlierFrames::new(observations, problem.photographs.len()))
+        .filter(|outliers| !outliers.outliers.is_empty());
+    let agreeing = outliers
+        .as_ref()
+        .map(|outliers| outliers.without_outliers(problem));
     let problem = agreeing.as_ref().unwrap_or(problem);
-    if let Some(poor) = poor {
-        survey = Survey::new(problem, settings, budget.survey_pixels);
-        monitor.progress.rays += survey.rays;
-        monitor.progress.warnings = poor.remarks();
+    if let Some(outliers) = outliers {
+        gbuffer = GBuffer::new(problem, settings, budget.gbuffer_pixels);
+        monitor.progress.rays += gbuffer.rays;
+        monitor.progress.warnings = outliers.remarks();
     }
-    let exposures = (sights.as_ref())
+    let exposures = (observations.as_ref())
         .filter(|_| settings.exposures)
-        .and_then(|sights| Exposures::new(problem, sights));
+        .and_then(|observations| Exposures::new(problem, observations));
     let needed = exposures.as_ref().filter(|e| e.needed());
     let undone = needed.map(|exposures| exposures.undone(problem));
     let problem = undone.as_ref().unwrap_or(problem);
     // Of a mesh that is no scan the mixtures at outlines are known.
     let bounded = match problem.scene.scanned {
-        true => overexposed::bounded(problem, &survey),
+        true => overexposed::bounded(problem, &gbuffer),
         false => None,
     };
     let problem = bounded.as_ref().unwrap_or(problem);
-    let max_bounces = settings.max_bounces().min(MOST_BOUNCES);
-    let clusters = cluster(problem, &survey, budget.pixels);
+    let max_bounces = settings.max_bounces().min(MAX_DEPTH);
+    let clusters = cluster(problem, &gbuffer, budget.pixels);
     let prior = Prior::new(surfaces, objects, mean_radiance(&clusters))
         .with_known(&monitor.known)
-        .with_albedo(ExpectedAlbedo::unknown(surfaces, &survey.seen));
+        .with_albedo(ExpectedAlbedo::unknown(surfaces, &gbuffer.seen));
     let start = match resume {
         Some(checkpoint) => {
-            checkpoint.state(|reached: &Reached| reached.fits(surfaces, outside.surfaces()))?
+            checkpoint.state(|state: &SolverState| state.fits(surfaces, outside.surfaces()))?
         }
-        None => Reached::new(
+        None => SolverState::new(
             0,
             false,
             &prior,
@@ -174,11 +176,11 @@ pub fn solve(
     let mut lobes = start.lobes();
     lobes.resize(objects, None);
     let sky = (start.open)
-        .then(|| MeasuredOutside::new(problem, &survey, start.surroundings))
+        .then(|| MeasuredOutside::new(problem, &gbuffer, start.surroundings))
         .flatten();
     let expected = (start.expected.clone()).unwrap_or_else(|| prior.albedo().clone());
     let prior = (prior.with_albedo(expected)).with_directions(start.directions.clone());
-    let mut ladder = Ladder {
+    let mut pipeline = Pipeline {
         problem,
         budget,
         losses: LossProbe::new(problem, settings, 400, 16, max_bounces),
@@ -188,7 +190,7 @@ pub fn solve(
         open: start.open,
         brightness: brightness(&clusters, surfaces),
         clusters,
-        survey,
+        gbuffer,
         widths: problem.photographs.iter().map(|p| p.width).collect(),
         mesh_area: problem.scene.objects.iter().map(|o| o.area).sum(),
         max_bounces,
@@ -199,7 +201,7 @@ pub fn solve(
         errors: start.errors(),
         model_variance: start.model_variance,
         roles: start.roles,
-        trust: Trust::even(surfaces),
+        robust: RobustWeights::even(surfaces),
         prior,
         patches: LampPatches::default(),
         path_noise: vec![1.0; surfaces],
@@ -211,22 +213,22 @@ pub fn solve(
         detail: None,
         stages: start.stages,
     };
-    ladder.hold();
-    ladder.describe();
+    pipeline.hold();
+    pipeline.describe();
     if let Some(exposures) = exposures.filter(|_| resume.is_none()) {
-        ladder.tell_exposures(&exposures, started);
+        pipeline.tell_exposures(&exposures, started);
     }
-    let termination = match ladder.run() {
+    let termination = match pipeline.run() {
         Ok(termination) | Err(termination) => termination,
     };
-    Ok(ladder.finish(termination))
+    Ok(pipeline.finish(termination))
 }
 
-impl Ladder<'_, '_> {
+impl Pipeline<'_, '_> {
     fn run(&mut self) -> Result<Termination, Termination> {
         if self.stages < 1 {
             self.light_field()?;
-            self.reached(1);
+            self.state(1);
             self.tell()?;
         }
         if self.budget.round_paths == 0 {
@@ -235,7 +237,7 @@ impl Ladder<'_, '_> {
         if self.stages < 2 {
             self.objects()?;
             self.tell_depth();
-            self.reached(2);
+            self.state(2);
             self.tell()?;
         }
         if self.stages < 3 {
@@ -244,12 +246,12 @@ impl Ladder<'_, '_> {
                 // Paths and textures are found under them.
                 self.settle_lobes(0)?;
             }
-            self.reached(3);
+            self.state(3);
             self.tell()?;
         }
         let ended = self.refine()?;
         self.settle_lobes(1)?;
-        self.reached(STAGES);
+        self.state(STAGES);
         Ok(ended)
     }
 
@@ -305,7 +307,7 @@ impl Ladder<'_, '_> {
         let (cache, limit) = self.stored(&lights, None, 1, self.budget.round_paths)?;
         self.monitor.phase("fitting albedo and emission");
         // Tests of roles weigh all alike: whatever the residuals of a wrong role say is no measure of trust.
-        self.trust = Trust::even(self.roles.len());
+        self.robust = RobustWeights::even(self.roles.len());
         let fitted = self.fit(&cache)?;
         self.settle_roles(&cache, fitted)?;
         Ok((cache, limit))
@@ -321,7 +323,7 @@ impl Ladder<'_, '_> {
     /// Whether a surface's albedo is fitted, if it is no lamp: where photographs see it, or where so much of it is out of sight
     /// that what it reflects counts.
     fn has_free_albedo(&self, k: usize) -> bool {
-        match self.survey.seen.get(k) {
+        match self.gbuffer.seen.get(k) {
             None => false,
             // What a lamp out of sight reflects cannot be told from its own light.
             Some(0) if self.stages == 0 || self.roles[k] == Role::Unseen => false,
@@ -337,9 +339,9 @@ impl Ladder<'_, '_> {
             cache,
             &self.unknowns,
             &free,
-            &self.trust,
+            &self.robust,
             &self.prior,
-            MOST_STEPS,
+            MAX_STEPS,
             |_| {
                 monitor.progress.iterations += 1;
                 monitor.tick(estimate, &|_| checkpoint.clone())
@@ -352,7 +354,7 @@ impl Ladder<'_, '_> {
     fn weigh(&mut self, cache: &PathCache) -> Result<(), Termination> {
         let residuals = cache.residuals(&self.unknowns);
         self.tell_model_error(&residuals);
-        self.trust = Trust::from_residuals(&residuals, self.roles.len());
+        self.robust = RobustWeights::from_residuals(&residuals, self.roles.len());
         let fitted = self.fit(cache)?;
         self.take(&fitted);
         Ok(())
@@ -399,7 +401,7 @@ impl Ladder<'_, '_> {
     fn describe(&mut self) {
         self.estimate = describe::estimate(
             &self.problem.scene,
-            &self.survey,
+            &self.gbuffer,
             &self.roles,
             &self.unknowns,
             &self.errors,
@@ -453,10 +455,10 @@ impl Ladder<'_, '_> {
     }
 
     /// Marks the end of a stage, from where a solve can be taken up again.
-    fn reached(&mut self, stages: u32) {
+    fn state(&mut self, stages: u32) {
         self.stages = stages;
         self.monitor.progress.seconds = self.monitor.seconds();
-        let mut reached = Reached::new(
+        let mut state = SolverState::new(
             stages,
             self.open,
             &self.prior,
@@ -465,9 +467,9 @@ impl Ladder<'_, '_> {
             &self.errors,
             &self.lobes,
         );
-        reached.model_variance = self.model_variance;
-        reached.surroundings = self.outside.surroundings;
-        self.checkpoint = Checkpoint::new(&self.monitor.progress, &reached);
+        state.model_variance = self.model_variance;
+        state.surroundings = self.outside.surroundings;
+        self.checkpoint = Checkpoint::new(&self.monitor.progress, &state);
     }
 
     fn finish(mut self, termination: Termination) -> Solution {

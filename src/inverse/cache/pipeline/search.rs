@@ -5,14 +5,14 @@
 //! candidate. Those that a linear step promises most of are tried, each with paths of its own and with all else fitted anew; the
 //! one that leaves least of the photographs unexplained is taken, and so on until none makes a difference that is sure.
 
-use super::Ladder;
+use super::Pipeline;
 use super::lamps::SIGNIFICANT;
 use crate::inverse::cache::PathCache;
 use crate::inverse::cache::errors::{Released, release};
 use crate::inverse::cache::evaluate::Linearised;
 use crate::inverse::cache::fit::Fit;
+use crate::inverse::cache::robust_weights::RobustWeights;
 use crate::inverse::cache::roles::Role;
-use crate::inverse::cache::trust::Trust;
 use crate::inverse::parameters::Unknowns;
 use crate::inverse::solver::Termination;
 use crate::math::stats::Moments;
@@ -49,7 +49,7 @@ impl Hypothesis {
     }
 }
 
-impl Ladder<'_, '_> {
+impl Pipeline<'_, '_> {
     /// Looks for lamps out of sight anew, as if the light field had said nothing of them; what it said stays where that explains
     /// the photographs as well.
     pub(super) fn search_anew(&mut self) -> Result<(), Termination> {
@@ -90,7 +90,7 @@ impl Ladder<'_, '_> {
         let weights = self.spread(self.light_weights(), &candidates, 1.0);
         let lights = Emitters::new(&self.problem.scene, &weights);
         let (explored, _) = self.stored(&lights, None, 5, paths)?;
-        self.trust = Trust::even(self.roles.len());
+        self.robust = RobustWeights::even(self.roles.len());
         let is_dark = self.unknowns.emission.iter().all(|&e| e == Vec3::ZERO);
         let mut found = false;
         for turn in 0..MAX_LAMPS {
@@ -126,7 +126,7 @@ impl Ladder<'_, '_> {
         at_first: bool,
     ) -> Vec<Released> {
         let surfaces = self.roles.len();
-        let most_tried = MAX_TRIED[usize::from(!at_first)];
+        let max_tried = MAX_TRIED[usize::from(!at_first)];
         let mut promising: Vec<Released> = Vec::new();
         let all = self.free();
         let light = all.iter().copied().filter(|&i| i >= surfaces).collect();
@@ -139,13 +139,13 @@ impl Ladder<'_, '_> {
             let active = free.len();
             free.extend(candidates.iter().map(|k| surfaces + k));
             let equations =
-                explored.normal_equations(&self.unknowns, &free, &self.trust, &self.prior);
+                explored.normal_equations(&self.unknowns, &free, &self.robust, &self.prior);
             let mut tests: Vec<Released> = (release(&equations, &free, active).into_iter())
                 .filter(|test| test.significance() > SIGNIFICANT)
                 .collect();
             tests.sort_by(|a, b| b.gain().total_cmp(&a.gain()).then(a.index.cmp(&b.index)));
             let most = tests.first().map_or(0.0, Released::gain);
-            tests.truncate(most_tried);
+            tests.truncate(max_tried);
             let is_new = |test: &Released| promising.iter().all(|p| p.index != test.index);
             tests.retain(|test| test.gain() > PROMISING * most && is_new(test));
             promising.extend(tests);

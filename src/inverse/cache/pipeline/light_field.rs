@@ -1,15 +1,15 @@
 //! The first stage: each object fitted to the light that the photographs measured around it; light from outside.
 
-use super::Ladder;
+use super::Pipeline;
 use crate::inverse::cache::PathCache;
 use crate::inverse::cache::clusters::mean_radiance;
 use crate::inverse::cache::equations::NormalEquations;
 use crate::inverse::cache::errors::StandardErrors;
 use crate::inverse::cache::evaluate::Linearised;
-use crate::inverse::cache::fit::{LEAST_DAMPING, propose};
+use crate::inverse::cache::fit::{MIN_DAMPING, propose};
 use crate::inverse::cache::prior::{ExpectedAlbedo, Prior};
+use crate::inverse::cache::robust_weights::RobustWeights;
 use crate::inverse::cache::roles::{self, Role};
-use crate::inverse::cache::trust::Trust;
 use crate::inverse::loss::Losses;
 use crate::inverse::measured::MeasuredRadiance;
 use crate::inverse::outside::MeasuredOutside;
@@ -20,15 +20,15 @@ use crate::transport::emitters::Emitters;
 use crate::transport::surroundings::Surroundings;
 use glam::{DVec3, Vec3};
 
-/// Share of paths that must leave the mesh before light from outside is tried.
+/// Fraction of paths that must leave the mesh before light from outside is tried.
 const ESCAPING: f64 = 1e-3;
-/// Share of the held-out loss that light from outside must take away.
+/// Fraction of the held-out loss that light from outside must take away.
 const OUTSIDE_GAIN: f64 = 0.03;
 /// Relative error of albedo that the light field's resolution is trusted to stay below, where edges blur: a
 /// cautious assumption until full paths have replaced it.
 const LIGHT_FIELD_BIAS: f32 = 0.01;
 /// No albedo is held closer than this.
-const LEAST_DEVIATION: f32 = 1e-3;
+const MIN_DEVIATION: f32 = 1e-3;
 
 /// The outcome of a trial of light from outside.
 #[derive(Clone)]
@@ -36,7 +36,7 @@ struct Found {
     roles: Vec<Role>,
     unknowns: Unknowns,
     errors: StandardErrors,
-    trust: Trust,
+    robust: RobustWeights,
     prior: Prior,
     surroundings: Surroundings,
     open: bool,
@@ -54,13 +54,13 @@ fn fall(before: Losses, after: Losses) -> f64 {
     }
 }
 
-impl Ladder<'_, '_> {
+impl Pipeline<'_, '_> {
     /// First stage: paths end where a photograph measured the radiance, so each object is nearly a linear fit of its
     /// own: what it sends against what it receives.
     pub(super) fn light_field(&mut self) -> Result<(), Termination> {
         let started = self.monitor.seconds();
         self.monitor.phase("gathering light from the photographs");
-        let measured = MeasuredRadiance::new(self.problem, &self.survey);
+        let measured = MeasuredRadiance::new(self.problem, &self.gbuffer);
 
         // Light samples go where the photographs are bright: in proportion to area × radiance².
         let scene = &self.problem.scene;
@@ -85,7 +85,7 @@ impl Ladder<'_, '_> {
             self.lamps()
         );
         let closed = self.record("light field", started, true, why)?;
-        let escaping = cache.share_ending_on(self.outside.first);
+        let escaping = cache.fraction_ending_on(self.outside.first);
         if escaping > ESCAPING && self.monitor.settings.outside_light {
             self.light_from_outside(&cache, &lights, &measured, escaping, closed)?;
         }
@@ -100,11 +100,11 @@ impl Ladder<'_, '_> {
         if !self.open {
             return;
         }
-        let mut expected = ExpectedAlbedo::unknown(self.roles.len(), &self.survey.seen);
+        let mut expected = ExpectedAlbedo::unknown(self.roles.len(), &self.gbuffer.seen);
         for (k, role) in self.roles.iter().enumerate() {
             if *role == Role::Reflector {
                 let deviation = &mut expected.deviation[k];
-                *deviation = self.errors.albedo[k].clamp(Vec3::splat(LEAST_DEVIATION), *deviation);
+                *deviation = self.errors.albedo[k].clamp(Vec3::splat(MIN_DEVIATION), *deviation);
                 expected.mean[k] = self.unknowns.albedo[k];
             }
         }
@@ -115,11 +115,11 @@ impl Ladder<'_, '_> {
     /// fitted where `outside` is [`Role::Unseen`].
     fn tell_lamps(&mut self, cache: &PathCache, outside: Role) -> Result<(), Termination> {
         self.unknowns = Unknowns::new(self.roles.len());
-        self.trust = Trust::even(self.roles.len());
+        self.robust = RobustWeights::even(self.roles.len());
         // Lamps in view first: taken for white walls they would call for light upon them from whatever is out of sight.
         for out_of_sight in [Role::Dark, Role::Unseen] {
             for (k, role) in self.roles.iter_mut().enumerate() {
-                match self.survey.seen.get(k) {
+                match self.gbuffer.seen.get(k) {
                     Some(0) => *role = out_of_sight,
                     Some(_) if out_of_sight == Role::Dark => *role = Role::Reflector,
                     Some(_) => {}
@@ -215,7 +215,7 @@ impl Ladder<'_, '_> {
     ) -> Result<Losses, Termination> {
         self.open = true;
         self.outside.surroundings = surroundings;
-        self.sky = MeasuredOutside::new(self.problem, &self.survey, surroundings);
+        self.sky = MeasuredOutside::new(self.problem, &self.gbuffer, surroundings);
         self.expect_of_outside();
         let paths = self.budget.light_field_paths;
         let as_stored = self.sky.is_none() && surroundings == Surroundings::Far;
@@ -255,7 +255,7 @@ impl Ladder<'_, '_> {
             roles: self.roles.clone(),
             unknowns: self.unknowns.clone(),
             errors: self.errors.clone(),
-            trust: self.trust.clone(),
+            robust: self.robust.clone(),
             prior: self.prior.clone(),
             surroundings: self.outside.surroundings,
             open: self.open,
@@ -268,7 +268,7 @@ impl Ladder<'_, '_> {
         self.roles = found.roles;
         self.unknowns = found.unknowns;
         self.errors = found.errors;
-        self.trust = found.trust;
+        self.robust = found.robust;
         self.prior = found.prior;
         self.outside.surroundings = found.surroundings;
         self.open = found.open;
@@ -289,16 +289,16 @@ impl Ladder<'_, '_> {
         self.prior = self.prior.clone().with_outside_found(found, color);
     }
 
-    /// The share of the clusters' squared residuals that one linear step takes away once light from every direction
+    /// The fraction of the clusters' squared residuals that one linear step takes away once light from every direction
     /// outside is free. The fall is measured across the two sets of paths, so that fitting their noise gains nothing.
     fn outside_gain(&self, cache: &PathCache) -> f64 {
         let surfaces = self.roles.len();
         let mut free = self.free();
         free.extend(surfaces + self.outside.first as usize..2 * surfaces);
         let linearised = cache.linearise(&self.unknowns, &roles::places(&free, surfaces), &[]);
-        let even = Trust::even(surfaces);
+        let even = RobustWeights::even(surfaces);
         let equations = NormalEquations::new(&linearised, free.len(), &even, &self.prior);
-        let (after, _) = propose(&equations, &free, &self.unknowns, LEAST_DAMPING);
+        let (after, _) = propose(&equations, &free, &self.unknowns, MIN_DAMPING);
         let steps: Vec<DVec3> = (free.iter())
             .map(|&i| (after.value(i) - self.unknowns.value(i)).as_dvec3())
             .collect();

@@ -5,12 +5,12 @@ mod scenes;
 use glam::{DVec3, Vec2, Vec3};
 use relit::inverse::cache::clusters::{Cluster, cluster};
 use relit::inverse::estimate::{Estimate, ObjectEstimate};
+use relit::inverse::gbuffer::{GBuffer, SurfacePoint};
 use relit::inverse::held_out::is_held_out;
 use relit::inverse::loss::LossProbe;
 use relit::inverse::measured::MeasuredRadiance;
 use relit::inverse::settings::Settings;
 use relit::inverse::solver::Problem;
-use relit::inverse::survey::{Survey, SurveyPoint};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -24,8 +24,8 @@ fn room() -> Problem {
     scenes::photographed(&capture, &materials, 4, 61)
 }
 
-fn survey(problem: &Problem) -> Survey {
-    Survey::new(problem, &Settings::default(), usize::MAX)
+fn gbuffer(problem: &Problem) -> GBuffer {
+    GBuffer::new(problem, &Settings::default(), usize::MAX)
 }
 
 /// The problem with every pixel that fits `which` (frame, pixel) replaced.
@@ -48,7 +48,7 @@ fn replaced(problem: &Problem, color: Vec3, which: impl Fn(u32, u32) -> bool) ->
 #[test]
 fn each_object_is_counted_where_the_middle_of_a_pixel_sees_it() {
     let problem = room();
-    let survey = survey(&problem);
+    let gbuffer = gbuffer(&problem);
     let mut seen = vec![0u64; problem.scene.objects.len()];
     for camera in &problem.scene.cameras {
         for pixel in 0..SIZE[0] * SIZE[1] {
@@ -58,12 +58,12 @@ fn each_object_is_counted_where_the_middle_of_a_pixel_sees_it() {
             seen[problem.scene.object_of[hit.triangle as usize] as usize] += 1;
         }
     }
-    assert_eq!(survey.seen, seen);
+    assert_eq!(gbuffer.seen, seen);
     assert!(seen.iter().all(|&n| n > 50), "{seen:?}");
 
     // A keyed quarter of the pixels gives the counts scaled up, within 5 binomial deviations.
     let total: u64 = seen.iter().sum();
-    let quarter = Survey::new(&problem, &Settings::default(), total as usize / 4);
+    let quarter = GBuffer::new(&problem, &Settings::default(), total as usize / 4);
     for (&scaled, &n) in quarter.seen.iter().zip(&seen) {
         let deviation = (n as f64 * 0.25 * 0.75).sqrt() * 4.0;
         assert!(
@@ -75,29 +75,29 @@ fn each_object_is_counted_where_the_middle_of_a_pixel_sees_it() {
 
 #[test]
 fn pure_pixels_see_one_surface_of_one_object_and_most_are_pure() {
-    let survey = survey(&room());
-    let pure = survey.pixels.iter().filter(|p| p.pure).count();
-    assert!(pure * 10 > survey.pixels.len() * 7, "{pure}");
-    for pixel in survey.pixels.iter().filter(|p| p.pure) {
+    let gbuffer = gbuffer(&room());
+    let pure = gbuffer.pixels.iter().filter(|p| p.pure).count();
+    assert!(pure * 10 > gbuffer.pixels.len() * 7, "{pure}");
+    for pixel in gbuffer.pixels.iter().filter(|p| p.pure) {
         let points = pixel
             .points
             .map(|p| p.expect("a pure pixel meets a surface"));
         assert!(points.iter().all(|p| p.object == pixel.object));
         assert!(points.iter().all(|p| p.normal.dot(points[0].normal) > 0.8));
     }
-    let mixed = |p: &&relit::inverse::survey::SurveyedPixel| {
+    let mixed = |p: &&relit::inverse::gbuffer::GBufferPixel| {
         p.points.iter().flatten().any(|q| q.object != p.object)
     };
-    assert!(survey.pixels.iter().filter(mixed).count() > 100);
+    assert!(gbuffer.pixels.iter().filter(mixed).count() > 100);
 }
 
 /// No ray anywhere in a pixel that is inside an object leaves it, on a mesh whose edges are straight.
 #[test]
 fn inside_an_object_no_part_of_a_pixel_sees_another() {
     let problem = room();
-    let survey = survey(&problem);
-    let inside: Vec<_> = survey.pixels.iter().filter(|p| p.inside).collect();
-    assert!(inside.len() * 2 > survey.pixels.len(), "{}", inside.len());
+    let gbuffer = gbuffer(&problem);
+    let inside: Vec<_> = gbuffer.pixels.iter().filter(|p| p.inside).collect();
+    assert!(inside.len() * 2 > gbuffer.pixels.len(), "{}", inside.len());
     for pixel in inside {
         assert!(pixel.pure);
         let corner = Vec2::new(
@@ -118,9 +118,9 @@ fn inside_an_object_no_part_of_a_pixel_sees_another() {
 #[test]
 fn points_lie_where_the_quarters_of_their_pixel_see_the_mesh() {
     let problem = room();
-    let survey = survey(&problem);
+    let gbuffer = gbuffer(&problem);
     let scene = &problem.scene;
-    for pixel in &survey.pixels {
+    for pixel in &gbuffer.pixels {
         let camera = &scene.cameras[pixel.frame as usize];
         let corner = Vec2::new(
             (pixel.pixel % SIZE[0]) as f32,
@@ -140,8 +140,8 @@ fn points_lie_where_the_quarters_of_their_pixel_see_the_mesh() {
             assert!((point.point - camera.center).dot(point.normal) <= 0.0);
         }
     }
-    let all = survey.pixels.len() as u64 * 5;
-    assert!(survey.rays < all * 3 / 4, "{} of {all}", survey.rays);
+    let all = gbuffer.pixels.len() as u64 * 5;
+    assert!(gbuffer.rays < all * 3 / 4, "{} of {all}", gbuffer.rays);
 }
 
 #[test]
@@ -152,7 +152,7 @@ fn footprints_grow_with_the_room() {
         let views = scenes::room_views().map(|(center, target)| (center * scale, target * scale));
         let capture = scenes::capture(mesh, &views, SIZE);
         f64::from(
-            survey(&scenes::photographed(
+            gbuffer(&scenes::photographed(
                 &capture,
                 &scenes::lamp_room().1,
                 1,
@@ -168,8 +168,8 @@ fn footprints_grow_with_the_room() {
 #[test]
 fn clusters_hold_each_fitted_pixel_at_most_once_and_its_mean_colour() {
     let problem = room();
-    let survey = survey(&problem);
-    let clusters = cluster(&problem, &survey, usize::MAX);
+    let gbuffer = gbuffer(&problem);
+    let clusters = cluster(&problem, &gbuffer, usize::MAX);
     let mut seen = BTreeSet::new();
     for c in &clusters {
         let photograph = &problem.photographs[c.frame as usize];
@@ -187,7 +187,7 @@ fn clusters_hold_each_fitted_pixel_at_most_once_and_its_mean_colour() {
         }
     }
     // A bound on the pixels is kept, but for the small objects.
-    let few = cluster(&problem, &survey, 1_000);
+    let few = cluster(&problem, &gbuffer, 1_000);
     let kept: usize = few.iter().map(|c| c.pixels.len()).sum();
     assert!(kept < seen.len() / 2, "{kept} of {}", seen.len());
     let objects: BTreeSet<u32> = few.iter().map(|c| c.object).collect();
@@ -212,12 +212,12 @@ fn held_out_pixels_enter_neither_clusters_nor_the_light_field() {
             is_held_out(&settings, frame, pixel)
         });
         let look = |problem: &Problem| -> (Vec<Cluster>, Vec<Option<Vec3>>, Vec<Option<Vec3>>) {
-            let survey = Survey::new(problem, &settings, usize::MAX);
-            let measured = MeasuredRadiance::new(problem, &survey);
-            let points = survey.pixels.iter().flat_map(|p| p.points).flatten();
+            let gbuffer = GBuffer::new(problem, &settings, usize::MAX);
+            let measured = MeasuredRadiance::new(problem, &gbuffer);
+            let points = gbuffer.pixels.iter().flat_map(|p| p.points).flatten();
             let field = points.map(|point| measured.at(&point)).collect();
             (
-                cluster(problem, &survey, 5_000),
+                cluster(problem, &gbuffer, 5_000),
                 field,
                 measured.object_means,
             )
@@ -237,26 +237,29 @@ fn masked_pixels_are_not_even_looked_at() {
     let mut masked = (*problem.photographs[2]).clone();
     masked.usable = (0..masked.pixels.len()).map(|p| p % 2 == 0).collect();
     problem.photographs[2] = Arc::new(masked);
-    let survey = survey(&problem);
+    let gbuffer = gbuffer(&problem);
     assert!(
-        survey
+        gbuffer
             .pixels
             .iter()
             .all(|p| p.frame != 2 || p.pixel % 2 == 0)
     );
-    let counted = survey.pixels.iter().filter(|p| p.object == 3).count();
-    assert_eq!(survey.seen[3], counted as u64);
+    let counted = gbuffer.pixels.iter().filter(|p| p.object == 3).count();
+    assert_eq!(gbuffer.seen[3], counted as u64);
     let [width, height] = SIZE.map(|n| n as usize);
-    assert_eq!(survey.pixels.len(), 6 * width * height - width * height / 2);
+    assert_eq!(
+        gbuffer.pixels.len(),
+        6 * width * height - width * height / 2
+    );
 }
 
 /// The lamp reflects nothing, so its photographs hold its emission exactly; no camera sees it from above.
 #[test]
 fn the_light_field_knows_the_lamp_from_below_and_nothing_of_its_back() {
     let problem = room();
-    let survey = survey(&problem);
-    let measured = MeasuredRadiance::new(&problem, &survey);
-    let at = |normal: Vec3| SurveyPoint {
+    let gbuffer = gbuffer(&problem);
+    let measured = MeasuredRadiance::new(&problem, &gbuffer);
+    let at = |normal: Vec3| SurfacePoint {
         point: Vec3::new(0.1, 0.9, -0.1) - problem.scene.origin.as_vec3(),
         normal,
         object: LAMP,
@@ -271,7 +274,7 @@ fn the_light_field_knows_the_lamp_from_below_and_nothing_of_its_back() {
     // The mean also holds pixels whose edges missed the lamp.
     assert!((mean - below).length() < 0.01 * below.length());
     // Another object at the same place is another cell.
-    let other = SurveyPoint {
+    let other = SurfacePoint {
         object: 0,
         ..at(Vec3::NEG_Y)
     };

@@ -14,14 +14,14 @@ use rayon::prelude::*;
 const QUARTERS: usize = 4;
 /// All pixels are looked at of objects that fewer pixels than this see.
 const RARE: u64 = 2_000;
-/// Corners that lie within this share of the scene's diameter of a plane lie on it.
+/// Corners that lie within this fraction of the scene's diameter of a plane lie on it.
 const COPLANAR: f32 = 1e-6;
-/// First of the sample keys of survey rays, far from those of paths.
+/// First of the sample keys of g-buffer rays, far from those of paths.
 const KEY: u64 = 1 << 62;
 
 /// One usable pixel of a photograph.
 #[derive(Debug, Clone, Copy)]
-pub struct SurveyedPixel {
+pub struct GBufferPixel {
     /// Frame index.
     pub frame: u32,
     /// Row by row from the top left.
@@ -35,12 +35,12 @@ pub struct SurveyedPixel {
     /// Whether it is kept out of the fit.
     pub held_out: bool,
     /// Points behind the quarters, with the normal of the side that is seen; unset where a ray leaves the mesh.
-    pub points: [Option<SurveyPoint>; QUARTERS],
+    pub points: [Option<SurfacePoint>; QUARTERS],
 }
 
 /// A surface point behind a part of a pixel.
 #[derive(Debug, Clone, Copy)]
-pub struct SurveyPoint {
+pub struct SurfacePoint {
     /// Position.
     pub point: Vec3,
     /// Unit normal of the side that is seen.
@@ -51,9 +51,9 @@ pub struct SurveyPoint {
 
 /// The usable pixels that were looked at, and how often each object was seen.
 #[derive(Debug, Clone)]
-pub struct Survey {
+pub struct GBuffer {
     /// In order of frame and pixel.
-    pub pixels: Vec<SurveyedPixel>,
+    pub pixels: Vec<GBufferPixel>,
     /// For each object, usable pixels whose centre sees it.
     pub seen: Vec<u64>,
     /// Median size of a pixel's footprint on the surfaces, in metres; zero where no pixel sees the mesh.
@@ -62,7 +62,7 @@ pub struct Survey {
     pub rays: u64,
 }
 
-impl Survey {
+impl GBuffer {
     /// For each of the photographs, whether no pixel of it is in the fit: those that are held out as a whole, and those that
     /// show nothing of use.
     pub fn unfitted(&self, photographs: usize) -> Vec<bool> {
@@ -73,8 +73,8 @@ impl Survey {
         unfitted
     }
 
-    /// Casts the rays of all pixels, or of a keyed share of about `most_pixels` and of the objects that few pixels see.
-    pub fn new(problem: &Problem, settings: &Settings, most_pixels: usize) -> Self {
+    /// Casts the rays of all pixels, or of a keyed fraction of about `max_pixels` and of the objects that few pixels see.
+    pub fn new(problem: &Problem, settings: &Settings, max_pixels: usize) -> Self {
         let scene = &*problem.scene;
         let centers = scene.ids();
         let mut seen = vec![0u64; scene.objects.len()];
@@ -89,8 +89,8 @@ impl Survey {
             }
         }
         let total: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
-        let share = (most_pixels as f64 / total.max(1) as f64).min(1.0);
-        let frames: Vec<Surveyed> = problem
+        let fraction = (max_pixels as f64 / total.max(1) as f64).min(1.0);
+        let frames: Vec<FramePixels> = problem
             .photographs
             .par_iter()
             .enumerate()
@@ -100,7 +100,7 @@ impl Survey {
                     camera: &scene.cameras[frame],
                     triangles: &centers.triangles[frame],
                 };
-                let mut surveyed = Surveyed::default();
+                let mut pixels_of_frame = FramePixels::default();
                 for pixel in 0..photograph.pixels.len() {
                     let usable = photograph.is_usable(pixel);
                     let triangle = centers.triangles[frame][pixel] as usize;
@@ -108,24 +108,24 @@ impl Survey {
                         .object_of
                         .get(triangle)
                         .is_some_and(|&k| seen[k as usize] < RARE);
-                    if !usable || !(rare || drawn(share, frame as u64, pixel as u64)) {
+                    if !usable || !(rare || drawn(fraction, frame as u64, pixel as u64)) {
                         continue;
                     }
                     let key = Stream::new(settings.seed, frame as u64, pixel as u64, KEY);
-                    let looked = view.look(pixel, key);
-                    surveyed.footprints.extend(looked.footprint);
-                    surveyed.rays += looked.rays;
-                    surveyed.pixels.push(SurveyedPixel {
+                    let sampled = view.sample(pixel, key);
+                    pixels_of_frame.footprints.extend(sampled.footprint);
+                    pixels_of_frame.rays += sampled.rays;
+                    pixels_of_frame.pixels.push(GBufferPixel {
                         frame: frame as u32,
                         pixel: pixel as u32,
-                        object: looked.object,
-                        pure: looked.pure,
-                        inside: looked.inside,
+                        object: sampled.object,
+                        pure: sampled.pure,
+                        inside: sampled.inside,
                         held_out: is_held_out(settings, frame as u32, pixel as u32),
-                        points: looked.points,
+                        points: sampled.points,
                     });
                 }
-                surveyed
+                pixels_of_frame
             })
             .collect();
 
@@ -154,17 +154,17 @@ impl Survey {
 
 /// What was found in one frame.
 #[derive(Default)]
-struct Surveyed {
-    pixels: Vec<SurveyedPixel>,
+struct FramePixels {
+    pixels: Vec<GBufferPixel>,
     footprints: Vec<f32>,
     rays: u64,
 }
 
 /// Whether a pixel belongs to the keyed share that is looked at.
-fn drawn(share: f64, frame: u64, pixel: u64) -> bool {
-    share >= 1.0
+fn drawn(fraction: f64, frame: u64, pixel: u64) -> bool {
+    fraction >= 1.0
         || ((splitmix64(splitmix64(frame ^ KEY) ^ pixel) >> 11) as f64)
-            < share * (1u64 << 53) as f64
+            < fraction * (1u64 << 53) as f64
 }
 
 /// A frame, with the triangle that the centre of each of its pixels sees.
@@ -175,11 +175,11 @@ struct FrameView<'a> {
 }
 
 /// What was found through one pixel.
-struct Looked {
+struct SampledPixel {
     object: u32,
     pure: bool,
     inside: bool,
-    points: [Option<SurveyPoint>; QUARTERS],
+    points: [Option<SurfacePoint>; QUARTERS],
     /// Width of the pixel on the surface.
     footprint: Option<f32>,
     rays: u64,
@@ -188,7 +188,7 @@ struct Looked {
 impl FrameView<'_> {
     /// Looks through a pixel, at points drawn from `stream`. Where all neighbours see the plane that it sees, the points
     /// lie on that plane and need no rays.
-    fn look(&self, pixel: usize, mut stream: Stream) -> Looked {
+    fn sample(&self, pixel: usize, mut stream: Stream) -> SampledPixel {
         let width = self.camera.intrinsics.width as usize;
         let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
         let triangle = self.triangles[pixel];
@@ -198,7 +198,7 @@ impl FrameView<'_> {
         // The pixels around, where they see the same object.
         let around = (self.around(pixel, width)).filter(|seen| self.is_one_object(triangle, *seen));
         let flat = center.is_some() && around.is_some_and(|seen| self.is_flat(triangle, seen));
-        let points: [Option<SurveyPoint>; QUARTERS] = std::array::from_fn(|quarter| {
+        let points: [Option<SurfacePoint>; QUARTERS] = std::array::from_fn(|quarter| {
             let [dx, dy] = stream.uniform2();
             let offset = Vec2::new((quarter % 2) as f32 + dx, (quarter / 2) as f32 + dy) * 0.5;
             if flat {
@@ -225,7 +225,7 @@ impl FrameView<'_> {
                 })
             })
         });
-        Looked {
+        SampledPixel {
             object: center.map_or(u32::MAX, |c| c.object),
             pure,
             inside: pure && around.is_some(),
@@ -236,10 +236,10 @@ impl FrameView<'_> {
     }
 
     /// The point of a triangle's surface, with the side that the camera sees.
-    fn seen_from(&self, triangle: u32, point: Vec3) -> SurveyPoint {
+    fn seen_from(&self, triangle: u32, point: Vec3) -> SurfacePoint {
         let normal = self.scene.normals[triangle as usize];
         let front = normal.dot(self.camera.center - point) >= 0.0;
-        SurveyPoint {
+        SurfacePoint {
             point,
             normal: if front { normal } else { -normal },
             object: self.scene.object_of[triangle as usize],
@@ -247,7 +247,7 @@ impl FrameView<'_> {
     }
 
     /// Where the ray through a place of the picture meets a triangle's plane; `None` where it runs along it.
-    fn on_plane(&self, triangle: u32, at: Vec2) -> Option<SurveyPoint> {
+    fn on_plane(&self, triangle: u32, at: Vec2) -> Option<SurfacePoint> {
         let ray = self.camera.ray(at);
         let t = self.scene.plane_distance(triangle, &ray);
         let point = ray.origin + ray.direction * t;

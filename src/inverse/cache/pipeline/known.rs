@@ -1,11 +1,11 @@
 //! Values that are known beforehand: held through every change of roles and every fit.
 
-use super::Ladder;
+use super::Pipeline;
 use crate::inverse::cache::roles::Role;
 use crate::inverse::known::Pinned;
 use glam::Vec3;
 
-impl Ladder<'_, '_> {
+impl Pipeline<'_, '_> {
     /// The role that an object may have of the one that the photographs speak for.
     pub(super) fn allowed(&self, object: usize, role: Role) -> Role {
         role_under(self.monitor.known.of(object), role)

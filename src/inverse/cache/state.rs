@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 /// The outcome of the finished stages.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Reached {
+pub struct SolverState {
     /// Stages finished.
     pub stages: u32,
     /// Whether light comes from outside.
@@ -38,7 +38,7 @@ pub struct Reached {
     lobes: Vec<Option<(f32, f32)>>,
 }
 
-impl Reached {
+impl SolverState {
     /// Writes down what was found; an infinite error becomes `null`.
     pub fn new(
         stages: u32,

@@ -1,15 +1,15 @@
 //! After textures were found: all colours and lamps once more, in the light as the textures send it on.
 
-use super::Ladder;
+use super::Pipeline;
 use super::detail::Detail;
-use crate::inverse::cache::path_noise::share_paths;
+use crate::inverse::cache::path_noise::distribute_paths;
 use crate::inverse::solver::Termination;
 use crate::math::stats::Moments;
 
 /// Held-out loss may rise by so many standard errors of the rise before what was found is taken back.
 const SIGNIFICANT: f64 = 2.0;
 
-impl Ladder<'_, '_> {
+impl Pipeline<'_, '_> {
     /// Fits all rounds again to the photographs less what the textures change in them, which one set of paths tells; the
     /// textures are shown scaled with their objects.
     ///
@@ -30,7 +30,7 @@ impl Ladder<'_, '_> {
             self.held_out_each(),
         );
         let lights = self.lights();
-        share_paths(
+        distribute_paths(
             &mut self.clusters,
             self.roles.len(),
             self.budget.round_paths,

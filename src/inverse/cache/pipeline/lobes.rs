@@ -1,6 +1,6 @@
 //! Rough specular lobes, tried on objects that look different from different sides.
 
-use super::Ladder;
+use super::Pipeline;
 use crate::inverse::cache::roles::Role;
 use crate::inverse::known::Pinned;
 use crate::inverse::lobe::{Found, Lobes, Task};
@@ -8,12 +8,12 @@ use crate::inverse::solver::{Stage, Termination};
 use crate::transport::arrival::Cast;
 use glam::Vec3;
 
-/// Share of a round's paths that a trial of a lobe takes; finding one anew, whose roughness is about known, takes all of them.
-const PATHS_SHARE: u64 = 4;
-/// More objects than this share what so many take.
-const FULL_SHARES: u64 = 4;
+/// Fraction of a round's paths that a trial of a lobe takes; finding one anew, whose roughness is about known, takes all of them.
+const PATHS_FRACTION: u64 = 4;
+/// More objects than this fraction what so many take.
+const FULL_FRACTIONS: u64 = 4;
 
-impl<'a> Ladder<'a, '_> {
+impl<'a> Pipeline<'a, '_> {
     /// Tries a lobe on each object that calls for one; where any is kept, what gives light is judged anew.
     pub(super) fn lobes(&mut self) -> Result<(), Termination> {
         let started = self.monitor.seconds();
@@ -22,7 +22,7 @@ impl<'a> Ladder<'a, '_> {
             .filter(|&k| self.roles[k].reflects() || self.roles[k] == Role::Emitter)
             .filter(|&k| self.monitor.known.of(k) == Pinned::default())
             .collect();
-        let mut lobes = Lobes::new(self.lobe_task(1), &self.survey);
+        let mut lobes = Lobes::new(self.lobe_task(1), &self.gbuffer);
         let estimate = self.estimate.clone();
         let evidence = lobes.evidence(&estimate, &objects, &mut |cast| self.cast(cast))?;
         let called: Vec<usize> = (objects.iter().zip(&evidence))
@@ -112,8 +112,8 @@ impl<'a> Ladder<'a, '_> {
         let started = self.monitor.seconds();
         self.monitor.phase("refining lobes");
         let mut task = self.lobe_task(glossy.len());
-        task.paths *= PATHS_SHARE;
-        let lobes = Lobes::new(task, &self.survey);
+        task.paths *= PATHS_FRACTION;
+        let lobes = Lobes::new(task, &self.gbuffer);
         let lit = self.estimate.lit(&self.problem.scene);
         let mut names = Vec::new();
         for k in glossy {
@@ -131,11 +131,11 @@ impl<'a> Ladder<'a, '_> {
 
     /// The task of finding the lobes of so many objects.
     fn lobe_task(&self, objects: usize) -> Task<'a> {
-        let share = FULL_SHARES.max(objects as u64);
+        let fraction = FULL_FRACTIONS.max(objects as u64);
         Task {
             problem: self.problem,
             seed: self.monitor.settings.seed,
-            paths: self.budget.round_paths / PATHS_SHARE * FULL_SHARES / share,
+            paths: self.budget.round_paths / PATHS_FRACTION * FULL_FRACTIONS / fraction,
             max_bounces: self.max_bounces,
         }
     }

@@ -1,7 +1,7 @@
 //! Photographs that do not show what all others show: taken from elsewhere than their pose says, or of another room.
 
-use super::fit::{LEAST_CELLS, Logarithms, Parts, compare, fit};
-use super::sights::{Sight, Sights, shared};
+use super::fit::{Logarithms, MIN_CELLS, Parts, compare, fit};
+use super::observations::{Observation, Observations, shared};
 use crate::capture::photograph::Photograph;
 use crate::inverse::solver::Problem;
 use crate::math::stats::quantile;
@@ -10,29 +10,29 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Photographs that must be compared, for the usual difference to say something.
-const LEAST_PHOTOGRAPHS: usize = 4;
-/// A photograph is poor whose difference is so many times that of most, ...
+const MIN_PHOTOGRAPHS: usize = 4;
+/// A photograph is an outlier frame whose difference is so many times that of most, ...
 const PLAINLY: f64 = 4.0;
 /// ... and a factor of e to this at least: noise, gloss and a blurred picture make less.
-const LEAST_DIFFERENCE: f64 = 0.3;
+const MIN_DIFFERENCE: f64 = 0.3;
 
 /// How well photographs agree about the surfaces that they share.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Agreement {
+pub struct OutlierFrames {
     /// Half of the photographs differ by at most so much, as the logarithm of a factor, from what the others show of half of the
     /// surfaces that they share, each at the exposure that suits it best.
     pub usual: f64,
     /// Photographs that differ plainly more than that, and by how much, in order.
-    pub poor: BTreeMap<usize, f64>,
+    pub outliers: BTreeMap<usize, f64>,
 }
 
-impl Agreement {
-    /// Compares the photographs, and takes what poor ones show out of what is compared; `None` where too few share enough to
+impl OutlierFrames {
+    /// Compares the photographs, and takes what outlier frames show out of what is compared; `None` where too few share enough to
     /// tell. The poorest is taken out first, since its neighbours may only differ from it; photographs that are held out are
     /// compared with the others, and the others not with them.
-    pub fn new(sights: &mut Sights, photographs: usize) -> Option<Self> {
-        let mut poor = BTreeMap::new();
-        let cells = shared(&sights.fitted);
+    pub fn new(observations: &mut Observations, photographs: usize) -> Option<Self> {
+        let mut outliers = BTreeMap::new();
+        let cells = shared(&observations.fitted);
         let mut found = exposures(&cells, photographs);
         let mut now = differences(&cells, &found);
         let most = now.len().div_ceil(2).saturating_sub(1);
@@ -40,33 +40,33 @@ impl Agreement {
         loop {
             let worst = now.iter().max_by(|a, b| a.1.total_cmp(b.1));
             let Some((&frame, &difference)) =
-                worst.filter(|(_, d)| is_poor(**d, usual) && poor.len() < most)
+                worst.filter(|(_, d)| is_outlier(**d, usual) && outliers.len() < most)
             else {
                 break;
             };
-            poor.insert(frame, difference);
-            sights.forget(frame);
-            // What poor photographs do to the exposures of others is little, as these are robust.
-            now = differences(&shared(&sights.fitted), &found);
+            outliers.insert(frame, difference);
+            observations.forget(frame);
+            // What outlier frames do to the exposures of others is little, as these are robust.
+            now = differences(&shared(&observations.fitted), &found);
             usual = middle(&now).unwrap_or(usual);
         }
-        if !poor.is_empty() {
-            found = exposures(&shared(&sights.fitted), photographs);
+        if !outliers.is_empty() {
+            found = exposures(&shared(&observations.fitted), photographs);
         }
-        for (frame, left) in compare(sights, &mut found) {
+        for (frame, left) in compare(observations, &mut found) {
             let mut sizes: Vec<f64> = left.iter().map(|d| d.abs().element_sum() / 3.0).collect();
-            if let Some(difference) = quantile(&mut sizes, 0.5).filter(|&d| is_poor(d, usual)) {
-                poor.insert(frame, difference);
-                sights.forget(frame);
+            if let Some(difference) = quantile(&mut sizes, 0.5).filter(|&d| is_outlier(d, usual)) {
+                outliers.insert(frame, difference);
+                observations.forget(frame);
             }
         }
-        Some(Self { usual, poor })
+        Some(Self { usual, outliers })
     }
 
-    /// The problem with none of the poor photographs' pixels in it.
-    pub fn without_poor(&self, problem: &Problem) -> Problem {
+    /// The problem with none of the outlier frames' pixels in it.
+    pub fn without_outliers(&self, problem: &Problem) -> Problem {
         let mut problem = problem.clone();
-        for &frame in self.poor.keys() {
+        for &frame in self.outliers.keys() {
             let photograph = &problem.photographs[frame];
             problem.photographs[frame] = Arc::new(Photograph {
                 usable: vec![false; photograph.pixels.len()],
@@ -76,28 +76,28 @@ impl Agreement {
         problem
     }
 
-    /// Which photographs are poor and why, in a sentence for each.
+    /// Which photographs are outliers and why, in a sentence for each.
     pub fn remarks(&self) -> Vec<String> {
-        let share = |difference: f64| (difference.exp() - 1.0) * 100.0;
+        let fraction = |difference: f64| (difference.exp() - 1.0) * 100.0;
         let remark = |(frame, difference): (&usize, &f64)| {
             format!(
                 "frame {frame} (counted from 0) is left out: half of what it shares with others differs by {:.0} % or more, where \
                  {:.0} % is usual; its pose may be wrong",
-                share(*difference),
-                share(self.usual)
+                fraction(*difference),
+                fraction(self.usual)
             )
         };
-        self.poor.iter().map(remark).collect()
+        self.outliers.iter().map(remark).collect()
     }
 }
 
 /// Whether a difference is plainly more than the usual one.
-fn is_poor(difference: f64, usual: f64) -> bool {
-    difference > (usual * PLAINLY).max(LEAST_DIFFERENCE)
+fn is_outlier(difference: f64, usual: f64) -> bool {
+    difference > (usual * PLAINLY).max(MIN_DIFFERENCE)
 }
 
 /// The exposures that suit the photographs best.
-fn exposures(shared: &[Sight], photographs: usize) -> Logarithms {
+fn exposures(shared: &[Observation], photographs: usize) -> Logarithms {
     let parts = Parts {
         exposures: true,
         vignetting: false,
@@ -107,18 +107,18 @@ fn exposures(shared: &[Sight], photographs: usize) -> Logarithms {
 }
 
 /// Of each photograph that shares enough, the median difference from what the others show of the same cells.
-fn differences(shared: &[Sight], found: &Logarithms) -> BTreeMap<usize, f64> {
+fn differences(shared: &[Observation], found: &Logarithms) -> BTreeMap<usize, f64> {
     let mut all: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
     for cell in shared.chunk_by(|a, b| a.cell == b.cell) {
         let levels: Vec<DVec3> = (cell.iter())
-            .map(|sight| sight.level - found.exposures[sight.frame])
+            .map(|observation| observation.level - found.exposures[observation.frame])
             .collect();
-        for (sight, difference) in cell.iter().zip(from_others(&levels)) {
-            all.entry(sight.frame).or_default().push(difference);
+        for (observation, difference) in cell.iter().zip(from_others(&levels)) {
+            all.entry(observation.frame).or_default().push(difference);
         }
     }
     (all.into_iter())
-        .filter(|(_, all)| all.len() >= LEAST_CELLS)
+        .filter(|(_, all)| all.len() >= MIN_CELLS)
         .filter_map(|(frame, mut all)| Some((frame, quantile(&mut all, 0.5)?)))
         .collect()
 }
@@ -126,7 +126,7 @@ fn differences(shared: &[Sight], found: &Logarithms) -> BTreeMap<usize, f64> {
 /// The median over photographs; `None` where they are too few.
 fn middle(differences: &BTreeMap<usize, f64>) -> Option<f64> {
     let mut all: Vec<f64> = differences.values().copied().collect();
-    let enough = all.len() >= LEAST_PHOTOGRAPHS;
+    let enough = all.len() >= MIN_PHOTOGRAPHS;
     enough.then(|| quantile(&mut all, 0.5))?
 }
 
@@ -165,10 +165,10 @@ mod tests {
         frames: usize,
         wrong: &[usize],
         sees: impl Fn(usize, usize) -> bool,
-    ) -> Vec<Sight> {
+    ) -> Vec<Observation> {
         let mut draw = numbers();
         let exposures: Vec<f64> = (0..frames).map(|_| draw()).collect();
-        let mut sights = Vec::new();
+        let mut observations = Vec::new();
         for cell in 0..cells {
             let level = draw();
             for (frame, exposure) in exposures.iter().enumerate().filter(|f| sees(cell, f.0)) {
@@ -176,7 +176,7 @@ mod tests {
                     true => draw(),
                     false => level + 0.1 * draw(),
                 };
-                sights.push(Sight {
+                observations.push(Observation {
                     frame,
                     cell: cell as u64,
                     level: DVec3::splat(shown + exposure),
@@ -185,46 +185,59 @@ mod tests {
                 });
             }
         }
-        sights
+        observations
     }
 
-    fn poor(fitted: Vec<Sight>, held_out: Vec<Sight>, frames: usize) -> Option<Vec<usize>> {
-        let mut sights = Sights { fitted, held_out };
-        let found = Agreement::new(&mut sights, frames)?;
-        assert_eq!(found.remarks().len(), found.poor.len());
-        let left = sights.fitted.iter().chain(&sights.held_out);
-        assert!(left.map(|s| s.frame).all(|f| !found.poor.contains_key(&f)));
-        Some(found.poor.into_keys().collect())
+    fn outliers(
+        fitted: Vec<Observation>,
+        held_out: Vec<Observation>,
+        frames: usize,
+    ) -> Option<Vec<usize>> {
+        let mut observations = Observations { fitted, held_out };
+        let found = OutlierFrames::new(&mut observations, frames)?;
+        assert_eq!(found.remarks().len(), found.outliers.len());
+        let left = observations.fitted.iter().chain(&observations.held_out);
+        assert!(
+            left.map(|s| s.frame)
+                .all(|f| !found.outliers.contains_key(&f))
+        );
+        Some(found.outliers.into_keys().collect())
     }
 
     #[test]
     fn photographs_of_something_else_are_found_whatever_the_exposures() {
         for wrong in [&[][..], &[3], &[0, 5]] {
-            let sights = seen(400, 8, wrong, |cell, frame| (cell >> frame) % 2 == 0);
-            assert_eq!(poor(sights, Vec::new(), 8).as_deref(), Some(wrong));
+            let observations = seen(400, 8, wrong, |cell, frame| (cell >> frame) % 2 == 0);
+            assert_eq!(
+                outliers(observations, Vec::new(), 8).as_deref(),
+                Some(wrong)
+            );
         }
     }
 
     /// A walk on which each photograph shares cells with the next alone: those beside the wrong one differ from nothing else.
     #[test]
     fn neighbours_of_a_wrong_photograph_stay() {
-        let sights = seen(40 * 11, 12, &[5], |cell, frame| {
+        let observations = seen(40 * 11, 12, &[5], |cell, frame| {
             (cell / 40..cell / 40 + 2).contains(&frame)
         });
-        assert_eq!(poor(sights, Vec::new(), 12), Some(vec![5]));
+        assert_eq!(outliers(observations, Vec::new(), 12), Some(vec![5]));
     }
 
     #[test]
     fn photographs_held_out_are_judged_by_the_others() {
-        let sights = seen(400, 8, &[2], |_, _| true);
+        let observations = seen(400, 8, &[2], |_, _| true);
         let held_out = |frame: usize| frame == 2 || frame == 6;
-        let (held_out, fitted) = sights.into_iter().partition(|s| held_out(s.frame));
-        assert_eq!(poor(fitted, held_out, 8), Some(vec![2]));
+        let (held_out, fitted) = observations.into_iter().partition(|s| held_out(s.frame));
+        assert_eq!(outliers(fitted, held_out, 8), Some(vec![2]));
     }
 
     #[test]
     fn three_photographs_are_too_few_to_tell_which_is_wrong() {
-        assert_eq!(poor(seen(400, 3, &[1], |_, _| true), Vec::new(), 3), None);
+        assert_eq!(
+            outliers(seen(400, 3, &[1], |_, _| true), Vec::new(), 3),
+            None
+        );
     }
 
     #[test]

@@ -1,13 +1,13 @@
 //! How many bounces of light the photographs hold, by what was found.
 
-use super::{Ladder, MOST_BOUNCES};
+use super::{MAX_DEPTH, Pipeline};
 use crate::inverse::loss::Rest;
 use crate::inverse::solver::Stage;
 
 /// Bounces that a fixed depth is commonly set to.
 const COMMON_DEPTH: u32 = 10;
 
-impl Ladder<'_, '_> {
+impl Pipeline<'_, '_> {
     /// Says how deep paths go, now that albedos are known, and what would be missing, or is, after fewer bounces.
     pub(super) fn tell_depth(&mut self) {
         let started = self.monitor.seconds();
@@ -16,7 +16,7 @@ impl Ladder<'_, '_> {
             _ => Some(self.max_bounces),
         };
         // Where the solve itself is limited, what it leaves out is told by deeper paths.
-        let deep = self.losses.deepened(MOST_BOUNCES);
+        let deep = self.losses.deepened(MAX_DEPTH);
         let bounces = limit.unwrap_or(COMMON_DEPTH);
         let rest = deep.beyond(self.problem, &self.estimate, bounces);
         if let Some(rest) = &rest {
@@ -36,20 +36,20 @@ impl Ladder<'_, '_> {
 }
 
 fn words(limit: Option<u32>, rest: Option<&Rest>) -> String {
-    let share = rest.map(|rest| {
+    let fraction = rest.map(|rest| {
         format!(
             "{:.2} ± {:.2} % of the light in the photographs",
-            rest.share * 100.0,
+            rest.fraction * 100.0,
             rest.stderr * 100.0
         )
     });
-    match (limit, share) {
-        (None, Some(share)) => format!(
-            "paths end by chance alone and leave nothing out; {share} comes after {COMMON_DEPTH} bounces, by the albedos found"
+    match (limit, fraction) {
+        (None, Some(fraction)) => format!(
+            "paths end by chance alone and leave nothing out; {fraction} comes after {COMMON_DEPTH} bounces, by the albedos found"
         ),
         (None, None) => "paths end by chance alone and leave nothing out".to_owned(),
-        (Some(limit), Some(share)) => format!(
-            "paths end after {limit} bounces, as asked for, and leave out {share}, by the albedos found"
+        (Some(limit), Some(fraction)) => format!(
+            "paths end after {limit} bounces, as asked for, and leave out {fraction}, by the albedos found"
         ),
         (Some(limit), None) => format!("paths end after {limit} bounces, as asked for"),
     }

@@ -15,10 +15,10 @@ const MOST: f64 = 400.0;
 /// The noise of a cluster's paths counts in full up to so many times the usual one; beyond it the cluster counts for less.
 const STRAYED: f64 = 4.0;
 /// Turns of finding which lower bounds are exceeded.
-const MOST_TURNS: usize = 8;
-/// An emitter must leave at most this share of the squared error that a reflector leaves.
+const MAX_TURNS: usize = 8;
+/// An emitter must leave at most this fraction of the squared error that a reflector leaves.
 const EXPLAINED: f64 = 0.25;
-/// What was taken for an emitter stays one down to this share of the advantage that it took to become one.
+/// What was taken for an emitter stays one down to this fraction of the advantage that it took to become one.
 const STAYING: f64 = 0.2;
 
 /// An object whose role should change.
@@ -32,38 +32,43 @@ pub struct Change {
     pub value: Vec3,
 }
 
-/// A cluster seen as what its own object adds to it: `target` = albedo × `received`, or emission × `shown`.
+/// A cluster seen as what its own object adds to it: `target` = albedo × `irradiance`, or emission × `shown`.
 struct Part {
     weight: DVec3,
     /// Channels in which the target is a lower bound.
     at_least: BVec3,
     target: [DVec3; 2],
-    received: [DVec3; 2],
+    irradiance: [DVec3; 2],
     shown: [DVec3; 2],
 }
 
 /// Judges all seen reflectors and emitters, given a fit under their present roles.
-pub fn judge(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<Change> {
+pub fn classify(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<Change> {
     let mut parts = parts(cache, unknowns, roles);
-    let verdicts: Vec<Option<Verdict>> = parts.iter().map(|p| Verdict::new(p)).collect();
+    let classifications: Vec<Option<Classification>> =
+        parts.iter().map(|p| Classification::new(p)).collect();
 
     // The typical error of a cluster, under whichever role explains it better; bounds that are kept have none.
     let measured = |part: &Part| !part.at_least.any();
-    let mut errors: Vec<f64> = (verdicts.iter().zip(&parts))
-        .filter_map(|(verdict, parts)| Some(verdict.as_ref()?.errors.iter().zip(parts)))
+    let mut errors: Vec<f64> = (classifications.iter().zip(&parts))
+        .filter_map(|(classification, parts)| {
+            Some(classification.as_ref()?.errors.iter().zip(parts))
+        })
         .flatten()
         .filter(|(_, part)| measured(part))
         .map(|(error, _)| *error)
         .collect();
     let typical = quantile(&mut errors, 0.5).unwrap_or(0.0);
-    (parts.iter_mut().zip(verdicts).enumerate())
-        .filter_map(|(object, (parts, verdict))| {
-            verdict?.steady(parts, typical);
-            let verdict = Verdict::new(parts)?;
-            let share = verdict.share_of_decision(typical);
+    (parts.iter_mut().zip(classifications).enumerate())
+        .filter_map(|(object, (parts, classification))| {
+            classification?.steady(parts, typical);
+            let classification = Classification::new(parts)?;
+            let fraction = classification.fraction_of_decision(typical);
             match roles[object] {
-                Role::Reflector if share > 1.0 => Some((Role::Emitter, verdict.emission)),
-                Role::Emitter if share < STAYING => Some((Role::Reflector, verdict.albedo)),
+                Role::Reflector if fraction > 1.0 => Some((Role::Emitter, classification.emission)),
+                Role::Emitter if fraction < STAYING => {
+                    Some((Role::Reflector, classification.albedo))
+                }
                 _ => None,
             }
             .map(|(role, value)| Change {
@@ -92,7 +97,7 @@ fn parts(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<Vec<Part
             let row = cluster.rows.iter().find(|r| r.0 == parameter);
             row.map_or([DVec3::ZERO; 2], |&(_, a, b)| [a, b])
         };
-        let (received, shown) = (derivative(k), derivative(surfaces + k));
+        let (irradiance, shown) = (derivative(k), derivative(surfaces + k));
         let (albedo, emission) = (
             unknowns.albedo[k].as_dvec3(),
             unknowns.emission[k].as_dvec3(),
@@ -101,9 +106,9 @@ fn parts(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<Vec<Part
             weight: cluster.weight,
             at_least: cluster.at_least,
             target: std::array::from_fn(|set| {
-                cluster.residuals[set] + albedo * received[set] + emission * shown[set]
+                cluster.residuals[set] + albedo * irradiance[set] + emission * shown[set]
             }),
-            received,
+            irradiance,
             shown,
         });
     }
@@ -111,7 +116,7 @@ fn parts(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<Vec<Part
 }
 
 /// What an object would be as a reflector and as an emitter, and which explains its clusters better.
-struct Verdict {
+struct Classification {
     albedo: DVec3,
     emission: DVec3,
     /// Squared error as a reflector less that as an emitter, for each cluster.
@@ -124,13 +129,13 @@ struct Verdict {
     sums: [f64; 2],
 }
 
-impl Verdict {
+impl Classification {
     /// `None` where there is nothing to see.
     fn new(parts: &[Part]) -> Option<Self> {
         if parts.is_empty() {
             return None;
         }
-        let albedo = least_squares(parts, |p| p.received).clamp(DVec3::ZERO, DVec3::ONE);
+        let albedo = least_squares(parts, |p| p.irradiance).clamp(DVec3::ZERO, DVec3::ONE);
         let emission = least_squares(parts, |p| p.shown).max(DVec3::ZERO);
         let errors = |left: &dyn Fn(&Part, usize) -> DVec3| -> Vec<[DVec3; 2]> {
             let wrong = |p: &Part| {
@@ -141,7 +146,7 @@ impl Verdict {
             };
             parts.iter().map(wrong).collect()
         };
-        let reflecting = errors(&|p, set| p.target[set] - albedo * p.received[set]);
+        let reflecting = errors(&|p, set| p.target[set] - albedo * p.irradiance[set]);
         let emitting = errors(&|p, set| p.target[set] - emission * p.shown[set]);
         let square = |weight: DVec3, [a, b]: [DVec3; 2]| (weight * a * b).element_sum();
         let sums = [&reflecting, &emitting].map(|all| {
@@ -187,8 +192,8 @@ impl Verdict {
         }
     }
 
-    /// The advantage of being an emitter as a share of what it takes to be sure of it.
-    fn share_of_decision(&self, typical: f64) -> f64 {
+    /// The advantage of being an emitter as a fraction of what it takes to be sure of it.
+    fn fraction_of_decision(&self, typical: f64) -> f64 {
         let [reflecting, emitting] = self.sums;
         if self.emission.max_element() <= 0.0 || emitting > EXPLAINED * reflecting {
             return 0.0;
@@ -218,7 +223,7 @@ impl Verdict {
 /// count while what is found stays below them.
 fn least_squares(parts: &[Part], regressor: impl Fn(&Part) -> [DVec3; 2]) -> DVec3 {
     let mut found = DVec3::ZERO;
-    for turn in 0..MOST_TURNS {
+    for turn in 0..MAX_TURNS {
         let (mut top, mut bottom) = (DVec3::ZERO, DVec3::ZERO);
         for part in parts {
             let [a, b] = regressor(part);
@@ -291,7 +296,7 @@ mod tests {
         let mut unknowns = Unknowns::new(3);
         unknowns.albedo[0] = Vec3::splat(0.6);
         unknowns.albedo[1] = Vec3::ONE;
-        let changes = judge(
+        let changes = classify(
             &room(),
             &unknowns,
             &[Role::Reflector, Role::Reflector, Role::Unseen],
@@ -314,12 +319,12 @@ mod tests {
         }
         let mut unknowns = Unknowns::new(2);
         unknowns.albedo = vec![Vec3::splat(0.6), Vec3::ONE];
-        let changes = judge(&strayed, &unknowns, &[Role::Reflector; 2]);
+        let changes = classify(&strayed, &unknowns, &[Role::Reflector; 2]);
         assert_eq!(changes.len(), 1, "{changes:?}");
         assert_eq!((changes[0].object, changes[0].role), (1, Role::Emitter));
         assert!((changes[0].value - Vec3::splat(8.0)).length() < 1e-5);
         unknowns.emission[1] = Vec3::splat(8.0);
-        let settled = judge(&strayed, &unknowns, &[Role::Reflector, Role::Emitter]);
+        let settled = classify(&strayed, &unknowns, &[Role::Reflector, Role::Emitter]);
         assert_eq!(settled, []);
     }
 
@@ -328,7 +333,7 @@ mod tests {
         let mut unknowns = Unknowns::new(3);
         unknowns.emission[0] = Vec3::splat(0.9);
         unknowns.emission[1] = Vec3::splat(8.0);
-        let changes = judge(
+        let changes = classify(
             &room(),
             &unknowns,
             &[Role::Emitter, Role::Emitter, Role::Unseen],
@@ -343,7 +348,7 @@ mod tests {
         let cache = cache((0..40).map(|index| cluster(0, index, 1.0, 0.6)));
         let mut unknowns = Unknowns::new(1);
         unknowns.albedo[0] = Vec3::splat(0.6);
-        assert_eq!(judge(&cache, &unknowns, &[Role::Reflector]), []);
+        assert_eq!(classify(&cache, &unknowns, &[Role::Reflector]), []);
     }
 
     /// Neither role explains stripes; that one fits a little better by chance decides nothing.
@@ -356,7 +361,7 @@ mod tests {
         }));
         let mut unknowns = Unknowns::new(1);
         unknowns.albedo[0] = Vec3::splat(0.5);
-        assert_eq!(judge(&cache, &unknowns, &[Role::Reflector]), []);
+        assert_eq!(classify(&cache, &unknowns, &[Role::Reflector]), []);
     }
 
     /// Highlights saturate at 1: forty times the light of elsewhere falls on a wall that reflects 0.6.
@@ -376,20 +381,23 @@ mod tests {
         let mut unknowns = Unknowns::new(2);
         unknowns.albedo = vec![Vec3::splat(0.6), Vec3::ONE];
         let cache = cache(wall.chain(highlights).chain(lamp));
-        let changes = judge(&cache, &unknowns, &[Role::Reflector; 2]);
+        let changes = classify(&cache, &unknowns, &[Role::Reflector; 2]);
         assert_eq!(changes.len(), 1, "{changes:?}");
         assert_eq!((changes[0].object, changes[0].role), (1, Role::Emitter));
         assert!((changes[0].value - Vec3::ONE).length() < 1e-5);
         // Brighter than its photographs, as its light asks for, it stays one.
         unknowns.albedo[1] = Vec3::ZERO;
         unknowns.emission[1] = Vec3::splat(8.0);
-        let settled = judge(&cache, &unknowns, &[Role::Reflector, Role::Emitter]);
+        let settled = classify(&cache, &unknowns, &[Role::Reflector, Role::Emitter]);
         assert_eq!(settled, []);
     }
 
     #[test]
     fn nothing_to_look_at_changes_nothing() {
         let roles = [Role::Reflector, Role::Unseen];
-        assert_eq!(judge(&PathCache::default(), &Unknowns::new(2), &roles), []);
+        assert_eq!(
+            classify(&PathCache::default(), &Unknowns::new(2), &roles),
+            []
+        );
     }
 }
