@@ -3,9 +3,10 @@
 mod scenes;
 
 use glam::DVec3;
+use relit::calibrate::problem::Problem;
 use relit::capture::photograph::Photograph;
 use relit::inverse::settings::{Preset, Settings};
-use relit::inverse::solver::{Problem, Solution};
+use relit::inverse::solver::Solution;
 use relit::scene::Scene;
 use relit::transport::material::Material;
 use std::sync::{Arc, LazyLock};

@@ -3,14 +3,14 @@
 mod scenes;
 
 use glam::{DVec3, Vec2, Vec3};
-use relit::inverse::cache::clusters::{Cluster, cluster};
+use relit::calibrate::gbuffer::{GBuffer, SurfacePoint};
+use relit::calibrate::held_out::HoldOut;
+use relit::calibrate::measured_radiance::MeasuredRadiance;
+use relit::calibrate::problem::Problem;
 use relit::inverse::estimate::{Estimate, ObjectEstimate};
-use relit::inverse::gbuffer::{GBuffer, SurfacePoint};
-use relit::inverse::held_out::is_held_out;
 use relit::inverse::loss::LossProbe;
-use relit::inverse::measured::MeasuredRadiance;
+use relit::inverse::paths::clusters::{Cluster, cluster};
 use relit::inverse::settings::Settings;
-use relit::inverse::solver::Problem;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -25,7 +25,12 @@ fn room() -> Problem {
 }
 
 fn gbuffer(problem: &Problem) -> GBuffer {
-    GBuffer::new(problem, &Settings::default(), usize::MAX)
+    GBuffer::new(
+        problem,
+        HoldOut::from(&Settings::default()),
+        Settings::default().seed,
+        usize::MAX,
+    )
 }
 
 /// The problem with every pixel that fits `which` (frame, pixel) replaced.
@@ -63,7 +68,12 @@ fn each_object_is_counted_where_the_middle_of_a_pixel_sees_it() {
 
     // A keyed quarter of the pixels gives the counts scaled up, within 5 binomial deviations.
     let total: u64 = seen.iter().sum();
-    let quarter = GBuffer::new(&problem, &Settings::default(), total as usize / 4);
+    let quarter = GBuffer::new(
+        &problem,
+        HoldOut::from(&Settings::default()),
+        Settings::default().seed,
+        total as usize / 4,
+    );
     for (&scaled, &n) in quarter.seen.iter().zip(&seen) {
         let deviation = (n as f64 * 0.25 * 0.75).sqrt() * 4.0;
         assert!(
@@ -85,7 +95,7 @@ fn pure_pixels_see_one_surface_of_one_object_and_most_are_pure() {
         assert!(points.iter().all(|p| p.object == pixel.object));
         assert!(points.iter().all(|p| p.normal.dot(points[0].normal) > 0.8));
     }
-    let mixed = |p: &&relit::inverse::gbuffer::GBufferPixel| {
+    let mixed = |p: &&relit::calibrate::gbuffer::GBufferPixel| {
         p.points.iter().flatten().any(|q| q.object != p.object)
     };
     assert!(gbuffer.pixels.iter().filter(mixed).count() > 100);
@@ -183,7 +193,7 @@ fn clusters_hold_each_fitted_pixel_at_most_once_and_its_mean_colour() {
         assert!(c.weight.is_finite() && c.weight.min_element() > 0.0);
         for &pixel in &c.pixels {
             assert!(seen.insert((c.frame, pixel)), "{pixel} is fitted twice");
-            assert!(!is_held_out(&Settings::default(), c.frame, pixel));
+            assert!(!HoldOut::from(&Settings::default()).contains(c.frame, pixel));
         }
     }
     // A bound on the pixels is kept, but for the small objects.
@@ -209,10 +219,11 @@ fn held_out_pixels_enter_neither_clusters_nor_the_light_field() {
         },
     ] {
         let absurd = replaced(&problem, Vec3::splat(1e6), |frame, pixel| {
-            is_held_out(&settings, frame, pixel)
+            HoldOut::from(&settings).contains(frame, pixel)
         });
         let look = |problem: &Problem| -> (Vec<Cluster>, Vec<Option<Vec3>>, Vec<Option<Vec3>>) {
-            let gbuffer = GBuffer::new(problem, &settings, usize::MAX);
+            let gbuffer =
+                GBuffer::new(problem, HoldOut::from(&settings), settings.seed, usize::MAX);
             let measured = MeasuredRadiance::new(problem, &gbuffer);
             let points = gbuffer.pixels.iter().flat_map(|p| p.points).flatten();
             let field = points.map(|point| measured.at(&point)).collect();
@@ -225,7 +236,7 @@ fn held_out_pixels_enter_neither_clusters_nor_the_light_field() {
         assert_eq!(look(&problem), look(&absurd));
         // Were they not held out, they would be noticed.
         let noticed = replaced(&problem, Vec3::splat(1e6), |frame, pixel| {
-            !is_held_out(&settings, frame, pixel) && pixel % 7 == 0
+            !HoldOut::from(&settings).contains(frame, pixel) && pixel % 7 == 0
         });
         assert_ne!(look(&problem).0, look(&noticed).0);
     }
@@ -293,7 +304,7 @@ fn losses_are_mean_absolute_differences_apart_for_fitted_and_held_out_pixels() {
     let brighter = replaced(
         &problem,
         emission + Vec3::new(0.3, 0.6, 0.0),
-        |frame, pixel| is_held_out(&settings, frame, pixel),
+        |frame, pixel| HoldOut::from(&settings).contains(frame, pixel),
     );
     let object = ObjectEstimate {
         emission,

@@ -4,10 +4,10 @@ mod scenes;
 
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
-use relit::inverse::cache::derivative::{Gradient, differentiate};
-use relit::inverse::cache::trace::Tracer;
-use relit::inverse::parameters::Unknowns;
+use relit::inverse::paths::derivative::{Gradient, differentiate};
+use relit::inverse::paths::trace::Tracer;
 use relit::inverse::settings::LightSampling;
+use relit::inverse::unknowns::Unknowns;
 use relit::math::rng::Stream;
 use relit::math::stats::Moments;
 use relit::scene::Scene;
@@ -87,7 +87,7 @@ fn gradients(tracer: &Tracer, unknowns: &Unknowns, pass: u64) -> [Vec<DVec3>; 2]
 fn loss(lit: &Lit, pass: u64) -> DVec3 {
     let options = PathOptions {
         max_bounces: BOUNCES,
-        roulette_after: 100,
+        rr_depth: 100,
         ..Default::default()
     };
     let pixels = SIZE[0] * SIZE[1];

@@ -3,10 +3,12 @@
 mod common;
 
 use glam::Vec3;
+use relit::calibrate::problem::Problem;
 use relit::inverse::estimate::Estimate;
 use relit::inverse::known::{Known, Pinned};
 use relit::inverse::settings::{Preset, Settings};
-use relit::inverse::solver::{Control, Observer, Problem, Progress, Solution, solve};
+use relit::inverse::solve;
+use relit::inverse::solver::{Control, Observer, Progress, Solution};
 use relit::session::command::{OpenOptions, Source};
 use relit::session::snapshot::OpenCapture;
 use std::sync::LazyLock;

@@ -113,6 +113,62 @@ fn imports_point_downwards() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// Layers inside a folder, from the bottom; a row's modules do not import each other.
+const INSIDE: &[(&str, &[&[&str]])] = &[
+    (
+        "calibrate",
+        &[
+            &["problem", "held_out", "alignment"],
+            &["gbuffer", "sharpness", "photographs"],
+            &["measured_radiance", "censored"],
+            &["exposure"],
+            &["observed", "segments"],
+        ],
+    ),
+    (
+        "inverse",
+        &[
+            &[
+                "unknowns", "known", "roles", "settings", "estimate", "outside",
+            ],
+            &["solver", "loss"],
+            &["monitor", "paths", "lobe", "texture"],
+            &["fit"],
+            &["emitters"],
+            &["pipeline", "paper"],
+        ],
+    ),
+];
+
+#[test]
+fn imports_inside_a_folder_point_downwards() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut wrong = Vec::new();
+    for (folder, layers) in INSIDE {
+        let level = |module: &str| layers.iter().position(|row| row.contains(&module));
+        let mut files = Vec::new();
+        sources(&root.join(folder), &mut files);
+        for file in files {
+            let inside = file.strip_prefix(root.join(folder)).expect("within it");
+            let first = inside.components().next().expect("a file");
+            let own = Path::new(first.as_os_str()).with_extension("");
+            let own = own.to_str().expect("a plain name");
+            if own == "mod" {
+                continue;
+            }
+            let source = fs::read_to_string(&file).expect("readable");
+            assert!(!source.contains("use super::super"), "{}", inside.display());
+            let from = level(own).unwrap_or_else(|| panic!("{folder}/{own} is in no layer"));
+            for to in imports(&source.replace(&format!("crate::{folder}::"), "inside crate::")) {
+                if to != own && level(&to).is_some_and(|to| to >= from) {
+                    wrong.push(format!("{folder}/{}: imports {to}", inside.display()));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
 #[test]
 fn the_window_library_stays_in_the_window() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");

@@ -3,10 +3,11 @@
 mod scenes;
 
 use glam::{DVec3, Vec3};
+use relit::calibrate::problem::Problem;
 use relit::capture::mesh::Mesh;
 use relit::inverse::estimate::relative_to_albedo;
 use relit::inverse::settings::Settings;
-use relit::inverse::solver::{Problem, Solution};
+use relit::inverse::solver::Solution;
 use relit::transport::material::{Albedo, Lobe, Material};
 use std::sync::LazyLock;
 

@@ -3,13 +3,16 @@
 mod scenes;
 
 use glam::{DVec3, Vec3};
+use relit::calibrate::gbuffer::GBuffer;
+use relit::calibrate::held_out::HoldOut;
+use relit::calibrate::problem::Problem;
 use relit::capture::mesh::Mesh;
 use relit::capture::photograph::Photograph;
 use relit::inverse::estimate::Estimate;
-use relit::inverse::gbuffer::GBuffer;
 use relit::inverse::outside::MeasuredOutside;
 use relit::inverse::settings::{Preset, Settings};
-use relit::inverse::solver::{Checkpoint, Control, Observer, Problem, Progress, Solution, solve};
+use relit::inverse::solve;
+use relit::inverse::solver::{Checkpoint, Control, Observer, Progress, Solution};
 use relit::scene::Scene;
 use relit::transport::environment::Environment;
 use relit::transport::material::Material;
@@ -139,7 +142,12 @@ fn a_saturated_sky_is_a_bound_only_where_nothing_measured_it() {
         ..Settings::default()
     };
     let [once, both, bounds] = [once, both, bounds].map(|problem| {
-        let gbuffer = GBuffer::new(&problem, &settings, usize::MAX);
+        let gbuffer = GBuffer::new(
+            &problem,
+            HoldOut::from(&settings),
+            settings.seed,
+            usize::MAX,
+        );
         MeasuredOutside::new(&problem, &gbuffer, Surroundings::Far).expect("the sky is seen")
     });
     let upwards = Vec3::new(0.1, 0.3, 1.0).normalize();

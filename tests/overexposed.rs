@@ -1,11 +1,12 @@
 //! Lamps that photographs show saturated, and the pixels at their edges.
 
 use glam::{BVec3, Vec3};
+use relit::calibrate::censored::bounded;
+use relit::calibrate::gbuffer::GBuffer;
+use relit::calibrate::held_out::HoldOut;
+use relit::calibrate::problem::Problem;
 use relit::capture::photograph::Photograph;
-use relit::inverse::gbuffer::GBuffer;
-use relit::inverse::overexposed::bounded;
 use relit::inverse::settings::Settings;
-use relit::inverse::solver::Problem;
 use relit::room::Room;
 use relit::room::photographs::Rendering;
 use std::sync::Arc;
@@ -39,7 +40,7 @@ fn the_edges_of_a_saturated_lamp_are_bounds_and_a_wall_stays_measured() {
         .collect();
     let plain = problem(&unsaturated);
     let settings = Settings::default();
-    let gbuffer = GBuffer::new(&plain, &settings, usize::MAX);
+    let gbuffer = GBuffer::new(&plain, HoldOut::from(&settings), settings.seed, usize::MAX);
     assert!(bounded(&plain, &gbuffer).is_none());
     // Pixels of lamps are at 2 inside, 0.4 at the edge; of all else at 0.3.
     let emits = |object: u32| {

@@ -3,10 +3,12 @@
 mod scenes;
 
 use glam::{DVec3, Vec3};
+use relit::calibrate::problem::Problem;
 use relit::inverse::estimate::Estimate;
 use relit::inverse::paper::descent::Descent;
 use relit::inverse::settings::{Preset, Settings};
-use relit::inverse::solver::{Control, Observer, Problem, Progress, Stage, Termination, solve};
+use relit::inverse::solve;
+use relit::inverse::solver::{Control, Observer, Progress, Stage, Termination};
 use relit::transport::material::{Albedo, Material, Texture};
 use std::sync::Arc;
 

@@ -4,9 +4,9 @@
 mod scenes;
 
 use glam::{DVec3, Vec3};
+use relit::calibrate::problem::Problem;
 use relit::inverse::estimate::Estimate;
 use relit::inverse::settings::{Preset, Settings};
-use relit::inverse::solver::Problem;
 use relit::scene::Scene;
 use relit::transport::material::Material;
 use relit::transport::surroundings::Surroundings;

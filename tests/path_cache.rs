@@ -4,16 +4,17 @@ mod scenes;
 
 use glam::{BVec3, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
-use relit::inverse::cache::PathCache;
-use relit::inverse::cache::clusters::Cluster;
-use relit::inverse::cache::lamp_patches::LampPatches;
-use relit::inverse::cache::roles::Role;
-use relit::inverse::cache::trace::Tracer;
-use relit::inverse::gbuffer::GBuffer;
-use relit::inverse::measured::MeasuredRadiance;
-use relit::inverse::parameters::Unknowns;
+use relit::calibrate::gbuffer::GBuffer;
+use relit::calibrate::held_out::HoldOut;
+use relit::calibrate::measured_radiance::MeasuredRadiance;
+use relit::calibrate::problem::Problem;
+use relit::inverse::paths::PathCache;
+use relit::inverse::paths::clusters::Cluster;
+use relit::inverse::paths::lamp_patches::LampPatches;
+use relit::inverse::paths::trace::Tracer;
+use relit::inverse::roles::Role;
 use relit::inverse::settings::{LightSampling, Settings};
-use relit::inverse::solver::Problem;
+use relit::inverse::unknowns::Unknowns;
 use relit::math::rng::Stream;
 use relit::math::stats::Moments;
 use relit::scene::Scene;
@@ -86,7 +87,7 @@ fn rows() -> Vec<Cluster> {
         pixels: (y * width..(y + 1) * width).collect(),
         paths: 2,
         measured: Vec3::ZERO,
-        at_least: BVec3::FALSE,
+        censored: BVec3::FALSE,
         weight: Vec3::ONE,
         dark: Vec3::ONE,
     };
@@ -302,7 +303,12 @@ fn paths_that_end_in_photographed_radiance_hold_one_bounce_and_that_radiance() {
         scene: scene.clone(),
         photographs: vec![photograph; 6],
     };
-    let gbuffer = GBuffer::new(&problem, &Settings::default(), usize::MAX);
+    let gbuffer = GBuffer::new(
+        &problem,
+        HoldOut::from(&Settings::default()),
+        Settings::default().seed,
+        usize::MAX,
+    );
     let measured = MeasuredRadiance::new(&problem, &gbuffer);
     let lights = Emitters::new(&scene, &[1.0; 6]);
     let tracer = Tracer {
@@ -328,7 +334,7 @@ fn paths_that_end_in_photographed_radiance_hold_one_bounce_and_that_radiance() {
         pixels: (0..576).collect(),
         paths: 4,
         measured: Vec3::ZERO,
-        at_least: BVec3::FALSE,
+        censored: BVec3::FALSE,
         weight: Vec3::ONE,
         dark: Vec3::ONE,
     }];

@@ -2,11 +2,11 @@
 
 mod common;
 
+use relit::calibrate::problem::Problem;
 use relit::inverse::estimate::Estimate;
 use relit::inverse::settings::{Preset, Settings};
-use relit::inverse::solver::{
-    Checkpoint, Control, Observer, Problem, Progress, Solution, Termination, solve,
-};
+use relit::inverse::solve;
+use relit::inverse::solver::{Checkpoint, Control, Observer, Progress, Solution, Termination};
 use relit::session::command::{OpenOptions, Source};
 use relit::session::snapshot::OpenCapture;
 

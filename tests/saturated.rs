@@ -3,13 +3,13 @@
 mod scenes;
 
 use glam::Vec3;
+use relit::calibrate::problem::Problem;
 use relit::capture::photograph::{Photograph, PhotographSource};
 use relit::capture::working::load_working;
 use relit::inverse::estimate::Estimate;
 use relit::inverse::loss::LossProbe;
 use relit::inverse::paper::descent::Descent;
 use relit::inverse::settings::{Preset, Settings};
-use relit::inverse::solver::Problem;
 use relit::transport::material::Material;
 use scenes::albedo;
 use std::sync::Arc;

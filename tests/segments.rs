@@ -1,10 +1,10 @@
 //! Segments of meshes without objects: by what photographs show, against the objects of the same meshes.
 
 use glam::{DVec3, Vec3};
+use relit::calibrate::held_out::HoldOut;
 use relit::capture::mesh::Mesh;
 use relit::capture::photograph::{Encoding, Photograph};
 use relit::capture::{Capture, Cut};
-use relit::inverse::held_out::HoldOut;
 use relit::math::color::{linear_to_srgb, srgb_to_linear};
 use relit::room::Room;
 use relit::room::cameras::View;

@@ -1,10 +1,11 @@
 //! Which photographs are blurred, by what others show of the same edges.
 
 use glam::Vec3;
+use relit::calibrate::held_out::HoldOut;
+use relit::calibrate::problem::Problem;
+use relit::calibrate::sharpness::Sharpness;
 use relit::capture::photograph::Photograph;
 use relit::inverse::settings::Settings;
-use relit::inverse::sharpness::Sharpness;
-use relit::inverse::solver::Problem;
 use relit::math::rng::Stream;
 use relit::room;
 use relit::scene::Scene;
@@ -50,7 +51,7 @@ fn moved(photograph: &Photograph, x: u32, y: u32) -> Vec3 {
 
 fn contrasts(problem: &Problem) -> Vec<Option<f64>> {
     let none = vec![false; problem.photographs.len()];
-    Sharpness::new(problem, &Settings::default(), &none).contrast
+    Sharpness::new(problem, HoldOut::from(&Settings::default()), &none).contrast
 }
 
 #[test]
@@ -88,8 +89,8 @@ fn photographs_that_are_left_out_have_no_say_and_none() {
     let blurred = with(4, moved);
     let mut left_out = vec![false; blurred.photographs.len()];
     left_out[4] = true;
-    let [with, without] =
-        [&blurred, &ROOM].map(|p| Sharpness::new(p, &Settings::default(), &left_out));
+    let [with, without] = [&blurred, &ROOM]
+        .map(|p| Sharpness::new(p, HoldOut::from(&Settings::default()), &left_out));
     assert_eq!(with, without);
     assert_eq!(with.contrast[4], None);
     assert_eq!(with.weight(4), 1.0);

@@ -3,11 +3,13 @@
 mod scenes;
 
 use glam::{DVec3, Vec3};
+use relit::calibrate::problem::Problem;
 use relit::capture::exposure::{Exposure, Vignetting};
 use relit::capture::photograph::{Encoding, Photograph};
 use relit::inverse::estimate::Estimate;
 use relit::inverse::settings::{Preset, Settings};
-use relit::inverse::solver::{Control, Observer, Problem, Progress, Solution, Termination, solve};
+use relit::inverse::solve;
+use relit::inverse::solver::{Control, Observer, Progress, Solution, Termination};
 use relit::math::color::{linear_to_srgb, srgb_to_linear};
 use relit::math::stats::quantile;
 use relit::transport::material::Material;

@@ -3,12 +3,15 @@
 mod scenes;
 
 use glam::{DVec3, Vec3};
+use relit::calibrate::gbuffer::GBuffer;
+use relit::calibrate::held_out::HoldOut;
+use relit::calibrate::problem::Problem;
+use relit::calibrate::sharpness::Sharpness;
 use relit::capture::mesh::Mesh;
 use relit::inverse::estimate::{Estimate, ObjectEstimate};
-use relit::inverse::gbuffer::GBuffer;
 use relit::inverse::settings::Settings;
-use relit::inverse::sharpness::Sharpness;
-use relit::inverse::solver::{Control, Observer, Problem, Progress, Termination, solve};
+use relit::inverse::solve;
+use relit::inverse::solver::{Control, Observer, Progress, Termination};
 use relit::inverse::texture::{Refined, Task, refine};
 use relit::transport::material::{Albedo, Material, Texture};
 use std::sync::{Arc, LazyLock};
@@ -77,7 +80,12 @@ fn task<'a>(problem: &'a Problem, gbuffer: &'a GBuffer, paths: u64) -> Task<'a> 
 }
 
 fn refined(problem: &Problem, estimate: &Estimate, objects: &[usize], paths: u64) -> Refined {
-    let gbuffer = GBuffer::new(problem, &SETTINGS, usize::MAX);
+    let gbuffer = GBuffer::new(
+        problem,
+        HoldOut::from(&*SETTINGS),
+        SETTINGS.seed,
+        usize::MAX,
+    );
     let task = task(problem, &gbuffer, paths);
     let (refined, ended) = refine(&task, estimate, objects, &|_| None, &mut |_, _, _| Ok(()));
     ended.expect("nobody ends it");
@@ -272,7 +280,12 @@ fn threads_do_not_change_a_bit() {
 
 #[test]
 fn who_ends_it_is_obeyed() {
-    let gbuffer = GBuffer::new(&ROOM.problem, &SETTINGS, usize::MAX);
+    let gbuffer = GBuffer::new(
+        &ROOM.problem,
+        HoldOut::from(&*SETTINGS),
+        SETTINGS.seed,
+        usize::MAX,
+    );
     let task = task(&ROOM.problem, &gbuffer, 10_000);
     let ended_after = |most: u32| {
         let mut calls = 0;
@@ -298,7 +311,12 @@ fn who_ends_it_is_obeyed() {
 /// Light and texture may fail to agree: what held-out pixels say decides between the states.
 #[test]
 fn states_that_held_out_pixels_speak_against_are_not_kept() {
-    let gbuffer = GBuffer::new(&ROOM.problem, &SETTINGS, usize::MAX);
+    let gbuffer = GBuffer::new(
+        &ROOM.problem,
+        HoldOut::from(&*SETTINGS),
+        SETTINGS.seed,
+        usize::MAX,
+    );
     let task = task(&ROOM.problem, &gbuffer, 10_000);
     let judged = |judge: &dyn Fn(&Estimate) -> Option<f64>| {
         let (refined, ended) = refine(&task, &ROOM.estimate, &[BACK], judge, &mut |_, _, _| Ok(()));

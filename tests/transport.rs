@@ -77,7 +77,7 @@ fn a_truncated_path_holds_exactly_its_bounces() {
         let options = PathOptions {
             max_bounces: bounces,
             sample_emitters: false,
-            roulette_after: 100,
+            rr_depth: 100,
             ..Default::default()
         };
         let [m, ..] = mean_radiance(&lit, &options, 2, 100);

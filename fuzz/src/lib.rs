@@ -1,6 +1,7 @@
 //! What a fuzzer does with the bytes of a file: reads it as relit does, and uses what was read. Nothing may panic, hang or
 //! take memory out of proportion. `tests/readers/corpus.rs` does the same with spoilt seeds on the stable toolchain.
 
+use relit::calibrate::problem::Problem;
 use relit::capture::import::{self, ImportOptions};
 use relit::capture::read::{ReadOptions, read};
 use relit::capture::truth::Truth;
@@ -8,7 +9,8 @@ use relit::compose::object::ObjectModel;
 use relit::error::Result;
 use relit::export;
 use relit::inverse::estimate::Estimate;
-use relit::inverse::solver::{Control, Observer, Problem, Progress, solve};
+use relit::inverse::solve;
+use relit::inverse::solver::{Control, Observer, Progress};
 use relit::session::command::{OpenOptions, Source};
 use relit::session::keep;
 use relit::session::open::open;

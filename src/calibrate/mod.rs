@@ -1,4 +1,14 @@
-//! What photographs tell about themselves before anything is solved: whether they are photographs of this mesh at all.
+//! From photographs to observations, once, before anything is solved: which pixels see what, how each photograph was
+//! exposed, and whether the photographs agree with the mesh and with each other.
 
 pub mod alignment;
+pub mod censored;
+pub mod exposure;
+pub mod gbuffer;
+pub mod held_out;
+pub mod measured_radiance;
+pub mod observed;
 pub mod photographs;
+pub mod problem;
+pub mod segments;
+pub mod sharpness;

@@ -1,5 +1,6 @@
 //! The commands and their options.
 
+use crate::calibrate::held_out::HoldOut;
 use crate::capture::orientation::Orientation;
 use crate::capture::place::Coordinates;
 use crate::capture::reading::{Axes, Reading};
@@ -17,7 +18,6 @@ use crate::cli::study::StudyArguments;
 use crate::cli::trade::TradeArguments;
 use crate::error::Result;
 use crate::export::overwrite;
-use crate::inverse::held_out::HoldOut;
 use crate::inverse::settings::Settings;
 use crate::render::{Device, Renderer};
 use crate::say;

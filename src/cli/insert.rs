@@ -4,7 +4,7 @@ use crate::cli::arguments::{DenoiseOptions, DeviceOptions, Replace};
 use crate::cli::numbers::{above_zero, degrees, from_one, triple};
 use crate::cli::photographs::write_with_progress;
 use crate::cli::saved::{Loaded, SavedOptions};
-use crate::compose::object::surface::Surface;
+use crate::compose::object::surface::ObjectSurface;
 use crate::compose::placement::Placement;
 use crate::error::Result;
 use crate::session::photographs::Photographs;
@@ -105,10 +105,10 @@ fn which(text: &str) -> std::result::Result<Which, String> {
 
 /// The objects with their placements and the materials that replace those of their files, in the order of the command line.
 #[derive(Debug, Clone, Default)]
-struct Objects(Vec<(Placement, Option<Surface>)>);
+struct Objects(Vec<(Placement, Option<ObjectSurface>)>);
 
 /// KIND:R,G,B or KIND:R,G,B,ROUGHNESS: a linear base colour and GGX roughness α, all from 0 to 1.
-fn material(text: &str) -> std::result::Result<Surface, String> {
+fn material(text: &str) -> std::result::Result<ObjectSurface, String> {
     const WANTED: &str = "diffuse:R,G,B, plastic:R,G,B,ROUGHNESS or metal:R,G,B,ROUGHNESS is wanted, with numbers from 0 to 1";
     let (kind, numbers) = text.split_once(':').ok_or(WANTED)?;
     let numbers: Vec<f32> = numbers
@@ -117,12 +117,12 @@ fn material(text: &str) -> std::result::Result<Surface, String> {
         .collect::<Option<_>>()
         .ok_or(WANTED)?;
     match (kind, &numbers[..]) {
-        ("diffuse", &[r, g, b]) => Ok(Surface::diffuse(Vec3::new(r, g, b))),
-        ("plastic" | "metal", &[r, g, b, roughness]) => Ok(Surface {
+        ("diffuse", &[r, g, b]) => Ok(ObjectSurface::diffuse(Vec3::new(r, g, b))),
+        ("plastic" | "metal", &[r, g, b, roughness]) => Ok(ObjectSurface {
             metallic: if kind == "metal" { 1.0 } else { 0.0 },
             alpha: Some(roughness),
             dielectric: DIELECTRIC,
-            ..Surface::diffuse(Vec3::new(r, g, b))
+            ..ObjectSurface::diffuse(Vec3::new(r, g, b))
         }),
         _ => Err(WANTED.to_owned()),
     }
@@ -240,7 +240,7 @@ impl FromArgMatches for Objects {
         for (place, rotate) in given::<f64>(matches, "rotate") {
             objects.0[owner(place, "rotate")?].0.rotate = rotate;
         }
-        for (place, surface) in given::<Surface>(matches, "material") {
+        for (place, surface) in given::<ObjectSurface>(matches, "material") {
             objects.0[owner(place, "material")?].1 = Some(surface);
         }
         for ((placement, _), as_modelled) in objects.0.iter().zip(as_modelled) {
@@ -267,7 +267,9 @@ impl FromArgMatches for Objects {
 mod tests {
     use super::*;
 
-    fn parse(arguments: &[&str]) -> std::result::Result<Vec<(Placement, Option<Surface>)>, String> {
+    fn parse(
+        arguments: &[&str],
+    ) -> std::result::Result<Vec<(Placement, Option<ObjectSurface>)>, String> {
         let command = Objects::augment_args(Command::new("insert"));
         let all = std::iter::once(&"insert").chain(arguments);
         let matches = command

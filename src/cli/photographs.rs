@@ -1,7 +1,7 @@
 //! Photographs in one go, with progress; Ctrl-C ends after what is whole.
 
 use crate::cli::interrupt::Interrupt;
-use crate::compose::object::surface::Surface;
+use crate::compose::object::surface::ObjectSurface;
 use crate::error::Result;
 use crate::render::Renderer;
 use crate::say;
@@ -20,7 +20,7 @@ const LENGTH: u64 = 1000;
 pub fn write_with_progress(
     work: &Photographs,
     renderer: &Renderer,
-    materials: &[Option<Surface>],
+    materials: &[Option<ObjectSurface>],
     prefix: &dyn Fn(usize) -> PathBuf,
 ) -> Result<i32> {
     let interrupt = Interrupt::listen()?;

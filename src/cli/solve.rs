@@ -1,5 +1,6 @@
 //! `relit solve`: headless, with progress, saving what there is when interrupted.
 
+use crate::calibrate::problem::Problem;
 use crate::cli::arguments::SolveOptions;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::object_values::ObjectValues;
@@ -10,7 +11,7 @@ use crate::export::overwrite::CaptureId;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::known::Known;
 use crate::inverse::settings::Settings;
-use crate::inverse::solver::{self, Checkpoint, Control, Observer, Problem, Progress};
+use crate::inverse::solver::{Checkpoint, Control, Observer, Progress};
 use crate::render::Renderer;
 use crate::say;
 use crate::session::command::Source;
@@ -118,7 +119,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
         offered: None,
         written: Instant::now(),
     };
-    let solution = solver::solve(&problem, &settings, checkpoint, &mut watch);
+    let solution = crate::inverse::solve(&problem, &settings, checkpoint, &mut watch);
     watch.meter.finish();
     let solution = solution?;
 

@@ -1,5 +1,6 @@
 //! `relit trade`: what exactness costs on a capture, or on generated rooms.
 
+use crate::calibrate::problem::Problem;
 use crate::cli::arguments::{ReadOptions, Replace};
 use crate::cli::families;
 use crate::cli::interrupt::Interrupt;
@@ -8,7 +9,6 @@ use crate::cli::parameters::duration;
 use crate::cli::solve::use_threads;
 use crate::error::Result;
 use crate::inverse::settings::{Preset, Settings};
-use crate::inverse::solver::Problem;
 use crate::room::generated::Family;
 use crate::say;
 use crate::session::command::Source;

@@ -2,7 +2,7 @@
 
 use crate::capture::exposure::Exposure;
 use crate::capture::photograph::Photograph;
-use crate::compose::finish::Finish;
+use crate::compose::psf_and_grain::PsfAndGrain;
 use crate::error::{Error, Result};
 use crate::export::picture::shown_at;
 use crate::math::color::luminance;
@@ -26,7 +26,7 @@ pub struct Backdrop {
     /// The value at which each channel of the photograph saturates; infinite for linear files.
     pub saturation: Vec3,
     /// How soft and how grainy what is put into it becomes: not at all, or as it is itself.
-    pub finish: Finish,
+    pub finish: PsfAndGrain,
     /// The exposure at which it is shown as 8-bit sRGB: its own, or the 99th percentile of the photograph as taken at 1.
     pub shown_at: f32,
 }
@@ -68,7 +68,7 @@ impl Backdrop {
             ));
         }
         Ok(Self {
-            finish: Finish::default(),
+            finish: PsfAndGrain::default(),
             frame: frame as u64,
             camera: camera.clone(),
             shown_at: shown_at(photograph.saturation, &picture.pixels),
@@ -182,7 +182,7 @@ mod tests {
     const OBJECT: f32 = 0.7;
 
     /// A square object, with a shadow right of it, before a grey photograph with some finish.
-    fn composite(finish: Finish) -> Vec<f32> {
+    fn composite(finish: PsfAndGrain) -> Vec<f32> {
         let backdrop = backdrop(finish, Vec3::ONE);
         let layers: Vec<Mixed> = (0..SIDE * SIDE)
             .map(|pixel| {
@@ -203,7 +203,7 @@ mod tests {
     }
 
     /// A grey photograph that saturates at a value.
-    fn backdrop(finish: Finish, saturation: Vec3) -> Backdrop {
+    fn backdrop(finish: PsfAndGrain, saturation: Vec3) -> Backdrop {
         let intrinsics = Intrinsics {
             width: SIDE,
             height: SIDE,
@@ -235,10 +235,10 @@ mod tests {
 
     #[test]
     fn objects_and_their_shadows_become_soft_and_what_is_far_stays_to_the_bit() {
-        let exact = composite(Finish::default());
+        let exact = composite(PsfAndGrain::default());
         assert_eq!([at(&exact, 11, 17), at(&exact, 12, 17)], [LEVEL, OBJECT]);
         assert!((at(&exact, 23, 17) - 0.1).abs() < 1e-6);
-        let soft = composite(Finish {
+        let soft = composite(PsfAndGrain {
             blur: Vec2::new(1.2, 0.8),
             grain: Vec::new(),
         });
@@ -254,7 +254,7 @@ mod tests {
 
     #[test]
     fn a_shadow_is_never_darker_than_black() {
-        let shadow = backdrop(Finish::default(), Vec3::INFINITY);
+        let shadow = backdrop(PsfAndGrain::default(), Vec3::INFINITY);
         let [over, under] = [0.0, LEVEL * 2.0].map(Vec3::splat);
         assert_eq!(shadow.blend(0, 0.0, over, under), Vec3::ZERO);
         assert_eq!(shadow.blend(0, 0.0, under, under), Vec3::splat(LEVEL));
@@ -262,7 +262,7 @@ mod tests {
 
     #[test]
     fn objects_take_grain_and_the_photograph_and_its_shadows_keep_their_own() {
-        let grainy = composite(Finish {
+        let grainy = composite(PsfAndGrain {
             blur: Vec2::ZERO,
             grain: vec![(0.5, Vec3::splat(0.02))],
         });
@@ -276,7 +276,7 @@ mod tests {
         assert!((at(&grainy, 23, 17) - 0.1).abs() < 1e-6);
         assert_eq!(
             grainy,
-            composite(Finish {
+            composite(PsfAndGrain {
                 blur: Vec2::ZERO,
                 grain: vec![(0.5, Vec3::splat(0.02))],
             })

@@ -2,12 +2,12 @@
 
 pub mod backdrop;
 pub mod denoise;
-pub mod finish;
 pub mod insert;
 pub mod naive;
 pub mod object;
 pub mod pick;
 pub mod placement;
+pub mod psf_and_grain;
 pub mod relight;
 pub mod world;
 pub mod write;

@@ -208,7 +208,7 @@ mod tests {
     use crate::capture::camera::{Intrinsics, Pose};
     use crate::capture::exposure::Exposure;
     use crate::capture::response::Response;
-    use crate::compose::finish::Finish;
+    use crate::compose::psf_and_grain::PsfAndGrain;
     use crate::scene::camera::Camera;
     use glam::{DMat3, DVec3};
 
@@ -237,7 +237,7 @@ mod tests {
             photograph: Arc::new(Picture::from_fn(1, 1, |_, _| Vec3::splat(photograph))),
             exposure,
             saturation: Vec3::splat(saturation),
-            finish: Finish::default(),
+            finish: PsfAndGrain::default(),
             shown_at: 1.0,
         };
         let picture = relit(&backdrop, &[Vec3::splat(before)], &[Vec3::splat(after)]);

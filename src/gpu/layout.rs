@@ -123,7 +123,7 @@ shared! {
 pub(super) fn head(stack_size: u32) -> String {
     use crate::scene::geometry::OFFSET_GAMMA;
     use crate::transport::bsdf::{COUPLING_SLOPE, coupling_scale};
-    use crate::transport::path::MAX_SURVIVAL;
+    use crate::transport::path::RR_MAX_SURVIVAL;
     // Three roundings of a slab, as on the processor.
     let widen = 1.0 + 8.0 * f32::EPSILON;
     // Two products and a difference, each off by half an epsilon.
@@ -139,7 +139,7 @@ pub(super) fn head(stack_size: u32) -> String {
         ("COUPLING_SLOPE", COUPLING_SLOPE as f32),
         ("COUPLING_SCALE", coupling_scale() as f32),
         ("NORMAL_MARGIN", crate::transport::world::NORMAL_MARGIN),
-        ("MAX_SURVIVAL", MAX_SURVIVAL),
+        ("RR_MAX_SURVIVAL", RR_MAX_SURVIVAL),
     ] {
         let _ = writeln!(text, "const {name} = {value:e}f;");
     }

@@ -1,6 +1,6 @@
 //! Emitters and light from outside as tables of cumulative chances in whole numbers, which the shader compares exactly.
 
-use super::layout::NONE;
+use crate::gpu::layout::NONE;
 use crate::transport::environment::{Environment, row_cosines};
 use crate::transport::lit::Lit;
 

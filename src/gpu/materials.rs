@@ -1,7 +1,8 @@
 //! Materials and their tables as the shader reads them.
 
-use super::layout::{ALBEDO_CONSTANT, ALBEDO_IMAGE, ALBEDO_TEXELS, Material as Shared, NONE};
-use super::scene::Inserted;
+use crate::gpu::layout::Material as Shared;
+use crate::gpu::layout::{ALBEDO_CONSTANT, ALBEDO_IMAGE, ALBEDO_TEXELS, NONE};
+use crate::gpu::scene::Inserted;
 use crate::transport::bsdf::MIN_ROUGHNESS;
 use crate::transport::lit::Lit;
 use crate::transport::material::{Albedo, Material};

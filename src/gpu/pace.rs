@@ -1,6 +1,6 @@
 //! How much work a dispatch gets: drivers kill one that runs for seconds, and a card shared with a screen must come back sooner.
 
-use super::layout::WORKGROUP;
+use crate::gpu::layout::WORKGROUP;
 use std::time::Duration;
 
 /// Seconds that a dispatch should take.

@@ -1,9 +1,10 @@
 //! A lit scene with inserted objects as the shader reads it: triangles in the order of the hierarchy, materials, lights.
 
-use super::hierarchy::Hierarchy;
-use super::layout::{Dispatch, Material as Shared, NONE};
-use super::lights::{Emitters, environment};
-use super::materials::Materials;
+use crate::gpu::hierarchy::Hierarchy;
+use crate::gpu::layout::Material as Shared;
+use crate::gpu::layout::{Dispatch, NONE};
+use crate::gpu::lights::{Emitters, environment};
+use crate::gpu::materials::Materials;
 use crate::transport::lit::Lit;
 use crate::transport::material::Material;
 use crate::transport::path::emitter_fraction;

@@ -1,6 +1,6 @@
 //! The shader's text: a head written from the shared definitions, then its modules.
 
-use super::layout::head;
+use crate::gpu::layout::head;
 
 /// The modules, in any order that reads well.
 const MODULES: [&str; 10] = [

@@ -1,11 +1,11 @@
 //! A scene on the card: pictures, pairs of pictures with and without inserted objects, single rays.
 
-use super::card::Card;
-use super::layout::{BINDINGS, Dispatch, FILM, Pixel, WORKGROUP};
-use super::pace::Pace;
-use super::scene::{Inserted, Packed};
-use super::shader::{Kernel, source};
 use crate::error::Result;
+use crate::gpu::card::Card;
+use crate::gpu::layout::{BINDINGS, Dispatch, FILM, Pixel, WORKGROUP};
+use crate::gpu::pace::Pace;
+use crate::gpu::scene::{Inserted, Packed};
+use crate::gpu::shader::{Kernel, source};
 use crate::math::rng::splitmix64;
 use crate::scene::camera::Camera;
 use crate::scene::geometry::{Hit, Ray};
@@ -398,7 +398,7 @@ fn described(scene: Dispatch, view: &View<'_>) -> Dispatch {
         distortion: k.distortion.map(|v| v as f32),
         key: [key as u32, (key >> 32) as u32, 0, 0],
         slice: [k.width, 0, 0, 0],
-        paths: [0, view.options.max_bounces, view.options.roulette_after, 0],
+        paths: [0, view.options.max_bounces, view.options.rr_depth, 0],
         ..scene
     }
 }

@@ -1,10 +1,10 @@
 //! The loss that is shown: mean absolute difference between photographs and re-renders on fixed sets of pixels. Where a
 //! photograph is saturated only a darker re-render differs.
 
+use crate::calibrate::held_out::HoldOut;
+use crate::calibrate::problem::Problem;
 use crate::inverse::estimate::Estimate;
-use crate::inverse::held_out::is_held_out;
 use crate::inverse::settings::Settings;
-use crate::inverse::solver::Problem;
 use crate::math::rng::{Stream, splitmix64};
 use crate::math::stats::Moments;
 use crate::scene::visibility::NOTHING;
@@ -72,7 +72,7 @@ impl LossProbe {
                 let pixel = next - before;
                 let usable = photograph.is_usable(pixel);
                 if usable && sees_mesh[frame].get(pixel) != Some(&NOTHING) {
-                    let held = is_held_out(settings, frame as u32, pixel as u32);
+                    let held = HoldOut::from(settings).contains(frame as u32, pixel as u32);
                     sets[usize::from(held)].push((frame as u32, pixel as u32));
                 }
                 next += 1 + splitmix64(next as u64) as usize % (2 * stride - 1).max(1);
@@ -176,8 +176,8 @@ impl LossProbe {
                 let photograph = &problem.photographs[frame as usize];
                 let measured = photograph.pixels[pixel as usize].as_dvec3();
                 let missing = measured - shown;
-                let at_least = photograph.saturated(pixel as usize);
-                let wrong = DVec3::select(at_least, missing.max(DVec3::ZERO), missing.abs());
+                let censored = photograph.saturated(pixel as usize);
+                let wrong = DVec3::select(censored, missing.max(DVec3::ZERO), missing.abs());
                 (wrong.element_sum() / 3.0, cast)
             })
             .collect();

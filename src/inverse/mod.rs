@@ -1,21 +1,50 @@
 //! From photographs to an estimate: the solvers, what they estimate, and how sure they are.
+//!
+//! [`solve`] picks the solver: [`pipeline`] (the transport cache, of all presets but one) or [`paper`]. Neither imports
+//! the other. [`paths`] holds stored paths and their derivatives, [`fit`] the least squares over them, [`emitters`] what is a
+//! lamp; [`lobe`] and [`texture`] find what one albedo an object does not explain.
 
-pub mod cache;
+pub mod emitters;
 pub mod estimate;
-pub mod exposure;
-pub mod faces;
-pub mod gbuffer;
-pub mod held_out;
+pub mod fit;
 pub mod known;
 pub mod lobe;
 pub mod loss;
-pub mod measured;
 pub mod monitor;
 pub mod outside;
-pub mod overexposed;
 pub mod paper;
-pub mod parameters;
+pub mod paths;
+pub mod pipeline;
+pub mod roles;
 pub mod settings;
-pub mod sharpness;
 pub mod solver;
 pub mod texture;
+pub mod unknowns;
+
+use crate::calibrate::held_out::HoldOut;
+use crate::calibrate::problem::Problem;
+use crate::error::Result;
+use monitor::Monitor;
+use settings::{Preset, Settings};
+use solver::{Checkpoint, Observer, Solution};
+
+/// Runs the solver that the settings' preset names.
+///
+/// # Errors
+/// The checkpoint belongs to another capture or preset, or all photographs are to be held out.
+pub fn solve(
+    problem: &Problem,
+    settings: &Settings,
+    resume: Option<&Checkpoint>,
+    observer: &mut dyn Observer,
+) -> Result<Solution> {
+    HoldOut::from(settings).check(problem.photographs.len())?;
+    let progress = resume.map(|c| c.progress.clone()).unwrap_or_default();
+    let monitor = Monitor::new(settings, observer, progress);
+    match settings.preset {
+        Preset::Paper => paper::solve(problem, settings, resume, monitor),
+        Preset::Preview | Preset::Balanced | Preset::Reference => {
+            pipeline::solve(problem, settings, resume, monitor)
+        }
+    }
+}

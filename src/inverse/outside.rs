@@ -3,8 +3,8 @@
 //! What lies there is far away, as a sky, and looks the same from everywhere in the room; or it is what a scan lacks, and
 //! lies on a box around the mesh.
 
-use crate::inverse::gbuffer::GBuffer;
-use crate::inverse::solver::Problem;
+use crate::calibrate::gbuffer::GBuffer;
+use crate::calibrate::problem::Problem;
 use crate::transport::environment::{Environment, direction_of, pixel_of};
 use crate::transport::surroundings::Surroundings;
 use glam::{DVec3, Vec2, Vec3};
@@ -24,7 +24,7 @@ pub struct MeasuredOutside {
     height: usize,
     known: Vec<bool>,
     /// Where all that is known is a lower bound.
-    at_least: Vec<bool>,
+    censored: Vec<bool>,
     map: Environment,
     /// Unit up vector.
     up: Vec3,
@@ -67,7 +67,7 @@ impl MeasuredOutside {
 
         // Fill gaps from coarser blocks; in each a bound counts only where nothing is measured.
         let mut known = vec![false; width * height];
-        let mut at_least = vec![false; width * height];
+        let mut censored = vec![false; width * height];
         let mut pixels = vec![Vec3::ZERO; width * height];
         for level in 0..LEVELS {
             let block = 1 << level;
@@ -88,7 +88,7 @@ impl MeasuredOutside {
                 let mean = (sum / f64::from(count)).as_vec3();
                 for cell in cells().filter(|&cell| !known[cell]).collect::<Vec<_>>() {
                     known[cell] = true;
-                    at_least[cell] = is_bound;
+                    censored[cell] = is_bound;
                     pixels[cell] = mean;
                 }
             }
@@ -98,7 +98,7 @@ impl MeasuredOutside {
             width,
             height,
             known,
-            at_least,
+            censored,
             map,
             up: scene.up,
         })
@@ -113,7 +113,7 @@ impl MeasuredOutside {
     /// Whether no photograph tells more of what a ray finds than that it is at least so bright: all are saturated there.
     #[inline]
     pub fn is_bound(&self, origin: Vec3, direction: Vec3) -> bool {
-        self.at_least[self.cell(origin, direction)]
+        self.censored[self.cell(origin, direction)]
     }
 
     fn cell(&self, origin: Vec3, direction: Vec3) -> usize {
@@ -147,7 +147,7 @@ impl MeasuredOutside {
 
     /// The mean of the bounds where there is nothing else; black where there are none.
     pub fn mean_bound(&self) -> Vec3 {
-        let cells = || (0..self.known.len()).filter(|&cell| self.at_least[cell]);
+        let cells = || (0..self.known.len()).filter(|&cell| self.censored[cell]);
         let sum: DVec3 = cells()
             .map(|cell| {
                 let direction = direction_of(self.width, self.height, cell);
@@ -167,7 +167,7 @@ impl MeasuredOutside {
         (0..self.width * self.height)
             .map(|cell| {
                 let direction = direction_of(self.width, self.height, cell);
-                match (self.known[cell], self.at_least[cell]) {
+                match (self.known[cell], self.censored[cell]) {
                     (true, true) => self.map.of_map(direction) + excess,
                     (true, false) => self.map.of_map(direction),
                     (false, _) => elsewhere(direction),
@@ -203,7 +203,7 @@ mod tests {
             width,
             height,
             known: (0..128).map(|c| c == above || c == below).collect(),
-            at_least: vec![false; 128],
+            censored: vec![false; 128],
             map: Environment::new(width, height, pixels).expect("sizes fit"),
             up: Vec3::Y,
         };

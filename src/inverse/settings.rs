@@ -1,5 +1,6 @@
 //! The one table of parameters: each is declared once and reaches the command line, the window, presets and files.
 
+use crate::calibrate::held_out::HoldOut;
 use serde::{Deserialize, Serialize};
 
 /// The value of a parameter, for tables and text.
@@ -213,9 +214,9 @@ parameters! {
         "Go on until the median relative standard error of the albedos seen is below this; 0 leaves it to the preset";
     bounces: u64 = 0, Kind::Whole { min: 0, max: 1000 }, "", false,
         "Longest path in bounces; 0 chooses (2 for the paper solver, by the albedo found for the others)";
-    held_out: f64 = 0.05, Kind::Real { min: 0.0, max: 0.9, logarithmic: false }, "of the pixels", false,
-        "Share of pixels kept out of the fit, to test it";
-    hold_out: u64 = 0, Kind::Whole { min: 0, max: 1_000_000 }, "frames", false,
+    held_out: f64 = HoldOut::DEFAULT.held_out, Kind::Real { min: 0.0, max: 0.9, logarithmic: false }, "of the pixels", false,
+        "Fraction of the pixels kept out of the fit, to test it";
+    hold_out: u64 = HoldOut::DEFAULT.hold_out, Kind::Whole { min: 0, max: 1_000_000 }, "frames", false,
         "Keep every K-th frame out of the fit instead of single pixels; 0 keeps single pixels";
     outside_light: bool = true, Kind::Flag, "", false,
         "Try light from outside the mesh, where rays leave it";
@@ -255,6 +256,15 @@ parameters! {
 
 /// Bounces that the paper's solver takes when none are set.
 const PAPER_BOUNCES: u32 = 2;
+
+impl From<&Settings> for HoldOut {
+    fn from(settings: &Settings) -> Self {
+        Self {
+            held_out: settings.held_out,
+            hold_out: settings.hold_out,
+        }
+    }
+}
 
 impl Settings {
     /// Longest path in bounces: what is set, else the paper solver's two, else all that roulette leaves.

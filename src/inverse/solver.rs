@@ -1,28 +1,12 @@
 //! What a solver is given, what it reports while it runs, and how it ends.
 
-use crate::capture::photograph::Photograph;
 use crate::error::{Error, Result};
-use crate::inverse::cache::pipeline;
 use crate::inverse::estimate::Estimate;
-use crate::inverse::held_out::leaves_some;
 use crate::inverse::known::Known;
-use crate::inverse::monitor::Monitor;
-use crate::inverse::paper;
-use crate::inverse::settings::{Preset, Settings};
-use crate::scene::Scene;
+use crate::inverse::settings::Settings;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::sync::Arc;
-
-/// A scene and what its photographs measured.
-#[derive(Debug, Clone)]
-pub struct Problem {
-    /// Geometry and cameras. Camera sizes equal those of `photographs`.
-    pub scene: Arc<Scene>,
-    /// One photograph a camera, at the working resolution.
-    pub photographs: Vec<Arc<Photograph>>,
-}
 
 /// How far a solve has come. Handed out between iterations.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -188,25 +172,4 @@ pub struct Solution {
     pub termination: Termination,
     /// Where to go on from, unless there is nothing left to do.
     pub checkpoint: Option<Checkpoint>,
-}
-
-/// Runs the solver that the settings' preset names.
-///
-/// # Errors
-/// The checkpoint belongs to another capture or preset, or all photographs are to be held out.
-pub fn solve(
-    problem: &Problem,
-    settings: &Settings,
-    resume: Option<&Checkpoint>,
-    observer: &mut dyn Observer,
-) -> Result<Solution> {
-    leaves_some(settings, problem.photographs.len())?;
-    let progress = resume.map(|c| c.progress.clone()).unwrap_or_default();
-    let monitor = Monitor::new(settings, observer, progress);
-    match settings.preset {
-        Preset::Paper => paper::solve(problem, settings, resume, monitor),
-        Preset::Preview | Preset::Balanced | Preset::Reference => {
-            pipeline::solve(problem, settings, resume, monitor)
-        }
-    }
 }

@@ -1,6 +1,6 @@
 //! Numbers that a path is made of: independent ones, or points of a low-discrepancy sequence that many paths share.
 
-use super::rng::{Stream, splitmix64};
+use crate::math::rng::{Stream, splitmix64};
 
 /// Points of one sequence before another scramble of it begins.
 const LENGTH: u64 = 1 << 16;

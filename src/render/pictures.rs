@@ -1,7 +1,7 @@
 //! Pictures of one lit scene.
 
-use super::{Renderer, went_wrong};
 use crate::gpu::{Tracer, View};
+use crate::render::{Renderer, went_wrong};
 use crate::scene::camera::Camera;
 use crate::transport::film::Film;
 use crate::transport::lit::Lit;

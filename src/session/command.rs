@@ -1,11 +1,11 @@
 //! What the window or the command line asks of the worker.
 
+use crate::calibrate::held_out::HoldOut;
 use crate::capture::place::Coordinates;
 use crate::capture::reading::Reading;
 use crate::capture::regroup::Regroup;
 pub use crate::compose::placement::Placement;
 pub use crate::export::scene::Format as ExportFormat;
-use crate::inverse::held_out::HoldOut;
 use crate::inverse::settings::Settings;
 use crate::scene::camera::Camera;
 use crate::session::edits::Edits;

@@ -1,8 +1,8 @@
 //! A capture as something to be measured on: its problem, and what tells the errors of its estimates.
 
+use crate::calibrate::problem::Problem;
 use crate::capture::truth::Truth;
 use crate::error::Result;
-use crate::inverse::solver::Problem;
 use crate::room::Room;
 use crate::room::photographs::KEPT;
 use crate::session::command::Source;

@@ -3,11 +3,11 @@
 use crate::capture::exposure::Exposure;
 use crate::capture::photograph::Photograph;
 use crate::compose::backdrop::Backdrop;
-use crate::compose::finish::Finish;
 use crate::compose::insert::Insertion as Composite;
 use crate::compose::naive::{Pasted, harmonics_of_estimate, harmonics_of_photographs};
 use crate::compose::object::ObjectModel;
 use crate::compose::placement::PlacedObject;
+use crate::compose::psf_and_grain::PsfAndGrain;
 use crate::error::Result;
 use crate::inverse::estimate::Estimate;
 use crate::math::sh::Harmonics;
@@ -43,7 +43,7 @@ struct Taken {
     size: (usize, u32),
     backdrop: Backdrop,
     photograph: Arc<Photograph>,
-    finish: Option<Finish>,
+    finish: Option<PsfAndGrain>,
 }
 
 impl Library {
@@ -99,7 +99,7 @@ impl Library {
         if soft {
             let finish = taken
                 .finish
-                .get_or_insert_with(|| Finish::of(&taken.photograph));
+                .get_or_insert_with(|| PsfAndGrain::of(&taken.photograph));
             backdrop.finish = finish.clone();
         }
         self.taken = Some(taken);

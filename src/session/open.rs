@@ -2,6 +2,7 @@
 
 use crate::calibrate::alignment::{Alignment, Decision};
 use crate::calibrate::photographs::{leave_out, leave_out_astray, name, without_hot_pixels};
+use crate::calibrate::segments::cut_up;
 use crate::capture::Capture;
 use crate::capture::photograph::{Photograph, PhotographSource};
 use crate::capture::read::{ReadOptions, read};
@@ -10,7 +11,6 @@ use crate::capture::regroup::regroup;
 use crate::capture::working::{Working, load_working};
 use crate::error::{Error, Result};
 use crate::inverse::estimate::Estimate;
-use crate::inverse::faces::cut_up;
 use crate::room;
 use crate::scene::Scene;
 use crate::scene::prepare::{Prepared, prepare};

@@ -3,9 +3,9 @@
 
 use crate::compose::backdrop::Backdrop;
 use crate::compose::denoise::denoised;
-use crate::compose::finish::Finish;
-use crate::compose::object::surface::Surface;
+use crate::compose::object::surface::ObjectSurface;
 use crate::compose::placement::{PlacedObject, Placement};
+use crate::compose::psf_and_grain::PsfAndGrain;
 use crate::compose::relight::Relighting;
 use crate::compose::write::{write_insertion, write_relit};
 use crate::error::Result;
@@ -87,7 +87,7 @@ impl Photographs {
     pub fn write_made_of(
         &self,
         renderer: &Renderer,
-        materials: &[Option<Surface>],
+        materials: &[Option<ObjectSurface>],
         prefix: &dyn Fn(usize) -> PathBuf,
         tell: &dyn Fn(Doing) -> bool,
     ) -> Result<Written> {
@@ -178,7 +178,7 @@ impl Photographs {
         let exposure = self.found.exposure(frame);
         let mut backdrop = Backdrop::new(frame, &camera, &photograph, exposure)?;
         if self.finish && !self.placements.is_empty() {
-            backdrop.finish = Finish::of(&photograph);
+            backdrop.finish = PsfAndGrain::of(&photograph);
         }
         if let Some(lights) = lights {
             let (options, seed) = (path_options(&self.settings), self.settings.seed);

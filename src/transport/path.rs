@@ -9,7 +9,7 @@ use glam::Vec3;
 
 /// Paths are never kept with a higher chance than this. Where all albedos are ρ, variance is finite only above ρ², since
 /// weights grow by ρ over the chance at each bounce.
-pub const MAX_SURVIVAL: f32 = 0.9999;
+pub const RR_MAX_SURVIVAL: f32 = 0.9999;
 
 /// How paths are traced.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,7 +17,7 @@ pub struct PathOptions {
     /// Longest path in bounces (one bounce is direct light); 0 is emission alone.
     pub max_bounces: u32,
     /// Bounces before Russian roulette may end a path.
-    pub roulette_after: u32,
+    pub rr_depth: u32,
     /// Whether emitters are sampled (next-event estimation).
     pub sample_emitters: bool,
     /// Whether emission met by BSDF sampling counts.
@@ -28,7 +28,7 @@ impl Default for PathOptions {
     fn default() -> Self {
         Self {
             max_bounces: u32::MAX,
-            roulette_after: 4,
+            rr_depth: 4,
             sample_emitters: true,
             sample_bsdf: true,
         }
@@ -268,8 +268,8 @@ pub(super) fn follow(
         bounce += 1;
 
         // End paths that carry little, without bias.
-        if bounce > options.roulette_after {
-            let survival = throughput.max_element().min(MAX_SURVIVAL);
+        if bounce > options.rr_depth {
+            let survival = throughput.max_element().min(RR_MAX_SURVIVAL);
             if survival <= 0.0 || stream.uniform() >= survival {
                 break;
             }

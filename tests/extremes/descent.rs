@@ -2,8 +2,9 @@
 
 use crate::{ROOM, preset, run, run_briefly, scenes};
 use glam::Vec3;
+use relit::calibrate::problem::Problem;
 use relit::inverse::settings::{Loss, Preset, Settings};
-use relit::inverse::solver::{Problem, Termination};
+use relit::inverse::solver::Termination;
 use std::sync::Arc;
 
 fn paper(steps: u64) -> Settings {

@@ -14,9 +14,11 @@ mod sizes;
 mod units;
 
 use glam::Vec3;
+use relit::calibrate::problem::Problem;
 use relit::inverse::estimate::Estimate;
 use relit::inverse::settings::{Preset, Settings};
-use relit::inverse::solver::{Control, Observer, Problem, Progress, Solution, solve};
+use relit::inverse::solve;
+use relit::inverse::solver::{Control, Observer, Progress, Solution};
 use relit::math::stats::Moments;
 use relit::transport::material::Material;
 use std::sync::LazyLock;

@@ -2,10 +2,10 @@
 
 use crate::{LAMP, ROOM, SIZE, grey, preset, run, scenes};
 use glam::{DVec3, Vec3};
+use relit::calibrate::problem::Problem;
 use relit::capture::mesh::Mesh;
 use relit::capture::read::{ReadOptions, read};
 use relit::inverse::settings::{Preset, Settings};
-use relit::inverse::solver::Problem;
 use relit::math::rng::Stream;
 use relit::math::warp;
 use relit::scene::Scene;

@@ -2,8 +2,8 @@
 
 use crate::{ROOM, preset, run_briefly, scenes};
 use glam::Vec3;
+use relit::calibrate::problem::Problem;
 use relit::inverse::settings::{Preset, Settings};
-use relit::inverse::solver::Problem;
 use relit::transport::material::Material;
 use std::sync::Arc;
 

@@ -3,17 +3,18 @@
 use crate::{LAMP, ROOM};
 use glam::DVec3;
 use nalgebra::{Cholesky, DMatrix, DVector};
-use relit::inverse::cache::clusters::{Cluster, cluster, mean_radiance};
-use relit::inverse::cache::derivative::{Gradient, differentiate};
-use relit::inverse::cache::errors::standard_errors;
-use relit::inverse::cache::fit::fit;
-use relit::inverse::cache::prior::Prior;
-use relit::inverse::cache::robust_weights::RobustWeights;
-use relit::inverse::cache::trace::Tracer;
-use relit::inverse::cache::{CachedCluster, NO_LAMP, PathCache, Vertex};
-use relit::inverse::gbuffer::GBuffer;
-use relit::inverse::parameters::Unknowns;
+use relit::calibrate::gbuffer::GBuffer;
+use relit::calibrate::held_out::HoldOut;
+use relit::inverse::fit::errors::standard_errors;
+use relit::inverse::fit::gauss_newton::fit;
+use relit::inverse::fit::prior::Prior;
+use relit::inverse::fit::robust_weights::RobustWeights;
+use relit::inverse::paths::clusters::{Cluster, cluster, mean_radiance};
+use relit::inverse::paths::derivative::{Gradient, differentiate};
+use relit::inverse::paths::trace::Tracer;
+use relit::inverse::paths::{CachedCluster, NO_LAMP, PathCache, Vertex};
 use relit::inverse::settings::{LightSampling, Settings};
+use relit::inverse::unknowns::Unknowns;
 use relit::transport::emitters::Emitters;
 
 const SURFACES: usize = 8;
@@ -21,7 +22,12 @@ const SURFACES: usize = 8;
 /// Paths to the lamp, and the parameters that are fitted: every albedo but the lamp's, and its emission.
 fn cache() -> (PathCache, Vec<Cluster>, Vec<usize>) {
     let problem = &ROOM.0;
-    let gbuffer = GBuffer::new(problem, &Settings::default(), 100_000);
+    let gbuffer = GBuffer::new(
+        problem,
+        HoldOut::from(&Settings::default()),
+        Settings::default().seed,
+        100_000,
+    );
     let mut clusters = cluster(problem, &gbuffer, 100_000);
     clusters.iter_mut().for_each(|c| c.paths = 4);
     let mut weights = vec![0.02; SURFACES];

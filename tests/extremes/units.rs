@@ -5,8 +5,8 @@
 
 use crate::{ROOM, SIZE, preset, run, scenes};
 use glam::Vec3;
+use relit::calibrate::problem::Problem;
 use relit::inverse::settings::Preset;
-use relit::inverse::solver::Problem;
 use relit::math::rng::Stream;
 use relit::scene::geometry::Ray;
 use relit::transport::lit::Lit;

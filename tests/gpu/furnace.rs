@@ -69,7 +69,7 @@ fn a_closed_furnace_has_its_closed_form_radiance_at_any_size_and_place() {
     for (max_bounces, truth) in [(0, 1.0), (1, 1.5), (2, 1.75)] {
         let options = PathOptions {
             max_bounces,
-            roulette_after: 100,
+            rr_depth: 100,
             ..PathOptions::default()
         };
         let Some(m) = seen(&lit, &options, 16) else {

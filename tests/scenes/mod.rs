@@ -2,13 +2,15 @@
 #![allow(dead_code, reason = "each test uses its own part")]
 
 use glam::{DMat3, DVec3, Vec2, Vec3};
+use relit::calibrate::problem::Problem;
 use relit::capture::camera::{Intrinsics, Pose};
 use relit::capture::mesh::Mesh;
 use relit::capture::photograph::{Encoding, Photograph, PhotographSource};
 use relit::capture::{Capture, Frame};
 use relit::inverse::estimate::{Estimate, TexelEstimate};
 use relit::inverse::settings::Settings;
-use relit::inverse::solver::{Control, Observer, Problem, Progress, Solution, solve};
+use relit::inverse::solve;
+use relit::inverse::solver::{Control, Observer, Progress, Solution};
 use relit::scene::Scene;
 use relit::scene::geometry::Hit;
 use relit::transport::environment::Environment;

@@ -6,14 +6,13 @@ mod keeping;
 mod recut;
 mod regroup;
 
+use relit::calibrate::problem::Problem;
 use relit::capture::Capture;
 use relit::capture::place::Coordinates;
 use relit::error::Result;
 use relit::inverse::estimate::Estimate;
 use relit::inverse::settings::Settings;
-use relit::inverse::solver::{
-    Checkpoint, Control, LossPoint, Observer, Problem, Solution, Termination,
-};
+use relit::inverse::solver::{Checkpoint, Control, LossPoint, Observer, Solution, Termination};
 use relit::session::Session;
 use relit::session::command::{Command, OpenOptions, Source, ViewCamera, ViewRequest};
 use relit::session::edits::{Edits, ObjectEdit};

@@ -1,9 +1,9 @@
 //! Segments that are cut anew where other pixels are kept out of the fits.
 
 use crate::{ROOM, Rig, common, iterations};
+use relit::calibrate::held_out::HoldOut;
 use relit::capture::{Capture, Cut};
 use relit::error::Error;
-use relit::inverse::held_out::HoldOut;
 use relit::inverse::settings::Settings;
 use relit::session::command::Command;
 use relit::session::snapshot::{Level, Phase};

@@ -2,7 +2,7 @@
 
 use crate::app::insertion::Inserted;
 use crate::compose::object::ObjectModel;
-use crate::compose::object::surface::Surface;
+use crate::compose::object::surface::ObjectSurface;
 use crate::error::Result;
 use crate::scene::Scene;
 use crate::session::command::Placement;
@@ -124,7 +124,7 @@ impl Models {
 fn extent(model: &ObjectModel) -> Result<ObjectModel> {
     let (low, high) = model.bounds();
     let corners = vec![[low, high, DVec3::new(low.x, high.y, low.z)]];
-    let material = Surface::diffuse(Vec3::ZERO).material(None);
+    let material = ObjectSurface::diffuse(Vec3::ZERO).material(None);
     ObjectModel::from_corners(&model.name, corners, material)
 }
 
@@ -165,7 +165,7 @@ mod tests {
             DVec3::new(size, 0.0, size),
             DVec3::new(0.0, size, 0.0),
         ]];
-        let material = Surface::diffuse(Vec3::splat(0.5)).material(None);
+        let material = ObjectSurface::diffuse(Vec3::splat(0.5)).material(None);
         let model = ObjectModel::from_corners("cube", corners, material).expect("a model");
         let model = extent(&model).expect("it has a size");
         let mut models = Models::default();

@@ -1,11 +1,11 @@
 //! Binary and JSON glTF 2.0: the default scene's triangles with their metallic-roughness materials.
 
-use super::files::{self, Meaning};
-use super::surface::{Surface, mean};
-use super::{Corners, Parts};
 use crate::capture::read::accessor::numbers;
 use crate::capture::read::gltf_file::{self, Buffer, ReadFile};
 use crate::capture::read::gltf_scene;
+use crate::compose::object::files::Meaning;
+use crate::compose::object::surface::{ObjectSurface, mean};
+use crate::compose::object::{Corners, Parts, files};
 use crate::error::{Error, Result};
 use crate::math::picture::Picture;
 use crate::transport::material::DIELECTRIC;
@@ -52,7 +52,7 @@ pub(super) fn read(path: &Path) -> Result<Parts> {
         parts.surfaces.push(surface);
     }
     // Primitives without a material are what the format calls its default: white, wholly metal, wholly rough.
-    parts.surfaces.push(Surface {
+    parts.surfaces.push(ObjectSurface {
         base_color: Vec3::ONE,
         texture: None,
         metallic: 1.0,
@@ -155,7 +155,7 @@ fn surface(
     buffers: &[Buffer],
     images: &mut HashMap<(usize, Meaning), Arc<Picture>>,
     warnings: &mut Vec<String>,
-) -> Result<Surface> {
+) -> Result<ObjectSurface> {
     let place = format!(
         "{}: material `{}`",
         path.display(),
@@ -208,7 +208,7 @@ fn surface(
     if material.normal_texture().is_some() {
         warnings.push(format!("{place}: the normal texture is ignored."));
     }
-    Surface {
+    ObjectSurface {
         base_color: Vec3::new(r, g, b),
         texture,
         metallic,

@@ -10,7 +10,7 @@ use crate::transport::material::Material;
 use glam::{DVec3, Vec2, Vec3};
 use std::path::Path;
 use std::sync::Arc;
-use surface::Surface;
+use surface::ObjectSurface;
 
 /// Most triangles that an object may have.
 const MAX_TRIANGLES: usize = 20_000_000;
@@ -80,7 +80,7 @@ impl ObjectModel {
     /// Replaces every material by one.
     ///
     /// Textures and vertex colours go with the materials that they belonged to.
-    pub fn with_material(mut self, surface: &Surface) -> Self {
+    pub fn with_material(mut self, surface: &ObjectSurface) -> Self {
         self.materials = vec![surface.material(None)];
         self.material_of.fill(0);
         self.corner_colors.clear();
@@ -127,7 +127,7 @@ impl Corners {
 #[derive(Default)]
 struct Parts {
     triangles: Vec<(Corners, u32)>,
-    surfaces: Vec<Surface>,
+    surfaces: Vec<ObjectSurface>,
     warnings: Vec<String>,
     skipped: usize,
     not_finite: usize,

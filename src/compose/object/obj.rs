@@ -5,9 +5,9 @@
 //! 0.08 × Ks, the convention of the exporters that write Ks as a strength rather than a colour. `Pr` and `Pm`, where
 //! a file has them, are roughness (α = Pr²) and metalness.
 
-use super::files::{self, Meaning};
-use super::surface::Surface;
-use super::{Corners, Parts};
+use crate::compose::object::files::Meaning;
+use crate::compose::object::surface::ObjectSurface;
+use crate::compose::object::{Corners, Parts, files};
 use crate::error::{Error, Result};
 use crate::math::picture::Picture;
 use crate::transport::material::DIELECTRIC;
@@ -75,7 +75,9 @@ pub(super) fn read(path: &Path) -> Result<Parts> {
     }
     // Triangles without a material are grey.
     let plain = parts.surfaces.len() as u32;
-    parts.surfaces.push(Surface::diffuse(Vec3::splat(0.5)));
+    parts
+        .surfaces
+        .push(ObjectSurface::diffuse(Vec3::splat(0.5)));
 
     for model in &models {
         let material = model
@@ -169,7 +171,7 @@ fn surface(
     library: &Path,
     textures: &mut HashMap<String, Arc<Picture>>,
     warnings: &mut Vec<String>,
-) -> Result<Surface> {
+) -> Result<ObjectSurface> {
     let place = || format!("{}: material `{}`", library.display(), material.name);
     let number =
         |key: &str| -> Option<f32> { material.unknown_param.get(key)?.trim().parse().ok() };
@@ -186,7 +188,7 @@ fn surface(
         .map_or(0.0, |c| (c.iter().sum::<f64>() / 3.0) as f32);
     let highlights = material.illumination_model.unwrap_or(2) >= 2 && ks > 0.0;
     let phong = material.shininess.filter(|_| highlights);
-    let mut surface = Surface {
+    let mut surface = ObjectSurface {
         texture: None,
         base_color: kd,
         metallic: number("Pm").unwrap_or(0.0),

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 /// Base colour, metalness and roughness.
 #[derive(Debug, Clone)]
-pub struct Surface {
+pub struct ObjectSurface {
     /// Linear base colour, a factor on the texture where there is one.
     pub base_color: Vec3,
     /// Linear image of the base colour.
@@ -29,7 +29,7 @@ pub fn mean(image: &Picture) -> Vec3 {
     (sum / image.pixels.len().max(1) as f64).as_vec3()
 }
 
-impl Surface {
+impl ObjectSurface {
     /// A diffuse surface.
     pub fn diffuse(base_color: Vec3) -> Self {
         Self {

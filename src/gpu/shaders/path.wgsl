@@ -133,7 +133,7 @@ fn radiance(camera_ray: Ray) -> PathSample {
 
         // End paths that carry little, without bias.
         if bounce > dispatch.paths.z {
-            let survival = min(largest(throughput), MAX_SURVIVAL);
+            let survival = min(largest(throughput), RR_MAX_SURVIVAL);
             if survival <= 0.0 || uniform1() >= survival {
                 break;
             }

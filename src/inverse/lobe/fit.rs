@@ -5,7 +5,7 @@
 //! two independent sets of paths, so that their noise biases nothing. What all observations of a spot share may be texture:
 //! it counts less the more spots differ (generalised least squares of random effects, Fuller and Battese 1973).
 
-use super::gather::Parts;
+use crate::inverse::lobe::gather::Parts;
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 

@@ -1,6 +1,6 @@
 //! The light that arrives at what pixels see, kept by direction: any lobe's share in it follows with no ray.
 
-use super::observations::SpotObservation;
+use crate::inverse::lobe::observations::SpotObservation;
 use crate::math::frame::Frame;
 use crate::math::rng::Stream;
 use crate::math::warp;

@@ -11,9 +11,10 @@ mod observations;
 mod screen;
 mod trial;
 
+use crate::calibrate::gbuffer::GBuffer;
+use crate::calibrate::problem::Problem;
 use crate::inverse::estimate::Estimate;
-use crate::inverse::gbuffer::GBuffer;
-use crate::inverse::solver::{Problem, Termination};
+use crate::inverse::solver::Termination;
 use crate::transport::arrival::Cast;
 use crate::transport::lit::Lit;
 use crate::transport::material::Lobe;

@@ -3,9 +3,9 @@
 //! A diffuse spot looks the same from everywhere whatever its colour, so what differs between photographs of one spot
 //! speaks of gloss and never of texture.
 
-use crate::inverse::gbuffer::GBuffer;
-use crate::inverse::measured::cell_key;
-use crate::inverse::solver::Problem;
+use crate::calibrate::gbuffer::GBuffer;
+use crate::calibrate::measured_radiance::cell_key;
+use crate::calibrate::problem::Problem;
 use glam::DVec3;
 use rayon::prelude::*;
 

@@ -1,7 +1,7 @@
 //! Which objects are worth a trial: those that look different from different sides, and as a lobe would make them.
 
-use super::gather::{Gathered, Gathering, Parts};
-use super::observations::{Spot, SpotObservation, choose};
+use crate::inverse::lobe::gather::{Gathered, Gathering, Parts};
+use crate::inverse::lobe::observations::{Spot, SpotObservation, choose};
 use crate::math::stats::quantile;
 use crate::scene::Scene;
 use crate::transport::arrival::Cast;

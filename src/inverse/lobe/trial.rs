@@ -1,9 +1,9 @@
 //! The lobe that explains an object best, and whether pixels that were left out of its fit ask for it.
 
-use super::fit::{Model, Row, Variances, freed};
-use super::gather::{Gathered, Gathering, Parts};
-use super::observations::{Spot, SpotObservation, choose};
 use crate::inverse::lobe::Found;
+use crate::inverse::lobe::fit::{Model, Row, Variances, freed};
+use crate::inverse::lobe::gather::{Gathered, Gathering, Parts};
+use crate::inverse::lobe::observations::{Spot, SpotObservation, choose};
 use crate::math::stats::{Moments, quantile};
 use crate::scene::Scene;
 use crate::transport::arrival::Cast;

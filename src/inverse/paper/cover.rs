@@ -1,11 +1,11 @@
 //! Which pixels each patch covers, how far off they are, and which patches are to be cut.
 
-use super::descent::Descent;
-use super::patches::{MAX_DEPTH, Patches};
-use super::pixel::{Drawn, Path};
-use crate::inverse::held_out::is_held_out;
+use crate::calibrate::held_out::HoldOut;
+use crate::calibrate::problem::Problem;
+use crate::inverse::paper::descent::Descent;
+use crate::inverse::paper::patches::{MAX_DEPTH, Patches};
+use crate::inverse::paper::pixel::{Drawn, Path};
 use crate::inverse::settings::Settings;
-use crate::inverse::solver::Problem;
 use crate::math::rng::Stream;
 use crate::scene::geometry::Hit;
 use crate::transport::arrival::Cast;
@@ -45,7 +45,7 @@ impl Cover {
                 .into_par_iter()
                 .filter(|pixel| (before + pixel).is_multiple_of(stride))
                 .filter(|&pixel| {
-                    let held = is_held_out(settings, frame as u32, pixel as u32);
+                    let held = HoldOut::from(settings).contains(frame as u32, pixel as u32);
                     photograph.is_usable(pixel) && !held
                 })
                 .filter_map(|pixel| {
@@ -114,12 +114,12 @@ impl Cover {
                     weight: 1.0,
                 };
                 let photograph = &problem.photographs[frame as usize];
-                let at_least = photograph.saturated(pixel as usize);
+                let censored = photograph.saturated(pixel as usize);
                 let mut residual = || {
                     let colour =
                         rendering.colour(drawn, SAMPLES, &mut stream, &mut path, &mut cast);
                     let residual = colour - photograph.pixels[pixel as usize];
-                    Vec3::select(at_least, residual.min(Vec3::ZERO), residual)
+                    Vec3::select(censored, residual.min(Vec3::ZERO), residual)
                 };
                 let [a, b] = [residual(), residual()];
                 (f64::from(a.dot(b)), cast)

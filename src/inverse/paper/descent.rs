@@ -1,14 +1,14 @@
 //! The state of the descent and one step of it.
 
-use super::adam::Adam;
-use super::pace::Pace;
-use super::patches::Patches;
-use super::pixel::{Draw, PixelGradient, Rendering, draw};
-use crate::inverse::cache::trace::Tracer;
+use crate::calibrate::problem::Problem;
 use crate::inverse::estimate::TexelEstimate;
 use crate::inverse::known::Known;
+use crate::inverse::paper::adam::Adam;
+use crate::inverse::paper::pace::Pace;
+use crate::inverse::paper::patches::Patches;
+use crate::inverse::paper::pixel::{Draw, PixelGradient, Rendering, draw};
+use crate::inverse::paths::trace::Tracer;
 use crate::inverse::settings::{Loss, Settings};
-use crate::inverse::solver::Problem;
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::scene::Scene;

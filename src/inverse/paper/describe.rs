@@ -1,9 +1,9 @@
 //! Where a descent stands, as an estimate.
 
-use super::descent::Descent;
+use crate::calibrate::gbuffer::GBuffer;
+use crate::calibrate::problem::Problem;
 use crate::inverse::estimate::{Estimate, ObjectEstimate, TexelEstimate};
-use crate::inverse::gbuffer::GBuffer;
-use crate::inverse::solver::Problem;
+use crate::inverse::paper::descent::Descent;
 use crate::scene::Scene;
 use crate::transport::material::TexelColors;
 use glam::{DVec3, Vec3};

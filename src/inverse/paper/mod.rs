@@ -14,13 +14,15 @@ pub mod pixel;
 mod schedule;
 mod stage;
 
+use crate::calibrate::gbuffer::GBuffer;
+use crate::calibrate::held_out::HoldOut;
+use crate::calibrate::problem::Problem;
 use crate::error;
 use crate::inverse::estimate::Estimate;
-use crate::inverse::gbuffer::GBuffer;
 use crate::inverse::loss::LossProbe;
 use crate::inverse::monitor::Monitor;
 use crate::inverse::settings::Settings;
-use crate::inverse::solver::{Checkpoint, Problem, Solution, Termination};
+use crate::inverse::solver::{Checkpoint, Solution, Termination};
 use cover::Cover;
 use descent::Descent;
 use describe::{describe, untold};
@@ -79,7 +81,7 @@ pub fn solve(
     resume: Option<&Checkpoint>,
     monitor: Monitor,
 ) -> error::Result<Solution> {
-    let gbuffer = GBuffer::new(problem, settings, 400_000);
+    let gbuffer = GBuffer::new(problem, HoldOut::from(settings), settings.seed, 400_000);
     let bounces = settings.max_bounces();
     let mut state = match resume {
         None => State {

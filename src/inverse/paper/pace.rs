@@ -10,7 +10,7 @@
 //! | objects | 5·10⁻³ / 2^level | 8, 16, then 32 | 2^level | 2^level, 8 at most |
 //! | patches | 5·10⁻³ / 2^level | 8 times patches / objects, 8192 at most | 4 | 2 |
 
-use super::descent::Descent;
+use crate::inverse::paper::descent::Descent;
 use crate::inverse::settings::Settings;
 
 /// Doublings of an objects' batch at most.

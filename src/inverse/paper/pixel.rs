@@ -1,13 +1,13 @@
 //! The gradient of one pixel: colour and derivative from independent paths.
 
-use super::patches::Patches;
-use crate::inverse::cache::derivative::{Gradient, differentiate, radiance};
-use crate::inverse::cache::trace::Tracer;
-use crate::inverse::cache::{NO_LAMP, NO_TEXEL, SPECULAR, Vertex};
-use crate::inverse::held_out::is_held_out;
-use crate::inverse::parameters::Unknowns;
+use crate::calibrate::held_out::HoldOut;
+use crate::calibrate::problem::Problem;
+use crate::inverse::paper::patches::Patches;
+use crate::inverse::paths::derivative::{Gradient, differentiate, radiance};
+use crate::inverse::paths::trace::Tracer;
+use crate::inverse::paths::{NO_LAMP, NO_TEXEL, SPECULAR, Vertex};
 use crate::inverse::settings::{Loss, Settings};
-use crate::inverse::solver::Problem;
+use crate::inverse::unknowns::Unknowns;
 use crate::math::rng::Stream;
 use crate::transport::arrival::Cast;
 use glam::{Vec2, Vec3, Vec3A};
@@ -43,7 +43,7 @@ pub fn draw(problem: &Problem, settings: &Settings, stream: &mut Stream) -> Opti
                 continue;
             }
             let usable = photograph.is_usable(at);
-            if usable && !is_held_out(settings, frame as u32, at as u32) {
+            if usable && !HoldOut::from(settings).contains(frame as u32, at as u32) {
                 return Some(Drawn {
                     frame: frame as u32,
                     pixel: at as u32,

@@ -1,10 +1,10 @@
 //! The stages of a descent: what each begins with, when it ends, and what it leaves.
 
-use super::descent::Descent;
-use super::pace::Pace;
-use super::patches::MAX_DEPTH;
-use super::schedule::Schedule;
-use super::{Run, State};
+use crate::inverse::paper::descent::Descent;
+use crate::inverse::paper::pace::Pace;
+use crate::inverse::paper::patches::MAX_DEPTH;
+use crate::inverse::paper::schedule::Schedule;
+use crate::inverse::paper::{Run, State};
 use crate::inverse::solver::{Stage, Termination};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};

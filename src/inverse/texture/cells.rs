@@ -4,7 +4,7 @@
 //! triangles much smaller than a footprint share a cell with their neighbours. Either way there are no more cells than
 //! a few for each pixel, however large or dense the mesh is.
 
-use super::look::{Landing, RAYS, SeenPixel};
+use crate::inverse::texture::look::{Landing, RAYS, SeenPixel};
 use crate::scene::Scene;
 use crate::scene::geometry::Hit;
 use glam::Vec3;

@@ -4,9 +4,9 @@
 //! is the variance that pixels left out of the fit show about it. Perturbing every measurement and every difference
 //! by its own noise and solving again draws from that Gaussian (Papandreou and Yuille 2010), so no inverse is needed.
 
-use super::fit::{Measurements, Texture};
-use super::fuse::{System, penalties};
-use super::links::Links;
+use crate::inverse::texture::fit::{Measurements, Texture};
+use crate::inverse::texture::fuse::{System, penalties};
+use crate::inverse::texture::links::Links;
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use glam::Vec3;

@@ -1,9 +1,9 @@
 //! The albedo of an object's cells from its pixels, smoothed as far as pixels left out of the fit ask for.
 
-use super::fuse::{Problem, fuse, mean, mean_channel};
-use super::links::Links;
-use super::look::{FOLDS, SeenPixel};
-use super::observations::Observations;
+use crate::inverse::texture::fuse::{Problem, fuse, mean, mean_channel};
+use crate::inverse::texture::links::Links;
+use crate::inverse::texture::look::{FOLDS, SeenPixel};
+use crate::inverse::texture::observations::Observations;
 use crate::math::color::luminance;
 use crate::math::stats::quantile;
 use glam::{DVec3, Vec3};

@@ -5,8 +5,8 @@
 //! where φ is Huber's: quadratic up to [`FLAT`], linear beyond. Colours change together, so edges lie at the same place
 //! in all channels. Solved by iteratively reweighted least squares with preconditioned conjugate gradients.
 
-use super::links::Links;
-use super::observations::Observations;
+use crate::inverse::texture::links::Links;
+use crate::inverse::texture::observations::Observations;
 use glam::Vec3;
 use rayon::prelude::*;
 

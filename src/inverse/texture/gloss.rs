@@ -1,6 +1,6 @@
 //! What a surface sends whose albedo is looked for: its base, and the lobe above it where there is one.
 
-use super::look::SeenPixel;
+use crate::inverse::texture::look::SeenPixel;
 use crate::math::frame::Frame;
 use crate::math::rng::Stream;
 use crate::transport::arrival::{Cast, arrivals};

@@ -1,10 +1,10 @@
 //! The light that cells receive: traced twice independently, then smoothed as far as the two agree that it may be.
 
-use super::cells::Cells;
-use super::fuse::{Problem, fuse, mean};
-use super::gloss::white_base;
-use super::links::Links;
-use super::observations::Observations;
+use crate::inverse::texture::cells::Cells;
+use crate::inverse::texture::fuse::{Problem, fuse, mean};
+use crate::inverse::texture::gloss::white_base;
+use crate::inverse::texture::links::Links;
+use crate::inverse::texture::observations::Observations;
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::math::warp;

@@ -1,6 +1,6 @@
 //! Which cells lie side by side, found by stepping over their edges.
 
-use super::cells::{Cell, Cells};
+use crate::inverse::texture::cells::{Cell, Cells};
 use crate::scene::Scene;
 use crate::scene::geometry::{Hit, Ray};
 use glam::Vec3;

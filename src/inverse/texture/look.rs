@@ -1,8 +1,8 @@
 //! Where the parts of each pixel of an object land on its triangles.
 
-use crate::inverse::gbuffer::GBufferPixel;
-use crate::inverse::sharpness::Sharpness;
-use crate::inverse::solver::Problem;
+use crate::calibrate::gbuffer::GBufferPixel;
+use crate::calibrate::problem::Problem;
+use crate::calibrate::sharpness::Sharpness;
 use crate::math::rng::{Stream, splitmix64};
 use crate::scene::geometry::Hit;
 use crate::transport::bsdf::base_by_view;

@@ -19,15 +19,16 @@ mod surface;
 mod trial;
 mod whole;
 
+use crate::calibrate::gbuffer::{GBuffer, GBufferPixel};
+use crate::calibrate::problem::Problem;
+use crate::calibrate::sharpness::Sharpness;
 use crate::inverse::estimate::{Estimate, TexelEstimate};
-use crate::inverse::gbuffer::{GBuffer, GBufferPixel};
 use crate::inverse::settings::Settings;
-use crate::inverse::sharpness::Sharpness;
-use crate::inverse::solver::{Problem, Termination};
+use crate::inverse::solver::Termination;
 use crate::transport::path::PathOptions;
 use glam::Vec3;
 use std::sync::Arc;
-use surface::Surface;
+use surface::TexturedSurface;
 pub use trial::Trial;
 
 /// A gain on held-out pixels of so many standard errors is no accident.
@@ -232,7 +233,7 @@ struct Refinement<'a> {
     estimate: &'a Estimate,
     options: PathOptions,
     attempts: Vec<Attempt>,
-    kept: Vec<Surface>,
+    kept: Vec<TexturedSurface>,
     unrest: f64,
 }
 
@@ -252,7 +253,8 @@ impl Refinement<'_> {
             let mut done = |rays, rejected| tell(rays, rejected, fraction);
             done(0, 0)?;
             let glossy = self.estimate.objects[*object].lobe().is_some();
-            let Some(mut coarse) = Surface::new(self.task, *object, glossy, pixels, COARSE) else {
+            let Some(mut coarse) = TexturedSurface::new(self.task, *object, glossy, pixels, COARSE)
+            else {
                 continue;
             };
             coarse.find(&lit, &self.options, paths as u64, 0, None, &mut done)?;
@@ -325,7 +327,7 @@ impl Refinement<'_> {
         let mut attempts = self.attempts.clone();
         for attempt in &mut attempts {
             let found = self.kept.iter().find(|s| s.object == attempt.object);
-            attempt.cells = found.map_or(attempt.cells, Surface::cell_count);
+            attempt.cells = found.map_or(attempt.cells, TexturedSurface::cell_count);
         }
         let scene = &self.task.problem.scene;
         Refined {

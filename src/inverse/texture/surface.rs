@@ -1,17 +1,17 @@
 //! One object under refinement: its cells, the light that they receive, and their albedo.
 
-use super::Task;
-use super::cells::Cells;
-use super::errors::{standard_errors, with_light};
-use super::fit::{Measurements, Texture};
-use super::gloss::find_gloss;
-use super::irradiance::{Irradiance, trace};
-use super::links::Links;
-use super::look::{FOLDS, RAYS, SeenPixel, look};
-use super::observations::Observations;
-use super::trial::{Trial, Untouched, try_out};
-use crate::inverse::gbuffer::GBufferPixel;
+use crate::calibrate::gbuffer::GBufferPixel;
 use crate::inverse::solver::Termination;
+use crate::inverse::texture::Task;
+use crate::inverse::texture::cells::Cells;
+use crate::inverse::texture::errors::{standard_errors, with_light};
+use crate::inverse::texture::fit::{Measurements, Texture};
+use crate::inverse::texture::gloss::find_gloss;
+use crate::inverse::texture::irradiance::{Irradiance, trace};
+use crate::inverse::texture::links::Links;
+use crate::inverse::texture::look::{FOLDS, RAYS, SeenPixel, look};
+use crate::inverse::texture::observations::Observations;
+use crate::inverse::texture::trial::{Trial, Untouched, try_out};
 use crate::scene::Scene;
 use crate::transport::lit::Lit;
 use crate::transport::path::PathOptions;
@@ -31,7 +31,7 @@ const MIN_GLOSS: u64 = RAYS as u64;
 const FEW_HELD_OUT: usize = 1_000;
 
 /// The state of one object.
-pub struct Surface {
+pub struct TexturedSurface {
     /// Object index.
     pub object: usize,
     /// Whether it has a lobe.
@@ -55,7 +55,7 @@ pub struct Surface {
 /// Hears of rays cast and paths dropped.
 type Done<'d> = dyn FnMut(u64, u64) -> Result<(), Termination> + 'd;
 
-impl Surface {
+impl TexturedSurface {
     /// Cuts the object into cells, `width` times as wide as the finest that its pixels resolve; `None` where none of the
     /// pixels sees it alone.
     pub fn new(

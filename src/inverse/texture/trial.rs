@@ -1,9 +1,9 @@
 //! Whether a texture explains pixels that no fit has seen better than one colour does.
 
-use super::SIGNIFICANT;
-use super::cells::Cells;
-use super::gloss::{gloss, white_base};
-use super::look::SeenPixel;
+use crate::inverse::texture::SIGNIFICANT;
+use crate::inverse::texture::cells::Cells;
+use crate::inverse::texture::gloss::{gloss, white_base};
+use crate::inverse::texture::look::SeenPixel;
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::math::stats::{Moments, quantile};
@@ -267,11 +267,11 @@ mod tests {
             ..first(50.0)
         }));
         // No noise at all: whatever is gained is significant.
-        let silent = |gain: f64| Trial {
+        let bound_met = |gain: f64| Trial {
             noise: 0.0,
             ..first(gain)
         };
-        assert!(!is_hopeless(&silent(1e-9), 2000));
-        assert!(is_hopeless(&silent(-1e-9), 2000));
+        assert!(!is_hopeless(&bound_met(1e-9), 2000));
+        assert!(is_hopeless(&bound_met(-1e-9), 2000));
     }
 }

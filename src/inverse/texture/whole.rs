@@ -1,8 +1,8 @@
 //! The textures of all objects as texels of the whole mesh; what no pixel sees takes its neighbours' value.
 
-use super::errors::spread;
-use super::surface::Surface;
 use crate::inverse::estimate::{Estimate, TexelEstimate};
+use crate::inverse::texture::errors::spread;
+use crate::inverse::texture::surface::TexturedSurface;
 use crate::scene::Scene;
 use crate::scene::geometry::Hit;
 use crate::scene::texels::TexelLayout;
@@ -22,7 +22,7 @@ type Place = GeomWithData<[f32; 3], usize>;
 
 /// The colour around a place: the mean over the seen cells nearest to it, by the inverse square of the distance and by how
 /// often each is seen. `None` where no cell is.
-fn surroundings(surface: &Surface, tree: &RTree<Place>, point: Vec3) -> Option<Vec3> {
+fn surroundings(surface: &TexturedSurface, tree: &RTree<Place>, point: Vec3) -> Option<Vec3> {
     let near = tree
         .nearest_neighbor_iter(point.to_array())
         .take(NEIGHBOURS);
@@ -57,7 +57,7 @@ fn mean_color(neighbours: impl Iterator<Item = Neighbour>) -> Option<Vec3> {
 }
 
 /// The texels of an estimate with these surfaces textured.
-pub fn texels(scene: &Scene, estimate: &Estimate, surfaces: &[Surface]) -> TexelEstimate {
+pub fn texels(scene: &Scene, estimate: &Estimate, surfaces: &[TexturedSurface]) -> TexelEstimate {
     let mut levels = vec![0; scene.triangles.len()];
     let mut textured = vec![false; scene.objects.len()];
     for surface in surfaces {

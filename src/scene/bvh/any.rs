@@ -1,9 +1,9 @@
 //! Traversal until any hit, in whichever order is cheapest.
 
-use super::lanes::Lanes;
-use super::shear::Shear;
-use super::slabs::{Slabs, reciprocal};
-use super::{Bvh, Child, GROUP, Group, Node, WIDTH, prefetch};
+use crate::scene::bvh::lanes::Lanes;
+use crate::scene::bvh::shear::Shear;
+use crate::scene::bvh::slabs::{Slabs, reciprocal};
+use crate::scene::bvh::{Bvh, Child, GROUP, Group, Node, WIDTH, prefetch};
 use crate::scene::geometry::Ray;
 
 /// Whether anything is hit in a hierarchy that holds something; `stack` holds `Bvh::stack_size` entries and

@@ -1,7 +1,7 @@
 //! A binary hierarchy, top-down by the surface area heuristic, and the cheapest way to open it eight wide.
 
-use super::split::{Bounds, Primitive, Split};
-use super::{GROUP, Tree, WIDTH};
+use crate::scene::bvh::split::{Bounds, Primitive, Split};
+use crate::scene::bvh::{GROUP, Tree, WIDTH};
 
 /// Leaves hold at most this many triangles.
 pub(super) const LARGEST_LEAF: usize = 4 * GROUP;

@@ -1,9 +1,9 @@
 //! From the binary hierarchy to nodes of eight children and groups of four triangles.
 
-use super::binary::{self, Binary, Grain, LARGEST_LEAF};
-use super::pages::Pages;
-use super::split::{Bounds, Primitive};
-use super::{Bvh, Child, GROUP, Group, InstructionSet, Node, Tree, WIDTH};
+use crate::scene::bvh::binary::{Binary, Grain, LARGEST_LEAF};
+use crate::scene::bvh::pages::Pages;
+use crate::scene::bvh::split::{Bounds, Primitive};
+use crate::scene::bvh::{Bvh, Child, GROUP, Group, InstructionSet, Node, Tree, WIDTH, binary};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::cmp::Reverse;

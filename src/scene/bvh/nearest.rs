@@ -1,9 +1,9 @@
 //! Traversal towards the nearest hit.
 
-use super::lanes::Lanes;
-use super::shear::Shear;
-use super::slabs::{Slabs, reciprocal};
-use super::{Bvh, Child, GROUP, Group, Node, WIDTH, prefetch};
+use crate::scene::bvh::lanes::Lanes;
+use crate::scene::bvh::shear::Shear;
+use crate::scene::bvh::slabs::{Slabs, reciprocal};
+use crate::scene::bvh::{Bvh, Child, GROUP, Group, Node, WIDTH, prefetch};
 use crate::scene::geometry::{Hit, Ray};
 
 /// A child still to be visited, in the low half, and the bits of where the ray enters its box: ordered by distance.

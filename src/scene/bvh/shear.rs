@@ -1,7 +1,7 @@
 //! A ray against the triangles of a group.
 
-use super::lanes::{Lanes, splat};
-use super::{GROUP, Group};
+use crate::scene::bvh::lanes::{Lanes, splat};
+use crate::scene::bvh::{GROUP, Group};
 use crate::scene::geometry::{Hit, Ray};
 use glam::Vec3A;
 

@@ -1,7 +1,7 @@
 //! A ray against the eight boxes of a node.
 
-use super::lanes::{Lanes, splat};
-use super::{Node, WIDTH};
+use crate::scene::bvh::lanes::{Lanes, splat};
+use crate::scene::bvh::{Node, WIDTH};
 use crate::scene::geometry::Ray;
 use glam::{Vec3, Vec3A};
 

@@ -1,6 +1,6 @@
 //! Where a set of boxes is best split in two: binned surface area heuristic (Wald 2007).
 
-use super::GROUP;
+use crate::scene::bvh::GROUP;
 use glam::{UVec3, Vec3, Vec3A};
 
 /// A triangle's box.

@@ -1,9 +1,9 @@
 //! Which instructions a ray is traced with.
 
-use super::lanes::Portable;
 #[cfg(target_arch = "x86_64")]
-use super::lanes::{Eight, Four};
-use super::{Bvh, GROUP, InstructionSet, WIDTH, any, nearest};
+use crate::scene::bvh::lanes::{Eight, Four, Portable};
+use crate::scene::bvh::nearest;
+use crate::scene::bvh::{Bvh, GROUP, InstructionSet, WIDTH, any};
 use crate::scene::geometry::{Hit, Ray};
 use std::cell::RefCell;
 

@@ -1,8 +1,8 @@
 //! A hierarchy of two children a node, for other traversals than the processor's and from other builders.
 
-use super::GROUP;
-use super::binary::{self, Binary, Grain};
-use super::build::{alone, primitives};
+use crate::scene::bvh::binary::{Binary, Grain};
+use crate::scene::bvh::build::{alone, primitives};
+use crate::scene::bvh::{GROUP, binary};
 use glam::Vec3;
 
 /// A node of a [`Tree`].

@@ -1,9 +1,9 @@
 //! What each command does.
 
+use crate::calibrate::held_out::HoldOut;
 use crate::capture::place::Coordinates;
 use crate::export::picture::shown_at;
 use crate::export::{light_layers, scene};
-use crate::inverse::held_out::HoldOut;
 use crate::math::picture::Picture;
 use crate::render::Renderer;
 use crate::session::command::{Command, ExportRequest, OpenOptions, ViewCamera};

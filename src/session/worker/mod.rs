@@ -6,9 +6,10 @@ mod state;
 mod steering;
 mod work;
 
+use crate::calibrate::problem::Problem;
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
-use crate::inverse::solver::{Checkpoint, Observer, Problem, Solution};
+use crate::inverse::solver::{Checkpoint, Observer, Solution};
 use crate::session::command::{Command, OpenOptions, Source};
 use crate::session::inbox::{self, Outbox};
 use crate::session::slot::Slot;
@@ -43,7 +44,7 @@ impl Default for Backend {
     fn default() -> Self {
         Self {
             open: Box::new(crate::session::open::open),
-            solve: Box::new(crate::inverse::solver::solve),
+            solve: Box::new(crate::inverse::solve),
             sessions: None,
         }
     }

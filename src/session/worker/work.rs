@@ -1,8 +1,9 @@
 //! The worker's main loop: waiting, opening, resuming, solving, and what happens when one of them panics.
 
+use crate::calibrate::held_out::HoldOut;
+use crate::calibrate::problem::Problem;
 use crate::error::Error;
-use crate::inverse::held_out::HoldOut;
-use crate::inverse::solver::{Checkpoint, Problem, Termination};
+use crate::inverse::solver::{Checkpoint, Termination};
 use crate::session::command::{OpenOptions, Regrouping, Source};
 use crate::session::edits::Edits;
 use crate::session::inbox::Mail;
@@ -289,10 +290,8 @@ impl Worker {
         self.publish(true);
 
         // The solver is moved out for the call, because the observer borrows the worker.
-        let mut solver = std::mem::replace(
-            &mut self.backend.solve,
-            Box::new(crate::inverse::solver::solve),
-        );
+        let mut solver =
+            std::mem::replace(&mut self.backend.solve, Box::new(crate::inverse::solve));
         let mut steering = Steering::new(self);
         let outcome = catch_unwind(AssertUnwindSafe(|| {
             solver(&problem, &settings, checkpoint, &mut steering)

@@ -43,7 +43,7 @@ const TOLERABLE: f64 = 0.01;
 const FACTOR: f64 = 2.0;
 
 /// One room, with a kind of solve for each depth.
-struct Scene {
+struct TestRoom {
     /// "mean albedo 0.5", or the twin of a capture.
     name: String,
     /// What the name of the descent's plot ends with.
@@ -74,12 +74,12 @@ fn run(bench: &Bench) -> Result<Findings> {
             .collect(),
     };
     let limits = bench.limits(2 * rooms.len() * depths.len() * bench.seeds as usize);
-    let mut scenes: Vec<Scene> = Vec::new();
+    let mut scenes: Vec<TestRoom> = Vec::new();
     for (file, room, rendering) in &rooms {
         let subject = Subject::of_room(room, rendering)?;
         // The loss is measured with all bounces, whatever the fit had.
         let gauge = Gauge::new(&subject, u32::MAX);
-        scenes.push(Scene {
+        scenes.push(TestRoom {
             name: room.name.clone(),
             file,
             cache: Vec::new(),
@@ -158,13 +158,13 @@ fn word(bounces: u64) -> String {
     }
 }
 
-fn of_albedo(scenes: &[Scene]) -> Plot {
+fn of_albedo(scenes: &[TestRoom]) -> Plot {
     over_depth(scenes, "mean absolute error of albedo", |e| e.albedo)
 }
 
 /// Where the transport cache ends over the depth of its fit, a curve a room.
-fn over_depth(scenes: &[Scene], label: &str, quantity: Quantity) -> Plot {
-    let of = |scene: &Scene| {
+fn over_depth(scenes: &[TestRoom], label: &str, quantity: Quantity) -> Plot {
+    let of = |scene: &TestRoom| {
         let mut series = Series {
             name: scene.name.clone(),
             ..Series::default()
@@ -193,7 +193,7 @@ fn over_depth(scenes: &[Scene], label: &str, quantity: Quantity) -> Plot {
 }
 
 /// The descent's kinds with their errors of albedo at the last mark that all of them passed, and that mark.
-fn at_equal_rays(scene: &Scene) -> (Option<u32>, Vec<(u64, Option<Spread>)>) {
+fn at_equal_rays(scene: &TestRoom) -> (Option<u32>, Vec<(u64, Option<Spread>)>) {
     let kinds = || scene.paper.iter().map(|(_, kind)| kind);
     let mark = common_mark(kinds());
     let error = |kind: &Kind| mark.and_then(|mark| kind.at_mark(mark, |e| e.albedo));
@@ -204,7 +204,7 @@ fn at_equal_rays(scene: &Scene) -> (Option<u32>, Vec<(u64, Option<Spread>)>) {
     (mark, errors.collect())
 }
 
-fn summary(scenes: &[Scene]) -> Summary {
+fn summary(scenes: &[TestRoom]) -> Summary {
     let mut rows = Vec::new();
     for scene in scenes {
         let mark = at_equal_rays(scene).0;
@@ -250,7 +250,7 @@ fn summary(scenes: &[Scene]) -> Summary {
     }
 }
 
-fn seen(scenes: &[Scene]) -> Vec<String> {
+fn seen(scenes: &[TestRoom]) -> Vec<String> {
     let mut seen = Vec::new();
     let (mut tried, mut short) = (0, Vec::new());
     for scene in scenes {
@@ -288,7 +288,7 @@ fn seen(scenes: &[Scene]) -> Vec<String> {
 }
 
 /// Which depth served the descent best, and which are as good within the noise.
-fn balance(scene: &Scene) -> Option<String> {
+fn balance(scene: &TestRoom) -> Option<String> {
     let (mark, errors) = at_equal_rays(scene);
     let known: Vec<(u64, Spread)> = (errors.into_iter())
         .filter_map(|(depth, error)| Some((depth, error?)))
@@ -322,7 +322,7 @@ mod tests {
     use crate::study::experiments::course::Errors;
 
     /// A room in which the cache ends at these errors with one bounce, two, and adaptive depth.
-    fn room(errors: [f64; 3]) -> Scene {
+    fn room(errors: [f64; 3]) -> TestRoom {
         let kind = |error: f64| Kind {
             name: String::new(),
             courses: vec![vec![Mark {
@@ -336,7 +336,7 @@ mod tests {
                 },
             }]],
         };
-        Scene {
+        TestRoom {
             name: "a room".to_owned(),
             file: "",
             cache: [1, 2, 0].into_iter().zip(errors.map(kind)).collect(),

@@ -1,7 +1,7 @@
 //! A small box of a room with a block and one lamp, whose mean albedo and lamp can be chosen.
 
 use crate::error::Result;
-use crate::inverse::parameters::Unknowns;
+use crate::inverse::unknowns::Unknowns;
 use crate::room::Room;
 use crate::room::cameras::View;
 use crate::room::photographs::Rendering;

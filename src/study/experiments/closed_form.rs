@@ -6,7 +6,7 @@
 
 use crate::capture::camera::{Intrinsics, Pose};
 use crate::capture::photograph::Photograph;
-use crate::inverse::parameters::Unknowns;
+use crate::inverse::unknowns::Unknowns;
 use crate::room::Room;
 use crate::room::cameras::cameras;
 use crate::room::photographs::linear;

@@ -1,12 +1,13 @@
 //! The courses of solves that studies compare: the paper's descent as published, watched at fixed numbers of rays, and
 //! where the transport cache ends.
 
+use crate::calibrate::problem::Problem;
 use crate::error::Result;
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::inverse::loss::LossProbe;
 use crate::inverse::paper::descent::{Descent, StepOutcome};
 use crate::inverse::settings::{Preset, Settings};
-use crate::inverse::solver::{Problem, Solution};
+use crate::inverse::solver::Solution;
 use crate::study::experiments::{Bench, Limits, Subject};
 use crate::study::trade::plan::Run;
 use crate::study::trade::watch;

@@ -67,7 +67,7 @@ struct Pixel {
 }
 
 /// One fit of the light's scale, whose true value is 1.
-struct Fit {
+struct EstimatorFit {
     estimator: usize,
     samples: u32,
     seed: u64,
@@ -122,7 +122,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     };
     let mut seen = Vec::new();
     for ((name, options), suffix) in options.iter().zip(["", "-mis"]) {
-        let mut fits: Vec<Fit> = Vec::new();
+        let mut fits: Vec<EstimatorFit> = Vec::new();
         let mut predictions = Vec::new();
         for (index, &count) in samples.iter().enumerate() {
             bench.begin(&format!("{name}, {count} samples a pixel"))?;
@@ -132,7 +132,7 @@ fn run(bench: &Bench) -> Result<Findings> {
                 let pixels = pixels(&photographs, &sets);
                 predicted.push(same_samples_predicted(&pixels));
                 let each = ESTIMATORS.iter().enumerate();
-                fits.extend(each.map(|(estimator, (_, fit))| Fit {
+                fits.extend(each.map(|(estimator, (_, fit))| EstimatorFit {
                     estimator,
                     samples: count,
                     seed,
@@ -268,7 +268,7 @@ fn same_samples_predicted(pixels: &[Pixel]) -> f64 {
 }
 
 /// Mean and spread of a fit over seeds; fits without a finite root are left out.
-fn mean(fits: &[Fit], estimator: usize, samples: u32) -> Moments {
+fn mean(fits: &[EstimatorFit], estimator: usize, samples: u32) -> Moments {
     let mut moments = Moments::default();
     (fits.iter())
         .filter(|fit| fit.estimator == estimator && fit.samples == samples)

@@ -1,9 +1,9 @@
 //! How noisy the mean of a pixel's paths is by random numbers and by points of a low-discrepancy sequence.
 
-use crate::inverse::cache::derivative::{Gradient, differentiate};
-use crate::inverse::parameters::Unknowns;
+use crate::calibrate::problem::Problem;
+use crate::inverse::paths::derivative::{Gradient, differentiate};
 use crate::inverse::settings::LightSampling;
-use crate::inverse::solver::Problem;
+use crate::inverse::unknowns::Unknowns;
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::math::sequence::{SequencePoint, Uniforms};

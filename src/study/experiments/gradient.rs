@@ -1,10 +1,10 @@
 //! How noisy the derivatives of single paths are.
 
-use crate::inverse::cache::derivative::{Gradient, differentiate};
-use crate::inverse::cache::trace::Tracer;
-use crate::inverse::parameters::Unknowns;
+use crate::calibrate::problem::Problem;
+use crate::inverse::paths::derivative::{Gradient, differentiate};
+use crate::inverse::paths::trace::Tracer;
 use crate::inverse::settings::LightSampling;
-use crate::inverse::solver::Problem;
+use crate::inverse::unknowns::Unknowns;
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::math::stats::Moments;

@@ -94,7 +94,7 @@ impl Lamp {
 }
 
 /// What was measured in one room.
-struct Scene {
+struct LitRoom {
     name: String,
     files: [&'static str; 2],
     kinds: Vec<Kind>,
@@ -167,7 +167,7 @@ fn run(bench: &Bench) -> Result<Findings> {
             lobes: lobes.iter().any(Option::is_some),
             ..cache_settings(seed, bench.quick)
         };
-        scenes.push(Scene {
+        scenes.push(LitRoom {
             name: name.to_owned(),
             files: *files,
             kinds,
@@ -229,7 +229,7 @@ fn word(sampling: LightSampling) -> &'static str {
     }
 }
 
-fn variances(scenes: &[Scene]) -> Table {
+fn variances(scenes: &[LitRoom]) -> Table {
     let mut table = Table::new(&[
         "scene",
         "sampling",
@@ -252,13 +252,13 @@ fn variances(scenes: &[Scene]) -> Table {
 }
 
 /// Loss at the last mark in rays that all of a scene's courses passed.
-fn at_equal_rays(scene: &Scene, quantity: fn(&Errors) -> Option<f64>) -> Vec<Option<Spread>> {
+fn at_equal_rays(scene: &LitRoom, quantity: fn(&Errors) -> Option<f64>) -> Vec<Option<Spread>> {
     let mark = common_mark(&scene.kinds);
     let loss = |kind: &Kind| mark.and_then(|mark| kind.at_mark(mark, quantity));
     scene.kinds.iter().map(loss).collect()
 }
 
-fn summary(scenes: &[Scene]) -> Summary {
+fn summary(scenes: &[LitRoom]) -> Summary {
     let mut rows = Vec::new();
     for scene in scenes {
         let losses = at_equal_rays(scene, |e| e.loss);
@@ -289,7 +289,7 @@ fn summary(scenes: &[Scene]) -> Summary {
     }
 }
 
-fn seen(scene: &Scene) -> Vec<String> {
+fn seen(scene: &LitRoom) -> Vec<String> {
     let [mis, light, bsdf] = [0, 1, 2].map(|i| scene.noises[i].variance);
     let mut seen = vec![format!(
         "{}: the gradient of one path has {} times the variance with light sampling alone and {} times with BSDF sampling \

@@ -1,9 +1,9 @@
 //! Other ways to draw the pixels of a batch than uniformly.
 
-use crate::inverse::held_out::is_held_out;
+use crate::calibrate::held_out::HoldOut;
+use crate::calibrate::problem::Problem;
 use crate::inverse::paper::pixel::Drawn;
 use crate::inverse::settings::Settings;
-use crate::inverse::solver::Problem;
 use crate::math::rng::Stream;
 use crate::scene::visibility::NOTHING;
 use crate::transport::lit::Lit;
@@ -61,7 +61,7 @@ impl Groups {
         for (frame, photograph) in problem.photographs.iter().enumerate() {
             for pixel in 0..photograph.pixels.len() as u32 {
                 let usable = photograph.is_usable(pixel as usize);
-                if !usable || is_held_out(settings, frame as u32, pixel) {
+                if !usable || HoldOut::from(settings).contains(frame as u32, pixel) {
                     continue;
                 }
                 let Some(place) = group(frame, pixel) else {

@@ -1,9 +1,9 @@
 //! What a study solves: a scene with photographs, and its truth where that is known.
 
+use crate::calibrate::problem::Problem;
 use crate::capture::Capture;
 use crate::capture::photograph::Photograph;
 use crate::error::Result;
-use crate::inverse::solver::Problem;
 use crate::room::Room;
 use crate::room::photographs::{self, Rendering};
 use crate::study::evaluate::Reference;

@@ -1,10 +1,10 @@
 //! Paths evaluated in 32 bits, as the fit does it, and in 64.
 
-use crate::inverse::cache::derivative::{Gradient, differentiate};
-use crate::inverse::cache::{NO_LAMP, Vertex};
-use crate::inverse::parameters::Unknowns;
+use crate::calibrate::problem::Problem;
+use crate::inverse::paths::derivative::{Gradient, differentiate};
+use crate::inverse::paths::{NO_LAMP, Vertex};
 use crate::inverse::settings::LightSampling;
-use crate::inverse::solver::Problem;
+use crate::inverse::unknowns::Unknowns;
 use crate::math::rng::Stream;
 use crate::study::experiments::gradient::tracer;
 use crate::transport::emitters::Emitters;

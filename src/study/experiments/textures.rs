@@ -1,12 +1,14 @@
 //! How textures come out, coarse to fine.
 
+use crate::calibrate::problem::Problem;
 use crate::error::Result;
 use crate::export::plot::{Axis, Plot, Series};
 use crate::export::table::Table;
 use crate::inverse::estimate::{Estimate, TexelEstimate};
 use crate::inverse::loss::LossProbe;
 use crate::inverse::settings::{Preset, Settings};
-use crate::inverse::solver::{Control, Observer, Problem, Progress, Termination, solve};
+use crate::inverse::solve;
+use crate::inverse::solver::{Control, Observer, Progress, Termination};
 use crate::math::picture::Picture;
 use crate::room::truth::albedo_picture;
 use crate::study::experiments::course::{cache_settings, paper_settings, solved};

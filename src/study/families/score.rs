@@ -1,13 +1,15 @@
 //! One room, solved and compared with its truth.
 
+use crate::calibrate::held_out::HoldOut;
+use crate::calibrate::problem::Problem;
+use crate::calibrate::segments::cut_up;
 use crate::capture::Capture;
 use crate::capture::working::load_working;
 use crate::error::Result;
 use crate::inverse::estimate::Estimate;
-use crate::inverse::faces::cut_up;
-use crate::inverse::held_out::HoldOut;
 use crate::inverse::settings::Settings;
-use crate::inverse::solver::{Control, Observer, Problem, Progress, Solution, solve};
+use crate::inverse::solve;
+use crate::inverse::solver::{Control, Observer, Progress, Solution};
 use crate::room::generated::{Family, Generated};
 use crate::scene::Scene;
 use crate::scene::prepare::prepare;

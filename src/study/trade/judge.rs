@@ -1,9 +1,9 @@
 //! What tells the error of an estimate: the truth where there is one, else pixels held out of the fit.
 
+use crate::calibrate::problem::Problem;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::loss::LossProbe;
 use crate::inverse::settings::Settings;
-use crate::inverse::solver::Problem;
 use crate::study::evaluate::Reference;
 use crate::study::trade::Measure;
 

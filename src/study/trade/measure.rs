@@ -1,8 +1,10 @@
 //! Runs the solves one after the other and watches the error of each.
 
+use crate::calibrate::problem::Problem;
 use crate::error::Result;
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
-use crate::inverse::solver::{Control, Observer, Problem, Progress, Solution, Termination, solve};
+use crate::inverse::solve;
+use crate::inverse::solver::{Control, Observer, Progress, Solution, Termination};
 use crate::study::trade::judge::{Bench, Judge};
 use crate::study::trade::plan::Run;
 use crate::study::trade::{Curve, Point};

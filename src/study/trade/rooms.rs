@@ -1,10 +1,10 @@
 //! The trade over generated rooms: what presets are chosen on.
 
+use crate::calibrate::problem::Problem;
 use crate::capture::Capture;
 use crate::capture::photograph::Photograph;
 use crate::capture::truth::Truth;
 use crate::error::Result;
-use crate::inverse::solver::Problem;
 use crate::room::Room;
 use crate::room::generated::generate;
 use crate::room::photographs::{self, Rendering};

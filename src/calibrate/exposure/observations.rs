@@ -1,0 +1,111 @@
+//! What the photographs show of the surfaces that they share.
+
+use crate::calibrate::gbuffer::{GBuffer, GBufferPixel};
+use crate::calibrate::measured_radiance::cell_key;
+use crate::calibrate::problem::Problem;
+use crate::capture::exposure::Vignetting;
+use crate::math::stats::quantile;
+use glam::{DVec2, DVec3};
+use std::collections::BTreeMap;
+
+/// Width of a surface cell in pixel footprints.
+const CELL_FOOTPRINTS: f32 = 4.0;
+/// Pixels darker than this fraction of the photographs' median level hold mostly noise.
+const ABOVE_NOISE: f64 = 0.1;
+
+/// The mean logarithm of what one photograph shows of one surface cell.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Observation {
+    pub frame: usize,
+    /// The cell's key, which is a hash.
+    pub cell: u64,
+    pub level: DVec3,
+    /// Where in the photograph, as [`Vignetting::off_axis`].
+    pub off_axis: f64,
+    /// The logarithm of the value at which its photograph saturates.
+    pub full: DVec3,
+}
+
+/// What the photographs show of the cells, in order of cells.
+#[derive(Debug, Default)]
+pub struct Observations {
+    pub(super) fitted: Vec<Observation>,
+    /// Of photographs that are kept out of every fit: these are compared with the others, and the others not with them.
+    pub(super) held_out: Vec<Observation>,
+}
+
+/// Sums over the pixels of a photograph that see a cell.
+#[derive(Default)]
+struct Sums {
+    value: DVec3,
+    off_axis: f64,
+    count: f64,
+}
+
+impl Observations {
+    /// Compares pixels of one surface, neither saturated nor dark, held-out ones of whole photographs alone.
+    pub fn new(problem: &Problem, gbuffer: &GBuffer) -> Self {
+        let size = gbuffer.footprint * CELL_FOOTPRINTS;
+        if size <= 0.0 {
+            return Self::default();
+        }
+        let held_out = gbuffer.unfitted(problem.photographs.len());
+        let value = |p: &GBufferPixel| {
+            problem.photographs[p.frame as usize].pixels[p.pixel as usize].as_dvec3()
+        };
+        let usable = |p: &&GBufferPixel| {
+            let photograph = &problem.photographs[p.frame as usize];
+            p.pure
+                && p.held_out == held_out[p.frame as usize]
+                && !photograph.is_saturated(p.pixel as usize)
+        };
+        let mut levels: Vec<f64> = (gbuffer.pixels.iter().filter(usable))
+            .filter(|p| !p.held_out)
+            .map(|p| value(p).max_element())
+            .collect();
+        let least =
+            (quantile(&mut levels, 0.5).unwrap_or(0.0) * ABOVE_NOISE).max(f64::MIN_POSITIVE);
+
+        let mut sums: BTreeMap<(u64, u32), Sums> = BTreeMap::new();
+        for pixel in gbuffer.pixels.iter().filter(usable) {
+            let value = value(pixel);
+            if value.min_element() < least {
+                continue;
+            }
+            if let Some(point) = pixel.points.iter().flatten().next() {
+                let key = (cell_key(size, point), pixel.frame);
+                let sum = sums.entry(key).or_default();
+                let frame = pixel.frame as usize;
+                let columns = problem.photographs[frame].width.max(1);
+                let [x, y] = [pixel.pixel % columns, pixel.pixel / columns].map(f64::from);
+                let lens = &problem.scene.cameras[frame].intrinsics;
+                sum.value += value;
+                sum.off_axis += Vignetting::off_axis(lens, DVec2::new(x, y) + 0.5);
+                sum.count += 1.0;
+            }
+        }
+        let observation = |((cell, frame), sum): ((u64, u32), Sums)| Observation {
+            frame: frame as usize,
+            cell,
+            level: (sum.value / sum.count).map(f64::ln),
+            off_axis: sum.off_axis / sum.count,
+            full: (problem.photographs[frame as usize].saturation.as_dvec3()).map(f64::ln),
+        };
+        let (held_out, fitted) =
+            (sums.into_iter().map(observation)).partition(|s| held_out[s.frame]);
+        Self { fitted, held_out }
+    }
+
+    /// Forgets what a photograph shows.
+    pub(super) fn forget(&mut self, frame: usize) {
+        self.fitted.retain(|observation| observation.frame != frame);
+        self.held_out
+            .retain(|observation| observation.frame != frame);
+    }
+}
+
+/// The observations of cells that at least two photographs see.
+pub(super) fn shared(observations: &[Observation]) -> Vec<Observation> {
+    let cells = observations.chunk_by(|a, b| a.cell == b.cell);
+    (cells.filter(|cell| cell.len() > 1).flatten().copied()).collect()
+}

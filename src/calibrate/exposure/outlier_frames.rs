@@ -1,0 +1,250 @@
+//! Photographs that do not show what all others show: taken from elsewhere than their pose says, or of another room.
+
+use crate::calibrate::exposure::fit::{Logarithms, MIN_CELLS, Parts, compare, fit};
+use crate::calibrate::exposure::observations::{Observation, Observations, shared};
+use crate::calibrate::problem::Problem;
+use crate::capture::photograph::Photograph;
+use crate::math::stats::quantile;
+use glam::DVec3;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Photographs that must be compared, for the usual difference to say something.
+const MIN_PHOTOGRAPHS: usize = 4;
+/// A photograph is an outlier frame whose difference is so many times that of most, ...
+const PLAINLY: f64 = 4.0;
+/// ... and a factor of e to this at least: noise, gloss and a blurred picture make less.
+const MIN_DIFFERENCE: f64 = 0.3;
+
+/// How well photographs agree about the surfaces that they share.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OutlierFrames {
+    /// Half of the photographs differ by at most so much, as the logarithm of a factor, from what the others show of half of the
+    /// surfaces that they share, each at the exposure that suits it best.
+    pub usual: f64,
+    /// Photographs that differ plainly more than that, and by how much, in order.
+    pub outliers: BTreeMap<usize, f64>,
+}
+
+impl OutlierFrames {
+    /// Compares the photographs, and takes what outlier frames show out of what is compared; `None` where too few share enough to
+    /// tell. The poorest is taken out first, since its neighbours may only differ from it; photographs that are held out are
+    /// compared with the others, and the others not with them.
+    pub fn new(observations: &mut Observations, photographs: usize) -> Option<Self> {
+        let mut outliers = BTreeMap::new();
+        let cells = shared(&observations.fitted);
+        let mut found = exposures(&cells, photographs);
+        let mut now = differences(&cells, &found);
+        let most = now.len().div_ceil(2).saturating_sub(1);
+        let mut usual = middle(&now)?;
+        loop {
+            let worst = now.iter().max_by(|a, b| a.1.total_cmp(b.1));
+            let Some((&frame, &difference)) =
+                worst.filter(|(_, d)| is_outlier(**d, usual) && outliers.len() < most)
+            else {
+                break;
+            };
+            outliers.insert(frame, difference);
+            observations.forget(frame);
+            // What outlier frames do to the exposures of others is little, as these are robust.
+            now = differences(&shared(&observations.fitted), &found);
+            usual = middle(&now).unwrap_or(usual);
+        }
+        if !outliers.is_empty() {
+            found = exposures(&shared(&observations.fitted), photographs);
+        }
+        for (frame, left) in compare(observations, &mut found) {
+            let mut sizes: Vec<f64> = left.iter().map(|d| d.abs().element_sum() / 3.0).collect();
+            if let Some(difference) = quantile(&mut sizes, 0.5).filter(|&d| is_outlier(d, usual)) {
+                outliers.insert(frame, difference);
+                observations.forget(frame);
+            }
+        }
+        Some(Self { usual, outliers })
+    }
+
+    /// The problem with none of the outlier frames' pixels in it.
+    pub fn without_outliers(&self, problem: &Problem) -> Problem {
+        let mut problem = problem.clone();
+        for &frame in self.outliers.keys() {
+            let photograph = &problem.photographs[frame];
+            problem.photographs[frame] = Arc::new(Photograph {
+                usable: vec![false; photograph.pixels.len()],
+                ..(**photograph).clone()
+            });
+        }
+        problem
+    }
+
+    /// Which photographs are outliers and why, in a sentence for each.
+    pub fn remarks(&self) -> Vec<String> {
+        let fraction = |difference: f64| (difference.exp() - 1.0) * 100.0;
+        let remark = |(frame, difference): (&usize, &f64)| {
+            format!(
+                "frame {frame} (counted from 0) is left out: half of what it shares with others differs by {:.0} % or more, where \
+                 {:.0} % is usual; its pose may be wrong",
+                fraction(*difference),
+                fraction(self.usual)
+            )
+        };
+        self.outliers.iter().map(remark).collect()
+    }
+}
+
+/// Whether a difference is plainly more than the usual one.
+fn is_outlier(difference: f64, usual: f64) -> bool {
+    difference > (usual * PLAINLY).max(MIN_DIFFERENCE)
+}
+
+/// The exposures that suit the photographs best.
+fn exposures(shared: &[Observation], photographs: usize) -> Logarithms {
+    let parts = Parts {
+        exposures: true,
+        vignetting: false,
+        response: false,
+    };
+    fit(shared, photographs, parts)
+}
+
+/// Of each photograph that shares enough, the median difference from what the others show of the same cells.
+fn differences(shared: &[Observation], found: &Logarithms) -> BTreeMap<usize, f64> {
+    let mut all: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    for cell in shared.chunk_by(|a, b| a.cell == b.cell) {
+        let levels: Vec<DVec3> = (cell.iter())
+            .map(|observation| observation.level - found.exposures[observation.frame])
+            .collect();
+        for (observation, difference) in cell.iter().zip(from_others(&levels)) {
+            all.entry(observation.frame).or_default().push(difference);
+        }
+    }
+    (all.into_iter())
+        .filter(|(_, all)| all.len() >= MIN_CELLS)
+        .filter_map(|(frame, mut all)| Some((frame, quantile(&mut all, 0.5)?)))
+        .collect()
+}
+
+/// The median over photographs; `None` where they are too few.
+fn middle(differences: &BTreeMap<usize, f64>) -> Option<f64> {
+    let mut all: Vec<f64> = differences.values().copied().collect();
+    let enough = all.len() >= MIN_PHOTOGRAPHS;
+    enough.then(|| quantile(&mut all, 0.5))?
+}
+
+/// How far each of a cell's levels is from the median of the others, mean over the channels.
+fn from_others(levels: &[DVec3]) -> Vec<f64> {
+    let mut sum = vec![0.0; levels.len()];
+    for channel in 0..3 {
+        let mut order: Vec<usize> = (0..levels.len()).collect();
+        order.sort_by(|&a, &b| levels[a][channel].total_cmp(&levels[b][channel]));
+        for (place, &own) in order.iter().enumerate() {
+            // The middle of the order without `place`.
+            let rest = |i: usize| levels[order[i + usize::from(i >= place)]][channel];
+            let count = levels.len() - 1;
+            let median = 0.5 * (rest((count - 1) / 2) + rest(count / 2));
+            sum[own] += (levels[own][channel] - median).abs() / 3.0;
+        }
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::rng::Stream;
+
+    /// Random numbers from −1 to 1.
+    fn numbers() -> impl FnMut() -> f64 {
+        let mut stream = Stream::new(73, 0, 0, 0);
+        move || f64::from(stream.uniform()) * 2.0 - 1.0
+    }
+
+    /// Cells of random levels, each seen by the photographs that `sees` takes for it, of random exposures, with a tenth of
+    /// noise; what those in `wrong` show has nothing to do with it.
+    fn seen(
+        cells: usize,
+        frames: usize,
+        wrong: &[usize],
+        sees: impl Fn(usize, usize) -> bool,
+    ) -> Vec<Observation> {
+        let mut draw = numbers();
+        let exposures: Vec<f64> = (0..frames).map(|_| draw()).collect();
+        let mut observations = Vec::new();
+        for cell in 0..cells {
+            let level = draw();
+            for (frame, exposure) in exposures.iter().enumerate().filter(|f| sees(cell, f.0)) {
+                let shown = match wrong.contains(&frame) {
+                    true => draw(),
+                    false => level + 0.1 * draw(),
+                };
+                observations.push(Observation {
+                    frame,
+                    cell: cell as u64,
+                    level: DVec3::splat(shown + exposure),
+                    off_axis: 0.0,
+                    full: DVec3::ZERO,
+                });
+            }
+        }
+        observations
+    }
+
+    fn outliers(
+        fitted: Vec<Observation>,
+        held_out: Vec<Observation>,
+        frames: usize,
+    ) -> Option<Vec<usize>> {
+        let mut observations = Observations { fitted, held_out };
+        let found = OutlierFrames::new(&mut observations, frames)?;
+        assert_eq!(found.remarks().len(), found.outliers.len());
+        let left = observations.fitted.iter().chain(&observations.held_out);
+        assert!(
+            left.map(|s| s.frame)
+                .all(|f| !found.outliers.contains_key(&f))
+        );
+        Some(found.outliers.into_keys().collect())
+    }
+
+    #[test]
+    fn photographs_of_something_else_are_found_whatever_the_exposures() {
+        for wrong in [&[][..], &[3], &[0, 5]] {
+            let observations = seen(400, 8, wrong, |cell, frame| (cell >> frame) % 2 == 0);
+            assert_eq!(
+                outliers(observations, Vec::new(), 8).as_deref(),
+                Some(wrong)
+            );
+        }
+    }
+
+    /// A walk on which each photograph shares cells with the next alone: those beside the wrong one differ from nothing else.
+    #[test]
+    fn neighbours_of_a_wrong_photograph_stay() {
+        let observations = seen(40 * 11, 12, &[5], |cell, frame| {
+            (cell / 40..cell / 40 + 2).contains(&frame)
+        });
+        assert_eq!(outliers(observations, Vec::new(), 12), Some(vec![5]));
+    }
+
+    #[test]
+    fn photographs_held_out_are_judged_by_the_others() {
+        let observations = seen(400, 8, &[2], |_, _| true);
+        let held_out = |frame: usize| frame == 2 || frame == 6;
+        let (held_out, fitted) = observations.into_iter().partition(|s| held_out(s.frame));
+        assert_eq!(outliers(fitted, held_out, 8), Some(vec![2]));
+    }
+
+    #[test]
+    fn three_photographs_are_too_few_to_tell_which_is_wrong() {
+        assert_eq!(
+            outliers(seen(400, 3, &[1], |_, _| true), Vec::new(), 3),
+            None
+        );
+    }
+
+    #[test]
+    fn a_level_is_compared_with_the_median_of_the_others() {
+        let levels = [5.0, 1.0, 2.0, 4.0].map(DVec3::splat);
+        // Medians of 1 2 4, of 2 4 5, of 1 4 5 and of 1 2 5.
+        assert_eq!(from_others(&levels), [3.0, 3.0, 2.0, 2.0]);
+        assert_eq!(from_others(&levels[..2]), [4.0, 4.0]);
+    }
+}

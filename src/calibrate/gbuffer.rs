@@ -1,0 +1,284 @@
+//! What each pixel sees: the objects behind a few rays through it.
+
+use crate::calibrate::held_out::HoldOut;
+use crate::calibrate::problem::Problem;
+use crate::math::rng::{Stream, splitmix64};
+use crate::scene::Scene;
+use crate::scene::camera::Camera;
+use crate::scene::visibility::NOTHING;
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+/// Rays through a pixel besides the one through its centre: one in each quarter.
+const QUARTERS: usize = 4;
+/// All pixels are looked at of objects that fewer pixels than this see.
+const RARE: u64 = 2_000;
+/// Corners that lie within this fraction of the scene's diameter of a plane lie on it.
+const COPLANAR: f32 = 1e-6;
+/// First of the sample keys of g-buffer rays, far from those of paths.
+const KEY: u64 = 1 << 62;
+
+/// One usable pixel of a photograph.
+#[derive(Debug, Clone, Copy)]
+pub struct GBufferPixel {
+    /// Frame index.
+    pub frame: u32,
+    /// Row by row from the top left.
+    pub pixel: u32,
+    /// Object behind the centre; `u32::MAX` where the ray leaves the mesh.
+    pub object: u32,
+    /// Whether all its rays meet one side of one smooth surface of one object.
+    pub pure: bool,
+    /// Whether it is pure and the eight pixels around see the same object too, so that no edge can be within it.
+    pub inside: bool,
+    /// Whether it is kept out of the fit.
+    pub held_out: bool,
+    /// Points behind the quarters, with the normal of the side that is seen; unset where a ray leaves the mesh.
+    pub points: [Option<SurfacePoint>; QUARTERS],
+}
+
+/// A surface point behind a part of a pixel.
+#[derive(Debug, Clone, Copy)]
+pub struct SurfacePoint {
+    /// Position.
+    pub point: Vec3,
+    /// Unit normal of the side that is seen.
+    pub normal: Vec3,
+    /// Object index.
+    pub object: u32,
+}
+
+/// The usable pixels that were looked at, and how often each object was seen.
+#[derive(Debug, Clone)]
+pub struct GBuffer {
+    /// In order of frame and pixel.
+    pub pixels: Vec<GBufferPixel>,
+    /// For each object, usable pixels whose centre sees it.
+    pub seen: Vec<u64>,
+    /// Median size of a pixel's footprint on the surfaces, in metres; zero where no pixel sees the mesh.
+    pub footprint: f32,
+    /// Rays cast.
+    pub rays: u64,
+}
+
+impl GBuffer {
+    /// For each of the photographs, whether no pixel of it is in the fit: those that are held out as a whole, and those that
+    /// show nothing of use.
+    pub fn unfitted(&self, photographs: usize) -> Vec<bool> {
+        let mut unfitted = vec![true; photographs];
+        for pixel in self.pixels.iter().filter(|p| !p.held_out) {
+            unfitted[pixel.frame as usize] = false;
+        }
+        unfitted
+    }
+
+    /// Casts the rays of all pixels, or of a keyed fraction of about `max_pixels` and of the objects that few pixels see.
+    pub fn new(problem: &Problem, hold_out: HoldOut, seed: u64, max_pixels: usize) -> Self {
+        let scene = &*problem.scene;
+        let centers = scene.ids();
+        let mut seen = vec![0u64; scene.objects.len()];
+        for (photograph, triangles) in problem.photographs.iter().zip(&centers.triangles) {
+            for (pixel, &triangle) in triangles.iter().enumerate() {
+                let usable = photograph.is_usable(pixel);
+                if let Some(&object) = scene.object_of.get(triangle as usize)
+                    && usable
+                {
+                    seen[object as usize] += 1;
+                }
+            }
+        }
+        let total: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
+        let fraction = (max_pixels as f64 / total.max(1) as f64).min(1.0);
+        let frames: Vec<FramePixels> = problem
+            .photographs
+            .par_iter()
+            .enumerate()
+            .map(|(frame, photograph)| {
+                let view = FrameView {
+                    scene,
+                    camera: &scene.cameras[frame],
+                    triangles: &centers.triangles[frame],
+                };
+                let mut pixels_of_frame = FramePixels::default();
+                for pixel in 0..photograph.pixels.len() {
+                    let usable = photograph.is_usable(pixel);
+                    let triangle = centers.triangles[frame][pixel] as usize;
+                    let rare = scene
+                        .object_of
+                        .get(triangle)
+                        .is_some_and(|&k| seen[k as usize] < RARE);
+                    if !usable || !(rare || drawn(fraction, frame as u64, pixel as u64)) {
+                        continue;
+                    }
+                    let key = Stream::new(seed, frame as u64, pixel as u64, KEY);
+                    let sampled = view.sample(pixel, key);
+                    pixels_of_frame.footprints.extend(sampled.footprint);
+                    pixels_of_frame.rays += sampled.rays;
+                    pixels_of_frame.pixels.push(GBufferPixel {
+                        frame: frame as u32,
+                        pixel: pixel as u32,
+                        object: sampled.object,
+                        pure: sampled.pure,
+                        inside: sampled.inside,
+                        held_out: hold_out.contains(frame as u32, pixel as u32),
+                        points: sampled.points,
+                    });
+                }
+                pixels_of_frame
+            })
+            .collect();
+
+        let mut pixels = Vec::with_capacity(frames.iter().map(|f| f.pixels.len()).sum());
+        let mut footprints = Vec::with_capacity(pixels.capacity());
+        let mut rays = total as u64;
+        for frame in frames {
+            pixels.extend(frame.pixels);
+            footprints.extend(frame.footprints);
+            rays += frame.rays;
+        }
+        let middle = footprints.len() / 2;
+        let footprint = if footprints.is_empty() {
+            0.0
+        } else {
+            *footprints.select_nth_unstable_by(middle, f32::total_cmp).1
+        };
+        Self {
+            pixels,
+            seen,
+            footprint,
+            rays,
+        }
+    }
+}
+
+/// What was found in one frame.
+#[derive(Default)]
+struct FramePixels {
+    pixels: Vec<GBufferPixel>,
+    footprints: Vec<f32>,
+    rays: u64,
+}
+
+/// Whether a pixel belongs to the keyed share that is looked at.
+fn drawn(fraction: f64, frame: u64, pixel: u64) -> bool {
+    fraction >= 1.0
+        || ((splitmix64(splitmix64(frame ^ KEY) ^ pixel) >> 11) as f64)
+            < fraction * (1u64 << 53) as f64
+}
+
+/// A frame, with the triangle that the centre of each of its pixels sees.
+struct FrameView<'a> {
+    scene: &'a Scene,
+    camera: &'a Camera,
+    triangles: &'a [u32],
+}
+
+/// What was found through one pixel.
+struct SampledPixel {
+    object: u32,
+    pure: bool,
+    inside: bool,
+    points: [Option<SurfacePoint>; QUARTERS],
+    /// Width of the pixel on the surface.
+    footprint: Option<f32>,
+    rays: u64,
+}
+
+impl FrameView<'_> {
+    /// Looks through a pixel, at points drawn from `stream`. Where all neighbours see the plane that it sees, the points
+    /// lie on that plane and need no rays.
+    fn sample(&self, pixel: usize, mut stream: Stream) -> SampledPixel {
+        let width = self.camera.intrinsics.width as usize;
+        let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+        let triangle = self.triangles[pixel];
+        let center = (triangle != NOTHING)
+            .then(|| self.on_plane(triangle, corner + 0.5))
+            .flatten();
+        // The pixels around, where they see the same object.
+        let around = (self.around(pixel, width)).filter(|seen| self.is_one_object(triangle, *seen));
+        let flat = center.is_some() && around.is_some_and(|seen| self.is_flat(triangle, seen));
+        let points: [Option<SurfacePoint>; QUARTERS] = std::array::from_fn(|quarter| {
+            let [dx, dy] = stream.uniform2();
+            let offset = Vec2::new((quarter % 2) as f32 + dx, (quarter / 2) as f32 + dy) * 0.5;
+            if flat {
+                return self.on_plane(triangle, corner + offset);
+            }
+            let hit = self.scene.intersect(&self.camera.ray(corner + offset))?;
+            Some(self.seen_from(hit.triangle, self.scene.point(&hit)))
+        });
+
+        // The footprint's area is d² / (f² cosθ).
+        let footprint = center.map(|c| {
+            let to_camera = self.camera.center - c.point;
+            let lens = &self.camera.intrinsics;
+            let focal = (lens.fx * lens.fy) as f32;
+            let cosine = c.normal.dot(to_camera.normalize_or_zero()).max(0.05);
+            (to_camera.length_squared() / (focal * cosine)).sqrt()
+        });
+        let pure = center.zip(footprint).is_some_and(|(center, size)| {
+            points.iter().all(|p| {
+                p.is_some_and(|p| {
+                    p.object == center.object
+                        && p.normal.dot(center.normal) > 0.9
+                        && (p.point - center.point).dot(center.normal).abs() < size
+                })
+            })
+        });
+        SampledPixel {
+            object: center.map_or(u32::MAX, |c| c.object),
+            pure,
+            inside: pure && around.is_some(),
+            points,
+            footprint,
+            rays: if flat { 0 } else { QUARTERS as u64 },
+        }
+    }
+
+    /// The point of a triangle's surface, with the side that the camera sees.
+    fn seen_from(&self, triangle: u32, point: Vec3) -> SurfacePoint {
+        let normal = self.scene.normals[triangle as usize];
+        let front = normal.dot(self.camera.center - point) >= 0.0;
+        SurfacePoint {
+            point,
+            normal: if front { normal } else { -normal },
+            object: self.scene.object_of[triangle as usize],
+        }
+    }
+
+    /// Where the ray through a place of the picture meets a triangle's plane; `None` where it runs along it.
+    fn on_plane(&self, triangle: u32, at: Vec2) -> Option<SurfacePoint> {
+        let ray = self.camera.ray(at);
+        let t = self.scene.plane_distance(triangle, &ray);
+        let point = ray.origin + ray.direction * t;
+        (t > 0.0 && point.is_finite()).then(|| self.seen_from(triangle, point))
+    }
+
+    /// The triangles that a pixel and the eight around it see, a row after the other; `None` on the picture's border.
+    fn around(&self, pixel: usize, width: usize) -> Option<[&[u32]; 3]> {
+        let height = self.triangles.len() / width;
+        let (x, y) = (pixel % width, pixel / width);
+        let surrounded = x > 0 && y > 0 && x + 1 < width && y + 1 < height;
+        surrounded.then(|| {
+            [y - 1, y, y + 1].map(|y| &self.triangles[y * width + x - 1..=y * width + x + 1])
+        })
+    }
+
+    /// Whether all of some triangles belong to the object of one.
+    fn is_one_object(&self, own: u32, seen: [&[u32]; 3]) -> bool {
+        let object = |triangle: u32| self.scene.object_of.get(triangle as usize);
+        (seen.into_iter().flatten()).all(|&other| other == own || object(other) == object(own))
+    }
+
+    /// Whether all of some triangles of an object lie on the plane of one.
+    fn is_flat(&self, own: u32, seen: [&[u32]; 3]) -> bool {
+        let scene = self.scene;
+        let [on_plane, _, _] = scene.corners(own);
+        let normal = scene.normals[own as usize];
+        let tolerance = COPLANAR * scene.diameter;
+        let coplanar = |other: u32| {
+            let corners = scene.corners(other);
+            (corners.iter()).all(|c| (*c - on_plane).dot(normal).abs() <= tolerance)
+        };
+        (seen.into_iter().flatten()).all(|&other| other == own || coplanar(other))
+    }
+}

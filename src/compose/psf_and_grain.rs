@@ -1,0 +1,443 @@
+//! What a camera did to a photograph besides its exposure: soft edges and grain, which inserted objects are given too.
+//!
+//! Softness by how much a known blur takes from the strongest edges (Zhuo and Sim 2011, "Defocus map estimation from a
+//! single image"), along rows and columns apart, as a hand moves. Grain by second differences (Immerkær 1996, "Fast noise
+//! variance estimation") where the photograph is smooth, in steps of brightness.
+
+use crate::capture::photograph::{Encoding, Photograph};
+use crate::math::color::luminance;
+use crate::math::rng::Stream;
+use crate::math::stats::quantile;
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use std::f32::consts::TAU;
+use std::iter::Sum;
+use std::ops::{Div, Mul};
+
+/// Standard deviation in pixels of the blur that edges are compared with.
+const KNOWN_BLUR: f32 = 1.0;
+/// A slope counts as an edge from this fraction of the local level on, ...
+const EDGE: f32 = 0.25;
+/// ... and is across if the other one is smaller than this fraction of it.
+const ACROSS: f32 = 0.25;
+/// An edge is so many times the grain.
+const ABOVE_GRAIN: f32 = 6.0;
+/// Edges needed to tell.
+const MIN_EDGES: usize = 50;
+/// Variance in pixels² of a pixel's own area.
+const PIXEL: f64 = 1.0 / 12.0;
+/// Halvings that find a softness.
+const HALVINGS: u32 = 40;
+/// Pixels on all sides that what tells something needs to be sound.
+const AROUND: usize = 4;
+/// A Gaussian narrower than this is not what its samples say; three pixels of its variance are.
+const NARROW: f32 = 0.6;
+/// Softness in pixels below which pictures are left as they are, and above which it is none of the camera's.
+const SOFT: [f32; 2] = [0.3, 4.0];
+/// Steps of brightness, each with as many pixels as any other.
+const STEPS: usize = 8;
+/// Pixels that a step needs.
+const MIN_PIXELS: usize = 100;
+/// Fraction of a step's pixels that are taken to be smooth.
+const SMOOTH: f64 = 0.3;
+/// Median of the absolute value of a normal number of variance one.
+const NORMAL_MEDIAN: f32 = 0.674_49;
+/// Root of the sum of squared weights of the second difference.
+const SECOND_DIFFERENCE: f32 = 6.0;
+/// Sample key of grain, far from those of paths.
+const KEY: u64 = 0x6772_6169;
+
+/// The softness and the grain of a photograph.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PsfAndGrain {
+    /// Standard deviation in pixels of the blur that makes an exact picture as soft as the photograph, along rows and
+    /// columns; 0 where it is as sharp.
+    pub blur: Vec2,
+    /// Standard deviation of each channel by luminance, ascending.
+    pub grain: Vec<(f32, Vec3)>,
+}
+
+impl PsfAndGrain {
+    /// Of an 8-bit or 16-bit photograph; none of linear ones, which are mostly rendered.
+    pub fn of(photograph: &Photograph) -> Self {
+        if photograph.encoding == Encoding::Linear {
+            return Self::default();
+        }
+        let shape = [photograph.width, photograph.height].map(|side| side as usize);
+        let told: Vec<bool> = (photograph.pixels.iter().enumerate())
+            .map(|(index, pixel)| {
+                let usable = photograph.is_usable(index);
+                usable && pixel.is_finite() && !photograph.is_saturated(index)
+            })
+            .collect();
+        let told = eroded(&told, shape[0]);
+        let levels: Vec<f32> = photograph.pixels.iter().map(|&p| luminance(p)).collect();
+        let mut found = Self {
+            blur: Vec2::ZERO,
+            grain: grain(&photograph.pixels, &levels, &told, shape),
+        };
+        let grain = |level: f32| luminance(found.grain_at(level));
+        let blur = [false, true].map(|down| softness(&levels, &told, &grain, shape, down));
+        found.blur = Vec2::from(blur);
+        found
+    }
+
+    /// Standard deviation of the grain at a brightness.
+    fn grain_at(&self, level: f32) -> Vec3 {
+        let above = self.grain.partition_point(|(step, _)| *step <= level);
+        match (
+            above.checked_sub(1).and_then(|i| self.grain.get(i)),
+            self.grain.get(above),
+        ) {
+            (None, None) => Vec3::ZERO,
+            // In the dark and beyond the brightest step as there.
+            (Some((_, only)), None) | (None, Some((_, only))) => *only,
+            (Some((low, a)), Some((high, b))) => a.lerp(*b, (level - low) / (high - low)),
+        }
+    }
+
+    /// Whether there is anything to do.
+    pub fn is_none(&self) -> bool {
+        self.blur == Vec2::ZERO && self.grain.is_empty()
+    }
+
+    /// A picture, or one number a pixel, made as soft as the photograph.
+    pub fn softened<T: Blend>(&self, values: &[T], [width, height]: [usize; 2]) -> Vec<T> {
+        let rows = blurred(values, [width, height], self.blur.x, false);
+        blurred(&rows, [width, height], self.blur.y, true)
+    }
+
+    /// Grain for a pixel of a photograph in which something new of some brightness covers `alpha` of it. The rest keeps its own.
+    pub fn grain(&self, [frame, pixel]: [u64; 2], level: f32, alpha: f32) -> Vec3 {
+        let deviation = self.grain_at(level);
+        if alpha <= 0.0 || deviation == Vec3::ZERO {
+            return Vec3::ZERO;
+        }
+        let mut stream = Stream::new(KEY, frame, pixel, 0);
+        let mut normal = || {
+            let [a, b] = stream.uniform2();
+            (-2.0 * (1.0 - a).ln()).sqrt() * (TAU * b).cos()
+        };
+        deviation * alpha * Vec3::new(normal(), normal(), normal())
+    }
+}
+
+/// Which pixels are so and all around them too, as far as slopes and blurs look.
+fn eroded(told: &[bool], width: usize) -> Vec<bool> {
+    let height = told.len() / width.max(1);
+    let along = |told: &[bool], down: bool| -> Vec<bool> {
+        (0..told.len())
+            .map(|index| {
+                let (x, y) = (index % width, index / width);
+                let (at, side) = if down { (y, height) } else { (x, width) };
+                let near = at.saturating_sub(AROUND)..(at + AROUND + 1).min(side);
+                let place = |i: usize| if down { i * width + x } else { y * width + i };
+                near.map(place).all(|i| told[i])
+            })
+            .collect()
+    };
+    along(&along(told, false), true)
+}
+
+/// What can be blurred.
+pub trait Blend:
+    Copy + Send + Sync + Sum + Mul<f32, Output = Self> + Div<f32, Output = Self>
+{
+}
+
+impl Blend for f32 {}
+impl Blend for Vec3 {}
+
+/// A Gaussian blur along rows or columns; the picture goes on as its border beyond it.
+fn blurred<T: Blend>(values: &[T], shape: [usize; 2], deviation: f32, down: bool) -> Vec<T> {
+    if deviation <= 0.0 || values.is_empty() {
+        return values.to_vec();
+    }
+    let variance = deviation * deviation;
+    let kernel: Vec<f32> = match deviation < NARROW {
+        true => vec![0.5 * variance, 1.0 - variance, 0.5 * variance],
+        false => {
+            let reach = (3.0 * deviation).ceil() as i32;
+            let weight = |i: i32| (-0.5 * (i * i) as f32 / variance).exp();
+            (-reach..=reach).map(weight).collect()
+        }
+    };
+    let reach = (kernel.len() / 2) as isize;
+    let sum: f32 = kernel.iter().sum();
+    let [width, height] = shape;
+    (0..values.len())
+        .into_par_iter()
+        .map(|index| {
+            let (x, y) = (index % width, index / width);
+            let at = |i: isize| match down {
+                false => y * width + (x as isize + i).clamp(0, width as isize - 1) as usize,
+                true => (y as isize + i).clamp(0, height as isize - 1) as usize * width + x,
+            };
+            let terms = (-reach..=reach).zip(&kernel);
+            terms.map(|(i, k)| values[at(i)] * *k).sum::<T>() / sum
+        })
+        .collect()
+}
+
+/// Standard deviation of the blur that edges across rows (or columns, `down`) have beyond that of pixels.
+fn softness(
+    levels: &[f32],
+    told: &[bool],
+    grain: &dyn Fn(f32) -> f32,
+    [width, height]: [usize; 2],
+    down: bool,
+) -> f32 {
+    if width < 5 || height < 5 {
+        return 0.0;
+    }
+    let (along, other) = if down { (width, 1) } else { (1, width) };
+    // Three pixels along an edge are alike but for their grain.
+    let own: Vec<f32> = (0..levels.len())
+        .map(|at| {
+            let near = [
+                at.saturating_sub(other),
+                at,
+                (at + other).min(levels.len() - 1),
+            ];
+            near.iter().map(|&i| levels[i]).sum::<f32>() / near.len() as f32
+        })
+        .collect();
+    let known = blurred(&own, [width, height], KNOWN_BLUR, down);
+    let slope = |at: usize, step: usize| own[at + step] - own[at - step];
+    let mut ratios: Vec<f64> = (2..height - 2)
+        .flat_map(|y| (2..width - 2).map(move |x| y * width + x))
+        .filter(|&at| {
+            let here = slope(at, along).abs();
+            let level = own[at + along].max(own[at - along]);
+            told[at]
+                && here > (EDGE * level).max(ABOVE_GRAIN * grain(level))
+                && slope(at, other).abs() < ACROSS * here
+                && here >= slope(at - along, along).abs()
+                && here > slope(at + along, along).abs()
+        })
+        .filter_map(|at| {
+            let after = (known[at + along] - known[at - along]).abs();
+            (after > 0.0).then(|| f64::from(slope(at, along).abs() / after))
+        })
+        .collect();
+    if ratios.len() < MIN_EDGES {
+        return 0.0;
+    }
+    let ratio = quantile(&mut ratios, 0.5).unwrap_or(f64::INFINITY);
+    let found = softness_of(ratio) as f32;
+    let [least, most] = SOFT;
+    if found < least { 0.0 } else { found.min(most) }
+}
+
+/// The softness beyond a pixel's own of a step whose slope the known blur makes smaller by a factor.
+fn softness_of(ratio: f64) -> f64 {
+    // Brightness from one pixel before a step to one after it, in steps.
+    let slope = |variance: f64| libm::erf((2.0 * (variance + PIXEL)).sqrt().recip());
+    let known = f64::from(KNOWN_BLUR * KNOWN_BLUR);
+    let (mut low, mut high) = (0.0, f64::from(SOFT[1] * SOFT[1]));
+    for _ in 0..HALVINGS {
+        let middle: f64 = 0.5 * (low + high);
+        // The softer a step is, the less a blur takes from it.
+        match slope(middle) / slope(middle + known) > ratio {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    low.sqrt()
+}
+
+/// Standard deviations by luminance where the photograph is smooth.
+fn grain(
+    pixels: &[Vec3],
+    levels: &[f32],
+    told: &[bool],
+    [width, height]: [usize; 2],
+) -> Vec<(f32, Vec3)> {
+    if width < 7 || height < 7 {
+        return Vec::new();
+    }
+    // Slopes over a distance hold little of the grain, so that choosing by them keeps it as it is.
+    let mean = |at: usize| -> f32 {
+        let rows = [at - width, at, at + width];
+        rows.iter()
+            .flat_map(|&row| &levels[row - 1..=row + 1])
+            .sum::<f32>()
+            / 9.0
+    };
+    let mut seen: Vec<(f32, f32, usize)> = (3..height - 3)
+        .flat_map(|y| (3..width - 3).map(move |x| y * width + x))
+        .filter(|&at| told[at])
+        .map(|at| {
+            let across = mean(at + 2) - mean(at - 2);
+            let down = mean(at + 2 * width) - mean(at - 2 * width);
+            (mean(at), across.hypot(down), at)
+        })
+        .collect();
+    seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let size = seen.len().div_ceil(STEPS);
+    if size < MIN_PIXELS {
+        return Vec::new();
+    }
+    let second = |at: usize| -> Vec3 {
+        let row = |i: usize| pixels[i - 1] - pixels[i] * 2.0 + pixels[i + 1];
+        row(at - width) - row(at) * 2.0 + row(at + width)
+    };
+    let step = |part: &mut [(f32, f32, usize)]| {
+        part.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let smooth = &part[..((part.len() as f64 * SMOOTH) as usize).max(1)];
+        let deviation = [0, 1, 2].map(|channel| {
+            let mut sizes: Vec<f64> = (smooth.iter())
+                .map(|(_, _, at)| f64::from(second(*at)[channel].abs()))
+                .collect();
+            let median = quantile(&mut sizes, 0.5).unwrap_or(0.0) as f32;
+            median / (NORMAL_MEDIAN * SECOND_DIFFERENCE)
+        });
+        let level = smooth.iter().map(|s| s.0).sum::<f32>() / smooth.len() as f32;
+        (level, Vec3::from(deviation))
+    };
+    let mut steps: Vec<(f32, Vec3)> = seen.chunks_mut(size).map(step).collect();
+    steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    steps.dedup_by(|next, kept| next.0 <= kept.0);
+    steps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: [usize; 2] = [240, 180];
+
+    /// Bricks of random colours, exact to the pixel's area, then blurred, with grain that grows with the level.
+    fn bricks(blur: Vec2, grain: f32) -> Photograph {
+        let [width, height] = SIZE;
+        let mut stream = Stream::new(7, 0, 0, 0);
+        let colors: Vec<f32> = (0..400).map(|_| 0.1 + 0.8 * stream.uniform()).collect();
+        // Joints that fall at all places within a pixel.
+        let cell = |at: f32| ((at / 11.3).floor() as usize).min(19);
+        let exact: Vec<Vec3> = (0..width * height)
+            .map(|index| {
+                let (x, y) = ((index % width) as f32, (index / width) as f32);
+                let points = (0..16).map(|i| {
+                    let (dx, dy) = ((i % 4) as f32, (i / 4) as f32);
+                    let at = [x + (dx + 0.5) / 4.0, y + (dy + 0.5) / 4.0];
+                    colors[cell(at[1]) * 20 + cell(at[0])]
+                });
+                Vec3::new(1.0, 0.8, 0.5) * (points.sum::<f32>() / 16.0)
+            })
+            .collect();
+        let finish = PsfAndGrain {
+            blur,
+            grain: vec![(0.0, Vec3::ZERO), (1.0, Vec3::splat(grain))],
+        };
+        let soft = finish.softened(&exact, SIZE);
+        let noisy = |(index, &pixel): (usize, &Vec3)| {
+            pixel + finish.grain([3, index as u64], luminance(pixel), 1.0)
+        };
+        let pixels = soft.iter().enumerate().map(noisy).collect();
+        photograph(width as u32, height as u32, pixels, Vec3::INFINITY)
+    }
+
+    fn photograph(width: u32, height: u32, pixels: Vec<Vec3>, saturation: Vec3) -> Photograph {
+        Photograph {
+            width,
+            height,
+            pixels,
+            usable: Vec::new(),
+            encoding: Encoding::Srgb8,
+            saturation,
+            limits: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn softness_and_grain_are_what_the_picture_was_given() {
+        for (blur, grain) in [([0.0, 0.0], 0.02), ([1.0, 1.0], 0.02), ([2.0, 0.6], 0.04)] {
+            let blur = Vec2::from(blur);
+            let found = PsfAndGrain::of(&bricks(blur, grain));
+            let off = (found.blur - blur).abs();
+            assert!(
+                off.max_element() <= 0.15 + 0.15 * blur.max_element(),
+                "{blur}: {}",
+                found.blur
+            );
+            for level in [0.3, 0.6] {
+                let ratio = found.grain_at(level) / (grain * level);
+                assert!(
+                    (ratio - 1.0).abs().max_element() < 0.25,
+                    "{blur} {level}: {ratio}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn exact_pictures_get_nothing_and_small_ones_are_not_asked() {
+        let exact = PsfAndGrain::of(&bricks(Vec2::ZERO, 0.0));
+        assert_eq!(exact.blur, Vec2::ZERO);
+        assert_eq!(exact.grain([0, 0], 0.5, 1.0), Vec3::ZERO);
+        for side in [1, 2, 5, 8] {
+            let pixels = (0..side * side).map(|i| Vec3::splat((i % side * (i / side)) as f32));
+            let small = photograph(side, side, pixels.collect(), Vec3::ONE);
+            assert!(PsfAndGrain::of(&small).is_none(), "{side}");
+        }
+        let black = photograph(50, 40, vec![Vec3::ZERO; 50 * 40], Vec3::ONE);
+        let found = PsfAndGrain::of(&black);
+        assert_eq!(
+            (found.blur, found.grain([0, 0], 0.0, 1.0)),
+            (Vec2::ZERO, Vec3::ZERO)
+        );
+    }
+
+    #[test]
+    fn what_is_masked_says_nothing() {
+        let mut picture = bricks(Vec2::splat(1.0), 0.02);
+        let whole = PsfAndGrain::of(&picture);
+        // Stripes of nothing, as sharp as can be.
+        let usable: Vec<bool> = (0..picture.pixels.len())
+            .map(|index| index % SIZE[0] % 60 >= 8)
+            .collect();
+        for (pixel, usable) in picture.pixels.iter_mut().zip(&usable) {
+            *pixel *= f32::from(u8::from(*usable));
+        }
+        picture.usable = usable;
+        let found = PsfAndGrain::of(&picture);
+        assert!(
+            (found.blur - whole.blur).abs().max_element() < 0.15,
+            "{found:?}"
+        );
+        for level in [0.15, 0.5] {
+            let ratio = found.grain_at(level) / whole.grain_at(level);
+            assert!((ratio - 1.0).abs().max_element() < 0.2, "{level}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn a_blur_keeps_the_sum_and_has_the_width_asked_for() {
+        let [width, height] = [41, 31];
+        let mut point = vec![Vec3::ZERO; width * height];
+        point[15 * width + 20] = Vec3::ONE;
+        let finish = PsfAndGrain {
+            blur: Vec2::new(2.0, 0.4),
+            grain: Vec::new(),
+        };
+        let soft = finish.softened(&point, [width, height]);
+        let moment = |power: i32, down: bool| -> f32 {
+            let term = |(index, value): (usize, &Vec3)| {
+                let away = match down {
+                    false => (index % width) as f32 - 20.0,
+                    true => (index / width) as f32 - 15.0,
+                };
+                value.x * away.powi(power)
+            };
+            soft.iter().enumerate().map(term).sum()
+        };
+        assert!((moment(0, false) - 1.0).abs() < 1e-5);
+        for (down, wanted) in [(false, 4.0), (true, 0.16)] {
+            assert!(
+                (moment(2, down) / wanted - 1.0).abs() < 0.05,
+                "{}",
+                moment(2, down)
+            );
+        }
+    }
+}

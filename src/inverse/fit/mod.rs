@@ -1,0 +1,13 @@
+//! The bounded, robust least-squares fit of all unknowns to stored paths, and the standard errors of what it finds.
+
+pub mod accumulate;
+pub mod equations;
+pub mod errors;
+pub mod gauss_newton;
+pub mod linear;
+pub mod model_error;
+pub mod path_noise;
+pub mod prior;
+pub mod robust_weights;
+pub mod rows;
+pub mod step;

@@ -1,0 +1,323 @@
+//! Radiance of a stored path and its derivative with respect to every albedo and emission on it.
+
+use crate::inverse::paths::{NO_LAMP, NO_PATCH, SPECULAR, Vertex};
+use crate::inverse::unknowns::Unknowns;
+use glam::{Vec3, Vec3A};
+
+/// Derivative of a radiance: dense over parameters (albedos first, then emissions), with the list of
+/// those that were touched.
+pub struct Gradient {
+    /// Derivative with respect to each parameter.
+    pub values: Vec<Vec3A>,
+    /// Parameters with a derivative, in the order in which paths met them.
+    pub touched: Vec<u32>,
+    /// Whether a parameter is in `touched`.
+    pub marked: Vec<bool>,
+}
+
+impl Gradient {
+    /// All zero.
+    pub fn new(parameters: usize) -> Self {
+        Self {
+            values: vec![Vec3A::ZERO; parameters],
+            touched: Vec::new(),
+            marked: vec![false; parameters],
+        }
+    }
+
+    #[inline]
+    fn add(&mut self, index: usize, value: Vec3A) {
+        if !self.marked[index] {
+            self.marked[index] = true;
+            self.touched.push(index as u32);
+        }
+        self.values[index] += value;
+    }
+
+    /// Sets everything touched back to zero.
+    pub fn clear(&mut self) {
+        for &index in &self.touched {
+            self.values[index as usize] = Vec3A::ZERO;
+            self.marked[index as usize] = false;
+        }
+        self.touched.clear();
+    }
+}
+
+/// Radiance of one path.
+#[inline]
+pub fn radiance(vertices: &[Vertex], unknowns: &Unknowns) -> Vec3 {
+    radiance_with(vertices, unknowns, |vertex| {
+        unknowns.albedo[vertex.surface as usize]
+    })
+}
+
+/// Radiance of one path where texels have their own albedos.
+#[inline]
+pub fn textured_radiance(vertices: &[Vertex], unknowns: &Unknowns, texels: &[Vec3]) -> Vec3 {
+    radiance_with(vertices, unknowns, |vertex| {
+        let texel = texels.get(vertex.texel as usize).copied();
+        texel.unwrap_or(unknowns.albedo[vertex.surface as usize])
+    })
+}
+
+#[inline]
+fn radiance_with(
+    vertices: &[Vertex],
+    unknowns: &Unknowns,
+    albedo: impl Fn(&Vertex) -> Vec3,
+) -> Vec3 {
+    let leaving = |beyond: Vec3A, vertex: &Vertex| {
+        let gathered = gathered_at(vertex, beyond, unknowns);
+        leaving(vertex, gathered, unknowns, &albedo)
+    };
+    vertices.iter().rev().fold(Vec3A::ZERO, leaving).into()
+}
+
+/// Radiance that leaves a vertex of what it gathered, and of its own.
+#[inline]
+fn leaving(
+    vertex: &Vertex,
+    gathered: Vec3A,
+    unknowns: &Unknowns,
+    albedo: impl Fn(&Vertex) -> Vec3,
+) -> Vec3A {
+    if vertex.surface == SPECULAR {
+        return gathered;
+    }
+    let emission = Vec3A::from(unknowns.emission[vertex.surface as usize]);
+    emission * vertex.emission_weight + Vec3A::from(albedo(vertex)) * gathered
+}
+
+/// Radiance gathered at a vertex, where `beyond` leaves the next one towards it.
+#[inline]
+fn gathered_at(vertex: &Vertex, beyond: Vec3A, unknowns: &Unknowns) -> Vec3A {
+    let mut gathered = beyond + Vec3A::from(vertex.known);
+    if vertex.lamp != NO_LAMP {
+        gathered += Vec3A::from(unknowns.emission[vertex.lamp as usize]) * vertex.lamp_weight;
+    }
+    gathered
+}
+
+/// Radiance of one path, its derivative added to `gradient`.
+///
+/// With G_i the radiance gathered at vertex i, L_i = w_i E_i + ρ_i G_i is what leaves it towards the camera; the
+/// derivative with respect to ρ_i is G_i, with respect to an emission its weight, each times the albedos before it. A
+/// vertex on a lobe has no ρ_i: there L_i = G_i. A patch of a lamp, whose albedo is held at zero, is known to send
+/// `reflected` for an albedo of one.
+#[inline]
+pub fn differentiate(
+    vertices: &[Vertex],
+    unknowns: &Unknowns,
+    reflected: &[Vec3],
+    gathered: &mut Vec<Vec3A>,
+    gradient: &mut Gradient,
+) -> Vec3 {
+    let surfaces = unknowns.surfaces();
+    gathered.resize(vertices.len().max(gathered.len()), Vec3A::ZERO);
+    let mut beyond = Vec3A::ZERO;
+    for (vertex, gathered) in vertices.iter().zip(&mut *gathered).rev() {
+        *gathered = gathered_at(vertex, beyond, unknowns);
+        beyond = leaving(vertex, *gathered, unknowns, |v| {
+            unknowns.albedo[v.surface as usize]
+        });
+    }
+    let patch = |patch: u32| Vec3A::from(reflected[patch as usize]);
+    let mut throughput = Vec3A::ONE;
+    for (vertex, g) in vertices.iter().zip(&*gathered) {
+        if vertex.surface != SPECULAR {
+            let surface = vertex.surface as usize;
+            if vertex.emission_weight != 0.0 {
+                let weight = throughput * vertex.emission_weight;
+                gradient.add(surfaces + surface, weight);
+                if vertex.patch != NO_PATCH && vertex.lamp == NO_LAMP {
+                    gradient.add(surface, weight * patch(vertex.patch));
+                }
+            }
+            gradient.add(surface, throughput * *g);
+            throughput *= Vec3A::from(unknowns.albedo[surface]);
+        }
+        if vertex.lamp != NO_LAMP {
+            let (lamp, weight) = (vertex.lamp as usize, throughput * vertex.lamp_weight);
+            gradient.add(surfaces + lamp, weight);
+            if vertex.patch != NO_PATCH {
+                gradient.add(lamp, weight * patch(vertex.patch));
+            }
+        }
+    }
+    beyond.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::rng::Stream;
+    use glam::DVec3;
+
+    const SURFACES: usize = 4;
+
+    fn color(stream: &mut Stream) -> Vec3 {
+        Vec3::from_array(std::array::from_fn(|_| 0.1 + 0.8 * stream.uniform()))
+    }
+
+    /// A path over few surfaces, so that they repeat, with lamps, emission seen and known radiance.
+    fn random_path(stream: &mut Stream) -> Vec<Vertex> {
+        (0..1 + stream.below(7))
+            .map(|_| Vertex {
+                surface: match stream.below(SURFACES + 1) {
+                    SURFACES => SPECULAR,
+                    surface => surface as u32,
+                },
+                lamp: if stream.uniform() < 0.5 {
+                    stream.below(SURFACES) as u32
+                } else {
+                    NO_LAMP
+                },
+                lamp_weight: stream.uniform(),
+                emission_weight: if stream.uniform() < 0.3 {
+                    0.0
+                } else {
+                    stream.uniform()
+                },
+                known: if stream.uniform() < 0.3 {
+                    color(stream)
+                } else {
+                    Vec3::ZERO
+                },
+                ..Vertex::on(0)
+            })
+            .collect()
+    }
+
+    fn random_unknowns(stream: &mut Stream) -> Unknowns {
+        let mut colors = || (0..SURFACES).map(|_| color(stream)).collect();
+        Unknowns {
+            albedo: colors(),
+            emission: colors(),
+        }
+    }
+
+    /// The sum over all ways of the path to find light, term by term in f64.
+    fn radiance(vertices: &[Vertex], albedo: &[DVec3], emission: &[DVec3]) -> DVec3 {
+        let mut sum = DVec3::ZERO;
+        for (i, vertex) in vertices.iter().enumerate() {
+            let factor = |v: &Vertex| {
+                albedo
+                    .get(v.surface as usize)
+                    .copied()
+                    .unwrap_or(DVec3::ONE)
+            };
+            let before: DVec3 = vertices[..i].iter().map(factor).product();
+            let after = before * factor(vertex);
+            let shown = emission.get(vertex.surface as usize).copied();
+            sum += before * shown.unwrap_or_default() * f64::from(vertex.emission_weight);
+            sum += after * vertex.known.as_dvec3();
+            if vertex.lamp != NO_LAMP {
+                sum += after * emission[vertex.lamp as usize] * f64::from(vertex.lamp_weight);
+            }
+        }
+        sum
+    }
+
+    #[test]
+    fn derivatives_agree_with_central_differences_for_every_parameter() {
+        let (mut gathered, mut gradient) = (Vec::new(), Gradient::new(2 * SURFACES));
+        for index in 0..200 {
+            let mut stream = Stream::new(11, 0, 0, index);
+            let (path, unknowns) = (random_path(&mut stream), random_unknowns(&mut stream));
+            let widen = |values: &[Vec3]| values.iter().map(|v| v.as_dvec3()).collect::<Vec<_>>();
+            let (albedo, emission) = (widen(&unknowns.albedo), widen(&unknowns.emission));
+            gradient.clear();
+            let found =
+                differentiate(&path, &unknowns, &[], &mut gathered, &mut gradient).as_dvec3();
+            let wanted = radiance(&path, &albedo, &emission);
+            assert!((found - wanted).length() < 1e-5 * (1.0 + wanted.length()));
+            for parameter in 0..2 * SURFACES {
+                // The polynomial's third derivative leaves an error of the order of h².
+                let h = 1e-5;
+                let at = |step: f64| {
+                    let (mut albedo, mut emission) = (albedo.clone(), emission.clone());
+                    match parameter.checked_sub(SURFACES) {
+                        None => albedo[parameter] += step,
+                        Some(surface) => emission[surface] += step,
+                    }
+                    radiance(&path, &albedo, &emission)
+                };
+                let difference = (at(h) - at(-h)) / (2.0 * h);
+                let derivative = gradient.values[parameter].as_dvec3();
+                assert!(
+                    (derivative - difference).length() < 1e-5 * (1.0 + difference.length()),
+                    "path {index}, parameter {parameter}: {derivative} against {difference}"
+                );
+                assert!(gradient.marked[parameter] || difference == DVec3::ZERO);
+            }
+        }
+    }
+
+    #[test]
+    fn gradients_add_up_over_paths_and_are_gone_when_cleared() {
+        let mut stream = Stream::new(12, 0, 0, 0);
+        let unknowns = random_unknowns(&mut stream);
+        let paths = [random_path(&mut stream), random_path(&mut stream)];
+        let (mut gathered, mut both) = (Vec::new(), Gradient::new(2 * SURFACES));
+        let mut each = [Vec3A::ZERO; 2 * SURFACES];
+        for path in &paths {
+            differentiate(path, &unknowns, &[], &mut gathered, &mut both);
+            let mut alone = Gradient::new(2 * SURFACES);
+            differentiate(path, &unknowns, &[], &mut gathered, &mut alone);
+            each.iter_mut()
+                .zip(&alone.values)
+                .for_each(|(sum, v)| *sum += *v);
+        }
+        for (sum, value) in each.iter().zip(&both.values) {
+            assert!((*sum - *value).length() < 1e-5, "{sum} {value}");
+        }
+        both.clear();
+        assert!(both.values.iter().all(|v| *v == Vec3A::ZERO));
+        assert!(both.touched.is_empty() && !both.marked.contains(&true));
+    }
+
+    #[test]
+    fn a_path_that_met_nothing_is_dark() {
+        let mut gradient = Gradient::new(2 * SURFACES);
+        let dark = differentiate(
+            &[],
+            &Unknowns::new(SURFACES),
+            &[],
+            &mut Vec::new(),
+            &mut gradient,
+        );
+        assert_eq!(dark, Vec3::ZERO);
+        assert!(gradient.touched.is_empty());
+    }
+
+    /// A patch sends what it reflects for the lamp's albedo besides its emission: where light samples reach it, and where
+    /// the path ends at it.
+    #[test]
+    fn a_lamp_s_albedo_changes_what_its_patches_send() {
+        let path = [
+            Vertex {
+                lamp: 1,
+                lamp_weight: 0.25,
+                patch: 1,
+                ..Vertex::on(0)
+            },
+            Vertex {
+                patch: 0,
+                emission_weight: 0.5,
+                ..Vertex::on(1)
+            },
+        ];
+        let unknowns = Unknowns {
+            albedo: vec![Vec3::splat(0.4), Vec3::ZERO],
+            emission: vec![Vec3::ZERO, Vec3::splat(10.0)],
+        };
+        let reflected = [Vec3::new(1.0, 2.0, 3.0), Vec3::new(0.1, 0.2, 0.4)];
+        let mut gradient = Gradient::new(4);
+        let found = differentiate(&path, &unknowns, &reflected, &mut Vec::new(), &mut gradient);
+        assert!((found - Vec3::splat(0.4 * 10.0 * 0.75)).length() < 1e-6);
+        let wanted = (reflected[1] * 0.25 + reflected[0] * 0.5) * 0.4;
+        assert!((Vec3::from(gradient.values[1]) - wanted).length() < 1e-6);
+        assert!((Vec3::from(gradient.values[3]) - Vec3::splat(0.4 * 0.75)).length() < 1e-6);
+    }
+}

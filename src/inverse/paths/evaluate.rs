@@ -1,0 +1,306 @@
+//! Radiance and derivatives of cached paths for given unknowns.
+
+use crate::inverse::paths::derivative::{Gradient, differentiate, radiance, textured_radiance};
+use crate::inverse::paths::{CachedCluster, PathCache, SPECULAR, Vertex};
+use crate::inverse::unknowns::Unknowns;
+use glam::{BVec3, DVec3, Vec3, Vec3A};
+use rayon::prelude::*;
+
+/// One cluster's residual and derivative from both sets.
+#[derive(Debug, Clone)]
+pub struct Linearised {
+    /// Object behind its pixels.
+    pub object: u32,
+    /// Weight of the squared residual, per channel.
+    pub weight: DVec3,
+    /// Its pixels: what the squared residual would weigh if it were as large as the level that it is weighed by.
+    pub pixels: f64,
+    /// Photograph minus model, from set A and from set B.
+    pub residuals: [DVec3; 2],
+    /// Channels in which the photograph is saturated, so that only a model that is darker is wrong.
+    pub censored: BVec3,
+    /// Derivative with respect to the object's own emission if that is all its light, else to its own albedo; mean of
+    /// both sets.
+    pub own: DVec3,
+    /// Place among the free parameters, derivative of A, derivative of B.
+    pub rows: Vec<(usize, DVec3, DVec3)>,
+}
+
+impl Linearised {
+    /// Takes a step along the derivatives, a component a row: the residuals become those after it.
+    pub fn step(&mut self, steps: &[DVec3]) {
+        let [a, b] = &mut self.residuals;
+        for &(row, of_a, of_b) in &self.rows {
+            *a -= of_a * steps[row];
+            *b -= of_b * steps[row];
+        }
+    }
+
+    /// Photograph minus model, the mean of both sets.
+    pub fn residual(&self) -> DVec3 {
+        (self.residuals[0] + self.residuals[1]) * 0.5
+    }
+
+    /// Channels that say nothing now: the photograph is saturated there, and the model at least as bright.
+    pub fn bound_met(&self) -> BVec3 {
+        self.censored & self.residual().cmple(DVec3::ZERO)
+    }
+
+    /// The weight of the squared residual, none in silent channels.
+    pub fn weight_now(&self) -> DVec3 {
+        DVec3::select(self.bound_met(), DVec3::ZERO, self.weight)
+    }
+
+    /// What each row adds to the direction of descent, for a weight per channel: ½ w (J_A r_B + J_B r_A).
+    pub fn scores(&self, weight: DVec3) -> impl Iterator<Item = DVec3> + '_ {
+        let [ra, rb] = self.residuals;
+        (self.rows.iter()).map(move |&(_, ja, jb)| weight * (ja * rb + jb * ra) * 0.5)
+    }
+}
+
+impl PathCache {
+    /// Linearises every cluster about some unknowns; `place` maps parameters to rows. `reflected` is what the patches of
+    /// lamps would send if they were white, if paths note any.
+    pub fn linearise(
+        &self,
+        unknowns: &Unknowns,
+        place: &[usize],
+        reflected: &[Vec3],
+    ) -> Vec<Linearised> {
+        let parameters = 2 * unknowns.surfaces();
+        self.clusters
+            .par_iter()
+            .map_init(
+                || Scratch::new(parameters),
+                |scratch, cluster| linearise(cluster, unknowns, place, reflected, scratch),
+            )
+            .collect()
+    }
+
+    /// Every cluster's residuals for some unknowns, without derivatives.
+    pub fn residuals(&self, unknowns: &Unknowns) -> Vec<Linearised> {
+        self.linearise(unknowns, &vec![usize::MAX; 2 * unknowns.surfaces()], &[])
+    }
+
+    /// By how much textures change the radiance of each cluster: the mean of the difference path by path.
+    pub fn texture_offsets(&self, unknowns: &Unknowns, texels: &[Vec3]) -> Vec<DVec3> {
+        let clusters = self.clusters.par_iter();
+        let offset = |cached: &CachedCluster| {
+            let [a, b] = means(cached, |vertices, _| {
+                textured_radiance(vertices, unknowns, texels) - radiance(vertices, unknowns)
+            });
+            (a + b) * 0.5
+        };
+        clusters.map(offset).collect()
+    }
+
+    /// The level of each cluster that its weight goes by, as its paths predict it.
+    pub fn levels(&self, unknowns: &Unknowns) -> Vec<Vec3> {
+        let clusters = self.clusters.par_iter();
+        clusters.map(|cached| level(cached, unknowns)).collect()
+    }
+}
+
+/// Root of the mean square of what the pixels of a cluster see by these paths, where light that is seen itself differs from
+/// path to path and what is reflected by its mean.
+///
+/// A pixel on the edge of a lamp has a moderate mean, but is as uncertain as its contrast: a sliver of the lamp more or
+/// less, by noise or by the camera's position, changes it by many times the dark side's radiance.
+fn level(cached: &CachedCluster, unknowns: &Unknowns) -> Vec3 {
+    let (mut seen_squared, mut reflected) = (DVec3::ZERO, DVec3::ZERO);
+    let mut start = 0;
+    for &end in &cached.ends {
+        let vertices = &cached.vertices[start..end as usize];
+        let first = vertices.first().filter(|v| v.surface != SPECULAR);
+        let seen = first.map_or(Vec3::ZERO, |vertex| {
+            unknowns.emission[vertex.surface as usize] * vertex.emission_weight
+        });
+        seen_squared += (seen * seen).as_dvec3();
+        reflected += (radiance(vertices, unknowns) - seen).as_dvec3();
+        start = end as usize;
+    }
+    let paths = cached.ends.len().max(1) as f64;
+    let reflected = reflected / paths;
+    (seen_squared / paths + reflected * reflected)
+        .powf(0.5)
+        .as_vec3()
+}
+
+/// Mean over the paths of each set of what one path gives, told the set.
+fn means(cached: &CachedCluster, mut of: impl FnMut(&[Vertex], usize) -> Vec3) -> [DVec3; 2] {
+    let paths = cached.cluster.paths as usize;
+    let mut sums = [DVec3::ZERO; 2];
+    let mut start = 0;
+    for (path, &end) in cached.ends.iter().enumerate() {
+        let set = path / paths % 2;
+        sums[set] += of(&cached.vertices[start..end as usize], set).as_dvec3();
+        start = end as usize;
+    }
+    sums.map(|sum| sum * f64::from(scale(cached)))
+}
+
+/// One over the paths of each set.
+fn scale(cached: &CachedCluster) -> f32 {
+    let paths = cached.cluster.paths as usize * cached.cluster.pixels.len();
+    1.0 / paths.max(1) as f32
+}
+
+/// Evaluates all paths of a cluster.
+fn linearise(
+    cached: &CachedCluster,
+    unknowns: &Unknowns,
+    place: &[usize],
+    reflected: &[Vec3],
+    scratch: &mut Scratch,
+) -> Linearised {
+    let Scratch {
+        gathered,
+        gradients,
+    } = scratch;
+    gradients.iter_mut().for_each(Gradient::clear);
+    let means = means(cached, |vertices, set| {
+        differentiate(vertices, unknowns, reflected, gathered, &mut gradients[set])
+    });
+    let residuals = means.map(|mean| cached.cluster.measured.as_dvec3() - mean);
+
+    // The parameters that either set touches and that are free.
+    let [a, b] = &*gradients;
+    let scale = scale(cached);
+    let mut rows = Vec::new();
+    for &t in a
+        .touched
+        .iter()
+        .chain(b.touched.iter().filter(|&&t| !a.marked[t as usize]))
+    {
+        let place = place[t as usize];
+        if place != usize::MAX {
+            let scaled = |g: &Gradient| Vec3::from(g.values[t as usize] * scale).as_dvec3();
+            rows.push((place, scaled(a), scaled(b)));
+        }
+    }
+    let object = cached.cluster.object as usize;
+    let gives_light_alone =
+        unknowns.albedo[object] == Vec3::ZERO && unknowns.emission[object] != Vec3::ZERO;
+    let own = object
+        + if gives_light_alone {
+            unknowns.surfaces()
+        } else {
+            0
+        };
+    Linearised {
+        own: Vec3::from((a.values[own] + b.values[own]) * (0.5 * scale)).as_dvec3(),
+        object: cached.cluster.object,
+        weight: cached.cluster.weight.as_dvec3(),
+        pixels: cached.cluster.pixels.len() as f64,
+        residuals,
+        censored: cached.cluster.censored,
+        rows,
+    }
+}
+
+/// Memory reused from cluster to cluster.
+struct Scratch {
+    gradients: [Gradient; 2],
+    gathered: Vec<Vec3A>,
+}
+
+impl Scratch {
+    fn new(parameters: usize) -> Self {
+        Self {
+            gradients: [Gradient::new(parameters), Gradient::new(parameters)],
+            gathered: Vec::new(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inverse::paths::NO_LAMP;
+    use crate::inverse::paths::NO_TEXEL;
+    use crate::inverse::paths::clusters::Cluster;
+
+    /// A path over a textured surface (0) and then a plain one (1) that meets a lamp (2), a path over the plain one alone.
+    fn cached() -> CachedCluster {
+        let vertex = |surface: u32, texel: u32, lamp: u32| Vertex {
+            lamp,
+            lamp_weight: 0.5,
+            texel,
+            ..Vertex::on(surface)
+        };
+        CachedCluster {
+            cluster: Cluster {
+                frame: 0,
+                object: 0,
+                pixels: vec![0],
+                paths: 1,
+                measured: Vec3::ONE,
+                censored: BVec3::FALSE,
+                weight: Vec3::ONE,
+                dark: Vec3::ONE,
+            },
+            vertices: vec![
+                vertex(0, 1, NO_LAMP),
+                vertex(1, NO_TEXEL, 2),
+                vertex(1, NO_TEXEL, 2),
+            ],
+            ends: vec![2, 3],
+        }
+    }
+
+    fn unknowns() -> Unknowns {
+        let mut unknowns = Unknowns::new(3);
+        unknowns.albedo = [0.4, 0.8, 0.0].map(Vec3::splat).to_vec();
+        unknowns.emission[2] = Vec3::splat(10.0);
+        unknowns
+    }
+
+    #[test]
+    fn a_texture_changes_the_paths_that_meet_it_by_the_difference_of_its_texel() {
+        let cache = PathCache {
+            clusters: vec![cached()],
+            ..PathCache::default()
+        };
+        let texels = [Vec3::splat(0.1), Vec3::new(0.6, 0.4, 0.2)];
+        let [offset] = cache.texture_offsets(&unknowns(), &texels)[..] else {
+            panic!("there is one cluster");
+        };
+        // (texel - 0.4) * 0.8 * 10 * 0.5 in one of two paths.
+        let expected = (texels[1].as_dvec3() - DVec3::splat(0.4)) * 0.8 * 10.0 * 0.5 * 0.5;
+        assert!((offset - expected).length() < 1e-6, "{offset}");
+    }
+
+    /// Green is saturated: what is darker there is wrong, what is brighter is not.
+    #[test]
+    fn a_lower_bound_is_silent_where_the_model_exceeds_it() {
+        let mut bound = cached();
+        bound.cluster.censored = BVec3::new(false, true, false);
+        let mut linearise = |measured: f32| {
+            bound.cluster.measured = Vec3::splat(measured);
+            let cache = PathCache {
+                clusters: vec![bound.clone()],
+                ..PathCache::default()
+            };
+            cache
+                .linearise(&unknowns(), &[usize::MAX; 6], &[])
+                .remove(0)
+        };
+        let (darker, brighter) = (linearise(9.0), linearise(0.1));
+        assert!(darker.residual().min_element() > 0.0);
+        assert!(brighter.residual().max_element() < 0.0);
+        assert_eq!(darker.weight_now(), DVec3::ONE);
+        assert_eq!(brighter.weight_now(), DVec3::new(1.0, 0.0, 1.0));
+    }
+
+    #[test]
+    fn the_edge_of_a_lamp_is_as_uncertain_as_its_contrast() {
+        let mut edge = cached();
+        // One of two paths sees the lamp itself.
+        edge.vertices[2].surface = 2;
+        edge.vertices[2].lamp = NO_LAMP;
+        edge.vertices[2].emission_weight = 1.0;
+        let reflected = 0.4 * 0.8 * 10.0 * 0.5 / 2.0;
+        let expected = f32::sqrt(10.0 * 10.0 / 2.0 + reflected * reflected);
+        assert!((level(&edge, &unknowns()).x - expected).abs() < 1e-4);
+    }
+}

@@ -1,0 +1,108 @@
+//! What lamps reflect, triangle by triangle: how bright each patch of a lamp would be if it were white and gave no light.
+//!
+//! A lamp's albedo changes by little what leaves it, but by how much differs over the lamp. Paths that meet a lamp and go
+//! on from there would tell, with a noise that drowns it for every surface but the lamp itself. Traced once from the
+//! patches, it is known wherever a light sample or a path reaches one.
+
+use crate::inverse::paths::NO_PATCH;
+use crate::inverse::roles::Role;
+use crate::math::rng::Stream;
+use crate::math::warp;
+use crate::scene::Scene;
+use crate::scene::geometry::Hit;
+use crate::transport::arrival::Cast;
+use crate::transport::lit::Lit;
+use crate::transport::path::{PathOptions, white_radiance};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// Paths of a patch at least, where there are enough for all, and at most.
+const PATHS: [f64; 2] = [4.0, 1024.0];
+/// Key of their random streams.
+const KEY: u64 = 0x7061_7463;
+
+/// The triangles of all lamps.
+#[derive(Debug, Default)]
+pub struct LampPatches {
+    /// Triangle of each patch.
+    triangles: Vec<u32>,
+    /// For each triangle of the scene its patch, or [`NO_PATCH`]; empty where there are no lamps.
+    patch_of: Vec<u32>,
+    /// Mean radiance (irradiance / π) that each patch would reflect from its front if it were white, once it is lit.
+    pub reflected: Vec<Vec3>,
+}
+
+impl LampPatches {
+    /// Of the objects that are lamps.
+    pub fn new(scene: &Scene, roles: &[Role]) -> Self {
+        let lamps = scene.objects.iter().zip(roles);
+        let triangles: Vec<u32> = lamps
+            .filter(|(_, role)| **role == Role::Emitter)
+            .flat_map(|(object, _)| object.triangles.iter().copied())
+            .collect();
+        let mut patch_of = Vec::new();
+        if !triangles.is_empty() {
+            patch_of.resize(scene.triangles.len(), NO_PATCH);
+        }
+        for (patch, &triangle) in (0..).zip(&triangles) {
+            patch_of[triangle as usize] = patch;
+        }
+        Self {
+            triangles,
+            patch_of,
+            reflected: Vec::new(),
+        }
+    }
+
+    /// The patch of a triangle, or [`NO_PATCH`].
+    pub fn of(&self, triangle: u32) -> u32 {
+        let patch = self.patch_of.get(triangle as usize);
+        patch.copied().unwrap_or(NO_PATCH)
+    }
+
+    /// Finds what they reflect by about `paths` paths from them, in proportion to area, through a scene as it is believed to
+    /// be lit; those of another `round` are independent.
+    pub fn light(
+        &mut self,
+        lit: &Lit,
+        paths: u64,
+        options: &PathOptions,
+        [seed, round]: [u64; 2],
+    ) -> Cast {
+        let scene = &*lit.scene;
+        let area: f64 = self.triangles.iter().map(|&t| area_of(scene, t)).sum();
+        let even = paths as f64 / self.triangles.len() as f64;
+        let least = even.clamp(1.0, PATHS[0]);
+        let traced: Vec<(Vec3, Cast)> = (self.triangles.par_iter())
+            .map(|&triangle| {
+                let fraction = paths as f64 * area_of(scene, triangle) / area;
+                // Lamps without any area have no share; the least is then the most.
+                let count = fraction.max(least).min(PATHS[1]) as u64;
+                let (mut sum, mut cast) = (DVec3::ZERO, Cast::default());
+                for path in 0..count {
+                    let mut stream = Stream::new(seed, KEY + round, u64::from(triangle), path);
+                    let [b1, b2] = warp::uniform_triangle(stream.uniform2());
+                    let hit = Hit {
+                        t: 0.0,
+                        triangle,
+                        b1,
+                        b2,
+                    };
+                    let normal = scene.normals[triangle as usize];
+                    let surface = lit.surface(&hit);
+                    let sample = white_radiance(lit, &surface, normal, &mut stream, options);
+                    sum += sample.radiance.as_dvec3();
+                    cast.rays += u64::from(sample.rays);
+                    cast.rejected += u64::from(sample.rejected);
+                }
+                ((sum / count as f64).as_vec3(), cast)
+            })
+            .collect();
+        self.reflected = traced.iter().map(|t| t.0).collect();
+        traced.iter().map(|t| t.1).sum()
+    }
+}
+
+fn area_of(scene: &Scene, triangle: u32) -> f64 {
+    f64::from(scene.areas[triangle as usize])
+}

@@ -1,0 +1,80 @@
+//! How many paths may be stored.
+
+use crate::inverse::paths::{PathCache, Vertex};
+use sysinfo::{MemoryRefreshKind, System};
+
+/// Clusters whose paths tell how long paths are.
+pub const PILOT_CLUSTERS: usize = 64;
+/// Fraction of the machine's memory that stored paths may take.
+const FRACTION: u64 = 4;
+/// Memory where the machine's is not known, in bytes.
+const UNKNOWN: u64 = 8 << 30;
+
+/// Bytes that stored paths may take: so many GiB, or a quarter of the machine's memory for zero.
+pub fn allowed(gibibytes: f64) -> u64 {
+    if gibibytes > 0.0 {
+        return (gibibytes * (1u64 << 30) as f64) as u64;
+    }
+    let known = System::new().ok().map(|mut system| {
+        system.refresh_memory_specifics(MemoryRefreshKind::nothing().with_ram());
+        // A container may hold less than the machine.
+        let limit = system.cgroup_limits().map(|limits| limits.total_memory);
+        limit.unwrap_or(u64::MAX).min(system.total_memory())
+    });
+    known.filter(|&bytes| bytes > 0).unwrap_or(UNKNOWN) / FRACTION
+}
+
+/// Whether so many paths of at most so many vertices each, in the mean, fit beyond doubt.
+pub fn suffices(allowed: u64, paths: u64, vertices: f32) -> bool {
+    paths as f64 * f64::from(vertices) * size_of::<Vertex>() as f64 <= allowed as f64
+}
+
+/// How many paths fit, if they are like those of a pilot.
+pub fn paths_that_fit(allowed: u64, pilot: &PathCache) -> u64 {
+    let paths: usize = pilot.clusters.iter().map(|c| c.ends.len()).sum();
+    let bytes = pilot.bytes().max(1);
+    (u128::from(allowed) * paths as u128 / bytes as u128) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inverse::paths::CachedCluster;
+    use crate::inverse::paths::clusters::Cluster;
+    use glam::{BVec3, Vec3};
+
+    #[test]
+    fn as_many_paths_fit_as_are_as_long_as_those_of_the_pilot() {
+        let cluster = Cluster {
+            frame: 0,
+            object: 0,
+            pixels: vec![0, 1],
+            paths: 1,
+            measured: Vec3::ONE,
+            censored: BVec3::FALSE,
+            weight: Vec3::ONE,
+            dark: Vec3::ONE,
+        };
+        // Four paths of three vertices.
+        let pilot = PathCache {
+            clusters: vec![CachedCluster {
+                cluster,
+                vertices: vec![Vertex::on(0); 12],
+                ends: vec![3, 6, 9, 12],
+            }],
+            ..PathCache::default()
+        };
+        let a_path = 3 * size_of::<Vertex>() as u64 + 4;
+        assert_eq!(paths_that_fit(1000 * a_path + 5, &pilot), 1000);
+        assert_eq!(paths_that_fit(1000, &PathCache::default()), 0);
+    }
+
+    #[test]
+    fn a_part_of_the_machine_is_taken_where_nothing_is_said() {
+        assert_eq!(allowed(2.0), 2 << 30);
+        let part = allowed(0.0);
+        assert!((1 << 20..1 << 46).contains(&part), "{part}");
+        assert!(suffices(part, 1000, 64.0) && !suffices(part, u64::MAX, 1.0));
+        assert!(!suffices(1 << 20, 1000, 1000.0));
+    }
+}

@@ -1,0 +1,117 @@
+//! The transport cache: paths traced once, stored with everything that does not depend on the unknowns.
+//!
+//! For diffuse surfaces and cosine sampling a path's contribution is a product of albedos times one emission (or one
+//! measured radiance) times a weight. Any values of the unknowns are then evaluated, and differentiated, with no ray.
+//! Rough specular lobes are held while such paths are used; [`crate::inverse::lobe`] finds them.
+
+pub mod clusters;
+pub mod derivative;
+pub mod evaluate;
+pub mod lamp_patches;
+pub mod memory;
+mod scatter;
+pub mod trace;
+
+use crate::transport::arrival::Cast;
+use clusters::Cluster;
+use glam::Vec3;
+
+/// No lamp was reached from this vertex.
+pub const NO_LAMP: u32 = u32::MAX;
+
+/// No patch of a lamp was reached.
+pub const NO_PATCH: u32 = u32::MAX;
+
+/// The vertex's surface has one colour.
+pub const NO_TEXEL: u32 = u32::MAX;
+
+/// In place of a surface: the path was scattered by a lobe, which holds no unknown.
+pub const SPECULAR: u32 = u32::MAX;
+
+/// One vertex of a stored path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Vertex {
+    /// The surface (set of triangles sharing unknowns) that the vertex lies on, or [`SPECULAR`].
+    pub surface: u32,
+    /// The surface whose emission a light sample from here reached, or [`NO_LAMP`].
+    pub lamp: u32,
+    /// Weight of that emission, after this vertex's albedo.
+    pub lamp_weight: f32,
+    /// The patch of a lamp that the light sample reached, or that the vertex lies on and the path ends at; or [`NO_PATCH`].
+    pub patch: u32,
+    /// Weight of this surface's own emission, before its albedo.
+    pub emission_weight: f32,
+    /// The texel of its surface's texture, or [`NO_TEXEL`].
+    pub texel: u32,
+    /// Known radiance that arrives here and is scattered by this vertex's albedo, weights included.
+    pub known: Vec3,
+}
+
+impl Vertex {
+    /// On a surface, with no light from anywhere and no texture.
+    pub fn on(surface: u32) -> Self {
+        Self {
+            surface,
+            lamp: NO_LAMP,
+            lamp_weight: 0.0,
+            patch: NO_PATCH,
+            emission_weight: 0.0,
+            texel: NO_TEXEL,
+            known: Vec3::ZERO,
+        }
+    }
+}
+
+/// The paths of one cluster of pixels: for each pixel those of set A, then those of set B.
+#[derive(Debug, Clone)]
+pub struct CachedCluster {
+    /// The pixels and what the photographs say of them.
+    pub cluster: Cluster,
+    /// Vertices of all paths, one path after the other, from the camera outwards.
+    pub vertices: Vec<Vertex>,
+    /// End of each path in `vertices`.
+    pub ends: Vec<u32>,
+}
+
+/// Two independent sets of paths through the same pixels.
+#[derive(Debug, Clone, Default)]
+pub struct PathCache {
+    /// In the order in which they were given.
+    pub clusters: Vec<CachedCluster>,
+    /// Rays that were cast, and paths dropped because a weight was not finite.
+    pub cast: Cast,
+}
+
+impl PathCache {
+    /// Bytes in use.
+    pub fn bytes(&self) -> usize {
+        self.clusters
+            .iter()
+            .map(|c| c.vertices.len() * size_of::<Vertex>() + c.ends.len() * size_of::<u32>())
+            .sum()
+    }
+
+    /// Fraction of the paths whose last vertex lies on a surface from `first` on.
+    pub fn fraction_ending_on(&self, first: u32) -> f64 {
+        let (mut ending, mut all) = (0u64, 0u64);
+        for cached in &self.clusters {
+            all += cached.ends.len() as u64;
+            let mut start = 0;
+            for &end in &cached.ends {
+                let path = &cached.vertices[start..end as usize];
+                ending += u64::from(
+                    path.last()
+                        .is_some_and(|v| v.surface >= first && v.surface != SPECULAR),
+                );
+                start = end as usize;
+            }
+        }
+        ending as f64 / all.max(1) as f64
+    }
+
+    /// Adds another cache's clusters.
+    pub fn append(&mut self, mut other: Self) {
+        self.clusters.append(&mut other.clusters);
+        self.cast += other.cast;
+    }
+}

@@ -1,0 +1,238 @@
+//! From fitted unknowns to the estimate that people see, saying what could not be known.
+
+use crate::calibrate::gbuffer::GBuffer;
+use crate::inverse::estimate::{Estimate, ObjectEstimate, Outside};
+use crate::inverse::fit::errors::StandardErrors;
+use crate::inverse::fit::prior::ALBEDO_DEVIATION;
+use crate::inverse::outside::MeasuredOutside;
+use crate::inverse::paths::trace::OutsideGrid;
+use crate::inverse::roles::Role;
+use crate::inverse::unknowns::Unknowns;
+use crate::math::color::luminance;
+use crate::scene::Scene;
+use crate::transport::material::Lobe;
+use glam::{DVec3, Vec3};
+
+/// An albedo with a larger standard error than this is as good as unknown.
+const UNKNOWN_ALBEDO: f32 = 0.2 * ALBEDO_DEVIATION;
+/// An emission with a larger relative standard error than this is as good as unknown.
+const UNKNOWN_EMISSION: f32 = 0.5;
+/// An emitting object that fewer pixels see is known only through its light.
+const FEW_PIXELS: u64 = 19;
+
+/// Relative difference in radiance, and of an albedo from one, below which a wall and a lamp may be taken for each other.
+const WHITE: f32 = 0.01;
+
+/// The estimate of some unknowns and of the objects' lobes.
+#[expect(clippy::too_many_arguments, reason = "all that a solve has found out")]
+pub fn estimate(
+    scene: &Scene,
+    gbuffer: &GBuffer,
+    roles: &[Role],
+    unknowns: &Unknowns,
+    errors: &StandardErrors,
+    outside: OutsideGrid,
+    sky: Option<&MeasuredOutside>,
+    lobes: &[Option<Lobe>],
+) -> Estimate {
+    let typical = typical_albedo(scene, roles, unknowns, errors);
+    // Between surfaces that lose nothing any light lives for ever: without a source nothing tells how much they keep.
+    let sourceless = sky.is_none() && unknowns.emission.iter().all(|&e| e == Vec3::ZERO);
+    let objects = (0..scene.objects.len())
+        .map(|k| {
+            let seen = gbuffer.seen[k];
+            let mut object = ObjectEstimate {
+                albedo: unknowns.albedo[k],
+                albedo_stderr: errors.albedo[k],
+                emission: unknowns.emission[k],
+                emission_stderr: finite(errors.emission[k]),
+                seen_pixels: seen,
+                roughness: lobes[k].map(|lobe| lobe.roughness),
+                specular: lobes[k].map(|lobe| lobe.specular.x),
+                ..Default::default()
+            };
+            match roles[k] {
+                Role::Reflector | Role::Glowing => {
+                    let unknown = errors.albedo[k].max_element() > UNKNOWN_ALBEDO;
+                    if unknown {
+                        object.albedo = drawn(unknowns.albedo[k], errors.albedo[k], typical);
+                    }
+                    if unknown || sourceless {
+                        object.albedo_identifiable = false;
+                        object.identifiable = false;
+                        object.note = if unknown {
+                            "too few paths through its pixels meet light to tell its albedo".into()
+                        } else {
+                            "no source was found of the light that it reflects".into()
+                        };
+                    }
+                }
+                Role::Emitter => {
+                    object.albedo = Vec3::ZERO;
+                    object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION);
+                    object.albedo_identifiable = false;
+                    object.note =
+                        "its own light hides what it reflects; emission is all that leaves it"
+                            .into();
+                    if is_unknown(object.emission, object.emission_stderr) {
+                        object.identifiable = false;
+                        object.note = "the photographs hardly tell how much light it gives".into();
+                    } else if seen < FEW_PIXELS {
+                        object.note.push_str("; only a few pixels see it");
+                    }
+                }
+                Role::Unseen => {
+                    object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION);
+                    object.identifiable = false;
+                    object.albedo_identifiable = false;
+                    object.note =
+                        "no photograph sees it; its light is inferred from what it does to others"
+                            .into();
+                }
+                Role::Dark => {
+                    object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION);
+                    object.identifiable = false;
+                    object.albedo_identifiable = false;
+                    object.note =
+                        "no photograph sees it; its albedo is taken to be middling".into();
+                }
+            }
+            object
+        })
+        .collect();
+    let surroundings = outside.surroundings;
+    let (size, pixels) = match sky {
+        Some(sky) => {
+            let elsewhere = |direction| unknowns.emission[outside.surface(direction) as usize];
+            let excess = unknowns.emission[outside.excess() as usize];
+            (sky.size(), sky.filled(excess, elsewhere))
+        }
+        None => (
+            [outside.width, outside.height],
+            unknowns.emission[outside.first as usize..outside.excess() as usize].to_vec(),
+        ),
+    };
+    let outside = pixels.iter().any(|&p| p != Vec3::ZERO).then_some(Outside {
+        width: size[0] as u32,
+        height: size[1] as u32,
+        pixels,
+        surroundings,
+    });
+    Estimate {
+        objects,
+        outside,
+        ..Default::default()
+    }
+}
+
+/// Between white surfaces all radiance nears that of the lamp, as in a furnace, and which of them gives the light cannot be
+/// told: a reflector of nearly all light that shows the radiance of one that is taken for a lamp. `brightness` holds the mean of each object's
+/// brightest channel over its pixels.
+pub fn doubt_white(estimate: &mut Estimate, brightness: &[f32]) {
+    let objects = &mut estimate.objects;
+    let lamps: Vec<usize> = (0..objects.len())
+        .filter(|&k| objects[k].emission.max_element() > 0.0 && objects[k].seen_pixels > 0)
+        .collect();
+    let mut doubtful: Vec<usize> = Vec::new();
+    for k in 0..objects.len() {
+        let white = (objects[k].albedo + objects[k].albedo_stderr).max_element() > 1.0 - WHITE;
+        let like = |lamp: usize| (brightness[k] / brightness[lamp] - 1.0).abs() < WHITE;
+        let alike: Vec<usize> = (lamps.iter().copied())
+            .filter(|&lamp| lamp != k && like(lamp))
+            .collect();
+        if white && !alike.is_empty() {
+            doubtful.push(k);
+            doubtful.extend(alike);
+        }
+    }
+    for k in doubtful {
+        objects[k].identifiable = false;
+        objects[k].albedo_identifiable = false;
+        "white surfaces show as much light as a lamp does: which of them gives it cannot be told"
+            .clone_into(&mut objects[k].note);
+    }
+}
+
+/// Whether an emission is as good as unknown; how strong a channel is that hardly shines does not matter.
+fn is_unknown(emission: Vec3, stderr: Vec3) -> bool {
+    stderr.max_element() > UNKNOWN_EMISSION * emission.max_element()
+}
+
+/// What to take for an albedo that is hardly known: drawn to the room's typical one by what is believed of any albedo.
+fn drawn(albedo: Vec3, stderr: Vec3, typical: Vec3) -> Vec3 {
+    let known = stderr * stderr / (ALBEDO_DEVIATION * ALBEDO_DEVIATION);
+    let fraction = (known + Vec3::ONE).recip();
+    albedo * fraction + typical * (Vec3::ONE - fraction)
+}
+
+/// Area-weighted mean of the albedos that are known.
+fn typical_albedo(
+    scene: &Scene,
+    roles: &[Role],
+    unknowns: &Unknowns,
+    errors: &StandardErrors,
+) -> Vec3 {
+    let mut sum = DVec3::ZERO;
+    let mut area = 0.0;
+    for (k, object) in scene.objects.iter().enumerate() {
+        let known = roles[k] == Role::Reflector && errors.albedo[k].max_element() <= UNKNOWN_ALBEDO;
+        if known && luminance(unknowns.albedo[k]).is_finite() {
+            sum += unknowns.albedo[k].as_dvec3() * object.area;
+            area += object.area;
+        }
+    }
+    if area > 0.0 {
+        (sum / area).as_vec3()
+    } else {
+        Vec3::splat(0.5)
+    }
+}
+
+/// Infinite errors as the largest finite number, which every file format can hold.
+fn finite(error: Vec3) -> Vec3 {
+    error.min(Vec3::splat(f32::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_albedo_that_is_hardly_known_is_drawn_to_the_typical_one() {
+        let typical = Vec3::splat(0.4);
+        let at = |stderr| drawn(Vec3::ZERO, Vec3::splat(stderr), typical).x;
+        assert!(at(UNKNOWN_ALBEDO) < 0.02);
+        assert!((at(ALBEDO_DEVIATION) - 0.2).abs() < 1e-6);
+        assert!((at(f32::INFINITY) - 0.4).abs() < 1e-6);
+    }
+
+    #[test]
+    fn an_emission_is_known_where_its_error_is_small_beside_its_brightest_channel() {
+        let red = Vec3::new(2.0, 0.1, 0.0);
+        assert!(!is_unknown(red, Vec3::splat(0.3)));
+        assert!(is_unknown(red, Vec3::new(1.1, 0.0, 0.0)));
+        assert!(is_unknown(red, Vec3::INFINITY));
+    }
+
+    #[test]
+    fn a_white_wall_as_bright_as_the_lamp_is_doubted_with_it_and_a_grey_or_darker_one_is_not() {
+        let object = |albedo: f32, emission: f32| ObjectEstimate {
+            albedo: Vec3::splat(albedo),
+            emission: Vec3::splat(emission),
+            seen_pixels: 100,
+            ..Default::default()
+        };
+        let identifiable = |albedo: f32, brightness: f32| {
+            let mut estimate = Estimate {
+                objects: vec![object(0.0, 2.0), object(albedo, 0.0), object(0.5, 0.0)],
+                ..Default::default()
+            };
+            doubt_white(&mut estimate, &[2.0, brightness, 1.0]);
+            assert!(estimate.objects[2].identifiable);
+            [0, 1].map(|k| estimate.objects[k].identifiable)
+        };
+        assert_eq!(identifiable(0.999, 1.995), [false; 2]);
+        assert_eq!(identifiable(0.999, 1.9), [true; 2]);
+        assert_eq!(identifiable(0.9, 1.995), [true; 2]);
+    }
+}

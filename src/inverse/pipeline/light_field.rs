@@ -1,0 +1,338 @@
+//! The first stage: each object fitted to the light that the photographs measured around it; light from outside.
+
+use crate::calibrate::measured_radiance::MeasuredRadiance;
+use crate::inverse::fit::equations::NormalEquations;
+use crate::inverse::fit::errors::StandardErrors;
+use crate::inverse::fit::gauss_newton::{MIN_DAMPING, propose};
+use crate::inverse::fit::prior::{ExpectedAlbedo, Prior};
+use crate::inverse::fit::robust_weights::RobustWeights;
+use crate::inverse::loss::Losses;
+use crate::inverse::outside::MeasuredOutside;
+use crate::inverse::paths::PathCache;
+use crate::inverse::paths::clusters::mean_radiance;
+use crate::inverse::paths::evaluate::Linearised;
+use crate::inverse::pipeline::Pipeline;
+use crate::inverse::roles;
+use crate::inverse::roles::Role;
+use crate::inverse::solver::Termination;
+use crate::inverse::unknowns::Unknowns;
+use crate::math::color::luminance;
+use crate::transport::emitters::Emitters;
+use crate::transport::surroundings::Surroundings;
+use glam::{DVec3, Vec3};
+
+/// Fraction of paths that must leave the mesh before light from outside is tried.
+const ESCAPING: f64 = 1e-3;
+/// Fraction of the held-out loss that light from outside must take away.
+const OUTSIDE_GAIN: f64 = 0.03;
+/// Relative error of albedo that the light field's resolution is trusted to stay below, where edges blur: a
+/// cautious assumption until full paths have replaced it.
+const LIGHT_FIELD_BIAS: f32 = 0.01;
+/// No albedo is held closer than this.
+const MIN_DEVIATION: f32 = 1e-3;
+
+/// The outcome of a trial of light from outside.
+#[derive(Clone)]
+struct Found {
+    roles: Vec<Role>,
+    unknowns: Unknowns,
+    errors: StandardErrors,
+    robust: RobustWeights,
+    prior: Prior,
+    surroundings: Surroundings,
+    open: bool,
+    sky: Option<MeasuredOutside>,
+}
+
+/// The part of the loss that is gone after a change: of held-out pixels, or where there are none, of those of the fit.
+fn fall(before: Losses, after: Losses) -> f64 {
+    match (
+        before.held_out.zip(after.held_out),
+        before.train.zip(after.train),
+    ) {
+        (Some((before, after)), _) | (None, Some((before, after))) => 1.0 - after / before,
+        (None, None) => 0.0,
+    }
+}
+
+impl Pipeline<'_, '_> {
+    /// Takes what was seen of the outside for what to expect of the rest of it.
+    pub(super) fn expect_of_outside(&mut self) {
+        if let Some(sky) = &self.sky {
+            let grid = self.outside;
+            let band = std::f64::consts::PI / grid.height as f64;
+            let expected = |surface| match surface == grid.excess() {
+                true => Vec3::ZERO,
+                false => sky.expected(grid.direction(surface), band),
+            };
+            self.prior = self.prior.clone().with_sky(expected);
+        }
+    }
+
+    /// First stage: paths end where a photograph measured the radiance, so each object is nearly a linear fit of its
+    /// own: what it sends against what it receives.
+    pub(super) fn light_field(&mut self) -> Result<(), Termination> {
+        let started = self.monitor.seconds();
+        self.monitor.phase("gathering light from the photographs");
+        let measured = MeasuredRadiance::new(self.problem, &self.gbuffer);
+
+        // Light samples go where the photographs are bright: in proportion to area × radiance².
+        let scene = &self.problem.scene;
+        let bright: Vec<f64> = (scene.objects.iter().zip(&measured.object_means))
+            .map(|(object, mean)| {
+                mean.map_or(0.0, |m| object.area * f64::from(luminance(m)).powi(2))
+            })
+            .collect();
+        let lights = Emitters::new(scene, &self.explore(bright));
+        let paths = self.budget.light_field_paths;
+        let (cache, limit) = self.stored(&lights, Some(&measured), 0, paths)?;
+
+        // First as if no light came from outside, then, where rays leave the mesh, as if some did.
+        self.monitor.phase("telling lamps from walls");
+        self.tell_lamps(&cache, Role::Dark)?;
+        self.monitor
+            .progress
+            .seconds_to_first_estimate
+            .get_or_insert(self.monitor.seconds());
+        let why = format!(
+            "each object fitted to the light that the photographs measured around it; {} give light{limit}",
+            self.lamps()
+        );
+        let closed = self.record("light field", started, true, why)?;
+        let escaping = cache.fraction_ending_on(self.outside.first);
+        if escaping > ESCAPING && self.monitor.settings.outside_light {
+            self.light_from_outside(&cache, &lights, &measured, escaping, closed)?;
+        }
+        self.expect_of_albedo();
+        self.monitor
+            .report(&self.estimate, &|_| self.checkpoint.clone())
+    }
+
+    /// Where light comes from outside, full paths know it only by a coarse map, and albedos would drift to make up for
+    /// what that lacks. What the light field said of them, which measures all light that arrives, holds them.
+    fn expect_of_albedo(&mut self) {
+        if !self.open {
+            return;
+        }
+        let mut expected = ExpectedAlbedo::unknown(self.roles.len(), &self.gbuffer.seen);
+        for (k, role) in self.roles.iter().enumerate() {
+            if *role == Role::Reflector {
+                let deviation = &mut expected.deviation[k];
+                *deviation = self.errors.albedo[k].clamp(Vec3::splat(MIN_DEVIATION), *deviation);
+                expected.mean[k] = self.unknowns.albedo[k];
+            }
+        }
+        self.prior = (self.prior.clone()).with_albedo(expected);
+    }
+
+    /// Fits all seen objects as reflectors, then those that plainly give light as emitters; light from outside is
+    /// fitted where `outside` is [`Role::Unseen`].
+    fn tell_lamps(&mut self, cache: &PathCache, outside: Role) -> Result<(), Termination> {
+        self.unknowns = Unknowns::new(self.roles.len());
+        self.robust = RobustWeights::even(self.roles.len());
+        // Lamps in view first: taken for white walls they would call for light upon them from whatever is out of sight.
+        for out_of_sight in [Role::Dark, Role::Unseen] {
+            for (k, role) in self.roles.iter_mut().enumerate() {
+                match self.gbuffer.seen.get(k) {
+                    Some(0) => *role = out_of_sight,
+                    Some(_) if out_of_sight == Role::Dark => *role = Role::Reflector,
+                    Some(_) => {}
+                    None => *role = outside,
+                }
+            }
+            self.hold();
+            let fitted = self.fit(cache)?;
+            self.settle_roles(cache, fitted)?;
+        }
+        self.weigh(cache)?;
+        for (error, albedo) in self.errors.albedo.iter_mut().zip(&self.unknowns.albedo) {
+            *error = (*error * *error + *albedo * *albedo * (LIGHT_FIELD_BIAS * LIGHT_FIELD_BIAS))
+                .powf(0.5);
+        }
+        self.test_dark(cache);
+        Ok(())
+    }
+
+    /// Tries light from outside the mesh, from far away and of a scan from a box around it, and keeps what predicts pixels held out of
+    /// the fit better than the model without it.
+    fn light_from_outside(
+        &mut self,
+        cache: &PathCache,
+        lights: &Emitters,
+        measured: &MeasuredRadiance,
+        escaping: f64,
+        closed: Losses,
+    ) -> Result<(), Termination> {
+        let started = self.monitor.seconds();
+        self.monitor.phase("trying light from outside");
+        let leave = format!("{:.1} % of the paths leave the mesh", escaping * 100.0);
+        // A linear step tells about what could be gained, at a small part of the cost of a trial.
+        let gain = self.outside_gain(cache);
+        if gain < OUTSIDE_GAIN {
+            let why = format!(
+                "{leave}; light from there would change the squared error by {:.1} %, so it is not called for",
+                -gain * 100.0,
+            );
+            self.record("outside light", started, false, why)?;
+            return Ok(());
+        }
+        let without = self.found();
+        let scene = &self.problem.scene;
+        let cameras = scene.cameras.iter().map(|camera| camera.center);
+        let places = scene.positions.iter().copied().chain(cameras);
+        // Only full paths tell the two apart. A mesh made of objects is taken to lack nothing but windows.
+        let around = match (scene.scanned, self.budget.round_paths) {
+            (false, _) | (_, 0) => None,
+            (true, _) => Surroundings::around(places),
+        };
+        let mut gained: Vec<(Losses, Found)> = Vec::new();
+        for surroundings in [Some(Surroundings::Far), around].into_iter().flatten() {
+            let losses = self.fit_open(surroundings, cache, lights, measured)?;
+            if fall(closed, losses) > OUTSIDE_GAIN {
+                gained.push((losses, self.found()));
+            }
+            self.go_back_to(without.clone());
+        }
+        let gained = self.by_full_paths(gained)?;
+        let best = (gained.into_iter()).reduce(|best, next| match fall(best.0, next.0) > 0.0 {
+            true => next,
+            false => best,
+        });
+        let gain = best
+            .as_ref()
+            .map_or(0.0, |(losses, _)| fall(closed, *losses));
+        self.go_back_to(best.map_or(without, |(_, found)| found));
+        self.describe();
+        let comes = match (self.open, self.outside.surroundings) {
+            (false, _) => "is not called for".to_owned(),
+            (true, from) => format!(
+                "changes the held-out loss by {:.1} % and comes from {}",
+                -gain * 100.0,
+                match from {
+                    Surroundings::Far => "far away",
+                    Surroundings::Box { .. } => "a box around the mesh",
+                }
+            ),
+        };
+        let why = format!("{leave}; light from there {comes}");
+        self.record("outside light", started, self.open, why)?;
+        Ok(())
+    }
+
+    /// Fits everything with light from outside; the losses after it.
+    fn fit_open(
+        &mut self,
+        surroundings: Surroundings,
+        cache: &PathCache,
+        lights: &Emitters,
+        measured: &MeasuredRadiance,
+    ) -> Result<Losses, Termination> {
+        self.open = true;
+        self.outside.surroundings = surroundings;
+        self.sky = MeasuredOutside::new(self.problem, &self.gbuffer, surroundings);
+        self.expect_of_outside();
+        let paths = self.budget.light_field_paths;
+        let as_stored = self.sky.is_none() && surroundings == Surroundings::Far;
+        let towards_it = match as_stored {
+            true => None,
+            false => Some(self.stored(lights, Some(measured), 0, paths)?.0),
+        };
+        let cache = towards_it.as_ref().unwrap_or(cache);
+        self.tell_lamps(cache, Role::Unseen)?;
+        self.expect_colors_of_outside();
+        self.weigh(cache)?;
+        Ok(self.measure())
+    }
+
+    /// Where there are two to choose from: the losses of each once full paths were fitted. The light field is blurred, and what makes
+    /// up for that looks better than it is.
+    fn by_full_paths(
+        &mut self,
+        gained: Vec<(Losses, Found)>,
+    ) -> Result<Vec<(Losses, Found)>, Termination> {
+        if gained.len() < 2 {
+            return Ok(gained);
+        }
+        let mut compared = Vec::new();
+        for (_, found) in gained {
+            self.go_back_to(found.clone());
+            self.expect_of_albedo();
+            self.fit_full_paths()?;
+            compared.push((self.measure(), found));
+        }
+        Ok(compared)
+    }
+
+    /// What a trial of light from outside changes.
+    fn found(&self) -> Found {
+        Found {
+            roles: self.roles.clone(),
+            unknowns: self.unknowns.clone(),
+            errors: self.errors.clone(),
+            robust: self.robust.clone(),
+            prior: self.prior.clone(),
+            surroundings: self.outside.surroundings,
+            open: self.open,
+            sky: self.sky.clone(),
+        }
+    }
+
+    /// Goes back to what was found.
+    fn go_back_to(&mut self, found: Found) {
+        self.roles = found.roles;
+        self.unknowns = found.unknowns;
+        self.errors = found.errors;
+        self.robust = found.robust;
+        self.prior = found.prior;
+        self.outside.surroundings = found.surroundings;
+        self.open = found.open;
+        self.sky = found.sky;
+    }
+
+    /// From now on light from outside is held near the colours that are expected of it, at the brightness found.
+    fn expect_colors_of_outside(&mut self) {
+        let photographed = mean_radiance(&self.clusters);
+        let bound = self.sky.as_ref().map(|sky| sky.mean_bound());
+        let excess = self.outside.excess();
+        let color = |surface: u32, expected: Vec3| match bound {
+            Some(bound) if surface == excess => bound,
+            Some(_) => expected,
+            None => photographed,
+        };
+        let found = |k: usize| (self.unknowns.emission[k], self.errors.emission[k]);
+        self.prior = self.prior.clone().with_outside_found(found, color);
+    }
+
+    /// The fraction of the clusters' squared residuals that one linear step takes away once light from every direction
+    /// outside is free. The fall is measured across the two sets of paths, so that fitting their noise gains nothing.
+    fn outside_gain(&self, cache: &PathCache) -> f64 {
+        let surfaces = self.roles.len();
+        let mut free = self.free();
+        free.extend(surfaces + self.outside.first as usize..2 * surfaces);
+        let linearised = cache.linearise(&self.unknowns, &roles::places(&free, surfaces), &[]);
+        let even = RobustWeights::even(surfaces);
+        let equations = NormalEquations::new(&linearised, free.len(), &even, &self.prior);
+        let (after, _) = propose(&equations, &free, &self.unknowns, MIN_DAMPING);
+        let steps: Vec<DVec3> = (free.iter())
+            .map(|&i| (after.value(i) - self.unknowns.value(i)).as_dvec3())
+            .collect();
+        let (mut fall, mut all) = (0.0, 0.0);
+        for mut cluster in linearised {
+            let square = |c: &Linearised| {
+                let [a, b] = c.residuals;
+                (c.weight_now() * a * b).element_sum()
+            };
+            let residual = cluster.residual();
+            all += (cluster.weight_now() * residual * residual).element_sum();
+            fall += square(&cluster);
+            cluster.step(&steps);
+            fall -= square(&cluster);
+        }
+        if all > 0.0 { fall / all } else { 0.0 }
+    }
+
+    /// Objects that give light.
+    fn lamps(&self) -> usize {
+        self.roles.iter().filter(|r| r.emits()).count()
+    }
+}

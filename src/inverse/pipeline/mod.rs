@@ -1,0 +1,246 @@
+//! The transport-cache solver. [`Pipeline::run`] is the algorithm of a solve: light field, full paths, gloss, refinement; each
+//! stage is a method in the file of its name and leaves its outcome in the [`Pipeline`].
+
+pub mod budget;
+mod depth;
+mod describe;
+mod emitters;
+mod exposures;
+mod fitting;
+mod full_paths;
+mod gloss;
+mod known;
+mod light_field;
+mod record;
+mod refine;
+mod refit;
+mod state;
+mod textures;
+mod trace;
+mod unseen_emitters;
+
+use crate::calibrate::exposure::Exposures;
+use crate::calibrate::gbuffer::GBuffer;
+use crate::calibrate::held_out::HoldOut;
+use crate::calibrate::observed::{Observed, Questions};
+use crate::calibrate::problem::Problem;
+use crate::error;
+use crate::inverse::estimate::Estimate;
+use crate::inverse::fit::errors::StandardErrors;
+use crate::inverse::fit::prior::{ExpectedAlbedo, Prior};
+use crate::inverse::fit::robust_weights::RobustWeights;
+use crate::inverse::loss::LossProbe;
+use crate::inverse::monitor::Monitor;
+use crate::inverse::outside::MeasuredOutside;
+use crate::inverse::paths::clusters::{Cluster, brightness, cluster, mean_radiance};
+use crate::inverse::paths::lamp_patches::LampPatches;
+use crate::inverse::paths::trace::OutsideGrid;
+use crate::inverse::pipeline::budget::Budget;
+use crate::inverse::pipeline::state::SolverState;
+use crate::inverse::roles::Role;
+use crate::inverse::settings::Settings;
+use crate::inverse::solver::{Checkpoint, Solution, Termination};
+use crate::inverse::unknowns::Unknowns;
+use crate::transport::material::Lobe;
+use crate::transport::surroundings::Surroundings;
+use glam::Vec3;
+use refine::Summed;
+use textures::Detail;
+
+/// Columns and rows of the map of light from outside.
+const OUTSIDE_WIDTH: usize = 12;
+const OUTSIDE_HEIGHT: usize = 6;
+/// Longest path in bounces of losses, textures, lobes and of what lamps reflect; those of the fits end by chance alone.
+const MAX_DEPTH: u32 = 1000;
+/// Stages of a solve that goes all the way.
+const STAGES: u32 = 4;
+
+/// The state of a solve.
+pub struct Pipeline<'a, 'o> {
+    problem: &'a Problem,
+    budget: Budget,
+    monitor: Monitor<'o>,
+    gbuffer: GBuffer,
+    clusters: Vec<Cluster>,
+    widths: Vec<u32>,
+    /// In square metres.
+    mesh_area: f64,
+    losses: LossProbe,
+    max_bounces: u32,
+    outside: OutsideGrid,
+    /// Whether light comes from outside.
+    open: bool,
+    /// What is known of it from pixels that see it, if light comes from there.
+    sky: Option<MeasuredOutside>,
+    roles: Vec<Role>,
+    robust: RobustWeights,
+    prior: Prior,
+    /// Of the lamps, once all of them are found.
+    patches: LampPatches,
+    /// For each surface, the fraction of the paths' noise in its residuals.
+    path_noise: Vec<f64>,
+    unknowns: Unknowns,
+    errors: StandardErrors,
+    /// Variance of what the model lacks, relative to what surfaces reflect.
+    model_variance: f64,
+    /// The rough specular lobe of each object that has one.
+    lobes: Vec<Option<Lobe>>,
+    /// Where the photographs disagree.
+    exposures: Option<Exposures>,
+    estimate: Estimate,
+    /// What the rounds know, once they are done.
+    summed: Option<Summed>,
+    /// Spatial detail, once it was looked for.
+    detail: Option<Detail>,
+    /// Mean of each surface's brightest channel in the photographs; zero where none sees it.
+    brightness: Vec<f32>,
+    /// Stages finished.
+    stages: u32,
+    /// Where the last of them ended.
+    checkpoint: Checkpoint,
+}
+
+/// Solves a problem with the transport cache.
+///
+/// # Errors
+/// The checkpoint belongs to another capture.
+pub fn solve(
+    problem: &Problem,
+    settings: &Settings,
+    resume: Option<&Checkpoint>,
+    mut monitor: Monitor,
+) -> error::Result<Solution> {
+    let budget = Budget::of(settings);
+    let objects = problem.scene.objects.len();
+    let outside = OutsideGrid {
+        first: objects as u32,
+        width: OUTSIDE_WIDTH,
+        height: OUTSIDE_HEIGHT,
+        surroundings: Surroundings::Far,
+    };
+    let surfaces = objects + outside.surfaces();
+    monitor.phase("looking through the pixels");
+    let started = monitor.seconds();
+    let Observed {
+        problem,
+        gbuffer,
+        exposures,
+        warnings,
+        rays,
+    } = Observed::new(
+        problem,
+        Questions {
+            hold_out: HoldOut::from(settings),
+            seed: settings.seed,
+            pixels: budget.gbuffer_pixels,
+            leave_out: settings.leave_out,
+            exposures: settings.exposures,
+        },
+    );
+    let problem = &problem;
+    monitor.progress.rays += rays;
+    if !warnings.is_empty() {
+        monitor.progress.warnings = warnings;
+    }
+    let max_bounces = settings.max_bounces().min(MAX_DEPTH);
+    let clusters = cluster(problem, &gbuffer, budget.pixels);
+    let prior = Prior::new(surfaces, objects, mean_radiance(&clusters))
+        .with_known(&monitor.known)
+        .with_albedo(ExpectedAlbedo::unknown(surfaces, &gbuffer.seen));
+    let start = match resume {
+        Some(checkpoint) => {
+            checkpoint.state(|state: &SolverState| state.fits(surfaces, outside.surfaces()))?
+        }
+        None => SolverState::new(
+            0,
+            false,
+            &prior,
+            &vec![Role::Reflector; surfaces],
+            &Unknowns::new(surfaces),
+            &StandardErrors {
+                albedo: vec![Vec3::splat(0.5); surfaces],
+                emission: vec![Vec3::INFINITY; surfaces],
+            },
+            &[],
+        ),
+    };
+    let mut lobes = start.lobes();
+    lobes.resize(objects, None);
+    let sky = (start.open)
+        .then(|| MeasuredOutside::new(problem, &gbuffer, start.surroundings))
+        .flatten();
+    let expected = (start.expected.clone()).unwrap_or_else(|| prior.albedo().clone());
+    let prior = (prior.with_albedo(expected)).with_directions(start.directions.clone());
+    let mut pipeline = Pipeline {
+        problem,
+        budget,
+        losses: LossProbe::new(problem, settings, 400, 16, max_bounces),
+        checkpoint: Checkpoint::new(&monitor.progress, &start),
+        monitor,
+        sky,
+        open: start.open,
+        brightness: brightness(&clusters, surfaces),
+        clusters,
+        gbuffer,
+        widths: problem.photographs.iter().map(|p| p.width).collect(),
+        mesh_area: problem.scene.objects.iter().map(|o| o.area).sum(),
+        max_bounces,
+        outside: OutsideGrid {
+            surroundings: start.surroundings,
+            ..outside
+        },
+        errors: start.errors(),
+        model_variance: start.model_variance,
+        roles: start.roles,
+        robust: RobustWeights::even(surfaces),
+        prior,
+        patches: LampPatches::default(),
+        path_noise: vec![1.0; surfaces],
+        unknowns: start.unknowns,
+        lobes,
+        exposures: exposures.clone().filter(Exposures::needed),
+        estimate: Estimate::default(),
+        summed: None,
+        detail: None,
+        stages: start.stages,
+    };
+    pipeline.hold();
+    pipeline.describe();
+    if let Some(exposures) = exposures.filter(|_| resume.is_none()) {
+        pipeline.tell_exposures(&exposures, started);
+    }
+    let termination = match pipeline.run() {
+        Ok(termination) | Err(termination) => termination,
+    };
+    Ok(pipeline.finish(termination))
+}
+
+impl Pipeline<'_, '_> {
+    /// The algorithm: each stage once, from where an earlier solve has left off.
+    fn run(&mut self) -> Result<Termination, Termination> {
+        if self.stages < 1 {
+            self.light_field()?;
+            self.end_stage(1)?;
+        }
+        if self.budget.round_paths == 0 {
+            return Ok(Termination::Converged);
+        }
+        if self.stages < 2 {
+            self.full_paths()?;
+            self.tell_depth();
+            self.end_stage(2)?;
+        }
+        if self.stages < 3 {
+            if self.monitor.settings.lobes {
+                self.gloss()?;
+                // Paths and textures are found under them.
+                self.settle_lobes(0)?;
+            }
+            self.end_stage(3)?;
+        }
+        let ended = self.refine()?;
+        self.settle_lobes(1)?;
+        self.keep_checkpoint(STAGES);
+        Ok(ended)
+    }
+}

@@ -1,0 +1,212 @@
+//! Tracing for the ladder: in slices, between which the observer hears, and within the memory that paths may take.
+
+use crate::calibrate::measured_radiance::MeasuredRadiance;
+use crate::inverse::estimate::TexelEstimate;
+use crate::inverse::fit::path_noise::distribute_paths;
+use crate::inverse::fit::prior::ALBEDO_MEAN;
+use crate::inverse::paths::clusters::{Cluster, cluster};
+use crate::inverse::paths::evaluate::Linearised;
+use crate::inverse::paths::memory::PILOT_CLUSTERS;
+use crate::inverse::paths::trace::{Tracer, longest_mean_path};
+use crate::inverse::paths::{PathCache, memory};
+use crate::inverse::pipeline::Pipeline;
+use crate::inverse::roles::Role;
+use crate::inverse::solver::Termination;
+use crate::inverse::unknowns::Unknowns;
+use crate::transport::emitters::Emitters;
+use glam::{DVec3, Vec3};
+use std::time::{Duration, Instant};
+
+/// Work between two reports to the observer.
+const SLICE: Duration = Duration::from_millis(25);
+/// The paths of one slice take at most this part of the memory that stored ones may.
+const SLICE_FRACTION: u64 = 8;
+
+/// Paths of some clusters, both sets.
+fn paths(clusters: &[Cluster]) -> u64 {
+    let of = |c: &Cluster| 2 * u64::from(c.paths) * c.pixels.len() as u64;
+    clusters.iter().map(of).sum()
+}
+
+impl Pipeline<'_, '_> {
+    /// The clusters' paths, kept so that any unknowns can be tried on them: about as many as asked for, fewer where they
+    /// would take more memory than they may, and what is to be said of that.
+    pub(super) fn stored(
+        &mut self,
+        lights: &Emitters,
+        measured: Option<&MeasuredRadiance>,
+        stage: u64,
+        paths: u64,
+    ) -> Result<(PathCache, String), Termination> {
+        let allowed = memory::allowed(self.monitor.settings.memory);
+        let surfaces = self.roles.len();
+        let mut fits = paths;
+        let believed = self.believed();
+        if !memory::suffices(allowed, paths, longest_mean_path(self.brightest(&believed))) {
+            // A few paths of the same kind tell how long they are.
+            distribute_paths(&mut self.clusters, surfaces, 0);
+            let step = self.clusters.len().div_ceil(PILOT_CLUSTERS).max(1);
+            let pilot: Vec<_> = self.clusters.iter().step_by(step).cloned().collect();
+            let pilot = self
+                .tracer(lights, measured, &believed, stage, 0)
+                .trace(&pilot, &self.widths);
+            self.monitor.cast(pilot.cast);
+            fits = paths.min(memory::paths_that_fit(allowed, &pilot));
+        }
+        let pixels: usize = self.clusters.iter().map(|c| c.pixels.len()).sum();
+        if fits < 2 * pixels as u64 {
+            // A pixel has a path in each set; there is no room for that.
+            let pixels = (fits / 2).min(self.budget.pixels as u64);
+            self.clusters = cluster(self.problem, &self.gbuffer, pixels as usize);
+        }
+        distribute_paths(&mut self.clusters, surfaces, fits);
+        let mut cache = PathCache::default();
+        self.slices(lights, measured, stage, 0, |slice| cache.append(slice))?;
+        let limit = match fits < paths {
+            true => {
+                let pixels: usize = self.clusters.iter().map(|c| c.pixels.len()).sum();
+                format!("; memory allows {fits} paths of {pixels} pixels in place of {paths}")
+            }
+            false => String::new(),
+        };
+        Ok((cache, limit))
+    }
+
+    /// The clusters' levels as paths predict them, where each albedo is as high as it may well be: what was taken for black
+    /// by mistake would else weigh as if its photographs had no noise.
+    pub(super) fn levels(
+        &mut self,
+        lights: &Emitters,
+        stage: u64,
+    ) -> Result<Vec<Vec3>, Termination> {
+        let mut unknowns = self.unknowns.clone();
+        for (k, albedo) in unknowns.albedo.iter_mut().enumerate() {
+            if self.roles[k].reflects() {
+                *albedo = (*albedo + self.errors.albedo[k]).min(Vec3::ONE);
+            }
+        }
+        let mut all = Vec::with_capacity(self.clusters.len());
+        self.slices(lights, None, stage, 0, |slice| {
+            all.extend(slice.levels(&unknowns))
+        })?;
+        Ok(all)
+    }
+
+    /// By how much the textures found change the radiance of each cluster from that of some unknowns.
+    pub(super) fn texture_offsets(
+        &mut self,
+        lights: &Emitters,
+        stage: u64,
+        texels: &TexelEstimate,
+        unknowns: &Unknowns,
+    ) -> Result<Vec<DVec3>, Termination> {
+        let mut all = Vec::with_capacity(self.clusters.len());
+        self.slices(lights, None, stage, 0, |slice| {
+            all.extend(slice.texture_offsets(unknowns, &texels.colors.colors));
+        })?;
+        Ok(all)
+    }
+
+    /// The clusters' paths linearised about some unknowns and forgotten; `places` maps parameters to rows.
+    pub(super) fn linearised(
+        &mut self,
+        lights: &Emitters,
+        stage: u64,
+        round: u32,
+        about: &Unknowns,
+        places: &[usize],
+    ) -> Result<Vec<Linearised>, Termination> {
+        let mut all = Vec::with_capacity(self.clusters.len());
+        let reflected = self.patches.reflected.clone();
+        self.slices(lights, None, stage, round, |slice| {
+            all.extend(slice.linearise(about, places, &reflected));
+        })?;
+        Ok(all)
+    }
+
+    /// Traces the clusters' paths in slices, reporting between them.
+    fn slices(
+        &mut self,
+        lights: &Emitters,
+        measured: Option<&MeasuredRadiance>,
+        stage: u64,
+        round: u32,
+        mut take: impl FnMut(PathCache),
+    ) -> Result<(), Termination> {
+        let believed = self.believed();
+        let most = memory::allowed(self.monitor.settings.memory) / SLICE_FRACTION;
+        let longest = longest_mean_path(self.brightest(&believed));
+        let mut next = 0;
+        let mut slice = 16;
+        while next < self.clusters.len() {
+            let mut end = (next + slice).min(self.clusters.len());
+            while end > next + 1
+                && !memory::suffices(most, paths(&self.clusters[next..end]), longest)
+            {
+                end = next + (end - next) / 2;
+            }
+            let begun = Instant::now();
+            let traced = self
+                .tracer(lights, measured, &believed, stage, round)
+                .trace(&self.clusters[next..end], &self.widths);
+            self.monitor.cast(traced.cast);
+            take(traced);
+            let elapsed = begun.elapsed();
+            self.monitor
+                .tick(&self.estimate, &|_| self.checkpoint.clone())?;
+            slice = if elapsed > SLICE {
+                (slice / 2).max(4)
+            } else {
+                slice + slice / 2
+            };
+            next = end;
+        }
+        Ok(())
+    }
+
+    /// For each surface, the largest channel of its albedo as believed now; of a lamp, whose own is left out, what may be.
+    fn believed(&self) -> Vec<f32> {
+        let albedo = self.unknowns.albedo.iter().zip(&self.roles);
+        albedo
+            .map(|(albedo, role)| match role {
+                Role::Emitter => ALBEDO_MEAN,
+                _ => albedo.max_element(),
+            })
+            .collect()
+    }
+
+    /// The largest albedo of any surface as believed; what has a lobe may reflect all light at a grazing angle.
+    fn brightest(&self, believed: &[f32]) -> f32 {
+        match self.lobes.iter().any(Option::is_some) {
+            true => 1.0,
+            false => believed.iter().copied().fold(0.0, f32::max),
+        }
+    }
+
+    fn tracer<'t>(
+        &'t self,
+        lights: &'t Emitters,
+        measured: Option<&'t MeasuredRadiance>,
+        believed: &'t [f32],
+        stage: u64,
+        round: u32,
+    ) -> Tracer<'t> {
+        Tracer {
+            scene: &self.problem.scene,
+            lights,
+            measured,
+            surface_of: &self.problem.scene.object_of,
+            believed_albedo: believed,
+            texels: self.estimate.texels.as_deref(),
+            lobes: &self.lobes,
+            patches: Some(&self.patches),
+            sky: self.sky.as_ref(),
+            outside: Some(self.outside),
+            sampling: self.monitor.settings.light_sampling,
+            max_bounces: self.monitor.settings.max_bounces(),
+            seed: self.monitor.settings.seed,
+            stage,
+            round,
+        }
+    }
+}
