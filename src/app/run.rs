@@ -7,7 +7,7 @@ use crate::app::window::Window;
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
 use crate::session::Session;
-use crate::session::command::{OpenOptions, Source};
+use crate::session::command::Start;
 use crate::session::worker::Backend;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
@@ -16,11 +16,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Size of the window at first, in points.
 pub const WINDOW: [f32; 2] = [1280.0, 800.0];
 
-/// Opens the window and returns when it is closed. With no `source` it shows the start page.
+/// Opens the window and returns when it is closed. With no `start` it shows the start page.
 ///
 /// # Errors
 /// There is no display, no library for it, or no graphics adapter.
-pub fn run(source: Option<(Source, OpenOptions)>, settings: Settings) -> Result<()> {
+pub fn run(start: Option<Start>, settings: Settings) -> Result<()> {
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("relit")
@@ -36,7 +36,7 @@ pub fn run(source: Option<(Source, OpenOptions)>, settings: Settings) -> Result<
     let create: eframe::AppCreator<'_> = {
         let opened = opened.clone();
         Box::new(move |cc| {
-            let window = window(cc, source, settings)?;
+            let window = window(cc, start, settings)?;
             opened.store(true, Ordering::Relaxed);
             Ok(Box::new(window))
         })
@@ -81,7 +81,7 @@ pub fn run(source: Option<(Source, OpenOptions)>, settings: Settings) -> Result<
 /// The window on a worker that wakes it.
 fn window(
     cc: &eframe::CreationContext<'_>,
-    source: Option<(Source, OpenOptions)>,
+    start: Option<Start>,
     settings: Settings,
 ) -> Result<Window> {
     let software = cc.wgpu_render_state.as_ref().is_none_or(|render_state| {
@@ -99,10 +99,10 @@ fn window(
         sessions: preferences::sessions(),
         ..Backend::default()
     };
-    let session = Session::spawn_with(source.clone(), settings.clone(), wake, backend)?;
+    let session = Session::spawn_with(start.clone(), settings.clone(), wake, backend)?;
     let mut app = App::new(Box::new(session), preferences_of_user);
     app.settings = settings;
-    app.opened_with(source.map(|(source, _)| source));
+    app.opened_with(start.as_ref());
     Ok(Window::new(cc, app, kept).paced(pace))
 }
 

@@ -30,7 +30,7 @@ use crate::capture::camera::Intrinsics;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::scene::camera::Camera;
-use crate::session::command::{Command, Placement, Source, ViewCamera, ViewRequest};
+use crate::session::command::{Command, Placement, Source, Start, ViewCamera, ViewRequest};
 use crate::session::edits::{Edited, Edits};
 use crate::session::snapshot::{Level, OpenCapture, Phase, Picture, Snapshot};
 use std::cell::RefCell;
@@ -230,8 +230,11 @@ impl App {
     }
 
     /// Notes what the session was started with.
-    pub fn opened_with(&mut self, source: Option<Source>) {
-        self.opening = source;
+    pub fn opened_with(&mut self, start: Option<&Start>) {
+        self.opening = start.map(|start| match start {
+            Start::Capture(source, _) => source.clone(),
+            Start::Results(folder) => Source::Folder(folder.clone()),
+        });
     }
 
     /// What is open.

@@ -38,7 +38,7 @@ use std::time::Duration;
     after_help = EXIT_CODES
 )]
 pub struct Arguments {
-    /// Folder of the capture to open in the window; the built-in room if none is named
+    /// What to open in the window: a capture, a scan of another program, or results to go on from; the built-in room if none is named
     pub capture: Option<PathBuf>,
     #[command(flatten)]
     pub solve: SolveOptions,
@@ -100,7 +100,7 @@ pub enum Action {
 /// `relit solve`.
 #[derive(Debug, Args)]
 pub struct SolveArguments {
-    /// Folder of the capture
+    /// A capture, a scan of another program (imported first, into relit-out/<scan>/capture), or results to go on from
     pub capture: PathBuf,
     #[command(flatten)]
     pub solve: SolveOptions,

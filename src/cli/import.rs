@@ -1,17 +1,19 @@
 //! `relit import`: scans of other programs as captures.
 
-use crate::capture::import::{self, AppliedTransform, Format, ImportOptions};
+use crate::capture::import::{self, AppliedTransform, Format, Import, ImportOptions};
+use crate::capture::read::CAMERAS;
 use crate::cli::arguments::Replace;
 use crate::cli::numbers::{above_zero, from_one, triple};
 use crate::error::Result;
 use crate::export;
 use crate::say;
+use crate::session::given::Given;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// `relit import`.
 #[derive(Debug, Args)]
@@ -94,12 +96,50 @@ pub fn import(arguments: &ImportArguments) -> Result<()> {
             Some(Applied::Keep) => AppliedTransform::Keep,
         },
     };
+    let scan = read(&arguments.source, &options)?;
+    for line in &scan.said {
+        say::line(line);
+    }
+    export::import::write(&arguments.out, &scan)?;
+    say::line(arguments.out.display());
+    Ok(())
+}
+
+/// The capture of a scan that was named where a capture could be: imported into the folder of its results, once.
+///
+/// # Errors
+/// It is no scan, or the capture cannot be written.
+pub fn beside_results(scan: &Path) -> Result<PathBuf> {
+    let out = Given::imported(scan);
+    if out.join(CAMERAS).exists() {
+        say::aside(format_args!(
+            "{}: imported into {} before",
+            scan.display(),
+            out.display()
+        ));
+        return Ok(out);
+    }
+    let read = read(scan, &ImportOptions::default())?;
+    for line in &read.said {
+        say::aside(line);
+    }
+    export::import::write(&out, &read)?;
+    say::aside(format_args!(
+        "{}: imported into {}",
+        scan.display(),
+        out.display()
+    ));
+    Ok(out)
+}
+
+/// Reads a scan, with a progress bar where depth images are fused.
+fn read(source: &Path, options: &ImportOptions) -> Result<Import> {
     let bar = std::io::stderr().is_terminal().then(|| {
         let style = ProgressStyle::with_template("{bar:24} {pos} of {len} depth images fused");
         ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr())
             .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
     });
-    let scan = import::read(&arguments.source, &options, &mut |done, all| {
+    let scan = import::read(source, options, &mut |done, all| {
         if let Some(bar) = &bar {
             bar.set_length(all as u64);
             bar.set_position(done as u64);
@@ -108,10 +148,5 @@ pub fn import(arguments: &ImportArguments) -> Result<()> {
     if let Some(bar) = &bar {
         bar.finish_and_clear();
     }
-    for line in &scan.said {
-        say::line(line);
-    }
-    export::import::write(&arguments.out, &scan)?;
-    say::line(arguments.out.display());
-    Ok(())
+    Ok(scan)
 }

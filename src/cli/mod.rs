@@ -24,8 +24,10 @@ mod trade;
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
 use crate::say;
-use crate::session::command::{OpenOptions, Source};
-use arguments::{Action, Arguments};
+use crate::session::command::{Source, Start};
+use crate::session::given::Given;
+use crate::session::save;
+use arguments::{Action, Arguments, SolveOptions};
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 use object_values::ObjectValues;
@@ -34,8 +36,8 @@ use std::path::Path;
 /// Letters that may be wrong, missing or swapped in a command that is still known for what it was meant as.
 const MAX_SLIPS: usize = 2;
 
-/// Opens the window on a source, read with some options, and returns when it is closed.
-pub type Window = fn(Option<(Source, OpenOptions)>, Settings) -> Result<()>;
+/// Opens the window and returns when it is closed.
+pub type Window = fn(Option<Start>, Settings) -> Result<()>;
 
 /// Runs the program with the process's arguments; the exit code: 0 done, 1 an error, 2 wrong usage, 128 and a signal's number
 /// where that ended the work.
@@ -66,7 +68,7 @@ pub fn run(window: Option<Window>) -> i32 {
 fn act(arguments: Arguments, window: Option<Window>) -> Result<i32> {
     let done = |()| 0;
     match arguments.action {
-        None => open(&arguments, window),
+        None => open(arguments, window),
         Some(Action::Evaluate(evaluate)) => evaluate::evaluate(&evaluate).map(done),
         Some(Action::Render(render)) => render::render(&render).map(done),
         Some(Action::Insert(insert)) => insert::insert(&insert),
@@ -77,13 +79,14 @@ fn act(arguments: Arguments, window: Option<Window>) -> Result<i32> {
         Some(Action::Trade(measured)) => trade::trade(&measured),
         Some(Action::Study(studied)) => study::study(&studied).map(done),
         Some(Action::Solve(capture)) => {
-            let source = Source::Folder(capture.capture);
             let known = ObjectValues {
                 emission: capture.known.known_emission,
                 albedo: capture.known.known_albedo,
                 ..ObjectValues::default()
             };
-            solve::solve(&source, &capture.solve, &known)
+            let mut options = capture.solve;
+            let source = take(&capture.capture, &mut options)?;
+            solve::solve(&source, &options, &known)
         }
     }
 }
@@ -120,31 +123,50 @@ fn unknown_command(word: &str, remedy: &str) -> Error {
 }
 
 /// `relit [CAPTURE]`: the window, or where none can be opened the same work headless.
-fn open(arguments: &Arguments, window: Option<Window>) -> Result<i32> {
+fn open(arguments: Arguments, window: Option<Window>) -> Result<i32> {
     if let Some(folder) = arguments.capture.as_ref().filter(|folder| !folder.exists())
         && let Some(error) = folder.to_str().and_then(command_meant)
     {
         return Err(error);
     }
-    let source = arguments
-        .capture
-        .clone()
-        .map_or(Source::BuiltInRoom, Source::Folder);
+    let mut options = arguments.solve;
+    let source = match &arguments.capture {
+        None => Source::BuiltInRoom,
+        Some(path) => take(path, &mut options)?,
+    };
     let reason = match window {
         None => "this build has no window".to_owned(),
         Some(_) if !display() => "no display".to_owned(),
         Some(window) => {
-            solve::use_threads(arguments.solve.threads)?;
-            let settings = arguments.solve.settings();
-            let opened = (source.clone(), arguments.solve.read.open(&settings));
-            match window(Some(opened), settings) {
+            solve::use_threads(options.threads)?;
+            let settings = options.settings();
+            let start = match options.out.clone().filter(|_| options.resume) {
+                Some(results) => Start::Results(results),
+                None => Start::Capture(source.clone(), options.read.open(&settings)),
+            };
+            match window(Some(start), settings) {
                 Ok(()) => return Ok(0),
                 Err(error) => error.to_string(),
             }
         }
     };
     say::aside(format_args!("relit: {reason}; solving without a window"));
-    solve::solve(&source, &arguments.solve, &ObjectValues::default())
+    solve::solve(&source, &options, &ObjectValues::default())
+}
+
+/// The source of whatever a person names. A scan is imported first; results are gone on from, which the options then say.
+fn take(path: &Path, options: &mut SolveOptions) -> Result<Source> {
+    match Given::at(path)? {
+        Given::Capture(folder) => Ok(Source::Folder(folder)),
+        Given::Results(folder) => {
+            let source = save::load_checkpoint(&folder)?.source;
+            say::aside(format_args!("going on from {}", folder.display()));
+            options.out.get_or_insert(folder);
+            options.resume = true;
+            Ok(source)
+        }
+        Given::Scan(scan) => import::beside_results(&scan).map(Source::Folder),
+    }
 }
 
 /// Whether there may be a display to open a window on.

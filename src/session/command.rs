@@ -22,6 +22,15 @@ pub enum Source {
     Folder(PathBuf),
 }
 
+/// What a window begins with.
+#[derive(Debug, Clone)]
+pub enum Start {
+    /// A capture.
+    Capture(Source, OpenOptions),
+    /// Results of an earlier solve, in this folder.
+    Results(PathBuf),
+}
+
 impl Source {
     /// The folder that results go into where none is named: `relit-out/<capture>`.
     pub fn default_out(&self) -> PathBuf {

@@ -3,6 +3,7 @@
 pub mod command;
 pub mod edits;
 mod full;
+pub mod given;
 pub mod inbox;
 pub mod insertion;
 mod judge;

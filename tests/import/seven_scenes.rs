@@ -124,3 +124,30 @@ fn frames_are_chosen_evenly_and_voxels_by_the_rooms_extent() {
     assert!(says(&scan, "size of a depth pixel"), "{:?}", scan.said);
     assert_eq!(scan.up, Some(DVec3::Y));
 }
+
+#[test]
+fn a_solve_takes_a_scan_and_then_its_results() {
+    let place = TempDir::new().unwrap();
+    let scan = place.path().join("attic");
+    let cameras = cameras();
+    sample(&scan, &cameras);
+    write(&scan, "camera-intrinsics.txt", intrinsics(&cameras[0]));
+    let relit = |words: &[&str]| {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_relit"))
+            .args(words)
+            .current_dir(place.path())
+            .output()
+            .expect("relit starts");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        said
+    };
+    let quick = ["--preset", "preview", "--views", "none", "--trust-poses"];
+    let scan = [&["solve", "attic"], &quick[..]].concat();
+    assert!(relit(&scan).contains("imported into relit-out/attic/capture"));
+    let written = |name: &str| place.path().join("relit-out/attic").join(name).exists();
+    assert!(written("capture/transforms.json") && written("estimate.json"));
+    assert!(relit(&scan).contains("imported into relit-out/attic/capture before"));
+    let results = ["solve", "relit-out/attic", "--views", "none"];
+    assert!(relit(&results).contains("going on from relit-out/attic"));
+}

@@ -4,7 +4,7 @@ use crate::place::Place;
 use crate::{all_files, change, done, refused, solve};
 use relit::inverse::settings::Settings;
 use relit::session::Session;
-use relit::session::command::{Command, ExportFormat, ExportRequest, OpenOptions, Source};
+use relit::session::command::{Command, ExportFormat, ExportRequest, OpenOptions, Source, Start};
 use relit::session::snapshot::{Level, Phase};
 use std::fs;
 use std::sync::Arc;
@@ -210,7 +210,7 @@ fn the_window_is_refused_the_same() {
         steps: 1,
         ..Settings::default()
     };
-    let opened = Some((source, OpenOptions::default()));
+    let opened = Some(Start::Capture(source, OpenOptions::default()));
     let session = Session::spawn(opened, settings, Arc::new(|| {})).expect("a thread");
     let until = |holds: &dyn Fn(&relit::session::snapshot::Snapshot) -> bool| {
         let started = Instant::now();

@@ -14,7 +14,7 @@ use relit::inverse::estimate::Estimate;
 use relit::inverse::settings::Settings;
 use relit::inverse::solver::{Checkpoint, Control, LossPoint, Observer, Solution, Termination};
 use relit::session::Session;
-use relit::session::command::{Command, OpenOptions, Source, ViewCamera, ViewRequest};
+use relit::session::command::{Command, OpenOptions, Source, Start, ViewCamera, ViewRequest};
 use relit::session::edits::{Edits, ObjectEdit};
 use relit::session::snapshot::{Level, OpenCapture, Phase, Picture, Snapshot};
 use relit::session::worker::Backend;
@@ -104,7 +104,7 @@ impl Rig {
             }),
         };
         let session = Session::spawn_with(
-            Some((Source::BuiltInRoom, OpenOptions::default())),
+            Some(Start::Capture(Source::BuiltInRoom, OpenOptions::default())),
             Settings::default(),
             Arc::new(|| {}),
             backend,

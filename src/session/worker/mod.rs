@@ -10,7 +10,7 @@ use crate::calibrate::problem::Problem;
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Observer, Solution};
-use crate::session::command::{Command, OpenOptions, Source};
+use crate::session::command::{Command, OpenOptions, Source, Start};
 use crate::session::inbox::{self, Outbox};
 use crate::session::slot::Slot;
 use crate::session::snapshot::{OpenCapture, Snapshot};
@@ -58,16 +58,12 @@ pub struct Session {
 }
 
 impl Session {
-    /// Starts a worker and, if a source is given, opens and solves it.
+    /// Starts a worker and lets it begin with what is given.
     ///
     /// # Errors
     /// The system grants no thread.
-    pub fn spawn(
-        source: Option<(Source, OpenOptions)>,
-        settings: Settings,
-        wake: Wake,
-    ) -> Result<Self> {
-        Self::spawn_with(source, settings, wake, Backend::default())
+    pub fn spawn(start: Option<Start>, settings: Settings, wake: Wake) -> Result<Self> {
+        Self::spawn_with(start, settings, wake, Backend::default())
     }
 
     /// Starts a worker that reads and solves by `backend`.
@@ -75,7 +71,7 @@ impl Session {
     /// # Errors
     /// The system grants no thread.
     pub fn spawn_with(
-        source: Option<(Source, OpenOptions)>,
+        start: Option<Start>,
         settings: Settings,
         wake: Wake,
         backend: Backend,
@@ -83,9 +79,11 @@ impl Session {
         let (outbox, inbox) = inbox::queue();
         let slot = Arc::new(Slot::default());
         let shared = slot.clone();
-        let first = source.map_or(Next::Wait, |(source, options)| {
-            Next::Open(source, options, Begin::GoingOn)
-        });
+        let first = match start {
+            None => Next::Wait,
+            Some(Start::Capture(source, options)) => Next::Open(source, options, Begin::GoingOn),
+            Some(Start::Results(folder)) => Next::Resume(folder),
+        };
         let thread = std::thread::Builder::new()
             .name("relit-worker".to_owned())
             .spawn(move || Worker::new(inbox, shared, settings, wake, backend).run(first))
