@@ -50,6 +50,7 @@ fn results(albedo: f32) -> Results {
         stopped_because: None,
         views: Frames::AtMost(0),
         renderer: Renderer::processor(),
+        denoiser: None,
         started: Instant::now(),
         seconds_load: 0.0,
     }

@@ -10,6 +10,7 @@ use relit::session::insertion::Inserting;
 use relit::session::light::Light;
 use relit::session::photographs::Photographs;
 use relit::session::snapshot::OpenCapture;
+use relit::transport::denoise::Denoiser;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -25,7 +26,7 @@ fn work(edits: &Edits, placements: Vec<Placement>) -> Photographs {
         placements,
         relight: !edits.is_empty(),
         samples: 16,
-        denoise: false,
+        denoise: None,
         finish: true,
         frames: vec![0, 1],
     }
@@ -146,7 +147,7 @@ fn the_screen_shows_what_the_files_hold() {
     };
     edits.set(0, red);
     let mut work = work(&edits, vec![block(folder.path())]);
-    (work.samples, work.denoise, work.frames) = (256, true, vec![1]);
+    (work.samples, work.denoise, work.frames) = (256, Some(Denoiser::Builtin), vec![1]);
     let light = Light::new(work.found.clone(), work.edited.clone(), &work.settings);
     let shown = |placements: &[Placement]| {
         let mut inserting = Inserting::default();

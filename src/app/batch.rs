@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::session::edits::Edits;
 use crate::session::photographs::{Doing, Photographs, Written};
 use crate::session::snapshot::Level;
+use crate::transport::denoise::Denoiser;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -135,7 +136,7 @@ impl App {
             placements: self.insertions.visible(),
             relight: !edits.is_empty(),
             samples,
-            denoise,
+            denoise: denoise.then(Denoiser::best),
             finish: self.insertions.finish,
         };
         let ctx = ctx.clone();

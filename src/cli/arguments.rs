@@ -16,13 +16,14 @@ use crate::cli::parameters::{Parameters, duration};
 use crate::cli::render::RenderArguments;
 use crate::cli::study::StudyArguments;
 use crate::cli::trade::TradeArguments;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::export::overwrite;
 use crate::inverse::settings::Settings;
 use crate::render::{Device, Renderer};
 use crate::say;
 use crate::session::command::OpenOptions;
 use crate::session::save::pictures::Frames;
+use crate::transport::denoise::Denoiser;
 use clap::{Arg, Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use glam::{DVec3, Vec3};
 use std::ffi::OsString;
@@ -115,6 +116,8 @@ pub enum Denoise {
     Auto,
     /// Always, by relit's own denoiser
     Builtin,
+    /// Always, by Open Image Denoise
+    Oidn,
     /// Never
     None,
 }
@@ -122,19 +125,32 @@ pub enum Denoise {
 /// Whether the noise of pictures is smoothed.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct DenoiseOptions {
-    /// Smooths the noise, guided by what each pixel sees; `auto` does in pictures to look at and leaves radiance in .exr as it was rendered
+    /// Takes out noise, guided by what each pixel sees; `auto` does so in pictures to look at, by Open Image Denoise where it is installed, and leaves radiance in .exr as it was rendered
     #[arg(long, value_name = "HOW", default_value = "auto", default_missing_value = "builtin", num_args = 0..=1)]
     denoise: Denoise,
 }
 
 impl DenoiseOptions {
-    /// Whether a picture is smoothed that is there to be looked at, or to measure by.
-    pub fn smooths(self, to_look_at: bool) -> bool {
-        match self.denoise {
-            Denoise::Auto => to_look_at,
-            Denoise::Builtin => true,
-            Denoise::None => false,
-        }
+    /// What denoises a picture that is there to be looked at, or to measure by; `None` where nothing does.
+    ///
+    /// # Errors
+    /// Open Image Denoise is asked for and is not installed.
+    pub fn denoiser(self, to_look_at: bool) -> Result<Option<Denoiser>> {
+        Ok(match self.denoise {
+            Denoise::Auto => to_look_at.then(Denoiser::best),
+            Denoise::Builtin => Some(Denoiser::Builtin),
+            Denoise::None => None,
+            Denoise::Oidn => match Denoiser::best() {
+                Denoiser::Oidn => Some(Denoiser::Oidn),
+                Denoiser::Builtin => {
+                    return Err(Error::new(
+                        "--denoise oidn",
+                        "the library of Open Image Denoise 2 is not found",
+                        "install it, name its file in RELIT_OIDN, or pass --denoise builtin",
+                    ));
+                }
+            },
+        })
     }
 }
 
@@ -188,6 +204,10 @@ pub struct SolveOptions {
     /// Pictures to write: all frames at full size, N frames, or none [default: 16, long side 1024]
     #[arg(long, value_name = "all|N|none", value_parser = frames)]
     pub views: Option<Frames>,
+    #[command(flatten)]
+    pub denoise: DenoiseOptions,
+    #[command(flatten)]
+    pub device: DeviceOptions,
     /// Time between two checkpoints, from which a killed solve goes on
     #[arg(long, value_name = "TIME", default_value = "8s", value_parser = time)]
     pub checkpoint: Duration,

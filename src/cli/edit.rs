@@ -88,6 +88,7 @@ pub fn edit(arguments: &EditArguments) -> Result<i32> {
     };
     values.change(&capture.scene, &mut edits)?;
     let edited = Arc::new(edits.apply(&found));
+    let denoiser = arguments.denoise.denoiser(true)?;
     let photographs = arguments.photographs.then(|| Photographs {
         frames: (0..capture.scene.cameras.len()).collect(),
         capture: capture.clone(),
@@ -97,7 +98,7 @@ pub fn edit(arguments: &EditArguments) -> Result<i32> {
         placements: Vec::new(),
         relight: true,
         samples: arguments.spp,
-        denoise: arguments.denoise.smooths(true),
+        denoise: denoiser,
         finish: true,
     });
     let results = Results {
@@ -110,6 +111,7 @@ pub fn edit(arguments: &EditArguments) -> Result<i32> {
         checkpoint: None,
         views: arguments.views.unwrap_or_default(),
         renderer: renderer.clone(),
+        denoiser,
         started: Instant::now(),
         seconds_load: 0.0,
     };

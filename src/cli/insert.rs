@@ -68,7 +68,7 @@ pub fn insert(arguments: &InsertArguments) -> Result<i32> {
         placements,
         relight: !edits.is_empty(),
         samples: arguments.spp,
-        denoise: arguments.denoise.smooths(true),
+        denoise: arguments.denoise.denoiser(true)?,
         finish: arguments.finish,
     };
     write_with_progress(

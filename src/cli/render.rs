@@ -14,7 +14,7 @@ use crate::render::{Device, Pictures, Renderer};
 use crate::say;
 use crate::scene::camera::Camera;
 use crate::session::light::path_options;
-use crate::transport::denoise::{denoise, guides};
+use crate::transport::denoise::guides;
 use crate::transport::layers::Split;
 use clap::Args;
 use glam::Vec3;
@@ -135,11 +135,12 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
             pixels: film.mean(),
         }
     };
-    let mut picture = if arguments.denoise.smooths(matches!(format, Format::Png)) {
+    let denoiser = arguments.denoise.denoiser(matches!(format, Format::Png))?;
+    let mut picture = if let Some(denoiser) = denoiser {
         // Two independent halves tell the noise.
         let half = spp.div_ceil(2);
         let [a, b] = [seed, seed.wrapping_add(1)].map(|seed| rendered(seed, half));
-        denoise(&a, &b, &guides(&lit, &camera))
+        denoiser.denoise(&a, &b, &guides(&lit, &camera))
     } else {
         rendered(seed, spp)
     };

@@ -12,7 +12,6 @@ use crate::inverse::estimate::Estimate;
 use crate::inverse::known::Known;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Control, Observer, Progress};
-use crate::render::Renderer;
 use crate::say;
 use crate::session::command::Source;
 use crate::session::edits::Edits;
@@ -107,7 +106,8 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
             stopped_because: None,
             checkpoint: checkpoint.cloned(),
             views: options.views.unwrap_or_default(),
-            renderer: Renderer::processor(),
+            renderer: options.device.renderer()?,
+            denoiser: options.denoise.denoiser(true)?,
             started,
             seconds_load,
         },

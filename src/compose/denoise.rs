@@ -4,13 +4,13 @@ use crate::compose::backdrop::Mixed;
 use crate::compose::insert::{Insertion, Layers};
 use crate::compose::world::FurnishedScene;
 use crate::math::picture::Picture;
-use crate::transport::denoise::{Guide, denoise, guides, guides_where};
+use crate::transport::denoise::{Denoiser, Guide, denoise, guides, guides_where};
 use glam::Vec3;
 
 /// The composite and its layers, from two independent insertions of the same objects into the same photograph.
 ///
 /// Pixels that no object changes in either, nor around them, stay the photograph's to the bit.
-pub fn denoised(halves: [&Insertion; 2]) -> (Picture, Layers) {
+pub fn denoised(halves: [&Insertion; 2], denoiser: Denoiser) -> (Picture, Layers) {
     let [a, b] = halves.map(Insertion::layers);
     let (backdrop, lit) = (halves[0].backdrop(), halves[0].lit());
     let camera = &backdrop.camera;
@@ -31,9 +31,10 @@ pub fn denoised(halves: [&Insertion; 2]) -> (Picture, Layers) {
             _ => {}
         }
     }
-    let over = denoise(&over_a, &over_b, &objects);
+    let over = denoiser.denoise(&over_a, &over_b, &objects);
 
-    // What is behind them, and how they change it. A difference holds no light of lamps, which is the same with and without.
+    // What is behind them, and how they change it. A difference holds no light of lamps, which is the same with and
+    // without; it has both signs, which only the built-in filter takes.
     let behind = guides(&**lit, camera);
     let dark: Vec<Option<Guide>> = (behind.iter())
         .map(|guide| {
@@ -45,7 +46,7 @@ pub fn denoised(halves: [&Insertion; 2]) -> (Picture, Layers) {
         .collect();
     let [beside_a, beside_b] = halves.map(Insertion::beside_them);
     let beside = denoise(&beside_a, &beside_b, &dark);
-    let without = denoise(&a.without, &b.without, &behind);
+    let without = denoiser.denoise(&a.without, &b.without, &behind);
     let each = |value: &dyn Fn(usize) -> Vec3| Picture {
         pixels: (0..alpha.len()).map(value).collect(),
         ..*backdrop.photograph

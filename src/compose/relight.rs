@@ -5,7 +5,7 @@ use crate::compose::backdrop::Backdrop;
 use crate::error::Result;
 use crate::gpu::{Tracer, View};
 use crate::math::picture::Picture;
-use crate::transport::denoise::{Guide, denoise, guides};
+use crate::transport::denoise::{Denoiser, Guide, guides};
 use crate::transport::film::Film;
 use crate::transport::lit::Lit;
 use crate::transport::path::PathOptions;
@@ -69,27 +69,31 @@ pub struct Relighting {
     /// Renders in both lights from the same random numbers; two independent pairs where noise is smoothed, which tell it.
     pairs: Vec<[Film; 2]>,
     next_row: u32,
+    denoiser: Option<Denoiser>,
     guides: Option<[Vec<Option<Guide>>; 2]>,
 }
 
 impl Relighting {
-    /// Brings the photograph of `backdrop` from the first light into the second. With `smooth` the noise of both renders
-    /// is smoothed, in the same way.
+    /// Brings the photograph of `backdrop` from the first light into the second. A denoiser takes the noise out of
+    /// both renders in the same way.
     pub fn new(
         backdrop: Backdrop,
         lights: [Arc<Lit>; 2],
         options: PathOptions,
         seed: u64,
-        smooth: bool,
+        denoiser: Option<Denoiser>,
     ) -> Self {
         let pair = || [0; 2].map(|_| Film::new(&backdrop.camera));
         Self {
-            pairs: (0..1 + u8::from(smooth)).map(|_| pair()).collect(),
+            pairs: (0..1 + u8::from(denoiser.is_some()))
+                .map(|_| pair())
+                .collect(),
             backdrop,
             lights,
             options,
             seed,
             next_row: 0,
+            denoiser,
             guides: None,
         }
     }
@@ -178,7 +182,13 @@ impl Relighting {
             camera: self.backdrop.camera.shrunk(COARSE_LONG_SIDE),
             ..self.backdrop.clone()
         };
-        let mut rough = Self::new(small, self.lights.clone(), self.options, self.seed, true);
+        let mut rough = Self::new(
+            small,
+            self.lights.clone(),
+            self.options,
+            self.seed,
+            self.denoiser,
+        );
         rough.refine_to(COARSE_SAMPLES, || true);
         let [before, after] = rough.renders().map(|render| render.enlarged(width, height));
         relit(&self.backdrop, &before.pixels, &after.pixels)
@@ -191,13 +201,15 @@ impl Relighting {
             height: film.height,
             pixels: film.mean(),
         };
-        let [first, second] = &self.pairs[..] else {
+        let ([first, second], Some(denoiser)) = (&self.pairs[..], self.denoiser) else {
             return [0, 1].map(|light| mean(&self.pairs[0][light]));
         };
         let camera = &self.backdrop.camera;
         let seen = || self.lights.each_ref().map(|lit| guides(&**lit, camera));
         let guides = self.guides.get_or_insert_with(seen);
-        [0, 1].map(|light| denoise(&mean(&first[light]), &mean(&second[light]), &guides[light]))
+        [0, 1].map(|light| {
+            denoiser.denoise(&mean(&first[light]), &mean(&second[light]), &guides[light])
+        })
     }
 }
 

@@ -11,6 +11,7 @@ use crate::session::library::{Inserted, Library};
 use crate::session::light::Light;
 use crate::session::snapshot::{Insertion, OpenCapture, Picture};
 use crate::session::view::differs;
+use crate::transport::denoise::Denoiser;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -75,7 +76,7 @@ impl Placed {
         let told = !none && halves.iter().all(|half| half.samples() > 0);
         self.samples = if told { self.samples() } else { 0 };
         self.picture = Arc::new(match told {
-            true => denoised(halves).0,
+            true => denoised(halves, Denoiser::best()).0,
             false => halves[0].composite(),
         });
     }
@@ -327,7 +328,13 @@ impl Inserting {
             return;
         }
         let lights = [&light.found, &light.edited].map(|e| Arc::new(e.lit(&capture.scene)));
-        let relighting = Relighting::new(taken.clone(), lights, light.options, light.seed, true);
+        let relighting = Relighting::new(
+            taken.clone(),
+            lights,
+            light.options,
+            light.seed,
+            Some(Denoiser::best()),
+        );
         self.relit = Some(Relit {
             photograph: Arc::new(relighting.coarse()),
             relighting,

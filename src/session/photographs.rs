@@ -16,6 +16,7 @@ use crate::render::{Renderer, went_wrong};
 use crate::session::library::{Inserted, Library};
 use crate::session::light::path_options;
 use crate::session::snapshot::OpenCapture;
+use crate::transport::denoise::Denoiser;
 use crate::transport::lit::Lit;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -38,7 +39,7 @@ pub struct Photographs {
     /// Samples a pixel.
     pub samples: u32,
     /// Whether the light's noise is smoothed.
-    pub denoise: bool,
+    pub denoise: Option<Denoiser>,
     /// Whether objects take the blur and the grain of 8-bit photographs.
     pub finish: bool,
     /// Which photographs, by frame.
@@ -202,9 +203,14 @@ impl Photographs {
         Ok(Some(backdrop))
     }
 
+    /// Independent renders of a picture: two where they are to tell the noise.
+    fn halves(&self) -> u32 {
+        1 + u32::from(self.denoise.is_some())
+    }
+
     /// Samples a pixel, an even number where two halves tell the noise.
     fn in_parts(&self) -> u32 {
-        self.samples.next_multiple_of(1 + u32::from(self.denoise))
+        self.samples.next_multiple_of(self.halves())
     }
 
     /// Puts the objects in and writes the composites; returns the files and whether any object is seen, or `None` if that was ended.
@@ -218,7 +224,7 @@ impl Photographs {
         go_on: &dyn Fn(f32) -> bool,
     ) -> Result<Option<(Vec<PathBuf>, bool)>> {
         // What is to be smoothed is made in two independent halves, which tell the noise.
-        let parts = if self.denoise { 2 } else { 1 };
+        let parts = self.halves();
         let samples = self.in_parts() / parts;
         let mut made: Vec<Inserted> = Vec::new();
         for part in 0..parts {
@@ -244,7 +250,10 @@ impl Photographs {
             made.push(inserted);
         }
         let (composite, layers) = match &made[..] {
-            [a, b] => denoised([&a.composite, &b.composite]),
+            [a, b] => denoised(
+                [&a.composite, &b.composite],
+                self.denoise.unwrap_or(Denoiser::Builtin),
+            ),
             made => (made[0].composite.composite(), made[0].composite.layers()),
         };
         let behind = &backdrop.photograph;

@@ -6,8 +6,10 @@
 
 use crate::math::color::luminance;
 use crate::math::picture::Picture;
+use crate::say;
 use crate::scene::camera::Camera;
 use crate::scene::geometry::Ray;
+use crate::transport::oidn;
 use crate::transport::world::World;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -42,6 +44,53 @@ pub struct Guide {
     pub emission: Vec3,
     /// Which object.
     pub object: u32,
+}
+
+/// What takes the noise out of pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Denoiser {
+    /// This file's filter.
+    Builtin,
+    /// Open Image Denoise; the built-in filter where it fails.
+    Oidn,
+}
+
+impl Denoiser {
+    /// Open Image Denoise where it is installed, else the built-in filter.
+    pub fn best() -> Self {
+        match oidn::found() {
+            Some(_) => Self::Oidn,
+            None => Self::Builtin,
+        }
+    }
+
+    /// Its name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Builtin => "builtin",
+            Self::Oidn => "oidn",
+        }
+    }
+
+    /// The mean of two independent pictures of one view without its noise; `guides` has one entry a pixel.
+    pub fn denoise(self, a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
+        let oidn = match self {
+            Self::Builtin => None,
+            Self::Oidn => oidn::found(),
+        };
+        let Some(oidn) = oidn else {
+            return denoise(a, b, guides);
+        };
+        let halves = a.pixels.iter().zip(&b.pixels);
+        let mean = Picture {
+            pixels: halves.map(|(a, b)| (*a + *b) * 0.5).collect(),
+            ..*a
+        };
+        oidn.denoise(&mean, guides).unwrap_or_else(|error| {
+            say::warning(format_args!("Open Image Denoise: {error}"));
+            denoise(a, b, guides)
+        })
+    }
 }
 
 /// Offsets in a pixel that are tried for what it sees: its centre, then a ring.

@@ -10,6 +10,7 @@ pub mod layers;
 pub mod lit;
 pub mod material;
 pub mod microfacet;
+pub mod oidn;
 pub mod path;
 pub mod surroundings;
 pub mod world;

@@ -22,6 +22,7 @@ use crate::render::Renderer;
 use crate::session::command::Source;
 use crate::session::edits::{Edited, Edits};
 use crate::session::snapshot::OpenCapture;
+use crate::transport::denoise::Denoiser;
 use estimate::EstimateFile;
 use pictures::Frames;
 use serde::{Deserialize, Serialize};
@@ -49,6 +50,8 @@ pub struct Results {
     pub views: Frames,
     /// What traces their paths.
     pub renderer: Renderer,
+    /// What takes the noise out of their PNGs, if anything does.
+    pub denoiser: Option<Denoiser>,
     /// When the work began.
     pub started: Instant,
     /// Seconds spent reading the capture.

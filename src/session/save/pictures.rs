@@ -12,6 +12,7 @@ use crate::session::light::path_options;
 use crate::session::save::Results;
 use crate::session::save::staging::Staging;
 use crate::session::view::hits::Hits;
+use crate::transport::denoise::guides;
 use crate::transport::lit::Lit;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -61,7 +62,7 @@ impl Frames {
     }
 }
 
-/// Renders and writes the pictures of the chosen frames, `views/NNN.KIND.{exr,png}`.
+/// Renders and writes the pictures of the chosen frames, `views/NNN.KIND.{exr,png}`. Noise is taken out of `render.png` alone.
 ///
 /// # Errors
 /// A photograph cannot be read again, or a file cannot be written.
@@ -113,17 +114,32 @@ fn frame(
     let scene = &capture.scene;
     let (photograph, shown_at) = capture.sized_photograph(index, camera)?;
 
-    // The render in the photograph's values, so that the two can be subtracted.
+    // Two independent renders, which tell the noise.
     let options = path_options(&results.settings);
-    let key = (results.settings.seed, index as u64);
-    let film = shown.renders.film(camera, &options, key, samples);
+    let [a, b] = [0, 1].map(|half| {
+        let key = (results.settings.seed.wrapping_add(half), index as u64);
+        let film = shown.renders.film(camera, &options, key, samples / 2);
+        Picture {
+            pixels: film.mean(),
+            ..photograph.clone()
+        }
+    });
     let mut render = Picture {
-        pixels: film.mean(),
+        pixels: (a.pixels.iter().zip(&b.pixels))
+            .map(|(a, b)| (*a + *b) * 0.5)
+            .collect(),
         ..photograph.clone()
     };
+    let mut clean = match results.denoiser {
+        Some(denoiser) => denoiser.denoise(&a, &b, &guides(lit, camera)),
+        None => render.clone(),
+    };
+    // In the photograph's values, so that the two can be subtracted.
     let exposure = estimate.exposure(index);
     let saturation = capture.frame(index)?.1.saturation;
-    exposure.apply(&camera.intrinsics, saturation, &mut render);
+    for picture in [&mut render, &mut clean] {
+        exposure.apply(&camera.intrinsics, saturation, picture);
+    }
     let error = Picture {
         pixels: (render.pixels.iter().zip(&photograph.pixels))
             .map(|(r, p)| *r - *p)
@@ -148,7 +164,7 @@ fn frame(
     ] {
         write_rgb(&path(kind, "exr")?, picture, Precision::Float)?;
     }
-    write_png(&path("render", "png")?, &render, shown_at)?;
+    write_png(&path("render", "png")?, &clean, shown_at)?;
     write_png(&path("albedo", "png")?, &albedo, 1.0)?;
     let emission_at = percentile_exposure(&emission.pixels);
     write_png(&path("emission", "png")?, &emission, emission_at)?;

@@ -1,14 +1,15 @@
 //! `report.json`: what a solve did and found, in numbers.
 
 use crate::capture::response::TERMS;
-use crate::inverse::estimate::{Estimate, ObjectEstimate};
-use crate::inverse::settings::{Preset, Settings};
-use crate::inverse::solver::{Progress, Stage, Termination};
+use crate::inverse::estimate::ObjectEstimate;
+use crate::inverse::settings::Preset;
+use crate::inverse::solver::{Stage, Termination};
 use crate::math::color::luminance;
 use crate::math::nullable::{Rgb, rgb};
+use crate::session::save::Results;
 use crate::session::save::memory::peak_memory_bytes;
 use crate::session::save::named::Named;
-use crate::session::snapshot::OpenCapture;
+use crate::transport::denoise::Denoiser;
 use crate::transport::surroundings::Surroundings;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -36,6 +37,10 @@ pub struct Report {
     pub seconds_to_first_estimate: Option<f64>,
     /// How much there was.
     pub capture: Counts,
+    /// What traced the paths of the pictures: a graphics card's name, or `cpu`. The fit's are the processor's.
+    pub device: String,
+    /// What took the noise out of `render.png`: `builtin`, `oidn` or `none`.
+    pub denoiser: &'static str,
     /// Rays traced by the solver.
     pub rays: u64,
     /// The same over `seconds_solve`.
@@ -104,14 +109,10 @@ pub struct Seconds {
 
 impl Report {
     /// The report of a solve.
-    pub fn new(
-        capture: &OpenCapture,
-        settings: &Settings,
-        estimate: &Estimate,
-        progress: &Progress,
-        stopped_because: Option<Termination>,
-        seconds: Seconds,
-    ) -> Self {
+    pub fn new(results: &Results, seconds: Seconds) -> Self {
+        let (capture, settings, estimate) =
+            (&results.capture, &results.settings, &results.estimate);
+        let (progress, stopped_because) = (&results.progress, results.stopped_because);
         let mut warnings = capture.warnings.clone();
         warnings.extend(progress.warnings.iter().cloned());
         Self {
@@ -134,6 +135,8 @@ impl Report {
                     .map(|p| u64::from(p.width) * u64::from(p.height))
                     .sum(),
             },
+            device: results.renderer.card().unwrap_or("cpu").to_owned(),
+            denoiser: results.denoiser.map_or("none", Denoiser::name),
             rays: progress.rays,
             rays_per_second: if progress.seconds > 0.0 {
                 progress.rays as f64 / progress.seconds

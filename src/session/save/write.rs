@@ -31,15 +31,7 @@ pub fn write(folder: &Path, results: &Results) -> Result<()> {
             load: results.seconds_load,
             write: started.elapsed().as_secs_f64(),
         };
-        let report = Report::new(
-            &results.capture,
-            &results.settings,
-            &results.estimate,
-            &results.progress,
-            results.stopped_because,
-            seconds,
-        );
-        json(REPORT, &report)
+        json(REPORT, &Report::new(results, seconds))
     };
     let mut staging = Staging::new(folder, &results.capture_id())?;
     stage_estimate(&mut staging, folder, results)?;

@@ -9,7 +9,7 @@ use crate::session::snapshot::{LightLayers, OpenCapture, Picture, View};
 use crate::session::view::hits::Hits;
 use crate::session::view::progressive::{ENOUGH, Progressive};
 use crate::session::view::sized::box_filter;
-use crate::transport::denoise::{Guide, denoise, guides};
+use crate::transport::denoise::{Denoiser, Guide, guides};
 use crate::transport::layers::Split;
 use crate::transport::lit::Lit;
 use crate::transport::path::PathOptions;
@@ -189,7 +189,7 @@ impl Target {
             return self.render.picture(&self.camera);
         };
         let seen = || guides(&self.world, &self.camera);
-        denoise(&a, &b, self.guides.get_or_insert_with(seen))
+        Denoiser::best().denoise(&a, &b, self.guides.get_or_insert_with(seen))
     }
 
     /// All pictures at once, coarsely.

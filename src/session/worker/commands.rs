@@ -14,6 +14,7 @@ use crate::session::snapshot::{Level, Phase};
 use crate::session::view::sized::box_filter;
 use crate::session::worker::state::Worker;
 use crate::session::worker::work::{Begin, Next};
+use crate::transport::denoise::Denoiser;
 use std::path::Path;
 use std::time::Duration;
 
@@ -164,6 +165,7 @@ impl Worker {
             checkpoint: self.checkpoint.clone(),
             views: Frames::default(),
             renderer: Renderer::processor(),
+            denoiser: Some(Denoiser::best()),
             started: self.started,
             seconds_load: self.seconds_load,
         })

@@ -19,6 +19,7 @@ use crate::scene::Scene;
 use crate::study::experiments::{Cylinder, chair, places, up};
 use crate::study::families::Plan;
 use crate::study::families::score::{Solved, solved};
+use crate::transport::denoise::Denoiser;
 use crate::transport::lit::Lit;
 use crate::transport::material::Material;
 use crate::transport::path::PathOptions;
@@ -320,7 +321,7 @@ fn scores(
         Ok(half)
     });
     let [a, b] = halves;
-    let (ours, _) = denoised([&a?, &b?]);
+    let (ours, _) = denoised([&a?, &b?], Denoiser::Builtin);
     let pictures: Vec<Picture> = (problem.photographs.iter()).map(|p| p.picture()).collect();
     let light = harmonics_of_photographs(scene.cameras.iter().zip(&pictures));
     let plain = backdrop(scene, estimate.exposure(frame))?;
