@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::export::canvas::{Canvas, FONT, register_fonts};
 use crate::export::picture::write_png_bytes;
 use crate::export::scale::Scale;
-use crate::inverse::solver::{LossPoint, Stage};
+use crate::inverse::solver::{FitPoint, LossPoint, Stage};
 use plotters::prelude::{
     BLACK, BitMapBackend, ChartBuilder, Circle, Color, EmptyElement, IntoDrawingArea, IntoFont,
     LineSeries, PathElement, Polygon, RGBColor, Rectangle, SeriesLabelPosition, Text, WHITE,
@@ -251,8 +251,9 @@ fn steps(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     points.first().copied().into_iter().chain(turns).collect()
 }
 
-/// The loss curve of a solve: loss in the fit and on held-out pixels over seconds, with its stages marked.
-pub fn loss_plot(losses: &[LossPoint], stages: &[Stage]) -> Plot {
+/// The course of a solve over seconds, with its stages marked: loss in the fit and on held-out pixels, and the relative residual of
+/// the fit after each iteration.
+pub fn loss_plot(losses: &[LossPoint], fits: &[FitPoint], stages: &[Stage]) -> Plot {
     let curve = |name: &str, value: fn(&LossPoint) -> Option<f64>| Series {
         name: name.to_owned(),
         points: losses
@@ -272,6 +273,11 @@ pub fn loss_plot(losses: &[LossPoint], stages: &[Stage]) -> Plot {
     let series = [
         curve("in the fit", |p| p.train),
         curve("held out", |p| p.held_out),
+        Series {
+            name: "residual, relative".to_owned(),
+            points: fits.iter().map(|p| [p.seconds, p.residual]).collect(),
+            ..Series::default()
+        },
     ];
     Plot {
         title: "Loss".to_owned(),
@@ -385,7 +391,7 @@ mod tests {
             held_out,
         };
         let losses = [point(0, Some(1.0)), point(1, None), point(2, Some(0.5))];
-        let plot = loss_plot(&losses, &[]);
+        let plot = loss_plot(&losses, &[], &[]);
         assert_eq!(plot.series[0].points.len(), 3);
         assert_eq!(plot.series[1].points, [[0.0, 1.0], [2.0, 0.5]]);
         let image = draw(&plot);

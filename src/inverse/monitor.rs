@@ -4,7 +4,7 @@ use crate::inverse::estimate::Estimate;
 use crate::inverse::known::Known;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{
-    Checkpoint, Control, LossPoint, Observer, Progress, Stage, Termination,
+    Checkpoint, Control, FitPoint, LossPoint, Observer, Progress, Stage, Termination,
 };
 use crate::transport::arrival::Cast;
 use std::time::{Duration, Instant};
@@ -122,6 +122,18 @@ impl<'a> Monitor<'a> {
             held_out,
         };
         self.progress.losses.push(point);
+    }
+
+    /// Adds a point to the course of the fit: the relative residual, with so many unknowns free, and what the estimate claims.
+    pub fn fitted(&mut self, residual: f64, unknowns: usize, estimate: &Estimate) {
+        let point = FitPoint {
+            seconds: self.seconds(),
+            iteration: self.progress.iterations,
+            residual,
+            stderr: estimate.relative_error(),
+            unknowns: unknowns as u64,
+        };
+        self.progress.fits.push(point);
     }
 
     /// Records a finished stage.

@@ -25,6 +25,9 @@ pub struct Progress {
     pub seconds_to_first_estimate: Option<f64>,
     /// Loss curve, in time order.
     pub losses: Vec<LossPoint>,
+    /// The course of the fit, a point an iteration; the paper's descent has none.
+    #[serde(default)]
+    pub fits: Vec<FitPoint>,
     /// Finished stages of the ladder.
     pub stages: Vec<Stage>,
     /// Samples dropped, by cause.
@@ -44,6 +47,21 @@ pub struct LossPoint {
     pub train: Option<f64>,
     /// Over held-out pixels; `None` where it was not measured.
     pub held_out: Option<f64>,
+}
+
+/// The fit after one iteration. Stored paths give it without a ray.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FitPoint {
+    /// Seconds of solving.
+    pub seconds: f64,
+    /// Iterations.
+    pub iteration: u64,
+    /// Root of the mean squared residual of the pixels in the fit, relative to their level.
+    pub residual: f64,
+    /// The error that the estimate claims: median relative standard error of albedo; `None` before there is one.
+    pub stderr: Option<f64>,
+    /// Free parameters.
+    pub unknowns: u64,
 }
 
 /// One rung of the model ladder, tried and kept or not.

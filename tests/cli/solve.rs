@@ -51,7 +51,28 @@ fn a_solve_writes_everything_and_all_of_it_can_be_read() {
         }
     }
     let losses = fs::read_to_string(place.path(&format!("{out}/loss.csv"))).expect("reads");
-    assert!(losses.lines().count() > 1, "{losses}");
+    // The fit is told after every iteration, losses where they were measured.
+    let rows: Vec<Vec<&str>> = losses
+        .lines()
+        .map(|line| line.split(',').collect())
+        .collect();
+    assert_eq!(
+        rows[0][2..],
+        ["train", "held_out", "residual", "stderr", "unknowns"]
+    );
+    let told = |column: usize| {
+        rows[1..]
+            .iter()
+            .filter(|row| !row[column].is_empty())
+            .count()
+    };
+    assert!(
+        told(2) >= 1 && told(4) >= 4 && told(6) == told(4),
+        "{losses}"
+    );
+    let residual = |row: &&Vec<&str>| row[4].parse::<f64>().ok();
+    let fits: Vec<f64> = rows[1..].iter().filter_map(|row| residual(&row)).collect();
+    assert!(fits.last() < fits.first(), "{fits:?}");
     image::open(place.path(&format!("{out}/loss.png"))).expect("an image");
     let (scene, ..) = gltf::import(place.path(&format!("{out}/scene.glb"))).expect("a glTF");
     let names: Vec<_> = scene.nodes().filter_map(|node| node.name()).collect();

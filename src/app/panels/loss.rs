@@ -15,12 +15,17 @@ const POINTS: usize = 2000;
 pub fn pane(ui: &mut Ui, app: &mut App) {
     let tokens = theme::tokens(ui);
     let progress = app.snapshot.progress.clone();
-    if progress.losses.is_empty() {
+    if progress.losses.is_empty() && progress.fits.is_empty() {
         ui.weak("No loss has been measured yet");
         return;
     }
     let train = curve(&progress.losses, |point| point.train);
     let held_out = curve(&progress.losses, |point| point.held_out);
+    let fits = progress
+        .fits
+        .iter()
+        .map(|point| [point.seconds, point.residual]);
+    let fits = logarithmic(fits);
     let mut marks = Vec::new();
     let mut end = 0.0;
     for stage in &progress.stages {
@@ -62,6 +67,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
             for (name, points, color) in [
                 ("Loss", train, tokens.train),
                 ("Held out", held_out, tokens.held_out),
+                ("Residual of the fit, relative", fits, tokens.outline),
             ] {
                 if points.len() == 1 {
                     plot.points(Points::new(name, points).color(color).radius(3.0));
@@ -76,11 +82,16 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         });
 }
 
-/// Seconds and logarithm of the loss, thinned out evenly; what is not positive has no place on the axis.
+/// Seconds and logarithm of a loss.
 fn curve(losses: &[LossPoint], value: impl Fn(&LossPoint) -> Option<f64>) -> Vec<[f64; 2]> {
-    let points: Vec<[f64; 2]> = losses
-        .iter()
-        .filter_map(|point| Some([point.seconds, value(point).filter(|v| *v > 0.0)?.log10()]))
+    logarithmic((losses.iter()).filter_map(|point| Some([point.seconds, value(point)?])))
+}
+
+/// Points with the logarithm of their second value, thinned out evenly; what is not positive has no place on the axis.
+fn logarithmic(points: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
+    let points: Vec<[f64; 2]> = points
+        .filter(|[_, value]| *value > 0.0)
+        .map(|[seconds, value]| [seconds, value.log10()])
         .collect();
     let stride = points.len().div_ceil(POINTS).max(1);
     let last = points.last().copied();

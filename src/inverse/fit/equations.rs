@@ -32,6 +32,8 @@ pub struct NormalEquations {
     pub objective: DVec3,
     /// Clusters in the sums that say anything.
     pub clusters: usize,
+    /// Pixels of those clusters.
+    pub pixels: f64,
     /// What is believed besides.
     pub prior: Prior,
     /// How parameters depend on each other.
@@ -94,13 +96,15 @@ impl NormalEquations {
         prior: &Prior,
         coupling: Coupling,
     ) -> Self {
+        let telling = || linearised.iter().filter(|c| !c.bound_met().all());
         let mut sums = Self {
             descent: vec![DVec3::ZERO; n],
             diagonal: vec![DVec3::ZERO; n],
             across: vec![DVec3::ZERO; n],
             scatter: vec![DVec3::ZERO; n],
             objective: DVec3::ZERO,
-            clusters: linearised.iter().filter(|c| !c.bound_met().all()).count(),
+            clusters: telling().count(),
+            pixels: telling().map(|c| c.pixels).sum(),
             prior: prior.clone(),
             coupling,
         };
@@ -116,6 +120,13 @@ impl NormalEquations {
             }
         }
         sums
+    }
+
+    /// Root of the mean squared residual of a pixel over the level that it is weighed by, over pixels and channels; free of the
+    /// paths' noise, which differs between the two sets.
+    pub fn relative_residual(&self) -> f64 {
+        let mean = self.objective.element_sum() / (3.0 * self.pixels.max(1.0));
+        mean.max(0.0).sqrt()
     }
 }
 

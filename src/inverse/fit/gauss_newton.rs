@@ -37,7 +37,8 @@ pub fn noise(equations: &NormalEquations) -> DVec3 {
     (equations.objective / equations.clusters.max(1) as f64).max(DVec3::splat(1e-12))
 }
 
-/// Fits the free parameters (indices into albedos, then emissions). `between` runs after every step and may end it.
+/// Fits the free parameters (indices into albedos, then emissions). `between` hears of
+/// the equations after every step, and may end the fit.
 ///
 /// # Errors
 /// What `between` returns.
@@ -48,7 +49,7 @@ pub fn fit<E>(
     robust: &RobustWeights,
     prior: &Prior,
     max_steps: u64,
-    mut between: impl FnMut(&Unknowns) -> Result<(), E>,
+    mut between: impl FnMut(&NormalEquations) -> Result<(), E>,
 ) -> Result<Fit, E> {
     let mut unknowns = start.clone();
     let mut equations = cache.normal_equations(&unknowns, free, robust, prior);
@@ -63,7 +64,7 @@ pub fn fit<E>(
         let (proposal, length) = propose(&equations, free, &unknowns, damping);
         let after = cache.normal_equations(&proposal, free, robust, prior);
         iterations += 1;
-        between(&proposal)?;
+        between(&after)?;
         // A step from afar may overshoot: the squared error then tells.
         if worse(&equations, &after) && damping < 1e3 {
             damping = (damping * 100.0).max(1e-3);
@@ -277,7 +278,7 @@ mod tests {
             roles::free(roles, |k| roles[k] != Role::Emitter),
         );
         let prior = Prior::new(roles.len(), roles.len(), Vec3::ONE);
-        let between = |_: &Unknowns| Ok::<_, ()>(());
+        let between = |_: &NormalEquations| Ok::<_, ()>(());
         fit(&cache, start, &free, &even, &prior, 30, between).expect("nothing ends it")
     }
 

@@ -45,8 +45,9 @@ impl Pipeline<'_, '_> {
             &self.robust,
             &self.prior,
             MAX_STEPS,
-            |_| {
+            |equations| {
                 monitor.progress.iterations += 1;
+                monitor.fitted(equations.relative_residual(), free.len(), estimate);
                 monitor.tick(estimate, &|_| checkpoint.clone())
             },
         )?;

@@ -207,6 +207,11 @@ impl Pipeline<'_, '_> {
         lamp_albedo::leave_out(&mut self.unknowns, &self.roles);
         self.monitor.progress.iterations += 1;
         self.merge_errors(errors);
+        self.monitor.fitted(
+            found.equations.relative_residual(),
+            free.len(),
+            &self.estimate,
+        );
         self.hold();
         found
     }

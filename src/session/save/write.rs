@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::export::plot::loss_plot;
 use crate::export::scene::{self, Format};
 use crate::export::table::{Cell, Table};
-use crate::inverse::solver::LossPoint;
+use crate::inverse::solver::Progress;
 use crate::session::save::estimate::EstimateFile;
 use crate::session::save::pictures;
 use crate::session::save::report::{Report, Seconds};
@@ -36,13 +36,17 @@ pub fn write(folder: &Path, results: &Results) -> Result<()> {
     let mut staging = Staging::new(folder, &results.capture_id())?;
     stage_estimate(&mut staging, folder, results)?;
     staging.write(REPORT, &report()?)?;
-    let table = losses(&results.progress.losses).write(&staging.file("loss.csv")?);
+    let table = losses(&results.progress).write(&staging.file("loss.csv")?);
     table.map_err(|error| staging.named(error))?;
     staging.commit(earlier)?;
 
     write_shown(folder, results, |staging| {
-        loss_plot(&results.progress.losses, &results.progress.stages)
-            .write(&staging.file("loss.png")?)?;
+        loss_plot(
+            &results.progress.losses,
+            &results.progress.fits,
+            &results.progress.stages,
+        )
+        .write(&staging.file("loss.png")?)?;
         staging.write(REPORT, &report()?)
     })
 }
@@ -143,17 +147,48 @@ impl Results {
     }
 }
 
-/// The loss curve as a table: seconds, iterations, loss in the fit and on held-out pixels.
-fn losses(points: &[LossPoint]) -> Table {
-    let mut table = Table::new(&["seconds", "iteration", "train", "held_out"]);
+/// The course of a solve as a table, in order of time: losses in the fit and on held-out pixels where they were measured, and
+/// after each iteration the relative residual of the fit, the relative error that the estimate claims, and the free parameters.
+fn losses(progress: &Progress) -> Table {
+    let mut table = Table::new(&[
+        "seconds",
+        "iteration",
+        "train",
+        "held_out",
+        "residual",
+        "stderr",
+        "unknowns",
+    ]);
     let cell = |value: Option<f64>| value.map_or(Cell::Empty, Cell::from);
-    for point in points {
-        table.row(&[
-            Cell::from(point.seconds),
-            Cell::from(point.iteration),
-            cell(point.train),
-            cell(point.held_out),
-        ]);
+    let measured = progress.losses.iter().map(|p| {
+        let values = [
+            cell(p.train),
+            cell(p.held_out),
+            Cell::Empty,
+            Cell::Empty,
+            Cell::Empty,
+        ];
+        (p.seconds, p.iteration, values)
+    });
+    let fitted = progress.fits.iter().map(|p| {
+        let unknowns = Cell::from(p.unknowns);
+        let values = [
+            Cell::Empty,
+            Cell::Empty,
+            Cell::from(p.residual),
+            cell(p.stderr),
+            unknowns,
+        ];
+        (p.seconds, p.iteration, values)
+    });
+    let mut rows: Vec<_> = measured.chain(fitted).collect();
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    for (seconds, iteration, values) in rows {
+        let row: Vec<Cell> = [Cell::from(seconds), Cell::from(iteration)]
+            .into_iter()
+            .chain(values)
+            .collect();
+        table.row(&row);
     }
     table
 }
