@@ -84,8 +84,8 @@ shared! {
         paths: [u32; 4],
         /// Emitting objects, unused, width and height of the light from outside (0 where there is none).
         lights: [u32; 4],
-        /// Chance of sampling an emitter of the mesh rather than the light from outside.
-        fraction: [f32; 4],
+        /// Probability of sampling an emitter of the mesh rather than the environment.
+        emitter_fraction: [f32; 4],
     }
 
     /// What a triangle is made of.

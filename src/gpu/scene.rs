@@ -75,7 +75,7 @@ impl Packed {
         let [width, height] = outside.map_or([0; 2], |map| map.size().map(|n| n as u32));
         let dispatch = Dispatch {
             lights: [emitters.objects, 0, width, height],
-            fraction: [emitter_fraction(lit), 0.0, 0.0, 0.0],
+            emitter_fraction: [emitter_fraction(lit), 0.0, 0.0, 0.0],
             ..Dispatch::default()
         };
         Self {

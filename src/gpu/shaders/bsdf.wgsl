@@ -9,9 +9,9 @@ struct BsdfSample {
     pdf: f32,
 }
 
-// Cosine and sine of a share of the full turn; arguments stay within ±π, where their precision is specified.
-fn circle(share: f32) -> vec2<f32> {
-    let angle = 2.0 * PI * (share - select(0.0, 1.0, share > 0.5));
+// Cosine and sine of a fraction of the full turn; arguments stay within ±π, where their precision is specified.
+fn circle(fraction: f32) -> vec2<f32> {
+    let angle = 2.0 * PI * (fraction - select(0.0, 1.0, fraction > 0.5));
     return vec2<f32>(cos(angle), sin(angle));
 }
 
@@ -35,7 +35,7 @@ fn cosine_hemisphere(u: vec2<f32>) -> vec3<f32> {
     return vec3<f32>(disk, sqrt(max(1.0 - dot(disk, disk), 0.0)));
 }
 
-// Upper bound of the share of light that a lobe with no reflectance at normal incidence reflects.
+// Upper bound of the fraction of light that a lobe with no reflectance at normal incidence reflects.
 fn reflected(cosine: f32) -> f32 {
     return fifth(1.0 - COUPLING_SLOPE * cosine);
 }
@@ -45,8 +45,8 @@ fn coupling(wo: vec3<f32>, wi: vec3<f32>) -> f32 {
     return COUPLING_SCALE * wi.z * (1.0 - reflected(wo.z)) * (1.0 - reflected(wi.z));
 }
 
-// At least the share of light that the lobe reflects to `wo`, mean over the channels.
-fn lobe_share(surface: Surface, wo: vec3<f32>) -> f32 {
+// At least the fraction of light that the lobe reflects to `wo`, mean over the channels.
+fn lobe_fraction(surface: Surface, wo: vec3<f32>) -> f32 {
     let specular = (surface.specular.x + surface.specular.y + surface.specular.z) / 3.0;
     return specular + (1.0 - specular) * reflected(wo.z);
 }
@@ -63,8 +63,8 @@ fn bsdf_eval(surface: Surface, wo: vec3<f32>, wi: vec3<f32>) -> vec4<f32> {
     let m = microfacet(surface.roughness, wo, wi);
     let fresnel = surface.specular + (1.0 - surface.specular) * m.schlick;
     let value = surface.albedo * (1.0 - surface.specular) * coupling(wo, wi) + fresnel * microfacet_eval(m);
-    let share = lobe_share(surface, wo);
-    return vec4<f32>(value, share * microfacet_pdf(m) + (1.0 - share) * base);
+    let fraction = lobe_fraction(surface, wo);
+    return vec4<f32>(value, fraction * microfacet_pdf(m) + (1.0 - fraction) * base);
 }
 
 // Draws a direction: `choice` decides between lobe and base, `u` the direction.
@@ -73,7 +73,7 @@ fn bsdf_sample(surface: Surface, wo: vec3<f32>, choice: f32, u: vec2<f32>) -> Bs
         return BsdfSample(vec3<f32>(0.0), vec3<f32>(0.0), 0.0);
     }
     var wi: vec3<f32>;
-    if surface.roughness >= 0.0 && choice < lobe_share(surface, wo) {
+    if surface.roughness >= 0.0 && choice < lobe_fraction(surface, wo) {
         wi = reflect_on_visible_normal(surface.roughness, wo, u);
     } else {
         wi = cosine_hemisphere(u);

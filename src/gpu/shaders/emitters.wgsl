@@ -69,6 +69,6 @@ fn sample_emitter(surface: Surface, choice: vec2<u32>, u: vec2<f32>) -> LightSam
     }
     let start = offset_origin(surface.point, surface.normal, surface.slot, wi);
     let end = offset_origin(point, normal, slot, -wi);
-    let pdf = dispatch.share.x * material.emission.w * distance2 / cosine;
+    let pdf = dispatch.emitter_fraction.x * material.emission.w * distance2 / cosine;
     return LightSample(wi, material.emission.xyz, pdf, Ray(start, end - start, 1.0));
 }

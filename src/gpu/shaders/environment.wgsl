@@ -39,5 +39,5 @@ fn sample_environment(surface: Surface, choice: vec2<u32>, u: vec2<f32>) -> Ligh
     let wi = vec3<f32>(r * across.x, y, r * across.y);
     let light = environment_at(low);
     let start = offset_origin(surface.point, surface.normal, surface.slot, wi);
-    return LightSample(wi, light.xyz, light.w * (1.0 - dispatch.share.x), Ray(start, wi, FAR));
+    return LightSample(wi, light.xyz, light.w * (1.0 - dispatch.emitter_fraction.x), Ray(start, wi, FAR));
 }

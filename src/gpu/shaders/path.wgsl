@@ -57,7 +57,7 @@ fn direct_light(surface: Surface, local: Frame, wo: vec3<f32>, rays: ptr<functio
     let choice = uniform53();
     let u = uniform2();
     var light = no_light();
-    if pick < dispatch.share.x {
+    if pick < dispatch.emitter_fraction.x {
         if dispatch.lights.x > 0u {
             light = sample_emitter(surface, choice, u);
         }
@@ -94,7 +94,7 @@ fn radiance(camera_ray: Ray) -> PathSample {
         if hit.slot == NONE {
             if dispatch.lights.z > 0u {
                 let light = environment_at(environment_pixel(normal_or(ray.direction, vec3<f32>(0.0))));
-                let weight = select(power_heuristic(bsdf_pdf, light.w * (1.0 - dispatch.share.x)), 1.0, bsdf_pdf < 0.0);
+                let weight = select(power_heuristic(bsdf_pdf, light.w * (1.0 - dispatch.emitter_fraction.x)), 1.0, bsdf_pdf < 0.0);
                 total += throughput * light.xyz * weight;
             }
             break;
@@ -106,7 +106,7 @@ fn radiance(camera_ray: Ray) -> PathSample {
         let cos_emitter = dot(surface.normal, wo);
         if cos_emitter > 0.0 && any(surface.emission != vec3<f32>(0.0)) {
             let along = ray.direction * surface.t;
-            let light_pdf = dispatch.share.x * surface.emitter_pdf * dot(along, along) / cos_emitter;
+            let light_pdf = dispatch.emitter_fraction.x * surface.emitter_pdf * dot(along, along) / cos_emitter;
             let weight = select(power_heuristic(bsdf_pdf, light_pdf), 1.0, bsdf_pdf < 0.0);
             total += throughput * surface.emission * weight;
         }
