@@ -1,20 +1,20 @@
-//! The one error type: what went wrong, where, and what to do about it.
+//! The error type of the whole program: place, problem and remedy.
 
 use std::fmt;
 use std::path::Path;
 
-/// A failure a person can act on.
+/// A failure that a person can act on.
 ///
 /// Printed as one line, `place: problem; remedy`. `place` names the file and, where known, the line or field.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Error {
     /// The file, field, option or stage concerned.
     pub place: String,
-    /// What is wrong there.
+    /// What is wrong.
     pub problem: String,
-    /// What the person can do; may be empty where nothing helps.
+    /// What the person can do; empty if nothing helps.
     pub remedy: String,
-    /// Whether the command was misused (exit code 2) rather than failed (exit code 1).
+    /// Whether the command was used wrongly (exit code 2) rather than failed (exit code 1).
     pub usage: bool,
 }
 
@@ -53,7 +53,7 @@ impl Error {
         Self::file(path, error, remedy)
     }
 
-    /// A wrongly used command (exit code 2).
+    /// An error of wrong usage (exit code 2).
     pub fn usage(
         place: impl fmt::Display,
         problem: impl fmt::Display,

@@ -1,40 +1,40 @@
-//! What the program says on the terminal.
+//! Terminal output.
 //!
-//! Whoever listens may have gone: a closed pipe, a closed terminal or a full disk behind it stops no work. Control characters,
-//! which come with names out of files, are shown and not obeyed.
+//! Failures of writing (a closed pipe or terminal, a full disk) do not stop the program. Control characters, which names from files
+//! may hold, are escaped.
 
 use crate::error::{Error, Result};
 use std::borrow::Cow;
 use std::fmt::{Display, Write as _};
 use std::io::{ErrorKind, Write};
 
-/// A line of what a command has to say, on standard output.
+/// Writes a line to standard output.
 pub fn line(text: impl Display) {
-    // Nobody is left to be told that nobody listens; the same below.
+    // A failure cannot be reported anywhere.
     let _ = writeln!(std::io::stdout(), "{}", plain(&text.to_string()));
 }
 
-/// A line beside the results, on standard error.
+/// Writes a line to standard error.
 pub fn aside(text: impl Display) {
     let _ = writeln!(std::io::stderr(), "{}", plain(&text.to_string()));
 }
 
-/// What a person should look at, on standard error.
+/// Writes a warning to standard error.
 pub fn warning(text: impl Display) {
     aside(format_args!("warning: {text}"));
 }
 
-/// Lines of a table, on standard output. Line ends are obeyed, so that names in it must be [`plain`] already.
+/// Writes the lines of a table to standard output. Names in the table must be [`plain`] already, since line ends are kept.
 pub fn table(text: &str) {
     for row in text.lines() {
         line(row);
     }
 }
 
-/// A result that is written nowhere else, on standard output; whoever closed the pipe has had enough of it.
+/// Writes a result to standard output. A closed pipe is not an error.
 ///
 /// # Errors
-/// It cannot be written, as on a full disk.
+/// Writing fails for another reason, such as a full disk.
 pub fn result(text: &str) -> Result<()> {
     let mut out = std::io::stdout();
     let written = writeln!(out, "{text}").and_then(|()| out.flush());
@@ -42,29 +42,42 @@ pub fn result(text: &str) -> Result<()> {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Error::new(
             "standard output",
             error,
-            "let it lead to where something can be written",
+            "redirect it to where something can be written",
         )),
         _ => Ok(()),
     }
 }
 
-/// JSON without control characters in its texts.
+/// Names in a list before the rest is only counted.
+const LISTED: usize = 5;
+
+/// The first few names, and the number of the others.
+pub fn listed<S: AsRef<str>>(names: &[S]) -> String {
+    let shown: Vec<&str> = names.iter().take(LISTED).map(AsRef::as_ref).collect();
+    let shown = shown.join(", ");
+    match names.len().saturating_sub(LISTED) {
+        0 => shown,
+        others => format!("{shown} and {others} more"),
+    }
+}
+
+/// JSON without control characters in its strings.
 pub fn json(text: &str) -> String {
-    let escaped = |c: char| match c != '\n' && is_obeyed(c) {
+    let escaped = |c: char| match c != '\n' && is_control(c) {
         true => format!("\\u{:04x}", u32::from(c)),
         false => c.to_string(),
     };
     text.chars().map(escaped).collect()
 }
 
-/// A text without control characters: each is written as its code.
+/// A text with control characters escaped.
 pub fn plain(text: &str) -> Cow<'_, str> {
-    if !text.chars().any(is_obeyed) {
+    if !text.chars().any(is_control) {
         return text.into();
     }
     let mut shown = String::with_capacity(text.len());
     for c in text.chars() {
-        match is_obeyed(c) {
+        match is_control(c) {
             // Writing to a string cannot fail.
             true => drop(write!(shown, "{}", c.escape_default())),
             false => shown.push(c),
@@ -73,8 +86,8 @@ pub fn plain(text: &str) -> Cow<'_, str> {
     shown.into()
 }
 
-/// Whether a terminal does something at a character instead of showing it, or shows others in another order.
-fn is_obeyed(c: char) -> bool {
+/// Whether a character controls the terminal or the order of text (bidirectional overrides).
+fn is_control(c: char) -> bool {
     c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 

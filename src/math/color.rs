@@ -1,4 +1,4 @@
-//! Linear radiance and sRGB. RGB everywhere means linear light with the Rec. 709 primaries.
+//! Linear RGB and sRGB. RGB always means linear light with the Rec. 709 primaries.
 
 use glam::{DVec3, Vec3};
 
@@ -35,7 +35,7 @@ pub fn linear_to_srgb(v: f32) -> f32 {
     }
 }
 
-/// 8-bit sRGB of a linear colour times an exposure; what is not a number becomes magenta, so that it shows.
+/// 8-bit sRGB of a linear colour times an exposure; non-finite colours become magenta, to be noticed.
 #[inline]
 pub fn to_srgb8(rgb: Vec3, exposure: f32) -> [u8; 3] {
     if !rgb.is_finite() {

@@ -1,4 +1,4 @@
-//! Colour, frames, sampling, statistics: what light transport is written in. Knows nothing of scenes.
+//! Colour, frames, sampling and statistics, independent of any scene.
 
 pub mod color;
 pub mod frame;

@@ -1,4 +1,4 @@
-//! A rectangle of linear colours.
+//! A picture of linear colours.
 
 use glam::Vec3;
 
@@ -9,7 +9,7 @@ pub struct Picture {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Linear values; what they mean is said where the picture is kept.
+    /// Linear values; the owner defines their meaning.
     pub pixels: Vec<Vec3>,
 }
 
@@ -33,7 +33,7 @@ impl Picture {
         expected > 0 && self.pixels.len() as u64 == expected
     }
 
-    /// The picture at another size, each new pixel one of the old.
+    /// The picture resampled to another size by nearest neighbour.
     pub fn enlarged(&self, width: u32, height: u32) -> Self {
         let at = |i: u32, from: u32, to: u32| {
             (u64::from(i) * u64::from(from) / u64::from(to.max(1))) as usize

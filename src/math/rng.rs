@@ -1,8 +1,8 @@
 //! Keyed random streams: the same key gives the same numbers on any thread.
 
-/// A stream of uniform numbers, made from a key and independent of every other key's stream.
+/// A stream of uniform numbers from a key; streams of different keys are independent.
 ///
-/// State is PCG-XSH-RR 32 (O'Neill 2014), with state and increment drawn from the key by SplitMix64.
+/// The generator is PCG-XSH-RR 32 (O'Neill 2014), with state and increment hashed from the key by SplitMix64.
 #[derive(Debug, Clone)]
 pub struct Stream {
     state: u64,
@@ -51,7 +51,7 @@ impl Stream {
         (self.next_u32() >> 8) as f32 * (1.0 / 16_777_216.0)
     }
 
-    /// A uniform number in [0, 1) with 53 bits, for choices among very many or very unequal things.
+    /// A uniform number in [0, 1) with 53 bits, for choices among many or very unequal probabilities.
     #[inline]
     pub fn uniform_f64(&mut self) -> f64 {
         let bits = (u64::from(self.next_u32()) << 32) | u64::from(self.next_u32());

@@ -1,21 +1,21 @@
-//! Numbers that a path is made of: independent ones, or points of a low-discrepancy sequence that many paths share.
+//! Random numbers of paths: independent, or points of a low-discrepancy sequence shared by many paths.
 
 use crate::math::rng::{Stream, splitmix64};
 
-/// Points of one sequence before another scramble of it begins.
+/// Points of a sequence before a new scramble is used.
 const LENGTH: u64 = 1 << 16;
-/// Groups of four numbers of a path that come from the sequence; later ones are independent.
+/// Groups of four numbers per path from the sequence; later groups are independent numbers.
 const GROUPS: u32 = 10;
-/// Spacing of the sequence's numbers in single precision, and of independent ones.
+/// Spacing of the sequence's f32 numbers, and of [`Stream`]'s.
 const SPACING: [f64; 2] = [1.0 / 8_388_608.0, 1.0 / 16_777_216.0];
 
-/// A source of the uniform numbers in [0, 1) that one path uses, in the order in which it uses them.
+/// A source of the uniform numbers in [0, 1) of one path, in order of use.
 pub trait Uniforms {
-    /// The next four.
+    /// The next four numbers.
     fn four(&mut self) -> [f32; 4];
 
-    /// A number with the same leading bits as `coarse`, one of the last four, and more bits after them, for choices among
-    /// very unequal things: all numbers that `coarse` may stand for are as likely.
+    /// Extends `coarse`, one of the last four numbers, by random lower-order bits, for choices among very unequal probabilities:
+    /// the result is uniform over the interval that rounds down to `coarse`.
     fn refine(&mut self, coarse: f32) -> f64;
 }
 
@@ -32,20 +32,21 @@ impl Uniforms for Stream {
 }
 
 /// One point of an Owen-scrambled Sobol sequence (Burley 2020, "Practical Hash-Based Owen Scrambling"). Each point
-/// alone is uniform, so that a mean over any points is unbiased; together they fill space more evenly than
-/// independent ones, so that the mean of a smooth function over many has far less variance.
+/// is uniform, so means over points are unbiased; together they are stratified, so the mean of a smooth function over
+/// many has far less variance than with independent points.
 #[derive(Debug, Clone)]
 pub struct SequencePoint {
     index: u32,
     scramble: u32,
     group: u32,
-    /// Whether the last four numbers came from `beyond`.
-    is_beyond: bool,
-    beyond: Stream,
+    /// Whether the last four numbers came from `independent`.
+    is_independent: bool,
+    /// The numbers after the sequence's groups.
+    independent: Stream,
 }
 
 impl SequencePoint {
-    /// Point `index` of the sequence of a (seed, frame, pixel, set) key. Sequences of other keys are independent.
+    /// Point `index` of the sequence with a (seed, [frame, pixel, set]) key. Sequences of different keys are independent.
     pub fn new(seed: u64, key: [u64; 3], index: u64) -> Self {
         let [frame, pixel, set] = key;
         let mut scramble = splitmix64(seed);
@@ -56,8 +57,8 @@ impl SequencePoint {
             index: (index % LENGTH) as u32,
             scramble: (scramble >> 32) as u32,
             group: 0,
-            is_beyond: false,
-            beyond: Stream::new(scramble, frame, pixel, index),
+            is_independent: false,
+            independent: Stream::new(scramble, frame, pixel, index),
         }
     }
 }
@@ -66,8 +67,8 @@ impl Uniforms for SequencePoint {
     #[inline]
     fn four(&mut self) -> [f32; 4] {
         if self.group == GROUPS {
-            self.is_beyond = true;
-            return self.beyond.four();
+            self.is_independent = true;
+            return self.independent.four();
         }
         self.group += 1;
         sobol_burley::sample_4d(self.index, self.group - 1, self.scramble)
@@ -75,7 +76,8 @@ impl Uniforms for SequencePoint {
 
     #[inline]
     fn refine(&mut self, coarse: f32) -> f64 {
-        f64::from(coarse) + self.beyond.uniform_f64() * SPACING[usize::from(self.is_beyond)]
+        f64::from(coarse)
+            + self.independent.uniform_f64() * SPACING[usize::from(self.is_independent)]
     }
 }
 

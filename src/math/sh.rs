@@ -1,4 +1,4 @@
-//! Real spherical harmonics up to second order: nine coefficients, enough for irradiance to about one per cent
+//! Real spherical harmonics up to degree 2: nine coefficients represent irradiance to about one per cent
 //! (Ramamoorthi and Hanrahan 2001, "An Efficient Representation for Irradiance Environment Maps").
 
 use glam::{DVec3, Vec3};
@@ -30,7 +30,7 @@ pub fn basis(direction: Vec3) -> [f64; 9] {
 }
 
 impl Harmonics {
-    /// Adds radiance from a unit direction over a solid angle (for a random direction: 1 / (n · pdf)).
+    /// Adds radiance from a unit direction over a solid angle (for one of n random directions: 1 / (n · pdf)).
     pub fn add(&mut self, direction: Vec3, radiance: Vec3, solid_angle: f64) {
         let weighted = radiance.as_dvec3() * solid_angle;
         for (coefficient, value) in self.coefficients.iter_mut().zip(basis(direction)) {
@@ -39,7 +39,7 @@ impl Harmonics {
     }
 
     /// Irradiance on a surface with a unit normal: the coefficients convolved with the clamped cosine, whose factors
-    /// are π, 2π/3 and π/4 for l = 0, 1, 2. Never below zero, as the truncated series alone could be.
+    /// are π, 2π/3 and π/4 for l = 0, 1, 2. Clamped to zero, since the truncated series can be negative.
     pub fn irradiance(&self, normal: Vec3) -> Vec3 {
         const FACTORS: [f64; 9] = {
             let (a, b, c) = (PI, 2.0 * PI / 3.0, PI / 4.0);

@@ -1,4 +1,4 @@
-//! Running means and variances, quantiles: sums of many terms are held in f64.
+//! Running means and variances, and quantiles, in f64.
 
 use serde::{Deserialize, Serialize};
 
