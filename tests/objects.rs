@@ -308,7 +308,7 @@ fn broken_files_get_one_line() {
         (
             "noise.glb",
             b"glTF\x02\0\0\0\xff\xff\xff\xff\0\0\0\0",
-            "is no valid glTF",
+            "is not a valid glTF",
         ),
         ("cycle.gltf", cycle.as_bytes(), "two parents"),
     ];

@@ -129,5 +129,5 @@ fn import(course: &Course<()>, source: &Path, out: &Path) -> Result<Vec<String>>
     }
     course.say("writing the capture");
     export::import::write(out, &scan)?;
-    Ok(scan.said)
+    Ok(scan.remarks)
 }

@@ -36,7 +36,7 @@ pub struct Pose {
 impl Intrinsics {
     /// Distorted normalised image coordinates of undistorted ones (x right, y down, at unit depth).
     ///
-    /// `None` beyond the radius where the radial polynomial turns back and the lens model says nothing.
+    /// `None` beyond the radius at which the radial polynomial stops increasing: the model does not hold there.
     pub fn distort(&self, p: DVec2) -> Option<DVec2> {
         let [k1, k2, p1, p2] = self.distortion;
         if self.distortion == [0.0; 4] {

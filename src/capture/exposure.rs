@@ -1,5 +1,4 @@
-//! How radiance becomes the values of a photograph: exposure, white balance, a lens that dims towards the corners, and the camera's
-//! response.
+//! The imaging model from radiance to pixel values: exposure, white balance, vignetting and the camera response.
 
 use crate::capture::camera::Intrinsics;
 use crate::capture::response::Response;
@@ -7,38 +6,37 @@ use crate::math::picture::Picture;
 use glam::{DVec2, Vec3};
 use rayon::prelude::*;
 
-/// How a lens dims what lies off its axis: by a power of the angle's cosine.
+/// Vignetting: a factor cosᵖ θ for the angle θ from the optical axis.
 ///
-/// The fourth power is the law of an ideal lens; sensors and cameras' own corrections make it more or less.
+/// An ideal lens has p = 4 (the cos⁴ law); sensors and in-camera corrections change the power.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vignetting {
-    /// The power, per channel.
+    /// The power p, per channel.
     pub power: Vec3,
 }
 
 impl Vignetting {
-    /// Logarithm of the cosine of the angle between the axis and what is seen at a point of the picture, in pixels from the
-    /// top-left corner; lens distortion is left out.
+    /// ln cos θ for a point of the image plane, in pixels from the top-left corner. Ignores lens distortion.
     pub fn off_axis(lens: &Intrinsics, point: DVec2) -> f64 {
         let tangent = (point - DVec2::new(lens.cx, lens.cy)) / DVec2::new(lens.fx, lens.fy);
         -0.5 * tangent.length_squared().ln_1p()
     }
 
-    /// The factor at a point of the picture, in pixels from the top-left corner.
+    /// The factor at a point of the image plane, in pixels from the top-left corner.
     pub fn factor(&self, lens: &Intrinsics, point: DVec2) -> Vec3 {
         let off_axis = Self::off_axis(lens, point);
         (self.power.as_dvec3() * off_axis).map(f64::exp).as_vec3()
     }
 }
 
-/// What radiance goes through to become the values of one photograph.
+/// Exposure, vignetting and response of one photograph.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Exposure {
-    /// Exposure and white balance: the factor on the lens's axis, per channel.
+    /// Exposure and white balance: the factor on the optical axis, per channel.
     pub factor: Vec3,
-    /// How it falls off from there; `None` where it does not.
+    /// Vignetting, where there is any.
     pub vignetting: Option<Vignetting>,
-    /// How values follow the light that comes of both; `None` where they are that light.
+    /// Camera response; `None` where values are linear in light.
     pub response: Option<Response>,
 }
 
@@ -54,8 +52,8 @@ impl Default for Exposure {
 }
 
 impl Exposure {
-    /// The factor from radiance to light on the sensor in the middle of a pixel, counted row by row from the top left, of a picture
-    /// through the lens, which may be larger or smaller than the lens says.
+    /// The factor from radiance to light on the sensor at a pixel's centre. `pixel` counts row by row from the top left of a picture
+    /// of the given size, which may differ from the lens's.
     pub fn at(&self, lens: &Intrinsics, [width, height]: [u32; 2], pixel: usize) -> Vec3 {
         let Some(vignetting) = &self.vignetting else {
             return self.factor;
@@ -67,7 +65,7 @@ impl Exposure {
         self.factor * vignetting.factor(lens, middle * DVec2::new(across, down))
     }
 
-    /// The light on the sensor that shows as a value of a photograph that saturates at `saturation`, in its units.
+    /// The light on the sensor of a pixel value, both in units of the photograph, whose values saturate at `saturation`.
     pub fn light(&self, value: Vec3, saturation: Vec3) -> Vec3 {
         match &self.response {
             Some(response) => response.light(value, saturation),
@@ -75,7 +73,7 @@ impl Exposure {
         }
     }
 
-    /// The value that light on the sensor shows as: the inverse of [`Exposure::light`].
+    /// The pixel value of light on the sensor: the inverse of [`Exposure::light`].
     pub fn value(&self, light: Vec3, saturation: Vec3) -> Vec3 {
         match &self.response {
             Some(response) => response.value(light, saturation),
@@ -83,7 +81,7 @@ impl Exposure {
         }
     }
 
-    /// Turns radiance into the values of a photograph that saturates at `saturation`, in place.
+    /// Converts radiance to pixel values that saturate at `saturation`, in place.
     pub fn apply(&self, lens: &Intrinsics, saturation: Vec3, picture: &mut Picture) {
         let size = [picture.width, picture.height];
         picture

@@ -1,4 +1,4 @@
-//! Files that this run of the program has read, wherever they lie: no output of it may take their place.
+//! The files that this process has read; no output may overwrite them.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -7,9 +7,9 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 /// Canonical paths.
 static READ: LazyLock<Mutex<HashSet<PathBuf>>> = LazyLock::new(Mutex::default);
 
-/// Remembers a file that is read.
+/// Registers a file as read.
 pub fn note(path: &Path) {
-    // A file that is not there will not be replaced.
+    // A missing file cannot be overwritten.
     if let Ok(path) = path.canonicalize() {
         READ.lock()
             .unwrap_or_else(PoisonError::into_inner)
@@ -17,7 +17,7 @@ pub fn note(path: &Path) {
     }
 }
 
-/// Whether a file was read; its path is canonical.
+/// Whether the file at a canonical path was read.
 pub fn holds(path: &Path) -> bool {
     READ.lock()
         .unwrap_or_else(PoisonError::into_inner)

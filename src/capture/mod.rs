@@ -1,6 +1,6 @@
-//! What comes in: a mesh cut into objects, and posed photographs (a folder; the format is in [`read`]).
+//! The input of a solve: a mesh of named objects and posed photographs (a folder in the format of [`read`]).
 //!
-//! Everything here is f64 and in the capture's own coordinates; [`crate::scene::Scene`] recentres and rounds.
+//! Geometry is f64 in the capture's own coordinates; [`crate::scene::Scene`] recentres it and rounds to f32.
 
 pub mod camera;
 pub mod exposure;
@@ -15,6 +15,7 @@ pub mod read;
 pub mod reading;
 pub mod regroup;
 pub mod response;
+pub mod scan;
 pub mod segment;
 pub mod truth;
 pub mod working;
@@ -27,7 +28,7 @@ use photograph::{Photograph, PhotographSource};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A scan: geometry and photographs, before anything is estimated.
+/// Geometry and posed photographs.
 #[derive(Debug, Clone)]
 pub struct Capture {
     /// The name shown to people: the folder's name, or "built-in room".
@@ -36,22 +37,22 @@ pub struct Capture {
     pub folder: Option<PathBuf>,
     /// Triangles grouped in objects.
     pub mesh: Mesh,
-    /// How its mesh is cut into segments, where it has no objects of its own. The reader leaves it whole.
+    /// How to segment a mesh without objects. The reader does not segment it.
     pub cut: Option<Cut>,
     /// Posed photographs, in the order of transforms.json.
     pub frames: Vec<Frame>,
     /// Unit up vector: the cameras' mean up unless overruled.
     pub up: DVec3,
-    /// What was odd but could be worked around, each a full sentence naming file and field.
+    /// Problems that were worked around, each a full sentence naming file and field.
     pub warnings: Vec<String>,
 }
 
-/// How a mesh without objects is cut into segments (see [`segment`]).
+/// How to segment a mesh without objects (see [`segment`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cut {
     /// The mesh's file.
     pub file: PathBuf,
-    /// The number of segments that a person asked for.
+    /// The number of segments that the person gave.
     pub wanted: Option<usize>,
 }
 
@@ -62,9 +63,9 @@ pub struct Frame {
     pub intrinsics: Intrinsics,
     /// Camera to world.
     pub pose: Pose,
-    /// Linear multiplier: radiance = value / exposure. `None` where neither the file nor its EXIF says.
+    /// Linear multiplier: radiance = value / exposure. `None` where neither transforms.json nor EXIF gives one.
     pub exposure: Option<f64>,
-    /// Where the pixels are.
+    /// Where the pixels come from.
     pub photograph: PhotographSource,
     /// 16-bit depth image and metres per unit, where the capture has one.
     pub depth: Option<(PathBuf, f64)>,
@@ -74,7 +75,7 @@ impl Frame {
     /// Reads the photograph (values divided by the exposure, if one is given).
     ///
     /// # Errors
-    /// The file cannot be read, is no image, or has another size than the camera.
+    /// The file cannot be read, is not an image, or has another size than the camera.
     pub fn load(&self) -> Result<Arc<Photograph>> {
         self.photograph.load(&self.intrinsics, self.exposure)
     }

@@ -1,8 +1,8 @@
-//! How a stored picture is turned and mirrored to be shown, as EXIF says it.
+//! EXIF orientation: how a stored picture is mirrored and rotated for display.
 
 use serde::{Deserialize, Serialize};
 
-/// One of the eight ways in which a stored picture may lie: mirrored left to right or not, then turned.
+/// One of the eight orientations: an optional mirroring left to right, then a rotation.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Orientation {
     /// Quarter turns clockwise, 0 to 3.
@@ -12,7 +12,7 @@ pub struct Orientation {
 }
 
 impl Orientation {
-    /// A turn clockwise by 0 to 3 quarters.
+    /// A clockwise rotation by `turns` quarter turns.
     pub const fn turned(turns: u8) -> Self {
         Self {
             turns: turns % 4,
@@ -26,7 +26,7 @@ impl Orientation {
         mirrored: true,
     };
 
-    /// The orientation of an EXIF record; `None` for numbers other than 1 to 8.
+    /// The orientation of an EXIF value; `None` for values other than 1 to 8.
     pub fn from_exif(number: u32) -> Option<Self> {
         let (turns, mirrored) = match number {
             1 => (0, false),
@@ -42,7 +42,7 @@ impl Orientation {
         Some(Self { turns, mirrored })
     }
 
-    /// This orientation followed by another.
+    /// This orientation followed by `next`.
     pub fn then(self, next: Self) -> Self {
         let turns = if next.mirrored {
             4 - self.turns
@@ -55,7 +55,7 @@ impl Orientation {
         }
     }
 
-    /// Width and height of the shown picture.
+    /// Width and height of the displayed picture, from those of the stored one.
     pub fn size(self, [width, height]: [u32; 2]) -> [u32; 2] {
         if self.turns.is_multiple_of(2) {
             [width, height]
@@ -64,7 +64,7 @@ impl Orientation {
         }
     }
 
-    /// The pixels of a stored picture of `size` as they are shown, row by row.
+    /// The pixels of a stored picture of `size` in display order, row by row.
     pub fn apply<T: Copy>(self, pixels: &[T], size: [u32; 2]) -> Vec<T> {
         let [width, height] = size.map(|n| n as usize);
         let [shown_width, shown_height] = self.size(size).map(|n| n as usize);

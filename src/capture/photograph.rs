@@ -1,9 +1,6 @@
 //! Photographs in linear light.
 
-use crate::capture::camera::Intrinsics;
 use crate::capture::orientation::Orientation;
-use crate::capture::read;
-use crate::error::Result;
 use crate::math::picture::Picture;
 use glam::{BVec3, Vec3};
 use std::path::PathBuf;
@@ -14,20 +11,20 @@ use std::sync::Arc;
 pub enum Encoding {
     /// Linear radiance (EXR, HDR).
     Linear,
-    /// sRGB curve, 8 bits a channel (PNG, JPEG): saturates at 1.
+    /// sRGB curve, 8 bits per channel (PNG, JPEG); saturates at 1.
     Srgb8,
-    /// sRGB curve, 16 bits a channel (PNG): saturates at 1.
+    /// sRGB curve, 16 bits per channel (PNG); saturates at 1.
     Srgb16,
 }
 
-/// Linear values of an image, row by row from the top left.
+/// A photograph in linear radiance, row by row from the top left.
 #[derive(Debug, Clone)]
 pub struct Photograph {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Linear radiance (file value / exposure) of each pixel: its mean over the pixel's area.
+    /// Linear radiance (linearised file value / exposure), the mean over each pixel's area.
     pub pixels: Vec<Vec3>,
     /// Whether each pixel may be used (alpha mask, finite values); empty means all.
     pub usable: Vec<bool>,
@@ -35,16 +32,16 @@ pub struct Photograph {
     pub encoding: Encoding,
     /// The value at which each channel saturates, in the units of `pixels`; infinite for linear files.
     pub saturation: Vec3,
-    /// The same for each pixel, where it is not one value for all of them; else empty. The mean of pixels of which some are
-    /// saturated is at its own limit.
+    /// The saturation value of each pixel, where pixels differ; else empty. A downsampled pixel that averages some saturated ones
+    /// has its own value as its limit.
     pub limits: Vec<Vec3>,
 }
 
-/// Pixels above this fraction of saturation may have been brighter than they show.
+/// Fraction of the saturation value from which a pixel counts as saturated (its value is a lower bound).
 pub const BELOW_SATURATION: f32 = 0.97;
 
 impl Photograph {
-    /// The photograph turned or mirrored.
+    /// The photograph in another orientation.
     pub fn oriented(&self, orientation: Orientation) -> Self {
         let size = [self.width, self.height];
         let [width, height] = orientation.size(size);
@@ -66,7 +63,7 @@ impl Photograph {
         }
     }
 
-    /// Its values as a picture.
+    /// A copy of the pixels as a picture.
     pub fn picture(&self) -> Picture {
         Picture {
             width: self.width,
@@ -80,7 +77,7 @@ impl Photograph {
         self.usable.is_empty() || self.usable[pixel]
     }
 
-    /// The channels in which a pixel may have been brighter than it shows: its value there is a lower bound.
+    /// The saturated channels of a pixel: their values are lower bounds.
     pub fn saturated(&self, pixel: usize) -> BVec3 {
         self.pixels[pixel].cmpge(self.limit(pixel) * BELOW_SATURATION)
     }
@@ -90,7 +87,7 @@ impl Photograph {
         *self.limits.get(pixel).unwrap_or(&self.saturation)
     }
 
-    /// Whether a pixel may have been brighter than it shows, in any channel.
+    /// Whether any channel of a pixel is saturated.
     pub fn is_saturated(&self, pixel: usize) -> bool {
         self.saturated(pixel).any()
     }
@@ -99,41 +96,14 @@ impl Photograph {
 /// Where a photograph's pixels come from.
 #[derive(Debug, Clone)]
 pub enum PhotographSource {
-    /// A file, read when needed, and how it lies in it.
+    /// A file, read when needed, and its orientation.
     File(PathBuf, Orientation),
     /// Already in memory.
     Memory(Arc<Photograph>),
 }
 
 impl PhotographSource {
-    /// Reads the photograph and divides by the exposure.
-    ///
-    /// # Errors
-    /// The file cannot be read, is no image, or has another size than the camera.
-    pub fn load(&self, intrinsics: &Intrinsics, exposure: Option<f64>) -> Result<Arc<Photograph>> {
-        Ok(self.load_counted(intrinsics, exposure)?.0)
-    }
-
-    /// [`PhotographSource::load`], and the number of pixels whose values are impossible: not finite or negative.
-    ///
-    /// # Errors
-    /// As [`PhotographSource::load`].
-    pub fn load_counted(
-        &self,
-        intrinsics: &Intrinsics,
-        exposure: Option<f64>,
-    ) -> Result<(Arc<Photograph>, usize)> {
-        match self {
-            Self::Memory(photograph) => Ok((photograph.clone(), 0)),
-            Self::File(path, orientation) => {
-                let (photograph, invalid) =
-                    read::image::read(path, *orientation, intrinsics, exposure)?;
-                Ok((Arc::new(photograph), invalid))
-            }
-        }
-    }
-
-    /// The photograph turned or mirrored, after what is done to it already.
+    /// The photograph with `orientation` applied after its own.
     pub fn oriented(&self, orientation: Orientation) -> Self {
         match self {
             Self::File(path, before) => Self::File(path.clone(), before.then(orientation)),

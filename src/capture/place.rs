@@ -1,46 +1,46 @@
-//! A capture in other coordinates: in metres, with the ground at height 0.
+//! Places a capture: scale to metres, and ground at height 0.
 
 use crate::capture::Capture;
 use crate::error::{Error, Result};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// From the coordinates of a capture's files to those that it is worked with.
+/// The map from the coordinates of a capture's files to scene units.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Coordinates {
-    /// Metres per unit of the files; `None` takes the units for metres.
+    /// Metres per file unit; `None` means 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<f64>,
-    /// What is at height 0, in the files' units: a point's product with the unit up vector; `None` leaves heights as they are.
+    /// Height of the ground in file units, along the unit up vector; the map takes it to 0. `None` means 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ground: Option<f64>,
 }
 
 impl Coordinates {
-    /// A point of the files where `up` is the unit up vector.
+    /// Maps a point of the files; `up` is the unit up vector.
     pub fn apply(&self, point: DVec3, up: DVec3) -> DVec3 {
         (point - up * self.ground.unwrap_or(0.0)) * self.scale.unwrap_or(1.0)
     }
 
-    /// The point of the files that comes to lie at `point`.
+    /// The inverse of [`Coordinates::apply`].
     pub fn undo(&self, point: DVec3, up: DVec3) -> DVec3 {
         point / self.scale.unwrap_or(1.0) + up * self.ground.unwrap_or(0.0)
     }
 }
 
 impl Capture {
-    /// The capture with `up`, if one is given, in other coordinates.
+    /// The capture with another up vector, if one is given, and in other coordinates.
     ///
     /// # Errors
-    /// A number is none that coordinates can have.
+    /// The scale is not positive, or a number is not finite.
     pub fn placed(mut self, up: Option<DVec3>, coordinates: &Coordinates) -> Result<Self> {
         let scale = coordinates.scale.unwrap_or(1.0);
         let usable = scale.is_finite() && scale > 0.0;
         if !usable || !coordinates.ground.is_none_or(f64::is_finite) {
             return Err(Error::usage(
                 "--scale",
-                "is no scale",
+                "is not a valid scale",
                 "give metres per unit, above 0",
             ));
         }

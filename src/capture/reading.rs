@@ -1,7 +1,7 @@
-//! How the numbers of a capture's files are meant: axes, units, sizes, and which photograph belongs to which pose.
+//! Conventions of a capture's files: axes, units, image sizes, and which photograph belongs to which pose.
 //!
-//! Files rarely say it. The default is the format's own convention; a person may say otherwise, and
-//! [`crate::calibrate::alignment`] finds out which reading the photographs agree with.
+//! Files rarely state them. The default is the format's own convention; options override it, and [`crate::calibrate::alignment`]
+//! finds the conventions that the photographs agree with.
 
 use crate::capture::camera::Intrinsics;
 use crate::capture::orientation::Orientation;
@@ -11,7 +11,7 @@ use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 
-/// Which way a camera's axes point.
+/// Convention of camera axes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Axes {
@@ -22,23 +22,23 @@ pub enum Axes {
     OpenCv,
 }
 
-/// How a capture's files are to be read.
+/// The conventions by which a capture's files are read.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Reading {
-    /// Axes of the poses.
+    /// Camera axes of the poses.
     pub axes: Axes,
     /// Quarter turns of the mesh about the x axis, 0 to 3: 3 takes a mesh whose z is up to poses whose y is up.
     pub mesh_turns: u8,
-    /// What the mesh's coordinates are multiplied by to be in the poses' unit.
+    /// Factor from the mesh's unit to the poses' unit.
     pub mesh_scale: f64,
-    /// What focal lengths are multiplied by.
+    /// Factor on focal lengths.
     pub focal: f64,
-    /// What focal lengths and principal points are multiplied by: photographs over the size that the lens is given for.
+    /// Factor on focal lengths and principal points: the photographs' size over the size that the lens is given for.
     pub lens_scale: f64,
-    /// How all photographs are turned or mirrored, after what their files say.
+    /// Orientation of all photographs, applied after that of their files.
     pub orientation: Orientation,
-    /// Pose k has the photograph of frame k + `shift`, around the end.
+    /// Pose k has the photograph of frame (k + `shift`) modulo the number of frames.
     pub shift: i32,
 }
 
@@ -57,12 +57,12 @@ impl Default for Reading {
 }
 
 impl Reading {
-    /// Whether files are read by the format's own conventions.
+    /// Whether the files follow the format's conventions.
     pub fn is_default(&self) -> bool {
         *self == Self::default()
     }
 
-    /// This reading followed by another, which was found on the capture as this one reads it.
+    /// This reading followed by `next`, which applies to the capture as this one reads it.
     pub fn then(&self, next: &Self) -> Self {
         Self {
             axes: match (self.axes, next.axes) {
@@ -78,7 +78,7 @@ impl Reading {
         }
     }
 
-    /// The rotation that takes the mesh's coordinates to those of the poses.
+    /// The rotation from the mesh's coordinates to the poses'.
     pub fn mesh_rotation(&self) -> DMat3 {
         match self.mesh_turns % 4 {
             0 => DMat3::IDENTITY,
@@ -86,7 +86,7 @@ impl Reading {
         }
     }
 
-    /// The options of the command line that ask for this reading; empty for the default.
+    /// The command-line options for this reading; empty for the default.
     pub fn options(&self) -> String {
         let mut options = Vec::new();
         if self.axes == Axes::OpenCv {
@@ -116,7 +116,7 @@ impl Reading {
         options.join(" ")
     }
 
-    /// What is done to the files to read them so, in plain words; empty for the default.
+    /// A description in words of what this reading does to the files; empty for the default.
     pub fn words(&self) -> String {
         let mut words = Vec::new();
         if self.axes == Axes::OpenCv {
@@ -155,7 +155,7 @@ impl Reading {
     }
 }
 
-/// A factor to a thousandth of itself or better, without an exponent.
+/// A factor with a relative precision of 1/1000 or better, without an exponent.
 fn number(factor: f64) -> String {
     let places = 3 - factor.log10().floor().min(0.0) as i32;
     let text = format!("{factor:.0$}", places.max(0) as usize);
@@ -163,8 +163,8 @@ fn number(factor: f64) -> String {
 }
 
 impl Intrinsics {
-    /// The lens as a reading means it. For photographs turned by a quarter it is that of the turned picture; a principal point in
-    /// the middle of the picture stays there, and another is taken for the turned picture's already.
+    /// The lens under a reading. A quarter turn of the photographs swaps width and height. A principal point at the picture's middle
+    /// stays at the middle; any other is taken as given for the turned picture.
     pub fn read_as(&self, reading: &Reading) -> Self {
         let mut lens = *self;
         lens.fx *= reading.focal * reading.lens_scale;
@@ -188,7 +188,7 @@ impl Intrinsics {
 }
 
 impl Capture {
-    /// The capture as a reading means it. Photographs in files are turned when they are read.
+    /// The capture under a reading. Photographs in files are turned when they are loaded.
     pub fn read_as(mut self, reading: &Reading) -> Self {
         if reading.is_default() {
             return self;
@@ -207,7 +207,7 @@ impl Capture {
                 frame.pose.rotation.y_axis *= -1.0;
                 frame.pose.rotation.z_axis *= -1.0;
             }
-            // A photograph in a file was read for its turned size already.
+            // The reader has already swapped the size of photographs in files.
             let in_file = matches!(frame.photograph, PhotographSource::File(..));
             let lens = Reading {
                 orientation: match in_file {
@@ -233,8 +233,9 @@ impl Capture {
             })
             .collect();
         for (index, frame) in self.frames.iter_mut().enumerate() {
-            let of = (index as i64 + i64::from(reading.shift)).rem_euclid(count as i64) as usize;
-            (frame.photograph, frame.exposure, frame.depth) = shown[of].clone();
+            let source =
+                (index as i64 + i64::from(reading.shift)).rem_euclid(count as i64) as usize;
+            (frame.photograph, frame.exposure, frame.depth) = shown[source].clone();
         }
         self
     }

@@ -1,10 +1,10 @@
-//! Changes of a mesh's objects by hand: named anew, joined, and cut out.
+//! Edits of a mesh's objects by hand: rename, join, cut.
 
 use crate::capture::mesh::Mesh;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-/// One change. Objects are named as they are when its turn comes.
+/// One edit. Names are those after all earlier edits.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Regroup {
@@ -22,7 +22,7 @@ pub enum Regroup {
     },
     /// Makes faces an object of their own, whichever objects they belong to.
     Cut {
-        /// The faces, as runs of neighbours in the mesh's order: first face and number of faces.
+        /// The faces as runs of consecutive indices: first face and number of faces.
         faces: Vec<[u32; 2]>,
         /// The new object's name, which no other object has.
         name: String,
@@ -30,7 +30,7 @@ pub enum Regroup {
 }
 
 impl Regroup {
-    /// A cut of faces given by ascending indices.
+    /// A cut of faces in ascending order.
     pub fn cut(faces: impl IntoIterator<Item = u32>, name: String) -> Self {
         let mut runs: Vec<[u32; 2]> = Vec::new();
         for face in faces {
@@ -43,28 +43,28 @@ impl Regroup {
     }
 }
 
-/// Changes a mesh's objects, one change after the other. Objects that lose all their faces vanish.
+/// Applies edits to a mesh's objects in order. Objects without faces are removed.
 ///
 /// # Errors
-/// A change names an object or a face that there is not, a name that is taken, or nothing at all.
+/// An edit names an unknown object or face, a name that is taken, or nothing.
 pub fn regroup(mesh: &mut Mesh, changes: &[Regroup]) -> Result<()> {
     for change in changes {
         match change {
             Regroup::Rename { object, name } => {
-                let object = place(mesh, object)?;
+                let object = index_of(mesh, object)?;
                 if mesh.objects[object] != *name {
                     mesh.objects[object] = unused(mesh, name)?;
                 }
             }
             Regroup::Join { objects } => {
-                let places: Vec<u32> = (objects.iter())
-                    .map(|object| Ok(place(mesh, object)? as u32))
+                let joined: Vec<u32> = (objects.iter())
+                    .map(|object| Ok(index_of(mesh, object)? as u32))
                     .collect::<Result<_>>()?;
-                let Some(&first) = places.first() else {
+                let Some(&first) = joined.first() else {
                     return Err(wrong("names no object to join"));
                 };
                 for object in &mut mesh.object_of {
-                    if places.contains(object) {
+                    if joined.contains(object) {
                         *object = first;
                     }
                 }
@@ -90,7 +90,8 @@ pub fn regroup(mesh: &mut Mesh, changes: &[Regroup]) -> Result<()> {
     Ok(())
 }
 
-/// For each object of one grouping of a mesh's faces the object of another that has the same faces, where there is one.
+/// For each object of the grouping `before`, the object of the grouping `after` with exactly the same faces, if there is one.
+/// Both hold the object of each face; `objects` is the number of objects before.
 pub fn same_objects(before: &[u32], after: &[u32], objects: usize) -> Vec<Option<u32>> {
     let mut same: Vec<Option<u32>> = vec![None; objects];
     let mut faces = vec![0usize; objects];
@@ -100,7 +101,7 @@ pub fn same_objects(before: &[u32], after: &[u32], objects: usize) -> Vec<Option
         faces[from] += 1;
         mixed[from] |= *same[from].get_or_insert(to) != to;
     }
-    let others = after.iter().max().map_or(0, |&most| most as usize + 1);
+    let others = after.iter().max().map_or(0, |&max| max as usize + 1);
     let mut faces_after = vec![0usize; others];
     for &to in after {
         faces_after[to as usize] += 1;
@@ -110,17 +111,21 @@ pub fn same_objects(before: &[u32], after: &[u32], objects: usize) -> Vec<Option
         .collect()
 }
 
-fn place(mesh: &Mesh, object: &str) -> Result<usize> {
-    let place = mesh.objects.iter().position(|name| name == object);
-    place.ok_or_else(|| wrong(&format!("names the object {object:?}, and there is none")))
+fn index_of(mesh: &Mesh, object: &str) -> Result<usize> {
+    let index = mesh.objects.iter().position(|name| name == object);
+    index.ok_or_else(|| {
+        wrong(&format!(
+            "names the object {object:?}, which does not exist"
+        ))
+    })
 }
 
-/// A name that no object has yet.
+/// `name`, checked to be new and not empty.
 fn unused(mesh: &Mesh, name: &str) -> Result<String> {
     match name {
         "" => Err(wrong("gives an object no name")),
         _ if mesh.objects.iter().any(|other| other == name) => Err(wrong(&format!(
-            "names a second object {name:?}, and names are unique"
+            "gives a second object the name {name:?}; names must be unique"
         ))),
         _ => Ok(name.to_owned()),
     }
@@ -130,11 +135,11 @@ fn wrong(what: &str) -> Error {
     Error::new(
         "objects",
         format!("a change {what}"),
-        "take the change back, or change the objects of this mesh anew",
+        "undo the change, or edit the objects of this mesh again",
     )
 }
 
-/// Leaves out objects without faces.
+/// Removes objects without faces.
 fn drop_empty(mesh: &mut Mesh) {
     let mut used = vec![false; mesh.objects.len()];
     for &object in &mesh.object_of {
@@ -143,17 +148,17 @@ fn drop_empty(mesh: &mut Mesh) {
     if used.iter().all(|&used| used) {
         return;
     }
-    let mut places = vec![0; used.len()];
+    let mut new_index = vec![0; used.len()];
     let mut objects = Vec::new();
     for (k, name) in std::mem::take(&mut mesh.objects).into_iter().enumerate() {
         if used[k] {
-            places[k] = objects.len() as u32;
+            new_index[k] = objects.len() as u32;
             objects.push(name);
         }
     }
     mesh.objects = objects;
     for object in &mut mesh.object_of {
-        *object = places[*object as usize];
+        *object = new_index[*object as usize];
     }
 }
 

@@ -1,22 +1,21 @@
-//! How a camera turns light into the values of its files, where that is not the curve that the files name.
+//! The camera response: pixel value against light, where it is not the curve that the file format prescribes.
 
 use glam::{DVec3, Vec3};
 
-/// Shapes that a response is made of, as functions of the light's logarithm.
+/// Number of basis functions of a response.
 pub const TERMS: usize = 3;
-/// The least and the greatest slope of a response that can be told from noise.
+/// Minimum and maximum d ln(light) / d ln(value) of a response; beyond them it cannot be measured through noise.
 const SLOPES: [f64; 2] = [0.1, 10.0];
-/// Steps of the inverse at most, and the change of a logarithm that ends them.
+/// Maximum number of Newton steps of the inverse, and the change of a logarithm at which they stop.
 const STEPS: usize = 60;
-const STANDING: f64 = 1e-10;
+const TOLERANCE: f64 = 1e-10;
 
-/// A camera's response, as the light that its values stand for: the logarithm of light is y + a y + b (√V − 1) + c (V − 1), where
-/// y is the logarithm of the value V. Values, after the file's own curve (sRGB) is undone, and light are fractions of those that
-/// saturate.
+/// The inverse response of a camera, from value V to light: ln light = y + a y + b (√V − 1) + c (V − 1), where y = ln V. V is the
+/// value after the file's own curve (sRGB) is undone; V and light are fractions of their saturation values.
 ///
-/// The first term is a power, the others bend the middle and the highlights; in the dark, and above saturation, a power is left.
-/// Any power of such a curve is one as well. Exposures that are not known leave the power open (Grossberg and Nayar 2003):
-/// then the terms are such that over what the photographs show the logarithm of light grows, on the whole, as the value's.
+/// a is a power; b and c bend the midtones and the highlights. The curve tends to a power in the dark and continues as one above
+/// saturation. A power of such a curve is again such a curve, so unknown exposures leave the power undetermined (Grossberg and
+/// Nayar 2003); then the terms are chosen such that over the photographs' values ln light has a mean slope of 1 in ln V.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Response {
     /// a, b and c, each per channel.
@@ -24,8 +23,8 @@ pub struct Response {
 }
 
 impl Response {
-    /// The shapes at the logarithm of a value, and their slopes.
-    pub fn shapes(log_value: f64) -> [[f64; 2]; TERMS] {
+    /// The basis functions of a, b and c at ln V, each with its derivative.
+    pub fn basis(log_value: f64) -> [[f64; 2]; TERMS] {
         let inside = log_value.min(0.0);
         let beyond = log_value - inside;
         let root = (0.5 * inside).exp();
@@ -36,64 +35,63 @@ impl Response {
         ]
     }
 
-    /// The logarithm of the light that became a value of a logarithm in a channel, and how it grows with that.
+    /// ln light at ln V in a channel, and its derivative d ln light / d ln V.
     pub fn log_light(&self, channel: usize, log_value: f64) -> [f64; 2] {
         let mut sum = [log_value, 1.0];
-        for (term, shape) in self.terms.iter().zip(Self::shapes(log_value)) {
+        for (term, function) in self.terms.iter().zip(Self::basis(log_value)) {
             let term = f64::from(term[channel]);
-            sum = [sum[0] + term * shape[0], sum[1] + term * shape[1]];
+            sum = [sum[0] + term * function[0], sum[1] + term * function[1]];
         }
         sum
     }
 
-    /// The logarithm of the value that light of a logarithm becomes: the inverse of [`Response::log_light`], by Newton's method
-    /// between bounds that close in.
+    /// ln V at ln light: the inverse of [`Response::log_light`], by Newton's method safeguarded by bisection.
     pub fn log_value(&self, channel: usize, log_light: f64) -> f64 {
         let [mut low, mut high] = [f64::NEG_INFINITY, f64::INFINITY];
         let mut value = log_light;
         for _ in 0..STEPS {
             let [light, slope] = self.log_light(channel, value);
-            let over = light - log_light;
-            if over > 0.0 {
+            let excess = light - log_light;
+            if excess > 0.0 {
                 high = value;
             } else {
                 low = value;
             }
-            let mut next = value - over / slope;
+            let mut next = value - excess / slope;
             if !(low..=high).contains(&next) {
                 next = 0.5 * (low + high);
             }
             let change = (next - value).abs();
             value = next;
-            if change < STANDING {
+            if change < TOLERANCE {
                 break;
             }
         }
         value
     }
 
-    /// The light of a value, both in the photograph's units, in which it saturates at `saturation`. A photograph that does not
-    /// saturate shows light as it is.
+    /// The light of a value, both in the photograph's units, in which values saturate at `saturation`. Channels with infinite
+    /// saturation are linear.
     pub fn light(&self, value: Vec3, saturation: Vec3) -> Vec3 {
-        each(value, saturation, |channel, log| {
+        map_log(value, saturation, |channel, log| {
             self.log_light(channel, log)[0]
         })
     }
 
     /// The value of light: the inverse of [`Response::light`].
     pub fn value(&self, light: Vec3, saturation: Vec3) -> Vec3 {
-        each(light, saturation, |channel, log| {
+        map_log(light, saturation, |channel, log| {
             self.log_value(channel, log)
         })
     }
 
-    /// Whether light grows with the values, at slopes that can be told.
+    /// Whether the slope lies between the limits at every value.
     pub fn is_possible(&self) -> bool {
         let terms = self.terms.map(Vec3::as_dvec3);
-        let [least, most] = SLOPES.map(DVec3::splat);
+        let [min, max] = SLOPES.map(DVec3::splat);
         let slope =
             |root: DVec3| DVec3::ONE + terms[0] + terms[1] * root * 0.5 + terms[2] * root * root;
-        // A parabola in the root of the value: its slope is extreme at the ends or at its vertex.
+        // The slope is a parabola in √V: its extremes lie at the ends of [0, 1] or at the vertex.
         let vertex = (-terms[1] / (4.0 * terms[2])).map(|root| {
             if root.is_finite() {
                 root.clamp(0.0, 1.0)
@@ -101,19 +99,19 @@ impl Response {
                 0.0
             }
         });
-        let possible = |root| slope(root).cmpge(least).all() && slope(root).cmple(most).all();
+        let possible = |root| slope(root).cmpge(min).all() && slope(root).cmple(max).all();
         terms.iter().all(|term| term.is_finite())
             && [DVec3::ZERO, DVec3::ONE, vertex].into_iter().all(possible)
     }
 }
 
-/// Changes the logarithms of positive colours in the channels that saturate.
-fn each(color: Vec3, saturation: Vec3, change: impl Fn(usize, f64) -> f64) -> Vec3 {
+/// Maps ln(colour / saturation) by `change`, in channels with a positive value and a finite saturation.
+fn map_log(color: Vec3, saturation: Vec3, change: impl Fn(usize, f64) -> f64) -> Vec3 {
     Vec3::from_array(std::array::from_fn(|channel| {
-        let full = f64::from(saturation[channel]);
-        let fraction = f64::from(color[channel]) / full;
-        if full.is_finite() && fraction > 0.0 {
-            (change(channel, fraction.ln()).exp() * full) as f32
+        let limit = f64::from(saturation[channel]);
+        let fraction = f64::from(color[channel]) / limit;
+        if limit.is_finite() && fraction > 0.0 {
+            (change(channel, fraction.ln()).exp() * limit) as f32
         } else {
             color[channel]
         }

@@ -1,10 +1,10 @@
-//! The true materials and lights of a capture, read for evaluation alone: no solver imports this.
+//! The true materials and lights of a capture, read by `evaluate` only: no solver imports this.
 
 use crate::capture::camera::Intrinsics;
 use crate::capture::orientation::Orientation;
 use crate::capture::photograph::Photograph;
 use crate::capture::read::confine::Confine;
-use crate::capture::read::fields::without_mark;
+use crate::capture::read::fields::without_bom;
 use crate::capture::read::image;
 use crate::error::{Error, Result};
 use glam::DVec3;
@@ -15,35 +15,35 @@ use std::path::Path;
 /// Longest truth.json that is read, in bytes.
 const MAX_BYTES: u64 = 1 << 28;
 
-/// What truth.json says.
+/// The content of truth.json.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Truth {
-    /// By object name.
+    /// The truth about each object, by name.
     pub objects: BTreeMap<String, ObjectTruth>,
 }
 
 /// The truth about an object.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ObjectTruth {
-    /// Diffuse reflectance; where `textured`, its mean. `None` where it is not known.
+    /// Diffuse reflectance; its mean if `textured`. `None` if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub albedo: Option<DVec3>,
     /// Emitted radiance.
     #[serde(default)]
     pub emission: DVec3,
-    /// Mean radiance that leaves it, emitted and reflected, where that differs from the emission.
+    /// Mean radiance that leaves the object, emitted and reflected, where it differs from the emission.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exitance: Option<DVec3>,
-    /// Roughness of its specular lobe; `None` where it is diffuse.
+    /// GGX roughness of the specular lobe; `None` for diffuse objects.
     #[serde(default)]
     pub roughness: Option<f64>,
-    /// Whether its albedo varies over the surface.
+    /// Whether the albedo varies over the surface.
     #[serde(default)]
     pub textured: bool,
 }
 
 impl ObjectTruth {
-    /// Whether it emits.
+    /// Whether the object emits.
     pub fn is_emitter(&self) -> bool {
         self.emission.max_element() > 0.0
     }
@@ -66,8 +66,12 @@ impl Truth {
             ));
         }
         let text = std::fs::read(&path).map_err(|e| Error::io(&path, &e))?;
-        let truth: Self = serde_json::from_slice(without_mark(&text)).map_err(|e| {
-            Error::file(&path, format!("is no valid truth: {e}"), "correct the file")
+        let truth: Self = serde_json::from_slice(without_bom(&text)).map_err(|e| {
+            Error::file(
+                &path,
+                format!("is not a valid truth: {e}"),
+                "correct the file",
+            )
         })?;
         for (name, object) in &truth.objects {
             let possible = |v: DVec3| v.is_finite() && v.min_element() >= 0.0;
@@ -88,7 +92,7 @@ impl Truth {
     }
 }
 
-/// The true albedo that a frame sees, truth/albedo_NNN.exr; `None` where there is no such file.
+/// The true albedo of each pixel of a frame, from truth/albedo_NNN.exr; `None` if there is no such file.
 ///
 /// # Errors
 /// The file is broken or has another size than the frame.

@@ -1,4 +1,4 @@
-//! The working resolution: photographs reduced until they fit a budget of pixels, with cameras reduced exactly.
+//! The working resolution: photographs downsampled to a pixel budget, with matching cameras.
 
 use crate::capture::camera::Intrinsics;
 use crate::capture::photograph::{Photograph, PhotographSource};
@@ -8,26 +8,26 @@ use glam::{BVec3, DVec3, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Pixels so near to a saturated one hold clipped light.
-const BESIDE: usize = 2;
+/// Radius in pixels around a saturated pixel within which blur, resampling and compression mix in clipped light.
+const CLIPPED_RADIUS: usize = 2;
 
 /// All photographs of a capture in memory at the working resolution.
 #[derive(Debug, Clone)]
 pub struct Working {
-    /// One a frame, in frame order: linear radiance, each pixel the mean of `factor`² pixels of the file.
+    /// One per frame: linear radiance, each pixel the mean of `factor`² pixels of the file.
     pub photographs: Vec<Arc<Photograph>>,
-    /// The frames' lenses at this resolution; sizes equal those of `photographs`.
+    /// The frames' intrinsics at this resolution.
     pub intrinsics: Vec<Intrinsics>,
-    /// Width and height of the block of pixels that became one.
+    /// The downsampling factor: width and height of the block of pixels that becomes one.
     pub factor: u32,
-    /// What was odd, each a full sentence naming the file.
+    /// Warnings, each a full sentence naming the file.
     pub warnings: Vec<String>,
 }
 
-/// Loads all photographs, reduced by the smallest whole factor with which they have at most `max_pixels` together. Pixels
-/// beside saturated ones are lower bounds.
+/// Loads all photographs, downsampled by the smallest whole factor at which their pixels sum to at most `max_pixels`. Pixels
+/// next to saturated ones are marked as lower bounds.
 ///
-/// Frames are read in parallel; no more full-size photographs are held at once than there are threads.
+/// Frames are read in parallel; at most one full-size photograph per thread is in memory.
 ///
 /// # Errors
 /// A photograph cannot be read or has another size than its camera, or there is no light in any of them.
@@ -44,7 +44,7 @@ pub fn load_working(capture: &Capture, max_pixels: u64) -> Result<Working> {
                 1 => photograph,
                 _ => Arc::new(reduce(&photograph, factor)),
             };
-            Ok((with_clipped_surroundings(reduced), invalid))
+            Ok((bound_near_clipped(reduced), invalid))
         })
         .collect();
 
@@ -83,7 +83,7 @@ pub fn load_working(capture: &Capture, max_pixels: u64) -> Result<Working> {
 }
 
 impl Capture {
-    /// The same capture seen at the working resolution: cameras and photographs are replaced by those of `working`.
+    /// The capture at the working resolution: with the cameras and photographs of `working`.
     pub fn at(&self, working: &Working) -> Self {
         let mut capture = self.clone();
         let reduced = working.intrinsics.iter().zip(&working.photographs);
@@ -96,8 +96,8 @@ impl Capture {
 }
 
 impl Intrinsics {
-    /// The lens of a photograph whose pixels are blocks of `factor` × `factor` pixels of this one, counted from the
-    /// top-left corner; a remainder at the right and the bottom is cut off.
+    /// The lens of the photograph downsampled by `factor`, in blocks from the top-left corner; a remainder at the right and the
+    /// bottom is cropped.
     pub fn reduced(&self, factor: u32) -> Self {
         let scale = f64::from(factor);
         Self {
@@ -112,14 +112,14 @@ impl Intrinsics {
     }
 }
 
-/// Whether any pixel that may be used shows light.
+/// Whether any usable pixel is brighter than zero.
 fn holds_light(photograph: &Photograph) -> bool {
     let is_lit =
         |(index, value): (usize, &Vec3)| value.max_element() > 0.0 && photograph.is_usable(index);
     photograph.pixels.iter().enumerate().any(is_lit)
 }
 
-/// The smallest factor that meets the budget; no photograph shrinks below one pixel.
+/// The smallest factor that meets the pixel budget; no photograph shrinks below one pixel.
 fn reduction(frames: &[Frame], max_pixels: u64) -> u32 {
     let sizes = || {
         frames
@@ -132,7 +132,7 @@ fn reduction(frames: &[Frame], max_pixels: u64) -> u32 {
             .map(|(w, h)| u64::from(w / factor) * u64::from(h / factor))
             .sum()
     };
-    // The number of pixels falls with the factor, so the smallest that fits is found by halving.
+    // The number of pixels decreases with the factor, so bisection finds the smallest that fits.
     let (mut low, mut high) = (1, largest);
     while low < high {
         let middle = low + (high - low) / 2;
@@ -145,8 +145,7 @@ fn reduction(frames: &[Frame], max_pixels: u64) -> u32 {
     low
 }
 
-/// The mean of every block of pixels. A block with an unusable pixel is unusable; one of which a part is saturated is a lower
-/// bound.
+/// Downsamples by block means. A block with an unusable pixel is unusable; a block with a saturated pixel is a lower bound.
 fn reduce(photograph: &Photograph, factor: u32) -> Photograph {
     let (width, height) = (photograph.width / factor, photograph.height / factor);
     let count = f64::from(factor) * f64::from(factor);
@@ -196,9 +195,9 @@ fn reduce(photograph: &Photograph, factor: u32) -> Photograph {
     }
 }
 
-/// The photograph, what lies beside saturated pixels counted as saturated at what it shows: blur, resampling and compression have
-/// mixed clipped light into it, of which a part is missing.
-fn with_clipped_surroundings(photograph: Arc<Photograph>) -> Arc<Photograph> {
+/// Marks the pixels within [`CLIPPED_RADIUS`] of a saturated one as lower bounds: they hold clipped light, so part of their
+/// light is missing.
+fn bound_near_clipped(photograph: Arc<Photograph>) -> Arc<Photograph> {
     let [width, height] = [photograph.width, photograph.height].map(|size| size as usize);
     let clipped: Vec<bool> = (0..photograph.pixels.len())
         .map(|pixel| photograph.is_saturated(pixel))
@@ -206,15 +205,15 @@ fn with_clipped_surroundings(photograph: Arc<Photograph>) -> Arc<Photograph> {
     if !clipped.contains(&true) {
         return photograph;
     }
-    let is_beside = |pixel: usize| {
+    let is_near_clipped = |pixel: usize| {
         let (x, y) = (pixel % width, pixel / width);
-        let columns = x.saturating_sub(BESIDE)..(x + BESIDE + 1).min(width);
-        (y.saturating_sub(BESIDE)..(y + BESIDE + 1).min(height)).any(|row| {
+        let columns = x.saturating_sub(CLIPPED_RADIUS)..(x + CLIPPED_RADIUS + 1).min(width);
+        (y.saturating_sub(CLIPPED_RADIUS)..(y + CLIPPED_RADIUS + 1).min(height)).any(|row| {
             clipped[row * width + columns.start..row * width + columns.end].contains(&true)
         })
     };
     let limits = (0..clipped.len())
-        .map(|pixel| match is_beside(pixel) {
+        .map(|pixel| match is_near_clipped(pixel) {
             true => photograph.limit(pixel).min(photograph.pixels[pixel]),
             false => photograph.limit(pixel),
         })
@@ -224,7 +223,7 @@ fn with_clipped_surroundings(photograph: Arc<Photograph>) -> Arc<Photograph> {
     Arc::new(bounded)
 }
 
-/// A block of pixels as one.
+/// A downsampled pixel.
 struct Block {
     mean: Vec3,
     usable: bool,
@@ -283,7 +282,7 @@ mod tests {
         let mut clipped = photograph(8, 5);
         clipped.saturation = Vec3::splat(100.0);
         clipped.pixels[2 * 8 + 3].y = 100.0;
-        let bounded = with_clipped_surroundings(Arc::new(clipped));
+        let bounded = bound_near_clipped(Arc::new(clipped));
         for pixel in 0..40 {
             let (x, y) = (pixel as i32 % 8, pixel as i32 / 8);
             let beside = (x - 3).abs() <= 2 && (y - 2).abs() <= 2;
@@ -291,7 +290,7 @@ mod tests {
             assert_eq!(bounded.is_saturated(pixel), beside, "{pixel}");
         }
         // Nothing saturates: nothing changes.
-        let linear = with_clipped_surroundings(Arc::new(photograph(6, 5)));
+        let linear = bound_near_clipped(Arc::new(photograph(6, 5)));
         assert!(linear.limits.is_empty());
     }
 

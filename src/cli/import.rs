@@ -97,7 +97,7 @@ pub fn import(arguments: &ImportArguments) -> Result<()> {
         },
     };
     let scan = read(&arguments.source, &options)?;
-    for line in &scan.said {
+    for line in &scan.remarks {
         say::line(line);
     }
     export::import::write(&arguments.out, &scan)?;
@@ -120,7 +120,7 @@ pub fn beside_results(scan: &Path) -> Result<PathBuf> {
         return Ok(out);
     }
     let read = read(scan, &ImportOptions::default())?;
-    for line in &read.said {
+    for line in &read.remarks {
         say::aside(line);
     }
     export::import::write(&out, &read)?;

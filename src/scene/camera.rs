@@ -16,7 +16,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// A capture's camera, recentred.
+    /// A capture's camera relative to the scene's `origin`.
     pub fn new(intrinsics: &Intrinsics, pose: &Pose, origin: DVec3) -> Self {
         Self {
             intrinsics: *intrinsics,
@@ -25,7 +25,7 @@ impl Camera {
         }
     }
 
-    /// The ray through a point of the image plane, in pixels from the top-left corner. Its direction is of unit length.
+    /// The ray through a point of the image plane in pixels from the top-left corner; its direction has unit length.
     #[inline]
     pub fn ray(&self, pixel: Vec2) -> Ray {
         let k = &self.intrinsics;
@@ -38,7 +38,7 @@ impl Camera {
         Ray::new(self.center, (self.rotation * local).normalize_or_zero())
     }
 
-    /// Where a point appears, in pixels from the top-left corner; `None` behind the camera or outside the image.
+    /// The image position of a point in pixels from the top-left corner; `None` behind the camera and outside the image.
     #[inline]
     pub fn project(&self, point: Vec3) -> Option<Vec2> {
         let local = self.rotation.transpose() * (point - self.center);
@@ -59,7 +59,7 @@ impl Camera {
         inside.then_some(pixel)
     }
 
-    /// The camera with its picture shrunk to a long side of at most `long_side` pixels.
+    /// The camera with its picture downscaled to a long side of at most `long_side` pixels.
     pub fn shrunk(&self, long_side: u32) -> Self {
         let k = &self.intrinsics;
         let factor = f64::from(long_side.max(1)) / f64::from(k.width.max(k.height).max(1));

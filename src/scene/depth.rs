@@ -1,8 +1,8 @@
-//! Pixels whose depth image contradicts the mesh: what they show is not in the mesh, or lies elsewhere in it.
+//! Masks pixels whose measured depth contradicts the mesh: what they show is missing from the mesh or elsewhere in it.
 
 use crate::capture::Capture;
-use crate::capture::import::depth::decode;
 use crate::capture::photograph::Photograph;
+use crate::capture::scan::depth::decode;
 use crate::error::{Error, Result};
 use crate::math::stats::quantile;
 use crate::scene::Scene;
@@ -12,23 +12,24 @@ use glam::Vec2;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// A pixel contradicts the mesh beyond so many times the frame's median difference, and this fraction of its depth.
+/// A pixel contradicts the mesh if the difference exceeds [`MEDIANS`] × the frame's median difference + [`DEPTH_FRACTION`] × depth.
 const MEDIANS: f64 = 5.0;
-const FRACTION: f64 = 0.02;
-/// Width over height of a depth image and its photograph may differ by this fraction.
-const SAME_ASPECT: f64 = 0.02;
+/// See [`MEDIANS`].
+const DEPTH_FRACTION: f64 = 0.02;
+/// Relative tolerance of the aspect ratio between a depth image and its photograph.
+const ASPECT_TOLERANCE: f64 = 0.02;
 
-/// Photographs with the pixels that contradict the mesh marked as unusable, and remarks for the person.
+/// The result of a comparison: photographs with contradicting pixels marked unusable.
 #[derive(Debug)]
 pub struct Compared {
-    /// One a camera.
+    /// One per camera.
     pub photographs: Vec<Arc<Photograph>>,
-    /// Full sentences.
+    /// Warnings, full sentences.
     pub warnings: Vec<String>,
 }
 
-/// Compares the depth images of a capture with its mesh. Frames without one keep all their pixels, as do frames whose
-/// depth image cannot be read, which is said.
+/// Compares the depth images of a capture with its mesh. Frames without a readable depth image keep all pixels; unreadable ones
+/// give a warning.
 pub fn compare(capture: &Capture, scene: &Scene, photographs: &[Arc<Photograph>]) -> Compared {
     let frames: Vec<(Arc<Photograph>, Option<Result<u64>>)> = (0..photographs.len())
         .into_par_iter()
@@ -45,10 +46,10 @@ pub fn compare(capture: &Capture, scene: &Scene, photographs: &[Arc<Photograph>]
                 },
                 Err(error) => return (photograph.clone(), Some(Err(error))),
             };
-            if !depth.shows_the_view_of(photograph) {
+            if !depth.matches_aspect_of(photograph) {
                 let error = Error::file(
                     path,
-                    "has another width to height than its photograph",
+                    "has another aspect ratio than its photograph",
                     "its pixels are not compared",
                 );
                 return (photograph.clone(), Some(Err(error)));
@@ -94,20 +95,19 @@ pub fn compare(capture: &Capture, scene: &Scene, photographs: &[Arc<Photograph>]
 struct Depth {
     size: [u32; 2],
     values: Vec<u16>,
-    /// Metres a unit.
+    /// Metres per unit.
     unit: f64,
 }
 
 impl Depth {
-    /// Whether it can be what the photograph shows, at another resolution.
-    fn shows_the_view_of(&self, photograph: &Photograph) -> bool {
+    /// Whether the aspect ratios agree.
+    fn matches_aspect_of(&self, photograph: &Photograph) -> bool {
         let aspect = |[width, height]: [u32; 2]| f64::from(width) / f64::from(height.max(1));
         let ratio = aspect(self.size) / aspect([photograph.width, photograph.height]);
-        !self.size.contains(&0) && (ratio - 1.0).abs() < SAME_ASPECT
+        !self.size.contains(&0) && (ratio - 1.0).abs() < ASPECT_TOLERANCE
     }
 
-    /// Metres along the viewing direction at a point given in fractions of width and height; `None` where nothing was
-    /// measured.
+    /// Depth in metres along the optical axis at a point in fractions of width and height; `None` where it is missing.
     fn at(&self, fraction: Vec2) -> Option<f64> {
         let [width, height] = self.size;
         let x = ((fraction.x * width as f32) as u32).min(width - 1);
@@ -117,7 +117,7 @@ impl Depth {
     }
 }
 
-/// The photograph without the pixels that contradict the mesh, and their number.
+/// Marks the pixels that contradict the mesh as unusable; also returns their number.
 fn mask(depth: &Depth, scene: &Scene, frame: usize, photograph: &Photograph) -> (Photograph, u64) {
     let size = [photograph.width, photograph.height];
     let camera = &scene.cameras[frame];
@@ -143,7 +143,7 @@ fn mask(depth: &Depth, scene: &Scene, frame: usize, photograph: &Photograph) -> 
     let mut count = 0;
     for (usable, seen) in masked.usable.iter_mut().zip(&pixels) {
         let contradicts = seen.is_some_and(|(measured, mesh)| {
-            (measured - mesh).abs() > MEDIANS * median + FRACTION * measured
+            (measured - mesh).abs() > MEDIANS * median + DEPTH_FRACTION * measured
         });
         count += u64::from(contradicts);
         *usable &= !contradicts;
@@ -151,7 +151,7 @@ fn mask(depth: &Depth, scene: &Scene, frame: usize, photograph: &Photograph) -> 
     (masked, count)
 }
 
-/// Metres along the viewing direction to a triangle's plane; infinite where there is none.
+/// Depth in metres along the optical axis of a triangle's plane; infinite for [`NOTHING`].
 fn mesh_depth(scene: &Scene, camera: &Camera, at: Vec2, triangle: u32) -> f64 {
     if triangle == NOTHING {
         return f64::INFINITY;

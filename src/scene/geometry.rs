@@ -1,13 +1,13 @@
-//! Rays, hits, and where the next ray may start.
+//! Rays, hits, and offsets of ray origins.
 
 use glam::Vec3;
 
-/// A half-line segment: origin + t · direction for t in (t_min, t_max).
+/// A ray segment: origin + t · direction for t in (t_min, t_max).
 #[derive(Debug, Clone, Copy)]
 pub struct Ray {
     /// Start.
     pub origin: Vec3,
-    /// Direction, of any length but zero; t counts in its units.
+    /// Direction of any length but zero; t is in units of its length.
     pub direction: Vec3,
     /// Hits at or below this are ignored.
     pub t_min: f32,
@@ -52,13 +52,13 @@ pub struct Hit {
     pub b2: f32,
 }
 
-/// Relative error of a point from its corners and of the intersection test that follows, in units of the coordinates.
+/// Bound on the relative error of an interpolated point plus that of the next intersection test.
 pub const OFFSET_GAMMA: f32 = 16.0 * (f32::EPSILON * 0.5);
 
-/// Moves a surface point off its triangle, to the side of `w`, by the rounding error of the point.
+/// Offsets a surface point from its triangle to the side of `w` by the bound on its rounding error.
 ///
-/// The bound is pbrt's for a point interpolated from `corners` (Pharr et al., PBR 4ed, section 6.8.4), with the
-/// error of a following intersection test added; it scales with the coordinates, so a room may be of any size.
+/// The bound is that of a point interpolated from `corners` (Pharr et al., PBR 4ed, section 6.8.4) plus the error of the next
+/// intersection test; it scales with the coordinates, so scenes may have any size.
 #[inline]
 pub fn offset_origin(point: Vec3, normal: Vec3, corners: &[Vec3; 3], w: Vec3) -> Vec3 {
     let magnitude = corners[0].abs().max(corners[1].abs()).max(corners[2].abs());

@@ -1,9 +1,10 @@
-//! The immutable scene that light moves in: recentred f32 geometry, objects, hierarchy and cameras.
+//! The immutable scene: recentred f32 geometry, objects, hierarchy and cameras.
 
 pub mod bvh;
 pub mod camera;
 pub mod depth;
 pub mod geometry;
+pub mod ids;
 pub mod prepare;
 pub mod texels;
 pub mod visibility;
@@ -15,13 +16,13 @@ use bvh::Bvh;
 use camera::Camera;
 use geometry::{Hit, Ray};
 use glam::{DVec3, Vec3};
+use ids::IdBuffers;
 use std::sync::OnceLock;
-use visibility::IdBuffers;
 
 /// Geometry and cameras of a capture, in metres relative to [`Scene::origin`].
 #[derive(Debug)]
 pub struct Scene {
-    /// What was subtracted from the capture's coordinates before rounding to f32.
+    /// The capture's coordinates of the scene's origin.
     pub origin: DVec3,
     /// Vertex positions relative to `origin`.
     pub positions: Vec<Vec3>,
@@ -35,15 +36,15 @@ pub struct Scene {
     pub areas: Vec<f32>,
     /// The named groups of triangles.
     pub objects: Vec<Object>,
-    /// One camera a frame, in frame order.
+    /// One camera per frame, in frame order.
     pub cameras: Vec<Camera>,
     /// Unit up vector.
     pub up: Vec3,
     /// Diagonal of the bounding box in metres.
     pub diameter: f32,
-    /// Whether the mesh has no objects of its own, as fused scans have none: what it lacks may lie near by.
+    /// Whether the mesh is a scan without objects: geometry may be missing nearby.
     pub scanned: bool,
-    /// Closest-hit and any-hit queries.
+    /// The hierarchy for nearest-hit and any-hit queries.
     pub bvh: Bvh,
     ids: OnceLock<IdBuffers>,
 }
@@ -51,7 +52,7 @@ pub struct Scene {
 /// A named group of triangles sharing parameters in the coarse stage.
 #[derive(Debug, Clone)]
 pub struct Object {
-    /// The capture's name for it.
+    /// Its name in the capture.
     pub name: String,
     /// Its triangles, ascending.
     pub triangles: Vec<u32>,
@@ -63,15 +64,10 @@ impl Scene {
     /// Recentres a capture, rounds it to f32 and builds the hierarchy.
     ///
     /// # Errors
-    /// The mesh has no triangle with an area, or no frames.
+    /// The mesh has no triangle with an area.
     pub fn new(capture: &Capture) -> Result<Self> {
         let mesh = &capture.mesh;
-        let (low, high) = mesh
-            .positions
-            .iter()
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &p| {
-                (low.min(p), high.max(p))
-            });
+        let (low, high) = mesh.bounds();
         if mesh.triangles.is_empty() || !(high - low).is_finite() {
             return Err(Error::new(
                 &capture.name,
@@ -86,7 +82,7 @@ impl Scene {
             .map(|&p| (p - origin).as_vec3())
             .collect();
 
-        // Normals and areas in f64, so that slivers keep theirs.
+        // Compute normals and areas in f64, since slivers would lose theirs in f32.
         let mut normals = Vec::with_capacity(mesh.triangles.len());
         let mut areas = Vec::with_capacity(mesh.triangles.len());
         let mut objects: Vec<Object> = mesh
@@ -138,17 +134,12 @@ impl Scene {
         })
     }
 
-    /// The same scene with id buffers that were found already; they must be its own.
+    /// The scene with precomputed id buffers, which must be its own.
     pub fn with_ids(self, ids: IdBuffers) -> Self {
         Self {
             ids: OnceLock::from(ids),
             ..self
         }
-    }
-
-    /// What the centre of each pixel sees; found when first asked for, and kept.
-    pub fn ids(&self) -> &IdBuffers {
-        self.ids.get_or_init(|| IdBuffers::new(self))
     }
 
     /// The nearest hit along a ray.
@@ -169,8 +160,7 @@ impl Scene {
         self.triangles[triangle as usize].map(|i| self.positions[i as usize])
     }
 
-    /// How far along a ray the plane of a triangle lies, in units of its direction: negative behind it, not finite where the ray
-    /// runs along the plane.
+    /// Ray parameter t of the intersection with a triangle's plane: negative behind the origin, non-finite for parallel rays.
     #[inline]
     pub fn plane_distance(&self, triangle: u32, ray: &Ray) -> f32 {
         let normal = self.normals[triangle as usize];
@@ -178,7 +168,7 @@ impl Scene {
         normal.dot(corner - ray.origin) / normal.dot(ray.direction)
     }
 
-    /// The point of a hit, recomputed from its barycentrics (more exact than origin + t · direction).
+    /// The point of a hit from its barycentrics (more accurate than origin + t · direction).
     #[inline]
     pub fn point(&self, hit: &Hit) -> Vec3 {
         let [a, b, c] = self.corners(hit.triangle);

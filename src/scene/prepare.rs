@@ -1,28 +1,27 @@
-//! From a capture to a scene that can be solved, with a checked summary of what there is and what is odd.
+//! Prepares a capture for solving: builds the scene, corrects windings, masks contradicting depth, and collects warnings.
 
 use crate::capture::Capture;
 use crate::capture::photograph::Photograph;
 use crate::capture::working::Working;
 use crate::error::{Error, Result};
+use crate::say::listed;
 use crate::scene::Scene;
 use crate::scene::depth;
 use crate::scene::visibility::seen_area_fraction;
 use crate::scene::winding::turn_over;
 use std::sync::Arc;
 
-/// Points on the mesh for which it is asked whether a photograph sees them: a standard error of at most 0.4 %.
+/// Points on the mesh that estimate the seen area, with a standard error of at most 0.4 %.
 const AREA_SAMPLES: u32 = 1 << 14;
-/// Lists of names end here, with the number of the rest.
-const LISTED: usize = 5;
 
 /// A capture ready to be solved.
 #[derive(Debug)]
 pub struct Prepared {
-    /// The capture at the working resolution, with windings put right.
+    /// The capture at the working resolution, with corrected windings.
     pub capture: Capture,
-    /// Its scene; camera sizes equal those of the photographs.
+    /// Its scene; camera sizes equal the photographs'.
     pub scene: Scene,
-    /// The photographs at the working resolution, one a camera.
+    /// The photographs at the working resolution, one per camera.
     pub photographs: Vec<Arc<Photograph>>,
     /// Fraction of the mesh's area that the photographs see, 0 to 1.
     pub seen_area_fraction: f64,
@@ -30,7 +29,7 @@ pub struct Prepared {
     pub warnings: Vec<String>,
 }
 
-/// Builds the scene, finds what the photographs see, and puts windings right (see [`crate::scene::winding`]).
+/// Builds the scene and its id buffers, and corrects windings (see [`crate::scene::winding`]).
 ///
 /// # Errors
 /// The mesh has no triangle with an area, or no photograph sees the mesh.
@@ -49,13 +48,13 @@ pub fn prepare(capture: &Capture, working: &Working) -> Result<Prepared> {
     let turned = turn_over(&mut capture, &scene, scene.ids(), &working.photographs);
     if !turned.is_empty() {
         warnings.extend(turned);
-        // Only the sides have changed.
+        // The seen triangles stay the same; only their sides change.
         let mut ids = scene.ids().clone();
         scene = Scene::new(&capture)?;
         ids.count_sides(&scene);
         scene = scene.with_ids(ids);
     }
-    warnings.extend(oddities(&scene));
+    warnings.extend(unseen(&scene));
     let compared = depth::compare(&capture, &scene, &working.photographs);
     warnings.extend(compared.warnings);
     Ok(Prepared {
@@ -68,7 +67,7 @@ pub fn prepare(capture: &Capture, working: &Working) -> Result<Prepared> {
 }
 
 impl Prepared {
-    /// What a person wants to know before solving, a line each: counts, size, what the photographs see.
+    /// A summary, a line each: counts, size, and what the photographs see.
     pub fn summary(&self) -> Vec<String> {
         let scene = &self.scene;
         let pixels: usize = self.photographs.iter().map(|p| p.pixels.len()).sum();
@@ -97,31 +96,30 @@ impl Prepared {
     }
 }
 
-/// Objects that no photograph sees, and photographs that do not see the mesh.
-fn oddities(scene: &Scene) -> Vec<String> {
+/// Warnings about objects that no photograph sees, and about photographs that do not see the mesh.
+fn unseen(scene: &Scene) -> Vec<String> {
     let ids = scene.ids();
     let mut warnings = Vec::new();
-    let unseen: Vec<&str> = (0..scene.objects.len())
+    let objects: Vec<&str> = (0..scene.objects.len())
         .filter(|&object| ids.seen_pixels(object) == 0)
         .map(|object| scene.objects[object].name.as_str())
         .collect();
-    if !unseen.is_empty() {
+    if !objects.is_empty() {
         warnings.push(format!(
             "no photograph sees {}: {}",
-            count(unseen.len(), "object"),
-            list(&unseen)
+            count(objects.len(), "object"),
+            listed(&objects)
         ));
     }
-    let blind: Vec<String> = (0..scene.cameras.len())
+    let photographs: Vec<String> = (0..scene.cameras.len())
         .filter(|&frame| ids.pixels_on_mesh(frame) == 0)
         .map(|frame| format!("{frame:03}"))
         .collect();
-    if !blind.is_empty() {
-        let names: Vec<&str> = blind.iter().map(String::as_str).collect();
+    if !photographs.is_empty() {
         warnings.push(format!(
             "{} see nothing of the mesh: {}",
-            count(blind.len(), "photograph"),
-            list(&names)
+            count(photographs.len(), "photograph"),
+            listed(&photographs)
         ));
     }
     warnings
@@ -138,13 +136,4 @@ fn count(n: usize, one: &str) -> String {
         .collect();
     let plural = if n == 1 { "" } else { "s" };
     format!("{} {one}{plural}", grouped.join(","))
-}
-
-/// The first few names and the number of the rest.
-fn list(names: &[&str]) -> String {
-    let first = names[..names.len().min(LISTED)].join(", ");
-    match names.len().saturating_sub(LISTED) {
-        0 => first,
-        rest => format!("{first} and {rest} more"),
-    }
 }

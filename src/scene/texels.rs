@@ -1,10 +1,10 @@
-//! A texel grid over triangles that needs no texture coordinates.
+//! Texel grids on triangles, without texture coordinates.
 
 use crate::scene::geometry::Hit;
 
 /// Splits each triangle into 4^level congruent sub-triangles (texels).
 ///
-/// Texels are numbered triangle by triangle; a triangle of level `l` is cut into 2^l strips along b2.
+/// Texels are numbered triangle by triangle; a triangle of level `l` has 2^l strips along b2.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TexelLayout {
     /// Subdivision level of each triangle.
@@ -36,7 +36,7 @@ impl TexelLayout {
         self.len() == 0
     }
 
-    /// The texel that a hit lies in.
+    /// The texel of a hit.
     #[inline]
     pub fn texel(&self, hit: &Hit) -> u32 {
         let triangle = hit.triangle as usize;
@@ -44,7 +44,7 @@ impl TexelLayout {
         if n == 1 {
             return self.first[triangle];
         }
-        // Strip `row` along b2 holds 2 (n − row) − 1 sub-triangles, upright and inverted in turn.
+        // Strip `row` along b2 has 2 (n − row) − 1 sub-triangles, alternately upright and inverted.
         let scale = n as f32;
         let row = ((hit.b2 * scale) as u32).min(n - 1);
         let along = hit.b1 * scale;
@@ -54,42 +54,39 @@ impl TexelLayout {
         self.first[triangle] + before + 2 * column + u32::from(inverted)
     }
 
-    /// Barycentric (b1, b2) of a texel's corners, counted within its triangle and wound as the triangle is.
+    /// Barycentric (b1, b2) of a texel's corners, in the triangle's winding; `texel` counts within its triangle.
     pub fn corners(&self, triangle: usize, texel: u32) -> [[f32; 2]; 3] {
-        let n = 1u32 << self.levels[triangle];
-        let mut row = 0;
-        while row + 1 < n && (row + 1) * (2 * n - row - 1) <= texel {
-            row += 1;
-        }
-        let within = texel - row * (2 * n - row);
-        let (x, y) = ((within / 2) as f32, row as f32);
-        let scale = 1.0 / n as f32;
-        let corners = if within.is_multiple_of(2) {
-            [[x, y], [x + 1.0, y], [x, y + 1.0]]
-        } else {
-            [[x + 1.0, y], [x + 1.0, y + 1.0], [x, y + 1.0]]
+        let (x, y, inverted) = self.cell(triangle, texel);
+        let corners = match inverted {
+            false => [[x, y], [x + 1.0, y], [x, y + 1.0]],
+            true => [[x + 1.0, y], [x + 1.0, y + 1.0], [x, y + 1.0]],
         };
+        let scale = self.texel_size(triangle);
         corners.map(|corner| corner.map(|v| v * scale))
     }
 
-    /// Barycentric (b1, b2) of the middle of a texel, counted within its triangle.
+    /// Barycentric (b1, b2) of a texel's centroid; `texel` counts within its triangle.
     pub fn center(&self, triangle: usize, texel: u32) -> [f32; 2] {
+        let (x, y, inverted) = self.cell(triangle, texel);
+        let third = if inverted { 2.0 / 3.0 } else { 1.0 / 3.0 };
+        let scale = self.texel_size(triangle);
+        [(x + third) * scale, (y + third) * scale]
+    }
+
+    /// Edge of a texel in barycentric units.
+    fn texel_size(&self, triangle: usize) -> f32 {
+        1.0 / (1u32 << self.levels[triangle]) as f32
+    }
+
+    /// Column and row of a texel, and whether it is inverted.
+    fn cell(&self, triangle: usize, texel: u32) -> (f32, f32, bool) {
         let n = 1u32 << self.levels[triangle];
         let mut row = 0;
         while row + 1 < n && (row + 1) * (2 * n - row - 1) <= texel {
             row += 1;
         }
         let within = texel - row * (2 * n - row);
-        let third = if within.is_multiple_of(2) {
-            1.0 / 3.0
-        } else {
-            2.0 / 3.0
-        };
-        let scale = 1.0 / n as f32;
-        [
-            ((within / 2) as f32 + third) * scale,
-            (row as f32 + third) * scale,
-        ]
+        ((within / 2) as f32, row as f32, !within.is_multiple_of(2))
     }
 }
 

@@ -1,23 +1,17 @@
-//! What the photographs see: a triangle for each pixel, sides and pixels for each object, the fraction of the mesh.
+//! What the photographs see: id buffers, seen sides of objects, and the seen fraction of the mesh's area.
 
 use crate::math::rng::Stream;
 use crate::scene::Scene;
 use crate::scene::geometry::Ray;
+pub use crate::scene::ids::{IdBuffers, NOTHING};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-/// Stands in an id buffer where a pixel sees no triangle.
-pub const NOTHING: u32 = u32::MAX;
-
-/// The triangle that the centre of each pixel sees.
-#[derive(Debug, Clone)]
-pub struct IdBuffers {
-    /// For each frame, row by row from the top left, a triangle's index or [`NOTHING`].
-    pub triangles: Vec<Vec<u32>>,
-    /// For each object, the number of pixels that see its front.
-    pub front_pixels: Vec<u64>,
-    /// For each object, the number of pixels that see its back.
-    pub back_pixels: Vec<u64>,
+impl Scene {
+    /// The id buffers of all cameras, computed at the first call.
+    pub fn ids(&self) -> &IdBuffers {
+        self.ids.get_or_init(|| IdBuffers::new(self))
+    }
 }
 
 impl IdBuffers {
@@ -47,7 +41,7 @@ impl IdBuffers {
         buffers
     }
 
-    /// Counts again which sides are seen, for a scene whose triangles were turned over.
+    /// Recounts the seen sides, for a scene with changed windings.
     pub fn count_sides(&mut self, scene: &Scene) {
         self.front_pixels = vec![0; scene.objects.len()];
         self.back_pixels = vec![0; scene.objects.len()];
@@ -66,24 +60,12 @@ impl IdBuffers {
             }
         }
     }
-
-    /// The number of pixels that see an object, from either side.
-    pub fn seen_pixels(&self, object: usize) -> u64 {
-        self.front_pixels[object] + self.back_pixels[object]
-    }
-
-    /// The number of pixels of a frame that see the mesh.
-    pub fn pixels_on_mesh(&self, frame: usize) -> u64 {
-        let seen = self.triangles[frame].iter().filter(|&&t| t != NOTHING);
-        seen.count() as u64
-    }
 }
 
-/// The fraction of the mesh's area that at least one camera sees, from either side, estimated from `samples` points.
+/// The fraction of the mesh's area that any camera sees, from either side, estimated from `samples` points.
 ///
-/// Points are drawn stratified by area, the same ones for the same scene; the standard error is at most ½ / √samples.
+/// Points are stratified by area and deterministic; the standard error is at most ½ / √samples.
 pub fn seen_area_fraction(scene: &Scene, samples: u32) -> f64 {
-    // Cumulative areas, to find the triangle at a given fraction of the area.
     let mut sum = 0.0;
     let cumulative: Vec<f64> = scene
         .areas

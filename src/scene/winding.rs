@@ -1,14 +1,12 @@
-//! Which side of a surface is its front, where the photographs plainly contradict the file.
+//! Corrects the winding of triangles where the photographs contradict it.
 //!
-//! A triangle emits on its front only, so winding matters for lamps alone. It is kept unless the photographs show that
-//! it cannot be right:
+//! A triangle emits on its front only, so winding matters for lamps. It is reversed in two cases:
 //!
-//! 1. nearly every pixel sees a back: the file winds the other way round, and every object that is seen is turned over;
-//! 2. an object is seen from its back only, and is there as bright as the brightest surfaces that are seen from their
-//!    front: it shines on the side on which it could not.
+//! 1. Nearly all pixels see backs: the file has the opposite convention, and all seen objects are reversed.
+//! 2. An object is seen from its back only, and is as bright there as the brightest surfaces seen from their front: it emits on its
+//!    back.
 //!
-//! A dim back is no contradiction (a lamp that lights the ceiling is seen from below), and objects that no photograph
-//! sees are never turned over.
+//! A dim back is no contradiction (a lamp that lights the ceiling is seen from below). Unseen objects are never reversed.
 
 use crate::capture::Capture;
 use crate::capture::photograph::Photograph;
@@ -18,17 +16,17 @@ use crate::scene::Scene;
 use crate::scene::visibility::{IdBuffers, NOTHING};
 use std::sync::Arc;
 
-/// Fraction of an object's pixels that must see its back.
-const ONLY_BACK: f64 = 0.99;
-/// Fewer pixels say nothing about an object.
-const ENOUGH_PIXELS: u64 = 16;
-/// "The brightest surfaces": this quantile of the pixels that see other objects from the front.
-const BRIGHT: f64 = 0.95;
+/// Fraction of an object's pixels that must see its back to count as seen from the back only.
+const BACK_FRACTION: f64 = 0.99;
+/// Minimum number of pixels of an object for a decision.
+const MIN_PIXELS: u64 = 16;
+/// Quantile of the luminances of all other objects that counts as the brightest surfaces.
+const BRIGHT_QUANTILE: f64 = 0.95;
 
-/// Turns over the objects of `capture` whose winding the photographs contradict; says which, a sentence each.
+/// Reverses the winding of objects where the photographs contradict it; returns a sentence about each change.
 ///
-/// `scene`, `ids` and `photographs` (one a camera, of its size) must be those of `capture`. If anything is returned the
-/// scene must be built again.
+/// `scene`, `ids` and `photographs` (one per camera, of its size) must be those of `capture`. If the result is not empty, the
+/// scene must be rebuilt.
 pub fn turn_over(
     capture: &mut Capture,
     scene: &Scene,
@@ -37,22 +35,22 @@ pub fn turn_over(
 ) -> Vec<String> {
     let front: u64 = ids.front_pixels.iter().sum();
     let back: u64 = ids.back_pixels.iter().sum();
-    if back >= ENOUGH_PIXELS && back as f64 >= ONLY_BACK * (front + back) as f64 {
+    if back >= MIN_PIXELS && back as f64 >= BACK_FRACTION * (front + back) as f64 {
         let seen: Vec<bool> = (0..scene.objects.len())
             .map(|object| ids.seen_pixels(object) > 0)
             .collect();
-        turn(capture, &seen);
+        reverse(capture, &seen);
         return vec![
             "the photographs see the mesh from the back of its triangles; all objects that are seen were turned over"
                 .into(),
         ];
     }
 
-    // Luminances of each object that is seen from its back only, and of everything else.
+    // Collect luminances of each object seen from its back only, and of all others together.
     let only_back: Vec<bool> = (0..scene.objects.len())
         .map(|object| {
             let seen = ids.seen_pixels(object);
-            seen >= ENOUGH_PIXELS && ids.back_pixels[object] as f64 >= ONLY_BACK * seen as f64
+            seen >= MIN_PIXELS && ids.back_pixels[object] as f64 >= BACK_FRACTION * seen as f64
         })
         .collect();
     if only_back.iter().all(|&b| !b) {
@@ -74,19 +72,19 @@ pub fn turn_over(
             values.push(f64::from(luminance(*pixel)));
         }
     }
-    let Some(bright) = quantile(&mut others, BRIGHT) else {
+    let Some(bright) = quantile(&mut others, BRIGHT_QUANTILE) else {
         return Vec::new();
     };
-    let shines: Vec<bool> = own
+    let emits: Vec<bool> = own
         .iter_mut()
         .map(|values| quantile(values, 0.5).is_some_and(|median| median > 0.0 && median >= bright))
         .collect();
-    turn(capture, &shines);
+    reverse(capture, &emits);
     scene
         .objects
         .iter()
-        .zip(&shines)
-        .filter(|(_, shines)| **shines)
+        .zip(&emits)
+        .filter(|(_, emits)| **emits)
         .map(|(object, _)| {
             format!(
                 "object {:?} shines on the back of its triangles; it was turned over",
@@ -97,7 +95,7 @@ pub fn turn_over(
 }
 
 /// Reverses the winding of the triangles of the chosen objects.
-fn turn(capture: &mut Capture, chosen: &[bool]) {
+fn reverse(capture: &mut Capture, chosen: &[bool]) {
     let mesh = &mut capture.mesh;
     for (index, &object) in mesh.object_of.iter().enumerate() {
         if chosen[object as usize] {

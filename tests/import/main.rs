@@ -195,7 +195,7 @@ pub(crate) fn import(folder: &Path) -> Result<Import, Error> {
 
 /// Whether one of the lines holds the words.
 pub fn says(import: &Import, words: &str) -> bool {
-    import.said.iter().any(|line| line.contains(words))
+    import.remarks.iter().any(|line| line.contains(words))
 }
 
 /// The pixel position (corners at whole numbers) at which a capture's camera sees a point.

@@ -64,7 +64,7 @@ fn hdr_photographs_lenses_poses_and_instances_come_together() {
     let cameras = &cameras()[..8];
     original(folder.path(), cameras, true);
     let scan = import(folder.path()).unwrap();
-    assert!(says(&scan, "Matterport3D") && says(&scan, "(HDR): 8, tone-mapped: 0"));
+    assert!(says(&scan, "Matterport3D") && says(&scan, "HDR photographs: 8, tone-mapped: 0"));
     assert_eq!(scan.mesh.object_of, [1, 2, 0]);
     assert_eq!(scan.mesh.objects, ["object -1", "object 12", "object 40"]);
     assert!(scan.has_objects);

@@ -175,7 +175,7 @@ fn lenses_beyond_a_captures_own_are_understood() {
             "singular",
         ),
         (json!({"applied_transform": [1]}), "OPENCV", "matrix"),
-        (json!({"frames": 1}), "OPENCV", "no list"),
+        (json!({"frames": 1}), "OPENCV", "not a list"),
         (json!({"frames": []}), "OPENCV", "no photograph"),
         (json!({"exposure": -1}), "OPENCV", "exposure"),
         (

@@ -42,7 +42,7 @@ fn the_room_comes_back() {
         intrinsics(&cameras[0]),
     );
     let scan = import(folder.path()).unwrap();
-    assert!(says(&scan, "taken for 7-Scenes") && says(&scan, "camera-intrinsics.txt"));
+    assert!(says(&scan, "detected 7-Scenes") && says(&scan, "camera-intrinsics.txt"));
     check_cameras(&scan, &cameras, |p| p);
     check_room(&scan.mesh, 0.05, |p| p);
 }
@@ -121,7 +121,7 @@ fn frames_are_chosen_evenly_and_voxels_by_the_rooms_extent() {
     }
     assert!(says(&scan, "photographs: 5 of 24"));
     // A pixel of these small images is larger than 1/256 of the room.
-    assert!(says(&scan, "size of a depth pixel"), "{:?}", scan.said);
+    assert!(says(&scan, "size of a depth pixel"), "{:?}", scan.remarks);
     assert_eq!(scan.up, Some(DVec3::Y));
 }
 

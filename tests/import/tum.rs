@@ -71,7 +71,7 @@ fn images_and_poses_find_each_other_by_time_and_the_room_comes_back() {
     assert!(
         says(&scan, "1 photographs left out: no pose"),
         "{:?}",
-        scan.said
+        scan.remarks
     );
     check_cameras(&scan, &cameras, |p| p);
     check_room(&scan.mesh, 0.05, |p| p);

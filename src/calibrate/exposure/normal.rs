@@ -206,7 +206,7 @@ pub(super) fn levels(
 fn shapes(observation: &Observation) -> [DVec3; TERMS] {
     let of_channels = (observation.level - observation.full)
         .to_array()
-        .map(Response::shapes);
+        .map(Response::basis);
     std::array::from_fn(|term| DVec3::from_array(of_channels.map(|shape| shape[term][0])))
 }
 

@@ -1,6 +1,5 @@
-//! Depth images added to the distance field.
+//! Integrates depth images into the distance field.
 
-use crate::capture::fuse::TRUNCATION;
 use crate::capture::fuse::block::{Block, SIDE, block_at};
 use crate::capture::fuse::view::View;
 use crate::error::{Error, Result};
@@ -8,16 +7,19 @@ use glam::{DVec2, DVec3, IVec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
+/// Truncation distance of the field in voxels.
+const TRUNCATION: f64 = 4.0;
+
 /// A sparse truncated signed distance field. Voxel (i, j, k) sits at (i, j, k) times the edge.
 #[derive(Debug)]
 pub struct Field {
     /// Edge of a voxel in metres.
     pub edge: f64,
-    /// All blocks, in the order in which they were needed.
+    /// All blocks, in the order of allocation.
     pub blocks: Vec<Block>,
-    /// The place of a block in `blocks` by its position.
+    /// Index into `blocks` by block position.
     pub places: HashMap<IVec3, usize>,
-    /// Bound on the memory of the blocks.
+    /// Limit on the memory of the blocks.
     max_bytes: usize,
 }
 
@@ -32,12 +34,12 @@ impl Field {
         }
     }
 
-    /// Adds one view.
+    /// Integrates one view.
     ///
     /// # Errors
-    /// The blocks that it needs go past the bound on memory.
+    /// The blocks exceed the memory limit.
     pub fn integrate(&mut self, view: &View) -> Result<()> {
-        // Make the blocks near the measured surface.
+        // Allocate the blocks near the measured surface.
         let mut new = blocks_near_surface(view, self.edge);
         new.retain(|at| !self.places.contains_key(at));
         if (self.blocks.len() + new.len()).saturating_mul(Block::bytes()) > self.max_bytes {
@@ -55,7 +57,7 @@ impl Field {
             self.places.insert(at, self.blocks.len());
             self.blocks.push(Block::new(at));
         }
-        // Every block in sight learns, so that what was seen through is cleared.
+        // Update every visible block, so that observed free space is cleared.
         let edge = self.edge;
         self.blocks
             .par_iter_mut()
@@ -64,12 +66,12 @@ impl Field {
     }
 }
 
-/// The blocks within the truncation of any measured point, each once, in a fixed order.
+/// The blocks within the truncation distance of any measured point, without duplicates, in a fixed order.
 fn blocks_near_surface(view: &View, edge: f64) -> Vec<IVec3> {
     let k = &view.lens.pinhole;
     let reach = TRUNCATION * edge;
     let side = f64::from(SIDE) * edge;
-    // Points closer together than half a block reach every block.
+    // Points spaced by at most half a block reach every block.
     let deepest = f64::from(view.depth.iter().copied().fold(0.0, f32::max));
     let stride = (side * 0.5 * k.fx.min(k.fy) / deepest.max(1e-9)).floor();
     let stride = stride.clamp(1.0, 64.0) as usize;
@@ -88,7 +90,7 @@ fn blocks_near_surface(view: &View, edge: f64) -> Vec<IVec3> {
                     continue;
                 };
                 let point = view.to_world(ray.extend(1.0) * depth);
-                // The corners of the point's surroundings reach every block that they touch, as 2 · reach ≤ a block's side.
+                // The corners of a cube around the point reach every block that it touches, as 2 · reach ≤ the side of a block.
                 for corner in 0..8 {
                     let sign = |bit: i32| f64::from((corner >> bit & 1) * 2 - 1);
                     let offset = DVec3::new(sign(0), sign(1), sign(2)) * reach;
@@ -105,7 +107,7 @@ fn blocks_near_surface(view: &View, edge: f64) -> Vec<IVec3> {
     blocks
 }
 
-/// Adds a view's distances and colours to the voxels of a block.
+/// Averages a view's distances and colours into the voxels of a block.
 fn update(block: &mut Block, view: &View, edge: f64) {
     if !may_be_seen(block, view, edge) {
         return;
@@ -123,8 +125,8 @@ fn update(block: &mut Block, view: &View, edge: f64) {
         if ahead < -reach {
             continue;
         }
-        // A depth camera's noise grows with the square of the distance, its variance with the fourth power; the square is
-        // a compromise with noise that does not.
+        // The standard deviation of depth noise grows with depth², so its inverse variance falls with depth⁻⁴; depth⁻² is a
+        // compromise with noise that does not grow.
         let weight = (1.0 / (f64::from(depth) * f64::from(depth)).max(1e-4)) as f32;
         let voxel = &mut block.voxels[index];
         let distance = (ahead / reach).min(1.0) as f32;
@@ -139,7 +141,7 @@ fn update(block: &mut Block, view: &View, edge: f64) {
     }
 }
 
-/// Whether a block may project into the view.
+/// Whether a block may project into the view: a conservative test of its bounding sphere.
 fn may_be_seen(block: &Block, view: &View, edge: f64) -> bool {
     let half = f64::from(SIDE) * 0.5;
     let radius = half * edge * 3f64.sqrt();
@@ -152,7 +154,7 @@ fn may_be_seen(block: &Block, view: &View, edge: f64) -> bool {
         return true;
     }
     let k = &view.lens.pinhole;
-    // Far enough in front, a sphere's picture is at most a bit larger than its radius over its depth; lenses bend less than that.
+    // At this distance a sphere's image is little larger than radius / depth; the factor 1.5 covers lens distortion.
     let Some(pixel) = view.lens.project(p) else {
         return true;
     };

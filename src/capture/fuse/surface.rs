@@ -1,4 +1,4 @@
-//! The zero surface of the distance field, block by block, by the crate fast-surface-nets.
+//! Extracts the zero surface of the distance field block by block, with the crate fast-surface-nets.
 
 use crate::capture::fuse::block::{Block, SIDE, Voxel};
 use crate::capture::fuse::integrate::Field;
@@ -9,12 +9,12 @@ use glam::{DVec3, IVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// A block with one voxel more on each side.
+/// A block padded by one voxel on each side.
 type Samples = ConstShape3u32<10, 10, 10>;
-/// Blocks whose surface is found at a time.
+/// Blocks extracted in parallel before their surfaces are merged.
 const BATCH: usize = 1024;
 
-/// The surface in one block: vertices by their cell of the grid, and triangles of them.
+/// The surface of one block; each vertex lies in its own grid cell.
 #[derive(Debug, Default)]
 struct Piece {
     cells: Vec<IVec3>,
@@ -23,7 +23,7 @@ struct Piece {
     triangles: Vec<[u32; 3]>,
 }
 
-/// All triangles between voxels that were all measured; their front is where the distance is positive.
+/// Extracts the mesh from cells whose eight voxels are all measured; fronts face positive distance.
 pub fn extract(field: &Field) -> Mesh {
     let mut order: Vec<&Block> = field.blocks.iter().collect();
     order.sort_unstable_by_key(|block| block.at.to_array());
@@ -31,7 +31,7 @@ pub fn extract(field: &Field) -> Mesh {
         objects: vec!["mesh".into()],
         ..Mesh::default()
     };
-    // A cell has one vertex, whichever block found it.
+    // Neighbouring blocks share the vertex of a cell.
     let mut vertices: HashMap<IVec3, u32> = HashMap::new();
     for blocks in order.chunks(BATCH) {
         let pieces: Vec<Piece> = blocks.par_iter().map(|b| piece(field, b)).collect();
@@ -55,9 +55,9 @@ pub fn extract(field: &Field) -> Mesh {
     mesh
 }
 
-/// The surface in a block and the cells before it.
+/// The surface of a block and of the cells on its lower border.
 fn piece(field: &Field, block: &Block) -> Piece {
-    // The block's voxels with one layer of its neighbours' around.
+    // The block's voxels, padded by one layer of its neighbours'.
     let low = block.at * SIDE - IVec3::ONE;
     let neighbours: [Option<&Block>; 27] = std::array::from_fn(|i| {
         let i = i as i32;
@@ -82,7 +82,7 @@ fn piece(field: &Field, block: &Block) -> Piece {
     let mut net = SurfaceNetsBuffer::default();
     surface_nets(&distances, &Samples {}, [0; 3], [9; 3], &mut net);
 
-    // Cells with a corner that nothing measured hold no surface.
+    // Drop cells with an unmeasured corner.
     let mut piece = Piece::default();
     let mut kept = vec![None; net.positions.len()];
     for (vertex, &cell) in net.surface_points.iter().enumerate() {
@@ -114,7 +114,7 @@ fn piece(field: &Field, block: &Block) -> Piece {
     piece
 }
 
-/// The mean colour of a cell's corners, nearer ones to the surface counting more; grey where no photograph saw any.
+/// The mean colour of a cell's corners, weighted towards those near the surface; grey where no photograph sees any.
 fn mean_color(corners: &[&Voxel]) -> Vec3 {
     let mut sum = Vec3::ZERO;
     let mut weights = 0.0;

@@ -1,21 +1,20 @@
-//! One depth image with its photograph, ready to be asked from anywhere in space.
+//! A depth image and its photograph, looked up by points in space.
 
 use crate::capture::camera::Pose;
-use crate::capture::import::ImportedFrame;
-use crate::capture::import::Lens;
 use crate::capture::orientation::Orientation;
 use crate::capture::photograph::Photograph;
 use crate::capture::read::image;
+use crate::capture::scan::{ImportedFrame, Lens};
 use crate::error::{Error, Result};
 use glam::{DVec2, DVec3, Vec3};
 
-/// Neighbouring depths that differ by more than this fraction lie on different surfaces.
+/// Relative difference above which neighbouring depths lie on different surfaces.
 const JUMP: f32 = 0.05;
 
 /// A decoded frame.
 #[derive(Debug)]
 pub struct View {
-    /// Where it was taken from.
+    /// Camera to world.
     pub pose: Pose,
     /// The depth camera.
     pub lens: Lens,
@@ -49,22 +48,22 @@ impl View {
         })
     }
 
-    /// A point of the world in camera axes: x right, y down, z forwards.
+    /// A world point in camera coordinates: x right, y down, z forwards.
     pub fn to_camera(&self, point: DVec3) -> DVec3 {
         let p = self.pose.rotation.transpose() * (point - self.pose.center);
         DVec3::new(p.x, -p.y, -p.z)
     }
 
-    /// A point in camera axes in the world.
+    /// A point in camera coordinates in the world.
     pub fn to_world(&self, p: DVec3) -> DVec3 {
         self.pose.rotation * DVec3::new(p.x, -p.y, -p.z) + self.pose.center
     }
 
-    /// The depth measured at a pixel position. Between pixels of one surface its inverse is interpolated, which is exact for
-    /// planes; where surfaces meet or a neighbour is missing, the nearest pixel counts.
+    /// The measured depth in metres at a pixel position. Inverse depth is interpolated bilinearly, which is exact for planes;
+    /// at depth discontinuities and next to missing depth the nearest pixel is used.
     pub fn depth_at(&self, pixel: DVec2) -> Option<f32> {
         let k = &self.lens.pinhole;
-        let nearest = self.depth_of(pixel.x.floor() as i64, pixel.y.floor() as i64)?;
+        let nearest = self.depth_of_pixel(pixel.x.floor() as i64, pixel.y.floor() as i64)?;
         let corner = pixel - DVec2::splat(0.5);
         let (i, j) = (corner.x.floor(), corner.y.floor());
         let (u, v) = ((corner.x - i) as f32, (corner.y - j) as f32);
@@ -72,7 +71,7 @@ impl View {
         if i < 0 || j < 0 || i + 1 >= i64::from(k.width) || j + 1 >= i64::from(k.height) {
             return Some(nearest);
         }
-        let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| self.depth_of(i + x, j + y));
+        let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| self.depth_of_pixel(i + x, j + y));
         let [Some(a), Some(b), Some(c), Some(d)] = four else {
             return Some(nearest);
         };
@@ -85,14 +84,14 @@ impl View {
         Some(1.0 / inverse)
     }
 
-    fn depth_of(&self, i: i64, j: i64) -> Option<f32> {
+    fn depth_of_pixel(&self, i: i64, j: i64) -> Option<f32> {
         let k = &self.lens.pinhole;
         let inside = i >= 0 && j >= 0 && i < i64::from(k.width) && j < i64::from(k.height);
         let depth = inside.then(|| self.depth[(j * i64::from(k.width) + i) as usize])?;
         (depth > 0.0).then_some(depth)
     }
 
-    /// The photograph's linear colour of a point in camera axes.
+    /// The photograph's linear colour at a point in camera coordinates; `None` outside it and at unusable pixels.
     pub fn color_at(&self, point: DVec3) -> Option<Vec3> {
         let pixel = self.color_lens.project(point)?.floor();
         let (width, height) = (self.photograph.width, self.photograph.height);

@@ -1,34 +1,35 @@
-//! How large voxels should be.
+//! Chooses the voxel size.
 
-use crate::capture::import::{DepthImage, ImportedFrame};
+use crate::capture::scan::{DepthImage, ImportedFrame};
 use crate::error::{Error, Result};
 use crate::math::stats::quantile;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-/// Voxels along the scan's longest side, by default.
+/// Default number of voxels along the scan's longest side.
 const ACROSS: f64 = 256.0;
-/// Depth images that are looked at for the scan's extent.
+/// Depth images sampled for the scan's extent.
 const FRAMES: usize = 64;
-/// Points of each depth image along its longer side.
+/// Points sampled along the longer side of each depth image.
 const POINTS: u32 = 64;
 
-/// An edge, and why it was chosen.
+/// A voxel edge and the reason for it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VoxelChoice {
     /// Edge in metres.
     pub edge: f64,
-    /// The reason in words; empty if the person chose.
+    /// The reason in words; empty for an edge that the person gave.
     pub reason: String,
 }
 
-/// The edge that the person asks for, or 1/256 of the longest side of what the depth images show (1 % at either end left out),
-/// no finer than depth pixels are. A room that fills its bounding box with surfaces would then need 400 MB.
+/// The edge that the person gives, or 1/256 of the longest side of the measured points' bounding box (from their 1 % to their
+/// 99 % quantiles), but at least the median size of a depth pixel on the surfaces. A room that fills its bounding box with
+/// surfaces then needs 400 MB.
 ///
 /// # Errors
-/// The edge asked for is impossible, a depth image is broken, or no depth was measured.
-pub fn voxel_size(frames: &[ImportedFrame], asked: Option<f64>) -> Result<VoxelChoice> {
-    if let Some(edge) = asked {
+/// The given edge is not positive, a depth image is broken, or no depth was measured.
+pub fn voxel_size(frames: &[ImportedFrame], given: Option<f64>) -> Result<VoxelChoice> {
+    if let Some(edge) = given {
         if !(edge.is_finite() && edge > 0.0) {
             return Err(Error::usage(
                 "--voxel",
@@ -81,7 +82,7 @@ pub fn voxel_size(frames: &[ImportedFrame], asked: Option<f64>) -> Result<VoxelC
     Ok(VoxelChoice { edge, reason })
 }
 
-/// Measured points of a depth image in the world, and the size of a pixel there.
+/// Measured points of a depth image in the world, each with the size of a pixel at its depth, in metres.
 fn points(frame: &ImportedFrame, depth: &DepthImage) -> Result<Vec<(DVec3, f64)>> {
     let metres = depth.metres()?;
     let k = &depth.lens.pinhole;

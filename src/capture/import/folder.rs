@@ -1,12 +1,13 @@
-//! The folder that is imported: listings and texts of bounded size, and no way out of it.
+//! The folder of a scan: listings and files of bounded size, confined to the folder.
 
 use crate::capture::read::confine::Confine;
 use crate::error::{Error, Result};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// Longest text file that is read.
+/// Longest text file that is read, in bytes.
 const MAX_TEXT: u64 = 1 << 28;
-/// Most entries that a folder may have.
+/// Maximum number of entries of a folder.
 const MAX_ENTRIES: usize = 1 << 20;
 
 /// A folder that paths may not leave.
@@ -19,7 +20,7 @@ impl Folder {
     /// The folder to import.
     ///
     /// # Errors
-    /// It is no folder.
+    /// It is not a folder.
     pub fn new(path: &Path) -> Result<Self> {
         if !path.is_dir() {
             return Err(Error::file(
@@ -33,40 +34,59 @@ impl Folder {
         })
     }
 
-    /// The way that keeps paths inside.
+    /// The confinement of paths to the folder.
     pub fn confine(&self) -> &Confine {
         &self.confine
     }
 
-    /// Full path of something inside, unchecked.
+    /// Full path of an entry, unchecked.
     pub fn path(&self, name: &str) -> PathBuf {
         self.confine.folder().join(name)
     }
 
-    /// Whether something of this name is there.
+    /// Whether an entry of this name exists.
     pub fn has(&self, name: &str) -> bool {
         self.confine.holds(name)
     }
 
-    /// Whether a folder of this name is there.
+    /// Whether a folder of this name exists.
     pub fn has_folder(&self, name: &str) -> bool {
         self.path(name).is_dir()
     }
 
-    /// The first of the names that is there.
+    /// The first of the names that exists.
     pub fn first<'a>(&self, names: &[&'a str]) -> Option<&'a str> {
         names.iter().copied().find(|name| self.has(name))
     }
 
-    /// The existing file of this name; `place` says who asks for it.
+    /// The existing file of this name; `place` names the field for messages.
     ///
     /// # Errors
-    /// It leads out of the folder, or is no regular file.
+    /// It leads out of the folder, or is not a regular file.
     pub fn file(&self, place: &str, name: &str) -> Result<PathBuf> {
         self.confine.file(place, name)
     }
 
-    /// A text file's content; bytes that are no UTF-8 are replaced.
+    /// The existing file of this name.
+    ///
+    /// # Errors
+    /// As [`Folder::file`].
+    pub fn existing(&self, name: &str) -> Result<PathBuf> {
+        self.file(&self.path(name).display().to_string(), name)
+    }
+
+    /// The content of a JSON file.
+    ///
+    /// # Errors
+    /// As [`Folder::text`], or the file is not valid JSON.
+    pub fn json(&self, name: &str) -> Result<Value> {
+        serde_json::from_str(&self.text(name)?).map_err(|e| {
+            let problem = format!("is not valid JSON: {e}");
+            Error::file(&self.path(name), problem, "correct the file")
+        })
+    }
+
+    /// A text file's content; bytes that are not UTF-8 are replaced.
     ///
     /// # Errors
     /// As [`Folder::file`], or the file is too long.
@@ -75,28 +95,27 @@ impl Folder {
         Ok(String::from_utf8_lossy(&bytes).into_owned())
     }
 
-    /// A file's content of at most `most` bytes.
+    /// A file's content of at most `max` bytes.
     ///
     /// # Errors
     /// As [`Folder::file`], or the file is too long.
-    pub fn bytes(&self, name: &str, most: u64) -> Result<Vec<u8>> {
-        let path = self.path(name);
-        let file = self.file(&path.display().to_string(), name)?;
+    pub fn bytes(&self, name: &str, max: u64) -> Result<Vec<u8>> {
+        let file = self.existing(name)?;
         let length = file.metadata().map_err(|e| Error::io(&file, &e))?.len();
-        if length > most {
+        if length > max {
             return Err(Error::file(
                 &file,
-                format!("{length} bytes are more than the {most} that are read"),
+                format!("{length} bytes are more than the {max} that are read"),
                 "split the scan",
             ));
         }
         std::fs::read(&file).map_err(|e| Error::io(&file, &e))
     }
 
-    /// Names of what lies in a folder inside (`""` for the folder itself), numbers in them ordered by value.
+    /// Names of the entries of a subfolder (`""` for the folder itself), in natural order (`9` before `10`).
     ///
     /// # Errors
-    /// The folder leads out, cannot be read or has too many entries.
+    /// The subfolder leads out of the folder, cannot be read or has too many entries.
     pub fn names(&self, inside: &str) -> Result<Vec<String>> {
         let path = self.path(inside);
         let whole = self.confine.folder().canonicalize();
@@ -128,7 +147,7 @@ impl Folder {
     }
 }
 
-/// Digits as numbers, all else as letters: `10` comes after `9`.
+/// Sort key of the natural order: runs of letters, and runs of digits by value.
 fn natural_key(name: &str) -> Vec<(String, u64, String)> {
     let mut parts: Vec<(String, u64, String)> = Vec::new();
     let mut rest = name;

@@ -1,13 +1,9 @@
-//! The layouts that are understood, and how a folder's content tells which it has.
+//! The supported layouts of scans.
 
-use crate::capture::import::folder::Folder;
-use crate::capture::import::{colmap, matterport, nerf, rgbd};
-use crate::error::{Error, Result};
-
-/// A layout of files.
+/// A layout of a scan's files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// 7-Scenes and 3DMatch: `frame-N.color.png`, `.depth.png`, `.pose.txt`, perhaps in `seq-NN`.
+    /// 7-Scenes and 3DMatch: `frame-N.color.png`, `.depth.png`, `.pose.txt`, possibly in `seq-NN`.
     SevenScenes,
     /// ScanNet as its exporter writes it: `color`, `depth`, `pose`, `intrinsic`.
     ScanNet,
@@ -26,7 +22,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// All layouts, with the words that `--format` takes.
+    /// All layouts, with their names for `--format`.
     pub const ALL: &[(&str, Self)] = &[
         ("7scenes", Self::SevenScenes),
         ("scannet", Self::ScanNet),
@@ -38,7 +34,7 @@ impl Format {
         ("matterport", Self::Matterport),
     ];
 
-    /// The layout in words.
+    /// A description for messages.
     pub fn description(self) -> &'static str {
         match self {
             Self::SevenScenes => "7-Scenes (frame-N.color, .depth, .pose)",
@@ -51,44 +47,4 @@ impl Format {
             Self::Matterport => "a house of Matterport3D",
         }
     }
-}
-
-/// The format of a folder's content.
-///
-/// # Errors
-/// No layout is recognised.
-pub fn detect(folder: &Folder) -> Result<Format> {
-    if matterport::is_here(folder) {
-        return Ok(Format::Matterport);
-    }
-    if nerf::is_here(folder) {
-        return Ok(Format::Nerfstudio);
-    }
-    if colmap::is_here(folder) {
-        return Ok(Format::Colmap);
-    }
-    if rgbd::seven_scenes::is_here(folder)? {
-        return Ok(Format::SevenScenes);
-    }
-    if rgbd::scannet::is_here(folder) {
-        return Ok(Format::ScanNet);
-    }
-    if rgbd::tum::is_icl_nuim(folder)? {
-        return Ok(Format::IclNuim);
-    }
-    if rgbd::tum::is_here(folder) {
-        return Ok(Format::Tum);
-    }
-    if rgbd::open3d::is_here(folder)? {
-        return Ok(Format::Open3d);
-    }
-    let words: Vec<&str> = Format::ALL.iter().map(|(word, _)| *word).collect();
-    Err(Error::file(
-        folder.confine().folder(),
-        "no known layout is recognised in this folder",
-        format!(
-            "name the folder that directly holds the scan's files, or pass --format {}",
-            words.join("|")
-        ),
-    ))
 }

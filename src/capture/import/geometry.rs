@@ -1,16 +1,17 @@
-//! The mesh of an import: read from a file, or fused from depth images.
+//! The mesh of an import, read from a file or fused from depth images.
 
 use crate::capture::fuse;
 use crate::capture::import::folder::Folder;
-use crate::capture::import::{ImportedFrame, memory_bound};
 use crate::capture::inputs;
 use crate::capture::mesh::Mesh;
 use crate::capture::read::confine::Confine;
 use crate::capture::read::mesh;
+use crate::capture::scan::ImportedFrame;
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
-/// Reads a mesh, mirrored in z with its winding turned if the scan's world is left-handed; also whether it has objects.
+/// Reads a mesh; returns it and whether the file defines objects. `mirrored` converts a left-handed world: it negates z and
+/// reverses the winding.
 ///
 /// # Errors
 /// The file is missing or broken.
@@ -18,9 +19,9 @@ pub fn read(
     path: &Path,
     folder: &Folder,
     mirrored: bool,
-    said: &mut Vec<String>,
+    remarks: &mut Vec<String>,
 ) -> Result<(Mesh, bool)> {
-    // A glTF file names its buffers; they may lie beside it, or in the scan.
+    // A glTF file may name buffers beside itself or anywhere in the scan.
     let beside = path
         .parent()
         .filter(|parent| !parent.as_os_str().is_empty());
@@ -29,15 +30,15 @@ pub fn read(
         false => Confine::new(beside.unwrap_or(Path::new(".")), false)?,
     };
     inputs::note(path);
-    let mut remarks = Vec::new();
-    let raw = mesh::read(path, &confine, &mut remarks)?;
+    let mut warnings = Vec::new();
+    let raw = mesh::read(path, &confine, &mut warnings)?;
     let mut mesh = raw.mesh;
-    said.push(format!(
+    remarks.push(format!(
         "mesh: {}, {} triangles",
         path.display(),
         mesh.triangles.len()
     ));
-    said.append(&mut remarks);
+    remarks.append(&mut warnings);
     if mirrored {
         for position in &mut mesh.positions {
             position.z = -position.z;
@@ -48,12 +49,12 @@ pub fn read(
         for uvs in &mut mesh.corner_uvs {
             uvs.swap(1, 2);
         }
-        said.push("the mesh is mirrored in z like the cameras".into());
+        remarks.push("the mesh is mirrored in z like the cameras".into());
     }
     Ok((mesh, raw.has_objects))
 }
 
-/// Meshes by name, the best first.
+/// Usual names of meshes, in order of preference.
 const NAMES: [&str; 9] = [
     "mesh.glb",
     "mesh.ply",
@@ -65,22 +66,25 @@ const NAMES: [&str; 9] = [
     "meshed-poisson.ply",
     "meshed-delaunay.ply",
 ];
-/// Words in the names of PLY files that hold points without faces.
+/// Words in the names of PLY files that are point clouds.
 const POINTS: [&str; 5] = ["fused", "point", "cloud", "sparse", "input"];
 
-/// The mesh in some of a folder's folders: one of the usual names, or the only file that may be one.
+/// Finds a mesh in some folders: a file with one of the usual names, or else the first file that may be a mesh.
 ///
 /// # Errors
 /// A folder cannot be read.
-pub fn find(folder: &Folder, places: &[&str], said: &mut Vec<String>) -> Result<Option<PathBuf>> {
+pub fn find(
+    folder: &Folder,
+    places: &[&str],
+    remarks: &mut Vec<String>,
+) -> Result<Option<PathBuf>> {
     let full = |place: &str, name: &str| match place {
         "" => name.to_owned(),
         _ => format!("{place}/{name}"),
     };
-    let file = |name: &str| folder.file(&folder.path(name).display().to_string(), name);
     for place in places {
         if let Some(name) = NAMES.iter().find(|name| folder.has(&full(place, name))) {
-            return file(&full(place, name)).map(Some);
+            return folder.existing(&full(place, name)).map(Some);
         }
     }
     for place in places.iter().filter(|place| folder.has_folder(place)) {
@@ -93,27 +97,27 @@ pub fn find(folder: &Folder, places: &[&str], said: &mut Vec<String>) -> Result<
         };
         let found: Vec<&String> = names.iter().filter(is_mesh).collect();
         if found.len() > 1 {
-            said.push(format!(
+            remarks.push(format!(
                 "mesh: the first of {} files that may be one; --mesh chooses another",
                 found.len()
             ));
         }
         if let Some(name) = found.first() {
-            return file(&full(place, name)).map(Some);
+            return folder.existing(&full(place, name)).map(Some);
         }
     }
     Ok(None)
 }
 
-/// Fuses the depth of all frames that have one.
+/// Fuses a mesh from all depth images.
 ///
 /// # Errors
-/// No frame has depth, a depth image is broken, or the voxels asked for need too much memory.
+/// No frame has depth, a depth image is broken, or the voxels need too much memory.
 pub fn fuse(
     source: &Path,
     frames: &[ImportedFrame],
     voxel: Option<f64>,
-    said: &mut Vec<String>,
+    remarks: &mut Vec<String>,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Mesh> {
     if !frames.iter().any(|frame| frame.depth.is_some()) {
@@ -124,17 +128,17 @@ pub fn fuse(
         ));
     }
     let choice = fuse::voxel_size(frames, voxel)?;
-    said.push(match voxel {
+    remarks.push(match voxel {
         Some(edge) => format!("voxels of {edge} m"),
         None => format!(
-            "voxels of {:.4} m: {} (at most {} of them; --voxel overrules)",
+            "voxels of {:.4} m: {} (at most {} GiB of them; --voxel overrides)",
             choice.edge,
             choice.reason,
-            memory_bound()
+            fuse::MAX_BYTES >> 30
         ),
     });
     let fused = fuse::fuse(frames, choice.edge, fuse::MAX_BYTES, progress)?;
-    said.push(format!(
+    remarks.push(format!(
         "mesh: fused from {} depth images, {} triangles",
         fused.frames,
         fused.mesh.triangles.len()

@@ -1,4 +1,4 @@
-//! Matrices and poses in text files.
+//! Parses matrices and poses in text files.
 
 use crate::capture::camera::Pose;
 use crate::capture::read::pose::from_rows;
@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use glam::{DMat3, DMat4, DQuat, DVec3, DVec4};
 use std::path::Path;
 
-/// A number as C, Python and MATLAB write it, `nan`, `-nan` and `-inf` included.
+/// A number as C, Python and MATLAB write it, including `nan`, `-nan` and `-inf`.
 pub fn number(word: &str) -> Option<f64> {
     let lower = word.to_ascii_lowercase();
     match lower.as_str() {
@@ -17,7 +17,7 @@ pub fn number(word: &str) -> Option<f64> {
     }
 }
 
-/// All numbers of a text, separated by white space, commas or semicolons; `None` if a word is no number.
+/// All numbers of a text, separated by white space, commas or semicolons; `None` if one is malformed.
 pub fn numbers(text: &str) -> Option<Vec<f64>> {
     text.split(|c: char| c.is_whitespace() || c == ',' || c == ';')
         .filter(|word| !word.is_empty())
@@ -37,7 +37,7 @@ pub fn rows(path: &Path, text: &str) -> Result<Vec<Vec<f64>>> {
         _ => {
             return Err(Error::file(
                 path,
-                "is no 3×3, 3×4 or 4×4 matrix of numbers",
+                "is not a 3×3, 3×4 or 4×4 matrix of numbers",
                 "export it again",
             ));
         }
@@ -49,8 +49,8 @@ pub fn rows(path: &Path, text: &str) -> Result<Vec<Vec<f64>>> {
         .collect())
 }
 
-/// A 3×4 or 4×4 matrix of rows; `None` for another shape.
-pub fn rows_of(rows: &[Vec<f64>]) -> Option<DMat4> {
+/// The matrix of 3 or 4 rows of 4 numbers; `None` for another shape.
+pub fn matrix_of_rows(rows: &[Vec<f64>]) -> Option<DMat4> {
     let fits = (3..=4).contains(&rows.len()) && rows.iter().all(|row| row.len() == 4);
     fits.then(|| {
         let row = |i: usize| match rows.get(i) {
@@ -61,10 +61,10 @@ pub fn rows_of(rows: &[Vec<f64>]) -> Option<DMat4> {
     })
 }
 
-/// The pose of a camera-to-world matrix with OpenCV's camera axes; `None` if it holds a number that is not finite.
+/// The pose of a camera-to-world matrix with OpenCV's camera axes; `None` if a number is not finite.
 ///
 /// # Errors
-/// The matrix is no rigid motion.
+/// The matrix is not a rigid motion.
 pub fn pose_of_rows(place: &str, rows: &[Vec<f64>]) -> Result<Option<Pose>> {
     if rows.iter().flatten().any(|x| !x.is_finite()) {
         return Ok(None);
@@ -79,7 +79,7 @@ pub fn pose_of_rows(place: &str, rows: &[Vec<f64>]) -> Result<Option<Pose>> {
     Ok(Some(from_opencv(pose.rotation, pose.center)))
 }
 
-/// The pose of a rotation (camera to world, OpenCV's axes: x right, y down, looking along +z) and a position.
+/// The pose of a camera-to-world rotation with OpenCV's camera axes (x right, y down, looking along +z) and a camera centre.
 pub fn from_opencv(rotation: DMat3, center: DVec3) -> Pose {
     Pose {
         rotation: DMat3::from_cols(rotation.x_axis, -rotation.y_axis, -rotation.z_axis),
@@ -87,23 +87,20 @@ pub fn from_opencv(rotation: DMat3, center: DVec3) -> Pose {
     }
 }
 
-/// The rotation of a quaternion of any length; `None` if it has none or a number is not finite.
+/// The rotation of a quaternion of any length; `None` if it is zero or not finite.
 pub fn rotation(x: f64, y: f64, z: f64, w: f64) -> Option<DMat3> {
     let q = DQuat::from_xyzw(x, y, z, w);
     let length = q.length();
     (length.is_finite() && length > 1e-9).then(|| DMat3::from_quat(q / length))
 }
 
-/// Refuses a rotation quaternion that is not one.
-///
-/// # Errors
-/// Always.
-pub fn no_quaternion<T>(place: &str) -> Result<T> {
-    Err(Error::new(
+/// The error for a zero quaternion.
+pub fn no_quaternion(place: &str) -> Error {
+    Error::new(
         place,
         "the quaternion has no length",
         "correct the pose or leave the line out",
-    ))
+    )
 }
 
 #[cfg(test)]

@@ -1,16 +1,18 @@
-//! Matterport3D (Chang et al. 2017), a house's folder.
+//! Reads a house of Matterport3D (Chang et al. 2017).
 //!
-//! The photographs are the HDR images in `matterport_hdr_images` where they were converted to EXR or HDR, else the tone-mapped
-//! ones in `matterport_color_images`; their lenses in `matterport_camera_intrinsics` (one line: width height fx fy cx cy k1 k2
-//! p1 p2 k3) and poses in `matterport_camera_poses` (camera to world, OpenCV's axes), `UUID_KINDcamera_yaw` by name. Without
-//! those, `undistorted_camera_parameters/*.conf` with `undistorted_color_images`, whose cy counts from the bottom. Depth is in
-//! quarter millimetres. The mesh is the one in `house_segmentations`, whose faces know their object, else another.
+//! Photographs are the HDR images in `matterport_hdr_images` if converted to EXR or HDR, else the tone-mapped ones in
+//! `matterport_color_images`. Lenses are in `matterport_camera_intrinsics` (one line: width height fx fy cx cy k1 k2 p1 p2 k3), poses
+//! in `matterport_camera_poses` (camera to world, OpenCV's axes); files are named `UUID_KINDcamera_yaw`. Without these, cameras come
+//! from `undistorted_camera_parameters/*.conf` with `undistorted_color_images`, whose cy counts from the bottom. Depth is in quarter
+//! millimetres. The mesh in `house_segmentations`, which has objects, is preferred.
 
-use crate::capture::import::depth::{self, DepthImage};
 use crate::capture::import::folder::Folder;
-use crate::capture::import::lens::{Lens, Model};
+use crate::capture::import::geometry;
 use crate::capture::import::matrix::{number, numbers, pose_of_rows, rows};
-use crate::capture::import::{ImportedFrame, Scan, geometry};
+use crate::capture::import::reader::Scan;
+use crate::capture::scan::ImportedFrame;
+use crate::capture::scan::depth::{self, DepthImage};
+use crate::capture::scan::lens::{Lens, Model};
 use crate::error::{Error, Result};
 use std::collections::{BTreeSet, HashMap};
 
@@ -20,10 +22,10 @@ const HDR: &str = "matterport_hdr_images";
 const COLOR: &str = "matterport_color_images";
 const DEPTH: &str = "matterport_depth_images";
 const UNDISTORTED: &str = "undistorted_camera_parameters";
-/// Metres of one unit of depth.
+/// Metres per unit of depth.
 const UNIT: f64 = 0.000_25;
 
-/// Whether a folder is a house.
+/// Whether a folder has this layout.
 pub fn is_here(folder: &Folder) -> bool {
     [POSES, UNDISTORTED]
         .iter()
@@ -48,11 +50,11 @@ pub fn read(folder: &Folder) -> Result<Scan> {
         "matterport_mesh",
         "",
     ];
-    scan.mesh = geometry::find(folder, &places, &mut scan.said)?;
+    scan.mesh = geometry::find(folder, &places, &mut scan.remarks)?;
     Ok(scan)
 }
 
-/// The images as they were taken.
+/// Reads the original images.
 fn original(folder: &Folder, scan: &mut Scan) -> Result<()> {
     let listed = |name: &str| -> Result<BTreeSet<String>> {
         match folder.has_folder(name) {
@@ -62,7 +64,7 @@ fn original(folder: &Folder, scan: &mut Scan) -> Result<()> {
     };
     let (hdr, color, depths) = (listed(HDR)?, listed(COLOR)?, listed(DEPTH)?);
     let mut lenses: HashMap<String, Lens> = HashMap::new();
-    let (mut linear, mut coded) = (0, 0);
+    let (mut hdr_count, mut tone_mapped) = (0, 0);
     for name in folder.names(POSES)? {
         // UUID_pose_CAMERA_YAW.txt
         let Some((uuid, view)) = name
@@ -89,11 +91,11 @@ fn original(folder: &Folder, scan: &mut Scan) -> Result<()> {
             first(&color, "i", &["jpg", "png"]),
         ) {
             (Some(name), _) => {
-                linear += 1;
+                hdr_count += 1;
                 format!("{HDR}/{name}")
             }
             (None, Some(name)) => {
-                coded += 1;
+                tone_mapped += 1;
                 format!("{COLOR}/{name}")
             }
             (None, None) => {
@@ -101,7 +103,7 @@ fn original(folder: &Folder, scan: &mut Scan) -> Result<()> {
                     true => {
                         "convert the JPEG XR images to EXR beside them, or add the tone-mapped ones"
                     }
-                    false => "add it, or take its pose away",
+                    false => "add it, or delete its pose",
                 };
                 let path = folder.path(&format!("{COLOR}/{uuid}_i{view}.jpg"));
                 return Err(Error::file(
@@ -124,28 +126,23 @@ fn original(folder: &Folder, scan: &mut Scan) -> Result<()> {
             Some(name) => Some(depth_image(folder, &format!("{DEPTH}/{name}"), &lens)?),
             None => None,
         };
-        scan.frames.push(ImportedFrame {
-            photograph: folder.file(&place, &photograph)?,
-            lens,
-            pose,
-            exposure: None,
-            mask: None,
-            depth,
-        });
+        let photograph = folder.file(&place, &photograph)?;
+        scan.frames
+            .push(ImportedFrame::new(photograph, lens, pose, depth));
     }
-    scan.said.push(format!(
-        "photographs with all their radiance (HDR): {linear}, tone-mapped: {coded}"
+    scan.remarks.push(format!(
+        "HDR photographs: {hdr_count}, tone-mapped: {tone_mapped}"
     ));
     let undecoded = hdr.iter().filter(|name| name.ends_with(".jxr")).count();
-    if undecoded > 0 && linear == 0 {
-        scan.said.push(format!(
+    if undecoded > 0 && hdr_count == 0 {
+        scan.remarks.push(format!(
             "{undecoded} JPEG XR images in {HDR} are not read; convert them to EXR beside them to have HDR photographs"
         ));
     }
     Ok(())
 }
 
-/// The lens in a file of one line.
+/// The lens in an intrinsics file, a single line.
 fn lens(folder: &Folder, name: &str) -> Result<Lens> {
     let path = folder.path(name);
     let numbers = numbers(&folder.text(name)?);
@@ -155,7 +152,7 @@ fn lens(folder: &Folder, name: &str) -> Result<Lens> {
     else {
         return Err(Error::file(
             &path,
-            "is no line of: width height fx fy cx cy k1 k2 p1 p2 k3",
+            "is not a line of: width height fx fy cx cy k1 k2 p1 p2 k3",
             "copy it again",
         ));
     };
@@ -167,7 +164,6 @@ fn lens(folder: &Folder, name: &str) -> Result<Lens> {
             "copy it again",
         ));
     }
-    // The origin is the image's top-left corner.
     let lens = Lens::plain([w as u32, h as u32], [fx, fy], [cx, cy]).with(Model::Rational {
         k: [k1, k2, k3, 0.0, 0.0, 0.0],
         p: [p1, p2],
@@ -183,7 +179,7 @@ fn lens(folder: &Folder, name: &str) -> Result<Lens> {
 }
 
 fn depth_image(folder: &Folder, name: &str, lens: &Lens) -> Result<DepthImage> {
-    let path = folder.file(&folder.path(name).display().to_string(), name)?;
+    let path = folder.existing(name)?;
     Ok(DepthImage {
         lens: lens.resized(depth::size(&path)?),
         path,
@@ -192,7 +188,7 @@ fn depth_image(folder: &Folder, name: &str, lens: &Lens) -> Result<DepthImage> {
     })
 }
 
-/// The images after undistortion, by their list.
+/// Reads the undistorted images by their .conf file.
 fn undistorted(folder: &Folder, scan: &mut Scan) -> Result<()> {
     let names = match folder.has_folder(UNDISTORTED) {
         true => folder.names(UNDISTORTED)?,
@@ -225,7 +221,7 @@ fn undistorted(folder: &Folder, scan: &mut Scan) -> Result<()> {
             ["color_directory", name] => colors = (*name).to_owned(),
             ["intrinsics_matrix", rest @ ..] => {
                 let k = values(rest).filter(|k| k.len() == 9);
-                let k = k.ok_or_else(|| broken("is no matrix of 9 numbers"))?;
+                let k = k.ok_or_else(|| broken("is not a matrix of 9 numbers"))?;
                 matrix = Some([k[0], k[4], k[2], k[5]]);
             }
             ["scan", depth, color, rest @ ..] => {
@@ -233,7 +229,7 @@ fn undistorted(folder: &Folder, scan: &mut Scan) -> Result<()> {
                     matrix.ok_or_else(|| broken("comes before any intrinsics_matrix"))?;
                 let m = values(rest).filter(|m| m.len() == 16);
                 let m = m.ok_or_else(|| broken("holds no matrix of 16 numbers"))?;
-                // The canonical camera has OpenGL's axes; poses are made from OpenCV's.
+                // The file has OpenGL's camera axes; `pose_of_rows` expects OpenCV's.
                 let rows: Vec<Vec<f64>> = m
                     .chunks(4)
                     .map(|row| vec![row[0], -row[1], -row[2], row[3]])
@@ -253,14 +249,8 @@ fn undistorted(folder: &Folder, scan: &mut Scan) -> Result<()> {
                     true => Some(depth_image(folder, &depth_name, &lens)?),
                     false => None,
                 };
-                scan.frames.push(ImportedFrame {
-                    photograph,
-                    lens,
-                    pose,
-                    exposure: None,
-                    mask: None,
-                    depth,
-                });
+                scan.frames
+                    .push(ImportedFrame::new(photograph, lens, pose, depth));
             }
             _ => {}
         }

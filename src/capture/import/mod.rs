@@ -1,87 +1,34 @@
-//! Scans of other programs, turned into what a capture holds: posed photographs with their lenses, and a mesh.
+//! Imports scans of other programs: posed photographs with their lenses, and a mesh.
 //!
-//! A format's reader gives a [`Scan`]: every frame whose pose is known, and the mesh if the scan has one. What all formats
-//! share is done here: frames are chosen, the mesh is read, or fused from the depth images ([`crate::capture::fuse`]).
-//! Nothing outside the scan's folder is opened, but for a mesh that the person names.
+//! Each format's reader returns a `Scan`: every frame with a known pose, and the mesh if the scan has one. This
+//! module does what all formats share: it selects frames and reads the mesh or fuses one from the depth images
+//! ([`crate::capture::fuse`]). Nothing outside the scan's folder is opened except a mesh that the person names.
 
 mod colmap;
-pub mod depth;
 mod folder;
 mod format;
 mod geometry;
-mod lens;
 mod matrix;
 mod matterport;
 mod nerf;
+mod reader;
 mod rgbd;
 
-pub use depth::DepthImage;
+pub use crate::capture::scan::{DepthImage, ImportedFrame, Lens, Model};
 pub use format::Format;
-pub use lens::{Lens, Model};
+pub use reader::{AppliedTransform, ImportOptions};
 
-use crate::capture::camera::Pose;
-use crate::capture::fuse::MAX_BYTES;
 use crate::capture::mesh::Mesh;
 use crate::error::{Error, Result};
 use folder::Folder;
 use glam::DVec3;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// Photographs taken of a video, where the person does not say how many.
+/// Photographs selected from a video by default.
 const PHOTOGRAPHS_OF_A_VIDEO: usize = 200;
 
-/// No depth image has units of so many metres.
+/// Metres per depth unit at and above which a depth image is refused.
 const MAX_UNIT: f64 = 1000.0;
-
-/// What a person may choose about an import.
-#[derive(Debug, Clone, Default)]
-pub struct ImportOptions {
-    /// The layout of the folder; found by its content if `None`.
-    pub format: Option<Format>,
-    /// The mesh, wherever it lies; otherwise the scan's own or one fused from depth.
-    pub mesh: Option<PathBuf>,
-    /// Edge of the voxels of a fused mesh in metres.
-    pub voxel: Option<f64>,
-    /// Every how many-th frame becomes a photograph; 0 and 1 are all.
-    pub every: usize,
-    /// At most so many photographs, evenly spaced.
-    pub max_frames: Option<usize>,
-    /// Up direction, written into the capture.
-    pub up: Option<DVec3>,
-    /// fx, fy, cx, cy of the colour camera in pixels, pixel centres at whole numbers, for scans that do not say.
-    pub intrinsics: Option<[f64; 4]>,
-    /// What becomes of Nerfstudio's `applied_transform`.
-    pub applied_transform: AppliedTransform,
-}
-
-/// What becomes of Nerfstudio's `applied_transform`, which moved the poses after they were found.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum AppliedTransform {
-    /// Undone for a mesh that comes from elsewhere, kept for one that the file names or that is fused.
-    #[default]
-    Guess,
-    /// Undone: the mesh has the coordinates from before it.
-    Undo,
-    /// Kept: mesh and poses share its coordinates.
-    Keep,
-}
-
-/// A photograph to be, and its depth image.
-#[derive(Debug, Clone)]
-pub struct ImportedFrame {
-    /// The image file.
-    pub photograph: PathBuf,
-    /// Its camera.
-    pub lens: Lens,
-    /// Camera to world, right-handed, OpenGL's camera axes.
-    pub pose: Pose,
-    /// Linear multiplier: radiance = value / exposure, where the scan says.
-    pub exposure: Option<f64>,
-    /// A grey image of the photograph's size, dark where the photograph may not be used.
-    pub mask: Option<PathBuf>,
-    /// What a depth camera at the same place saw.
-    pub depth: Option<DepthImage>,
-}
 
 /// What is needed to write a capture.
 #[derive(Debug, Clone)]
@@ -90,36 +37,19 @@ pub struct Import {
     pub frames: Vec<ImportedFrame>,
     /// Geometry in the poses' coordinates.
     pub mesh: Mesh,
-    /// Whether `mesh` is cut into objects that mean something.
+    /// Whether the mesh file defines objects.
     pub has_objects: bool,
-    /// Up direction, if known better than by the cameras' mean up.
+    /// Up direction; `None` leaves the cameras' mean up.
     pub up: Option<DVec3>,
     /// What was found, guessed and left out, a line each.
-    pub said: Vec<String>,
+    pub remarks: Vec<String>,
 }
 
-/// What a format's reader finds.
-#[derive(Debug, Default)]
-struct Scan {
-    /// All frames with a pose, in order.
-    frames: Vec<ImportedFrame>,
-    /// The scan's own mesh.
-    mesh: Option<PathBuf>,
-    /// Up direction, where the scan says.
-    up: Option<DVec3>,
-    /// Whether the scan's world is left-handed: the frames are mirrored in z already, a mesh still has to be.
-    mirrored: bool,
-    /// Whether neighbouring frames show nearly the same.
-    is_video: bool,
-    /// Remarks, a line each.
-    said: Vec<String>,
-}
-
-/// Reads the scan in a folder; fusing tells `progress` how many of how many frames are done.
+/// Reads the scan in a folder. While depth is fused, `progress` gets the number of fused frames and of all frames.
 ///
 /// # Errors
 /// The format is not recognised, a file is missing or broken, no frame has a pose, there is neither mesh nor depth, or the
-/// voxels asked for need more than [`MAX_BYTES`].
+/// voxels need more than [`crate::capture::fuse::MAX_BYTES`].
 pub fn read(
     source: &Path,
     options: &ImportOptions,
@@ -133,13 +63,13 @@ pub fn read(
         ));
     }
     let folder = Folder::new(source)?;
-    let mut said = Vec::new();
+    let mut remarks = Vec::new();
     let format = match options.format {
         Some(format) => format,
         None => {
-            let format = format::detect(&folder)?;
-            said.push(format!(
-                "taken for {} by its files; --format overrules",
+            let format = detect(&folder)?;
+            remarks.push(format!(
+                "detected {} from its files; --format overrides",
                 format.description()
             ));
             format
@@ -155,29 +85,66 @@ pub fn read(
         Format::Matterport => matterport::read(&folder)?,
         Format::Open3d => rgbd::open3d::read(&folder, options)?,
     };
-    said.append(&mut scan.said);
+    remarks.append(&mut scan.remarks);
     check(source, &scan.frames)?;
 
-    // The mesh: named, the scan's own, or fused from every frame's depth.
+    // The mesh: the one that the person names, the scan's own, or one fused from the depth of all frames.
     let named = options.mesh.as_ref();
     let (mesh, has_objects) = match named.or(scan.mesh.as_ref()) {
-        Some(path) => geometry::read(path, &folder, scan.mirrored, &mut said)?,
+        Some(path) => geometry::read(path, &folder, scan.mirrored, &mut remarks)?,
         None => (
-            geometry::fuse(source, &scan.frames, options.voxel, &mut said, progress)?,
+            geometry::fuse(source, &scan.frames, options.voxel, &mut remarks, progress)?,
             false,
         ),
     };
-    let frames = choose(scan.frames, options, scan.is_video, &mut said);
+    let frames = choose(scan.frames, options, scan.is_video, &mut remarks);
     Ok(Import {
         frames,
         mesh,
         has_objects,
         up: options.up.or(scan.up),
-        said,
+        remarks,
     })
 }
 
-/// Refuses a scan without frames and lenses that cannot be.
+/// Detects the layout of a folder from its content.
+fn detect(folder: &Folder) -> Result<Format> {
+    if matterport::is_here(folder) {
+        return Ok(Format::Matterport);
+    }
+    if nerf::is_here(folder) {
+        return Ok(Format::Nerfstudio);
+    }
+    if colmap::is_here(folder) {
+        return Ok(Format::Colmap);
+    }
+    if rgbd::seven_scenes::is_here(folder)? {
+        return Ok(Format::SevenScenes);
+    }
+    if rgbd::scannet::is_here(folder) {
+        return Ok(Format::ScanNet);
+    }
+    if rgbd::tum::is_icl_nuim(folder)? {
+        return Ok(Format::IclNuim);
+    }
+    if rgbd::tum::is_here(folder) {
+        return Ok(Format::Tum);
+    }
+    if rgbd::open3d::is_here(folder)? {
+        return Ok(Format::Open3d);
+    }
+    let words: Vec<&str> = Format::ALL.iter().map(|(word, _)| *word).collect();
+    Err(Error::file(
+        folder.confine().folder(),
+        "no known layout is recognised in this folder",
+        format!(
+            "name the folder that directly holds the scan's files, or pass --format {}",
+            words.join("|")
+        ),
+    ))
+}
+
+/// Refuses a scan without frames, and impossible lenses, depth units and exposures.
 fn check(source: &Path, frames: &[ImportedFrame]) -> Result<()> {
     if frames.is_empty() {
         return Err(Error::file(
@@ -217,29 +184,29 @@ fn check(source: &Path, frames: &[ImportedFrame]) -> Result<()> {
     Ok(())
 }
 
-/// The frames that become photographs.
+/// Selects the frames that become photographs.
 fn choose(
     frames: Vec<ImportedFrame>,
     options: &ImportOptions,
     is_video: bool,
-    said: &mut Vec<String>,
+    remarks: &mut Vec<String>,
 ) -> Vec<ImportedFrame> {
     let total = frames.len();
     let step = options.every.max(1);
     let mut frames: Vec<ImportedFrame> = frames.into_iter().step_by(step).collect();
     let asked = options.every > 0 || options.max_frames.is_some();
-    let most = match options.max_frames {
-        Some(most) => most.max(1),
+    let max = match options.max_frames {
+        Some(max) => max.max(1),
         None if is_video && !asked => PHOTOGRAPHS_OF_A_VIDEO,
         None => usize::MAX,
     };
-    if frames.len() > most {
+    if frames.len() > max {
         let count = frames.len();
         let mut index = 0..;
         frames.retain(|_| {
-            // Keeps the first index of each of `most` equal parts.
+            // Keeps the first index of each of `max` equal parts.
             let i = index.next().unwrap_or(0);
-            i == 0 || i * most / count != (i - 1) * most / count
+            i == 0 || i * max / count != (i - 1) * max / count
         });
     }
     let how = match (frames.len() < total, asked) {
@@ -249,11 +216,6 @@ fn choose(
             format!(" of {total}, evenly spaced; --every and --most-frames choose others")
         }
     };
-    said.push(format!("photographs: {}{how}", frames.len()));
+    remarks.push(format!("photographs: {}{how}", frames.len()));
     frames
-}
-
-/// The bound on memory of a fused mesh's voxels, in words.
-fn memory_bound() -> String {
-    format!("{} GiB", MAX_BYTES >> 30)
 }

@@ -1,26 +1,28 @@
-//! transforms.json as Nerfstudio, instant-ngp, Polycam and Record3D write it.
+//! Reads transforms.json of Nerfstudio, instant-ngp, Polycam and Record3D.
 //!
-//! Beyond what a capture itself may say: lenses with k3 to k6 and fisheyes, intrinsics of another resolution than the
-//! photographs', file names without an ending, masks in files of their own, `applied_transform`, depth to fuse a mesh from.
+//! Supports more than a capture's own transforms.json: k3 to k6 and fisheye lenses, intrinsics for another resolution than the
+//! photographs', file names without an extension, mask files, `applied_transform`, and depth to fuse a mesh from.
 
 use crate::capture::camera::Intrinsics;
-use crate::capture::import::depth::{self, DepthImage};
 use crate::capture::import::folder::Folder;
-use crate::capture::import::lens::{Lens, Model};
-use crate::capture::import::matrix::rows_of;
-use crate::capture::import::{AppliedTransform, ImportOptions, ImportedFrame, Scan, geometry};
+use crate::capture::import::geometry;
+use crate::capture::import::matrix::matrix_of_rows;
+use crate::capture::import::reader::{AppliedTransform, ImportOptions, Scan};
 use crate::capture::read::fields::Fields;
 use crate::capture::read::{image, lens, pose};
+use crate::capture::scan::ImportedFrame;
+use crate::capture::scan::depth::{self, DepthImage};
+use crate::capture::scan::lens::{Lens, Model};
 use crate::error::{Error, Result};
 use glam::{DMat4, DVec4};
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 
-/// The file's names, the best first.
+/// Names of the file, in order of preference.
 const NAMES: [&str; 2] = ["transforms.json", "transforms_train.json"];
-/// Endings tried where a photograph's name has none.
-const ENDINGS: [&str; 5] = ["", ".png", ".jpg", ".jpeg", ".exr"];
-/// Metres per unit of depth where the file does not say.
+/// Extensions tried for a photograph's name.
+const EXTENSIONS: [&str; 5] = ["", ".png", ".jpg", ".jpeg", ".exr"];
+/// Default metres per unit of depth.
 const DEPTH_UNIT: f64 = 0.001;
 
 /// Whether a folder has such a file.
@@ -34,10 +36,8 @@ pub fn is_here(folder: &Folder) -> bool {
 /// The file is missing or broken, or names something that is not there.
 pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
     let name = folder.first(&NAMES).unwrap_or(NAMES[0]);
-    let path = folder.path(name);
-    let value: Value = serde_json::from_str(&folder.text(name)?)
-        .map_err(|e| Error::file(&path, format!("is not valid JSON: {e}"), "correct the file"))?;
-    let place = path.display().to_string();
+    let value = folder.json(name)?;
+    let place = folder.path(name).display().to_string();
     let shared = Fields::new(format!("{place}: "), &value)?;
     let list = shared
         .get("frames")
@@ -45,7 +45,7 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
         .ok_or_else(|| {
             Error::new(
                 shared.place("frames"),
-                "is no list of frames",
+                "is not a list of frames",
                 "add the photographs",
             )
         })?;
@@ -55,56 +55,52 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
         ..Scan::default()
     };
     if name != NAMES[0] {
-        scan.said.push(format!(
+        scan.remarks.push(format!(
             "frames: those of {name}; other splits are left out"
         ));
     }
     scan.mesh = match shared.text("mesh_path")? {
         Some(mesh) => Some(folder.file(&shared.place("mesh_path"), mesh)?),
-        None => geometry::find(folder, &[""], &mut scan.said)?,
+        None => geometry::find(folder, &[""], &mut scan.remarks)?,
     };
-    let back = undoing(&shared, options, &mut scan)?;
-    scan.up = scan.up.map(|up| back.transform_vector3(up));
-    let mut lost = 0;
+    let to_mesh = to_mesh_coordinates(&shared, options, &mut scan)?;
+    scan.up = scan.up.map(|up| to_mesh.transform_vector3(up));
+    let mut lost_frames = 0;
     for (index, entry) in list.iter().enumerate() {
         let fields = Fields::new(format!("{place}: frames[{index}]."), entry)?;
-        match frame(folder, [&value, entry], [&shared, &fields], &back)? {
+        match frame(folder, [&value, entry], [&shared, &fields], &to_mesh)? {
             Some(frame) => scan.frames.push(frame),
-            None => lost += 1,
+            None => lost_frames += 1,
         }
     }
-    if lost > 0 {
-        scan.said
-            .push(format!("{lost} frames left out: their pose is not finite"));
-    }
-    let resampled = scan.frames.iter().filter(|f| !f.lens.fits_a_capture());
-    let resampled = resampled.count();
-    if resampled > 0 {
-        scan.said.push(format!(
-            "{resampled} photographs are resampled to a pinhole of the same focal length; what lies outside it is lost"
+    if lost_frames > 0 {
+        scan.remarks.push(format!(
+            "{lost_frames} frames left out: their pose is not finite"
         ));
     }
+    scan.remark_on_resampled();
     if value.get("fisheye_crop_radius").is_some() {
-        scan.said.push("fisheye_crop_radius is not read".into());
+        scan.remarks.push("fisheye_crop_radius is not read".into());
     }
     Ok(scan)
 }
 
-/// What takes poses back to the coordinates of the scan's mesh.
-fn undoing(shared: &Fields, options: &ImportOptions, scan: &mut Scan) -> Result<DMat4> {
+/// The transform from the poses' coordinates to the mesh's: the inverse of `applied_transform` where it is undone, else the
+/// identity.
+fn to_mesh_coordinates(shared: &Fields, options: &ImportOptions, scan: &mut Scan) -> Result<DMat4> {
     let Some(applied) = shared.matrix("applied_transform")? else {
         return Ok(DMat4::IDENTITY);
     };
     let place = shared.place("applied_transform");
     let wrong = |problem: &str| Error::new(&place, problem, "correct the field");
-    let rows = rows_of(&applied).ok_or_else(|| wrong("is no 3×4 or 4×4 matrix"))?;
+    let rows = matrix_of_rows(&applied).ok_or_else(|| wrong("is not a 3×4 or 4×4 matrix"))?;
     if rows == DMat4::IDENTITY {
         return Ok(rows);
     }
     if !(rows.is_finite() && rows.determinant().abs() > 1e-9) {
         return Err(wrong("is singular"));
     }
-    // A mesh that the file itself names, and one that is fused, share the poses' coordinates.
+    // A mesh that the file names and a fused mesh share the poses' coordinates.
     let same_coordinates =
         options.mesh.is_none() && (scan.mesh.is_none() || shared.get("mesh_path").is_some());
     let undo = match options.applied_transform {
@@ -112,10 +108,10 @@ fn undoing(shared: &Fields, options: &ImportOptions, scan: &mut Scan) -> Result<
         AppliedTransform::Keep => false,
         AppliedTransform::Guess => !same_coordinates,
     };
-    scan.said.push(if undo {
-        "applied_transform is undone: the mesh is taken to have the coordinates from before it; --applied-transform keep overrules".into()
+    scan.remarks.push(if undo {
+        "applied_transform is undone: the mesh is taken to have the coordinates from before it; --applied-transform keep overrides".into()
     } else {
-        "applied_transform is kept: mesh and poses are taken to share its coordinates; --applied-transform undo overrules".into()
+        "applied_transform is kept: mesh and poses are taken to share its coordinates; --applied-transform undo overrides".into()
     });
     Ok(if undo {
         rows.inverse()
@@ -129,7 +125,7 @@ fn frame(
     folder: &Folder,
     values: [&Value; 2],
     [shared, fields]: [&Fields; 2],
-    back: &DMat4,
+    to_mesh: &DMat4,
 ) -> Result<Option<ImportedFrame>> {
     let photograph = photograph(folder, fields)?;
     let header = image::header(&photograph)?;
@@ -140,9 +136,9 @@ fn frame(
     let rows = fields
         .matrix("transform_matrix")?
         .as_deref()
-        .and_then(rows_of)
-        .ok_or_else(|| refuse("is no 3×4 or 4×4 matrix"))?;
-    let rows = *back * rows;
+        .and_then(matrix_of_rows)
+        .ok_or_else(|| refuse("is not a 3×4 or 4×4 matrix"))?;
+    let rows = *to_mesh * rows;
     if !rows.is_finite() {
         return Ok(None);
     }
@@ -154,7 +150,7 @@ fn frame(
         Some(mask) => Some(folder.file(&fields.place("mask_path"), mask)?),
         None => None,
     };
-    let of =
+    let number =
         |name: &str| -> Result<Option<f64>> { Ok(fields.number(name)?.or(shared.number(name)?)) };
     let depth = match fields.text("depth_file_path")? {
         Some(name) => {
@@ -163,7 +159,7 @@ fn frame(
             Some(DepthImage {
                 lens: lens.resized(size),
                 path,
-                metres_per_unit: of("depth_unit_scale_factor")?.unwrap_or(DEPTH_UNIT),
+                metres_per_unit: number("depth_unit_scale_factor")?.unwrap_or(DEPTH_UNIT),
                 invalid: None,
             })
         }
@@ -173,20 +169,20 @@ fn frame(
         photograph,
         lens,
         pose,
-        exposure: of("exposure")?,
+        exposure: number("exposure")?,
         mask,
         depth,
     }))
 }
 
-/// The photograph's file, its ending added where the name has none.
+/// The photograph's file, with an extension added if needed.
 fn photograph(folder: &Folder, fields: &Fields) -> Result<PathBuf> {
     let place = fields.place("file_path");
     let name = fields
         .text("file_path")?
         .ok_or_else(|| Error::new(&place, "is absent", "name the photograph"))?
         .replace('\\', "/");
-    let names = ENDINGS.map(|ending| format!("{name}{ending}"));
+    let names = EXTENSIONS.map(|extension| format!("{name}{extension}"));
     let found = names
         .iter()
         .find(|name| folder.path(name).is_file())
@@ -194,7 +190,7 @@ fn photograph(folder: &Folder, fields: &Fields) -> Result<PathBuf> {
     folder.file(&place, found)
 }
 
-/// The lens of a frame: what a capture could say is read as a capture's, the distortion here.
+/// The lens of a frame. The pinhole fields are read as those of a capture; distortion is read here.
 fn camera(values: [&Value; 2], fields: [&Fields; 2], size: [u32; 2]) -> Result<Lens> {
     let [shared, frame] = fields;
     let number = |name: &str| -> Result<f64> {
@@ -220,7 +216,7 @@ fn camera(values: [&Value; 2], fields: [&Fields; 2], size: [u32; 2]) -> Result<L
         Some("OPENCV_FISHEYE" | "FISHEYE") => Model::Fisheye([k[0], k[1], k[2], k[3]]),
         _ if is_fisheye => Model::Fisheye([k[0], k[1], k[2], k[3]]),
         None | Some("PINHOLE" | "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" | "OPENCV") => {
-            // Nerfstudio's own k4 belongs to another polynomial than OpenCV's.
+            // k4 of Nerfstudio belongs to another polynomial than OpenCV's.
             if k[3..].iter().any(|&k| k != 0.0) {
                 return Err(Error::new(
                     frame.place("k4"),
@@ -240,7 +236,7 @@ fn camera(values: [&Value; 2], fields: [&Fields; 2], size: [u32; 2]) -> Result<L
         }
     };
 
-    // Focal lengths and principal point, brought to the photograph's resolution.
+    // Scale focal lengths and principal point to the photograph's resolution.
     let stated =
         |name: &str| -> Result<Option<u32>> { Ok(frame.count(name)?.or(shared.count(name)?)) };
     let factor = match (stated("w")?, stated("h")?) {
@@ -261,15 +257,15 @@ fn camera(values: [&Value; 2], fields: [&Fields; 2], size: [u32; 2]) -> Result<L
         }
         _ => [1.0, 1.0],
     };
-    let plain = values.map(|value| {
+    let pinhole_only = values.map(|value| {
         let map = value.as_object().cloned().unwrap_or_default();
         Value::Object(without_distortion(map, factor))
     });
     let places = fields.map(|fields| fields.place(""));
     let [shared_place, frame_place] = places;
     let (intrinsics, _) = lens::read(
-        &Fields::new(shared_place, &plain[0])?,
-        &Fields::new(frame_place, &plain[1])?,
+        &Fields::new(shared_place, &pinhole_only[0])?,
+        &Fields::new(frame_place, &pinhole_only[1])?,
         size,
     )?;
     Ok(Lens {
@@ -282,7 +278,7 @@ fn camera(values: [&Value; 2], fields: [&Fields; 2], size: [u32; 2]) -> Result<L
     .with(model))
 }
 
-/// A file's or frame's fields with the pinhole alone, its numbers scaled to the photograph.
+/// The fields of a file or frame without distortion and size, with pinhole parameters scaled by x and y.
 fn without_distortion(mut map: Map<String, Value>, [x, y]: [f64; 2]) -> Map<String, Value> {
     for name in [
         "camera_model",

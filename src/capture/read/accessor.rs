@@ -1,15 +1,15 @@
-//! glTF accessors read with every bound checked.
+//! Reads glTF accessors with all bounds checked.
 
 use crate::capture::read::gltf_file::Buffer;
 use gltf::Accessor;
 use gltf::accessor::{DataType, Dimensions};
 
-/// The numbers of an accessor, `components` an element.
+/// The numbers of an accessor, and the number of components per element.
 ///
-/// Normalised integers are scaled to [0, 1] or [−1, 1]; others are converted as they are.
+/// Normalised integers are scaled to [0, 1] or [−1, 1].
 ///
 /// # Errors
-/// What is wrong, as a phrase: sparse values, a component type or count that is not expected, a range past the buffer's end.
+/// As a phrase: the accessor is sparse, its type is not `allowed`, or it reaches past its buffer's end.
 pub fn numbers(
     accessor: &Accessor,
     buffers: &[Buffer],
@@ -66,7 +66,7 @@ pub fn numbers(
     Ok((values, components))
 }
 
-/// One little-endian number; zero if there are too few bytes, which [`numbers`] has ruled out.
+/// One little-endian number; [`numbers`] guarantees the right number of bytes.
 fn number(data_type: DataType, bytes: &[u8]) -> f64 {
     match (data_type, bytes) {
         (DataType::I8, &[a]) => f64::from(i8::from_le_bytes([a])),

@@ -1,8 +1,8 @@
-//! One camera in a file of its own: the fields of a frame of transforms.json, with the size of its picture.
+//! A camera in its own file: the fields of a frame of transforms.json, with the picture's size.
 
 use crate::capture::camera::{Intrinsics, Pose};
 use crate::capture::inputs;
-use crate::capture::read::fields::{Fields, without_mark};
+use crate::capture::read::fields::{Fields, without_bom};
 use crate::capture::read::{lens, pose};
 use crate::error::{Error, Result};
 use serde_json::Value;
@@ -10,15 +10,15 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// Longest file in bytes; a camera is some hundred.
+/// Longest file that is read, in bytes; a camera takes a few hundred.
 const MAX_BYTES: u64 = 1 << 20;
 /// Largest picture in pixels.
 const MAX_PIXELS: u64 = 1 << 28;
 
-/// Reads a camera, with remarks about what had to be guessed.
+/// Reads a camera; also returns remarks about guessed fields.
 ///
 /// # Errors
-/// No JSON, a lens model other than those of captures, no size, a pose that is no rigid motion.
+/// The file is not JSON, has an unsupported lens model or no size, or its pose is not a rigid motion.
 pub fn read(path: &Path) -> Result<(Intrinsics, Pose, Vec<String>)> {
     let failed = |error: std::io::Error| Error::io(path, &error);
     let mut bytes = Vec::new();
@@ -32,7 +32,7 @@ pub fn read(path: &Path) -> Result<(Intrinsics, Pose, Vec<String>)> {
             "give the fields of one frame",
         ));
     }
-    let value: Value = serde_json::from_slice(without_mark(&bytes)).map_err(|error| {
+    let value: Value = serde_json::from_slice(without_bom(&bytes)).map_err(|error| {
         Error::file(
             path,
             error,
@@ -53,13 +53,13 @@ pub fn read(path: &Path) -> Result<(Intrinsics, Pose, Vec<String>)> {
     if size.iter().map(|&side| u64::from(side)).product::<u64>() > MAX_PIXELS {
         return Err(Error::new(
             fields.place("w, h"),
-            "no size for a picture",
+            "the size is not supported",
             "give sizes from 1 to 16384",
         ));
     }
-    let (intrinsics, said) = lens::read(&fields, &fields, size)?;
+    let (intrinsics, guesses) = lens::read(&fields, &fields, size)?;
     let (pose, remark) = pose::of_frame(&fields)?;
-    let remarks = said.into_iter().map(str::to_owned).chain(remark);
+    let remarks = guesses.into_iter().map(str::to_owned).chain(remark);
     let remarks = remarks.map(|remark| format!("{}: {remark}", path.display()));
     Ok((intrinsics, pose, remarks.collect()))
 }

@@ -1,10 +1,10 @@
-//! Keeps the paths written in a capture inside its folder.
+//! Confines the paths in a capture's files to its folder.
 
 use crate::capture::inputs;
 use crate::error::{Error, Result};
 use std::path::{Component, Path, PathBuf};
 
-/// Longer files are refused unread.
+/// Larger files are refused.
 const MAX_FILE_BYTES: u64 = 1 << 36;
 
 /// A folder that file paths may not leave.
@@ -16,7 +16,7 @@ pub struct Confine {
 }
 
 impl Confine {
-    /// Confines to `folder`, or to nothing if `allow_outside`.
+    /// Confines paths to `folder`; with `allow_outside`, any path is allowed.
     ///
     /// # Errors
     /// The folder cannot be resolved.
@@ -29,13 +29,13 @@ impl Confine {
         })
     }
 
-    /// The folder as the person named it.
+    /// The folder as the caller wrote it.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// The existing regular file that `path`, relative to `base` (a folder inside), leads to, which is
-    /// remembered as an input. `place` names the field for messages.
+    /// Resolves `path`, relative to `base` (a folder inside), to an existing regular file, and registers the file as an input.
+    /// `place` names the field for messages.
     ///
     /// # Errors
     /// The path is empty, leaves the folder (also by a symbolic link), or leads to no regular file.
@@ -84,21 +84,20 @@ impl Confine {
         self.file_from(&self.folder, place, path)
     }
 
-    /// Whether a path is one that [`Confine::file`] refuses as leaving the folder, by its letters alone.
+    /// Whether [`Confine::file`] would refuse a path as leaving the folder, judged by its text alone.
     pub fn leads_out(&self, path: &str) -> bool {
         let full = self.written_path(&self.folder, path);
         !self.allow_outside && !self.stays_inside(&self.folder, &full)
     }
 
-    /// Whether something of this name lies in the folder.
+    /// Whether the folder has an entry at this path.
     pub fn holds(&self, name: &str) -> bool {
         self.written_path(&self.folder, name)
             .symlink_metadata()
             .is_ok()
     }
 
-    /// Where a path leads from `base`. Backslashes, as programs on Windows write them, part folders where no file has them in
-    /// its name.
+    /// Joins a path to `base`. Backslashes count as separators (Windows) unless a file with backslashes in its name exists.
     fn written_path(&self, base: &Path, path: &str) -> PathBuf {
         let full = base.join(path);
         let is_inside = || self.stays_inside(base, &full);
@@ -108,7 +107,7 @@ impl Confine {
         base.join(path.replace('\\', "/"))
     }
 
-    /// Whether a path from `base` never climbs above the folder on its way, or is an absolute one into it.
+    /// Whether a path from `base` never leaves the folder on its way, or is an absolute path into the folder.
     fn stays_inside(&self, base: &Path, full: &Path) -> bool {
         let relative = match full.strip_prefix(base) {
             Ok(relative) => relative,
@@ -137,7 +136,7 @@ fn outside(place: &str, path: &str) -> Error {
     )
 }
 
-/// Whether a path from a folder so deep never climbs above the top on its way.
+/// Whether a relative path from a folder at `depth` never climbs above depth 0.
 fn never_climbs(mut depth: i64, relative: &Path) -> bool {
     relative.components().all(|component| {
         match component {

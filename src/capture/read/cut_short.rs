@@ -1,15 +1,15 @@
-//! JPEG files that end before their picture does, as copies that were broken off: decoders fill the rest with grey.
+//! Detects truncated JPEG files, such as interrupted copies: decoders would fill the missing rows with grey.
 
 use std::fs;
 use std::io::{Read, Result};
 use std::path::Path;
 
-/// Marker: the image starts.
+/// Start-of-image marker.
 const SOI: u8 = 0xd8;
-/// Marker: the image ends.
+/// End-of-image marker.
 const EOI: u8 = 0xd9;
 
-/// Whether a file is a JPEG without its end; false for other formats.
+/// Whether a file is a truncated JPEG; false for other formats.
 ///
 /// # Errors
 /// The file cannot be read.
@@ -22,12 +22,11 @@ pub fn jpeg(path: &Path) -> Result<bool> {
     Ok(!reaches_end(&fs::read(path)?))
 }
 
-/// Whether the segments and scans of a JPEG lead to its end. A thumbnail's end, which lies within a segment, is none.
+/// Whether the segments and scans of a JPEG lead to its end marker. End markers inside segments (thumbnails) do not count.
 fn reaches_end(bytes: &[u8]) -> bool {
-    // Behind the start marker.
     let mut rest = bytes.get(2..).unwrap_or_default();
     loop {
-        // The next marker: what lies before it is compressed data, in which 0xff is followed by 0 or a restart marker.
+        // Find the next marker; compressed data before it has 0xff only before 0 or a restart marker.
         let Some(at) = rest.iter().position(|&byte| byte == 0xff) else {
             return false;
         };
@@ -35,18 +34,19 @@ fn reaches_end(bytes: &[u8]) -> bool {
         match rest.first() {
             None => return false,
             Some(&EOI) => return true,
-            // Filling, data, restart markers, and markers without content.
+            // Fill byte.
             Some(0xff) => {}
+            // Stuffed data byte, restart marker, or marker without content.
             Some(0x00 | 0x01 | 0xd0..=0xd7) => rest = &rest[1..],
             Some(_) => {
                 let Some(&[_, high, low]) = rest.first_chunk() else {
                     return false;
                 };
                 let length = usize::from(u16::from_be_bytes([high, low]));
-                let Some(behind) = rest.get(1 + length..) else {
+                let Some(after) = rest.get(1 + length..) else {
                     return false;
                 };
-                rest = behind;
+                rest = after;
             }
         }
     }

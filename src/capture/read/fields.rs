@@ -4,12 +4,12 @@ use crate::error::{Error, Result};
 use glam::DVec3;
 use serde_json::{Map, Value};
 
-/// The text of a file without the mark that some Windows programs put before UTF-8.
-pub fn without_mark(text: &[u8]) -> &[u8] {
+/// The text of a file without a UTF-8 byte order mark.
+pub fn without_bom(text: &[u8]) -> &[u8] {
     text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
 }
 
-/// A JSON object and where it stands, e.g. `transforms.json: frames[3].`.
+/// A JSON object and its path, e.g. `transforms.json: frames[3].`.
 #[derive(Debug, Clone)]
 pub struct Fields<'a> {
     place: String,
@@ -20,7 +20,7 @@ impl<'a> Fields<'a> {
     /// The object at `place`, a prefix that a field's name completes.
     ///
     /// # Errors
-    /// The value is no object.
+    /// The value is not an object.
     pub fn new(place: String, value: &'a Value) -> Result<Self> {
         match value {
             Value::Object(map) => Ok(Self { place, map }),

@@ -1,10 +1,10 @@
-//! glTF and GLB: every node with a mesh is an object. Transforms are applied in f64; materials are not needed here.
+//! Reads glTF and GLB: every node with a mesh becomes an object. Transforms are applied in f64; materials are ignored.
 
 use crate::capture::read::accessor::numbers;
 use crate::capture::read::confine::Confine;
 use crate::capture::read::gltf_file::{self, Buffer};
 use crate::capture::read::gltf_scene;
-use crate::capture::read::mesh::RawMesh;
+use crate::capture::read::raw_mesh::RawMesh;
 use crate::error::{Error, Result};
 use ::gltf::accessor::Dimensions::{Scalar, Vec2 as Two, Vec3 as Three, Vec4 as Four};
 use ::gltf::{Node, Primitive, Semantic};
@@ -93,7 +93,7 @@ fn add_primitive(
     }
     let count = mesh.positions.len() as u32 - first;
 
-    // The format demands as many of each attribute as there are positions.
+    // All attributes must have as many elements as the positions.
     for semantic in [Semantic::Colors(0), Semantic::TexCoords(0)] {
         if let Some(other) = primitive.get(&semantic)
             && other.count() != accessor.count()
@@ -103,7 +103,7 @@ fn add_primitive(
         }
     }
 
-    // Colours and texture coordinates, where this or an earlier primitive has them.
+    // Colours and texture coordinates, if this or an earlier primitive has them; missing ones are white and zero.
     let colors = match primitive.get(&Semantic::Colors(0)) {
         Some(accessor) => {
             let (values, components) = numbers(&accessor, buffers, &[Three, Four])?;

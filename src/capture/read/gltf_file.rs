@@ -1,4 +1,4 @@
-//! glTF and GLB files and their buffers, checked before the gltf crate trusts them.
+//! Parses glTF and GLB files and their buffers, with the checks that the gltf crate lacks.
 
 use crate::error::{Error, Result};
 use gltf::buffer::{Data, Source};
@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Bytes of a GLB file's header.
+/// Length of a GLB file's header in bytes.
 const GLB_HEADER: usize = 12;
 
 /// Parses and validates the bytes of a glTF or GLB file.
@@ -17,10 +17,10 @@ const GLB_HEADER: usize = 12;
 /// The file breaks the format or requires an extension that is not supported.
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<Gltf> {
     let broken = |problem: String| Error::file(path, problem, "export the mesh again");
-    let invalid = |e: gltf::Error| broken(format!("is no valid glTF: {e}"));
+    let invalid = |e: gltf::Error| broken(format!("is not a valid glTF: {e}"));
     let (root, blob): (std::result::Result<Root, _>, _) = if bytes.starts_with(b"glTF") {
         if declared_length(bytes).is_none_or(|n| n < GLB_HEADER) {
-            return Err(broken("is no valid GLB: its header is too short".into()));
+            return Err(broken("is not a valid GLB: its header is too short".into()));
         }
         let glb = Glb::from_slice(bytes).map_err(invalid)?;
         let root = gltf::json::deserialize::from_slice(&glb.json);
@@ -29,11 +29,11 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Gltf> {
         (gltf::json::deserialize::from_slice(bytes), None)
     };
     let root = root.map_err(|e| invalid(gltf::Error::Deserialize(e)))?;
-    if let Some((name, remedy)) = compression(&root) {
+    if let Some(name) = compression(&root) {
         return Err(Error::file(
             path,
-            format!("is compressed with {name}, which is not read"),
-            remedy,
+            format!("is compressed with {name}, which is not supported"),
+            "export the mesh without compression, or decode it: npx @gltf-transform/cli copy IN.glb OUT.glb",
         ));
     }
     check_accessors(&root).map_err(broken)?;
@@ -41,34 +41,28 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Gltf> {
     Ok(Gltf { document, blob })
 }
 
-/// The compression that a file cannot be read without, and what to do about it.
-fn compression(root: &Root) -> Option<(&'static str, &'static str)> {
-    let required = |name: &str| root.extensions_required.iter().any(|r| r == name);
-    let known = [
-        (
-            "KHR_draco_mesh_compression",
-            "Draco",
-            "export the mesh without compression, or decode it: npx @gltf-transform/cli copy IN.glb OUT.glb",
-        ),
-        (
-            "EXT_meshopt_compression",
-            "meshopt",
-            "export the mesh without compression, or decode it: npx @gltf-transform/cli copy IN.glb OUT.glb",
-        ),
-    ];
-    let found = known
-        .into_iter()
-        .find(|(extension, ..)| required(extension))?;
-    Some((found.1, found.2))
+/// Unsupported compression extensions, with their names.
+const COMPRESSIONS: [(&str, &str); 2] = [
+    ("KHR_draco_mesh_compression", "Draco"),
+    ("EXT_meshopt_compression", "meshopt"),
+];
+
+/// The name of an unsupported compression that a file requires.
+fn compression(root: &Root) -> Option<&'static str> {
+    let required = |extension: &str| root.extensions_required.iter().any(|r| r == extension);
+    let found = COMPRESSIONS
+        .iter()
+        .find(|(extension, _)| required(extension));
+    found.map(|(_, name)| *name)
 }
 
-/// The crate's validation looks up accessors of attributes before it knows that they exist.
+/// Checks that attributes refer to existing accessors: the crate's validation would panic otherwise.
 fn check_accessors(root: &Root) -> std::result::Result<(), String> {
     for (index, mesh) in root.meshes.iter().enumerate() {
         let mut accessors = (mesh.primitives.iter()).flat_map(|p| p.attributes.values());
         if accessors.any(|accessor| accessor.value() >= root.accessors.len()) {
             return Err(format!(
-                "is no valid glTF: meshes[{index}] names an accessor that is not there"
+                "is not a valid glTF: meshes[{index}] names an accessor that is not there"
             ));
         }
     }
@@ -81,16 +75,16 @@ fn declared_length(bytes: &[u8]) -> Option<usize> {
     Some(u32::from_le_bytes(field.try_into().ok()?) as usize)
 }
 
-/// Reads the file of a name that a glTF file holds; the first argument is the field, for messages.
+/// Reads a file that a glTF file names. Arguments: the field (for messages) and the name.
 pub type ReadFile<'a> = &'a dyn Fn(&str, &str) -> Result<Vec<u8>>;
 
-/// The bytes of a buffer; buffers of one name share them, so that they take no more memory than the files.
+/// The bytes of a buffer; buffers with the same URI share them.
 pub type Buffer = Arc<Vec<u8>>;
 
-/// The bytes of all buffers: the GLB's own, data URIs, and what `file` reads.
+/// The bytes of all buffers: the GLB's own chunk, data URIs, and files read by `file`.
 ///
 /// # Errors
-/// A buffer is missing or shorter than promised, or `file` fails.
+/// A buffer is missing or shorter than declared, or `file` fails.
 pub fn buffers(gltf: &Gltf, path: &Path, file: ReadFile<'_>) -> Result<Vec<Buffer>> {
     let mut blob = gltf.blob.clone();
     let mut named: BTreeMap<&str, Buffer> = BTreeMap::new();
@@ -115,7 +109,7 @@ pub fn buffers(gltf: &Gltf, path: &Path, file: ReadFile<'_>) -> Result<Vec<Buffe
                 return Err(Error::new(
                     &place,
                     format!(
-                        "holds {} bytes of the {} promised",
+                        "holds {} bytes of the {} declared",
                         bytes.len(),
                         buffer.length()
                     ),
@@ -127,7 +121,7 @@ pub fn buffers(gltf: &Gltf, path: &Path, file: ReadFile<'_>) -> Result<Vec<Buffe
         .collect()
 }
 
-/// The bytes behind a URI: inline data, or what `file` reads. `place` names the field for messages.
+/// The bytes of a URI: inline data, or a file read by `file`. `place` names the field for messages.
 ///
 /// # Errors
 /// The inline data is broken, or `file` fails.
@@ -141,7 +135,7 @@ pub fn resource(place: &str, uri: &str, file: ReadFile<'_>) -> Result<Vec<u8>> {
     file(place, &percent_decoded(uri))
 }
 
-/// A URI's path with its %XX decoded.
+/// Decodes the %XX of a URI.
 fn percent_decoded(uri: &str) -> String {
     let bytes = uri.as_bytes();
     let mut decoded = Vec::with_capacity(bytes.len());

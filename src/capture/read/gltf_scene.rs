@@ -1,4 +1,4 @@
-//! The nodes of a glTF scene where they stand in the world, and the triangles of its primitives.
+//! The nodes of a glTF scene with their world transforms, and the triangles of primitives.
 
 use crate::capture::read::gltf_file::Buffer;
 use glam::{DMat4, DQuat, DVec3};
@@ -7,21 +7,22 @@ use gltf::scene::Transform;
 use gltf::{Accessor, Gltf, Mesh, Node, Semantic};
 use std::collections::BTreeMap;
 
-/// Vertices that a scene may have however small its file, since nodes may share a mesh.
-const ALWAYS_ALLOWED: usize = 1 << 25;
+/// Vertices that a scene may always have. Beyond it the limit is the size of the buffers in bytes, since nodes that share meshes
+/// could make a small file arbitrarily large.
+const MIN_VERTEX_LIMIT: usize = 1 << 25;
 
 /// The nodes of the default scene (or the first, or all nodes where there is none), parents before their children, each
-/// with the map from its own coordinates to the world's, composed in f64.
+/// with its world transform, composed in f64.
 ///
 /// # Errors
-/// As a phrase: the nodes form no tree, or they use meshes over and over, to more vertices than `buffers` have bytes and than
-/// [`ALWAYS_ALLOWED`].
+/// As a phrase: the nodes form no tree, or instances of meshes exceed the limit of vertices, the larger of the bytes of `buffers`
+/// and [`MIN_VERTEX_LIMIT`].
 pub fn nodes<'a>(gltf: &'a Gltf, buffers: &[Buffer]) -> Result<Vec<(Node<'a>, DMat4)>, String> {
     // Shared buffers count once.
     let distinct: BTreeMap<*const u8, usize> =
         buffers.iter().map(|b| (b.as_ptr(), b.len())).collect();
     let bytes: usize = distinct.values().sum();
-    let most = bytes.max(ALWAYS_ALLOWED);
+    let limit = bytes.max(MIN_VERTEX_LIMIT);
     let mut vertices = 0_usize;
     let mut visited = vec![false; gltf.nodes().len()];
     let scene = gltf.default_scene().or_else(|| gltf.scenes().next());
@@ -38,14 +39,14 @@ pub fn nodes<'a>(gltf: &'a Gltf, buffers: &[Buffer]) -> Result<Vec<(Node<'a>, DM
                 node.index()
             ));
         }
-        // A count beyond the bytes there are is found out when it is read.
+        // Counts beyond the buffers' bytes are refused when the accessor is read.
         let count = |accessor: Option<Accessor>| accessor.map_or(0, |a| a.count().min(bytes));
         for primitive in node.mesh().iter().flat_map(Mesh::primitives) {
             let positions = count(primitive.get(&Semantic::Positions));
             vertices += 1 + positions.max(count(primitive.indices()));
-            if vertices > most {
+            if vertices > limit {
                 return Err(format!(
-                    "its nodes use meshes over and over, to more than {most} vertices"
+                    "its nodes instance meshes to more than {limit} vertices"
                 ));
             }
         }
@@ -81,7 +82,7 @@ fn matrix(transform: &Transform) -> DMat4 {
             scale,
         } => {
             let rotation = DQuat::from_array(rotation.map(f64::from));
-            // A quaternion of no length turns nothing; others may be off by rounding.
+            // A zero quaternion is no rotation; others may be off unit length by rounding.
             let rotation = if rotation.length() > 0.0 {
                 rotation.normalize()
             } else {

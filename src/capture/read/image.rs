@@ -1,9 +1,9 @@
-//! Photographs from EXR, Radiance HDR, PNG (8 and 16 bit) and JPEG, in linear light.
+//! Reads photographs from EXR, Radiance HDR, PNG (8 and 16 bit) and JPEG into linear radiance.
 
 use crate::capture::camera::Intrinsics;
 use crate::capture::orientation::Orientation;
-use crate::capture::photograph::{Encoding, Photograph};
-use crate::capture::read::{cut_short, exposure};
+use crate::capture::photograph::{Encoding, Photograph, PhotographSource};
+use crate::capture::read::cut_short;
 use crate::error::{Error, Result};
 use crate::math::color::srgb_to_linear;
 use glam::Vec3;
@@ -12,18 +12,20 @@ use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Lim
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Photographs of more pixels are refused before anything is allocated (RGB in f32: 3 GiB).
 pub const MAX_PIXELS: u64 = 1 << 28;
-/// An EXR may store pixels beyond the picture's edge, up to this many times those of the picture, ...
-const MAX_STORED: u64 = 16;
-/// ... and any number up to this one; whole rows of what is stored are held while it is decoded.
-const STORED_WITHOUT_QUESTION: u64 = 1 << 20;
+/// The data window of an EXR may hold this many times the pixels of its display window ...
+const MAX_DATA_RATIO: u64 = 16;
+/// ... or this number of pixels, whichever is more: decoding holds whole rows of the data window.
+const MIN_DATA_LIMIT: u64 = 1 << 20;
 
-/// What helps with a photograph that cannot be decoded whole.
-const AGAIN: &str = "copy it again from where it came, or take its frame out of transforms.json";
+/// Remedy for a photograph that cannot be decoded completely.
+const COPY_AGAIN: &str =
+    "copy it again from where it came, or take its frame out of transforms.json";
 
-/// What a photograph's header says.
+/// The header of a photograph.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Header {
     /// Width in pixels.
@@ -32,16 +34,16 @@ pub struct Header {
     pub height: u32,
     /// How the values are stored.
     pub encoding: Encoding,
-    /// How EXIF says that the picture lies in the file; upright where it says nothing.
+    /// Orientation by EXIF; upright if EXIF has none.
     pub orientation: Orientation,
-    /// Time × ISO / F² where EXIF has it.
+    /// Exposure time × ISO / F², if EXIF has it.
     pub exif_exposure: Option<f64>,
 }
 
 /// Reads a photograph's header.
 ///
 /// # Errors
-/// The file cannot be read, is no image of a known format, is empty or has more than [`MAX_PIXELS`] pixels.
+/// The file cannot be read, is not an image of a known format, is empty or has more than [`MAX_PIXELS`] pixels.
 pub fn header(path: &Path) -> Result<Header> {
     let mut decoder = decoder(path)?;
     let (width, height) = decoder.dimensions();
@@ -57,15 +59,43 @@ pub fn header(path: &Path) -> Result<Header> {
         height,
         encoding,
         orientation: orientation.unwrap_or_default(),
-        exif_exposure: exif.as_ref().and_then(exposure::of_exif),
+        exif_exposure: exif.as_ref().and_then(exif_exposure),
     })
 }
 
-/// Reads a photograph: linear values divided by the exposure. Alpha below one half, values that are no number,
-/// infinite or negative make a pixel unusable (its colour is then zero); such values, alpha apart, are counted.
+impl PhotographSource {
+    /// Reads the photograph and divides by the exposure.
+    ///
+    /// # Errors
+    /// The file cannot be read, is not an image, or has another size than the camera.
+    pub fn load(&self, intrinsics: &Intrinsics, exposure: Option<f64>) -> Result<Arc<Photograph>> {
+        Ok(self.load_counted(intrinsics, exposure)?.0)
+    }
+
+    /// [`PhotographSource::load`], and the number of pixels with negative or non-finite values.
+    ///
+    /// # Errors
+    /// As [`PhotographSource::load`].
+    pub fn load_counted(
+        &self,
+        intrinsics: &Intrinsics,
+        exposure: Option<f64>,
+    ) -> Result<(Arc<Photograph>, usize)> {
+        match self {
+            Self::Memory(photograph) => Ok((photograph.clone(), 0)),
+            Self::File(path, orientation) => {
+                let (photograph, invalid) = read(path, *orientation, intrinsics, exposure)?;
+                Ok((Arc::new(photograph), invalid))
+            }
+        }
+    }
+}
+
+/// Reads a photograph and divides linear values by the exposure. Pixels with alpha below 0.5 or with negative or non-finite
+/// values are unusable and black. Also returns the number of pixels with negative or non-finite values.
 ///
 /// # Errors
-/// The file cannot be read, is no image, or has, turned as `orientation` says, another size than the camera.
+/// The file cannot be read, is not an image, or its size after `orientation` differs from the camera's.
 pub fn read(
     path: &Path,
     orientation: Orientation,
@@ -87,12 +117,16 @@ pub fn read(
     }
     let encoding = encoding(path, decoder.color_type())?;
     if cut_short::jpeg(path).map_err(|e| Error::io(path, &e))? {
-        return Err(Error::file(path, "ends before its picture is whole", AGAIN));
+        return Err(Error::file(
+            path,
+            "ends before its picture is whole",
+            COPY_AGAIN,
+        ));
     }
     let decoded = DynamicImage::from_decoder(decoder).map_err(|e| broken(path, &e))?;
     let scale = (1.0 / exposure.unwrap_or(1.0)) as f32;
-    let multiplied = match encoding {
-        Encoding::Linear => multiplied(path)?,
+    let multiplier = match encoding {
+        Encoding::Linear => hdr_multiplier(path)?,
         Encoding::Srgb8 | Encoding::Srgb16 => Vec3::ONE,
     };
     let values = linear_values(decoded, encoding);
@@ -102,7 +136,7 @@ pub fn read(
     let pixels: Vec<Vec3> = values
         .iter()
         .map(|&[r, g, b, alpha]| {
-            let rgb = Vec3::new(r, g, b) / multiplied * scale;
+            let rgb = Vec3::new(r, g, b) / multiplier * scale;
             let valid = rgb.is_finite() && rgb.min_element() >= 0.0;
             invalid += usize::from(!valid);
             let good = valid && alpha >= 0.5;
@@ -131,7 +165,26 @@ pub fn read(
     }
 }
 
-/// Opens the decoder that the file's first bytes ask for, with its size checked and its memory limited.
+/// Exposure time × ISO / F² of an EXIF record: the linear multiplier up to the sensor's own scale.
+///
+/// `None` if the time is absent or the numbers are impossible. Absent ISO and F-number count as 100 and 1: phones have a fixed
+/// aperture.
+fn exif_exposure(exif: &exif::Exif) -> Option<f64> {
+    let number = |tag| -> Option<f64> {
+        let field = exif.get_field(tag, exif::In::PRIMARY)?;
+        match &field.value {
+            exif::Value::Rational(v) => v.first().map(exif::Rational::to_f64),
+            value => value.get_uint(0).map(f64::from),
+        }
+    };
+    let time = number(exif::Tag::ExposureTime)?;
+    let iso = number(exif::Tag::PhotographicSensitivity).unwrap_or(100.0);
+    let aperture = number(exif::Tag::FNumber).unwrap_or(1.0);
+    let exposure = time * iso / 100.0 / (aperture * aperture);
+    (exposure.is_finite() && exposure > 0.0).then_some(exposure)
+}
+
+/// Opens the decoder for the format of the file's first bytes; checks the size and limits memory.
 fn decoder(path: &Path) -> Result<impl ImageDecoder> {
     let file = File::open(path).map_err(|e| Error::io(path, &e))?;
     let mut reader = ImageReader::new(BufReader::new(file))
@@ -142,7 +195,7 @@ fn decoder(path: &Path) -> Result<impl ImageDecoder> {
         _ => {
             return Err(Error::file(
                 path,
-                "is no EXR, HDR, PNG or JPEG image",
+                "is not an EXR, HDR, PNG or JPEG image",
                 "convert it to one of these",
             ));
         }
@@ -159,7 +212,7 @@ fn decoder(path: &Path) -> Result<impl ImageDecoder> {
     Ok(decoder)
 }
 
-/// An EXR may store another rectangle than it shows; both must be of a size that can be held.
+/// Checks the sizes of an EXR's data window and display window.
 fn check_exr_windows(path: &Path) -> Result<()> {
     let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|e| {
         Error::file(
@@ -174,8 +227,8 @@ fn check_exr_windows(path: &Path) -> Result<()> {
         for size in [stored, shown] {
             check_size(path, size.x() as u64, size.y() as u64)?;
         }
-        let most = (shown.area() as u64 * MAX_STORED).max(STORED_WITHOUT_QUESTION);
-        if stored.area() as u64 > most {
+        let limit = (shown.area() as u64 * MAX_DATA_RATIO).max(MIN_DATA_LIMIT);
+        if stored.area() as u64 > limit {
             return Err(Error::file(
                 path,
                 format!(
@@ -206,8 +259,8 @@ fn check_size(path: &Path, width: u64, height: u64) -> Result<()> {
     Ok(())
 }
 
-/// What the values of a Radiance file were multiplied by, as its EXPOSURE and COLORCORR lines say; one for other files.
-fn multiplied(path: &Path) -> Result<Vec3> {
+/// The factor on the values of a Radiance HDR file by its EXPOSURE and COLORCORR lines; 1 for other files.
+fn hdr_multiplier(path: &Path) -> Result<Vec3> {
     let file = File::open(path).map_err(|e| Error::io(path, &e))?;
     let Ok(decoder) = HdrDecoder::new(BufReader::new(file)) else {
         return Ok(Vec3::ONE);
@@ -270,5 +323,5 @@ fn linear_values(image: DynamicImage, encoding: Encoding) -> Vec<[f32; 4]> {
 }
 
 fn broken(path: &Path, error: &image::ImageError) -> Error {
-    Error::file(path, format!("cannot be decoded: {error}"), AGAIN)
+    Error::file(path, format!("cannot be decoded: {error}"), COPY_AGAIN)
 }

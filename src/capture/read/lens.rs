@@ -1,20 +1,19 @@
-//! Intrinsics as transforms.json writes them: shared fields, overruled frame by frame.
+//! Reads intrinsics from transforms.json: shared fields, overridden per frame.
 
 use crate::capture::camera::Intrinsics;
 use crate::capture::read::fields::Fields;
 use crate::error::{Error, Result};
 use glam::DVec2;
 
-/// Coefficients of lens models that relit does not have; they may be present but must be zero.
+/// Coefficients of unsupported lens models; they may be present but must be zero.
 const HIGHER_COEFFICIENTS: [&str; 8] = ["k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"];
 
-/// No lens without distortion draws what lies farther from its axis, as a tangent: the widest there are, of 9 mm for a picture
-/// of 36 × 24 mm, reach 2.4.
-const MAX_SLOPE: f64 = 2.5;
+/// Limit on tan θ of the off-axis angle in a picture: the widest rectilinear lenses (9 mm for 36 × 24 mm) reach 2.4.
+const MAX_TANGENT: f64 = 2.5;
 
 /// Reads the lens of one frame for an image of `size` (width, height) pixels.
 ///
-/// Returns remarks about what had to be guessed.
+/// Also returns remarks about guessed fields.
 ///
 /// # Errors
 /// A lens model other than pinhole with k1 k2 p1 p2, no focal length, a size other than the image's, numbers out of range.
@@ -24,17 +23,16 @@ pub fn read(
     size: [u32; 2],
 ) -> Result<(Intrinsics, Vec<&'static str>)> {
     let mut remarks = Vec::new();
-    let of = |name: &str| -> &Fields {
+    let fields_of = |name: &str| -> &Fields {
         if frame.get(name).is_some() {
             frame
         } else {
             shared
         }
     };
-    let number = |name: &str| of(name).number(name);
+    let number = |name: &str| fields_of(name).number(name);
 
-    // The lens model.
-    let fields = of("camera_model");
+    let fields = fields_of("camera_model");
     match fields.text("camera_model")?.map(str::to_ascii_uppercase) {
         None => {}
         Some(model) => match model.as_str() {
@@ -51,14 +49,14 @@ pub fn read(
     for name in HIGHER_COEFFICIENTS {
         if number(name)?.is_some_and(|k| k != 0.0) {
             return Err(Error::new(
-                of(name).place(name),
+                fields_of(name).place(name),
                 "this lens coefficient is not supported",
                 "undistort the photographs first, or refit the lens with k1 k2 p1 p2",
             ));
         }
     }
 
-    // A lens that is given for the same photograph at another size is scaled to this one.
+    // Scale a lens that is given for another size of the same photograph.
     let [width, height] = size;
     let mut scale = DVec2::ONE;
     if let Some([stated_width, stated_height]) = stated_size(shared, frame)?
@@ -78,7 +76,7 @@ pub fn read(
                 false => ("w", stated_width),
             };
             return Err(Error::new(
-                of(name).place(name),
+                fields_of(name).place(name),
                 format!("is {stated}, but {photograph} is {width}×{height} pixels"),
                 remedy,
             ));
@@ -87,10 +85,10 @@ pub fn read(
     }
 
     // Focal length in pixels, or from the field of view.
-    let half = |extent: u32, angle: f64| f64::from(extent) * 0.5 / (angle * 0.5).tan();
+    let focal = |extent: u32, angle: f64| f64::from(extent) * 0.5 / (angle * 0.5).tan();
     let fx = match (number("fl_x")?, number("camera_angle_x")?) {
         (Some(f), _) => f * scale.x,
-        (None, Some(angle)) => half(width, angle),
+        (None, Some(angle)) => focal(width, angle),
         (None, None) => {
             return Err(Error::new(
                 frame.place("fl_x"),
@@ -101,7 +99,7 @@ pub fn read(
     };
     let fy = match (number("fl_y")?, number("camera_angle_y")?) {
         (Some(f), _) => f * scale.y,
-        (None, Some(angle)) => half(height, angle),
+        (None, Some(angle)) => focal(height, angle),
         (None, None) => {
             remarks.push("fl_y is absent and taken equal to fl_x");
             fx
@@ -123,25 +121,25 @@ pub fn read(
     for (name, f) in [("fl_x", fx), ("fl_y", fy)] {
         if !(f.is_finite() && f > 0.0) {
             return Err(Error::new(
-                of(name).place(name),
+                fields_of(name).place(name),
                 format!("a focal length of {f} pixels is impossible"),
                 "give a positive focal length in pixels",
             ));
         }
     }
     for (name, c, extent, f) in [("cx", cx, width, fx), ("cy", cy, height, fy)] {
-        // From the principal point to the nearest edge; not above zero inside the picture.
-        let beside = (-c).max(c - f64::from(extent));
-        if beside > MAX_SLOPE * f {
+        // Distance from the principal point to the nearest edge; positive outside the picture.
+        let outside = (-c).max(c - f64::from(extent));
+        if outside > MAX_TANGENT * f {
             return Err(Error::new(
-                of(name).place(name),
+                fields_of(name).place(name),
                 format!(
                     "a principal point at {c} pixels is far outside the picture of {width}×{height}"
                 ),
                 "give it in pixels from the picture's top-left corner",
             ));
         }
-        if beside > 0.0 {
+        if outside > 0.0 {
             remarks.push("the principal point (cx, cy) lies outside the picture");
         }
     }
@@ -165,7 +163,7 @@ pub fn read(
     Ok((intrinsics, remarks))
 }
 
-/// Width and height that the lens is given for, where both are stated.
+/// Width and height that the lens is given for, if both are present.
 pub fn stated_size(shared: &Fields, frame: &Fields) -> Result<Option<[u32; 2]>> {
     let count = |name: &str| match frame.get(name) {
         Some(_) => frame.count(name),

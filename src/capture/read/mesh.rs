@@ -1,26 +1,15 @@
-//! What every mesh reader hands over, and the checks that all of them share.
+//! Reads a mesh of any format, and the checks that all formats share.
 
 use crate::capture::mesh::Mesh;
 use crate::capture::read::confine::Confine;
+use crate::capture::read::raw_mesh::RawMesh;
 use crate::capture::read::{gltf, obj, ply};
 use crate::error::{Error, Result};
+use crate::say::listed;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::path::Path;
-
-/// A mesh as a file holds it, before it is checked.
-#[derive(Debug, Default)]
-pub struct RawMesh {
-    /// Geometry and objects; `objects` may hold equal or empty names.
-    pub mesh: Mesh,
-    /// Whether the file says which triangle belongs to which object.
-    pub has_objects: bool,
-    /// Largest rounding of a position that the file's own number format causes, in the capture's units.
-    pub rounding: f64,
-    /// What was odd.
-    pub warnings: Vec<String>,
-}
 
 /// Reads and checks a mesh.
 ///
@@ -37,7 +26,7 @@ pub fn read(path: &Path, confine: &Confine, warnings: &mut Vec<String>) -> Resul
         _ => {
             return Err(Error::file(
                 path,
-                "is no OBJ, PLY, GLB or glTF mesh",
+                "is not an OBJ, PLY, GLB or glTF mesh",
                 "convert it to one of these",
             ));
         }
@@ -48,11 +37,11 @@ pub fn read(path: &Path, confine: &Confine, warnings: &mut Vec<String>) -> Resul
         warnings.push(format!("{}: {warning}", path.display()));
     }
     make_names_unique(path, &mut raw.mesh.objects, warnings);
-    remark_on_triangles(path, &raw, warnings);
+    warn_about_triangles(path, &raw, warnings);
     Ok(raw)
 }
 
-/// Refuses what no scene can be built from.
+/// Refuses a mesh that no scene can be built from.
 fn check(path: &Path, mesh: &Mesh) -> Result<()> {
     if mesh.triangles.is_empty() {
         return Err(Error::file(
@@ -88,7 +77,7 @@ fn check(path: &Path, mesh: &Mesh) -> Result<()> {
     Ok(())
 }
 
-/// Leaves out vertices that no triangle uses: they would move the scene's origin and size.
+/// Removes unused vertices: they would change the scene's origin and size.
 fn drop_unused(mesh: &mut Mesh) {
     let mut used = vec![false; mesh.positions.len()];
     for &corner in mesh.triangles.iter().flatten() {
@@ -97,33 +86,21 @@ fn drop_unused(mesh: &mut Mesh) {
     if used.iter().all(|&used| used) {
         return;
     }
-    let mut places = vec![0u32; used.len()];
-    let kept = places.iter_mut().zip(&used).filter(|(_, used)| **used);
-    for (next, (place, _)) in (0..).zip(kept) {
-        *place = next;
+    let mut new_index = vec![0u32; used.len()];
+    let kept = new_index.iter_mut().zip(&used).filter(|(_, used)| **used);
+    for (next, (index, _)) in (0..).zip(kept) {
+        *index = next;
     }
     let mut flags = used.iter();
     mesh.positions.retain(|_| flags.next() == Some(&true));
     let mut flags = used.iter();
     mesh.vertex_colors.retain(|_| flags.next() == Some(&true));
     for corner in mesh.triangles.iter_mut().flatten() {
-        *corner = places[*corner as usize];
+        *corner = new_index[*corner as usize];
     }
 }
 
-/// Lists of names end here, with the number of the rest.
-const LISTED: usize = 5;
-
-/// The first few names and the number of the rest.
-pub fn listed(names: &[String]) -> String {
-    let first = names[..names.len().min(LISTED)].join(", ");
-    match names.len().saturating_sub(LISTED) {
-        0 => first,
-        rest => format!("{first} and {rest} more"),
-    }
-}
-
-/// Gives repeated names a number and empty ones a name.
+/// Numbers repeated names and names empty ones.
 fn make_names_unique(path: &Path, names: &mut [String], warnings: &mut Vec<String>) {
     let mut taken: HashSet<String> = names.iter().cloned().collect();
     let mut seen = HashSet::new();
@@ -159,8 +136,8 @@ fn make_names_unique(path: &Path, names: &mut [String], warnings: &mut Vec<Strin
     }
 }
 
-/// Counts triangles that are there twice or have no area, and says where the file's numbers are too coarse.
-fn remark_on_triangles(path: &Path, raw: &RawMesh, warnings: &mut Vec<String>) {
+/// Warns about duplicate triangles, triangles without area, and coarse single-precision positions.
+fn warn_about_triangles(path: &Path, raw: &RawMesh, warnings: &mut Vec<String>) {
     let mesh = &raw.mesh;
     let place = path.display();
     let flat = mesh
@@ -181,7 +158,7 @@ fn remark_on_triangles(path: &Path, raw: &RawMesh, warnings: &mut Vec<String>) {
         ));
     }
     let (low, high) = mesh.bounds();
-    // Half a unit in the last place of f32 is 2⁻²⁵ of a number; a mesh about the origin has 2⁻²⁵ of its own size.
+    // Rounding to f32 is 2⁻²⁵ of a number, so a mesh about the origin has 2⁻²⁵ of its own size; warn beyond 32 times more.
     if raw.rounding > 16.0 * (high - low).length() * f64::from(f32::EPSILON) {
         warnings.push(format!(
             "{place}: the mesh lies far from the origin in single precision; positions are rounded by up to {:.1e}, {:.1e} of its size",

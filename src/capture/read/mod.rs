@@ -1,4 +1,4 @@
-//! Reads a capture from a folder: transforms.json, a mesh, and photographs (which are read when needed).
+//! Reads a capture from a folder: transforms.json, a mesh, and photographs (decoded only when needed).
 //!
 //! ```text
 //! transforms.json     camera_model, w, h, fl_x, fl_y, cx, cy, [k1 k2 p1 p2], frames[{file_path,
@@ -8,8 +8,8 @@
 //! images/*            .exr, .hdr (linear), .png, .jpg (sRGB)
 //! ```
 //!
-//! A capture from someone else is data: nothing outside its folder is opened unless the person allows it, and no
-//! header is believed before it was compared with the file's length or the camera's size.
+//! Captures are untrusted: nothing outside the folder is opened unless allowed, and sizes in headers are checked against the
+//! file's length or the camera's size before memory is allocated.
 
 pub mod accessor;
 pub mod camera_file;
@@ -27,9 +27,10 @@ mod obj;
 mod ply;
 mod ply_elements;
 pub(in crate::capture) mod pose;
+mod raw_mesh;
 mod transforms;
 
-use crate::capture::read::mesh::RawMesh;
+use crate::capture::read::raw_mesh::RawMesh;
 use crate::capture::reading::Reading;
 use crate::capture::{Capture, Cut};
 use crate::error::{Error, Result};
@@ -37,11 +38,11 @@ use confine::Confine;
 use glam::DVec3;
 use std::path::Path;
 
-/// The file that makes a folder a capture: its cameras and the names of all else.
+/// The file that makes a folder a capture: cameras and the names of all other files.
 pub const CAMERAS: &str = "transforms.json";
-/// The mesh, where `mesh_path` does not name one, in this order.
+/// Names of the mesh if `mesh_path` is absent, in order of preference.
 pub const MESHES: [&str; 3] = ["mesh.glb", "mesh.ply", "mesh.obj"];
-/// A mesh whose only object has more triangles than this is taken for a scan without objects.
+/// A mesh with a single object of more triangles counts as a scan without objects.
 const MAX_TRIANGLES_OF_ONE_OBJECT: usize = 5000;
 
 /// What a person may choose about reading.
@@ -49,18 +50,18 @@ const MAX_TRIANGLES_OF_ONE_OBJECT: usize = 5000;
 pub struct ReadOptions {
     /// Overrules the cameras' mean up; need not be of unit length.
     pub up: Option<DVec3>,
-    /// About how many segments a mesh without objects is cut into; 1 leaves it whole.
+    /// Approximate number of segments of a mesh without objects; 1 does not segment it.
     pub segments: Option<usize>,
-    /// How the files' numbers are meant.
+    /// Conventions of the files.
     pub reading: Reading,
-    /// Lets file paths inside the capture lead out of its folder.
+    /// Whether paths in the capture may leave its folder.
     pub allow_outside: bool,
 }
 
 /// Reads the capture in `folder`. Photographs are checked (they exist and have their camera's size) but not decoded.
 ///
 /// # Errors
-/// Anything that leaves no capture to work on: a missing or broken transforms.json, a pose that is no rigid motion, a
+/// The capture cannot be used: a missing or broken transforms.json, a pose that is not a rigid motion, a
 /// photograph of another size than its camera, no mesh, a broken mesh, a path that leaves the folder.
 pub fn read(folder: &Path, options: &ReadOptions) -> Result<Capture> {
     if !folder.is_dir() {
@@ -92,7 +93,7 @@ pub fn read(folder: &Path, options: &ReadOptions) -> Result<Capture> {
     Ok(capture.read_as(&options.reading))
 }
 
-/// How a mesh without objects is to be cut, if that is wanted; a single object of a scan's complexity counts as none.
+/// How to segment the mesh, if it has no objects. A single object with many triangles counts as none.
 fn cut(
     raw: &RawMesh,
     path: &Path,
@@ -120,7 +121,7 @@ fn cut(
     }
 }
 
-/// The folder's own name, also of `.` and `..`.
+/// The folder's name, also for `.` and `..`.
 fn name_of(folder: &Path) -> String {
     let absolute = folder.canonicalize();
     let path = absolute.as_deref().unwrap_or(folder);

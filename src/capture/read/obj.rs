@@ -1,9 +1,9 @@
-//! Wavefront OBJ: every `o` or `g` is an object, taken up again where its name comes again. Parsed by tobj; materials are not
-//! needed here and not opened.
+//! Reads Wavefront OBJ with tobj: every `o` or `g` is an object; equal names are one object. Material files are not opened.
 
-use crate::capture::read::fields::without_mark;
-use crate::capture::read::mesh::{RawMesh, listed};
+use crate::capture::read::fields::without_bom;
+use crate::capture::read::raw_mesh::RawMesh;
 use crate::error::{Error, Result};
+use crate::say::listed;
 use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 use std::io::{BufRead, Read};
@@ -15,13 +15,13 @@ const UNNAMED: &str = "unnamed_object";
 /// Reads an OBJ file; polygons become fans of triangles.
 ///
 /// # Errors
-/// The file cannot be read or breaks the format, with the number of the line where that showed.
+/// The file cannot be read or breaks the format; the message names the line.
 pub fn read(path: &Path) -> Result<RawMesh> {
     let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
-    // Comments and names in other encodings than UTF-8 are no reason to fail.
+    // Tolerate comments and names in other encodings than UTF-8.
     parse(
         path,
-        String::from_utf8_lossy(without_mark(&bytes)).as_bytes(),
+        String::from_utf8_lossy(without_bom(&bytes)).as_bytes(),
     )
 }
 
@@ -98,10 +98,10 @@ fn parse(path: &Path, reader: impl BufRead) -> Result<RawMesh> {
     }
     if !repeated.is_empty() {
         raw.warnings.push(format!(
-            "{} several times and taken as one object each: {}; give each its own name to keep them apart",
+            "{} repeated and taken as one object each: {}; rename them to keep them apart",
             match repeated.len() {
-                1 => "one name comes".to_owned(),
-                n => format!("{n} names come"),
+                1 => "one name is".to_owned(),
+                n => format!("{n} names are"),
             },
             listed(&repeated)
         ));
@@ -114,7 +114,7 @@ fn too_large(path: &Path) -> Error {
     Error::file(path, "has more than 2³² vertices", "make the mesh smaller")
 }
 
-/// Counts the lines that pass, so that an error can name one.
+/// A reader that counts lines, so that an error can name one.
 struct CountLines<R> {
     inner: R,
     line: usize,
@@ -139,8 +139,8 @@ impl<R: BufRead> BufRead for CountLines<R> {
 
     fn consume(&mut self, amount: usize) {
         if let Ok(buffer) = self.inner.fill_buf() {
-            let passed = &buffer[..amount.min(buffer.len())];
-            self.line += passed.iter().filter(|&&byte| byte == b'\n').count();
+            let consumed = &buffer[..amount.min(buffer.len())];
+            self.line += consumed.iter().filter(|&&byte| byte == b'\n').count();
         }
         self.inner.consume(amount);
     }

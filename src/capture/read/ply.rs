@@ -1,11 +1,11 @@
-//! PLY, ASCII and binary of either byte order, parsed by ply-rs-bw.
+//! Reads PLY, ASCII and binary of either byte order, with ply-rs-bw.
 //!
-//! Vertex colours are linear. A face's `object_id` (or Matterport3D's `segment_id`) names its object; a line `comment object_id 3 wall` in the header
-//! gives object 3 its name.
+//! Vertex colours are linear. A face's `object_id` (or Matterport3D's `segment_id`) is its object; a header line `comment object_id
+//! 3 wall` names object 3.
 
 use crate::capture::mesh::Mesh;
-use crate::capture::read::mesh::RawMesh;
-use crate::capture::read::ply_elements::{Face, Passed, Vertex};
+use crate::capture::read::ply_elements::{Face, Skipped, Vertex};
+use crate::capture::read::raw_mesh::RawMesh;
 use crate::error::{Error, Result};
 use glam::Vec2;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
@@ -21,7 +21,7 @@ const MAX_HEADER: u64 = 1 << 26;
 /// Reads a PLY file; polygons become fans of triangles.
 ///
 /// # Errors
-/// The file cannot be read, breaks the format, or promises more elements than its bytes can hold.
+/// The file cannot be read, breaks the format, or declares more elements than its bytes can hold.
 pub fn read(path: &Path) -> Result<RawMesh> {
     let file = File::open(path).map_err(|e| Error::io(path, &e))?;
     let length = file.metadata().map_err(|e| Error::io(path, &e))?.len();
@@ -46,7 +46,7 @@ fn parse(path: &Path, source: impl BufRead, length: u64) -> Result<RawMesh> {
     let rest = length - (MAX_HEADER.min(length) - reader.get_ref().limit());
     reader.get_mut().set_limit(rest);
 
-    // Elements come in the header's order; those before the faces must be read to be passed.
+    // Elements come in the header's order; others before the faces must be parsed to be skipped.
     let mut vertices: Vec<Vertex> = Vec::new();
     let mut faces: Vec<Face> = Vec::new();
     for element in header.elements.values() {
@@ -61,7 +61,7 @@ fn parse(path: &Path, source: impl BufRead, length: u64) -> Result<RawMesh> {
                 .map_err(broken)?;
             break;
         } else {
-            Parser::<Passed>::new()
+            Parser::<Skipped>::new()
                 .read_payload_for_element(&mut reader, element, &header)
                 .map_err(broken)?;
         }
@@ -69,7 +69,7 @@ fn parse(path: &Path, source: impl BufRead, length: u64) -> Result<RawMesh> {
     assemble(path, &header, &vertices, &faces)
 }
 
-/// Refuses an element that the bytes left in the file cannot hold.
+/// Refuses an element count that the remaining `left` bytes of the file cannot hold.
 fn check_count(path: &Path, element: &ElementDef, encoding: Encoding, left: u64) -> Result<()> {
     let size = |scalar: &ScalarType| match scalar {
         ScalarType::Char | ScalarType::UChar => 1,
@@ -78,13 +78,13 @@ fn check_count(path: &Path, element: &ElementDef, encoding: Encoding, left: u64)
         ScalarType::Double => 8,
     };
     let types = element.properties.values().map(|p| &p.data_type);
-    let least: u64 = match encoding {
+    let min_size: u64 = match encoding {
         // A digit and a separator for each property.
         Encoding::Ascii => 2 * types.count() as u64,
         _ => types
             .map(|t| match t {
                 PropertyType::Scalar(scalar) => size(scalar),
-                // Few faces are without corners.
+                // Assume at least one corner per face.
                 PropertyType::List(length, item) if element.name == "face" => {
                     size(length) + size(item)
                 }
@@ -94,9 +94,9 @@ fn check_count(path: &Path, element: &ElementDef, encoding: Encoding, left: u64)
     };
     // The last line of an ASCII file may lack its line break.
     let needed = (element.count as u64)
-        .saturating_mul(least)
+        .saturating_mul(min_size)
         .saturating_sub(1);
-    if element.count > 0 && (least == 0 || needed > left) {
+    if element.count > 0 && (min_size == 0 || needed > left) {
         return Err(Error::file(
             path,
             format!(
@@ -109,7 +109,7 @@ fn check_count(path: &Path, element: &ElementDef, encoding: Encoding, left: u64)
     Ok(())
 }
 
-/// The mesh of the elements read.
+/// Assembles the mesh from vertices and faces.
 fn assemble(path: &Path, header: &Header, vertices: &[Vertex], faces: &[Face]) -> Result<RawMesh> {
     let vertex_has = |name: &str| {
         let element = header.elements.get("vertex");
@@ -138,14 +138,14 @@ fn assemble(path: &Path, header: &Header, vertices: &[Vertex], faces: &[Face]) -
     if vertex_has("red").is_some() {
         mesh.vertex_colors = vertices.iter().map(|v| v.color).collect();
     }
-    let single = ["x", "y", "z"].iter().any(|axis| {
+    let single_precision = ["x", "y", "z"].iter().any(|axis| {
         vertex_has(axis).is_some_and(|p| p.data_type == PropertyType::Scalar(ScalarType::Float))
     });
     let largest = mesh
         .positions
         .iter()
         .fold(0.0, |m: f64, p| m.max(p.abs().max_element()));
-    let rounding = if single {
+    let rounding = if single_precision {
         largest * f64::from(f32::EPSILON) * 0.25
     } else {
         0.0
@@ -219,7 +219,7 @@ fn assemble(path: &Path, header: &Header, vertices: &[Vertex], faces: &[Face]) -
     })
 }
 
-/// The names in the header's comments.
+/// Object names from the header's comments.
 fn object_names(header: &Header) -> HashMap<i64, String> {
     header
         .comments

@@ -1,4 +1,4 @@
-//! The PLY elements that are kept, as the parser fills them; every other property is passed over.
+//! The PLY elements that are kept, filled by the parser; other properties are ignored.
 
 use glam::{DVec3, Vec2, Vec3};
 use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
@@ -14,11 +14,11 @@ pub struct Vertex {
     pub uv: Vec2,
 }
 
-/// An element of another kind, which is read past and takes no memory.
+/// An element of another kind; nothing of it is stored.
 #[derive(Debug, Clone, Copy)]
-pub struct Passed;
+pub struct Skipped;
 
-impl PropertyAccess for Passed {
+impl PropertyAccess for Skipped {
     fn new() -> Self {
         Self
     }
@@ -31,7 +31,7 @@ pub struct Face {
     pub corners: Vec<u32>,
     /// texcoord: u, v of each corner.
     pub texcoord: Vec<f32>,
-    /// object_id, or segment_id where there is none.
+    /// object_id, or else segment_id or face_segment (Matterport3D).
     pub object_id: Option<i64>,
 }
 
@@ -79,13 +79,12 @@ impl PropertyAccess for Face {
                 Some(corners) => self.corners = corners,
                 None => return PropertyAccessResult::UnsupportedType,
             },
-            "object_id" => match whole(&property) {
+            "object_id" => match integer(&property) {
                 Some(id) => self.object_id = Some(id),
                 None => return PropertyAccessResult::UnsupportedType,
             },
-            // Matterport3D's name of the same.
             "segment_id" | "face_segment" if self.object_id.is_none() => {
-                self.object_id = whole(&property);
+                self.object_id = integer(&property);
             }
             "texcoord" => match property {
                 Property::ListFloat(list) => self.texcoord = list,
@@ -100,7 +99,7 @@ impl PropertyAccess for Face {
     }
 }
 
-/// Vertex indices of any integer type.
+/// Vertex indices from a list of any integer type.
 fn indices(property: Property) -> Option<Vec<u32>> {
     fn convert<T: TryInto<u32>>(list: Vec<T>) -> Vec<u32> {
         let index = |x: T| x.try_into().unwrap_or(u32::MAX);
@@ -117,8 +116,8 @@ fn indices(property: Property) -> Option<Vec<u32>> {
     }
 }
 
-/// A whole number of any integer type.
-fn whole(property: &Property) -> Option<i64> {
+/// An integer of any type.
+fn integer(property: &Property) -> Option<i64> {
     match *property {
         Property::Char(x) => Some(x.into()),
         Property::UChar(x) => Some(x.into()),

@@ -1,19 +1,19 @@
-//! Camera-to-world matrices: what is tolerated, what is refused.
+//! Reads camera-to-world matrices: small flaws are corrected, others refused.
 
 use crate::capture::camera::Pose;
 use crate::capture::read::fields::Fields;
 use crate::error::{self, Error};
 use glam::{DMat3, DVec3, DVec4};
 
-/// Columns further than this from orthonormal (scale taken out) are no rotation but a shear.
+/// Maximum deviation of the columns from orthonormal, after removal of the scale.
 const MAX_SHEAR: f64 = 1e-2;
-/// Deviations up to this are the rounding of single precision and are not worth a word.
+/// Deviations up to this are single-precision rounding and are not reported.
 const ROUNDING: f64 = 1e-4;
 
-/// The pose of a frame, and a remark where its matrix had to be changed.
+/// The pose of a frame, and a remark if its matrix was corrected.
 ///
 /// # Errors
-/// There is no matrix, or it is no rigid motion.
+/// There is not a matrix, or it is not a rigid motion.
 pub fn of_frame(fields: &Fields) -> error::Result<(Pose, Option<String>)> {
     const NAME: &str = "transform_matrix";
     let place = fields.place(NAME);
@@ -24,7 +24,7 @@ pub fn of_frame(fields: &Fields) -> error::Result<(Pose, Option<String>)> {
     Ok((pose, remark.map(|remark| format!("{NAME} {remark}"))))
 }
 
-/// What is said of a matrix at a place in a file that is no pose, for the reason that [`from_rows`] gives.
+/// The error for a matrix at `place` that [`from_rows`] refuses with `problem`.
 pub fn refused(place: &str, problem: &str) -> Error {
     Error::new(
         place,
@@ -33,10 +33,10 @@ pub fn refused(place: &str, problem: &str) -> Error {
     )
 }
 
-/// The rigid pose nearest to a 3×4 or 4×4 row-major matrix, and a remark where that changed more than rounding.
+/// The nearest rigid pose to a 3×4 or 4×4 row-major matrix, and a remark if it differs by more than rounding.
 ///
 /// # Errors
-/// What makes the matrix no rigid motion, as a phrase.
+/// Why the matrix is not a rigid motion, as a phrase.
 pub fn from_rows(rows: &[Vec<f64>]) -> Result<(Pose, Option<String>), String> {
     if !(rows.len() == 3 || rows.len() == 4) || rows.iter().any(|row| row.len() != 4) {
         return Err("is not a 4×4 (or 3×4) matrix".into());
@@ -60,13 +60,13 @@ pub fn from_rows(rows: &[Vec<f64>]) -> Result<(Pose, Option<String>), String> {
         return Err("mirrors (its determinant is negative)".into());
     }
 
-    // Take out the mean scale, then the nearest rotation by the polar iteration.
+    // Remove the mean scale, then take the nearest rotation by the polar decomposition (Newton's iteration).
     let scale = determinant.cbrt();
     let unscaled = linear * scale.recip();
     let shear = deviation(&unscaled);
     if shear > MAX_SHEAR {
         return Err(format!(
-            "is no rigid motion (its axes are {shear:.3} from orthonormal)"
+            "is not a rigid motion (its axes are {shear:.3} from orthonormal)"
         ));
     }
     let mut rotation = unscaled;

@@ -1,10 +1,10 @@
-//! transforms.json: cameras, photographs, exposures, the way to the mesh, and which way is up.
+//! Reads transforms.json: cameras, photographs, exposures, the mesh's path and the up vector.
 
 use crate::capture::Frame;
 use crate::capture::orientation::Orientation;
 use crate::capture::photograph::PhotographSource;
 use crate::capture::read::confine::Confine;
-use crate::capture::read::fields::{Fields, without_mark};
+use crate::capture::read::fields::{Fields, without_bom};
 use crate::capture::read::{CAMERAS, MESHES, exposure, image, lens, pose};
 use crate::error::{Error, Result};
 use glam::DVec3;
@@ -15,15 +15,15 @@ use std::path::PathBuf;
 
 /// Longest transforms.json that is read.
 const MAX_BYTES: u64 = 1 << 28;
-/// Metres per unit of a depth image where the file does not say (16-bit millimetres).
+/// Default metres per unit of a depth image (millimetres).
 const DEPTH_UNIT: f64 = 0.001;
 
-/// What transforms.json says.
+/// The content of transforms.json.
 #[derive(Debug)]
 pub struct Transforms {
     /// Posed photographs in file order.
     pub frames: Vec<Frame>,
-    /// Where the mesh is.
+    /// The mesh file.
     pub mesh: PathBuf,
     /// Unit up vector.
     pub up: DVec3,
@@ -51,7 +51,7 @@ pub fn read(
         ));
     }
     let text = std::fs::read(&file).map_err(|e| Error::io(&file, &e))?;
-    let value: Value = serde_json::from_slice(without_mark(&text))
+    let value: Value = serde_json::from_slice(without_bom(&text))
         .map_err(|e| Error::file(&file, format!("is not valid JSON: {e}"), "correct the file"))?;
     let shared = Fields::new(format!("{place}: "), &value)?;
 
@@ -72,7 +72,7 @@ pub fn read(
     Ok(Transforms { frames, mesh, up })
 }
 
-/// Reads all frames in parallel and gathers their remarks, each once with the number of frames concerned.
+/// Reads all frames in parallel; equal remarks become one warning with the number of frames.
 fn read_frames(
     confine: &Confine,
     shared: &Fields,
@@ -83,7 +83,7 @@ fn read_frames(
     let entries = shared
         .get("frames")
         .and_then(Value::as_array)
-        .ok_or_else(|| Error::new(&place, "is no list of frames", "add the photographs"))?;
+        .ok_or_else(|| Error::new(&place, "is not a list of frames", "add the photographs"))?;
     if entries.is_empty() {
         return Err(Error::new(&place, "is empty", "add the photographs"));
     }
@@ -100,8 +100,8 @@ fn read_frames(
     let mut headers = Vec::with_capacity(results.len());
     let mut remarks: BTreeMap<String, (usize, usize)> = BTreeMap::new();
     for (index, result) in results.into_iter().enumerate() {
-        let (frame, header, said) = result?;
-        for remark in said {
+        let (frame, header, frame_remarks) = result?;
+        for remark in frame_remarks {
             remarks.entry(remark).or_insert((index, 0)).1 += 1;
         }
         frames.push(frame);
@@ -117,7 +117,7 @@ fn read_frames(
     Ok(frames)
 }
 
-/// Reads one entry of `frames`; `orientation` is how a person says that all photographs lie.
+/// Reads one entry of `frames`; `orientation` applies to all photographs after EXIF.
 fn read_frame(
     confine: &Confine,
     shared: &Fields,
@@ -141,18 +141,18 @@ fn read_frame(
             "run `relit import` on the folder, which resamples its photographs to a pinhole",
         ));
     }
-    // A camera of the stored picture's size was calibrated on that; else EXIF says how the picture is turned.
+    // A camera with the stored picture's size was calibrated on the stored picture; otherwise apply the EXIF orientation.
     let stored = [header.width, header.height];
-    let turned = header.orientation;
-    let lies = match lens::stated_size(shared, fields)? {
+    let by_exif = header.orientation;
+    let applied = match lens::stated_size(shared, fields)? {
         Some(size) if size == orientation.size(stored) => Orientation::default(),
-        Some(size) if size == turned.then(orientation).size(stored) => turned,
+        Some(size) if size == by_exif.then(orientation).size(stored) => by_exif,
         _ => Orientation::default(),
     };
-    let shown = lies.then(orientation).size(stored);
-    let (intrinsics, said) = lens::read(shared, fields, shown)?;
-    let mut remarks: Vec<String> = said.into_iter().map(str::to_owned).collect();
-    if lies != Orientation::default() {
+    let displayed = applied.then(orientation).size(stored);
+    let (intrinsics, guesses) = lens::read(shared, fields, displayed)?;
+    let mut remarks: Vec<String> = guesses.into_iter().map(str::to_owned).collect();
+    if applied != Orientation::default() {
         remarks.push("the photograph is turned as its EXIF record says".into());
     }
 
@@ -182,13 +182,13 @@ fn read_frame(
         intrinsics,
         pose,
         exposure,
-        photograph: PhotographSource::File(photograph, lies),
+        photograph: PhotographSource::File(photograph, applied),
         depth,
     };
     Ok((frame, header, remarks))
 }
 
-/// The frame's depth image, if it is there.
+/// The frame's depth image and its unit in metres, if there is one.
 fn read_depth(
     confine: &Confine,
     shared: &Fields,
@@ -221,7 +221,7 @@ fn read_depth(
     Ok(Some((confine.file(&place, name)?, scale)))
 }
 
-/// The mesh named by `mesh_path`, or the first of the usual names.
+/// The mesh named by `mesh_path`, or the first of [`MESHES`] that exists.
 fn find_mesh(confine: &Confine, shared: &Fields) -> Result<PathBuf> {
     let place = shared.place("mesh_path");
     if let Some(name) = shared.text("mesh_path")? {
@@ -242,10 +242,10 @@ fn unit(up: DVec3, place: &str) -> Result<DVec3> {
         .ok_or_else(|| Error::new(place, "the up vector has no length", "give a direction"))
 }
 
-/// The cameras' mean up. Where it vanishes, +y is taken and said.
+/// The cameras' mean up; +y with a warning if it vanishes.
 fn mean_up(frames: &[Frame], place: &str, warnings: &mut Vec<String>) -> DVec3 {
     let sum: DVec3 = frames.iter().map(|frame| frame.pose.rotation.y_axis).sum();
-    // Cameras in all attitudes leave a mean of the order of its own noise, which says nothing.
+    // The sum of n random unit vectors has length about √n: a shorter one carries no information.
     let noise = (frames.len() as f64).sqrt();
     if frames.len() > 2 && sum.length() < noise {
         warnings.push(format!(

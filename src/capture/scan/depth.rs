@@ -1,28 +1,28 @@
 //! 16-bit depth images.
 
-use crate::capture::import::lens::Lens;
+use crate::capture::scan::lens::Lens;
 use crate::error::{Error, Result};
 use image::{DynamicImage, ImageBuffer, ImageReader, Limits, Luma};
 use std::path::{Path, PathBuf};
 
-/// A depth image and what its numbers mean.
+/// A depth image, its camera and its unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthImage {
     /// 16-bit grey PNG (or PGM).
     pub path: PathBuf,
-    /// The camera that it was taken with; it sits where the photograph's does.
+    /// The depth camera; its pose is the photograph's.
     pub lens: Lens,
-    /// Metres per unit, along the viewing direction (not along the ray).
+    /// Metres per unit of depth, measured along the optical axis (not along the ray).
     pub metres_per_unit: f64,
-    /// A value that, like 0, means that nothing was measured.
+    /// A value besides 0 that marks missing depth.
     pub invalid: Option<u16>,
 }
 
 impl DepthImage {
-    /// The raw values, row by row; 0 where nothing was measured.
+    /// The raw values, row by row; 0 where depth is missing.
     ///
     /// # Errors
-    /// The file cannot be read, is no 16-bit grey image, or has another size than its camera.
+    /// The file cannot be read, is not a 16-bit grey image, or has another size than its camera.
     pub fn raw(&self) -> Result<Vec<u16>> {
         let image = decode(&self.path)?;
         let (width, height) = image.dimensions();
@@ -48,7 +48,7 @@ impl DepthImage {
         Ok(values)
     }
 
-    /// Metres along the viewing direction; 0 where nothing was measured.
+    /// Depth in metres along the optical axis; 0 where it is missing.
     ///
     /// # Errors
     /// As [`DepthImage::raw`].
@@ -58,7 +58,7 @@ impl DepthImage {
         Ok(raw.iter().map(|&v| (f64::from(v) * unit) as f32).collect())
     }
 
-    /// Whether the depth image shows what the photograph's lens shows, up to the number of pixels.
+    /// Whether the depth image has the photograph's field of view and distortion, at any resolution.
     pub fn is_registered_to(&self, photograph: &Lens) -> bool {
         let k = &self.lens.pinhole;
         let scaled = photograph.resized([k.width, k.height]);
@@ -72,7 +72,7 @@ impl DepthImage {
 /// The raw values of a depth image.
 ///
 /// # Errors
-/// The file cannot be read, is larger than 1 GiB, or is no 16-bit grey image.
+/// The file cannot be read, is larger than 1 GiB, or is not a 16-bit grey image.
 pub fn decode(path: &Path) -> Result<ImageBuffer<Luma<u16>, Vec<u16>>> {
     let mut reader = reader(path)?;
     let mut limits = Limits::default();
@@ -85,7 +85,7 @@ pub fn decode(path: &Path) -> Result<ImageBuffer<Luma<u16>, Vec<u16>>> {
         DynamicImage::ImageLuma16(image) => Ok(image),
         other => Err(Error::file(
             path,
-            format!("is no 16-bit grey image but {:?}", other.color()),
+            format!("is not a 16-bit grey image but {:?}", other.color()),
             "export depth as 16-bit grey PNG",
         )),
     }
@@ -94,7 +94,7 @@ pub fn decode(path: &Path) -> Result<ImageBuffer<Luma<u16>, Vec<u16>>> {
 /// Width and height of a depth image.
 ///
 /// # Errors
-/// The file cannot be read or is no image.
+/// The file cannot be read or is not an image.
 pub fn size(path: &Path) -> Result<[u32; 2]> {
     let (width, height) = reader(path)?
         .into_dimensions()

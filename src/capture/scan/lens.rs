@@ -1,24 +1,24 @@
-//! Lens models of other programs, and which of them a capture can hold as they are.
+//! Lens models of other programs.
 
 use crate::capture::camera::Intrinsics;
 use glam::{DVec2, DVec3};
 
-/// A camera before it is a capture's: any of the lens models that are understood.
+/// A camera with any supported lens model.
 ///
 /// Pixel (i, j) covers [i, i+1] × [j, j+1], y down, as in [`Intrinsics`]. Camera axes are OpenCV's: x right, y down,
 /// looking along +z.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lens {
-    /// Focal lengths, principal point and size; its own distortion is zero and plays no part.
+    /// Focal lengths, principal point and size; its distortion is zero and is ignored.
     pub pinhole: Intrinsics,
-    /// How the lens bends.
+    /// Lens distortion.
     pub model: Model,
 }
 
 /// Distortion of normalised image coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Model {
-    /// k1, k2, p1, p2 of OpenCV: what a capture itself holds.
+    /// k1, k2, p1, p2 of OpenCV: the model of captures.
     Brown([f64; 4]),
     /// OpenCV's rational model: radial (1 + k1 r² + k2 r⁴ + k3 r⁶) / (1 + k4 r² + k5 r⁴ + k6 r⁶), tangential p1, p2.
     Rational {
@@ -48,7 +48,7 @@ impl Lens {
         }
     }
 
-    /// The same lens with a distortion; a rational model or a fisheye that says no more than k1 k2 p1 p2 becomes that.
+    /// The lens with a distortion; a rational model with only k1 k2 p1 p2 becomes [`Model::Brown`].
     pub fn with(self, model: Model) -> Self {
         let model = match model {
             Model::Rational { k, p } if k[2..].iter().all(|&k| k == 0.0) => {
@@ -74,12 +74,12 @@ impl Lens {
             && coefficients.iter().all(finite)
     }
 
-    /// Whether a capture holds this lens as it is; otherwise the photograph has to be resampled.
+    /// Whether a capture supports this lens; otherwise the photograph has to be resampled.
     pub fn fits_a_capture(&self) -> bool {
         matches!(self.model, Model::Brown(_))
     }
 
-    /// What the capture's photograph has: this lens, or the pinhole of the same focal length that it is resampled to.
+    /// The capture's intrinsics: this lens, or the pinhole of the same focal length that the photograph is resampled to.
     pub fn intrinsics(&self) -> Intrinsics {
         match self.model {
             Model::Brown(distortion) => Intrinsics {
@@ -109,7 +109,7 @@ impl Lens {
         }
     }
 
-    /// The pixel position of a point in camera axes; `None` behind the camera or where the lens model says nothing.
+    /// The pixel position of a point in camera coordinates; `None` behind the camera and where [`Lens::distort`] has none.
     pub fn project(&self, point: DVec3) -> Option<DVec2> {
         if point.z <= 0.0 {
             return None;
@@ -124,7 +124,7 @@ impl Lens {
         DVec2::new(p.x * k.fx + k.cx, p.y * k.fy + k.cy)
     }
 
-    /// Distorted normalised coordinates of undistorted ones; `None` where the radial function turns back.
+    /// Distorted normalised coordinates of undistorted ones; `None` where the radial function no longer increases.
     pub fn distort(&self, p: DVec2) -> Option<DVec2> {
         let r2 = p.length_squared();
         match self.model {
@@ -134,16 +134,17 @@ impl Lens {
             }
             .distort(p),
             Model::Rational { k, p: [p1, p2] } => {
-                let over = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[2]));
-                let under = 1.0 + r2 * (k[3] + r2 * (k[4] + r2 * k[5]));
-                let over_slope = k[0] + r2 * (2.0 * k[1] + r2 * 3.0 * k[2]);
-                let under_slope = k[3] + r2 * (2.0 * k[4] + r2 * 3.0 * k[5]);
-                // d(r · over / under)/dr, times under².
-                let slope = over * under + 2.0 * r2 * (over_slope * under - over * under_slope);
-                if slope <= 0.0 || under <= 0.0 {
+                let numerator = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[2]));
+                let denominator = 1.0 + r2 * (k[3] + r2 * (k[4] + r2 * k[5]));
+                let numerator_slope = k[0] + r2 * (2.0 * k[1] + r2 * 3.0 * k[2]);
+                let denominator_slope = k[3] + r2 * (2.0 * k[4] + r2 * 3.0 * k[5]);
+                // d(r · numerator / denominator)/dr, times denominator².
+                let slope = numerator * denominator
+                    + 2.0 * r2 * (numerator_slope * denominator - numerator * denominator_slope);
+                if slope <= 0.0 || denominator <= 0.0 {
                     return None;
                 }
-                let radial = over / under;
+                let radial = numerator / denominator;
                 Some(DVec2::new(
                     p.x * radial + 2.0 * p1 * p.x * p.y + p2 * (r2 + 2.0 * p.x * p.x),
                     p.y * radial + p1 * (r2 + 2.0 * p.y * p.y) + 2.0 * p2 * p.x * p.y,
@@ -153,19 +154,19 @@ impl Lens {
                 let r = r2.sqrt();
                 let angle = r.atan();
                 let a2 = angle * angle;
-                let bent = 1.0 + a2 * (k[0] + a2 * (k[1] + a2 * (k[2] + a2 * k[3])));
+                let radial = 1.0 + a2 * (k[0] + a2 * (k[1] + a2 * (k[2] + a2 * k[3])));
                 let slope = 1.0
                     + a2 * (3.0 * k[0] + a2 * (5.0 * k[1] + a2 * (7.0 * k[2] + a2 * 9.0 * k[3])));
                 if slope <= 0.0 {
                     return None;
                 }
-                let scale = if r > 1e-12 { angle * bent / r } else { 1.0 };
+                let scale = if r > 1e-12 { angle * radial / r } else { 1.0 };
                 Some(p * scale)
             }
         }
     }
 
-    /// Undistorted normalised coordinates of a pixel position, by fixed-point iteration; `None` where that finds none.
+    /// Undistorted normalised coordinates of a pixel position, by fixed-point iteration; `None` where it does not converge.
     pub fn ray(&self, pixel: DVec2) -> Option<DVec2> {
         let k = &self.pinhole;
         let distorted = DVec2::new((pixel.x - k.cx) / k.fx, (pixel.y - k.cy) / k.fy);

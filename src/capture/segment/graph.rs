@@ -1,37 +1,37 @@
-//! Faces and which of them share an edge.
+//! The dual graph of a mesh: faces and the edges between them.
 
 use crate::capture::mesh::Mesh;
 use crate::capture::segment::shown::{ShownFace, filled};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// How much a full change of normal counts against a full change of colour.
+/// Weight of a change of normal in the contrast of an edge.
 const NORMAL_WEIGHT: f64 = 1.0;
-/// See [`NORMAL_WEIGHT`].
+/// Weight of a change of colour in the contrast of an edge.
 const COLOR_WEIGHT: f64 = 0.5;
-/// How much a change of brightness counts against one of hue, which light and shadow change less.
+/// Weight of a change of brightness relative to one of hue: light and shadow change hue less.
 const BRIGHTNESS_WEIGHT: f64 = 0.5;
 
-/// The dual graph of a mesh with what segmentation looks at.
+/// The dual graph of a mesh, with the features of segmentation per face.
 #[derive(Debug)]
 pub struct FaceGraph {
-    /// Areas.
+    /// Face areas.
     pub area: Vec<f64>,
-    /// Unit normals, smoothed over the corners; zero for faces without area.
+    /// Unit normals, smoothed over vertices; zero for degenerate faces.
     pub normal: Vec<DVec3>,
-    /// Colours relative to the mesh's mean, compressed by the square root, as perception does, and with half of their brightness:
-    /// what photographs show, or the vertex colours; zero without either.
+    /// Square roots of colours (as lightness is perceived), relative to the mesh's mean and with half of the brightness: from the
+    /// photographs, or else from vertex colours; zero without either.
     pub color: Vec<DVec3>,
-    /// Whether a face is part of a patch that photographs show saturated.
+    /// Whether a face belongs to a saturated patch.
     pub saturated: Vec<bool>,
-    /// Middles.
+    /// Face centroids.
     pub centroid: Vec<DVec3>,
     /// Pairs of faces that share an edge.
     pub edges: Vec<[u32; 2]>,
 }
 
 impl FaceGraph {
-    /// The graph of a mesh, of which photographs show each face; vertices at equal positions count as one.
+    /// The graph of a mesh and what photographs show of its faces; vertices at equal positions are welded.
     pub fn new(mesh: &Mesh, shown: &[ShownFace]) -> Self {
         let welded = mesh.weld();
         let corners: Vec<[u32; 3]> = mesh
@@ -48,7 +48,7 @@ impl FaceGraph {
             })
             .collect();
 
-        // Normals averaged over each vertex, then over each face: fused depth is noisy at the scale of a face.
+        // Average normals over each vertex, then over each face: fused depth is noisy at the scale of a face.
         let mut at_vertex = vec![DVec3::ZERO; mesh.positions.len()];
         for (t, &cross) in corners.iter().zip(&crosses) {
             t.iter().for_each(|&i| at_vertex[i as usize] += cross);
@@ -79,7 +79,7 @@ impl FaceGraph {
         }
     }
 
-    /// The contrast of every edge: change of colour, and of normal, squared where the edge is convex.
+    /// The contrast of every edge: weighted change of normal (squared at convex edges) plus change of colour.
     pub fn contrasts(&self) -> Vec<f64> {
         self.edges
             .par_iter()
@@ -95,7 +95,7 @@ impl FaceGraph {
     }
 }
 
-/// Compressed colour of each face: the mean of its corners; zero without vertex colours.
+/// Square root of vertex colour, averaged over each face's corners; zero without vertex colours.
 fn vertex_colors(mesh: &Mesh) -> Vec<DVec3> {
     if mesh.vertex_colors.is_empty() {
         return vec![DVec3::ZERO; mesh.triangles.len()];
@@ -103,11 +103,11 @@ fn vertex_colors(mesh: &Mesh) -> Vec<DVec3> {
     let compressed: Vec<DVec3> = (mesh.vertex_colors.iter())
         .map(|c| c.as_dvec3().max(DVec3::ZERO).map(f64::sqrt))
         .collect();
-    let of_face = |t: &[u32; 3]| t.iter().map(|&i| compressed[i as usize]).sum::<DVec3>() / 3.0;
-    mesh.triangles.iter().map(of_face).collect()
+    let mean_of = |t: &[u32; 3]| t.iter().map(|&i| compressed[i as usize]).sum::<DVec3>() / 3.0;
+    mesh.triangles.iter().map(mean_of).collect()
 }
 
-/// Colours over the mean of all, with less of their brightness.
+/// Divides colours by the mean over all faces, and reduces their brightness.
 fn relative(mut colors: Vec<DVec3>) -> Vec<DVec3> {
     let sum: DVec3 = colors.iter().sum();
     let mean = sum.element_sum() / (3.0 * colors.len() as f64);
@@ -119,7 +119,7 @@ fn relative(mut colors: Vec<DVec3>) -> Vec<DVec3> {
     colors
 }
 
-/// Pairs of faces that share two corners; at an edge of more than two faces each is paired with the next.
+/// Pairs of faces that share an edge; at an edge of more than two faces each is paired with the next.
 fn shared_edges(corners: &[[u32; 3]]) -> Vec<[u32; 2]> {
     let mut sides: Vec<(u32, u32, u32)> = corners
         .par_iter()

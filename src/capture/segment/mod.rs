@@ -1,12 +1,12 @@
-//! Cuts a mesh without objects into segments by normal and colour, as its photographs show it.
+//! Segments a mesh without objects by normals and by the colours in its photographs.
 //!
-//! Fine segments first, by the graph-based segmentation of Felzenszwalb and Huttenlocher (2004) over the edges between
-//! faces, where concave edges count more than convex ones (Karpathy et al. 2013); then neighbours are merged in
-//! Ward's order (1963: the least increase of the area-weighted variance of normal and colour) to the number wanted.
-//! Light changes smoothly where paint does not, and brightness more than hue: of the colour counts what changes at the border
-//! of two segments, and half of it where it is brightness.
-//! What photographs show saturated, lamps and windows, is never joined with what they do not.
-//! Every quantity is relative to the mesh's own area and colours: size and exposure do not matter.
+//! First, the graph-based segmentation of Felzenszwalb and Huttenlocher (2004) over the edges between faces gives fine segments;
+//! concave edges weigh more than convex ones (Karpathy et al. 2013). Then neighbours are merged in Ward's order (1963: the least
+//! increase of the area-weighted variance of normal and colour) down to the wanted number.
+//!
+//! Illumination varies smoothly, and in brightness more than in hue. So the colour difference of two segments is at most the
+//! difference across their border, and brightness has half weight. Saturated patches (lamps and windows) are never merged with
+//! others. All quantities are relative to the mesh's area and mean colour, so scale and exposure do not matter.
 
 mod graph;
 mod sets;
@@ -18,14 +18,13 @@ use graph::FaceGraph;
 use sets::Sets;
 pub use shown::ShownFace;
 
-/// Felzenszwalb and Huttenlocher's k: the contrast that a segment of one mean face tolerates.
+/// Felzenszwalb and Huttenlocher's k: the contrast tolerated by a segment with the area of the mean face.
 const FINE_CONTRAST: f64 = 0.2;
 
 /// Replaces the mesh's objects by segments, named "segment 000", "segment 001", … by descending area.
 ///
-/// `shown` is what photographs show of each face; it goes before the mesh's own colours. `wanted` is the
-/// number of segments, besides those that are saturated; `None` lets the mesh's complexity decide. The result depends on
-/// nothing else. Returns the number of saturated segments.
+/// `shown` is what photographs show of each face; it has priority over vertex colours. `wanted` is the number of segments without
+/// the saturated ones; `None` chooses it by the merge cost. The result is deterministic. Returns the number of saturated segments.
 pub fn segment(mesh: &mut Mesh, shown: &[ShownFace], wanted: Option<usize>) -> usize {
     let graph = FaceGraph::new(mesh, shown);
     let fine = fine_segments(&graph);
@@ -36,10 +35,10 @@ pub fn segment(mesh: &mut Mesh, shown: &[ShownFace], wanted: Option<usize>) -> u
     for (&segment, &is_saturated) in mesh.object_of.iter().zip(&graph.saturated) {
         saturated[segment as usize] |= is_saturated;
     }
-    saturated.iter().filter(|is| **is).count()
+    saturated.iter().filter(|&&saturated| saturated).count()
 }
 
-/// Felzenszwalb–Huttenlocher: for each face, a face that stands for its segment.
+/// Felzenszwalb–Huttenlocher segmentation; returns the representative face of each face's segment.
 fn fine_segments(graph: &FaceGraph) -> Vec<u32> {
     let mut order: Vec<u32> = (0..graph.edges.len() as u32).collect();
     let contrasts: Vec<f64> = graph.contrasts();
@@ -48,7 +47,7 @@ fn fine_segments(graph: &FaceGraph) -> Vec<u32> {
         contrast(a).total_cmp(&contrast(b)).then(a.cmp(&b))
     });
 
-    // Join two segments where the edge between them is no stronger than what each tolerates inside.
+    // Join two segments if the contrast between them is at most the tolerance of both.
     let count = graph.area.len();
     let mean_area = graph.area.iter().sum::<f64>() / count as f64;
     let mut sets = Sets::new(count);
@@ -58,7 +57,7 @@ fn fine_segments(graph: &FaceGraph) -> Vec<u32> {
         let contrast = contrasts[edge as usize];
         let [a, b] = graph.edges[edge as usize].map(|face| sets.find(face));
         let [left, right] = graph.edges[edge as usize].map(|face| graph.saturated[face as usize]);
-        // A lamp is one segment, whatever its shape.
+        // Saturated neighbours always join: a lamp is one segment.
         let tolerated = match left && right {
             true => f64::INFINITY,
             false => tolerance[a as usize].min(tolerance[b as usize]),

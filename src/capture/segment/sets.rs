@@ -16,7 +16,7 @@ impl Sets {
         }
     }
 
-    /// The member that stands for the set of `x`.
+    /// The representative of the set of `x`.
     pub fn find(&mut self, mut x: u32) -> u32 {
         while self.parent[x as usize] != x {
             let grandparent = self.parent[self.parent[x as usize] as usize];
@@ -26,7 +26,7 @@ impl Sets {
         x
     }
 
-    /// Joins the sets of any two members.
+    /// Joins the sets of two members.
     pub fn unite(&mut self, a: u32, b: u32) {
         let (a, b) = (self.find(a), self.find(b));
         if a != b {
@@ -34,7 +34,7 @@ impl Sets {
         }
     }
 
-    /// Joins the sets that two standing members stand for; returns the one that stands for both.
+    /// Joins the sets of two distinct representatives; returns the new representative.
     pub fn join(&mut self, a: u32, b: u32) -> u32 {
         let (root, child) = if self.size[a as usize] >= self.size[b as usize] {
             (a, b)

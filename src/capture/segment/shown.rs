@@ -1,32 +1,33 @@
-//! What photographs show of the faces of a mesh, made good where they show little of it.
+//! Colour and saturation of faces from photographs, filled in where few pixels see a face.
 
 use crate::capture::mesh::Mesh;
 use crate::capture::segment::sets::Sets;
 use glam::{DVec3, DVec4, Vec3};
 
-/// A face that more pixels see is hardly smoothed by its neighbours.
-const ENOUGH_PIXELS: f64 = 4.0;
-/// Patches that a smaller fraction of all pixels see are no lamps, and no holes in lamps.
+/// Weight, in pixels, of the neighbours' colour: faces seen by many more pixels are hardly smoothed.
+const SMOOTHING_PIXELS: f64 = 4.0;
+/// Patches seen by a smaller fraction of all pixels are neither lamps nor holes in lamps.
 const MIN_FRACTION: f64 = 1e-4;
-/// A patch around which the brightest channel, compressed, is a larger fraction of its own has no edge: it is lit brightly and gives
-/// no light.
-const NO_EDGE: f64 = 0.8;
+/// A saturated patch whose surroundings exceed this fraction of its level (square root of the brightest channel) has no edge: it
+/// is brightly lit and no lamp.
+const MAX_SURROUND_RATIO: f64 = 0.8;
 
-/// What photographs show of one face, all brought to one exposure.
+/// What photographs show of one face, at a common exposure.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ShownFace {
-    /// Mean radiance over its pixels; what saturated ones show is a lower bound.
+    /// Mean radiance over its pixels; saturated pixels enter with their lower bounds.
     pub radiance: Vec3,
-    /// Fraction of its pixels in which the photograph is saturated in all channels, 0 to 1.
+    /// Fraction of its pixels that are saturated in all channels, 0 to 1.
     pub saturated: f32,
-    /// Pixels of which it is the mean; zero where no photograph shows it.
+    /// Number of pixels; zero for unseen faces.
     pub pixels: u32,
 }
 
-/// For each face its colour, compressed by the square root, in any scale; and whether it belongs to a patch that most
-/// photographs of it show saturated: a lamp, or a window.
+/// For each face, the square root of its colour at an arbitrary scale, and whether it belongs to a patch that is mostly
+/// saturated: a lamp or a window.
 ///
-/// Faces that few pixels see take part of their neighbours', those that none sees all of it, or the mesh's own colours where it has any.
+/// Faces with few pixels are smoothed by their neighbours. Unseen faces take the vertex colours if there are any, else their
+/// neighbours' colours. `own` is the square root of vertex colour per face.
 pub fn filled(
     mesh: &Mesh,
     shown: &[ShownFace],
@@ -35,24 +36,27 @@ pub fn filled(
 ) -> (Vec<DVec3>, Vec<bool>) {
     let mut known: Vec<Known> = shown.iter().map(Known::of).collect();
     if !mesh.vertex_colors.is_empty() {
-        take_own(&mut known, own);
+        fill_with_own(&mut known, own);
     }
     smooth(&mut known, edges);
-    while fill(&mut known, edges) {}
-    let bright: Vec<bool> = known.iter().map(|k| k.look.w > 0.5).collect();
+    while fill_from_neighbors(&mut known, edges) {}
+    let saturated: Vec<bool> = known.iter().map(|k| k.features.w > 0.5).collect();
     let pixels: Vec<f64> = shown.iter().map(|face| f64::from(face.pixels)).collect();
-    let bright = without_specks(bright, &pixels, edges, true);
-    let bright = without_specks(bright, &pixels, edges, false);
-    let bright = without_highlights(bright, &known, edges);
-    (known.iter().map(|k| k.look.truncate()).collect(), bright)
+    let saturated = without_specks(saturated, &pixels, edges, true);
+    let saturated = without_specks(saturated, &pixels, edges, false);
+    let saturated = without_highlights(saturated, &known, edges);
+    (
+        known.iter().map(|k| k.features.truncate()).collect(),
+        saturated,
+    )
 }
 
-/// What is known of a face.
+/// The features of a face, measured or filled in.
 #[derive(Debug, Clone, Copy, Default)]
 struct Known {
-    /// Compressed colour, and the fraction of saturated pixels.
-    look: DVec4,
-    /// Pixels that tell it; zero where it is not known.
+    /// Square root of colour; w is the fraction of saturated pixels.
+    features: DVec4,
+    /// Number of pixels; zero where unknown.
     weight: f64,
 }
 
@@ -60,17 +64,17 @@ impl Known {
     fn of(face: &ShownFace) -> Self {
         let color = face.radiance.as_dvec3().max(DVec3::ZERO).map(f64::sqrt);
         Self {
-            look: color.extend(f64::from(face.saturated)),
+            features: color.extend(f64::from(face.saturated)),
             weight: f64::from(face.pixels),
         }
     }
 }
 
-/// Gives faces that no photograph shows the mesh's own colours, brought to the scale of what photographs show.
-fn take_own(known: &mut [Known], own: &[DVec3]) {
+/// Fills unseen faces with vertex colours, scaled per channel to the photographs.
+fn fill_with_own(known: &mut [Known], own: &[DVec3]) {
     let mut sums = [DVec3::ZERO; 2];
     for (known, own) in known.iter().zip(own) {
-        sums[0] += known.look.truncate() * known.weight;
+        sums[0] += known.features.truncate() * known.weight;
         sums[1] += *own * known.weight;
     }
     let scale = sums[0] / sums[1];
@@ -78,43 +82,43 @@ fn take_own(known: &mut [Known], own: &[DVec3]) {
     for (known, own) in known.iter_mut().zip(own) {
         if known.weight == 0.0 {
             *known = Known {
-                look: (*own * scale).extend(0.0),
+                features: (*own * scale).extend(0.0),
                 weight: 1.0,
             };
         }
     }
 }
 
-/// Adds to each known face part of what is known of its neighbours, the less the more pixels see it.
+/// Averages each known face with its neighbours, the less the more pixels see it.
 fn smooth(known: &mut [Known], edges: &[[u32; 2]]) {
     let before = known.to_vec();
     let mut sums: Vec<(DVec4, f64)> = (before.iter())
-        .map(|k| (k.look * k.weight, k.weight))
+        .map(|k| (k.features * k.weight, k.weight))
         .collect();
     for &[a, b] in edges {
         for (own, other) in [(a, b), (b, a)] {
             let (own, other) = (own as usize, &before[other as usize]);
-            let fraction = ENOUGH_PIXELS / (ENOUGH_PIXELS + before[own].weight);
-            let weight = other.weight.min(ENOUGH_PIXELS) * fraction;
-            sums[own].0 += other.look * weight;
+            let fraction = SMOOTHING_PIXELS / (SMOOTHING_PIXELS + before[own].weight);
+            let weight = other.weight.min(SMOOTHING_PIXELS) * fraction;
+            sums[own].0 += other.features * weight;
             sums[own].1 += weight;
         }
     }
     for (known, (sum, weight)) in known.iter_mut().zip(sums) {
         if known.weight > 0.0 {
-            known.look = sum / weight;
+            known.features = sum / weight;
         }
     }
 }
 
-/// Gives faces of which nothing is known the mean of what is known of their neighbours; whether there were such.
-fn fill(known: &mut [Known], edges: &[[u32; 2]]) -> bool {
+/// Fills unknown faces with the mean of their known neighbours; returns whether any was filled.
+fn fill_from_neighbors(known: &mut [Known], edges: &[[u32; 2]]) -> bool {
     let mut sums = vec![(DVec4::ZERO, 0.0); known.len()];
     for &[a, b] in edges {
         for (own, other) in [(a, b), (b, a)] {
             let other = known[other as usize];
             if known[own as usize].weight == 0.0 && other.weight > 0.0 {
-                sums[own as usize].0 += other.look;
+                sums[own as usize].0 += other.features;
                 sums[own as usize].1 += 1.0;
             }
         }
@@ -123,7 +127,7 @@ fn fill(known: &mut [Known], edges: &[[u32; 2]]) -> bool {
     for (known, (sum, count)) in known.iter_mut().zip(sums) {
         if count > 0.0 {
             *known = Known {
-                look: sum / count,
+                features: sum / count,
                 weight: 1.0,
             };
             filled = true;
@@ -132,23 +136,23 @@ fn fill(known: &mut [Known], edges: &[[u32; 2]]) -> bool {
     filled
 }
 
-/// The patches of neighbours that are alike.
-fn patches(bright: &[bool], edges: &[[u32; 2]]) -> Sets {
-    let mut sets = Sets::new(bright.len());
+/// Connected patches of faces with equal flags.
+fn patches(saturated: &[bool], edges: &[[u32; 2]]) -> Sets {
+    let mut sets = Sets::new(saturated.len());
     for &[a, b] in edges {
-        if bright[a as usize] == bright[b as usize] {
+        if saturated[a as usize] == saturated[b as usize] {
             sets.unite(a, b);
         }
     }
     sets
 }
 
-/// Takes for no lamps the patches that rise from what is around them without an edge, as a pool of light on a floor does.
-fn without_highlights(mut bright: Vec<bool>, known: &[Known], edges: &[[u32; 2]]) -> Vec<bool> {
-    let mut sets = patches(&bright, edges);
-    // Sums of the brightest channel inside each patch and around it, with their counts.
-    let level = |face: u32| known[face as usize].look.truncate().max_element();
-    let mut inside = vec![(0.0, 0.0); bright.len()];
+/// Clears saturated patches whose border has no edge in brightness, such as a pool of light on a floor.
+fn without_highlights(mut saturated: Vec<bool>, known: &[Known], edges: &[[u32; 2]]) -> Vec<bool> {
+    let mut sets = patches(&saturated, edges);
+    // (Sum, count) of the brightest channel inside and around each patch.
+    let level = |face: u32| known[face as usize].features.truncate().max_element();
+    let mut inside = vec![(0.0, 0.0); saturated.len()];
     let mut around = inside.clone();
     for (face, known) in (0..).zip(known) {
         let sum = &mut inside[sets.find(face) as usize];
@@ -156,7 +160,7 @@ fn without_highlights(mut bright: Vec<bool>, known: &[Known], edges: &[[u32; 2]]
         sum.1 += known.weight;
     }
     for &[a, b] in edges {
-        let (lamp, other) = match [a, b].map(|face| bright[face as usize]) {
+        let (lamp, other) = match [a, b].map(|face| saturated[face as usize]) {
             [true, false] => (a, b),
             [false, true] => (b, a),
             _ => continue,
@@ -165,42 +169,42 @@ fn without_highlights(mut bright: Vec<bool>, known: &[Known], edges: &[[u32; 2]]
         sum.0 += level(other);
         sum.1 += 1.0;
     }
-    for (face, bright) in (0..).zip(&mut bright) {
+    for (face, saturated) in (0..).zip(&mut saturated) {
         let patch = sets.find(face) as usize;
         let (inside, around) = (inside[patch], around[patch]);
-        *bright &= around.0 * inside.1 <= NO_EDGE * inside.0 * around.1;
+        *saturated &= around.0 * inside.1 <= MAX_SURROUND_RATIO * inside.0 * around.1;
     }
-    bright
+    saturated
 }
 
-/// Turns patches of one kind that few pixels see, and that border on the other, into that.
+/// Flips patches with flag `kind` that few pixels see; patches with a false flag only if they border on another patch.
 fn without_specks(
-    mut bright: Vec<bool>,
+    mut saturated: Vec<bool>,
     pixels: &[f64],
     edges: &[[u32; 2]],
     kind: bool,
 ) -> Vec<bool> {
-    let mut sets = patches(&bright, edges);
-    let least = MIN_FRACTION * pixels.iter().sum::<f64>();
-    let mut seen = vec![0.0; bright.len()];
+    let mut sets = patches(&saturated, edges);
+    let min_pixels = MIN_FRACTION * pixels.iter().sum::<f64>();
+    let mut seen = vec![0.0; saturated.len()];
     for (face, pixels) in (0..).zip(pixels) {
         seen[sets.find(face) as usize] += pixels;
     }
-    let mut at_border = vec![false; bright.len()];
+    let mut at_border = vec![false; saturated.len()];
     for &[a, b] in edges {
-        if bright[a as usize] != bright[b as usize] {
+        if saturated[a as usize] != saturated[b as usize] {
             for face in [a, b] {
                 at_border[sets.find(face) as usize] = true;
             }
         }
     }
-    for (face, bright) in (0..).zip(&mut bright) {
+    for (face, saturated) in (0..).zip(&mut saturated) {
         let patch = sets.find(face) as usize;
-        if *bright == kind && seen[patch] < least && (at_border[patch] || kind) {
-            *bright = !kind;
+        if *saturated == kind && seen[patch] < min_pixels && (at_border[patch] || kind) {
+            *saturated = !kind;
         }
     }
-    bright
+    saturated
 }
 
 #[cfg(test)]
@@ -253,12 +257,12 @@ mod tests {
         let wall = face(0.5, 0.1, 100_000);
         let lamp = face(1.0, 0.9, 100);
         let hole = face(1.0, 0.2, 2);
-        let (_, bright) = strip(&[wall, wall, lamp, lamp, hole, lamp, lamp, wall, wall]);
+        let (_, saturated) = strip(&[wall, wall, lamp, lamp, hole, lamp, lamp, wall, wall]);
         let expected = [false, false, true, true, true, true, true, false, false];
-        assert_eq!(bright, expected);
+        assert_eq!(saturated, expected);
         let speck = face(1.0, 1.0, 12);
-        let (_, bright) = strip(&[wall, wall, speck, wall, wall]);
-        assert_eq!(bright, [false; 5]);
+        let (_, saturated) = strip(&[wall, wall, speck, wall, wall]);
+        assert_eq!(saturated, [false; 5]);
     }
 
     #[test]
@@ -273,10 +277,10 @@ mod tests {
                 pixels: 100,
             },
         };
-        let (_, bright) = strip(&lit.each_ref().map(shown));
-        assert_eq!(bright, [false; 9]);
+        let (_, saturated) = strip(&lit.each_ref().map(shown));
+        assert_eq!(saturated, [false; 9]);
         let pane = [0.2, 0.2, 0.2, 1.0, 1.0, 1.0, 0.2, 0.2, 0.2];
-        let (_, bright) = strip(&pane.each_ref().map(shown));
-        assert_eq!(bright, pane.map(|radiance| radiance == 1.0));
+        let (_, saturated) = strip(&pane.each_ref().map(shown));
+        assert_eq!(saturated, pane.map(|radiance| radiance == 1.0));
     }
 }

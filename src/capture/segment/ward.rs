@@ -1,4 +1,4 @@
-//! Merges neighbouring segments in Ward's order.
+//! Merges neighbouring segments in Ward's order: cheapest merge first.
 
 use crate::capture::segment::graph::FaceGraph;
 use crate::capture::segment::sets::Sets;
@@ -8,26 +8,25 @@ use rstar::primitives::GeomWithData;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-/// Without a number wanted, merging ends where the next merge would add this fraction of the mesh's area times the
-/// square of a full change of normal or colour.
+/// Default merging stops at a merge cost of this fraction of the mesh's area (times a unit squared difference of normal or
+/// colour).
 const MERGE_LIMIT: f64 = 5e-4;
-/// Without a number wanted, at most so many segments, however complex the mesh.
+/// Maximum number of segments by default.
 const MAX_SEGMENTS: usize = 400;
 
-/// Merges that wait are looked through for outdated ones when they are twice as many as after the last look, and more than
-/// twice this.
+/// Outdated candidates are purged when the heap has twice as many entries as after the last purge, and more than twice this.
 const MIN_CANDIDATES: usize = 4096;
 
-/// Area, and area-weighted sums of normal, colour and position.
+/// A segment: area, and area-weighted sums of normal, colour and position.
 #[derive(Debug, Clone, Copy, Default)]
 struct Region {
     area: f64,
     normal: DVec3,
     color: DVec3,
     position: DVec3,
-    /// Whether photographs show it saturated: it is a segment by itself.
+    /// Whether it is saturated: never merged.
     saturated: bool,
-    /// Counts the changes, so that outdated merges are recognised.
+    /// Counts merges; candidates of older versions are outdated.
     version: u32,
 }
 
@@ -36,8 +35,8 @@ impl Region {
         self.position / self.area.max(f64::MIN_POSITIVE)
     }
 
-    /// By how much the area-weighted variance of normal and colour grows if two regions become one. Of the colour counts no more
-    /// than what changes at their border: what changes on the way from middle to middle is light.
+    /// Ward's cost of a merge: the increase of the area-weighted variance of normal and colour. The colour difference is at most
+    /// that across the border, since differences between the interiors are due to illumination.
     fn cost(&self, other: &Self, border: &Border) -> f64 {
         if self.area <= 0.0 || other.area <= 0.0 {
             return 0.0;
@@ -57,10 +56,10 @@ impl Region {
     }
 }
 
-/// Sums over the edges between two regions, seen from one of them.
+/// Sums over the edges between a region and a neighbour.
 #[derive(Debug, Clone, Copy, Default)]
 struct Border {
-    /// Its colour less the other's.
+    /// Sum of the region's colour minus the neighbour's.
     change: DVec3,
     edges: f64,
 }
@@ -78,7 +77,7 @@ impl Border {
         self.edges += other.edges;
     }
 
-    /// Square of the change of colour across it; infinite where regions have none.
+    /// Squared mean colour difference across the border; infinite for regions without common edges.
     fn contrast_squared(&self) -> f64 {
         if self.edges == 0.0 {
             return f64::INFINITY;
@@ -87,14 +86,14 @@ impl Border {
     }
 }
 
-/// The regions around each, with the borders to them; those that are saturated have none.
+/// The neighbours of each region with their borders; saturated regions have none.
 fn borders(graph: &FaceGraph, region_of: &[u32], regions: &[Region]) -> Vec<BTreeMap<u32, Border>> {
     let mut neighbors = vec![BTreeMap::<u32, Border>::new(); regions.len()];
     for &[a, b] in &graph.edges {
         let change = graph.color[a as usize] - graph.color[b as usize];
         let (a, b) = (region_of[a as usize], region_of[b as usize]);
-        let stays = [a, b].map(|region| regions[region as usize].saturated);
-        if a != b && stays == [false; 2] {
+        let saturated = [a, b].map(|region| regions[region as usize].saturated);
+        if a != b && saturated == [false; 2] {
             let border = Border { change, edges: 1.0 };
             neighbors[a as usize].entry(b).or_default().extend(border);
             let back = neighbors[b as usize].entry(a).or_default();
@@ -104,15 +103,15 @@ fn borders(graph: &FaceGraph, region_of: &[u32], regions: &[Region]) -> Vec<BTre
     neighbors
 }
 
-/// Merges the segments of `fine` (for each face one that stands for its segment) to `wanted` of them.
+/// Merges the segments of `fine` (the representative of each face's segment) until `wanted` are left.
 ///
-/// Returns for each face its segment's number, by descending area, and the number of segments.
+/// Returns each face's segment, numbered by descending area, and the number of segments.
 pub fn merge(graph: &FaceGraph, fine: &[u32], wanted: Option<usize>) -> (Vec<u32>, usize) {
-    let (region_of, mut regions) = sum_up(graph, fine);
+    let (region_of, mut regions) = regions_of(graph, fine);
     let mut neighbors = borders(graph, &region_of, &regions);
     link_islands(&regions, &mut neighbors);
 
-    // The cheapest merge first; costs are never negative, so their bits order as they do.
+    // Costs are not negative, so their bits sort as they do.
     let mut heap = BinaryHeap::new();
     let candidate = |regions: &[Region], a: u32, b: u32, border: &Border| {
         let (ra, rb) = (&regions[a as usize], &regions[b as usize]);
@@ -122,7 +121,7 @@ pub fn merge(graph: &FaceGraph, fine: &[u32], wanted: Option<usize>) -> (Vec<u32
         let after = around.range(a + 1..);
         heap.extend(after.map(|(&b, border)| candidate(&regions, a, b, border)));
     }
-    let mut fresh = heap.len().max(MIN_CANDIDATES);
+    let mut purged_size = heap.len().max(MIN_CANDIDATES);
     let total: f64 = regions.iter().map(|region| region.area).sum();
     let mut sets = Sets::new(regions.len());
     let mut count = regions.iter().filter(|region| !region.saturated).count();
@@ -160,20 +159,20 @@ pub fn merge(graph: &FaceGraph, fine: &[u32], wanted: Option<usize>) -> (Vec<u32
                 .iter()
                 .map(|(&b, border)| candidate(&regions, root, b, border)),
         );
-        // A region that takes up one speck after the other leaves outdated candidates behind.
-        if heap.len() > 2 * fresh {
+        // Purge outdated candidates: a large region that absorbs many small ones leaves many.
+        if heap.len() > 2 * purged_size {
             heap.retain(|Reverse((_, a, b, version_a, version_b))| {
                 let current = |x: u32, version: u32| regions[x as usize].version == version;
                 current(*a, *version_a) && current(*b, *version_b)
             });
-            fresh = heap.len().max(MIN_CANDIDATES);
+            purged_size = heap.len().max(MIN_CANDIDATES);
         }
     }
     number_by_area(&region_of, &regions, &mut sets)
 }
 
-/// For each face its region's index, and the regions in the order of their first faces.
-fn sum_up(graph: &FaceGraph, fine: &[u32]) -> (Vec<u32>, Vec<Region>) {
+/// Each face's region, and the regions in the order of their first faces.
+fn regions_of(graph: &FaceGraph, fine: &[u32]) -> (Vec<u32>, Vec<Region>) {
     let mut index = vec![u32::MAX; fine.len()];
     let mut regions: Vec<Region> = Vec::new();
     let region_of = fine
@@ -198,8 +197,8 @@ fn sum_up(graph: &FaceGraph, fine: &[u32]) -> (Vec<u32>, Vec<Region>) {
     (region_of, regions)
 }
 
-/// Makes separate pieces of the mesh neighbours: each piece's largest region of the nearest one in a larger piece. Pieces that are
-/// saturated stay apart, as lamps are.
+/// Connects separate components of the mesh: each component's largest region becomes a neighbour of the nearest region in a
+/// larger component. Saturated components stay separate.
 fn link_islands(regions: &[Region], neighbors: &mut [BTreeMap<u32, Border>]) {
     let mut sets = Sets::new(regions.len());
     for (a, around) in (0..).zip(neighbors.iter()) {
@@ -207,7 +206,7 @@ fn link_islands(regions: &[Region], neighbors: &mut [BTreeMap<u32, Border>]) {
             sets.unite(a, b);
         }
     }
-    // Pieces by descending area, each with its regions; ties by the first region.
+    // Components by descending area, ties by the first region.
     let mut members: Vec<Vec<u32>> = vec![Vec::new(); regions.len()];
     for a in 0..regions.len() as u32 {
         members[sets.find(a) as usize].push(a);
@@ -228,7 +227,7 @@ fn link_islands(regions: &[Region], neighbors: &mut [BTreeMap<u32, Border>]) {
             area(*a).total_cmp(&area(*b)).then(b.cmp(a))
         };
         if let Some(&largest) = piece.iter().max_by(|a, b| by_area(a, b)) {
-            // Of equally near ones the first.
+            // Ties by index.
             let nearest = larger.nearest_neighbors(&place(largest));
             if let Some(nearest) = nearest.iter().map(|region| region.data).min() {
                 neighbors[largest as usize].insert(nearest, Border::default());

@@ -1,4 +1,4 @@
-//! Traversal until any hit, in whichever order is cheapest.
+//! Any-hit traversal.
 
 use crate::scene::bvh::lanes::Lanes;
 use crate::scene::bvh::shear::Shear;
@@ -6,8 +6,7 @@ use crate::scene::bvh::slabs::{Slabs, reciprocal};
 use crate::scene::bvh::{Bvh, Child, GROUP, Group, Node, WIDTH, prefetch};
 use crate::scene::geometry::Ray;
 
-/// Whether anything is hit in a hierarchy that holds something; `stack` holds `Bvh::stack_size` entries and
-/// [`WIDTH`] more.
+/// Whether a ray hits anything in a non-empty hierarchy; `stack` has `Bvh::stack_size` + [`WIDTH`] entries.
 #[inline(always)]
 pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
     bvh: &Bvh,
@@ -21,10 +20,10 @@ pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
     let mut depth = 0;
     let mut current = Child::inner(0);
     loop {
-        // Descend to the last child that is met, the one with the fewest triangles; the others go onto the stack.
+        // Descend to the last intersected child, the one with the fewest triangles; push the others.
         while !current.is_leaf() {
             let node = &nodes[current.0 as usize];
-            let (_, mask) = slabs.meet(node, ray.t_max);
+            let (_, mask) = slabs.intersect(node, ray.t_max);
             if mask == 0 {
                 current = Child::EMPTY;
                 break;
@@ -40,7 +39,7 @@ pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
 
         if current != Child::EMPTY {
             for group in &groups[current.groups()] {
-                if shear.meets(group, ray.t_max) {
+                if shear.hits_any(group, ray.t_max) {
                     return true;
                 }
             }

@@ -1,21 +1,21 @@
-//! A binary hierarchy, top-down by the surface area heuristic, and the cheapest way to open it eight wide.
+//! Builds a binary hierarchy top-down by the surface area heuristic, and collapses it optimally to eight children per node.
 
 use crate::scene::bvh::split::{Bounds, Primitive, Split};
 use crate::scene::bvh::{GROUP, Tree, WIDTH};
 
 /// Leaves hold at most this many triangles.
-pub(super) const LARGEST_LEAF: usize = 4 * GROUP;
+pub(super) const MAX_LEAF: usize = 4 * GROUP;
 
 /// A node of the binary hierarchy; the left child follows it in the list.
 pub(super) struct Binary {
     pub bounds: Bounds,
-    /// The first of its primitives.
+    /// Its first primitive.
     pub first: u32,
-    /// How many primitives lie below.
+    /// Number of primitives below it.
     pub count: u32,
-    /// How far behind this node the right child is; zero for a leaf.
+    /// Offset from this node to its right child; zero for a leaf.
     pub right: u32,
-    /// Least cost of the subtree as at most 1, 2, … 7 children of a wide node (Ylitie, Karras and Laine 2017).
+    /// Minimum cost of the subtree as at most 1, 2, … 7 children of a wide node (Ylitie, Karras and Laine 2017).
     costs: [f32; WIDTH - 1],
 }
 
@@ -35,23 +35,28 @@ impl Binary {
     }
 }
 
-/// How far a hierarchy is built.
+/// Granularity of a build.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Grain {
-    /// Ranges of more primitives are built side by side.
-    pub alone: usize,
-    /// Leaves hold at most this many triangles, or one group.
-    pub largest_leaf: usize,
+pub(super) struct Granularity {
+    /// Ranges of more primitives are built in parallel.
+    pub parallel_above: usize,
+    /// Maximum number of triangles in a leaf, or one group.
+    pub max_leaf: usize,
 }
 
-/// The hierarchy over primitives, which it reorders.
-pub(super) fn build(primitives: &mut [Primitive], grain: Grain) -> Vec<Binary> {
+/// Builds the hierarchy over primitives and reorders them.
+pub(super) fn build(primitives: &mut [Primitive], granularity: Granularity) -> Vec<Binary> {
     let mut nodes = Vec::new();
-    grow(primitives, 0, grain, &mut nodes);
+    grow(primitives, 0, granularity, &mut nodes);
     nodes
 }
 
-fn grow(primitives: &mut [Primitive], first: usize, grain: Grain, nodes: &mut Vec<Binary>) {
+fn grow(
+    primitives: &mut [Primitive],
+    first: usize,
+    granularity: Granularity,
+    nodes: &mut Vec<Binary>,
+) {
     let bounds = Bounds::of(primitives);
     let count = primitives.len();
     let node = nodes.len();
@@ -61,16 +66,16 @@ fn grow(primitives: &mut [Primitive], first: usize, grain: Grain, nodes: &mut Ve
     }
     let middle = Split::best(primitives).partition(primitives);
     let (left, right) = primitives.split_at_mut(middle);
-    let second = if count > grain.alone {
+    let second = if count > granularity.parallel_above {
         let (left, right) = rayon::join(
             || {
                 let mut nodes = Vec::new();
-                grow(left, first, grain, &mut nodes);
+                grow(left, first, granularity, &mut nodes);
                 nodes
             },
             || {
                 let mut nodes = Vec::new();
-                grow(right, first + middle, grain, &mut nodes);
+                grow(right, first + middle, granularity, &mut nodes);
                 nodes
             },
         );
@@ -79,22 +84,22 @@ fn grow(primitives: &mut [Primitive], first: usize, grain: Grain, nodes: &mut Ve
         nodes.extend(right);
         second
     } else {
-        grow(left, first, grain, nodes);
+        grow(left, first, granularity, nodes);
         let second = nodes.len();
-        grow(right, first + middle, grain, nodes);
+        grow(right, first + middle, granularity, nodes);
         second
     };
 
-    join(node, second, grain.largest_leaf, nodes);
+    make_inner_if_cheaper(node, second, granularity.max_leaf, nodes);
 }
 
-/// Makes a node that was added as a leaf an inner one, where its children, the second of them at `second`, cost less.
-fn join(node: usize, second: usize, largest_leaf: usize, nodes: &mut [Binary]) {
+/// Turns a node from a leaf into an inner node if that costs less; `second` is its right child.
+fn make_inner_if_cheaper(node: usize, second: usize, max_leaf: usize, nodes: &mut [Binary]) {
     let (half_area, leaf) = (nodes[node].bounds.half_area(), nodes[node].costs[0]);
     // Visiting a node costs as much as testing a group.
     let cost = |slots: usize| best_split(&nodes[node + 1], &nodes[second], slots).1;
     let inner = half_area + cost(WIDTH);
-    if nodes[node].count as usize <= largest_leaf && leaf <= inner {
+    if nodes[node].count as usize <= max_leaf && leaf <= inner {
         return;
     }
     let mut costs = [inner; WIDTH - 1];
@@ -105,22 +110,22 @@ fn join(node: usize, second: usize, largest_leaf: usize, nodes: &mut [Binary]) {
     nodes[node].costs = costs;
 }
 
-/// The same from another builder's tree, with the primitives in the order of its leaves; `boxed` is a triangle as a primitive.
-pub(super) fn adopt(
+/// Converts another builder's tree, with the primitives in the order of its leaves; `primitive` gives the primitive of a triangle.
+pub(super) fn from_tree(
     tree: &Tree,
-    boxed: &impl Fn(u32) -> Primitive,
+    primitive: &impl Fn(u32) -> Primitive,
 ) -> (Vec<Primitive>, Vec<Binary>) {
     let (mut primitives, mut nodes) = (Vec::new(), Vec::new());
     if !tree.nodes.is_empty() {
-        take(tree, 0, boxed, &mut primitives, &mut nodes);
+        convert(tree, 0, primitive, &mut primitives, &mut nodes);
     }
     (primitives, nodes)
 }
 
-fn take(
+fn convert(
     tree: &Tree,
     index: usize,
-    boxed: &impl Fn(u32) -> Primitive,
+    primitive: &impl Fn(u32) -> Primitive,
     primitives: &mut Vec<Primitive>,
     nodes: &mut Vec<Binary>,
 ) {
@@ -133,37 +138,37 @@ fn take(
     let below = from.first as usize;
     if from.count > 0 {
         let triangles = &tree.order[below..below + from.count as usize];
-        primitives.extend(triangles.iter().map(|&t| boxed(t)));
+        primitives.extend(triangles.iter().map(|&t| primitive(t)));
         nodes.push(Binary::leaf(bounds, first, primitives.len() - first));
         return;
     }
     nodes.push(Binary::leaf(bounds, first, 0));
-    take(tree, below, boxed, primitives, nodes);
+    convert(tree, below, primitive, primitives, nodes);
     let second = nodes.len();
-    take(tree, below + 1, boxed, primitives, nodes);
+    convert(tree, below + 1, primitive, primitives, nodes);
     let count = primitives.len() - first;
     nodes[node] = Binary::leaf(bounds, first, count);
     if count > GROUP {
-        join(node, second, LARGEST_LEAF, nodes);
+        make_inner_if_cheaper(node, second, MAX_LEAF, nodes);
     } else {
         nodes.truncate(node + 1);
     }
 }
 
-/// How many of the slots the left child gets at least cost, and the cost.
+/// The number of slots for the left child at minimum cost, and the cost.
 fn best_split(left: &Binary, right: &Binary, slots: usize) -> (usize, f32) {
     (1..slots)
-        .map(|fraction| {
-            let cost = left.costs[fraction - 1] + right.costs[slots - fraction - 1];
-            (fraction, cost)
+        .map(|left_slots| {
+            let cost = left.costs[left_slots - 1] + right.costs[slots - left_slots - 1];
+            (left_slots, cost)
         })
         .fold((1, f32::INFINITY), |best, next| {
             if next.1 < best.1 { next } else { best }
         })
 }
 
-/// The children that a wide node has in place of a binary one: at most eight, at least cost.
-pub(super) fn open(nodes: &[Binary], node: usize) -> Vec<usize> {
+/// The at most eight children of the wide node that replaces a binary one, at minimum cost.
+pub(super) fn wide_children(nodes: &[Binary], node: usize) -> Vec<usize> {
     let mut children = Vec::with_capacity(WIDTH);
     if nodes[node].is_leaf() {
         children.push(node);
@@ -177,7 +182,7 @@ fn split_slots(nodes: &[Binary], node: usize, slots: usize, children: &mut Vec<u
     let (left, right) = (node + 1, node + nodes[node].right as usize);
     let (first, _) = best_split(&nodes[left], &nodes[right], slots);
     for (child, mut slots) in [(left, first), (right, slots - first)] {
-        // More slots than pay are left empty.
+        // Leave slots empty that do not lower the cost.
         let costs = &nodes[child].costs;
         while slots > 1 && costs[slots - 2] <= costs[slots - 1] {
             slots -= 1;

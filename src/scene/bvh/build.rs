@@ -1,42 +1,91 @@
-//! From the binary hierarchy to nodes of eight children and groups of four triangles.
+//! Lays out the binary hierarchy as nodes of eight children and groups of four triangles.
 
-use crate::scene::bvh::binary::{Binary, Grain, LARGEST_LEAF};
+use crate::scene::bvh::binary::{Binary, Granularity, MAX_LEAF};
 use crate::scene::bvh::pages::Pages;
 use crate::scene::bvh::split::{Bounds, Primitive};
-use crate::scene::bvh::{Bvh, Child, GROUP, Group, InstructionSet, Node, Tree, WIDTH, binary};
+use crate::scene::bvh::{
+    Bvh, Child, GROUP, Group, InstructionSet, Node, Tree, TreeNode, WIDTH, binary,
+};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::cmp::Reverse;
 
-/// Subtrees of more primitives than this, and than a fraction of all, are built and laid out side by side.
-const ALONE: usize = 8192;
-/// See [`ALONE`].
-const FRACTIONS: usize = 64;
+/// Subtrees with more primitives than this, and than 1 / [`TASKS`] of all, are built and laid out in parallel.
+const MIN_PARALLEL: usize = 8192;
+/// See [`MIN_PARALLEL`].
+const TASKS: usize = 64;
 
 pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Bvh {
     let corners = |triangle: u32| triangles[triangle as usize].map(|i| positions[i as usize]);
     let mut primitives = primitives(triangles.len(), corners);
-    let grain = Grain {
-        alone: alone(primitives.len()),
-        largest_leaf: LARGEST_LEAF,
+    let granularity = Granularity {
+        parallel_above: parallel_above(primitives.len()),
+        max_leaf: MAX_LEAF,
     };
     let binary = if primitives.is_empty() {
         Vec::new()
     } else {
-        binary::build(&mut primitives, grain)
+        binary::build(&mut primitives, granularity)
     };
     lay_out(&corners, &primitives, &binary, triangles.len())
 }
 
 /// [`Bvh::from_tree`].
-pub(super) fn adopt(positions: &[Vec3], triangles: &[[u32; 3]], tree: &Tree) -> Bvh {
+pub(super) fn from_tree(positions: &[Vec3], triangles: &[[u32; 3]], tree: &Tree) -> Bvh {
     let corners = |triangle: u32| triangles[triangle as usize].map(|i| positions[i as usize]);
-    let (primitives, binary) = binary::adopt(tree, &|t| Primitive::of(t, corners(t)));
+    let (primitives, binary) = binary::from_tree(tree, &|t| Primitive::of(t, corners(t)));
     lay_out(&corners, &primitives, &binary, triangles.len())
 }
 
-/// The boxes of triangles, without what can never be hit and would spoil them.
-pub(super) fn primitives(count: usize, corners: impl Fn(u32) -> [Vec3; 3]) -> Vec<Primitive> {
+impl Tree {
+    /// Builds the hierarchy over triangles, with at most four per leaf. Triangles with non-finite corners are left out.
+    pub fn new(corners: &[[Vec3; 3]]) -> Self {
+        let mut primitives = primitives(corners.len(), |triangle| corners[triangle as usize]);
+        if primitives.is_empty() {
+            return Self::default();
+        }
+        let granularity = Granularity {
+            parallel_above: parallel_above(primitives.len()),
+            max_leaf: GROUP,
+        };
+        let binary = binary::build(&mut primitives, granularity);
+        let mut tree = Self {
+            nodes: Vec::with_capacity(binary.len()),
+            order: primitives.iter().map(|p| p.triangle).collect(),
+        };
+        tree.nodes.push(leaf(&binary[0]));
+        // (Index in the tree, index in the binary hierarchy) of nodes whose children are not placed yet.
+        let mut pending = vec![(0, 0)];
+        while let Some((place, index)) = pending.pop() {
+            let from: &Binary = &binary[index];
+            if from.is_leaf() {
+                continue;
+            }
+            let children = [index + 1, index + from.right as usize];
+            let first = tree.nodes.len();
+            tree.nodes[place].first = first as u32;
+            tree.nodes[place].count = 0;
+            tree.nodes
+                .extend(children.map(|child| leaf(&binary[child])));
+            pending.push((first + 1, children[1]));
+            pending.push((first, children[0]));
+        }
+        tree
+    }
+}
+
+/// A node as a leaf over all its primitives.
+fn leaf(from: &Binary) -> TreeNode {
+    TreeNode {
+        low: from.bounds.low.into(),
+        high: from.bounds.high.into(),
+        first: from.first,
+        count: from.count,
+    }
+}
+
+/// The bounding boxes of all triangles with finite corners.
+fn primitives(count: usize, corners: impl Fn(u32) -> [Vec3; 3]) -> Vec<Primitive> {
     (0..count as u32)
         .map(|triangle| (triangle, corners(triangle)))
         .filter(|(_, c)| c.iter().all(|v| v.is_finite()))
@@ -44,9 +93,9 @@ pub(super) fn primitives(count: usize, corners: impl Fn(u32) -> [Vec3; 3]) -> Ve
         .collect()
 }
 
-/// Size from which a subtree is worth a task of its own.
-pub(super) fn alone(primitives: usize) -> usize {
-    ALONE.max(primitives / FRACTIONS)
+/// Number of primitives above which a subtree is a parallel task.
+fn parallel_above(primitives: usize) -> usize {
+    MIN_PARALLEL.max(primitives / TASKS)
 }
 
 fn lay_out<C: Fn(u32) -> [Vec3; 3] + Sync>(
@@ -65,7 +114,7 @@ fn lay_out<C: Fn(u32) -> [Vec3; 3] + Sync>(
     if binary.is_empty() {
         return bvh;
     }
-    // Boxes grow by the rounding of the largest coordinate, so that rays within their faces meet them.
+    // Enlarge boxes by the rounding error of the largest coordinate, so that rays within their faces hit them.
     let bounds = binary[0].bounds;
     let largest = bounds.low.abs().max(bounds.high.abs()).max_element();
     let layout = Layout {
@@ -73,7 +122,7 @@ fn lay_out<C: Fn(u32) -> [Vec3; 3] + Sync>(
         primitives,
         binary,
         margin: largest * 2.0 * f32::EPSILON,
-        alone: alone(primitives.len()) as u32,
+        parallel_above: parallel_above(primitives.len()) as u32,
     };
     let tree = layout.subtree(0);
     bvh.nodes = Pages::new(tree.nodes);
@@ -82,26 +131,26 @@ fn lay_out<C: Fn(u32) -> [Vec3; 3] + Sync>(
     bvh
 }
 
-/// What is laid out eight wide.
+/// The input of the layout.
 struct Layout<'a, C> {
     corners: &'a C,
     primitives: &'a [Primitive],
     binary: &'a [Binary],
     margin: f32,
-    alone: u32,
+    parallel_above: u32,
 }
 
-/// Nodes and groups of a subtree, counted from its own start; the first node is its root.
+/// Nodes and groups of a subtree, with indices relative to it; the first node is its root.
 #[derive(Default)]
 struct Subtree {
     nodes: Vec<Node>,
     groups: Vec<Group>,
-    /// Entries that a traversal's stack can need.
+    /// Maximum number of stack entries of a traversal.
     stack: usize,
 }
 
 impl Subtree {
-    /// Appends another subtree and returns where its root is now.
+    /// Appends another subtree; returns the reference to its root.
     fn append(&mut self, other: Self) -> Child {
         let (nodes, groups) = (self.nodes.len(), self.groups.len());
         self.groups.extend(other.groups);
@@ -118,11 +167,11 @@ impl Subtree {
 impl<C: Fn(u32) -> [Vec3; 3] + Sync> Layout<'_, C> {
     fn subtree(&self, root: usize) -> Subtree {
         let mut tree = Subtree::default();
-        if self.binary[root].count <= self.alone {
+        if self.binary[root].count <= self.parallel_above {
             self.place(root, 0, &mut tree);
             return tree;
         }
-        // Lay the children out side by side and append them in order.
+        // Lay the children out in parallel and append them in order.
         tree.nodes.push(Node::empty());
         let children = self.children(root);
         let stacked = children.len() - 1;
@@ -138,7 +187,7 @@ impl<C: Fn(u32) -> [Vec3; 3] + Sync> Layout<'_, C> {
         tree
     }
 
-    /// Adds a node for a binary one, and all below it; `stacked` stack entries are in use where it is visited.
+    /// Lays out a binary node and its subtree; `stacked` stack entries are in use when it is visited.
     fn place(&self, root: usize, stacked: usize, tree: &mut Subtree) -> Child {
         let index = tree.nodes.len();
         tree.nodes.push(Node::empty());
@@ -159,9 +208,9 @@ impl<C: Fn(u32) -> [Vec3; 3] + Sync> Layout<'_, C> {
         Child::inner(index)
     }
 
-    /// The binary nodes that become a wide one's children, those with the most triangles first.
+    /// The binary nodes that become a wide node's children, by descending number of triangles.
     fn children(&self, root: usize) -> Vec<usize> {
-        let mut children = binary::open(self.binary, root);
+        let mut children = binary::wide_children(self.binary, root);
         children.sort_by_key(|&child| Reverse(self.binary[child].count));
         children
     }
@@ -189,7 +238,7 @@ impl<C: Fn(u32) -> [Vec3; 3] + Sync> Layout<'_, C> {
 }
 
 impl Node {
-    /// A node whose boxes no ray meets.
+    /// A node whose boxes no ray hits.
     fn empty() -> Self {
         let (low, high) = (
             [f32::INFINITY.to_bits(); WIDTH],

@@ -1,12 +1,12 @@
-//! Several floats at once, as vectors and as plain arrays with the same results.
+//! SIMD vectors of floats, and plain arrays with identical results.
 
 /// `N` f32 lanes. `min` and `max` return the second operand where either is NaN; comparisons are then false.
 ///
-/// Everything is `#[inline(always)]` and nothing is a closure: what is not inlined into the function that enables
-/// the instructions is compiled without them.
+/// All methods are `#[inline(always)]`: code that is not inlined into the function with `#[target_feature]` is compiled without
+/// those instructions.
 pub(super) trait Lanes<const N: usize>: Copy {
     fn splat(x: f32) -> Self;
-    /// The floats whose bits these are.
+    /// Floats from their bits.
     fn load(bits: &[u32; N]) -> Self;
     fn store(self) -> [f32; N];
     fn add(self, other: Self) -> Self;
@@ -19,18 +19,18 @@ pub(super) trait Lanes<const N: usize>: Copy {
     fn le(self, other: Self) -> u32;
     /// Bit i is set where lane i of `self` < lane i of `other`.
     fn lt(self, other: Self) -> u32;
-    /// Puts the entries whose bits are set first, in order, into a slice of at least N; what comes behind them in its first N
-    /// is undefined.
+    /// Compacts the entries whose mask bits are set, in order, into `packed` (at least N long); the rest of its first N entries is
+    /// undefined.
     fn pack(entries: &[u32; N], mask: u32, packed: &mut [u32]);
 }
 
-/// The three coordinates, each in all lanes.
+/// Broadcasts three coordinates to all lanes.
 #[inline(always)]
 pub(super) fn splat<const N: usize, L: Lanes<N>>([x, y, z]: [f32; 3]) -> [L; 3] {
     [L::splat(x), L::splat(y), L::splat(z)]
 }
 
-/// Plain arrays; the compiler may use whatever vectors the target has.
+/// Plain arrays, on any processor.
 #[derive(Clone, Copy)]
 pub(super) struct Portable<const N: usize>([f32; N]);
 
@@ -112,8 +112,7 @@ fn pack_each<const N: usize>(entries: &[u32; N], mut mask: u32, packed: &mut [u3
     }
 }
 
-/// Asks for the first four cache lines at an address, which need not be valid; does nothing where there is no such
-/// instruction.
+/// Prefetches four cache lines at an address, which need not be valid; no operation on other architectures.
 #[inline(always)]
 pub(super) fn prefetch<T>(address: *const T) {
     #[cfg(target_arch = "x86_64")]
@@ -239,7 +238,7 @@ mod vectors {
         pack_eight
     );
 
-    /// For each mask, a byte a lane: the lanes of the set bits, in order.
+    /// For each mask, the lanes of its set bits in order, one byte per lane.
     static PACKING: [u64; 256] = packing();
 
     const fn packing() -> [u64; 256] {

@@ -1,7 +1,7 @@
-//! The hierarchy over triangles, eight children a node.
+//! Bounding volume hierarchy over triangles with eight children per node.
 //!
-//! A hit does not depend on the hierarchy: among equally near triangles the lowest index wins, and every
-//! instruction set does the same arithmetic in the same order (no fused multiply-add).
+//! Hits do not depend on the hierarchy or the processor: of equally near triangles the lowest index wins, and every instruction set
+//! does the same arithmetic in the same order (no fused multiply-add).
 
 #![allow(
     unsafe_code,
@@ -27,15 +27,16 @@ use std::hint::select_unpredictable;
 
 pub use tree::{Tree, TreeNode};
 
-/// Children of a node.
+/// Children per node.
 const WIDTH: usize = 8;
 
-/// Triangles of a group.
+/// Triangles per group.
 const GROUP: usize = 4;
 
-/// Eight child boxes and the children, those with the most triangles first, all as bits: rows are min x, max x, min y, max y, min z, max z, children, unused.
+/// Eight child boxes and children, by descending number of triangles, as bits. Rows: min x, max x, min y, max y, min z, max z,
+/// children, unused.
 ///
-/// Four cache lines. With eight rows a masked row index needs no check.
+/// Four cache lines. With eight rows, a masked row index needs no bounds check.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(64))]
 struct Node {
@@ -58,7 +59,7 @@ struct Child(u32);
 impl Child {
     const EMPTY: Self = Self(u32::MAX);
     const LEAF: u32 = 1 << 31;
-    /// Bits for the number of groups of a leaf, minus one.
+    /// Bits of a leaf's number of groups minus one.
     const COUNT_BITS: u32 = 4;
 
     fn inner(node: usize) -> Self {
@@ -69,7 +70,7 @@ impl Child {
         Self(Self::LEAF | (first as u32) << Self::COUNT_BITS | (groups - 1) as u32)
     }
 
-    /// The same child after nodes and groups were put behind others.
+    /// The reference shifted by numbers of nodes and groups.
     fn moved(self, nodes: usize, groups: usize) -> Self {
         if self == Self::EMPTY {
             self
@@ -90,7 +91,7 @@ impl Child {
     }
 }
 
-/// Four triangles, as bits: for each corner the rows x, y, z, and in the first corner's fourth row the triangles.
+/// Four triangles as bits: rows x, y, z of each corner; the fourth row of the first corner holds the triangle indices.
 ///
 /// Three cache lines. Unused lanes repeat a triangle.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -108,7 +109,7 @@ impl Group {
     }
 }
 
-/// Which instructions the traversal uses, from the narrowest to the widest; all give the same bits.
+/// Instruction sets of the traversal, from the narrowest to the widest; all give identical results.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum InstructionSet {
     /// Arrays of eight, on any processor.
@@ -120,7 +121,7 @@ pub enum InstructionSet {
 }
 
 impl InstructionSet {
-    /// The widest one that this processor has.
+    /// The widest instruction set of this processor.
     pub fn widest() -> Self {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2")
@@ -143,7 +144,7 @@ impl InstructionSet {
 pub struct Bvh {
     nodes: Pages<Node>,
     groups: Pages<Group>,
-    /// Entries that a traversal's stack can need.
+    /// Maximum number of stack entries of a traversal.
     stack_size: usize,
     triangles: usize,
     instructions: InstructionSet,
@@ -161,18 +162,18 @@ impl std::fmt::Debug for Bvh {
 }
 
 impl Bvh {
-    /// Builds the hierarchy of a mesh. Triangles with corners that are not finite are never hit.
+    /// Builds the hierarchy of a mesh. Triangles with non-finite corners are never hit.
     pub fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         build::build(positions, triangles)
     }
 
-    /// The hierarchy of a mesh by another builder's binary tree: its leaves are joined and its nodes opened eight wide at least
-    /// cost. A triangle may be in several leaves.
+    /// The hierarchy of a mesh from another builder's binary tree, with leaves merged and nodes collapsed at minimum cost. A triangle
+    /// may be in several leaves.
     pub fn from_tree(positions: &[Vec3], triangles: &[[u32; 3]], tree: &Tree) -> Self {
-        build::adopt(positions, triangles, tree)
+        build::from_tree(positions, triangles, tree)
     }
 
-    /// The same hierarchy, traversed with another instruction set (which the processor must have; else portable).
+    /// Sets the instruction set of traversals; falls back to portable if the processor lacks it.
     #[must_use]
     pub fn with_instructions(mut self, instructions: InstructionSet) -> Self {
         self.instructions = if instructions <= InstructionSet::widest() {
@@ -183,7 +184,7 @@ impl Bvh {
         self
     }
 
-    /// The nearest hit with t in (t_min, t_max), or none.
+    /// The nearest hit with t in (t_min, t_max).
     #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         traverse::intersect(self, ray)
@@ -196,7 +197,7 @@ impl Bvh {
     }
 }
 
-/// Asks for the memory of a child that will soon be visited. Whether that is a leaf cannot be predicted.
+/// Prefetches a child that will soon be visited. Branch-free, since whether it is a leaf is unpredictable.
 #[inline(always)]
 fn prefetch(nodes: &[Node], groups: &[Group], child: Child) {
     let node: *const Node = nodes.as_ptr().wrapping_add(child.0 as usize);

@@ -1,4 +1,4 @@
-//! Traversal towards the nearest hit.
+//! Nearest-hit traversal.
 
 use crate::scene::bvh::lanes::Lanes;
 use crate::scene::bvh::shear::Shear;
@@ -6,7 +6,7 @@ use crate::scene::bvh::slabs::{Slabs, reciprocal};
 use crate::scene::bvh::{Bvh, Child, GROUP, Group, Node, WIDTH, prefetch};
 use crate::scene::geometry::{Hit, Ray};
 
-/// A child still to be visited, in the low half, and the bits of where the ray enters its box: ordered by distance.
+/// A stack entry: the child in the low half, the bits of its entry distance in the high half, so that entries sort by distance.
 pub(super) type Entry = u64;
 
 #[inline(always)]
@@ -14,8 +14,7 @@ fn entry(child: Child, t: f32) -> Entry {
     u64::from(t.to_bits()) << 32 | u64::from(child.0)
 }
 
-/// The nearest hit in a hierarchy that holds something, `u32::MAX` its triangle where there is none; `stack` holds
-/// `Bvh::stack_size` entries.
+/// The nearest hit in a non-empty hierarchy; its triangle is `u32::MAX` if there is none. `stack` has `Bvh::stack_size` entries.
 #[inline(always)]
 pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
     bvh: &Bvh,
@@ -35,10 +34,10 @@ pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
     let mut depth = 0;
     let mut current = Child::inner(0);
     loop {
-        // Descend to the nearest child, leaving the others on the stack.
+        // Descend to the nearest child; push the others, sorted by distance.
         while !current.is_leaf() {
             let node = &nodes[current.0 as usize];
-            let (near, mut mask) = slabs.meet(node, nearest.t);
+            let (near, mut mask) = slabs.intersect(node, nearest.t);
             if mask == 0 {
                 current = Child::EMPTY;
                 break;
@@ -52,14 +51,14 @@ pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
             let second = mask.trailing_zeros() as usize;
             mask &= mask - 1;
             let t = near.store();
-            let of = |lane: usize| entry(node.child(lane), t[lane & (WIDTH - 1)]);
-            let (a, b) = (of(first), of(second));
+            let entry_of = |lane: usize| entry(node.child(lane), t[lane & (WIDTH - 1)]);
+            let (a, b) = (entry_of(first), entry_of(second));
             prefetch(nodes, groups, node.child(first));
             prefetch(nodes, groups, node.child(second));
             let (mut best, mut rest) = (a.min(b), a.max(b));
             let base = depth;
             while mask != 0 {
-                let next = of(mask.trailing_zeros() as usize);
+                let next = entry_of(mask.trailing_zeros() as usize);
                 prefetch(nodes, groups, node.child(mask.trailing_zeros() as usize));
                 mask &= mask - 1;
                 insert(stack, base, depth, rest);
@@ -78,7 +77,7 @@ pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
             }
         }
 
-        // Take the next child that is still near enough.
+        // Pop the next child that is nearer than the nearest hit.
         loop {
             if depth == 0 {
                 return nearest;
@@ -93,7 +92,7 @@ pub(super) fn traverse<B: Lanes<WIDTH>, T: Lanes<GROUP>>(
     }
 }
 
-/// Puts an entry among those from `base` to `depth`, of which the nearest lies on top.
+/// Inserts an entry into those from `base` to `depth`, which are sorted with the nearest on top.
 #[inline(always)]
 fn insert(stack: &mut [Entry], base: usize, depth: usize, entry: Entry) {
     let mut place = depth;

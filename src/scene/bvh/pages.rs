@@ -1,22 +1,22 @@
-//! Large arrays on large pages: random access to many megabytes is otherwise bound by address translation.
+//! Large arrays on huge pages: random access to many megabytes is otherwise limited by address translation.
 
 use bytemuck::Pod;
 use memmap2::MmapMut;
 use std::ops::{Deref, Range};
 
-/// Size of a large page on x86-64 and on most Arm systems.
+/// Size of a huge page on x86-64 and on most Arm systems.
 const PAGE: usize = 2 << 20;
 
-/// An array that never grows, on large pages where the system has them.
+/// An array of fixed length, on huge pages if the system has them.
 pub(super) enum Pages<T> {
-    /// Too small to gain, or the system gave no mapping.
+    /// Too small to benefit, or mapping failed.
     Small(Vec<T>),
-    /// The bytes of a mapping that hold the array, from a multiple of [`PAGE`] on.
+    /// A mapping and the byte range of the array in it, aligned to [`PAGE`].
     Large(MmapMut, Range<usize>),
 }
 
 impl<T: Pod> Pages<T> {
-    /// Moves a vector.
+    /// Takes over a vector's items.
     pub fn new(items: Vec<T>) -> Self {
         let length = size_of_val(items.as_slice());
         if length < PAGE {
@@ -25,7 +25,7 @@ impl<T: Pod> Pages<T> {
         let Ok(mut map) = MmapMut::map_anon(length + PAGE) else {
             return Self::Small(items);
         };
-        // Small pages do as well, only slower: a system that refuses the advice is no error.
+        // The advice may be refused: small pages are only slower.
         #[cfg(target_os = "linux")]
         let _ = map.advise(memmap2::Advice::HugePage);
         let start = map.as_ptr().align_offset(PAGE);

@@ -1,22 +1,22 @@
-//! A ray against the triangles of a group.
+//! Intersection of a ray with the triangles of a group.
 
 use crate::scene::bvh::lanes::{Lanes, splat};
 use crate::scene::bvh::{GROUP, Group};
 use crate::scene::geometry::{Hit, Ray};
 use glam::Vec3A;
 
-/// A ray as the triangle test wants it.
+/// A ray, precomputed for the triangle test.
 pub(super) struct Shear<L> {
     origin: [L; 3],
-    /// The axes in the order in which the ray is a z axis: its largest component last.
+    /// Axes permuted so that the direction's largest component is last (z).
     axes: [usize; 3],
-    /// Shear of x and y, and scale of z, that turn the ray into the unit z axis.
+    /// Shear of x and y, and scale of z, that map the direction to the unit z axis.
     shear: [L; 3],
     t_min: L,
 }
 
 impl<L: Lanes<GROUP>> Shear<L> {
-    /// `inverse` holds the reciprocals of the direction's components that are not tiny.
+    /// `inverse` is the `slabs::reciprocal` of the ray's direction.
     #[inline(always)]
     pub fn new(ray: &Ray, inverse: Vec3A) -> Self {
         let (origin, direction) = (ray.origin.to_array(), ray.direction.to_array());
@@ -41,7 +41,7 @@ impl<L: Lanes<GROUP>> Shear<L> {
         }
     }
 
-    /// A corner of each triangle, sheared onto the ray.
+    /// A corner of each triangle in the sheared space of the ray.
     #[inline(always)]
     fn corner(&self, group: &Group, corner: usize) -> [L; 3] {
         let rows = &group.corners[corner];
@@ -56,10 +56,11 @@ impl<L: Lanes<GROUP>> Shear<L> {
         ]
     }
 
-    /// Of a group's triangles: which the line meets, where, and the unscaled barycentric coordinates v, w and their total.
+    /// Intersects the line with a group's triangles beyond `t_min`: returns the mask of hits, t, and the unnormalised barycentric
+    /// coordinates v, w and their total.
     ///
-    /// Watertight (Woop, Benthin and Wald 2013): corners are sheared onto the ray first, and a difference of two
-    /// rounded products never has the wrong sign, at worst it is zero, which counts as inside.
+    /// Watertight (Woop, Benthin and Wald 2013): the edge function of sheared corners is a difference of two rounded products, which
+    /// never has the wrong sign; zero counts as inside.
     #[inline(always)]
     fn cross(&self, group: &Group) -> (u32, L, [L; 3]) {
         let [ax, ay, az] = self.corner(group, 0);
@@ -79,14 +80,14 @@ impl<L: Lanes<GROUP>> Shear<L> {
         (inside & self.t_min.lt(t), t, [v, w, total])
     }
 
-    /// Whether the ray meets any triangle of a group before `t_max`.
+    /// Whether the ray hits any triangle of a group before `t_max`.
     #[inline(always)]
-    pub fn meets(&self, group: &Group, t_max: f32) -> bool {
+    pub fn hits_any(&self, group: &Group, t_max: f32) -> bool {
         let (crossed, t, _) = self.cross(group);
         crossed & t.lt(L::splat(t_max)) != 0
     }
 
-    /// Keeps the nearest hit among the triangles of a group.
+    /// Updates `nearest` with the hits of a group's triangles.
     #[inline(always)]
     pub fn nearest(&self, group: &Group, nearest: &mut Hit) {
         let (crossed, t, [v, w, total]) = self.cross(group);
@@ -95,7 +96,7 @@ impl<L: Lanes<GROUP>> Shear<L> {
             return;
         }
 
-        // Of equally near triangles the lowest index wins; t_max itself is outside.
+        // Ties go to the lowest index; a hit at t_max itself does not count.
         let (t, v, w, total) = (t.store(), v.store(), w.store(), total.store());
         while candidates != 0 {
             let lane = candidates.trailing_zeros() as usize & (GROUP - 1);

@@ -1,17 +1,17 @@
-//! A ray against the eight boxes of a node.
+//! Intersection of a ray with the eight boxes of a node.
 
 use crate::scene::bvh::lanes::{Lanes, splat};
 use crate::scene::bvh::{Node, WIDTH};
 use crate::scene::geometry::Ray;
 use glam::{Vec3, Vec3A};
 
-/// A ray as the box test wants it.
+/// A ray, precomputed for the slab test.
 pub(super) struct Slabs<L> {
     origin: [L; 3],
     inverse: [L; 3],
-    /// The same, enlarged by the rounding of distances.
+    /// The reciprocals, enlarged by the rounding error of slab distances.
     inverse_far: [L; 3],
-    /// For each axis, the row of `Node` that the ray meets first.
+    /// For each axis, the row of `Node` with the near plane.
     near: [usize; 3],
     t_min: L,
 }
@@ -20,7 +20,7 @@ impl<L: Lanes<WIDTH>> Slabs<L> {
     /// `inverse` is the [`reciprocal`] of the ray's direction.
     #[inline(always)]
     pub fn new(ray: &Ray, inverse: Vec3A) -> Self {
-        // Slab distances are off by at most three roundings (pbrt 4ed, 6.1.2): widen the far side by more.
+        // Slab distances have at most three rounding errors (PBR 4ed, 6.1.2); widen the far distance by more.
         const WIDEN: f32 = 1.0 + 8.0 * f32::EPSILON;
         let negative = inverse.is_negative_bitmask() as usize;
         Self {
@@ -36,7 +36,7 @@ impl<L: Lanes<WIDTH>> Slabs<L> {
         }
     }
 
-    /// Distance to each child's plane of an axis.
+    /// Distance to a plane of each child box.
     #[inline(always)]
     fn plane(&self, node: &Node, axis: usize, row: usize, inverse: &[L; 3]) -> L {
         L::load(&node.rows[row & 7])
@@ -44,9 +44,9 @@ impl<L: Lanes<WIDTH>> Slabs<L> {
             .mul(inverse[axis])
     }
 
-    /// Distances at which the ray enters the eight boxes, and the boxes that it meets before `t_max`.
+    /// Entry distances of the eight boxes, and the mask of boxes hit before `t_max`.
     #[inline(always)]
-    pub fn meet(&self, node: &Node, t_max: f32) -> (L, u32) {
+    pub fn intersect(&self, node: &Node, t_max: f32) -> (L, u32) {
         let [x, y, z] = self.near;
         let near = self
             .plane(node, 0, x, &self.inverse)
@@ -63,10 +63,10 @@ impl<L: Lanes<WIDTH>> Slabs<L> {
     }
 }
 
-/// One over each component of a direction; where one is next to nothing, something huge of its sign.
+/// The reciprocal of each component of a direction; tiny components are clamped, keeping their sign.
 #[inline(always)]
 pub(super) fn reciprocal(direction: Vec3) -> Vec3A {
-    // A zero component would make 0 · ∞; a tiny one gives slabs that are as good as parallel.
+    // Zero components would give 0 · ∞ in the slab test.
     let tiny = Vec3A::splat(direction.abs().max_element() * 1e-24);
     let direction = Vec3A::from(direction);
     let is_tiny = direction.abs().cmplt(tiny);

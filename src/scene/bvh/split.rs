@@ -1,9 +1,9 @@
-//! Where a set of boxes is best split in two: binned surface area heuristic (Wald 2007).
+//! Splits a set of boxes in two by the binned surface area heuristic (Wald 2007).
 
 use crate::scene::bvh::GROUP;
 use glam::{UVec3, Vec3, Vec3A};
 
-/// A triangle's box.
+/// A triangle's bounding box.
 #[derive(Clone, Copy)]
 pub(super) struct Primitive {
     pub low: Vec3A,
@@ -28,7 +28,7 @@ impl Primitive {
     }
 }
 
-/// An axis-aligned box; the empty one has its corners swapped.
+/// An axis-aligned box; the empty box is inverted (infinite).
 #[derive(Clone, Copy)]
 pub(super) struct Bounds {
     pub low: Vec3A,
@@ -58,7 +58,7 @@ impl Bounds {
         }
     }
 
-    /// Half the surface; zero for the empty box.
+    /// Half the surface area; zero for the empty box.
     #[inline]
     pub fn half_area(&self) -> f32 {
         let size = (self.high - self.low).max(Vec3A::ZERO);
@@ -66,7 +66,7 @@ impl Bounds {
     }
 }
 
-/// Bins of an axis.
+/// Bins per axis.
 const BINS: usize = 16;
 
 /// How to split a range of primitives.
@@ -78,11 +78,11 @@ pub(super) enum Split {
         axis: usize,
         bin: u32,
     },
-    /// No plane tells the boxes apart: the first half goes left.
+    /// No plane separates the centres: the first half goes left.
     Halves,
 }
 
-/// The bin of a primitive on each axis.
+/// The map from box centres to bins on each axis.
 #[derive(Clone)]
 pub(super) struct Binning {
     low: Vec3A,
@@ -117,21 +117,21 @@ impl Bin {
         }
     }
 
-    /// Surface times groups to test.
+    /// Surface area times the number of triangle groups.
     fn cost(&self) -> f32 {
         self.bounds.half_area() * self.count.div_ceil(GROUP) as f32
     }
 }
 
 impl Split {
-    /// The split of least surface area cost.
+    /// The split of minimum surface area cost.
     pub fn best(primitives: &[Primitive]) -> Self {
         let (low, high) = primitives
             .iter()
             .fold((Vec3A::INFINITY, Vec3A::NEG_INFINITY), |(low, high), p| {
                 (low.min(p.center()), high.max(p.center()))
             });
-        // Count boxes by bins of their centres; an axis without extent has one bin.
+        // Bin boxes by their centres; an axis without extent has one bin.
         let size = high - low;
         let binning = Binning {
             low,
@@ -155,7 +155,7 @@ impl Split {
                 *bin = bin.join(&one);
             }
         }
-        // Sweep the planes between bins from both sides.
+        // Evaluate the planes between bins by sweeps from both sides.
         let mut best = (f32::INFINITY, 0, 0);
         for (axis, bins) in bins.iter().enumerate() {
             let mut right = [Bin::EMPTY; BINS];
@@ -187,7 +187,7 @@ impl Split {
         }
     }
 
-    /// Reorders primitives so that the left ones come first, and returns how many they are.
+    /// Reorders primitives so that the left ones come first; returns their number.
     pub fn partition(&self, primitives: &mut [Primitive]) -> usize {
         match self {
             Self::Halves => primitives.len() / 2,

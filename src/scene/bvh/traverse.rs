@@ -1,4 +1,4 @@
-//! Which instructions a ray is traced with.
+//! Dispatches traversals to instruction sets.
 
 #[cfg(target_arch = "x86_64")]
 use crate::scene::bvh::lanes::{Eight, Four, Portable};
@@ -7,14 +7,14 @@ use crate::scene::bvh::{Bvh, GROUP, InstructionSet, WIDTH, any};
 use crate::scene::geometry::{Hit, Ray};
 use std::cell::RefCell;
 
-/// Entries of a thread's stacks; deeper hierarchies take theirs from the heap, ray by ray.
-const SHALLOW: usize = 128;
+/// Entries of each thread's stacks; deeper hierarchies allocate a stack per ray.
+const STACK_SIZE: usize = 128;
 
 thread_local! {
-    // A stack in the frame would have to be cleared for every ray.
-    static NEAREST: RefCell<[nearest::Entry; SHALLOW]> = const { RefCell::new([0; SHALLOW]) };
-    // A whole vector is put onto this one at a time.
-    static ANY: RefCell<[u32; SHALLOW + WIDTH]> = const { RefCell::new([0; SHALLOW + WIDTH]) };
+    // Thread-local, since a stack on the call stack would be cleared for every ray.
+    static NEAREST: RefCell<[nearest::Entry; STACK_SIZE]> = const { RefCell::new([0; STACK_SIZE]) };
+    // `Lanes::pack` writes a whole vector at a time.
+    static ANY: RefCell<[u32; STACK_SIZE + WIDTH]> = const { RefCell::new([0; STACK_SIZE + WIDTH]) };
 }
 
 #[inline]
@@ -22,7 +22,7 @@ pub(super) fn intersect(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
     if bvh.nodes.is_empty() {
         return None;
     }
-    let hit = if bvh.stack_size <= SHALLOW {
+    let hit = if bvh.stack_size <= STACK_SIZE {
         NEAREST.with_borrow_mut(|stack| nearest_hit(bvh, ray, stack))
     } else {
         nearest_hit(bvh, ray, &mut vec![0; bvh.stack_size])
@@ -35,7 +35,7 @@ pub(super) fn occluded(bvh: &Bvh, ray: &Ray) -> bool {
     if bvh.nodes.is_empty() {
         return false;
     }
-    if bvh.stack_size <= SHALLOW {
+    if bvh.stack_size <= STACK_SIZE {
         ANY.with_borrow_mut(|stack| any_hit(bvh, ray, stack))
     } else {
         any_hit(bvh, ray, &mut vec![0; bvh.stack_size + WIDTH])
@@ -92,7 +92,7 @@ fn any_avx2(bvh: &Bvh, ray: &Ray, stack: &mut [u32]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::SHALLOW;
+    use super::STACK_SIZE;
     use crate::scene::bvh::Bvh;
     use crate::scene::geometry::Ray;
     use glam::Vec3;
@@ -114,7 +114,7 @@ mod tests {
     fn hierarchies_deeper_than_the_threads_stacks_are_traversed_whole() {
         let (positions, triangles) = chain();
         let bvh = Bvh::new(&positions, &triangles);
-        assert!(bvh.stack_size > SHALLOW, "only {}", bvh.stack_size);
+        assert!(bvh.stack_size > STACK_SIZE, "only {}", bvh.stack_size);
         for (index, _) in triangles.iter().enumerate().step_by(50) {
             // Between this triangle and the next, forward and back.
             let x = positions[3 * index].x;

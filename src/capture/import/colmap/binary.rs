@@ -1,18 +1,18 @@
-//! cameras.bin and images.bin: little-endian, counts first.
+//! Reads cameras.bin and images.bin: little-endian, each beginning with the number of entries.
 
-use crate::capture::import::colmap::{Image, model};
+use crate::capture::import::colmap::model::{self, Image};
 use crate::capture::import::folder::Folder;
-use crate::capture::import::lens::Lens;
+use crate::capture::scan::lens::Lens;
 use crate::error::{Error, Result};
 use glam::DVec3;
 use std::collections::HashMap;
 
 /// Longest file that is read.
 const MAX_BYTES: u64 = 1 << 32;
-/// Bytes of a point of an image: x, y, and the number of its 3-D point.
-const POINT: u64 = 24;
+/// Bytes of an image's feature point: x, y, and the id of its 3-D point.
+const POINT_BYTES: u64 = 24;
 
-/// Bytes that are left.
+/// The unread bytes.
 struct Cursor<'a>(&'a [u8]);
 
 impl<'a> Cursor<'a> {
@@ -54,7 +54,7 @@ fn broken(folder: &Folder, name: &str, index: u64, problem: &str) -> Error {
     )
 }
 
-/// Cameras: number, model, width, height, parameters.
+/// Cameras by id. An entry is: id, model, width, height, parameters.
 ///
 /// # Errors
 /// The file ends too early or holds an impossible camera.
@@ -87,7 +87,7 @@ pub fn cameras(folder: &Folder, name: &str) -> Result<HashMap<u32, Lens>> {
     Ok(cameras)
 }
 
-/// Images: number, quaternion, translation, camera, name, points.
+/// Images. An entry is: id, quaternion, translation, camera, name, points.
 ///
 /// # Errors
 /// The file ends too early.
@@ -111,7 +111,7 @@ fn image(cursor: &mut Cursor) -> Option<Image> {
     let translation = DVec3::new(number()?, number()?, number()?);
     let camera = cursor.u32()?;
     let name = cursor.text()?;
-    let points = cursor.u64()?.checked_mul(POINT)?;
+    let points = cursor.u64()?.checked_mul(POINT_BYTES)?;
     cursor.take(usize::try_from(points).ok()?)?;
     Some(Image {
         quaternion,

@@ -1,20 +1,22 @@
-//! COLMAP models, text and binary: `cameras`, `images`; `points3D` is not needed. Poses are world to camera with OpenCV's
-//! axes, pixel centres lie at halves. The mesh comes from elsewhere; COLMAP's own meshers write it beside the model.
+//! Reads COLMAP models, text and binary: `cameras` and `images` (not `points3D`). Poses are world-to-camera with OpenCV's axes;
+//! pixel centres are at half-integers. The mesh is a file beside the model, such as COLMAP's own meshers write.
 
 mod binary;
 mod model;
 mod text;
 
 use crate::capture::import::folder::Folder;
-use crate::capture::import::lens::Lens;
+use crate::capture::import::geometry;
 use crate::capture::import::matrix::{from_opencv, no_quaternion, rotation};
-use crate::capture::import::{ImportedFrame, Scan, geometry};
+use crate::capture::import::reader::Scan;
+use crate::capture::scan::ImportedFrame;
+use crate::capture::scan::lens::Lens;
 use crate::error::{Error, Result};
-use glam::DVec3;
+use model::Image;
 use std::collections::HashMap;
 
-/// Where models lie in a project, the best first.
-const PLACES: [&str; 9] = [
+/// Folders of models in a project, in order of preference.
+const MODEL_FOLDERS: [&str; 9] = [
     "",
     "sparse/0",
     "sparse",
@@ -25,30 +27,17 @@ const PLACES: [&str; 9] = [
     "undistorted/sparse",
     "distorted/sparse/0",
 ];
-/// What folders of photographs are called.
-const IMAGES: [&str; 5] = ["images", "image", "rgb", "input", "color"];
+/// Usual names of folders of photographs.
+const IMAGE_FOLDERS: [&str; 5] = ["images", "image", "rgb", "input", "color"];
 
-/// A photograph of the model.
-#[derive(Debug, Clone, PartialEq)]
-struct Image {
-    /// w, x, y, z of the rotation from world to camera.
-    quaternion: [f64; 4],
-    /// The world's origin in camera axes.
-    translation: DVec3,
-    /// The number of its camera.
-    camera: u32,
-    /// Its file, relative to the folder of photographs.
-    name: String,
-}
-
-/// The model's place and whether it is binary.
+/// The model's folder, and whether the model is binary.
 fn find(folder: &Folder) -> Option<(&'static str, bool)> {
     let both = |place: &str, end: &str| {
         ["cameras", "images"]
             .iter()
             .all(|name| folder.has(&inside(place, &format!("{name}.{end}"))))
     };
-    PLACES.into_iter().find_map(|place| {
+    MODEL_FOLDERS.into_iter().find_map(|place| {
         let binary = both(place, "bin");
         (binary || both(place, "txt")).then_some((place, binary))
     })
@@ -86,7 +75,7 @@ pub fn read(folder: &Folder) -> Result<Scan> {
         )
     };
     let mut scan = Scan::default();
-    scan.said
+    scan.remarks
         .push(format!("model: {images_name}, {} images", images.len()));
     let photographs = photographs(folder, place, images.first());
     let place_name = folder.path(&images_name).display().to_string();
@@ -95,14 +84,8 @@ pub fn read(folder: &Folder) -> Result<Scan> {
             .push(frame(folder, &place_name, &photographs, &cameras, image)?);
     }
     scan.frames.sort_by(|a, b| a.photograph.cmp(&b.photograph));
-    let others = scan.frames.iter().filter(|f| !f.lens.fits_a_capture());
-    let others = others.count();
-    if others > 0 {
-        scan.said.push(format!(
-            "{others} photographs are resampled to a pinhole of the same focal length; what lies outside it is lost"
-        ));
-    }
-    scan.mesh = geometry::find(folder, &["", "dense", "dense/0", place], &mut scan.said)?;
+    scan.remark_on_resampled();
+    scan.mesh = geometry::find(folder, &["", "dense", "dense/0", place], &mut scan.remarks)?;
     Ok(scan)
 }
 
@@ -124,7 +107,7 @@ fn frame(
     };
     let [w, x, y, z] = image.quaternion;
     let Some(to_camera) = rotation(x, y, z, w) else {
-        return no_quaternion(&format!("{place} image {name}"));
+        return Err(no_quaternion(&format!("{place} image {name}")));
     };
     if !image.translation.is_finite() {
         return Err(Error::new(
@@ -134,14 +117,9 @@ fn frame(
         ));
     }
     let to_world = to_camera.transpose();
-    Ok(ImportedFrame {
-        photograph: folder.file(&format!("{place} image {name}"), &inside(photographs, name))?,
-        lens: *lens,
-        pose: from_opencv(to_world, -(to_world * image.translation)),
-        exposure: None,
-        mask: None,
-        depth: None,
-    })
+    let photograph = folder.file(&format!("{place} image {name}"), &inside(photographs, name))?;
+    let pose = from_opencv(to_world, -(to_world * image.translation));
+    Ok(ImportedFrame::new(photograph, *lens, pose, None))
 }
 
 /// The folder of photographs: one of the usual names at the model or above that holds the first image.
@@ -152,7 +130,7 @@ fn photographs(folder: &Folder, place: &str, first: Option<&Image>) -> String {
     }
     let candidates = above
         .iter()
-        .flat_map(|up| IMAGES.iter().map(|name| inside(up, name)))
+        .flat_map(|up| IMAGE_FOLDERS.iter().map(|name| inside(up, name)))
         .chain(above.iter().map(|up| (*up).to_owned()));
     let mut candidates = candidates
         .filter(|candidate| first.is_some_and(|image| folder.has(&inside(candidate, &image.name))));

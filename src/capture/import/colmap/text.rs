@@ -1,9 +1,9 @@
-//! cameras.txt and images.txt.
+//! Reads cameras.txt and images.txt.
 
-use crate::capture::import::colmap::{Image, model};
+use crate::capture::import::colmap::model::{self, Image};
 use crate::capture::import::folder::Folder;
-use crate::capture::import::lens::Lens;
 use crate::capture::import::matrix::number;
+use crate::capture::scan::lens::Lens;
 use crate::error::{Error, Result};
 use glam::DVec3;
 use std::collections::HashMap;
@@ -16,7 +16,7 @@ fn broken(folder: &Folder, name: &str, line: usize, problem: &str) -> Error {
     )
 }
 
-/// Lines of `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`.
+/// Cameras by id, from lines of `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`.
 ///
 /// # Errors
 /// A line is something else.
@@ -34,7 +34,7 @@ pub fn cameras(folder: &Folder, name: &str) -> Result<HashMap<u32, Lens>> {
             Some((words[0].parse().ok()?, size, parameters?))
         };
         let Some((id, size, parameters)) = parsed() else {
-            let problem = "is no CAMERA_ID MODEL WIDTH HEIGHT PARAMS";
+            let problem = "is not a line of CAMERA_ID MODEL WIDTH HEIGHT PARAMS";
             return Err(broken(folder, name, index, problem));
         };
         let lens = model::lens(words[1], size, &parameters)
@@ -44,7 +44,7 @@ pub fn cameras(folder: &Folder, name: &str) -> Result<HashMap<u32, Lens>> {
     Ok(cameras)
 }
 
-/// Pairs of lines, `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME` and the image's points, which may be empty.
+/// Images, from pairs of lines: `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME` and the image's points, which may be empty.
 ///
 /// # Errors
 /// A line is something else.
@@ -60,7 +60,7 @@ pub fn images(folder: &Folder, name: &str) -> Result<Vec<Image>> {
             continue;
         }
         let Some(image) = image(line) else {
-            let problem = "is no IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME";
+            let problem = "is not a line of IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME";
             return Err(broken(folder, name, index, problem));
         };
         images.push(image);

@@ -1,29 +1,30 @@
-//! Open3D's reconstruction system and the Redwood data sets: `color` (or `rgb`, `image`), `depth`, a trajectory, intrinsics.
+//! Reads Open3D's reconstruction system and the Redwood data sets: `color` (or `rgb`, `image`), `depth`, a trajectory, intrinsics.
 //!
-//! A trajectory is a `.log` file (for each frame a line of three numbers and a 4×4 camera-to-world matrix with OpenCV's
-//! axes) or a JSON list of world-to-camera matrices stored by columns. camera_intrinsic.json holds the 3×3 matrix by columns.
+//! A trajectory is a `.log` file (for each frame a line of three numbers and a 4×4 camera-to-world matrix with OpenCV's axes) or a
+//! JSON list of column-major world-to-camera matrices. camera_intrinsic.json holds the 3×3 matrix, column-major.
 //! Depth is in millimetres.
 
-use crate::capture::import::depth::DepthImage;
 use crate::capture::import::folder::Folder;
-use crate::capture::import::lens::Lens;
 use crate::capture::import::matrix::{numbers, pose_of_rows};
+use crate::capture::import::reader::{ImportOptions, Scan};
 use crate::capture::import::rgbd::{
-    COLOR_FOLDERS, depth_size, lost, opencv_lens, photograph_size, possible,
+    COLOR_FOLDERS, depth_size, opencv_lens, photograph_size, possible, remark_on_lost,
 };
-use crate::capture::import::{ImportOptions, ImportedFrame, Scan};
+use crate::capture::scan::ImportedFrame;
+use crate::capture::scan::depth::DepthImage;
+use crate::capture::scan::lens::Lens;
 use crate::error::{Error, Result};
 use glam::{DMat4, DVec4};
 use serde_json::Value;
 
-/// Intrinsics files by name.
+/// Names of intrinsics files, in order of preference.
 const INTRINSICS: [&str; 4] = [
     "camera_intrinsic.json",
     "intrinsic.json",
     "camera_primesense.json",
     "scene/camera_intrinsic.json",
 ];
-/// Trajectories by name, the best first; any other `.log` comes after.
+/// Names of trajectories, in order of preference, before any other `.log`.
 const TRAJECTORIES: [&str; 6] = [
     "scene/refined_trajectory.log",
     "scene/trajectory.log",
@@ -32,7 +33,7 @@ const TRAJECTORIES: [&str; 6] = [
     "trajectory.json",
     "camera_trajectory.json",
 ];
-/// Meshes of the reconstruction system, the best first.
+/// Meshes of the reconstruction system, in order of preference.
 const MESHES: [&str; 4] = [
     "scene/color_map_after_optimization.ply",
     "scene/refined_integrated.ply",
@@ -40,8 +41,8 @@ const MESHES: [&str; 4] = [
     "integrated.ply",
 ];
 
-/// Rows of a camera-to-world matrix, with its frame's number.
-type Stop = (usize, Vec<Vec<f64>>);
+/// A frame's index, and the rows of its camera-to-world matrix.
+type PosedFrame = (usize, Vec<Vec<f64>>);
 
 /// Whether a folder has this layout.
 ///
@@ -69,7 +70,7 @@ fn trajectory_name(folder: &Folder) -> Result<Option<String>> {
 /// Reads the frames and finds the mesh.
 ///
 /// # Errors
-/// A file is missing or broken, or there are fewer images than poses name.
+/// A file is missing or broken, or a pose names an image that does not exist.
 pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
     let mut scan = Scan {
         is_video: true,
@@ -93,16 +94,16 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
     }
     let name = trajectory_name(folder)?
         .ok_or_else(|| missing("trajectory.log", "add the camera trajectory"))?;
-    scan.said.push(format!("poses: {name}"));
+    scan.remarks.push(format!("poses: {name}"));
     let place = folder.path(&name).display().to_string();
-    let stops = if name.ends_with(".json") {
+    let poses = if name.ends_with(".json") {
         from_json(folder, &name)?
     } else {
         from_log(folder, &name)?
     };
     let mut cameras: Option<[Lens; 2]> = None;
     let mut left_out = 0;
-    for (index, rows) in stops {
+    for (index, rows) in poses {
         let (Some(color), Some(depth)) = (colors.get(index), depths.get(index)) else {
             return Err(Error::new(
                 &place,
@@ -124,34 +125,30 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
                     folder,
                     photograph_size(folder, color)?,
                     options,
-                    &mut scan.said,
+                    &mut scan.remarks,
                 )?;
                 let depth_lens = lens.resized(depth_size(folder, depth)?);
                 *cameras.insert([lens, depth_lens])
             }
         };
-        scan.frames.push(ImportedFrame {
-            photograph: folder.file(&place, color)?,
-            lens,
-            pose,
-            exposure: None,
-            mask: None,
-            depth: Some(DepthImage {
-                path: folder.file(&place, depth)?,
-                lens: depth_lens,
-                metres_per_unit: 0.001,
-                invalid: None,
-            }),
-        });
+        let photograph = folder.file(&place, color)?;
+        let depth = DepthImage {
+            path: folder.file(&place, depth)?,
+            lens: depth_lens,
+            metres_per_unit: 0.001,
+            invalid: None,
+        };
+        scan.frames
+            .push(ImportedFrame::new(photograph, lens, pose, Some(depth)));
     }
-    lost(left_out, &mut scan.said);
+    remark_on_lost(left_out, &mut scan.remarks);
     if let Some(name) = folder.first(&MESHES) {
         scan.mesh = Some(folder.file(&place, name)?);
     }
     Ok(scan)
 }
 
-/// The images of a folder in the order of their numbers.
+/// The images of a folder in natural order.
 fn images(folder: &Folder, inside: &str, ends: &[&str]) -> Result<Vec<String>> {
     let names = folder.names(inside)?;
     let is_image = |name: &String| {
@@ -167,8 +164,8 @@ fn images(folder: &Folder, inside: &str, ends: &[&str]) -> Result<Vec<String>> {
         .collect())
 }
 
-/// The stops of a `.log` file.
-fn from_log(folder: &Folder, name: &str) -> Result<Vec<Stop>> {
+/// The poses of a `.log` file.
+fn from_log(folder: &Folder, name: &str) -> Result<Vec<PosedFrame>> {
     let text = folder.text(name)?;
     let path = folder.path(name);
     let lines: Vec<&str> = text
@@ -178,11 +175,11 @@ fn from_log(folder: &Folder, name: &str) -> Result<Vec<Stop>> {
     let broken = |index: usize| {
         Error::new(
             format!("{} frame {index}", path.display()),
-            "is no line of three numbers with a 4×4 matrix below",
+            "is not a line of three numbers with a 4×4 matrix below",
             "export the trajectory again",
         )
     };
-    let mut stops = Vec::new();
+    let mut poses = Vec::new();
     for (index, block) in lines.chunks(5).enumerate() {
         let head = numbers(block[0]).filter(|head| head.len() >= 2);
         let rows: Option<Vec<Vec<f64>>> = block[1..].iter().map(|line| numbers(line)).collect();
@@ -194,16 +191,15 @@ fn from_log(folder: &Folder, name: &str) -> Result<Vec<Stop>> {
         if !whole || rows.len() != 4 || rows.iter().any(|row| row.len() != 4) {
             return Err(broken(index));
         }
-        stops.push((frame as usize, rows));
+        poses.push((frame as usize, rows));
     }
-    Ok(stops)
+    Ok(poses)
 }
 
-/// The stops of a JSON trajectory.
-fn from_json(folder: &Folder, name: &str) -> Result<Vec<Stop>> {
+/// The poses of a JSON trajectory.
+fn from_json(folder: &Folder, name: &str) -> Result<Vec<PosedFrame>> {
     let path = folder.path(name);
-    let value: Value = serde_json::from_str(&folder.text(name)?)
-        .map_err(|e| Error::file(&path, format!("is not valid JSON: {e}"), "correct the file"))?;
+    let value = folder.json(name)?;
     let list = value.get("parameters").and_then(Value::as_array);
     let list = list.ok_or_else(|| {
         Error::file(
@@ -212,17 +208,17 @@ fn from_json(folder: &Folder, name: &str) -> Result<Vec<Stop>> {
             "export the trajectory again",
         )
     })?;
-    let stop = |(index, entry): (usize, &Value)| -> Result<Stop> {
+    let pose = |(index, entry): (usize, &Value)| -> Result<PosedFrame> {
         let columns = column_major(entry.get("extrinsic"), 16);
         let Some(columns) = columns else {
             return Err(Error::file(
                 &path,
-                format!("parameters[{index}].extrinsic is no list of 16 numbers"),
+                format!("parameters[{index}].extrinsic is not a list of 16 numbers"),
                 "export the trajectory again",
             ));
         };
         let to_camera = DMat4::from_cols_slice(&columns);
-        // A singular matrix has an inverse that is not finite, as lost frames have.
+        // A singular matrix counts as a lost frame.
         let to_world = if to_camera.determinant().abs() > 1e-9 {
             to_camera.inverse()
         } else {
@@ -231,7 +227,7 @@ fn from_json(folder: &Folder, name: &str) -> Result<Vec<Stop>> {
         let row = |r: DVec4| r.to_array().to_vec();
         Ok((index, (0..4).map(|i| row(to_world.row(i))).collect()))
     };
-    list.iter().enumerate().map(stop).collect()
+    list.iter().enumerate().map(pose).collect()
 }
 
 fn column_major(value: Option<&Value>, count: usize) -> Option<Vec<f64>> {
@@ -244,25 +240,24 @@ fn camera(
     folder: &Folder,
     size: [u32; 2],
     options: &ImportOptions,
-    said: &mut Vec<String>,
+    remarks: &mut Vec<String>,
 ) -> Result<Lens> {
     if let Some(given) = options.intrinsics {
         return Ok(opencv_lens(size, given));
     }
     let Some(name) = folder.first(&INTRINSICS) else {
-        said.push(
-            "intrinsics: Open3D's default for PrimeSense cameras, as there is no camera_intrinsic.json; --intrinsics overrules"
+        remarks.push(
+            "intrinsics: Open3D's default for PrimeSense cameras, as there is no camera_intrinsic.json; --intrinsics overrides"
                 .into(),
         );
         return Ok(opencv_lens([640, 480], [525.0, 525.0, 319.5, 239.5]).resized(size));
     };
     let path = folder.path(name);
-    let value: Value = serde_json::from_str(&folder.text(name)?)
-        .map_err(|e| Error::file(&path, format!("is not valid JSON: {e}"), "correct the file"))?;
+    let value = folder.json(name)?;
     let Some(k) = column_major(value.get("intrinsic_matrix"), 9) else {
         return Err(Error::file(
             &path,
-            "intrinsic_matrix is no list of 9 numbers",
+            "intrinsic_matrix is not a list of 9 numbers",
             "write the intrinsics again",
         ));
     };

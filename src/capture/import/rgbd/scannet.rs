@@ -1,14 +1,17 @@
-//! ScanNet (Dai et al. 2017) as its exporter writes a `.sens` file: `color/N.jpg`, `depth/N.png`, `pose/N.txt`, `intrinsic/`.
+//! Reads ScanNet (Dai et al. 2017) as exported from a `.sens` file: `color/N.jpg`, `depth/N.png`, `pose/N.txt`, `intrinsic/`.
 //!
 //! Poses are 4×4 camera-to-world matrices with OpenCV's axes, all −inf where tracking was lost; depth is in millimetres.
 //! `*_vh_clean_2.ply` (or `_vh_clean.ply`) is the reconstructed mesh.
 
-use crate::capture::import::depth::DepthImage;
 use crate::capture::import::folder::Folder;
-use crate::capture::import::lens::Lens;
 use crate::capture::import::matrix::{pose_of_rows, rows};
-use crate::capture::import::rgbd::{depth_size, lost, opencv_lens, photograph_size, possible};
-use crate::capture::import::{ImportedFrame, Scan};
+use crate::capture::import::reader::Scan;
+use crate::capture::import::rgbd::{
+    depth_size, opencv_lens, photograph_size, possible, remark_on_lost,
+};
+use crate::capture::scan::ImportedFrame;
+use crate::capture::scan::depth::DepthImage;
+use crate::capture::scan::lens::Lens;
 use crate::error::Result;
 use glam::DMat3;
 
@@ -60,22 +63,18 @@ pub fn read(folder: &Folder) -> Result<Scan> {
                 camera(folder, "depth", depth_size(folder, &depth)?)?,
             ]),
         };
-        scan.frames.push(ImportedFrame {
-            photograph: folder.file(&place, &color)?,
-            lens,
-            pose,
-            exposure: None,
-            mask: None,
-            depth: Some(DepthImage {
-                path: folder.file(&place, &depth)?,
-                lens: depth_lens,
-                metres_per_unit: 0.001,
-                invalid: None,
-            }),
-        });
+        let photograph = folder.file(&place, &color)?;
+        let depth = DepthImage {
+            path: folder.file(&place, &depth)?,
+            lens: depth_lens,
+            metres_per_unit: 0.001,
+            invalid: None,
+        };
+        scan.frames
+            .push(ImportedFrame::new(photograph, lens, pose, Some(depth)));
     }
-    lost(left_out, &mut scan.said);
-    remark_on_extrinsics(folder, &mut scan.said)?;
+    remark_on_lost(left_out, &mut scan.remarks);
+    remark_on_extrinsics(folder, &mut scan.remarks)?;
     Ok(scan)
 }
 
@@ -88,8 +87,8 @@ fn camera(folder: &Folder, kind: &str, size: [u32; 2]) -> Result<Lens> {
     possible(lens, &path)
 }
 
-/// Says where the depth camera stands elsewhere than the colour camera.
-fn remark_on_extrinsics(folder: &Folder, said: &mut Vec<String>) -> Result<()> {
+/// Adds a remark if the depth and colour cameras have different poses.
+fn remark_on_extrinsics(folder: &Folder, remarks: &mut Vec<String>) -> Result<()> {
     for kind in ["color", "depth"] {
         let name = format!("intrinsic/extrinsic_{kind}.txt");
         if !folder.has(&name) {
@@ -98,18 +97,18 @@ fn remark_on_extrinsics(folder: &Folder, said: &mut Vec<String>) -> Result<()> {
         let path = folder.path(&name);
         let m = rows(&path, &folder.text(&name)?)?;
         let column = |j: usize| glam::DVec3::new(m[0][j], m[1][j], m[2][j]);
-        let turn = DMat3::from_cols(column(0), column(1), column(2)) - DMat3::IDENTITY;
+        let difference = DMat3::from_cols(column(0), column(1), column(2)) - DMat3::IDENTITY;
         let shift = if m[0].len() == 4 {
             column(3).length()
         } else {
             0.0
         };
-        let turned = turn
+        let rotation = difference
             .to_cols_array()
             .iter()
             .fold(0.0, |a: f64, x| a.max(x.abs()));
-        if turned > 1e-3 || shift > 1e-3 {
-            said.push(format!(
+        if rotation > 1e-3 || shift > 1e-3 {
+            remarks.push(format!(
                 "{name} is not the identity ({shift:.3} m); depth is taken to be seen from where the colour camera is"
             ));
         }
@@ -117,14 +116,12 @@ fn remark_on_extrinsics(folder: &Folder, said: &mut Vec<String>) -> Result<()> {
     Ok(())
 }
 
-/// The reconstruction, the simplified one first.
+/// The reconstructed mesh; the simplified one is preferred.
 fn mesh(folder: &Folder) -> Result<Option<std::path::PathBuf>> {
     let names = folder.names("")?;
     for end in ["_vh_clean_2.ply", "_vh_clean.ply"] {
         if let Some(name) = names.iter().find(|name| name.ends_with(end)) {
-            return folder
-                .file(&folder.path(name).display().to_string(), name)
-                .map(Some);
+            return folder.existing(name).map(Some);
         }
     }
     Ok(None)

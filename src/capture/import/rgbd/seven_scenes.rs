@@ -1,21 +1,24 @@
-//! 7-Scenes (Shotton et al. 2013) and 3DMatch: `frame-N.color.png`, `frame-N.depth.png`, `frame-N.pose.txt`.
+//! Reads 7-Scenes (Shotton et al. 2013) and 3DMatch: `frame-N.color.png`, `frame-N.depth.png`, `frame-N.pose.txt`.
 //!
-//! Poses are 4×4 camera-to-world matrices with OpenCV's axes; depth is in millimetres, 65535 meaning none. 3DMatch adds
-//! `camera-intrinsics.txt`, a 3×3 matrix; 7-Scenes itself is said to have a focal length of 585 at 640 × 480.
+//! Poses are 4×4 camera-to-world matrices with OpenCV's axes; depth is in millimetres, with 65535 for missing depth. 3DMatch adds
+//! `camera-intrinsics.txt`, a 3×3 matrix; 7-Scenes states a focal length of 585 pixels at 640 × 480.
 
-use crate::capture::import::depth::DepthImage;
 use crate::capture::import::folder::Folder;
-use crate::capture::import::lens::Lens;
 use crate::capture::import::matrix::{pose_of_rows, rows};
-use crate::capture::import::rgbd::{depth_size, lost, opencv_lens, photograph_size, possible};
-use crate::capture::import::{ImportOptions, ImportedFrame, Scan};
+use crate::capture::import::reader::{ImportOptions, Scan};
+use crate::capture::import::rgbd::{
+    depth_size, opencv_lens, photograph_size, possible, remark_on_lost,
+};
+use crate::capture::scan::ImportedFrame;
+use crate::capture::scan::depth::DepthImage;
+use crate::capture::scan::lens::Lens;
 use crate::error::{Error, Result};
 
-/// The end of a pose file's name.
+/// Suffix of a pose file's name.
 const POSE: &str = ".pose.txt";
-/// 3DMatch's intrinsics.
+/// Names of 3DMatch's intrinsics.
 const INTRINSICS: [&str; 2] = ["camera-intrinsics.txt", "intrinsics.txt"];
-/// The value of a depth pixel that saw nothing.
+/// Depth value for missing depth.
 const INVALID: u16 = 65535;
 
 /// Whether a folder has this layout.
@@ -31,7 +34,7 @@ pub fn is_here(folder: &Folder) -> Result<bool> {
     Ok(false)
 }
 
-/// The folder itself and its `seq-NN`.
+/// The folder itself and its subfolders `seq-NN`.
 fn sequences(folder: &Folder) -> Result<Vec<String>> {
     let inner = folder.names("")?;
     let inner = inner
@@ -67,7 +70,7 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
                     Error::file(
                         &folder.path(&format!("{stem}.{kind}.{}", ends[0])),
                         "is missing, though the frame has a pose",
-                        "copy the file, or take the frame's pose away",
+                        "copy the file, or delete the frame's pose",
                     )
                 })
             };
@@ -82,48 +85,46 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
             };
             let [lens, depth_lens] = match lenses {
                 Some(known) => known,
-                None => *lenses.insert(cameras(folder, &color, &depth, options, &mut scan.said)?),
+                None => {
+                    *lenses.insert(cameras(folder, &color, &depth, options, &mut scan.remarks)?)
+                }
             };
-            scan.frames.push(ImportedFrame {
-                photograph: folder.file(&path.display().to_string(), &color)?,
-                lens,
-                pose,
-                exposure: None,
-                mask: None,
-                depth: Some(DepthImage {
-                    path: folder.file(&path.display().to_string(), &depth)?,
-                    lens: depth_lens,
-                    metres_per_unit: 0.001,
-                    invalid: Some(INVALID),
-                }),
-            });
+            let photograph = folder.file(&path.display().to_string(), &color)?;
+            let depth = DepthImage {
+                path: folder.file(&path.display().to_string(), &depth)?,
+                lens: depth_lens,
+                metres_per_unit: 0.001,
+                invalid: Some(INVALID),
+            };
+            scan.frames
+                .push(ImportedFrame::new(photograph, lens, pose, Some(depth)));
         }
     }
-    lost(left_out, &mut scan.said);
+    remark_on_lost(left_out, &mut scan.remarks);
     Ok(scan)
 }
 
-/// The colour camera and the depth camera, which is taken to see the same.
+/// The colour and the depth camera; depth is assumed to be registered to colour.
 fn cameras(
     folder: &Folder,
     color: &str,
     depth: &str,
     options: &ImportOptions,
-    said: &mut Vec<String>,
+    remarks: &mut Vec<String>,
 ) -> Result<[Lens; 2]> {
     let size = photograph_size(folder, color)?;
     let lens = match (options.intrinsics, folder.first(&INTRINSICS)) {
         (Some(given), _) => opencv_lens(size, given),
         (None, Some(name)) => {
             let k = rows(&folder.path(name), &folder.text(name)?)?;
-            said.push(format!("intrinsics: {name}"));
+            remarks.push(format!("intrinsics: {name}"));
             let lens = opencv_lens(size, [k[0][0], k[1][1], k[0][2], k[1][2]]);
             possible(lens, &folder.path(name))?
         }
         (None, None) => {
             let focal = 585.0 * f64::from(size[0]) / 640.0;
-            said.push(format!(
-                "intrinsics: a focal length of {focal} pixels and the middle of the image, as 7-Scenes states; --intrinsics overrules"
+            remarks.push(format!(
+                "intrinsics: a focal length of {focal} pixels and the middle of the image, as 7-Scenes states; --intrinsics overrides"
             ));
             Lens::plain(
                 size,
@@ -132,6 +133,6 @@ fn cameras(
             )
         }
     };
-    said.push("depth is taken to be seen by the colour camera".into());
+    remarks.push("depth is taken to be seen by the colour camera".into());
     Ok([lens, lens.resized(depth_size(folder, depth)?)])
 }

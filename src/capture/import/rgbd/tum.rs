@@ -1,37 +1,38 @@
-//! TUM RGB-D (Sturm et al. 2012) and ICL-NUIM (Handa et al. 2014) in TUM's layout.
+//! Reads TUM RGB-D (Sturm et al. 2012) and ICL-NUIM (Handa et al. 2014), which has TUM's layout.
 //!
 //! `rgb.txt` and `depth.txt` list `timestamp file`, the trajectory `timestamp tx ty tz qx qy qz qw` (camera to world,
-//! OpenCV's axes); depth is in 1/5000 m. Photographs, depth and poses belong together by their timestamps.
+//! OpenCV's axes); depth is in 1/5000 m. Photographs, depth and poses are matched by timestamp.
 //!
 //! ICL-NUIM lists both images in `associations.txt`, its timestamps count frames, and its camera has fy = −480: its axes are
 //! x right, y *up*, z forwards, left-handed like its world. Mirroring the camera in y and the world in z gives a
 //! right-handed scene that keeps y up.
 
 use crate::capture::camera::Pose;
-use crate::capture::import::depth::DepthImage;
 use crate::capture::import::folder::Folder;
-use crate::capture::import::lens::{Lens, Model};
 use crate::capture::import::matrix::{from_opencv, no_quaternion, number, rotation};
-use crate::capture::import::rgbd::{depth_size, lost, opencv_lens, photograph_size};
-use crate::capture::import::{ImportOptions, ImportedFrame, Scan};
+use crate::capture::import::reader::{ImportOptions, Scan};
+use crate::capture::import::rgbd::{depth_size, opencv_lens, photograph_size, remark_on_lost};
+use crate::capture::scan::ImportedFrame;
+use crate::capture::scan::depth::DepthImage;
+use crate::capture::scan::lens::{Lens, Model};
 use crate::error::{Error, Result};
 use glam::{DMat3, DVec3};
 
-/// Seconds between the stamps of things that belong together, at most.
+/// Maximum difference between matched timestamps in seconds.
 const MAX_DIFFERENCE: f64 = 0.02;
-/// Metres of one unit of depth.
+/// Metres per unit of depth.
 const UNIT: f64 = 1.0 / 5000.0;
-/// The trajectory's names in TUM's layout.
+/// Names of the trajectory in TUM's layout.
 const TRAJECTORIES: [&str; 4] = [
     "groundtruth.txt",
     "trajectory.txt",
     "CameraTrajectory.txt",
     "poses.txt",
 ];
-/// Lists of both images in one.
+/// Names of lists of both images.
 const ASSOCIATIONS: [&str; 2] = ["associations.txt", "associated.txt"];
 
-/// A line of a list: its stamp, and the words behind.
+/// A line of a list: timestamp and the words after it.
 #[derive(Debug, Clone)]
 struct Entry {
     stamp: f64,
@@ -82,17 +83,17 @@ pub fn read(folder: &Folder, options: &ImportOptions, left_handed: bool) -> Resu
         }
     };
     let poses = entries(folder, &trajectory_name, 7)?;
-    // ICL-NUIM counts frames where TUM has seconds.
-    let reach = if left_handed { 0.5 } else { MAX_DIFFERENCE };
+    // ICL-NUIM's timestamps are frame numbers.
+    let tolerance = if left_handed { 0.5 } else { MAX_DIFFERENCE };
 
     let mut lenses: Option<[Lens; 2]> = None;
     let (mut without_depth, mut without_pose, mut left_out) = (0, 0, 0);
     for color in &colors {
-        let Some(depth) = nearest(&depths, color.stamp, reach) else {
+        let Some(depth) = nearest(&depths, color.stamp, tolerance) else {
             without_depth += 1;
             continue;
         };
-        let Some(line) = nearest(&poses, color.stamp, reach) else {
+        let Some(line) = nearest(&poses, color.stamp, tolerance) else {
             without_pose += 1;
             continue;
         };
@@ -109,33 +110,29 @@ pub fn read(folder: &Folder, options: &ImportOptions, left_handed: bool) -> Resu
                 [color, depth],
                 options,
                 left_handed,
-                &mut scan.said,
+                &mut scan.remarks,
             )?),
         };
-        scan.frames.push(ImportedFrame {
-            photograph: folder.file(&folder.path(color).display().to_string(), color)?,
-            lens,
-            pose,
-            exposure: None,
-            mask: None,
-            depth: Some(DepthImage {
-                path: folder.file(&folder.path(depth).display().to_string(), depth)?,
-                lens: depth_lens,
-                metres_per_unit: UNIT,
-                invalid: None,
-            }),
-        });
+        let photograph = folder.existing(color)?;
+        let depth = DepthImage {
+            path: folder.existing(depth)?,
+            lens: depth_lens,
+            metres_per_unit: UNIT,
+            invalid: None,
+        };
+        scan.frames
+            .push(ImportedFrame::new(photograph, lens, pose, Some(depth)));
     }
     for (count, lacking) in [(without_depth, "depth image"), (without_pose, "pose")] {
         if count > 0 {
-            scan.said.push(format!(
-                "{count} photographs left out: no {lacking} within {reach} of their timestamp"
+            scan.remarks.push(format!(
+                "{count} photographs left out: no {lacking} within {tolerance} of their timestamp"
             ));
         }
     }
-    lost(left_out, &mut scan.said);
+    remark_on_lost(left_out, &mut scan.remarks);
     if left_handed {
-        scan.said.push(
+        scan.remarks.push(
             "the left-handed cameras (negative fy) and their world are mirrored: z changes its sign"
                 .into(),
         );
@@ -143,7 +140,7 @@ pub fn read(folder: &Folder, options: &ImportOptions, left_handed: bool) -> Resu
     Ok(scan)
 }
 
-/// The lists of photographs and depth images, ordered by stamp.
+/// The lists of photographs and depth images, ordered by timestamp.
 fn images(folder: &Folder, numbered: bool) -> Result<(Vec<Entry>, Vec<Entry>)> {
     if folder.has("rgb.txt") && folder.has("depth.txt") {
         return Ok((
@@ -152,7 +149,7 @@ fn images(folder: &Folder, numbered: bool) -> Result<(Vec<Entry>, Vec<Entry>)> {
         ));
     }
     if let Some(name) = folder.first(&ASSOCIATIONS) {
-        // stamp file stamp file; which of the two is depth is told by its folder.
+        // Lines of: stamp file stamp file. The depth image is the one in a folder "depth".
         let mut lists = (Vec::new(), Vec::new());
         for entry in entries(folder, name, 3)? {
             let second = Entry {
@@ -188,8 +185,8 @@ fn images(folder: &Folder, numbered: bool) -> Result<(Vec<Entry>, Vec<Entry>)> {
     ))
 }
 
-/// The lines of a list with at least `least` words behind the stamp, ordered by stamp; `#` begins a comment.
-fn entries(folder: &Folder, name: &str, least: usize) -> Result<Vec<Entry>> {
+/// The lines of a list with at least `min_words` words after the timestamp, ordered by timestamp; `#` begins a comment.
+fn entries(folder: &Folder, name: &str, min_words: usize) -> Result<Vec<Entry>> {
     let text = folder.text(name)?;
     let path = folder.path(name);
     let mut entries = Vec::new();
@@ -201,10 +198,10 @@ fn entries(folder: &Folder, name: &str, least: usize) -> Result<Vec<Entry>> {
         let Some(first) = words.next() else { continue };
         let words: Vec<String> = words.map(str::to_owned).collect();
         let stamp = number(first).filter(|stamp| stamp.is_finite());
-        let (Some(stamp), true) = (stamp, words.len() >= least) else {
+        let (Some(stamp), true) = (stamp, words.len() >= min_words) else {
             return Err(Error::new(
                 format!("{} line {}", path.display(), index + 1),
-                format!("is no timestamp with {least} words behind it"),
+                format!("is not a timestamp with {min_words} words after it"),
                 "correct the line",
             ));
         };
@@ -214,26 +211,26 @@ fn entries(folder: &Folder, name: &str, least: usize) -> Result<Vec<Entry>> {
     Ok(entries)
 }
 
-/// The entry whose stamp is nearest, within `reach`.
-fn nearest(entries: &[Entry], stamp: f64, reach: f64) -> Option<&Entry> {
+/// The entry with the nearest timestamp, within `tolerance`.
+fn nearest(entries: &[Entry], stamp: f64, tolerance: f64) -> Option<&Entry> {
     let after = entries.partition_point(|entry| entry.stamp < stamp);
     let before = after.checked_sub(1).and_then(|i| entries.get(i));
     let difference = |entry: &&Entry| (entry.stamp - stamp).abs();
     [before, entries.get(after)]
         .into_iter()
         .flatten()
-        .filter(|entry| difference(entry) <= reach)
+        .filter(|entry| difference(entry) <= tolerance)
         .min_by(|a, b| difference(a).total_cmp(&difference(b)))
 }
 
-/// The pose of a line of a trajectory; `None` if a number is not finite.
+/// The pose of a trajectory's line; `None` if a number is not finite.
 fn pose(place: &str, line: &Entry, left_handed: bool) -> Result<Option<Pose>> {
     let numbers: Option<Vec<f64>> = line.words[..7].iter().map(|word| number(word)).collect();
     let Some(&[x, y, z, qx, qy, qz, qw]) = numbers.as_deref() else {
         return Err(Error::new(
             place,
             format!(
-                "the line of timestamp {} holds a word that is no number",
+                "the line of timestamp {} holds a word that is not a number",
                 line.stamp
             ),
             "correct the line",
@@ -243,25 +240,25 @@ fn pose(place: &str, line: &Entry, left_handed: bool) -> Result<Option<Pose>> {
     if !center.is_finite() || ![qx, qy, qz, qw].iter().all(|q| q.is_finite()) {
         return Ok(None);
     }
-    let Some(turn) = rotation(qx, qy, qz, qw) else {
-        return no_quaternion(&format!("{place} timestamp {}", line.stamp));
+    let Some(to_world) = rotation(qx, qy, qz, qw) else {
+        return Err(no_quaternion(&format!("{place} timestamp {}", line.stamp)));
     };
     Ok(Some(if left_handed {
         let world = DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0));
         let camera = DMat3::from_diagonal(DVec3::new(1.0, -1.0, 1.0));
-        from_opencv(world * turn * camera, world * center)
+        from_opencv(world * to_world * camera, world * center)
     } else {
-        from_opencv(turn, center)
+        from_opencv(to_world, center)
     }))
 }
 
-/// The colour camera and the depth camera, whose images TUM registered to each other pixel by pixel.
+/// The colour and the depth camera; TUM's images are registered to each other pixel by pixel.
 fn cameras(
     folder: &Folder,
     [color, depth]: [&str; 2],
     options: &ImportOptions,
     left_handed: bool,
-    said: &mut Vec<String>,
+    remarks: &mut Vec<String>,
 ) -> Result<[Lens; 2]> {
     let size = photograph_size(folder, color)?;
     let depth_size = depth_size(folder, depth)?;
@@ -281,7 +278,7 @@ fn cameras(
         p: [p1, p2],
     };
     let none = Model::Brown([0.0; 4]);
-    let (whose, numbers, model) = if left_handed {
+    let (source, numbers, model) = if left_handed {
         ("ICL-NUIM", [481.2, 480.0, 319.5, 239.5], none)
     } else if name.contains("freiburg1") {
         let model = rational(0.2624, -0.9531, -0.0054, 0.0026, 1.1633);
@@ -294,8 +291,8 @@ fn cameras(
     } else {
         ("the ROS default", [525.0, 525.0, 319.5, 239.5], none)
     };
-    said.push(format!(
-        "intrinsics: those of {whose} by the folder's layout and name; --intrinsics overrules"
+    remarks.push(format!(
+        "intrinsics: those of {source} by the folder's layout and name; --intrinsics overrides"
     ));
     let lens = opencv_lens([640, 480], numbers).with(model);
     Ok([lens.resized(size), lens.resized(depth_size)])
