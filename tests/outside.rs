@@ -106,7 +106,7 @@ fn a_room_lit_through_its_window_keeps_its_walls_dark() {
     let [width, height] = [outside.width, outside.height].map(|side| side as usize);
     let found = Environment::new(width, height, outside.pixels.clone());
     let upwards = Vec3::new(0.1, 0.3, 1.0).normalize();
-    let ratio = found.expect("a map").of_map(upwards) / sky().of_map(upwards);
+    let ratio = found.expect("a map").map_radiance(upwards) / sky().map_radiance(upwards);
     println!("the sky is found at {ratio} of its radiance");
     assert!((ratio - 1.0).abs().max_element() < 0.1, "{ratio}");
     // 0.0076 and 0.065 are seen.

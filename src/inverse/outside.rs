@@ -55,9 +55,9 @@ impl MeasuredOutside {
             let at = Vec2::from(place.map(|x| x as f32 + 0.5));
             let ray = scene.cameras[pixel.frame as usize].ray(at);
             let direction = ray.direction.normalize_or_zero();
-            let looked_up = surroundings.looked_up(ray.origin, direction);
+            let map_direction = surroundings.map_direction(ray.origin, direction);
             let bound = usize::from(photograph.is_saturated(pixel.pixel as usize));
-            let sum = &mut sums[pixel_of(width, height, looked_up)][bound];
+            let sum = &mut sums[pixel_of(width, height, map_direction)][bound];
             sum.0 += photograph.pixels[pixel.pixel as usize].as_dvec3();
             sum.1 += 1;
         }
@@ -117,8 +117,8 @@ impl MeasuredOutside {
     }
 
     fn cell(&self, origin: Vec3, direction: Vec3) -> usize {
-        let looked_up = self.map.surroundings().looked_up(origin, direction);
-        pixel_of(self.width, self.height, looked_up)
+        let map_direction = self.map.surroundings().map_direction(origin, direction);
+        pixel_of(self.width, self.height, map_direction)
     }
 
     /// The map, for drawing directions from.
@@ -135,7 +135,7 @@ impl MeasuredOutside {
         for cell in (0..self.known.len()).filter(|&cell| self.known[cell]) {
             let seen = direction_of(self.width, self.height, cell);
             let solid_angle = f64::from(1.0 - seen.y * seen.y).max(0.0).sqrt();
-            let radiance = self.map.of_map(seen).as_dvec3() * solid_angle;
+            let radiance = self.map.map_radiance(seen).as_dvec3() * solid_angle;
             all = (all.0 + radiance, all.1 + solid_angle);
             if (height_of(seen) - height).abs() < 0.5 * band {
                 near = (near.0 + radiance, near.1 + solid_angle);
@@ -151,7 +151,7 @@ impl MeasuredOutside {
         let sum: DVec3 = cells()
             .map(|cell| {
                 let direction = direction_of(self.width, self.height, cell);
-                self.map.of_map(direction).as_dvec3()
+                self.map.map_radiance(direction).as_dvec3()
             })
             .sum();
         (sum / cells().count().max(1) as f64).as_vec3()
@@ -168,8 +168,8 @@ impl MeasuredOutside {
             .map(|cell| {
                 let direction = direction_of(self.width, self.height, cell);
                 match (self.known[cell], self.censored[cell]) {
-                    (true, true) => self.map.of_map(direction) + excess,
-                    (true, false) => self.map.of_map(direction),
+                    (true, true) => self.map.map_radiance(direction) + excess,
+                    (true, false) => self.map.map_radiance(direction),
                     (false, _) => elsewhere(direction),
                 }
             })

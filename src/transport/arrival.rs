@@ -1,27 +1,27 @@
-//! Light arriving at a surface point, kept by direction, so that any scattering can be integrated over it with no ray.
+//! Samples of incident light at a surface point, stored by direction, so that any BSDF can be integrated over them without rays.
 
 use crate::math::frame::Frame;
 use crate::math::rng::Stream;
 use crate::math::warp;
 use crate::scene::geometry::{Ray, offset_origin};
 use crate::transport::microfacet::{Microfacet, reflect_on_visible_normal};
-use crate::transport::path::{Leg, PathOptions, draw_light, follow, power_heuristic};
+use crate::transport::path::{PathOptions, PathState, draw_light, follow, power_heuristic};
 use crate::transport::world::{SurfacePoint, World};
 use glam::Vec3;
 use std::iter::Sum;
 use std::ops::AddAssign;
 
-/// Light from one drawn direction.
+/// Incident light from one sampled direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Arrival {
     /// Unit direction in the local frame, above the horizon.
     pub wi: Vec3,
-    /// Radiance over the density with which directions like this were drawn: Σ f(wi) cosθ · `light` over the arrivals of one
-    /// call is an unbiased estimate of what f scatters.
+    /// MIS-weighted radiance over pdf (per solid angle): Σ f(wi) cosθ · `light` over the arrivals of one call is an unbiased
+    /// estimate of the radiance scattered by f.
     pub light: Vec3,
 }
 
-/// What tracing took.
+/// Counts of traced rays.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Cast {
     /// Rays cast.
@@ -46,9 +46,9 @@ impl Sum for Cast {
     }
 }
 
-/// Appends light that arrives at a surface: from one direction drawn with density cosθ/π, one reflected on a normal of
-/// each of the given GGX roughnesses as seen from the local direction `wo`, and one towards an emitter. The directions
-/// share their densities (balance heuristic), and what they meet is shared with the light sample (power heuristic).
+/// Appends samples of incident light at a surface: one direction with pdf cosθ/π, one reflected on a visible normal of each given
+/// GGX roughness for the local direction `wo`, and one light sample. The directional techniques are combined by the balance
+/// heuristic, and together with the light sample by the power heuristic.
 #[expect(clippy::too_many_arguments, reason = "the state of one path vertex")]
 pub fn arrivals(
     world: &impl World,
@@ -65,7 +65,7 @@ pub fn arrivals(
         warp::cosine_hemisphere_pdf(wi.z) + lobes.sum::<f64>() as f32
     };
     let mut cast = Cast::default();
-    let mut keep = |wi: Vec3, light: Vec3| {
+    let mut push = |wi: Vec3, light: Vec3| {
         if !light.is_finite() {
             return 1;
         }
@@ -75,19 +75,19 @@ pub fn arrivals(
         0
     };
 
-    // Towards an emitter.
+    // Light sample.
     if let (_, Some(light)) = draw_light(world, surface, stream) {
         let wi = frame.to_local(light.wi);
         if wi.z > 0.0 {
             cast.rays += 1;
             if !world.occluded(&light.ray) {
                 let weight = power_heuristic(light.pdf, density(wi));
-                cast.rejected += keep(wi, light.radiance * (weight / light.pdf));
+                cast.rejected += push(wi, light.radiance * (weight / light.pdf));
             }
         }
     }
 
-    // In directions drawn by what scatters.
+    // Directional techniques.
     let normal = frame.n;
     for technique in 0..=roughnesses.len() {
         let u = stream.uniform2();
@@ -101,15 +101,15 @@ pub fn arrivals(
         }
         let direction = frame.to_world(wi);
         let origin = offset_origin(surface.point, normal, &surface.corners, direction);
-        let leg = Leg {
+        let state = PathState {
             ray: Ray::new(origin, direction),
             throughput: Vec3::ONE,
             bsdf_pdf: Some(pdf),
             bounce: 1,
         };
-        let sample = follow(world, leg, stream, options, &mut |_, _| {});
+        let sample = follow(world, state, stream, options, &mut |_, _| {});
         cast.rays += u64::from(sample.rays);
-        cast.rejected += u64::from(sample.rejected) + keep(wi, sample.radiance / pdf);
+        cast.rejected += u64::from(sample.rejected) + push(wi, sample.radiance / pdf);
     }
     cast
 }
@@ -200,7 +200,7 @@ mod tests {
                 );
                 let drawn = bsdf.sample(wo, stream.uniform(), stream.uniform2());
                 wanted.push(drawn.map_or(0.0, |s| {
-                    f64::from((s.weight * sky.0.of_map(frame.to_world(s.wi))).x)
+                    f64::from((s.weight * sky.0.map_radiance(frame.to_world(s.wi))).x)
                 }));
             }
             let error = found.standard_error().hypot(wanted.standard_error());

@@ -1,4 +1,4 @@
-//! Scattering at a surface point: a diffuse base, and over it a rough specular lobe where there is one.
+//! The BSDF: a diffuse base under an optional rough specular lobe.
 //!
 //! Directions are unit vectors pointing away from the surface, in the local frame whose z axis is the normal on the
 //! side of `wo`.
@@ -9,7 +9,7 @@ use crate::transport::microfacet::{Microfacet, reflect_on_visible_normal};
 use glam::{DVec3, Vec3};
 use std::f64::consts::FRAC_1_PI;
 
-/// Roughness below this is taken as this: a mirror is a very narrow lobe.
+/// Lower limit of roughness: mirrors are rendered as very narrow lobes.
 pub const MIN_ROUGHNESS: f32 = 1e-4;
 
 /// The material of one surface point.
@@ -17,7 +17,7 @@ pub const MIN_ROUGHNESS: f32 = 1e-4;
 pub struct Bsdf {
     /// Diffuse reflectance, in [0, 1] per channel.
     pub albedo: Vec3,
-    /// Rough specular lobe, where there is one.
+    /// Rough specular lobe, if any.
     pub lobe: Option<Lobe>,
 }
 
@@ -28,7 +28,7 @@ pub struct BsdfSample {
     pub wi: Vec3,
     /// f(wo, wi) cosθi / pdf.
     pub weight: Vec3,
-    /// Density of `wi` per solid angle, positive.
+    /// Pdf of `wi` per solid angle, positive.
     pub pdf: f32,
 }
 
@@ -57,7 +57,7 @@ impl Bsdf {
         (base + lobe.reflected(wo, wi)).as_vec3()
     }
 
-    /// Density per solid angle with which [`Bsdf::sample`] draws `wi`; zero at or below the horizon.
+    /// Pdf per solid angle of [`Bsdf::sample`]; zero at or below the horizon.
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         if wo.z <= 0.0 || wi.z <= 0.0 {
@@ -69,9 +69,9 @@ impl Bsdf {
         (p * lobe.pdf(wo, wi) + (1.0 - p) * f64::from(base)) as f32
     }
 
-    /// Draws a direction: `choice` decides between lobe and base, `u` the direction.
+    /// Samples a direction: `choice` selects lobe or base, `u` the direction.
     ///
-    /// `None` where `wo` is at or below the horizon, or where the lobe reflects below it: the sample carries nothing.
+    /// `None` if `wo` is at or below the horizon, or if the lobe reflects below it: the sample contributes zero.
     #[inline]
     pub fn sample(&self, wo: Vec3, choice: f32, u: [f32; 2]) -> Option<BsdfSample> {
         if wo.z <= 0.0 {
@@ -92,9 +92,9 @@ impl Bsdf {
         Some(BsdfSample { wi, weight, pdf })
     }
 
-    /// Derivatives of [`Bsdf::eval`] with respect to the parameters, directions held.
+    /// Derivatives of [`Bsdf::eval`] with respect to the parameters, for fixed directions.
     ///
-    /// Without a lobe those of roughness and specular reflectance are zero: adding a lobe is another model.
+    /// Without a lobe, those of roughness and specular reflectance are zero.
     pub fn derivative(&self, wo: Vec3, wi: Vec3) -> BsdfDerivative {
         let mut derivative = BsdfDerivative {
             albedo: Vec3::ZERO,
@@ -122,7 +122,7 @@ impl Bsdf {
     }
 }
 
-/// The two parts of scattering under a lobe, for directions above the horizon.
+/// The lobe and the base under it, for directions above the horizon.
 impl Lobe {
     /// f(wo, wi) cosθi of the lobe itself.
     #[inline]
@@ -131,25 +131,25 @@ impl Lobe {
         microfacet.fresnel(self.specular.as_dvec3()) * microfacet.eval()
     }
 
-    /// f(wo, wi) cosθi of the diffuse base below it, for unit albedo.
+    /// f(wo, wi) cosθi of the diffuse base under the lobe, for unit albedo.
     #[inline]
     pub fn base(&self, wo: Vec3, wi: Vec3) -> DVec3 {
         (DVec3::ONE - self.specular.as_dvec3()) * coupling(wo, wi)
     }
 
-    /// Density per solid angle with which [`Lobe::sample`] draws `wi`.
+    /// Pdf per solid angle of [`Lobe::sample`].
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f64 {
         Microfacet::new(alpha(self), wo, wi).pdf()
     }
 
-    /// Draws a direction that the lobe reflects to; it may point below the horizon, where it carries nothing.
+    /// Samples a direction of the lobe; it may point below the horizon, where it contributes zero.
     #[inline]
     pub fn sample(&self, wo: Vec3, u: [f32; 2]) -> Vec3 {
         reflect_on_visible_normal(alpha(self), wo, u)
     }
 
-    /// At least the fraction of light that it reflects to `wo`, mean over the channels.
+    /// Probability of sampling the lobe: an upper bound of the fraction of light that it reflects to `wo`, averaged over channels.
     #[inline]
     pub fn fraction(&self, wo: Vec3) -> f64 {
         let specular = f64::from(self.specular.element_sum() / 3.0);
@@ -157,32 +157,32 @@ impl Lobe {
     }
 }
 
-/// Slope of [`reflected`]; 1 would be Schlick's curve itself.
+/// Slope of the fit (1 − slope · cosθ)⁵ to a rough lobe's reflectance; 1 is Schlick's curve.
 pub const COUPLING_SLOPE: f64 = 0.85;
 
-/// Upper bound, over all roughnesses, of the fraction of light that a lobe with no reflectance at normal incidence
-/// reflects: Schlick's (1 − cosθ)⁵, flattened because rough lobes reflect more than that near the normal.
+/// Upper bound over all roughnesses of the directional reflectance of a lobe with F0 = 0: Schlick's (1 − cosθ)⁵, flattened
+/// because rough lobes reflect more near the normal.
 #[inline]
 fn reflected(cos_theta: f64) -> f64 {
     (1.0 - COUPLING_SLOPE * cos_theta).powi(5)
 }
 
-/// The base's f cosθi for unit albedo, before the factor (1 − specular reflectance at normal incidence).
+/// f cosθi of the base for unit albedo, without the factor (1 − F0).
 ///
-/// As Ashikhmin and Shirley 2000: what the lobe may reflect at either end is taken from the base, symmetrically, and
-/// the rest is normalised, so that the base returns albedo × (1 − specular) × (1 − reflected(θo)) in all.
+/// As in Ashikhmin and Shirley 2000: the base is reduced symmetrically by the lobe's reflectance at both directions and normalised,
+/// so that its directional albedo is albedo × (1 − F0) × (1 − reflected(θo)).
 #[inline]
 pub fn coupling(wo: Vec3, wi: Vec3) -> f64 {
     let (cos_o, cos_i) = (f64::from(wo.z), f64::from(wi.z));
     FRAC_1_PI * cos_i * (1.0 - reflected(cos_o)) * (1.0 - reflected(cos_i)) / unreflected_mean()
 }
 
-/// Cosine-weighted mean over the hemisphere of what is not [`reflected`].
+/// Cosine-weighted mean of 1 − [`reflected`] over the hemisphere.
 #[inline]
 fn unreflected_mean() -> f64 {
     const A: f64 = COUPLING_SLOPE;
-    let rest = 1.0 - A;
-    1.0 - (1.0 - rest.powi(6) * (1.0 + 6.0 * A)) / (21.0 * A * A)
+    const B: f64 = 1.0 - A;
+    1.0 - (1.0 - B.powi(6) * (1.0 + 6.0 * A)) / (21.0 * A * A)
 }
 
 /// The constant factor of [`coupling`].
@@ -190,8 +190,7 @@ pub fn coupling_scale() -> f64 {
     FRAC_1_PI / unreflected_mean()
 }
 
-/// What the base below any lobe sends at an angle of this cosine to the normal, over what it sends along the normal: the same
-/// whatever light arrives.
+/// Radiance of the base at viewing angle cosθ relative to that along the normal; independent of the incident light.
 #[inline]
 pub fn base_by_view(cos_theta: f32) -> f32 {
     ((1.0 - reflected(f64::from(cos_theta))) / (1.0 - reflected(1.0))) as f32

@@ -1,62 +1,43 @@
-//! A denoiser for pictures, guided by what each pixel sees. For people to look at, never for a fit.
+//! A denoiser guided by feature buffers, for pictures that people look at, never for fits.
 //!
-//! Light is taken apart from the surfaces' own colours, and smoothed by an à-trous wavelet transform (Dammertz et al.
-//! 2010) whose weights fall off across normals, depths, objects, and differences in brightness that the noise does not
-//! explain (Schied et al. 2017). The noise is told by two independent pictures of the same view.
+//! Radiance is demodulated by albedo and smoothed by an edge-avoiding à-trous wavelet filter (Dammertz et al. 2010), whose weights
+//! fall off across normals, planes, objects, and luminance differences beyond the noise (Schied et al. 2017). The noise is
+//! estimated from two independent pictures of the same view.
 
 use crate::math::color::luminance;
 use crate::math::picture::Picture;
 use crate::say;
-use crate::scene::camera::Camera;
-use crate::scene::geometry::Ray;
+pub use crate::transport::guide::{Guide, guides, guides_where};
 use crate::transport::oidn;
-use crate::transport::world::World;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
-/// Passes, each reaching twice as far: 5 × 5 taps out to 32 pixels.
+/// Filter passes of 5 × 5 taps; the spacing doubles each pass, up to a radius of 32 pixels.
 const PASSES: u32 = 5;
-/// The cubic B-spline's weights.
+/// Cubic B-spline weights.
 const SPLINE: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
-/// Differences of brightness within so many standard deviations of the noise are smoothed.
-const BRIGHTNESS: f32 = 3.0;
-/// How fast weights fall with the angle between normals: the cosine to this power.
-const NORMAL: i32 = 64;
-/// Distance from a pixel's plane, as a fraction of its depth, at which weights have fallen to 1/e.
-const PLANE: f32 = 0.01;
-/// Pixels to each side over which the noise is averaged before anything is smoothed.
-const NOISE_REACH: isize = 3;
-/// Albedos are taken for at least this large where light is taken apart from them.
-const DARKEST: f32 = 0.02;
+/// Luminance differences are measured in units of this many standard deviations of the noise.
+const LUMINANCE_SIGMAS: f32 = 3.0;
+/// Power of the cosine between normals in the weights.
+const NORMAL_POWER: i32 = 64;
+/// Distance from a pixel's tangent plane, as a fraction of depth, at which weights fall to 1/e.
+const PLANE_DISTANCE: f32 = 0.01;
+/// Radius in pixels over which the noise variance is averaged first.
+const NOISE_RADIUS: isize = 3;
+/// Lower limit of the albedo in the demodulation.
+const MIN_ALBEDO: f32 = 0.02;
 
-/// What a pixel's centre sees.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Guide {
-    /// Point, scene coordinates.
-    pub point: Vec3,
-    /// Unit normal.
-    pub normal: Vec3,
-    /// Distance from the camera, metres.
-    pub depth: f32,
-    /// Diffuse reflectance.
-    pub albedo: Vec3,
-    /// Emitted radiance towards the camera.
-    pub emission: Vec3,
-    /// Which object.
-    pub object: u32,
-}
-
-/// What takes the noise out of pictures.
+/// The denoiser of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Denoiser {
-    /// This file's filter.
+    /// The built-in filter, [`denoise`].
     Builtin,
-    /// Open Image Denoise; the built-in filter where it fails.
+    /// Open Image Denoise, or the built-in filter if it fails.
     Oidn,
 }
 
 impl Denoiser {
-    /// Open Image Denoise where it is installed, else the built-in filter.
+    /// Open Image Denoise if it is installed, else the built-in filter.
     pub fn best() -> Self {
         match oidn::found() {
             Some(_) => Self::Oidn,
@@ -64,7 +45,7 @@ impl Denoiser {
         }
     }
 
-    /// Its name in reports.
+    /// The name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Builtin => "builtin",
@@ -72,7 +53,7 @@ impl Denoiser {
         }
     }
 
-    /// The mean of two independent pictures of one view without its noise; `guides` has one entry a pixel.
+    /// Denoises the mean of two independent pictures of one view; `guides` has one entry per pixel.
     pub fn denoise(self, a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
         let oidn = match self {
             Self::Builtin => None,
@@ -93,79 +74,8 @@ impl Denoiser {
     }
 }
 
-/// Offsets in a pixel that are tried for what it sees: its centre, then a ring.
-const OFFSETS: [[f32; 2]; 9] = [
-    [0.5, 0.5],
-    [0.25, 0.25],
-    [0.75, 0.75],
-    [0.75, 0.25],
-    [0.25, 0.75],
-    [0.5, 0.1],
-    [0.5, 0.9],
-    [0.1, 0.5],
-    [0.9, 0.5],
-];
-
-/// What the pixels of a camera see at their centres. Albedo is the mean over a pixel's part of the object there.
-pub fn guides(world: &impl World, camera: &Camera) -> Vec<Option<Guide>> {
-    let center = OFFSETS[0];
-    guides_of(world, camera, |_, ray_at| Some(ray_at(center)))
-}
-
-/// The same, at the first of a few points of each pixel whose ray is wanted.
-pub fn guides_where(
-    world: &impl World,
-    camera: &Camera,
-    wanted: impl Fn(usize, &Ray) -> bool + Sync,
-) -> Vec<Option<Guide>> {
-    guides_of(world, camera, |pixel, ray_at| {
-        let mut rays = OFFSETS.into_iter().map(ray_at);
-        rays.find(|ray| wanted(pixel, ray))
-    })
-}
-
-/// What the pixels of a camera see along a ray through each.
-fn guides_of(
-    world: &impl World,
-    camera: &Camera,
-    choose: impl Fn(usize, &dyn Fn([f32; 2]) -> Ray) -> Option<Ray> + Sync,
-) -> Vec<Option<Guide>> {
-    let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
-    let guide = |pixel: u32| {
-        let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
-        let ray_at = |offset: [f32; 2]| camera.ray(corner + Vec2::from(offset));
-        let ray = choose(pixel as usize, &ray_at)?;
-        let seen = world.intersect(&ray)?;
-        let towards = -ray.direction.normalize_or_zero();
-        let front = seen.normal.dot(towards) > 0.0;
-        let around = [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]];
-        let (mut albedo, mut taps) = (seen.albedo, 1.0);
-        for offset in around.map(Vec2::from_array) {
-            let beside = world.intersect(&camera.ray(corner + offset));
-            if let Some(beside) = beside.filter(|b| b.object == seen.object) {
-                albedo += beside.albedo;
-                taps += 1.0;
-            }
-        }
-        let normal = if front {
-            seen.shading_normal
-        } else {
-            -seen.shading_normal
-        };
-        Some(Guide {
-            point: seen.point,
-            normal,
-            depth: seen.point.distance(camera.center),
-            albedo: albedo / taps,
-            emission: if front { seen.emission } else { Vec3::ZERO },
-            object: seen.object,
-        })
-    };
-    (0..width * height).into_par_iter().map(guide).collect()
-}
-
-/// Smooths the mean of two independent pictures of one view; `guides` has one entry a pixel, `None` where nothing is seen.
-/// Lamps, pixels whose guides are `None`, and what is not finite stay as they are.
+/// Denoises the mean of two independent pictures of one view; `guides` has one entry per pixel, `None` for the background.
+/// Emitters, background and non-finite pixels are not changed.
 pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
     let width = a.width as usize;
     let halves = a.pixels.iter().zip(&b.pixels);
@@ -174,13 +84,13 @@ pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
         return Picture { pixels: mean, ..*a };
     }
 
-    // Light by itself, and the variance of its brightness, averaged over like pixels.
+    // Demodulate, and estimate the variance of luminance from the two pictures, averaged over similar pixels.
     let light = |pixel: usize, value: Vec3| match &guides[pixel] {
-        Some(guide) => (value - guide.emission) / guide.albedo.max(Vec3::splat(DARKEST)),
+        Some(guide) => (value - guide.emission) / guide.albedo.max(Vec3::splat(MIN_ALBEDO)),
         None => value,
     };
     let mut smooth: Vec<Vec3> = (0..mean.len()).map(|i| light(i, mean[i])).collect();
-    let apart: Vec<f32> = (0..mean.len())
+    let variance: Vec<f32> = (0..mean.len())
         .map(|i| {
             let half = luminance(light(i, a.pixels[i]) - light(i, b.pixels[i])) * 0.5;
             let square = half * half;
@@ -194,10 +104,10 @@ pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
     let mut noise: Vec<f32> = (0..mean.len())
         .into_par_iter()
         .map(|pixel| {
-            let alike = around.square(pixel, NOISE_REACH, 1);
-            let (sum, weights) = alike.fold((0.0, 0.0), |(sum, weights), (q, _)| {
-                let weight = alike_weight(guides[pixel].as_ref(), guides[q].as_ref());
-                (sum + weight * apart[q], weights + weight)
+            let taps = around.square(pixel, NOISE_RADIUS, 1);
+            let (sum, weights) = taps.fold((0.0, 0.0), |(sum, weights), (q, _)| {
+                let weight = similarity(guides[pixel].as_ref(), guides[q].as_ref());
+                (sum + weight * variance[q], weights + weight)
             });
             if weights > 0.0 { sum / weights } else { 0.0 }
         })
@@ -214,21 +124,21 @@ pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
                 else {
                     return here;
                 };
-                let allowed = BRIGHTNESS * here.1.sqrt() + f32::MIN_POSITIVE;
-                let (mut sum, mut spread, mut weights) = (Vec3::ZERO, 0.0, 0.0);
+                let allowed = LUMINANCE_SIGMAS * here.1.sqrt() + f32::MIN_POSITIVE;
+                let (mut sum, mut sum_variance, mut weights) = (Vec3::ZERO, 0.0, 0.0);
                 for (q, [dx, dy]) in around.square(pixel, 2, step) {
                     let spline = SPLINE[dx.unsigned_abs()] * SPLINE[dy.unsigned_abs()];
-                    let like = alike_weight(Some(guide), guides[q].as_ref());
+                    let like = similarity(Some(guide), guides[q].as_ref());
                     if like == 0.0 || !smooth[q].is_finite() {
                         continue;
                     }
                     let off = luminance(smooth[q] - here.0).abs() / allowed;
                     let weight = spline * like * (-off).exp();
                     sum += smooth[q] * weight;
-                    spread += noise[q] * weight * weight;
+                    sum_variance += noise[q] * weight * weight;
                     weights += weight;
                 }
-                (sum / weights, spread / (weights * weights))
+                (sum / weights, sum_variance / (weights * weights))
             })
             .collect();
         (smooth, noise) = filtered.into_iter().unzip();
@@ -236,7 +146,7 @@ pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
 
     let pixels = (0..mean.len()).map(|pixel| match &guides[pixel] {
         Some(guide) if smooth[pixel].is_finite() => {
-            smooth[pixel] * guide.albedo.max(Vec3::splat(DARKEST)) + guide.emission
+            smooth[pixel] * guide.albedo.max(Vec3::splat(MIN_ALBEDO)) + guide.emission
         }
         _ => mean[pixel],
     });
@@ -246,19 +156,19 @@ pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
     }
 }
 
-/// How far two pixels see the same surface, 0 to 1.
-fn alike_weight(a: Option<&Guide>, b: Option<&Guide>) -> f32 {
+/// Weight for two pixels seeing the same surface, 0 to 1.
+fn similarity(a: Option<&Guide>, b: Option<&Guide>) -> f32 {
     match (a, b) {
         (Some(a), Some(b)) if a.object == b.object => {
-            let turned = a.normal.dot(b.normal).max(0.0).powi(NORMAL);
+            let turned = a.normal.dot(b.normal).max(0.0).powi(NORMAL_POWER);
             let off = (b.point - a.point).dot(a.normal).abs();
-            turned * (-off / (PLANE * a.depth + f32::MIN_POSITIVE)).exp()
+            turned * (-off / (PLANE_DISTANCE * a.depth + f32::MIN_POSITIVE)).exp()
         }
         _ => 0.0,
     }
 }
 
-/// The pixels of a picture around one of them.
+/// Neighbourhoods of pixels in a picture.
 #[derive(Clone, Copy)]
 struct Around {
     width: usize,
@@ -266,7 +176,7 @@ struct Around {
 }
 
 impl Around {
-    /// Those of a square `reach` taps to each side, `step` pixels apart, that lie in the picture, with their taps.
+    /// The pixels of a square of `reach` taps to each side, `step` pixels apart, clipped to the picture, with their tap offsets.
     fn square(
         self,
         pixel: usize,

@@ -1,13 +1,12 @@
-//! Which emitter to sample: a Fenwick tree over weights, then a point by area.
+//! Emitter sampling: an object from a Fenwick tree of weights, then a point uniformly by area.
 
 use crate::math::warp;
 use crate::scene::Scene;
 use glam::Vec3;
 
-/// Binary indexed tree over non-negative weights (Fenwick 1994): logarithmic draw and update.
+/// Binary indexed tree over non-negative weights (Fenwick 1994), with logarithmic sampling and updates.
 ///
-/// An update recomputes each node from its children instead of adding a difference, so that no number of
-/// updates lets the sums drift.
+/// An update recomputes nodes from their children instead of adding a difference, so that sums do not drift.
 #[derive(Debug, Clone, Default)]
 pub struct FenwickTree {
     weights: Vec<f64>,
@@ -16,7 +15,7 @@ pub struct FenwickTree {
 }
 
 impl FenwickTree {
-    /// The tree of the given weights; what is negative or not finite counts as zero.
+    /// The tree of the given weights; negative and non-finite weights count as zero.
     pub fn new(weights: &[f64]) -> Self {
         let weights: Vec<f64> = weights.iter().map(|&w| usable(w)).collect();
         let mut tree = Self {
@@ -69,7 +68,7 @@ impl FenwickTree {
         }
     }
 
-    /// Draws an index in proportion to its weight from `u` in [0, 1); `None` where all weights are zero.
+    /// Samples an index in proportion to its weight from `u` in [0, 1); `None` if all weights are zero.
     pub fn sample(&self, u: f64) -> Option<usize> {
         let mut rest = u * self.total();
         let n = self.weights.len();
@@ -82,7 +81,7 @@ impl FenwickTree {
             }
             step >>= 1;
         }
-        // Rounding of the prefix sums may end beside the weight that was meant.
+        // Rounding of prefix sums may lead to a neighbour with zero weight.
         let start = position.min(n.checked_sub(1)?);
         let drawable = |&i: &usize| self.weights[i] > 0.0;
         (0..=start)
@@ -114,15 +113,15 @@ fn usable(weight: f64) -> f64 {
     }
 }
 
-/// Points of one object, uniform in area.
+/// Uniform area sampling of one object.
 #[derive(Debug, Clone)]
 struct AreaDistribution {
     triangles: Vec<u32>,
-    /// Cumulative area up to and including each triangle, m².
+    /// Cumulative areas of the triangles in m².
     cumulative: Vec<f64>,
 }
 
-/// A point drawn on an object.
+/// A point sampled on an object.
 #[derive(Debug, Clone, Copy)]
 pub struct AreaSample {
     /// Triangle index.
@@ -131,7 +130,7 @@ pub struct AreaSample {
     pub point: Vec3,
 }
 
-/// Draws emitters in proportion to a weight per object, then points on them uniformly in area.
+/// Samples an emitter in proportion to a weight per object, then a point on it uniformly by area.
 #[derive(Debug, Clone)]
 pub struct Emitters {
     tree: FenwickTree,
@@ -139,7 +138,7 @@ pub struct Emitters {
 }
 
 impl Emitters {
-    /// Emitters of a scene with one weight an object (area × luminance of emission, as the paper draws them).
+    /// Emitters of a scene with one weight per object (in the paper: area × luminance of emission).
     pub fn new(scene: &Scene, weights: &[f64]) -> Self {
         let objects = scene
             .objects
@@ -171,7 +170,7 @@ impl Emitters {
         self.tree.set(object, weight);
     }
 
-    /// Whether nothing can be drawn.
+    /// Whether all weights are zero.
     pub fn is_dark(&self) -> bool {
         self.tree.total() <= 0.0
     }
@@ -181,7 +180,7 @@ impl Emitters {
         self.tree.probability(object)
     }
 
-    /// Density per square metre of drawing a point of an object, the choice of object included.
+    /// Pdf per square metre of a point on an object, including the choice of object.
     #[inline]
     pub fn pdf(&self, object: u32) -> f32 {
         let index = object as usize;
@@ -197,17 +196,16 @@ impl Emitters {
         }
     }
 
-    /// Draws an object and a point on it; `None` where all weights are zero.
+    /// Samples an object and a point on it; `None` if all weights are zero.
     ///
-    /// The 24 bits of `u[0]` are continued by the last ones of `choice`, so that a triangle is drawn by its area however
-    /// small a part of the object it is.
+    /// The lowest bits of `choice` extend the 24 bits of `u[0]`, so that even very small triangles have the right probability.
     pub fn sample(&self, scene: &Scene, choice: f64, u: [f32; 2]) -> Option<(u32, AreaSample)> {
         let object = self.tree.sample(choice)?;
-        // u[0] picks the triangle and is rescaled.
+        // u[0] selects the triangle and is rescaled.
         let distribution = &self.objects[object];
         let area = *distribution.cumulative.last()?;
-        let beyond = (choice * (1u64 << 29) as f64).fract() / f64::from(1 << 24);
-        let target = (f64::from(u[0]) + beyond) * area;
+        let low_bits = (choice * (1u64 << 29) as f64).fract() / f64::from(1 << 24);
+        let target = (f64::from(u[0]) + low_bits) * area;
         let index = distribution
             .cumulative
             .partition_point(|&c| c <= target)
@@ -217,9 +215,9 @@ impl Emitters {
         } else {
             distribution.cumulative[index - 1]
         };
-        let fraction = distribution.cumulative[index] - low;
-        let within = if fraction > 0.0 {
-            ((target - low) / fraction) as f32
+        let size = distribution.cumulative[index] - low;
+        let within = if size > 0.0 {
+            ((target - low) / size) as f32
         } else {
             0.0
         };

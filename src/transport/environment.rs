@@ -1,27 +1,27 @@
-//! Light that arrives from outside the mesh, as a map of directions, from far away or from a box around the mesh.
+//! Environment light: a map of radiance by direction, infinitely far or on a box around the mesh.
 
 use crate::math::color::luminance;
 use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
 use std::f32::consts::PI;
 
-/// An equirectangular map of incoming radiance, drawn in proportion to luminance × solid angle.
+/// An equirectangular map of incident radiance, sampled in proportion to luminance × solid angle.
 ///
-/// Directions are the scene's (towards the light); the map's pole is the scene's y axis, whatever `up` is. Around a box they are
-/// directions from its middle.
+/// Directions point towards the light in scene coordinates; the pole is the y axis, independent of `up`. For a box they start at its
+/// centre.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Environment {
     width: usize,
     height: usize,
     pixels: Vec<Vec3>,
-    /// Cumulative luminance × solid angle over pixels, row by row.
+    /// Cumulative luminance × solid angle over the pixels.
     cumulative: Vec<f64>,
-    /// How far away the light comes from.
+    /// The distance of the light.
     surroundings: Surroundings,
 }
 
 impl Environment {
-    /// A map of `width` × `height` radiances; row 0 is around +y. `None` if the sizes do not fit.
+    /// A map of `width` × `height` radiances; row 0 is around +y. `None` if the number of pixels differs or is zero.
     pub fn new(width: usize, height: usize, pixels: Vec<Vec3>) -> Option<Self> {
         if width == 0 || height == 0 || pixels.len() != width * height {
             return None;
@@ -50,7 +50,7 @@ impl Environment {
         })
     }
 
-    /// The same map, around something else than what is infinitely far.
+    /// The map with other surroundings.
     pub fn around(self, surroundings: Surroundings) -> Self {
         Self {
             surroundings,
@@ -58,22 +58,22 @@ impl Environment {
         }
     }
 
-    /// How far away the light comes from.
+    /// The distance of the light.
     pub fn surroundings(&self) -> Surroundings {
         self.surroundings
     }
 
-    /// Radiance that a ray finds.
+    /// Radiance along a ray that leaves the mesh.
     pub fn radiance(&self, origin: Vec3, direction: Vec3) -> Vec3 {
         self.pixels[self.pixel(origin, direction)]
     }
 
-    /// Radiance in a direction of the map.
-    pub fn of_map(&self, direction: Vec3) -> Vec3 {
+    /// Radiance of the map in a direction.
+    pub fn map_radiance(&self, direction: Vec3) -> Vec3 {
         self.pixels[pixel_of(self.width, self.height, direction)]
     }
 
-    /// Draws a direction from a point; returns it with its density per solid angle. `None` where the map is black.
+    /// Samples a direction at a point; returns it with its pdf per solid angle. `None` if the map is black.
     pub fn sample(&self, origin: Vec3, choice: f64, u: [f32; 2]) -> Option<(Vec3, f32)> {
         let total = *self.cumulative.last()?;
         if total <= 0.0 {
@@ -85,18 +85,18 @@ impl Environment {
             .partition_point(|&c| c <= target)
             .min(self.pixels.len() - 1);
         let (row, column) = (index / self.width, index % self.width);
-        // Uniform in solid angle within the pixel: uniform in cosθ and φ.
+        // Sample uniformly by solid angle within the pixel: uniformly in cosθ and φ.
         let (top, bottom) = row_cosines(row, self.height);
         let y = (top + (bottom - top) * f64::from(u[0])) as f32;
         let phi = 2.0 * PI * (column as f32 + u[1]) / self.width as f32;
         let r = (1.0 - y * y).max(0.0).sqrt();
-        let looked_up = Vec3::new(r * phi.cos(), y, r * phi.sin());
-        let direction = self.surroundings.seen_from(origin, looked_up);
+        let map_direction = Vec3::new(r * phi.cos(), y, r * phi.sin());
+        let direction = self.surroundings.from_map(origin, map_direction);
         let ratio = self.surroundings.density_ratio(origin, direction);
         Some((direction, self.pixel_pdf(index) * ratio))
     }
 
-    /// Density per solid angle with which [`Environment::sample`] draws a direction from a point.
+    /// Pdf per solid angle of [`Environment::sample`] at a point.
     pub fn pdf(&self, origin: Vec3, direction: Vec3) -> f32 {
         let ratio = self.surroundings.density_ratio(origin, direction);
         self.pixel_pdf(self.pixel(origin, direction)) * ratio
@@ -112,7 +112,7 @@ impl Environment {
         &self.pixels
     }
 
-    /// Luminance × solid angle up to and including each pixel.
+    /// Cumulative luminance × solid angle over the pixels.
     pub fn cumulative(&self) -> &[f64] {
         &self.cumulative
     }
@@ -123,11 +123,11 @@ impl Environment {
     }
 
     fn pixel(&self, origin: Vec3, direction: Vec3) -> usize {
-        let looked_up = self.surroundings.looked_up(origin, direction);
-        pixel_of(self.width, self.height, looked_up)
+        let map_direction = self.surroundings.map_direction(origin, direction);
+        pixel_of(self.width, self.height, map_direction)
     }
 
-    /// Density per solid angle with which directions within a pixel are drawn.
+    /// Pdf per solid angle of the map's directions within a pixel.
     pub fn pixel_pdf(&self, index: usize) -> f32 {
         let total = self.power();
         if total <= 0.0 {
@@ -143,7 +143,7 @@ impl Environment {
     }
 }
 
-/// The pixel of a `width` × `height` map that a unit direction falls into, row by row.
+/// The pixel index of a unit direction in a `width` × `height` map, row by row.
 pub fn pixel_of(width: usize, height: usize, direction: Vec3) -> usize {
     let theta = direction.y.clamp(-1.0, 1.0).acos();
     let row = ((theta / PI * height as f32) as usize).min(height - 1);
@@ -152,7 +152,7 @@ pub fn pixel_of(width: usize, height: usize, direction: Vec3) -> usize {
     row * width + column
 }
 
-/// The unit direction in the middle of a pixel of a `width` × `height` map.
+/// The unit direction of a pixel's centre in a `width` × `height` map.
 pub fn direction_of(width: usize, height: usize, pixel: usize) -> Vec3 {
     let theta = PI * ((pixel / width) as f32 + 0.5) / height as f32;
     let phi = 2.0 * PI * ((pixel % width) as f32 + 0.5) / width as f32;
@@ -163,7 +163,7 @@ pub fn direction_of(width: usize, height: usize, pixel: usize) -> Vec3 {
     )
 }
 
-/// Cosines of the upper and lower edge of a row.
+/// cosθ at the upper and lower edge of a row.
 pub fn row_cosines(row: usize, height: usize) -> (f64, f64) {
     let angle = |r: usize| (std::f64::consts::PI * r as f64 / height as f64).cos();
     (angle(row), angle(row + 1))
@@ -200,7 +200,7 @@ mod tests {
                 .expect("not black");
             assert!((direction.length() - 1.0).abs() < 1e-5);
             missing += u32::from((map.pdf(Vec3::ONE, direction) - pdf).abs() > 1e-4 * pdf);
-            sum += f64::from(luminance(map.of_map(direction)) / pdf);
+            sum += f64::from(luminance(map.map_radiance(direction)) / pdf);
         }
         // Directions on a pixel's edge may round into its neighbour.
         assert!(missing < 5, "{missing}");

@@ -1,4 +1,4 @@
-//! Pictures from paths: every pixel the box-filtered mean of radiance over its area.
+//! Accumulates path samples into pictures; a pixel is the box-filtered mean of radiance over its area.
 
 use crate::math::rng::Stream;
 use crate::scene::camera::Camera;
@@ -8,20 +8,20 @@ use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Sums of radiance over samples, in f64, one entry a pixel.
+/// Sums of radiance over samples in f64, one per pixel.
 #[derive(Debug, Clone)]
 pub struct Film {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Samples a pixel so far.
+    /// Samples per pixel so far.
     pub samples: u32,
     /// Sum of radiance over the samples of each pixel.
     pub sums: Vec<DVec3>,
     /// Rays cast.
     pub rays: u64,
-    /// Samples dropped because they came out non-finite.
+    /// Samples dropped because they were not finite.
     pub rejected: u64,
 }
 
@@ -39,8 +39,8 @@ impl Film {
         }
     }
 
-    /// Adds `samples` paths to every pixel. Streams are keyed by (seed, frame, pixel, sample), so that the
-    /// picture does not depend on threads or on how the samples are split over calls.
+    /// Adds `samples` paths to every pixel. Streams are keyed by (seed, frame, pixel, sample), so the result does not depend on
+    /// threads or on the split over calls.
     pub fn add(
         &mut self,
         world: &impl World,
@@ -55,8 +55,8 @@ impl Film {
         self.samples += samples;
     }
 
-    /// Adds one path to the pixels of some rows, keyed as in [`Film::add`]. The sample counts once the last row has it;
-    /// until then [`Film::mean`] is not to be asked for.
+    /// Adds one path to each pixel of some rows, keyed as in [`Film::add`]. The call with the last row increments the number of
+    /// samples; until then [`Film::mean`] is invalid.
     pub fn add_rows(
         &mut self,
         world: &impl World,

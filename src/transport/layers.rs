@@ -1,4 +1,4 @@
-//! Light kept apart by its lamp. Light adds up: layers times any strengths are a picture again, with no new rays.
+//! Light layers: one picture per lamp. Light is linear, so weighted sums of layers are relit pictures without new rays.
 
 use crate::math::color::luminance;
 use crate::math::picture::Picture;
@@ -11,41 +11,41 @@ use crate::transport::path::{Origin, PathOptions, radiance_by_origin};
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-/// Lamps with a layer of their own; weaker ones share a layer.
+/// Maximum number of lamps with their own layer; weaker ones share one.
 pub const MAX_LAMPS: usize = 16;
 
-/// What a layer holds the light of.
+/// The light source of a layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum LightSource {
-    /// An object of the scene that emits.
+    /// An emitting object of the scene.
     Lamp(u32),
-    /// All lamps that have no layer of their own.
+    /// All lamps without their own layer.
     OtherLamps,
-    /// What lies outside the mesh.
+    /// The environment.
     Outside,
 }
 
-/// Which layer each origin of light belongs to.
+/// The assignment of light sources to layers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Split {
     sources: Vec<LightSource>,
-    /// Layer of each object; `u32::MAX` where it does not emit.
+    /// Layer of each object; `u32::MAX` for objects that do not emit.
     of_object: Vec<u32>,
     outside: u32,
 }
 
-/// Parts of one path, kept between paths to spare allocations.
+/// The light of one path by origin; reused between paths to save allocations.
 pub type Parts = Vec<(Origin, Vec3)>;
 
 impl Split {
-    /// One layer for each of the [`MAX_LAMPS`] lamps with the largest area × luminance, in the scene's order, one for
-    /// all others, and one for light from outside; only those that there are.
+    /// One layer for each of the at most [`MAX_LAMPS`] lamps with the largest area × luminance, in the scene's order, one for all other
+    /// lamps, and one for the environment; empty layers are left out.
     pub fn new(lit: &Lit) -> Self {
         let emission = |object: usize| lit.materials.get(object).map_or(Vec3::ZERO, |m| m.emission);
         Self::of(&lit.scene, emission, lit.outside.is_some())
     }
 
-    /// [`Split::new`] of a scene whose objects have these emissions, with light from outside or without.
+    /// [`Split::new`] for the given emission of each object, with or without an environment.
     pub fn of(scene: &Scene, emission: impl Fn(usize) -> Vec3, outside_light: bool) -> Self {
         let power =
             |object: usize| scene.objects[object].area * f64::from(luminance(emission(object)));
@@ -78,19 +78,19 @@ impl Split {
         }
     }
 
-    /// What each layer holds.
+    /// The light source of each layer.
     pub fn sources(&self) -> &[LightSource] {
         &self.sources
     }
 
-    /// The layer that an object's light goes into.
+    /// The layer of an object's light; `None` if it does not emit.
     pub fn source_of(&self, object: u32) -> Option<LightSource> {
         let layer = *self.of_object.get(object as usize)?;
         self.sources.get(layer as usize).copied()
     }
 
-    /// Adds the light that one path finds to the sums of its pixel, one a layer. Uses the stream as
-    /// [`crate::transport::path::radiance`] does, so that the layers add up to the same path's radiance.
+    /// Adds the light of one path to the layers' sums of its pixel. Consumes the stream as [`crate::transport::path::radiance`] does,
+    /// so the layers sum to that path's radiance.
     pub fn add(
         &self,
         world: &Lit,
@@ -112,8 +112,8 @@ impl Split {
         }
     }
 
-    /// One picture a layer from `samples` paths a pixel, keyed as [`crate::transport::film::Film::add`] keys them: the
-    /// layers add up to that film's picture.
+    /// One picture per layer from `samples` paths per pixel, keyed as in [`crate::transport::film::Film::add`]: the layers sum to that
+    /// film's picture.
     pub fn render(
         &self,
         world: &Lit,
@@ -126,8 +126,8 @@ impl Split {
         let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
         let count = self.sources.len();
         let mut sums = vec![DVec3::ZERO; width as usize * height as usize * count];
-        let row_of = width as usize * count;
-        sums.par_chunks_mut(row_of.max(1))
+        let row_length = width as usize * count;
+        sums.par_chunks_mut(row_length.max(1))
             .enumerate()
             .for_each(|(row, sums)| {
                 let mut parts = Parts::new();
@@ -152,13 +152,13 @@ impl Split {
     }
 }
 
-/// One layer of sums that hold `count` layers a pixel, times a factor.
+/// One layer of sums with `count` interleaved layers per pixel, times a factor.
 pub fn layer_of(sums: &[DVec3], layer: usize, count: usize, scale: f64) -> Vec<Vec3> {
-    let of_layer = sums.iter().skip(layer).step_by(count.max(1));
-    of_layer.map(|sum| (*sum * scale).as_vec3()).collect()
+    let layer = sums.iter().skip(layer).step_by(count.max(1));
+    layer.map(|sum| (*sum * scale).as_vec3()).collect()
 }
 
-/// The sum of pictures of one size, each times a factor on red, green and blue; `None` where there are none.
+/// The sum of pictures of one size, each times an RGB factor; `None` without pictures.
 pub fn mix<'a>(layers: impl IntoIterator<Item = (&'a Picture, Vec3)>) -> Option<Picture> {
     let mut layers = layers.into_iter();
     let (first, factor) = layers.next()?;

@@ -1,4 +1,4 @@
-//! A scene with one material an object: the world of a capture and its estimate.
+//! A scene with materials and lights, one material per object.
 
 use crate::math::color::luminance;
 use crate::scene::Scene;
@@ -14,16 +14,16 @@ use std::sync::Arc;
 pub struct Lit {
     /// Geometry.
     pub scene: Arc<Scene>,
-    /// One an object.
+    /// One per object.
     pub materials: Vec<Material>,
-    /// Drawn by area × luminance of emission.
+    /// Emitter sampling, weighted by area × luminance of emission.
     pub emitters: Emitters,
-    /// Light from outside the mesh.
+    /// Environment light.
     pub outside: Option<Arc<Environment>>,
 }
 
 impl Lit {
-    /// A lit scene; `materials` holds one entry an object.
+    /// A lit scene; `materials` has one entry per object.
     pub fn new(
         scene: Arc<Scene>,
         materials: Vec<Material>,
@@ -44,7 +44,7 @@ impl Lit {
         }
     }
 
-    /// Everything that scattering needs at a hit.
+    /// The surface point of a hit.
     #[inline]
     pub fn surface(&self, hit: &Hit) -> SurfacePoint {
         let object = self.scene.object_of[hit.triangle as usize];

@@ -1,4 +1,4 @@
-//! What surfaces are made of.
+//! Materials of surfaces.
 
 use crate::scene::geometry::Hit;
 use crate::scene::texels::TexelLayout;
@@ -13,7 +13,7 @@ pub const DIELECTRIC: f32 = 0.04;
 pub enum Albedo {
     /// One colour.
     Constant(Vec3),
-    /// One colour a texel of the scene's triangles.
+    /// One colour per texel of the scene's triangles.
     Texels(Arc<TexelColors>),
     /// An image over texture coordinates, times a constant.
     Image(Arc<Texture>, Vec3),
@@ -22,13 +22,13 @@ pub enum Albedo {
 /// Colours on a [`TexelLayout`].
 #[derive(Debug, Clone)]
 pub struct TexelColors {
-    /// Which texels there are.
+    /// The texels.
     pub layout: TexelLayout,
-    /// The colour of each.
+    /// The colour of each texel.
     pub colors: Vec<Vec3>,
 }
 
-/// A linear-light image repeated over the plane, with the corner coordinates of each triangle.
+/// A tiled image of linear colours, with texture coordinates per triangle.
 #[derive(Debug, Clone)]
 pub struct Texture {
     /// Width in pixels.
@@ -78,7 +78,7 @@ pub struct Material {
     pub albedo: Albedo,
     /// Radiance emitted by the front side, W·sr⁻¹·m⁻².
     pub emission: Vec3,
-    /// The rough specular lobe, where there is one.
+    /// Rough specular lobe, if any.
     pub lobe: Option<Lobe>,
 }
 

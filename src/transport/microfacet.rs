@@ -5,8 +5,8 @@
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
-/// A unit direction in f64. Its largest component follows from the other two, whose rounding is relative to their own
-/// size: near the horizon that of the largest would drown them.
+/// A unit direction in f64, with the largest component recomputed from the other two: its f32 rounding error would dominate them
+/// near the horizon.
 fn widen(direction: Vec3) -> DVec3 {
     let mut wide = direction.as_dvec3();
     let axis = wide.abs().max_position();
@@ -27,7 +27,7 @@ pub struct Microfacet {
     sin2_i: f64,
     /// Squared sine of the half vector.
     sin2_h: f64,
-    /// Distribution's denominator: sin²θh / α² + cos²θh.
+    /// Denominator of the distribution: sin²θh / α² + cos²θh.
     q: f64,
     /// Schlick's (1 − wo · h)⁵.
     pub schlick: f64,
@@ -47,7 +47,7 @@ impl Microfacet {
             sin2_i: wi.x * wi.x + wi.y * wi.y,
             sin2_h,
             q: sin2_h / (alpha * alpha) + h.z * h.z,
-            // The mean of both ends, so that rounding does not break reciprocity.
+            // Mean of wo · h and wi · h, so that rounding does not break reciprocity.
             schlick: (1.0 - 0.5 * h.dot(wo + wi)).clamp(0.0, 1.0).powi(5),
         }
     }
@@ -78,7 +78,7 @@ impl Microfacet {
         0.5 * self.distribution() * self.cos_i / masking
     }
 
-    /// D G₁ / (4 cosθo): the density of reflection on a visible normal.
+    /// D G₁ / (4 cosθo): the pdf per solid angle of reflection on a visible normal.
     #[inline]
     pub fn pdf(&self) -> f64 {
         0.5 * self.distribution() / (self.cos_o + self.smith(self.cos_o, self.sin2_o))
@@ -97,13 +97,13 @@ impl Microfacet {
     }
 }
 
-/// `wo` reflected on a normal drawn from those that it sees (Heitz 2018, in the form of Dupuy and Benyoub 2023,
-/// "Sampling Visible GGX Normals with Spherical Caps"). May point below the horizon.
+/// Reflects `wo` on a sampled visible normal (Heitz 2018, in the form of Dupuy and Benyoub 2023, "Sampling Visible GGX Normals with
+/// Spherical Caps"). The result may point below the horizon.
 pub fn reflect_on_visible_normal(alpha: f64, wo: Vec3, u: [f32; 2]) -> Vec3 {
     let wo = widen(wo);
-    // Stretch to the configuration of a hemisphere.
+    // Stretch the ellipsoid to a hemisphere.
     let stretched = DVec3::new(alpha * wo.x, alpha * wo.y, wo.z).normalize_or_zero();
-    // Uniform on the cap of directions that the hemisphere reflects `stretched` to.
+    // Sample uniformly the cap of directions that the hemisphere reflects `stretched` to.
     let phi = 2.0 * PI * f64::from(u[0]);
     let z = (1.0 - f64::from(u[1])) * (1.0 + stretched.z) - stretched.z;
     let sin = (1.0 - z * z).max(0.0).sqrt();

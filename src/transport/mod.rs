@@ -1,4 +1,4 @@
-//! How light moves: paths, scattering, emitters, next-event estimation, multiple importance sampling.
+//! Light transport: paths, BSDFs, emitters, next-event estimation, multiple importance sampling.
 
 pub mod arrival;
 pub mod bsdf;
@@ -6,6 +6,7 @@ pub mod denoise;
 pub mod emitters;
 pub mod environment;
 pub mod film;
+pub mod guide;
 pub mod layers;
 pub mod lit;
 pub mod material;

@@ -1,21 +1,21 @@
-//! Open Image Denoise, taken at run time where its library is installed (Áfra 2019–2025, <https://www.openimagedenoise.org>).
+//! Open Image Denoise, loaded at run time if it is installed (Áfra 2019–2025, <https://www.openimagedenoise.org>).
 //!
-//! The library is not linked: a machine without it runs the same program and takes [`super::denoise`]. `RELIT_OIDN` names the
-//! library's file where the system's search does not find it.
+//! The library is not linked: without it, pictures are denoised by [`super::denoise`]. `RELIT_OIDN` names the library's file if the
+//! system's search does not find it.
 
 use crate::math::picture::Picture;
-use crate::transport::denoise::Guide;
+use crate::transport::guide::Guide;
 use glam::Vec3;
 use libloading::Library;
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::ptr::null;
 use std::sync::{LazyLock, Mutex};
 
-/// `OIDN_DEVICE_TYPE_CPU`: the processor gives the same picture on every machine.
+/// `OIDN_DEVICE_TYPE_CPU`, for equal results on all machines.
 const CPU: c_int = 1;
 /// `OIDN_FORMAT_FLOAT3`.
 const FLOAT3: c_int = 3;
-/// Names of the library, of version 2.
+/// File names of the library, version 2.
 const NAMES: [&str; 4] = [
     "libOpenImageDenoise.so.2",
     "libOpenImageDenoise.so",
@@ -25,7 +25,7 @@ const NAMES: [&str; 4] = [
 
 type Handle = *mut c_void;
 
-/// The functions of the library that are called, by the names and types of its header `oidn.h`.
+/// The used functions of the library, with the types of its header `oidn.h`.
 struct Functions {
     new_filter: unsafe extern "C" fn(Handle, *const c_char) -> Handle,
     set_image: unsafe extern "C" fn(
@@ -57,7 +57,7 @@ pub struct Oidn {
 
 struct Device(Handle);
 
-// SAFETY: a device may be used from any thread, by one at a time; the mutex around it sees to that.
+// SAFETY: a device may be used from any thread, one at a time, which the mutex around it ensures.
 #[allow(unsafe_code, reason = "the library's handle is a raw pointer")]
 unsafe impl Send for Device {}
 
@@ -70,7 +70,7 @@ static FOUND: LazyLock<Option<Oidn>> = LazyLock::new(|| {
     names.into_iter().find_map(Oidn::load)
 });
 
-/// The library, if it is installed.
+/// The library, if it is installed; loaded at the first call.
 pub fn found() -> Option<&'static Oidn> {
     FOUND.as_ref()
 }
@@ -110,18 +110,18 @@ impl Oidn {
         }
     }
 
-    /// A picture of radiance without its noise, guided by albedo and normal; `guides` has one entry a pixel.
+    /// Denoises a picture of radiance, guided by albedo and normal; `guides` has one entry per pixel.
     ///
     /// # Errors
-    /// What the library says.
+    /// The library's message, or guides are missing.
     #[allow(unsafe_code, reason = "a foreign library")]
     pub fn denoise(&self, noisy: &Picture, guides: &[Option<Guide>]) -> Result<Picture, String> {
-        let of = |value: &dyn Fn(&Guide) -> Vec3| -> Vec<Vec3> {
+        let feature = |value: &dyn Fn(&Guide) -> Vec3| -> Vec<Vec3> {
             (guides.iter().map(|g| g.as_ref().map_or(Vec3::ZERO, value))).collect()
         };
-        // A lamp's brightness tells it apart as an albedo does.
-        let mut albedo = of(&|g| (g.albedo + g.emission).min(Vec3::ONE));
-        let mut normal = of(&|g| g.normal);
+        // Emission is added to albedo, so that lamps have edges in it.
+        let mut albedo = feature(&|g| (g.albedo + g.emission).min(Vec3::ONE));
+        let mut normal = feature(&|g| g.normal);
         let mut color = noisy.pixels.clone();
         let mut output = color.clone();
         let images: [(&CStr, &mut Vec<Vec3>); 4] = [

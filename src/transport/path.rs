@@ -7,20 +7,20 @@ use crate::transport::bsdf::Bsdf;
 use crate::transport::world::{SurfacePoint, World};
 use glam::Vec3;
 
-/// Paths are never kept with a higher chance than this. Where all albedos are ρ, variance is finite only above ρ², since
-/// weights grow by ρ over the chance at each bounce.
+/// Maximum survival probability of Russian roulette. With all albedos ρ, variance is finite only for a probability above ρ², since
+/// weights grow by ρ / probability per bounce.
 pub const RR_MAX_SURVIVAL: f32 = 0.9999;
 
 /// How paths are traced.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathOptions {
-    /// Longest path in bounces (one bounce is direct light); 0 is emission alone.
+    /// Maximum number of bounces (one bounce is direct light; 0 is emission alone).
     pub max_bounces: u32,
-    /// Bounces before Russian roulette may end a path.
+    /// Number of bounces before Russian roulette starts.
     pub rr_depth: u32,
     /// Whether emitters are sampled (next-event estimation).
     pub sample_emitters: bool,
-    /// Whether emission met by BSDF sampling counts.
+    /// Whether emission hit by BSDF sampling counts.
     pub sample_bsdf: bool,
 }
 
@@ -35,27 +35,27 @@ impl Default for PathOptions {
     }
 }
 
-/// Where light comes from.
+/// The source of light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
-    /// An object of the world that emits.
+    /// An emitting object.
     Object(u32),
-    /// Outside the mesh.
+    /// The environment.
     Outside,
 }
 
-/// What one path found.
+/// The result of one path.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PathSample {
     /// Radiance estimate.
     pub radiance: Vec3,
     /// Rays cast, shadow rays included.
     pub rays: u32,
-    /// Whether the sample was dropped because it came out non-finite; its radiance is then zero.
+    /// Whether the sample was dropped because it was not finite; its radiance is then zero.
     pub rejected: bool,
 }
 
-/// Weight of a sample drawn with density `a` where `b` could have drawn it too: power heuristic, β = 2 (Veach 1997).
+/// MIS weight of a sample with pdf `a` against a technique with pdf `b`: power heuristic, β = 2 (Veach 1997).
 #[inline]
 pub fn power_heuristic(a: f32, b: f32) -> f32 {
     if a <= 0.0 {
@@ -65,7 +65,7 @@ pub fn power_heuristic(a: f32, b: f32) -> f32 {
     1.0 / (1.0 + ratio * ratio)
 }
 
-/// Radiance that arrives against a ray, estimated by one path.
+/// Radiance along a camera ray, estimated by one path.
 pub fn radiance(
     world: &impl World,
     camera_ray: &Ray,
@@ -74,15 +74,15 @@ pub fn radiance(
 ) -> PathSample {
     follow(
         world,
-        Leg::from_camera(camera_ray),
+        PathState::from_camera(camera_ray),
         stream,
         options,
         &mut |_, _| {},
     )
 }
 
-/// [`radiance`] with the light of each origin apart: fills `parts` with what the path's vertices added, whose sum is
-/// the sample's radiance up to rounding; with nothing where the sample was rejected.
+/// [`radiance`] split by origin: fills `parts` with the contributions of the path's vertices, whose sum is the sample's radiance up
+/// to rounding; leaves it empty for rejected samples.
 pub fn radiance_by_origin(
     world: &impl World,
     camera_ray: &Ray,
@@ -96,16 +96,16 @@ pub fn radiance_by_origin(
             parts.push((origin, light));
         }
     };
-    let leg = Leg::from_camera(camera_ray);
-    let sample = follow(world, leg, stream, options, &mut keep);
+    let state = PathState::from_camera(camera_ray);
+    let sample = follow(world, state, stream, options, &mut keep);
     if sample.rejected {
         parts.clear();
     }
     sample
 }
 
-/// Radiance that a white diffuse surface would send from a point to the side of `normal` (irradiance / π), estimated by
-/// one path. The surface's own albedo and emission there do not matter.
+/// Radiance of a white diffuse surface at a point on the side of `normal` (irradiance / π), estimated by one path. The actual albedo
+/// and emission there are ignored.
 pub fn white_radiance(
     world: &impl World,
     surface: &SurfacePoint,
@@ -138,13 +138,13 @@ pub fn white_radiance(
     };
     let wi = frame.to_world(next.wi);
     let origin = offset_origin(surface.point, normal, &surface.corners, wi);
-    let leg = Leg {
+    let state = PathState {
         ray: Ray::new(origin, wi),
         throughput: next.weight,
         bsdf_pdf: Some(next.pdf),
         bounce: 1,
     };
-    let mut sample = follow(world, leg, stream, options, &mut |_, _| {});
+    let mut sample = follow(world, state, stream, options, &mut |_, _| {});
     sample.radiance += direct;
     sample.rays += rays;
     if !sample.radiance.is_finite() {
@@ -154,16 +154,16 @@ pub fn white_radiance(
     sample
 }
 
-/// Where a path stands before its next ray.
-pub(super) struct Leg {
+/// The state of a path before its next ray.
+pub(super) struct PathState {
     pub ray: Ray,
     pub throughput: Vec3,
-    /// Density of the last BSDF sample per solid angle; `None` on the camera ray, which no light sample competes with.
+    /// Pdf per solid angle of the last BSDF sample; `None` for the camera ray, which has no competing light sample.
     pub bsdf_pdf: Option<f32>,
     pub bounce: u32,
 }
 
-impl Leg {
+impl PathState {
     fn from_camera(ray: &Ray) -> Self {
         Self {
             ray: *ray,
@@ -174,21 +174,21 @@ impl Leg {
     }
 }
 
-/// Follows a path from a leg on to its end; `found` hears what each vertex adds to the radiance, and where from.
+/// Traces a path from `state` to its end; calls `found` with each contribution to the radiance and its origin.
 pub(super) fn follow(
     world: &impl World,
-    leg: Leg,
+    state: PathState,
     stream: &mut Stream,
     options: &PathOptions,
     found: &mut impl FnMut(Origin, Vec3),
 ) -> PathSample {
     let mut sample = PathSample::default();
-    let Leg {
+    let PathState {
         mut ray,
         mut throughput,
         mut bsdf_pdf,
         mut bounce,
-    } = leg;
+    } = state;
     let mut total = Vec3::ZERO;
     let mut add = |origin, light| {
         total += light;
@@ -213,7 +213,7 @@ pub(super) fn follow(
             break;
         };
 
-        // Add what it emits towards us.
+        // Add emission.
         let wo = -ray.direction.normalize_or_zero();
         let cos_emitter = surface.normal.dot(wo);
         if cos_emitter > 0.0 && surface.emission != Vec3::ZERO {
@@ -234,7 +234,7 @@ pub(super) fn follow(
             break;
         }
 
-        // Sample light from emitters directly.
+        // Next-event estimation.
         let side = if cos_emitter < 0.0 { -1.0 } else { 1.0 };
         let frame = Frame::around(surface.shading_normal * side);
         let local_wo = frame.to_local(wo);
@@ -267,7 +267,7 @@ pub(super) fn follow(
         bsdf_pdf = Some(next.pdf);
         bounce += 1;
 
-        // End paths that carry little, without bias.
+        // Russian roulette.
         if bounce > options.rr_depth {
             let survival = throughput.max_element().min(RR_MAX_SURVIVAL);
             if survival <= 0.0 || stream.uniform() >= survival {
@@ -287,7 +287,7 @@ pub(super) fn follow(
     sample
 }
 
-/// Light that reaches a surface straight from an emitter and is scattered towards `local_wo`, and its origin: one light sample.
+/// Direct light scattered towards `local_wo`, estimated by one light sample, and its origin.
 #[expect(clippy::too_many_arguments, reason = "the state of one path vertex")]
 fn direct_light(
     world: &impl World,
@@ -315,19 +315,19 @@ fn direct_light(
     (origin, scattered * light.radiance / light.pdf * weight)
 }
 
-/// A direction towards an emitter.
+/// A sampled direction towards a light.
 pub(super) struct LightSample {
     /// Unit direction.
     pub wi: Vec3,
-    /// Radiance that arrives from there where nothing is in between.
+    /// Unoccluded radiance.
     pub radiance: Vec3,
-    /// Density per solid angle.
+    /// Pdf per solid angle.
     pub pdf: f32,
-    /// What must be free.
+    /// Shadow ray.
     pub ray: Ray,
 }
 
-/// Draws a point on an emitter's front side or a direction towards the light from outside, as seen from a surface.
+/// Samples a point on an emitter's front or a direction of the environment, for a surface point.
 pub(super) fn draw_light(
     world: &impl World,
     surface: &SurfacePoint,
@@ -335,7 +335,7 @@ pub(super) fn draw_light(
 ) -> (Origin, Option<LightSample>) {
     let (pick, choice, u) = (stream.uniform(), stream.uniform_f64(), stream.uniform2());
     let fraction = emitter_fraction(world);
-    let leave = |wi| offset_origin(surface.point, surface.normal, &surface.corners, wi);
+    let origin_towards = |wi| offset_origin(surface.point, surface.normal, &surface.corners, wi);
     if pick >= fraction {
         let drawn = world.environment().and_then(|environment| {
             let (wi, pdf) = environment.sample(surface.point, choice, u)?;
@@ -343,7 +343,7 @@ pub(super) fn draw_light(
                 wi,
                 radiance: environment.radiance(surface.point, wi),
                 pdf: pdf * (1.0 - fraction),
-                ray: Ray::new(leave(wi), wi),
+                ray: Ray::new(origin_towards(wi), wi),
             })
         });
         return (Origin::Outside, drawn);
@@ -364,12 +364,12 @@ pub(super) fn draw_light(
         wi,
         radiance: light.radiance,
         pdf: fraction * light.pdf * distance2 / cos_emitter,
-        ray: Ray::between(leave(wi), to),
+        ray: Ray::between(origin_towards(wi), to),
     };
     (origin, Some(drawn))
 }
 
-/// Probability of sampling an emitter of the mesh rather than the light from outside.
+/// Probability of sampling an emitter of the mesh rather than the environment.
 pub fn emitter_fraction(world: &impl World) -> f32 {
     match (world.environment(), world.has_emitters()) {
         (None, _) => 1.0,
@@ -378,18 +378,18 @@ pub fn emitter_fraction(world: &impl World) -> f32 {
     }
 }
 
-/// Density per solid angle with which a direction towards outside is drawn by light sampling.
+/// Pdf per solid angle of light sampling for a direction of the environment.
 fn environment_pdf(world: &impl World, origin: Vec3, direction: Vec3) -> f32 {
     world.environment().map_or(0.0, |e| {
         e.pdf(origin, direction) * (1.0 - emitter_fraction(world))
     })
 }
 
-/// MIS weight of emission met by BSDF sampling.
+/// MIS weight of emission hit by BSDF sampling.
 fn emission_weight(bsdf_pdf: f32, light_pdf: f32, options: &PathOptions) -> f32 {
     match (options.sample_bsdf, options.sample_emitters) {
         (true, true) => power_heuristic(bsdf_pdf, light_pdf),
-        // Emission that light sampling never draws is left to BSDF sampling.
+        // Emission that light sampling cannot reach is left to BSDF sampling.
         (false, true) => f32::from(light_pdf <= 0.0),
         _ => 1.0,
     }

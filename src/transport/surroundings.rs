@@ -1,22 +1,21 @@
-//! Where light from outside the mesh comes from: far away, as a sky, or from a box around the mesh, as what a scan lacks.
+//! The distance of environment light: infinite, as a sky, or on a box around the mesh, for geometry missing from a scan.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-/// Width of the gap between the mesh and a box around it, relative to the mesh's diagonal: light samples on the box are
-/// the noisier the nearer it comes to a surface.
+/// Gap between the mesh and the box, relative to the mesh's diagonal: light samples are noisier the closer the box is to a surface.
 const GAP: f32 = 0.02;
 
-/// The place that a map of directions is looked up by.
+/// How rays map to directions of the environment map.
 ///
-/// A map around a box is a cube map with parallax correction: a ray finds the direction from the middle of the box to the
-/// point where it leaves the box.
+/// A box is a parallax-corrected environment map: a ray maps to the direction from the box's centre to the point where it leaves the
+/// box.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub enum Surroundings {
-    /// Infinitely far: the light depends on the direction alone.
+    /// Infinitely far: light depends on direction only.
     #[default]
     Far,
-    /// The surface of a box, scene coordinates; each point sends the same radiance in all directions.
+    /// The surface of a box in scene coordinates; each point emits the same radiance in all directions.
     Box {
         /// Smallest coordinates.
         min: Vec3,
@@ -26,7 +25,7 @@ pub enum Surroundings {
 }
 
 impl Surroundings {
-    /// A box around some points, with a gap. `None` where there are none, or they are not finite.
+    /// The box around some points with a gap. `None` if they have no finite extent.
     pub fn around(points: impl Iterator<Item = Vec3>) -> Option<Self> {
         let start = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let (min, max) = points.fold(start, |(min, max), p| (min.min(p), max.max(p)));
@@ -38,41 +37,41 @@ impl Surroundings {
         })
     }
 
-    /// The direction in the map that a ray finds: unit vectors.
-    pub fn looked_up(&self, origin: Vec3, direction: Vec3) -> Vec3 {
-        match self.left_at(origin, direction) {
-            Some(left) => (left.point - left.middle).normalize_or_zero(),
+    /// The map's unit direction for a ray with a unit direction.
+    pub fn map_direction(&self, origin: Vec3, direction: Vec3) -> Vec3 {
+        match self.exit(origin, direction) {
+            Some(exit) => (exit.point - exit.middle).normalize_or_zero(),
             None => direction,
         }
     }
 
-    /// The unit direction in which a point sees what the map holds in a direction.
-    pub fn seen_from(&self, origin: Vec3, looked_up: Vec3) -> Vec3 {
+    /// The unit direction at a point for a direction of the map: the inverse of [`Surroundings::map_direction`].
+    pub fn from_map(&self, origin: Vec3, map_direction: Vec3) -> Vec3 {
         let Self::Box { min, max } = *self else {
-            return looked_up;
+            return map_direction;
         };
         let middle = (min + max) * 0.5;
-        match self.left_at(middle, looked_up) {
-            Some(left) => (left.point - origin).normalize_or_zero(),
-            None => looked_up,
+        match self.exit(middle, map_direction) {
+            Some(exit) => (exit.point - origin).normalize_or_zero(),
+            None => map_direction,
         }
     }
 
-    /// Density per solid angle around the origin over density per solid angle around the middle of the map, along a ray.
+    /// Pdf per solid angle at the origin over pdf per solid angle at the map's centre, along a ray.
     pub fn density_ratio(&self, origin: Vec3, direction: Vec3) -> f32 {
-        let Some(left) = self.left_at(origin, direction) else {
+        let Some(exit) = self.exit(origin, direction) else {
             return 1.0;
         };
-        let from_middle = left.point - left.middle;
+        let from_middle = exit.point - exit.middle;
         // dA = r² dω / cosθ, on the same face for both.
         let r2_middle = from_middle.length_squared();
-        let cos_middle = from_middle[left.axis].abs() / r2_middle.sqrt();
-        let cos_origin = direction[left.axis].abs();
-        (cos_middle / r2_middle) * (left.distance * left.distance / cos_origin)
+        let cos_middle = from_middle[exit.axis].abs() / r2_middle.sqrt();
+        let cos_origin = direction[exit.axis].abs();
+        (cos_middle / r2_middle) * (exit.distance * exit.distance / cos_origin)
     }
 
-    /// Where a ray leaves the box; `None` where there is none, or the ray starts outside and leads away.
-    fn left_at(&self, origin: Vec3, direction: Vec3) -> Option<Left> {
+    /// The exit of a ray from the box; `None` without a box, and for rays that start outside and lead away.
+    fn exit(&self, origin: Vec3, direction: Vec3) -> Option<Exit> {
         let Self::Box { min, max } = *self else {
             return None;
         };
@@ -84,7 +83,7 @@ impl Surroundings {
                 (axis, distance) = (side, t);
             }
         }
-        (distance > 0.0 && distance.is_finite()).then(|| Left {
+        (distance > 0.0 && distance.is_finite()).then(|| Exit {
             point: origin + direction * distance,
             middle: (min + max) * 0.5,
             axis,
@@ -93,12 +92,12 @@ impl Surroundings {
     }
 }
 
-/// Where a ray leaves a box.
-struct Left {
+/// The exit point of a ray from a box.
+struct Exit {
     point: Vec3,
-    /// Of the box.
+    /// Centre of the box.
     middle: Vec3,
-    /// Which the face is perpendicular to.
+    /// Normal axis of the exit face.
     axis: usize,
     distance: f32,
 }
@@ -121,17 +120,20 @@ mod tests {
         let mut stream = Stream::new(3, 0, 0, 0);
         for _ in 0..200 {
             let direction = sphere(&mut stream);
-            let same = surroundings.looked_up(middle, direction);
+            let same = surroundings.map_direction(middle, direction);
             assert!((same - direction).length() < 1e-5);
             assert!((surroundings.density_ratio(middle, direction) - 1.0).abs() < 1e-4);
             // There and back from any other point.
             let origin = Vec3::new(0.3, -1.5, -2.0);
-            let seen = surroundings.seen_from(origin, direction);
-            let back = surroundings.looked_up(origin, seen);
+            let seen = surroundings.from_map(origin, direction);
+            let back = surroundings.map_direction(origin, seen);
             assert!((back - direction).length() < 1e-4, "{direction} {back}");
-            assert_eq!(Surroundings::Far.looked_up(origin, direction), direction);
+            assert_eq!(
+                Surroundings::Far.map_direction(origin, direction),
+                direction
+            );
         }
-        let moved = surroundings.looked_up(Vec3::new(2.0, 0.0, -1.0), Vec3::Y);
+        let moved = surroundings.map_direction(Vec3::new(2.0, 0.0, -1.0), Vec3::Y);
         assert!(moved.x > 0.1 && moved.y < 0.99);
     }
 
@@ -144,8 +146,8 @@ mod tests {
         // Estimates of ∫ f dω around the origin, f = 1 and (1 + z)².
         let mut found = [Moments::default(); 2];
         for _ in 0..n {
-            let looked_up = sphere(&mut stream);
-            let wi = surroundings.seen_from(origin, looked_up);
+            let map_direction = sphere(&mut stream);
+            let wi = surroundings.from_map(origin, map_direction);
             let pdf = surroundings.density_ratio(origin, wi) / (4.0 * std::f32::consts::PI);
             found[0].push(f64::from(1.0 / pdf));
             found[1].push(f64::from((1.0 + wi.z).powi(2) / pdf));
@@ -169,7 +171,7 @@ mod tests {
             Surroundings::around([Vec3::NAN, Vec3::ONE].into_iter()),
             None
         );
-        let away = unit_box().looked_up(Vec3::new(9.0, 0.0, 0.0), Vec3::X);
+        let away = unit_box().map_direction(Vec3::new(9.0, 0.0, 0.0), Vec3::X);
         assert_eq!(away, Vec3::X);
     }
 

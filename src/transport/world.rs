@@ -1,16 +1,16 @@
-//! What the path tracer asks of the world around it.
+//! The interface between the path tracer and a scene.
 
 use crate::scene::geometry::Ray;
 use crate::transport::environment::Environment;
 use crate::transport::material::Lobe;
 use glam::Vec3;
 
-/// A surface point met by a ray, with everything that scattering there needs.
+/// A surface point with all data for scattering.
 #[derive(Debug, Clone, Copy)]
 pub struct SurfacePoint {
     /// Position.
     pub point: Vec3,
-    /// The triangle's corners, for offsetting the next ray.
+    /// The triangle's corners, for ray offsets.
     pub corners: [Vec3; 3],
     /// Unit geometric normal of the front side.
     pub normal: Vec3,
@@ -22,7 +22,7 @@ pub struct SurfacePoint {
     pub emission: Vec3,
     /// Rough specular lobe.
     pub lobe: Option<Lobe>,
-    /// Object index (inserted objects follow the scene's).
+    /// Object index (inserted objects come after the scene's).
     pub object: u32,
     /// Triangle index within its mesh.
     pub triangle: u32,
@@ -30,7 +30,7 @@ pub struct SurfacePoint {
     pub t: f32,
 }
 
-/// A point drawn on an emitter.
+/// A point sampled on an emitter.
 #[derive(Debug, Clone, Copy)]
 pub struct EmitterSample {
     /// Position.
@@ -41,16 +41,16 @@ pub struct EmitterSample {
     pub normal: Vec3,
     /// Emitted radiance.
     pub radiance: Vec3,
-    /// Density per square metre, the choice of emitter included.
+    /// Pdf per square metre, including the choice of emitter.
     pub pdf: f32,
     /// Object index.
     pub object: u32,
 }
 
-/// Sine of the angle that a bent shading normal keeps above the view's horizon.
+/// Minimum cosine between a corrected shading normal and the viewing direction.
 pub const NORMAL_MARGIN: f32 = 0.01;
 
-/// The shading normal, bent just far enough that `wo` sees its front where it sees the geometric normal's.
+/// The shading normal, bent minimally so that it faces `wo` on the side on which the geometric normal does.
 pub fn towards_viewer(shading: Vec3, geometric: Vec3, wo: Vec3) -> Vec3 {
     let side = if geometric.dot(wo) < 0.0 { -wo } else { wo };
     let cos = shading.dot(side);
@@ -60,24 +60,23 @@ pub fn towards_viewer(shading: Vec3, geometric: Vec3, wo: Vec3) -> Vec3 {
     (shading + side * (NORMAL_MARGIN - cos)).normalize_or(geometric)
 }
 
-/// Geometry, materials and emitters: all that the path tracer needs to know.
+/// Geometry, materials and emitters, as the path tracer needs them.
 pub trait World: Sync {
     /// The nearest surface along a ray.
     fn intersect(&self, ray: &Ray) -> Option<SurfacePoint>;
 
-    /// Whether anything lies on the ray between its ends.
+    /// Whether anything blocks the ray between its ends.
     fn occluded(&self, ray: &Ray) -> bool;
 
-    /// Draws a point on an emitter, from one uniform number for the choice and two for the point.
-    /// `None` where nothing emits.
+    /// Samples a point on an emitter from one uniform number for the choice and two for the point. `None` if nothing emits.
     fn sample_emitter(&self, choice: f64, u: [f32; 2]) -> Option<EmitterSample>;
 
-    /// Density per square metre with which [`World::sample_emitter`] draws a point of this surface.
+    /// Pdf per square metre of [`World::sample_emitter`] for a point of this surface.
     fn emitter_pdf(&self, surface: &SurfacePoint) -> f32;
 
-    /// Whether [`World::sample_emitter`] can draw anything.
+    /// Whether [`World::sample_emitter`] can return a sample.
     fn has_emitters(&self) -> bool;
 
-    /// Light from outside the mesh, met by rays that escape.
+    /// Environment light, hit by rays that escape.
     fn environment(&self) -> Option<&Environment>;
 }

@@ -106,16 +106,16 @@ impl OutsideGrid {
     }
 
     /// The surface of a unit direction of the map.
-    pub fn surface(&self, looked_up: Vec3) -> u32 {
-        self.first + pixel_of(self.width, self.height, looked_up) as u32
+    pub fn surface(&self, map_direction: Vec3) -> u32 {
+        self.first + pixel_of(self.width, self.height, map_direction) as u32
     }
 
     /// The vertex at which a path ends that leaves along a ray.
     fn vertex(&self, ray: &Ray, weight: f32) -> Vertex {
-        let looked_up = self.surroundings.looked_up(ray.origin, ray.direction);
+        let map_direction = self.surroundings.map_direction(ray.origin, ray.direction);
         Vertex {
             emission_weight: weight,
-            ..Vertex::on(self.surface(looked_up))
+            ..Vertex::on(self.surface(map_direction))
         }
     }
 }

@@ -1,0 +1,95 @@
+//! Feature buffers of the denoisers: what each pixel sees.
+
+use crate::scene::camera::Camera;
+use crate::scene::geometry::Ray;
+use crate::transport::world::World;
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+/// The features of a pixel: what it sees at one point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Guide {
+    /// Surface point in scene coordinates.
+    pub point: Vec3,
+    /// Unit normal.
+    pub normal: Vec3,
+    /// Distance from the camera in metres.
+    pub depth: f32,
+    /// Diffuse reflectance.
+    pub albedo: Vec3,
+    /// Emitted radiance towards the camera.
+    pub emission: Vec3,
+    /// Object index.
+    pub object: u32,
+}
+
+/// Candidate positions in a pixel: its centre, then a ring.
+const OFFSETS: [[f32; 2]; 9] = [
+    [0.5, 0.5],
+    [0.25, 0.25],
+    [0.75, 0.75],
+    [0.75, 0.25],
+    [0.25, 0.75],
+    [0.5, 0.1],
+    [0.5, 0.9],
+    [0.1, 0.5],
+    [0.9, 0.5],
+];
+
+/// The features of all pixels of a camera at their centres. Albedo is averaged over the part of the pixel on the same object.
+pub fn guides(world: &impl World, camera: &Camera) -> Vec<Option<Guide>> {
+    let center = OFFSETS[0];
+    guides_of(world, camera, |_, ray_at| Some(ray_at(center)))
+}
+
+/// [`guides`] at the first of a few points of each pixel whose ray satisfies `wanted`.
+pub fn guides_where(
+    world: &impl World,
+    camera: &Camera,
+    wanted: impl Fn(usize, &Ray) -> bool + Sync,
+) -> Vec<Option<Guide>> {
+    guides_of(world, camera, |pixel, ray_at| {
+        let mut rays = OFFSETS.into_iter().map(ray_at);
+        rays.find(|ray| wanted(pixel, ray))
+    })
+}
+
+/// The features of all pixels along the ray that `choose` returns for each.
+fn guides_of(
+    world: &impl World,
+    camera: &Camera,
+    choose: impl Fn(usize, &dyn Fn([f32; 2]) -> Ray) -> Option<Ray> + Sync,
+) -> Vec<Option<Guide>> {
+    let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
+    let guide = |pixel: u32| {
+        let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+        let ray_at = |offset: [f32; 2]| camera.ray(corner + Vec2::from(offset));
+        let ray = choose(pixel as usize, &ray_at)?;
+        let seen = world.intersect(&ray)?;
+        let towards = -ray.direction.normalize_or_zero();
+        let front = seen.normal.dot(towards) > 0.0;
+        let around = [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]];
+        let (mut albedo, mut taps) = (seen.albedo, 1.0);
+        for offset in around.map(Vec2::from_array) {
+            let beside = world.intersect(&camera.ray(corner + offset));
+            if let Some(beside) = beside.filter(|b| b.object == seen.object) {
+                albedo += beside.albedo;
+                taps += 1.0;
+            }
+        }
+        let normal = if front {
+            seen.shading_normal
+        } else {
+            -seen.shading_normal
+        };
+        Some(Guide {
+            point: seen.point,
+            normal,
+            depth: seen.point.distance(camera.center),
+            albedo: albedo / taps,
+            emission: if front { seen.emission } else { Vec3::ZERO },
+            object: seen.object,
+        })
+    };
+    (0..width * height).into_par_iter().map(guide).collect()
+}
