@@ -1,15 +1,15 @@
-//! The graphics card: which there is, its device, and what goes wrong with it.
+//! The graphics card: selection of an adapter, its device, and its errors.
 
 use crate::error::{Error, Result};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// Which adapters will do.
+/// Accepted adapters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Adapters {
-    /// Graphics cards, in a chip of their own or the processor's.
+    /// Graphics cards, discrete or integrated.
     Cards,
-    /// Programs that do a card's work on the processor, too.
+    /// Software adapters, too.
     Any,
 }
 
@@ -22,11 +22,11 @@ pub struct Card {
     failure: Arc<Mutex<Option<String>>>,
 }
 
-/// A dispatch that has not come back after this has hung.
+/// Time after which a dispatch counts as hung.
 const TIMEOUT: Duration = Duration::from_secs(60);
 
 impl Card {
-    /// Opens the best adapter of those that will do; `None` where there is none that can trace paths.
+    /// Opens the best accepted adapter; `None` if none can trace paths.
     pub fn open(adapters: Adapters) -> Option<Self> {
         if adapters == Adapters::Cards && !may_have_card() {
             return None;
@@ -48,8 +48,8 @@ impl Card {
 
     fn of(adapter: &wgpu::Adapter) -> Option<Self> {
         let granted = adapter.limits();
-        // What WebGPU grants everywhere, with as much memory as there is: of a device below its standard ("downlevel") only the
-        // eight storage buffers are asked in addition.
+        // Limits that WebGPU guarantees, plus the adapter's full buffer sizes. Devices below the standard ("downlevel") need eight
+        // storage buffers in addition.
         let limits = wgpu::Limits {
             max_storage_buffers_per_shader_stage: 8,
             max_storage_buffer_binding_size: granted.max_storage_buffer_binding_size,
@@ -63,18 +63,18 @@ impl Card {
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&description)).ok()?;
         let failure: Arc<Mutex<Option<String>>> = Arc::default();
-        let note = |failure: &Mutex<Option<String>>, text: String| {
+        let record = |failure: &Mutex<Option<String>>, text: String| {
             if let Ok(mut failure) = failure.lock() {
                 failure.get_or_insert(text);
             }
         };
         let lost = failure.clone();
         device.set_device_lost_callback(move |_, text| {
-            note(&lost, format!("the device was lost ({})", one_line(&text)));
+            record(&lost, format!("the device was lost ({})", one_line(&text)));
         });
-        let wrong = failure.clone();
+        let uncaptured = failure.clone();
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            note(&wrong, one_line(&error.to_string()));
+            record(&uncaptured, one_line(&error.to_string()));
         }));
         Some(Self {
             name: adapter.get_info().name,
@@ -89,7 +89,7 @@ impl Card {
         &self.name
     }
 
-    /// Most bytes that one buffer may hold.
+    /// Maximum size of a buffer in bytes.
     pub(super) fn max_buffer(&self) -> u64 {
         let limits = self.device.limits();
         limits
@@ -97,14 +97,14 @@ impl Card {
             .min(limits.max_buffer_size)
     }
 
-    /// Gives the device back as if the driver had taken it; all further work fails.
+    /// Destroys the device, as a driver reset would; all further work fails.
     pub fn lose(&self) {
         self.device.destroy();
-        // The loss is heard at the next poll.
+        // The callback runs during a poll.
         let _ = self.device.poll(wgpu::PollType::Poll);
     }
 
-    /// Waits until the work submitted last is done.
+    /// Waits until a submission is done.
     pub(super) fn wait(&self, submission: wgpu::SubmissionIndex) -> Result<()> {
         let polled = self.device.poll(wgpu::PollType::Wait {
             submission_index: Some(submission),
@@ -117,7 +117,7 @@ impl Card {
         }
     }
 
-    /// Fails if anything has gone wrong so far.
+    /// Fails if an error was recorded.
     pub(super) fn check(&self) -> Result<()> {
         match self.failure.lock().map(|failure| failure.clone()) {
             Ok(None) => Ok(()),
@@ -126,7 +126,7 @@ impl Card {
         }
     }
 
-    /// Runs `make`, which asks for memory or pipelines; what goes wrong there is its error.
+    /// Runs `make` and returns its out-of-memory and validation errors.
     pub(super) fn attempt<T>(&self, make: impl FnOnce() -> T) -> Result<T> {
         self.check()?;
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
@@ -147,12 +147,12 @@ impl Card {
     }
 }
 
-/// Whether the system shows a graphics card at all, without asking drivers: those of software adapters take a while to start.
+/// Whether the system may have a graphics card, without loading drivers: software drivers start slowly.
 fn may_have_card() -> bool {
     if !cfg!(target_os = "linux") {
         return true;
     }
-    // Render nodes of the kernel's own drivers, of NVIDIA's, of Windows below, of phones' chips.
+    // Device nodes of NVIDIA, WSL, Mali and Adreno; other drivers have nodes in /dev/dri.
     let nodes = ["/dev/nvidia0", "/dev/dxg", "/dev/mali0", "/dev/kgsl-3d0"];
     let is_node = |name: std::ffi::OsString| name.to_string_lossy().starts_with("renderD");
     nodes.iter().any(|node| std::path::Path::new(node).exists())
@@ -160,7 +160,7 @@ fn may_have_card() -> bool {
             .is_ok_and(|mut folder| folder.any(|e| e.is_ok_and(|e| is_node(e.file_name()))))
 }
 
-/// Order of preference; `None` where an adapter will not do.
+/// Order of preference; `None` for adapters that are not accepted.
 fn rank(info: &wgpu::AdapterInfo, adapters: Adapters) -> Option<u8> {
     match info.device_type {
         wgpu::DeviceType::DiscreteGpu => Some(0),
@@ -171,7 +171,7 @@ fn rank(info: &wgpu::AdapterInfo, adapters: Adapters) -> Option<u8> {
     }
 }
 
-/// Drivers' messages run over many lines.
+/// A driver's message on one line.
 fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }

@@ -1,4 +1,4 @@
-//! The hierarchy that the card traverses: the binary one, flattened.
+//! The card's hierarchy: the binary one as buffers.
 
 use crate::scene::bvh::Tree;
 use glam::Vec3;
@@ -6,23 +6,23 @@ use glam::Vec3;
 /// Nodes and the order of the triangles in their leaves.
 #[derive(Debug, Default)]
 pub(super) struct Hierarchy {
-    /// Two entries a node: low corner and first child or triangle, high corner and number of triangles (0 in inner nodes). A
-    /// node's second child follows its first.
+    /// Two entries per node: low corner and first child or triangle; high corner and number of triangles (0 in inner nodes). The second
+    /// child follows the first.
     pub nodes: Vec<[u32; 4]>,
-    /// Indices into the triangles given.
+    /// Triangle indices in the order of the leaves.
     pub order: Vec<u32>,
-    /// Entries that a traversal's stack can need.
+    /// Maximum number of stack entries of a traversal.
     pub stack_size: u32,
 }
 
 impl Hierarchy {
-    /// The hierarchy over triangles by their corners. Those with corners that are not finite are left out.
+    /// The hierarchy over triangles; those with non-finite corners are left out.
     pub fn new(corners: &[[Vec3; 3]]) -> Self {
         let tree = Tree::new(corners);
         let Some(root) = tree.nodes.first() else {
-            return Self::nothing();
+            return Self::empty();
         };
-        // Boxes grow by the rounding of the largest coordinate, so that rays within their faces meet them.
+        // Enlarge boxes by the rounding error of the largest coordinate, so that rays within their faces hit them.
         let margin = root.low.abs().max(root.high.abs()).max_element() * 2.0 * f32::EPSILON;
         let nodes = tree.nodes.iter().flat_map(|node| {
             [
@@ -37,8 +37,8 @@ impl Hierarchy {
         }
     }
 
-    /// One box that no ray meets.
-    fn nothing() -> Self {
+    /// One box that no ray hits.
+    fn empty() -> Self {
         let (low, high) = (Vec3::splat(f32::MAX), Vec3::splat(-f32::MAX));
         Self {
             nodes: vec![entry(low, 0), entry(high, 1)],

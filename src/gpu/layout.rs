@@ -1,25 +1,25 @@
-//! What processor and card share: structs laid out once, and the constants of the shader.
+//! Definitions shared by processor and shader: structs with one layout, bindings and constants.
 
 use bytemuck::{Pod, Zeroable};
 use std::fmt::Write;
 
-/// Threads of a workgroup.
+/// Threads per workgroup.
 pub(super) const WORKGROUP: u32 = 64;
-/// No triangle, no table.
+/// Marks a missing triangle or table.
 pub(super) const NONE: u32 = u32::MAX;
-/// Words of four that hold a triangle: three corners and the normal.
+/// Four-component words per triangle: three corners and the normal.
 pub(super) const TRIANGLE_WORDS: usize = 4;
-/// How an albedo is stored.
+/// Kind of albedo: a constant colour.
 pub(super) const ALBEDO_CONSTANT: u32 = 0;
-/// One colour a texel.
+/// Kind of albedo: one colour per texel.
 pub(super) const ALBEDO_TEXELS: u32 = 1;
-/// An image times a constant.
+/// Kind of albedo: an image times a constant.
 pub(super) const ALBEDO_IMAGE: u32 = 2;
 
-/// A field that has the same bytes on both sides.
+/// A type with the same bytes in Rust and WGSL.
 trait Shared {
     const WGSL: &'static str;
-    /// What WGSL aligns it to.
+    /// Alignment in WGSL.
     const ALIGNMENT: usize;
 }
 
@@ -33,7 +33,7 @@ impl Shared for [u32; 4] {
     const ALIGNMENT: usize = 16;
 }
 
-/// Defines structs for both sides; their fields lie where WGSL puts them, or it does not compile.
+/// Defines structs for Rust and WGSL; compilation fails if fields are not at WGSL's offsets.
 macro_rules! shared {
     ($($(#[$about:meta])* struct $name:ident { $($(#[$field_about:meta])* $field:ident: $kind:ty,)* })*) => {
         $(
@@ -62,7 +62,7 @@ macro_rules! shared {
 }
 
 shared! {
-    /// What a dispatch is to trace.
+    /// Parameters of a dispatch.
     struct Dispatch {
         /// The camera's centre.
         center: [f32; 4],
@@ -78,43 +78,43 @@ shared! {
         distortion: [f32; 4],
         /// Hash of seed and frame, the low word first.
         key: [u32; 4],
-        /// Width of the picture, first pixel, end of the pixels, first sample.
+        /// Width of the picture, first pixel, end of pixels, first sample.
         slice: [u32; 4],
-        /// Samples, most bounces, bounces before Russian roulette, the pixel that the film begins with.
+        /// Number of samples, maximum bounces, bounces before Russian roulette, first pixel of the film buffer.
         paths: [u32; 4],
-        /// Emitting objects, unused, width and height of the light from outside (0 where there is none).
+        /// Number of emitting objects, unused, width and height of the environment map (0 without one).
         lights: [u32; 4],
         /// Probability of sampling an emitter of the mesh rather than the environment.
         emitter_fraction: [f32; 4],
     }
 
-    /// What a triangle is made of.
+    /// A material.
     struct Material {
         /// Constant albedo, or factor on the image.
         albedo: [f32; 4],
-        /// Emitted radiance, and the density per square metre of light sampling.
+        /// Emitted radiance, and the pdf per square metre of light sampling.
         emission: [f32; 4],
         /// Specular reflectance at normal incidence, and the roughness (negative without a lobe).
         specular: [f32; 4],
-        /// How the albedo is stored, and where: texel table and colours, or image and corner coordinates.
+        /// Kind of albedo, and indices into `data`: texel table and colours, or image and texture coordinates.
         kind: [u32; 4],
-        /// Size of the image, and the index of the first triangle that the tables know.
+        /// Size of the image, and the index of the first triangle in the tables.
         image: [u32; 4],
-        /// Where normals and colours of the corners are stored, or [`NONE`].
+        /// Indices into `data` of corner normals and corner colours, or [`NONE`].
         corners: [u32; 4],
     }
 
-    /// What was found for one pixel.
+    /// The sums of one pixel.
     struct Pixel {
-        /// Sum of radiance, and samples that see an inserted object first.
+        /// Sum of radiance, and number of samples whose first hit is an inserted object.
         over: [f32; 4],
         /// Sum of radiance without the inserted objects.
         under: [f32; 4],
-        /// Sum of radiance of the samples that see an inserted object first.
+        /// Sum of radiance of the samples whose first hit is an inserted object.
         covered: [f32; 4],
         /// The same without the inserted objects.
         covered_under: [f32; 4],
-        /// Rays, rejected samples, unused, samples that the objects change.
+        /// Numbers of rays, of rejected samples, unused, and of samples that the objects change.
         counts: [u32; 4],
     }
 }
@@ -124,9 +124,9 @@ pub(super) fn head(stack_size: u32) -> String {
     use crate::scene::geometry::OFFSET_GAMMA;
     use crate::transport::bsdf::{COUPLING_SLOPE, coupling_scale};
     use crate::transport::path::RR_MAX_SURVIVAL;
-    // Three roundings of a slab, as on the processor.
+    // Rounding errors of slab distances, as on the processor.
     let widen = 1.0 + 8.0 * f32::EPSILON;
-    // Two products and a difference, each off by half an epsilon.
+    // Rounding errors of two products and a difference.
     let rounding = 2.0 * f32::EPSILON;
     let mut text = String::new();
     for (name, value) in [
@@ -167,10 +167,10 @@ pub(super) fn head(stack_size: u32) -> String {
     text
 }
 
-/// The binding that is written.
+/// The writable binding.
 pub(super) const FILM: &str = "film";
 
-/// The storage bindings behind the uniform one, with their elements. Eight are what WebGPU grants everywhere.
+/// The storage bindings after the uniform one, with their element types. WebGPU guarantees eight.
 pub(super) const BINDINGS: [(&str, &str); 8] = [
     ("nodes", "vec4<u32>"),
     ("triangles", "vec4<u32>"),

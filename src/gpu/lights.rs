@@ -1,32 +1,32 @@
-//! Emitters and light from outside as tables of cumulative chances in whole numbers, which the shader compares exactly.
+//! Emitters and environment as tables of cumulative probabilities in integers, which the shader compares exactly.
 
 use crate::gpu::layout::NONE;
 use crate::transport::environment::{Environment, row_cosines};
 use crate::transport::lit::Lit;
 
-/// Bits of the number that chooses an object or a pixel of the light from outside.
+/// Bits of the random number that selects an object or an environment pixel.
 const CHOICE_BITS: i32 = 53;
-/// Bits of the number that chooses a triangle.
+/// Bits of the random number that selects a triangle.
 const TRIANGLE_BITS: i32 = 48;
 
-/// Objects that can be drawn, then their triangles: (low word, high word, first entry or slot, number of entries).
+/// Objects with positive probability, then their triangles: (low word, high word, first entry or slot, number of entries).
 #[derive(Debug, Default)]
 pub(super) struct Emitters {
     /// The entries.
     pub entries: Vec<[u32; 4]>,
-    /// How many of them are objects.
+    /// Number of objects among them.
     pub objects: u32,
 }
 
 impl Emitters {
-    /// The emitters of a scene whose triangles lie at `slot_of` ([`NONE`] where one can never be hit).
+    /// The emitters of a scene; `slot_of` is the slot of each triangle ([`NONE`] for triangles that cannot be hit).
     pub fn new(lit: &Lit, slot_of: &[u32]) -> Self {
-        let chance = |object: usize| lit.emitters.probability(object);
+        let probability = |object: usize| lit.emitters.probability(object);
         let drawn: Vec<usize> = (0..lit.scene.objects.len())
-            .filter(|&object| chance(object) > 0.0 && lit.emitters.pdf(object as u32) > 0.0)
+            .filter(|&object| probability(object) > 0.0 && lit.emitters.pdf(object as u32) > 0.0)
             .collect();
-        let chances: Vec<f64> = drawn.iter().map(|&object| chance(object)).collect();
-        let chosen = thresholds(&chances, CHOICE_BITS);
+        let probabilities: Vec<f64> = drawn.iter().map(|&object| probability(object)).collect();
+        let chosen = thresholds(&probabilities, CHOICE_BITS);
         let mut entries = vec![[0; 4]; drawn.len()];
         for (index, (&object, threshold)) in drawn.iter().zip(chosen).enumerate() {
             let first = entries.len() as u32;
@@ -53,7 +53,7 @@ impl Emitters {
     }
 }
 
-/// The light from outside: radiances with densities, cumulative chances, cosines of the rows' edges.
+/// The environment: radiance and pdf per pixel, cumulative probability per pixel, cosines of the edges per row.
 pub(super) fn environment(map: &Environment) -> Vec<[u32; 4]> {
     let [width, height] = map.size();
     let mut words: Vec<[u32; 4]> = (map.pixels().iter().enumerate())
@@ -63,10 +63,10 @@ pub(super) fn environment(map: &Environment) -> Vec<[u32; 4]> {
         })
         .collect();
     let before = std::iter::once(0.0).chain(map.cumulative().iter().copied());
-    let chances: Vec<f64> = (map.cumulative().iter().zip(before))
+    let weights: Vec<f64> = (map.cumulative().iter().zip(before))
         .map(|(sum, before)| sum - before)
         .collect();
-    let drawn = thresholds(&chances, CHOICE_BITS);
+    let drawn = thresholds(&weights, CHOICE_BITS);
     words.extend(drawn.into_iter().map(|threshold| entry(threshold, 0, 0)));
     words.extend((0..height).map(|row| {
         let (top, bottom) = row_cosines(row, height);
@@ -76,16 +76,16 @@ pub(super) fn environment(map: &Environment) -> Vec<[u32; 4]> {
     words
 }
 
-/// Cumulative chances in units of 2^-bits; the last is 1 where there is any chance.
-fn thresholds(chances: &[f64], bits: i32) -> Vec<u64> {
-    let total: f64 = chances.iter().sum();
+/// Cumulative probabilities of weights in units of 2^-bits; the last is 1 if any weight is positive.
+fn thresholds(weights: &[f64], bits: i32) -> Vec<u64> {
+    let total: f64 = weights.iter().sum();
     let scale = 2f64.powi(bits);
     let mut sum = 0.0;
-    let mut threshold = |chance: &f64| {
-        sum += chance;
+    let mut threshold = |weight: &f64| {
+        sum += weight;
         (sum / total * scale).ceil() as u64
     };
-    chances.iter().map(&mut threshold).collect()
+    weights.iter().map(&mut threshold).collect()
 }
 
 fn entry(threshold: u64, third: u32, fourth: u32) -> [u32; 4] {

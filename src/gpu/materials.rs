@@ -1,8 +1,8 @@
-//! Materials and their tables as the shader reads them.
+//! Materials and their tables in the shader's layout.
 
+use crate::gpu::inserted::Inserted;
 use crate::gpu::layout::Material as Shared;
 use crate::gpu::layout::{ALBEDO_CONSTANT, ALBEDO_IMAGE, ALBEDO_TEXELS, NONE};
-use crate::gpu::scene::Inserted;
 use crate::transport::bsdf::MIN_ROUGHNESS;
 use crate::transport::lit::Lit;
 use crate::transport::material::{Albedo, Material};
@@ -10,47 +10,47 @@ use glam::Vec3;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Materials, and the words that they point into.
+/// Materials and the data that they refer to.
 #[derive(Debug, Default)]
 pub(super) struct Materials {
-    /// One an object of the scene, then those of each inserted object.
+    /// One per object of the scene, then those of each inserted object.
     pub materials: Vec<Shared>,
     /// Tables of colours, texels, coordinates and normals.
     pub data: Vec<u32>,
-    /// Where tables that several materials share are stored, by their address.
+    /// Index of each stored table by its address: materials share tables.
     stored: HashMap<usize, u32>,
 }
 
 impl Materials {
-    /// The materials of a scene, each with the density of light sampling.
+    /// The materials of a scene, with the pdf of light sampling.
     pub fn new(lit: &Lit) -> Self {
         let mut all = Self::default();
         for (object, material) in lit.materials.iter().enumerate() {
-            let mut shared = all.shared(material, 0);
+            let mut packed = all.pack(material, 0);
             let density = lit.emitters.pdf(object as u32);
-            shared.emission = with(material.emission, density);
-            all.materials.push(shared);
+            packed.emission = with(material.emission, density);
+            all.materials.push(packed);
         }
         all
     }
 
-    /// Adds those of an inserted object, whose triangles follow `first` others; returns the index of the first one.
+    /// Adds the materials of an inserted object whose first triangle has index `first`; returns the index of its first material.
     pub fn insert(&mut self, object: &Inserted<'_>, first: u32) -> u32 {
         let index = self.materials.len() as u32;
         let normals = self.corners(object.corner_normals);
         let colors = self.corners(object.corner_colors);
         for material in object.materials {
-            let shared = self.shared(material, first);
+            let packed = self.pack(material, first);
             self.materials.push(Shared {
                 corners: [normals, colors, 0, 0],
-                ..shared
+                ..packed
             });
         }
         index
     }
 
-    /// A material without emission.
-    fn shared(&mut self, material: &Material, first: u32) -> Shared {
+    /// Packs a material without emission.
+    fn pack(&mut self, material: &Material, first: u32) -> Shared {
         let (albedo, kind, size) = match &material.albedo {
             Albedo::Constant(color) => (*color, [ALBEDO_CONSTANT, 0, 0, 0], [0; 2]),
             Albedo::Texels(texels) => {
@@ -82,7 +82,7 @@ impl Materials {
         }
     }
 
-    /// Values at the corners of triangles; [`NONE`] where there are none.
+    /// Stores values at the corners of triangles; returns their index, or [`NONE`] if there are none.
     fn corners(&mut self, values: &[[Vec3; 3]]) -> u32 {
         if values.is_empty() {
             return NONE;
@@ -93,7 +93,7 @@ impl Materials {
         place
     }
 
-    /// Stores a table once and returns where.
+    /// Stores a table once; returns its index.
     fn table<T, const N: usize>(&mut self, items: &[T], words: impl Fn(&T) -> [u32; N]) -> u32 {
         let place = self.data.len() as u32;
         let stored = *self.stored.entry(items.as_ptr() as usize).or_insert(place);

@@ -1,21 +1,22 @@
-//! Paths traced by a graphics card: the estimator of [`crate::transport::path`] in WGSL, by compute shaders alone.
+//! The path tracer on a graphics card: the estimator of [`crate::transport::path`] in WGSL compute shaders.
 //!
 //! ```text
-//! card       adapters, the device, its failures
-//! layout     what both sides share: structs and constants, written into the shader's text
-//! shaders/   the path tracer, modules with the names of `transport`
-//! hierarchy  the binary hierarchy, flattened
-//! scene      triangles, materials and lights as the shader reads them
+//! card       adapters, the device, its errors
+//! layout     structs and constants shared with the shader
+//! shaders/   the path tracer, in modules named as in `transport`
+//! hierarchy  the binary hierarchy as buffers
+//! scene      triangles, materials and lights in the shader's layout
 //! tracer     a scene on the card: pictures, pairs of pictures, single rays
-//! pace       how much work a dispatch gets
+//! pace       the amount of work per dispatch
 //! ```
 //!
-//! Random numbers are the processor's, key by key and bit for bit, so that a pixel's sample is the same path up to rounding.
-//! What the shader needs is what WebGPU grants on Vulkan, Metal and DX12: eight storage buffers, no feature. Every failure, the
-//! loss of the device included, is an error value; whoever called goes on with the processor.
+//! Random numbers are bit-identical to the processor's, so each sample is the same path up to rounding. The shader needs only what
+//! WebGPU guarantees on Vulkan, Metal and DX12: eight storage buffers and no features. Every failure, including the loss of the
+//! device, is an error value, after which callers continue on the processor.
 
 mod card;
 mod hierarchy;
+mod inserted;
 mod layout;
 mod lights;
 mod materials;
@@ -25,5 +26,5 @@ mod shader;
 mod tracer;
 
 pub use card::{Adapters, Card};
-pub use scene::Inserted;
+pub use inserted::Inserted;
 pub use tracer::{PairSums, Tracer, View};

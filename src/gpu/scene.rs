@@ -1,33 +1,16 @@
-//! A lit scene with inserted objects as the shader reads it: triangles in the order of the hierarchy, materials, lights.
+//! A lit scene with inserted objects in the shader's layout: triangles in the order of the hierarchy, materials, lights.
 
 use crate::gpu::hierarchy::Hierarchy;
+use crate::gpu::inserted::Inserted;
 use crate::gpu::layout::Material as Shared;
 use crate::gpu::layout::{Dispatch, NONE};
 use crate::gpu::lights::{Emitters, environment};
 use crate::gpu::materials::Materials;
 use crate::transport::lit::Lit;
-use crate::transport::material::Material;
 use crate::transport::path::emitter_fraction;
 use glam::Vec3;
 
-/// An object put into a scene, in the scene's coordinates.
-#[derive(Debug, Clone, Copy)]
-pub struct Inserted<'a> {
-    /// Corners of each triangle.
-    pub corners: &'a [[Vec3; 3]],
-    /// Unit geometric normal of each triangle's front.
-    pub normals: &'a [Vec3],
-    /// Unit shading normals at the corners; empty where there are none.
-    pub corner_normals: &'a [[Vec3; 3]],
-    /// Factors on the albedo at the corners; empty where there are none.
-    pub corner_colors: &'a [[Vec3; 3]],
-    /// For each triangle, an index into `materials`.
-    pub material_of: &'a [u32],
-    /// What it is made of; emission does not count.
-    pub materials: &'a [Material],
-}
-
-/// All storage buffers of a scene, on the processor's side.
+/// The contents of a scene's storage buffers.
 #[derive(Debug)]
 pub(super) struct Packed {
     pub nodes: Vec<[u32; 4]>,
@@ -36,9 +19,9 @@ pub(super) struct Packed {
     pub data: Vec<u32>,
     pub emitters: Vec<[u32; 4]>,
     pub environment: Vec<[u32; 4]>,
-    /// Entries of a traversal's stack.
+    /// Maximum number of stack entries of a traversal.
     pub stack_size: u32,
-    /// What a dispatch says of the scene; the rest is zero.
+    /// The scene's part of the dispatch parameters; the rest is zero.
     pub dispatch: Dispatch,
 }
 

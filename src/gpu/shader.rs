@@ -1,8 +1,8 @@
-//! The shader's text: a head written from the shared definitions, then its modules.
+//! The shader's source: a generated head of shared definitions, then the modules.
 
 use crate::gpu::layout::head;
 
-/// The modules, in any order that reads well.
+/// The modules; their order does not matter.
 const MODULES: [&str; 10] = [
     include_str!("shaders/random.wgsl"),
     include_str!("shaders/hierarchy.wgsl"),
@@ -20,14 +20,14 @@ const MODULES: [&str; 10] = [
     ),
 ];
 
-/// What one thread can do, each an entry point.
+/// The entry points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kernel {
-    /// Radiance of a pixel.
+    /// Accumulates radiance of a pixel.
     Render,
-    /// Radiance of a pixel with and without inserted objects.
+    /// Accumulates radiance of a pixel with and without inserted objects.
     Insert,
-    /// A ray's hit.
+    /// Intersects a ray.
     Trace,
 }
 
@@ -42,7 +42,7 @@ impl Kernel {
     }
 }
 
-/// The whole text, for hierarchies whose traversal needs at most `stack_size` entries.
+/// The source for traversals with a stack of `stack_size` entries.
 pub(super) fn source(stack_size: u32) -> String {
     let mut text = head(stack_size);
     for module in MODULES {

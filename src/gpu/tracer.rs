@@ -2,9 +2,10 @@
 
 use crate::error::Result;
 use crate::gpu::card::Card;
+use crate::gpu::inserted::Inserted;
 use crate::gpu::layout::{BINDINGS, Dispatch, FILM, Pixel, WORKGROUP};
 use crate::gpu::pace::Pace;
-use crate::gpu::scene::{Inserted, Packed};
+use crate::gpu::scene::Packed;
 use crate::gpu::shader::{Kernel, source};
 use crate::math::rng::splitmix64;
 use crate::scene::camera::Camera;
@@ -18,40 +19,40 @@ use glam::{DVec3, Vec3};
 use std::ops::Range;
 use std::time::Instant;
 
-/// Samples that are summed in single precision before the sums are taken over in double.
+/// Samples summed in f32 on the card before the sums are added in f64.
 const CHUNK: u32 = 16;
 
-/// What is looked at, and how paths are traced.
+/// A camera and how its paths are traced.
 #[derive(Debug, Clone, Copy)]
 pub struct View<'a> {
     /// The camera.
     pub camera: &'a Camera,
-    /// Depth of paths; emitters and the BSDF are both sampled.
+    /// Depth of paths; the switches of emitter and BSDF sampling are ignored (both are on).
     pub options: &'a PathOptions,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// The frame, which keys them too.
+    /// The frame, also part of the key.
     pub frame: u64,
 }
 
-/// What pairs of paths through one pixel found, with the inserted objects and without them.
+/// Sums over pairs of paths through one pixel, with and without the inserted objects.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PairSums {
     /// Sum of radiance with the objects.
     pub with: DVec3,
     /// Sum of radiance without them.
     pub without: DVec3,
-    /// The same of the samples that saw an object first.
+    /// Sum of radiance with the objects, over samples whose first hit is an inserted object.
     pub covered_with: DVec3,
-    /// Without them.
+    /// Sum of radiance without the objects, over the same samples.
     pub covered_without: DVec3,
-    /// Samples that saw an object first.
+    /// Number of samples whose first hit is an inserted object.
     pub covered: u32,
-    /// Whether any sample differed.
+    /// Whether any sample differs.
     pub changed: bool,
     /// Rays cast.
     pub rays: u32,
-    /// Samples dropped because they came out non-finite.
+    /// Samples dropped because they were not finite.
     pub rejected: u32,
 }
 
@@ -69,15 +70,14 @@ pub struct Tracer {
 }
 
 impl Tracer {
-    /// Takes a scene with inserted objects onto the card.
+    /// Uploads a scene with inserted objects.
     ///
     /// # Errors
     /// The scene does not fit, or the card failed.
     pub fn new(card: &Card, lit: &Lit, objects: &[Inserted<'_>]) -> Result<Self> {
         if (lit.outside.as_ref()).is_some_and(|map| map.surroundings() != Surroundings::Far) {
-            return Err(
-                card.failed("light from a box around the mesh is the processor's alone".to_owned())
-            );
+            return Err(card
+                .failed("an environment on a box is supported on the processor only".to_owned()));
         }
         let packed = Packed::new(lit, objects);
         let contents: [&[u8]; 7] = [
@@ -94,9 +94,9 @@ impl Tracer {
         for (bytes, (name, _)) in contents.iter().zip(BINDINGS) {
             if bytes.len() as u64 > card.max_buffer() {
                 let size = bytes.len() >> 20;
-                let most = card.max_buffer() >> 20;
+                let max = card.max_buffer() >> 20;
                 return Err(card.failed(format!(
-                    "the scene's {name} take {size} MiB, of which it grants {most}"
+                    "the scene's {name} take {size} MiB, but a buffer may have {max}"
                 )));
             }
         }
@@ -132,7 +132,7 @@ impl Tracer {
         })
     }
 
-    /// Adds `samples` paths to every pixel of a film, keyed as [`Film::add`] keys them; after an error it is as it was.
+    /// Adds `samples` paths to every pixel of a film, keyed as in [`Film::add`]; after an error the film is unchanged.
     ///
     /// # Errors
     /// The card failed.
@@ -155,7 +155,7 @@ impl Tracer {
         Ok(())
     }
 
-    /// A picture from `samples` paths a pixel.
+    /// A picture from `samples` paths per pixel.
     ///
     /// # Errors
     /// The card failed.
@@ -165,7 +165,7 @@ impl Tracer {
         Ok(film)
     }
 
-    /// Pairs of paths with and without the inserted objects through each pixel of a range, for a range of samples.
+    /// Traces pairs of paths with and without the inserted objects, for ranges of pixels and samples.
     ///
     /// # Errors
     /// The card failed.
@@ -192,7 +192,7 @@ impl Tracer {
         Ok(sums)
     }
 
-    /// The nearest hit of each ray, inserted objects' triangles counted behind the scene's; with `any`, some hit. Rays start at 0.
+    /// The nearest hit of each ray, or any hit if `any`. Triangles of inserted objects count after the scene's; `t_min` is taken as 0.
     ///
     /// # Errors
     /// The rays do not fit, or the card failed.
@@ -241,11 +241,11 @@ impl Tracer {
         samples: Range<u32>,
         add: impl FnMut(u32, &Pixel),
     ) -> Result<()> {
-        let description = described(self.description, view);
+        let description = with_view(self.description, view);
         self.dispatch_all(kernel, description, pixels, samples, add)
     }
 
-    /// Traces samples of pixels, slice by slice; `add` hears the sums of up to [`CHUNK`] samples of each pixel.
+    /// Traces samples of pixels in bands and chunks; `add` gets the sums of up to [`CHUNK`] samples of each pixel.
     fn dispatch_all(
         &mut self,
         kernel: Kernel,
@@ -275,7 +275,7 @@ impl Tracer {
         Ok(())
     }
 
-    /// Dispatches that add some samples to the film.
+    /// Submits the dispatches that add a range of samples of a band to the film buffer.
     fn slices(
         &mut self,
         pipeline: &wgpu::ComputePipeline,
@@ -308,7 +308,7 @@ impl Tracer {
             let start = Instant::now();
             let submission = card.queue.submit([encoder.finish()]);
             card.wait(submission)?;
-            self.pace.took((end - pixel) * taken, start.elapsed());
+            self.pace.record((end - pixel) * taken, start.elapsed());
             pixel = end;
             if pixel == band.end {
                 (pixel, sample) = (band.start, sample + taken);
@@ -328,7 +328,7 @@ impl Tracer {
             let _ = send.send(mapped.is_ok());
         });
         card.wait(submission)?;
-        let failed = || card.failed("what it traced cannot be read back".to_owned());
+        let failed = || card.failed("its results cannot be read back".to_owned());
         if !receive.try_recv().unwrap_or(false) {
             return Err(failed());
         }
@@ -358,7 +358,7 @@ impl Tracer {
             })
     }
 
-    /// The pipeline of a kernel, compiled when first asked for.
+    /// The pipeline of a kernel, compiled at first use.
     fn pipeline(&mut self, kernel: Kernel) -> Result<wgpu::ComputePipeline> {
         if let Some((_, pipeline)) = self.pipelines.iter().find(|(k, _)| *k == kernel) {
             return Ok(pipeline.clone());
@@ -384,8 +384,8 @@ impl Tracer {
     }
 }
 
-/// A dispatch's description with the view in it.
-fn described(scene: Dispatch, view: &View<'_>) -> Dispatch {
+/// Adds a view to the scene's dispatch parameters.
+fn with_view(scene: Dispatch, view: &View<'_>) -> Dispatch {
     let k = &view.camera.intrinsics;
     let axes = view.camera.rotation;
     let key = splitmix64(splitmix64(view.seed) ^ view.frame);
@@ -403,9 +403,9 @@ fn described(scene: Dispatch, view: &View<'_>) -> Dispatch {
     }
 }
 
-/// A buffer that the shader reads: its memory is asked for, then written.
+/// Creates a read-only storage buffer.
 fn storage(card: &Card, bytes: &[u8]) -> Result<wgpu::Buffer> {
-    /// A binding must hold one element at least.
+    /// Content of empty buffers: a binding must hold at least one element.
     const NOTHING: [u8; size_of::<super::layout::Material>()] =
         [0; size_of::<super::layout::Material>()];
     let bytes = if bytes.is_empty() { &NOTHING } else { bytes };
@@ -421,7 +421,7 @@ fn storage(card: &Card, bytes: &[u8]) -> Result<wgpu::Buffer> {
     Ok(buffer)
 }
 
-/// The buffer that the shader adds to, and the one that is read.
+/// The film buffer of the shader, and the buffer to read it back.
 fn film_buffers(device: &wgpu::Device, pixels: u32) -> (wgpu::Buffer, wgpu::Buffer) {
     let buffer = |usage| {
         device.create_buffer(&wgpu::BufferDescriptor {

@@ -1,16 +1,16 @@
-//! What paths are to be traced by.
+//! The `--device` option.
 
 use std::str::FromStr;
 
-/// What a person asks for.
+/// The device that traces paths.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Device {
-    /// A graphics card where there is one; software adapters are none.
+    /// A graphics card if there is one (not a software adapter), else the processor.
     #[default]
     Auto,
     /// The processor.
     Cpu,
-    /// Any graphics adapter, a software one too.
+    /// Any graphics adapter, including software ones.
     Gpu,
 }
 
@@ -22,7 +22,7 @@ impl FromStr for Device {
             "auto" => Ok(Self::Auto),
             "cpu" => Ok(Self::Cpu),
             "gpu" => Ok(Self::Gpu),
-            _ => Err("auto, cpu or gpu is wanted".to_owned()),
+            _ => Err("expected auto, cpu or gpu".to_owned()),
         }
     }
 }

@@ -1,7 +1,7 @@
-//! Pictures of one lit scene.
+//! Renders pictures of one lit scene.
 
 use crate::gpu::{Tracer, View};
-use crate::render::{Renderer, went_wrong};
+use crate::render::renderer::{Renderer, warn_card_failed};
 use crate::scene::camera::Camera;
 use crate::transport::film::Film;
 use crate::transport::lit::Lit;
@@ -15,7 +15,7 @@ pub struct Pictures<'a> {
 }
 
 impl<'a> Pictures<'a> {
-    /// Views of a scene, by the card if the renderer has one that takes it.
+    /// Renders a scene on the card if the renderer has one that accepts it.
     pub fn new(renderer: &Renderer, lit: &'a Lit) -> Self {
         Self {
             lit,
@@ -23,8 +23,8 @@ impl<'a> Pictures<'a> {
         }
     }
 
-    /// A picture from `samples` paths a pixel, keyed by (seed, frame). A card that fails costs a line, and the processor renders the
-    /// picture and all later ones.
+    /// A picture from `samples` paths per pixel, keyed by (seed, frame). If the card fails, a warning is written and the processor
+    /// renders this picture and all later ones.
     pub fn film(
         &mut self,
         camera: &Camera,
@@ -41,7 +41,7 @@ impl<'a> Pictures<'a> {
         if let Some(tracer) = &mut self.tracer {
             match tracer.film(&view, samples) {
                 Ok(film) => return film,
-                Err(error) => went_wrong(&error),
+                Err(error) => warn_card_failed(&error),
             }
             self.tracer = None;
         }

@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::gpu::{self, Tracer};
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
-use crate::render::{Renderer, went_wrong};
+use crate::render::{Renderer, warn_card_failed};
 use crate::session::library::{Inserted, Library};
 use crate::session::light::path_options;
 use crate::session::snapshot::OpenCapture;
@@ -279,7 +279,7 @@ fn on_card<W, C>(
 ) -> Option<bool> {
     let done = refine(work, card.as_mut()?);
     if let Err(error) = &done {
-        went_wrong(error);
+        warn_card_failed(error);
         *card = None;
     }
     done.ok()

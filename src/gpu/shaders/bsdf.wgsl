@@ -1,11 +1,11 @@
-// Scattering at a surface point: a diffuse base, and over it a rough specular lobe where there is one. Directions are local:
-// their z axis is the normal on the side of `wo`.
+// The BSDF (`transport::bsdf`): a diffuse base under an optional rough specular lobe. Directions are local: the z axis is the
+// normal on the side of `wo`.
 
 struct BsdfSample {
     wi: vec3<f32>,
     // f(wo, wi) cosθi / pdf.
     weight: vec3<f32>,
-    // Density per solid angle; zero where the sample carries nothing.
+    // Pdf per solid angle; zero for samples that contribute nothing.
     pdf: f32,
 }
 
@@ -35,23 +35,23 @@ fn cosine_hemisphere(u: vec2<f32>) -> vec3<f32> {
     return vec3<f32>(disk, sqrt(max(1.0 - dot(disk, disk), 0.0)));
 }
 
-// Upper bound of the fraction of light that a lobe with no reflectance at normal incidence reflects.
+// Upper bound of the directional reflectance of a lobe with F0 = 0.
 fn reflected(cosine: f32) -> f32 {
     return fifth(1.0 - COUPLING_SLOPE * cosine);
 }
 
-// The base's f cosθi for unit albedo, before the factor (1 − specular reflectance at normal incidence).
+// f cosθi of the base for unit albedo, without the factor (1 − F0).
 fn coupling(wo: vec3<f32>, wi: vec3<f32>) -> f32 {
     return COUPLING_SCALE * wi.z * (1.0 - reflected(wo.z)) * (1.0 - reflected(wi.z));
 }
 
-// At least the fraction of light that the lobe reflects to `wo`, mean over the channels.
+// Probability of sampling the lobe.
 fn lobe_fraction(surface: Surface, wo: vec3<f32>) -> f32 {
     let specular = (surface.specular.x + surface.specular.y + surface.specular.z) / 3.0;
     return specular + (1.0 - specular) * reflected(wo.z);
 }
 
-// f(wo, wi) cosθi and, as w, the density with which `bsdf_sample` draws `wi`; zero at or below the horizon.
+// f(wo, wi) cosθi and, in w, the pdf of `bsdf_sample`; zero at or below the horizon.
 fn bsdf_eval(surface: Surface, wo: vec3<f32>, wi: vec3<f32>) -> vec4<f32> {
     if wo.z <= 0.0 || wi.z <= 0.0 {
         return vec4<f32>(0.0);
@@ -67,7 +67,7 @@ fn bsdf_eval(surface: Surface, wo: vec3<f32>, wi: vec3<f32>) -> vec4<f32> {
     return vec4<f32>(value, fraction * microfacet_pdf(m) + (1.0 - fraction) * base);
 }
 
-// Draws a direction: `choice` decides between lobe and base, `u` the direction.
+// Samples a direction: `choice` selects lobe or base, `u` the direction.
 fn bsdf_sample(surface: Surface, wo: vec3<f32>, choice: f32, u: vec2<f32>) -> BsdfSample {
     if wo.z <= 0.0 {
         return BsdfSample(vec3<f32>(0.0), vec3<f32>(0.0), 0.0);

@@ -1,14 +1,14 @@
-// Which emitter to sample: an object by its weight, then a triangle by its area. Both are tables of cumulative chances as
+// Emitter sampling: an object by its weight, then a triangle by its area. Both are tables of cumulative probabilities as
 // 64-bit integers: (low word, high word, first or slot, count), in units of 2⁻⁵³ for objects and of 2⁻⁴⁸ for triangles.
 
 struct LightSample {
     // Unit direction.
     wi: vec3<f32>,
-    // Radiance that arrives from there where nothing is in between.
+    // Unoccluded radiance.
     radiance: vec3<f32>,
-    // Density per solid angle; zero where there is none.
+    // Pdf per solid angle; zero without a sample.
     pdf: f32,
-    // What must be free.
+    // Shadow ray.
     ray: Ray,
 }
 
@@ -17,7 +17,7 @@ fn no_light() -> LightSample {
     return LightSample(nowhere, nowhere, 0.0, Ray(nowhere, nowhere, 0.0));
 }
 
-// The first entry from `first` whose cumulative chance is above `target_bits`; the last where none is.
+// The first entry from `first` whose cumulative probability exceeds `target_bits`, else the last.
 fn draw_entry(first: u32, count: u32, target_bits: vec2<u32>) -> u32 {
     var low = first;
     var high = first + count - 1u;
@@ -40,10 +40,10 @@ fn uniform_triangle(u: vec2<f32>) -> vec2<f32> {
     return vec2<f32>(u.x - 0.5 * u.y, 0.5 * u.y);
 }
 
-// A point on an emitter's front side as seen from a surface, from 53 bits for the choice and two numbers for the point.
+// Samples a point on an emitter's front for a surface point, from 53 bits for the choice and two numbers for the point.
 fn sample_emitter(surface: Surface, choice: vec2<u32>, u: vec2<f32>) -> LightSample {
     let object = emitters[draw_entry(0u, dispatch.lights.x, choice)];
-    // The last bits of the choice continue the 24 of the first number.
+    // The lowest bits of the choice extend the 24 bits of the first number.
     let bits = u32(u.x * 16777216.0);
     let target_bits = vec2<u32>((bits << 24u) | (choice.x & 0xffffffu), bits >> 8u);
     let drawn = draw_entry(object.z, object.w, target_bits);

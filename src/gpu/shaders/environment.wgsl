@@ -1,5 +1,5 @@
-// Light from outside the mesh, a map of directions whose pole is the y axis. `environment` holds, a pixel, its radiance and
-// density per solid angle; then, a pixel, its cumulative chance in units of 2⁻⁵³; then, a row, the cosines of its edges.
+// The environment map, with its pole on the y axis. `environment` holds radiance and pdf per solid angle of each pixel, then the
+// cumulative probability of each pixel in units of 2⁻⁵³, then the cosines of the edges of each row.
 
 fn environment_pixel(direction: vec3<f32>) -> u32 {
     let width = dispatch.lights.z;
@@ -13,7 +13,7 @@ fn environment_pixel(direction: vec3<f32>) -> u32 {
     return row * width + column;
 }
 
-// Radiance from a direction and its density per solid angle.
+// Radiance of a pixel and its pdf per solid angle.
 fn environment_at(pixel: u32) -> vec4<f32> {
     return bitcast<vec4<f32>>(environment[pixel]);
 }
@@ -31,7 +31,7 @@ fn sample_environment(surface: Surface, choice: vec2<u32>, u: vec2<f32>) -> Ligh
             low = middle + 1u;
         }
     }
-    // Uniform in solid angle within the pixel: uniform in cosθ and φ.
+    // Sample uniformly by solid angle within the pixel: uniformly in cosθ and φ.
     let edges = bitcast<vec2<f32>>(environment[2u * pixels + low / width].xy);
     let y = mix(edges.x, edges.y, u.x);
     let r = sqrt(max(1.0 - y * y, 0.0));

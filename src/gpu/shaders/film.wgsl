@@ -1,4 +1,4 @@
-// Pictures from paths: a slice of pixels and samples a dispatch, each thread the samples of one pixel.
+// Accumulates path samples; each dispatch covers a slice of pixels and samples, each thread one pixel.
 
 // The ray through a point of the image plane, in pixels from the top-left corner (`scene::camera`).
 fn camera_ray(pixel: vec2<f32>) -> Ray {
@@ -29,7 +29,7 @@ fn undistorted(image: vec2<f32>) -> vec2<f32> {
     return p;
 }
 
-// The pixel of a thread; NONE where it has none.
+// The pixel of a thread; NONE beyond the slice.
 fn pixel_of(thread: u32) -> u32 {
     let pixel = dispatch.slice.y + thread;
     return select(NONE, pixel, pixel < dispatch.slice.z);
@@ -47,7 +47,7 @@ fn render(@builtin(global_invocation_id) id: vec3<u32>) {
     if pixel == NONE {
         return;
     }
-    furnished = true;
+    with_inserted = true;
     for (var i = 0u; i < dispatch.paths.x; i += 1u) {
         let path = radiance(begin_sample(pixel, dispatch.slice.w + i));
         film[pixel - dispatch.paths.w].over += vec4<f32>(path.radiance, 0.0);
@@ -65,23 +65,23 @@ fn insert(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var i = 0u; i < dispatch.paths.x; i += 1u) {
         let ray = begin_sample(pixel, dispatch.slice.w + i);
         let state = stream_state;
-        furnished = true;
+        with_inserted = true;
         let first = traverse(ray, false);
         var covered = false;
         if first.slot != NONE {
             covered = is_inserted(first.slot);
         }
-        touched = false;
+        affected = false;
         let with_objects = radiance(ray);
-        // A path that met no object would be the same without them.
+        // A path that no object affected is the same without them.
         var without = with_objects;
         without.rays = 0u;
-        if touched {
+        if affected {
             stream_state = state;
-            furnished = false;
+            with_inserted = false;
             without = radiance(ray);
         }
-        // A pair is dropped as a whole, or the difference would be biased.
+        // Drop pairs as a whole, else the difference would be biased.
         let rejected = with_objects.rejected || without.rejected;
         let keep = select(1.0, 0.0, rejected);
         let over = with_objects.radiance * keep;

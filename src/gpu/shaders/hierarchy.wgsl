@@ -1,4 +1,4 @@
-// The nearest and any hit in a binary hierarchy. Node i is nodes[2 i] (low corner, first) and nodes[2 i + 1] (high
+// Nearest-hit and any-hit traversal of a binary hierarchy. Node i is nodes[2 i] (low corner, first) and nodes[2 i + 1] (high
 // corner, count): a leaf holds `count` triangles from `first`, an inner node has its children at `first` and `first + 1`.
 
 struct Ray {
@@ -10,7 +10,7 @@ struct Ray {
 
 struct Hit {
     t: f32,
-    // Place of the triangle in `triangles`; NONE where nothing is hit.
+    // Index into `triangles`; NONE without a hit.
     slot: u32,
     b1: f32,
     b2: f32,
@@ -18,11 +18,11 @@ struct Hit {
     index: u32,
 }
 
-// Whether rays meet the inserted objects, and whether one has changed the answer to any query.
-var<private> furnished: bool;
-var<private> touched: bool;
+// Whether rays hit inserted objects, and whether an inserted object was hit.
+var<private> with_inserted: bool;
+var<private> affected: bool;
 
-// A ray as the tests want it: axes in the order in which it is a z axis, its largest component last.
+// A ray, precomputed for the triangle test: axes permuted so that the direction's largest component is last, and the shear.
 struct Shear {
     axes: vec3<u32>,
     shear: vec3<f32>,
@@ -48,7 +48,7 @@ fn normal_of(slot: u32) -> vec3<f32> {
     return bitcast<vec3<f32>>(triangles[TRIANGLE_WORDS * slot + 3u].xyz);
 }
 
-// One over each component of a direction; where one is next to nothing, something huge of its sign.
+// The reciprocal of each component of a direction; tiny components are clamped, keeping their sign.
 fn reciprocal(direction: vec3<f32>) -> vec3<f32> {
     let size = abs(direction);
     let tiny = max(max(size.x, size.y), size.z) * 1e-12;
@@ -56,7 +56,7 @@ fn reciprocal(direction: vec3<f32>) -> vec3<f32> {
     return 1.0 / select(direction, signed_tiny, size < vec3<f32>(tiny));
 }
 
-// Where a ray enters a box, or FAR where it does not before `t_max`.
+// Entry distance of a box; FAR if it is not hit before `t_max`.
 fn enter(node: u32, ray: Ray, inverse: vec3<f32>, t_max: f32) -> f32 {
     let low = (bitcast<vec3<f32>>(nodes[2u * node].xyz) - ray.origin) * inverse;
     let high = (bitcast<vec3<f32>>(nodes[2u * node + 1u].xyz) - ray.origin) * inverse;
@@ -84,17 +84,17 @@ fn sheared(corner: vec3<f32>, ray: Ray, shear: Shear) -> vec3<f32> {
     return vec3<f32>(p[shear.axes.x] - shear.shear.x * z, p[shear.axes.y] - shear.shear.y * z, shear.shear.z * z);
 }
 
-// Twice the signed area that the ray's origin spans with an edge, and how far rounding, fused products included, may be off.
+// Twice the signed area of the triangle of the ray and an edge, and a bound on its rounding error, including fused products.
 fn edge(a: vec3<f32>, b: vec3<f32>) -> vec2<f32> {
     let first = a.x * b.y;
     let second = a.y * b.x;
     return vec2<f32>(first - second, (abs(first) + abs(second)) * ROUNDING);
 }
 
-// Keeps the hit of a triangle if it is the nearest so far, of equally near ones the lowest index.
+// Updates `nearest` with a triangle's hit; ties go to the lowest index.
 //
-// As Woop, Benthin and Wald 2013, but compilers may fuse products: an edge within rounding counts as inside for both of its
-// triangles, and weights are clamped to one sign, so that the hit stays within the triangle.
+// As in Woop, Benthin and Wald 2013, but compilers may fuse products: edge functions within the rounding error count as inside for
+// both triangles of an edge, and weights are clamped to one sign, so that the hit stays within the triangle.
 fn test_triangle(slot: u32, ray: Ray, shear: Shear, nearest: ptr<function, Hit>) {
     let a = sheared(corner_of(slot, 0u), ray, shear);
     let b = sheared(corner_of(slot, 1u), ray, shear);
@@ -136,7 +136,7 @@ fn traverse(ray: Ray, any_hit: bool) -> Hit {
         let count = nodes[2u * node + 1u].w;
         var descended = false;
         if count == 0u {
-            // Descend to the nearer child, leaving the other on the stack.
+            // Descend to the nearer child; push the other.
             let left = enter(first, ray, inverse, nearest.t);
             let right = enter(first + 1u, ray, inverse, nearest.t);
             if min(left, right) < FAR {
@@ -150,7 +150,7 @@ fn traverse(ray: Ray, any_hit: bool) -> Hit {
             }
         } else {
             for (var slot = first; slot < first + count; slot += 1u) {
-                if furnished || !is_inserted(slot) {
+                if with_inserted || !is_inserted(slot) {
                     test_triangle(slot, ray, shear, &nearest);
                 }
             }
@@ -161,7 +161,7 @@ fn traverse(ray: Ray, any_hit: bool) -> Hit {
         if descended {
             continue;
         }
-        // Take the next child; boxes that lie behind what was hit since fall out at their own children.
+        // Pop the next child. Boxes beyond the nearest hit are culled at their children.
         if depth == 0u {
             break;
         }
@@ -169,7 +169,7 @@ fn traverse(ray: Ray, any_hit: bool) -> Hit {
         node = stack[depth];
     }
     if nearest.slot != NONE && is_inserted(nearest.slot) {
-        touched = true;
+        affected = true;
     }
     return nearest;
 }
@@ -178,7 +178,7 @@ fn occluded(ray: Ray) -> bool {
     return traverse(ray, true).slot != NONE;
 }
 
-// Moves a surface point off its triangle, to the side of `w`, by the rounding error of the point (`scene::geometry`).
+// Offsets a surface point from its triangle to the side of `w` by the bound on its rounding error (`scene::geometry`).
 fn offset_origin(point: vec3<f32>, normal: vec3<f32>, slot: u32, w: vec3<f32>) -> vec3<f32> {
     let size = max(max(abs(corner_of(slot, 0u)), abs(corner_of(slot, 1u))), abs(corner_of(slot, 2u)));
     let distance = 2.0 * OFFSET_GAMMA * max(dot(size, abs(normal)), max(max(size.x, size.y), size.z) * 0.25);

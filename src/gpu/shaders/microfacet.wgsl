@@ -4,7 +4,7 @@ struct Microfacet {
     alpha: f32,
     wo: vec3<f32>,
     wi: vec3<f32>,
-    // Distribution's denominator: sin²θh / α² + cos²θh.
+    // Denominator of the distribution: sin²θh / α² + cos²θh.
     q: f32,
     // Schlick's (1 − wo · h)⁵.
     schlick: f32,
@@ -14,15 +14,15 @@ fn fifth(x: f32) -> f32 {
     return x * x * x * x * x;
 }
 
-// A unit direction whose z follows from the other two where it is the largest: their rounding is relative to their own size.
-fn upright(w: vec3<f32>) -> vec3<f32> {
+// Recomputes z of a unit direction from x and y where z is the largest: its rounding error would dominate theirs.
+fn renormalized_z(w: vec3<f32>) -> vec3<f32> {
     let rest = w.x * w.x + w.y * w.y;
     return vec3<f32>(w.xy, select(w.z, sqrt(max(1.0 - rest, 0.0)), rest < 0.5));
 }
 
 fn microfacet(alpha: f32, wo: vec3<f32>, wi: vec3<f32>) -> Microfacet {
-    let o = upright(wo);
-    let i = upright(wi);
+    let o = renormalized_z(wo);
+    let i = renormalized_z(wi);
     let h = normal_or(o + i, vec3<f32>(0.0, 0.0, 1.0));
     let slope = h.xy / alpha;
     let schlick = fifth(clamp(1.0 - 0.5 * dot(h, o + i), 0.0, 1.0));
@@ -46,14 +46,14 @@ fn microfacet_eval(m: Microfacet) -> f32 {
     return 0.5 * distribution(m) * m.wi.z / max(masking, SMALLEST);
 }
 
-// The density of reflection on a visible normal.
+// The pdf per solid angle of reflection on a visible normal.
 fn microfacet_pdf(m: Microfacet) -> f32 {
     return 0.5 * distribution(m) / max(m.wo.z + smith(m.alpha, m.wo), SMALLEST);
 }
 
-// `wo` reflected on a normal drawn from those that it sees; may point below the horizon.
+// Reflects `w` on a sampled visible normal; the result may point below the horizon.
 fn reflect_on_visible_normal(alpha: f32, w: vec3<f32>, u: vec2<f32>) -> vec3<f32> {
-    let wo = upright(w);
+    let wo = renormalized_z(w);
     let stretched = normal_or(vec3<f32>(alpha * wo.xy, wo.z), vec3<f32>(0.0, 0.0, 1.0));
     let z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
     let sine = sqrt(max(1.0 - z * z, 0.0));

@@ -6,7 +6,7 @@ struct Frame {
     n: vec3<f32>,
 }
 
-// What one path found.
+// The result of one path.
 struct PathSample {
     radiance: vec3<f32>,
     rays: u32,
@@ -33,7 +33,7 @@ fn to_world(f: Frame, v: vec3<f32>) -> vec3<f32> {
     return f.s * v.x + f.t * v.y + f.n * v.z;
 }
 
-// Weight of a sample drawn with density `a` where `b` could have drawn it too: power heuristic, β = 2.
+// MIS weight of a sample with pdf `a` against a technique with pdf `b`: power heuristic, β = 2.
 fn power_heuristic(a: f32, b: f32) -> f32 {
     if a <= 0.0 {
         return 0.0;
@@ -51,7 +51,7 @@ fn largest(v: vec3<f32>) -> f32 {
     return max(max(v.x, v.y), v.z);
 }
 
-// Light that reaches a surface straight from an emitter or from outside and is scattered towards `wo`: one light sample.
+// Direct light scattered towards `wo`, estimated by one light sample.
 fn direct_light(surface: Surface, local: Frame, wo: vec3<f32>, rays: ptr<function, u32>) -> vec3<f32> {
     let pick = uniform1();
     let choice = uniform53();
@@ -78,14 +78,14 @@ fn direct_light(surface: Surface, local: Frame, wo: vec3<f32>, rays: ptr<functio
     return scattered.xyz * light.radiance / light.pdf * power_heuristic(light.pdf, scattered.w);
 }
 
-// Radiance that arrives against a ray, estimated by one path.
+// Radiance along a camera ray, estimated by one path.
 fn radiance(camera_ray: Ray) -> PathSample {
     var ray = camera_ray;
     var throughput = vec3<f32>(1.0);
     var total = vec3<f32>(0.0);
     var rays = 0u;
     var bounce = 0u;
-    // Negative on the camera ray, which no light sample competes with.
+    // Negative for the camera ray, which has no competing light sample.
     var bsdf_pdf = -1.0;
     loop {
         // Find the next vertex.
@@ -101,7 +101,7 @@ fn radiance(camera_ray: Ray) -> PathSample {
         }
         let surface = surface_at(hit, ray);
 
-        // Add what it emits towards us.
+        // Add emission.
         let wo = -normal_or(ray.direction, vec3<f32>(0.0));
         let cos_emitter = dot(surface.normal, wo);
         if cos_emitter > 0.0 && any(surface.emission != vec3<f32>(0.0)) {
@@ -114,7 +114,7 @@ fn radiance(camera_ray: Ray) -> PathSample {
             break;
         }
 
-        // Sample light from emitters directly.
+        // Next-event estimation.
         let local = frame_around(surface.shading_normal * select(1.0, -1.0, cos_emitter < 0.0));
         let local_wo = to_local(local, wo);
         total += throughput * direct_light(surface, local, local_wo, &rays);
@@ -131,7 +131,7 @@ fn radiance(camera_ray: Ray) -> PathSample {
         bsdf_pdf = next.pdf;
         bounce += 1u;
 
-        // End paths that carry little, without bias.
+        // Russian roulette.
         if bounce > dispatch.paths.z {
             let survival = min(largest(throughput), RR_MAX_SURVIVAL);
             if survival <= 0.0 || uniform1() >= survival {

@@ -1,4 +1,4 @@
-// Rays on their own: (origin, t_max) and (direction, any) in, (t, b1, b2) and the triangle's index out.
+// Ray queries: reads (origin, t_max) and (direction, any), writes (t, b1, b2) and the triangle's index.
 
 @compute @workgroup_size(WORKGROUP)
 fn trace(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -6,7 +6,7 @@ fn trace(@builtin(global_invocation_id) id: vec3<u32>) {
     if index == NONE {
         return;
     }
-    furnished = true;
+    with_inserted = true;
     let start = rays[2u * index];
     let along = rays[2u * index + 1u];
     let hit = traverse(Ray(start.xyz, along.xyz, start.w), along.w != 0.0);

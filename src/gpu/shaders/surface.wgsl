@@ -1,4 +1,4 @@
-// What a hit met: its point, its frame and its material.
+// The surface point of a hit: position, normals and material.
 
 struct Surface {
     point: vec3<f32>,
@@ -6,10 +6,10 @@ struct Surface {
     shading_normal: vec3<f32>,
     albedo: vec3<f32>,
     emission: vec3<f32>,
-    // Density per square metre with which light sampling draws the point.
+    // Pdf per square metre of light sampling.
     emitter_pdf: f32,
     specular: vec3<f32>,
-    // Negative where there is no lobe.
+    // Negative without a lobe.
     roughness: f32,
     slot: u32,
     t: f32,
@@ -28,13 +28,13 @@ fn color(at: u32) -> vec3<f32> {
     return vec3<f32>(number(at), number(at + 1u), number(at + 2u));
 }
 
-// A value at a hit from those at the corners, nine numbers a triangle.
+// Interpolates RGB values at the corners, nine numbers per triangle.
 fn interpolated(at: u32, triangle: u32, hit: Hit) -> vec3<f32> {
     let first = at + 9u * triangle;
     return color(first) * (1.0 - hit.b1 - hit.b2) + color(first + 3u) * hit.b1 + color(first + 6u) * hit.b2;
 }
 
-// The shading normal, bent just far enough that `wo` sees its front where it sees the geometric normal's.
+// The shading normal, bent minimally so that it faces `wo` on the side on which the geometric normal does.
 fn towards_viewer(shading: vec3<f32>, geometric: vec3<f32>, wo: vec3<f32>) -> vec3<f32> {
     let side = select(wo, -wo, dot(geometric, wo) < 0.0);
     let cosine = dot(shading, side);
@@ -48,7 +48,7 @@ fn surface_at(hit: Hit, ray: Ray) -> Surface {
     let slot = hit.slot;
     let material = materials[material_of(slot)];
     let normal = normal_of(slot);
-    // Inserted objects count their triangles from their own first.
+    // Tables of inserted objects start at their own first triangle.
     let triangle = hit.index - material.image.z;
     var surface: Surface;
     surface.point = corner_of(slot, 0u) * (1.0 - hit.b1 - hit.b2) + corner_of(slot, 1u) * hit.b1 + corner_of(slot, 2u) * hit.b2;

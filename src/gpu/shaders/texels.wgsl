@@ -1,4 +1,4 @@
-// Diffuse reflectance over a triangle: one colour, texel cells, or an image.
+// Albedo at a hit: a constant, a texel, or an image.
 
 fn albedo_at(material: Material, triangle: u32, hit: Hit) -> vec3<f32> {
     if material.kind.x == ALBEDO_TEXELS {
@@ -10,14 +10,14 @@ fn albedo_at(material: Material, triangle: u32, hit: Hit) -> vec3<f32> {
     return material.albedo.xyz;
 }
 
-// The texel that a hit lies in; `table` holds each triangle's first one, and one past the last.
+// The texel of a hit; `table` holds each triangle's first texel, and the total number at the end.
 fn texel_of(table: u32, triangle: u32, hit: Hit) -> u32 {
     let first = data[table + triangle];
     let count = data[table + triangle + 1u] - first;
     if count <= 1u {
         return first;
     }
-    // A triangle of 4^level texels is cut into n = 2^level strips along b2.
+    // A triangle with 4^level texels has n = 2^level strips along b2.
     let n = 1u << (firstLeadingBit(count) / 2u);
     let along = vec2<f32>(hit.b1, hit.b2) * f32(n);
     let row = min(u32(along.y), n - 1u);
@@ -41,7 +41,7 @@ fn image_pixel(material: Material, at: vec2<i32>) -> vec3<f32> {
     return color(material.kind.y + 3u * u32(pixel));
 }
 
-// Bilinear lookup at a hit, the image repeated over the plane.
+// Bilinear lookup at a hit in the tiled image.
 fn image_at(material: Material, triangle: u32, hit: Hit) -> vec3<f32> {
     let corners = material.kind.z + 6u * triangle;
     let uv = corner_uv(corners) * (1.0 - hit.b1 - hit.b2) + corner_uv(corners + 2u) * hit.b1 + corner_uv(corners + 4u) * hit.b2;
