@@ -47,7 +47,7 @@ fn a_scan_without_objects_is_cut_into_segments_and_reduced_to_a_budget() {
     };
     let capture = read(&folder, &ReadOptions::default()).unwrap();
     assert_eq!(capture.mesh.triangles.len(), 309_026);
-    assert!(capture.cut.is_some() && capture.mesh.objects.len() == 1);
+    assert!(capture.segmentation.is_some() && capture.mesh.objects.len() == 1);
     let open = open(&Source::Folder(folder), &OpenOptions::default()).unwrap();
     // 158 were seen, and a twentieth more or fewer are as good.
     let segments = open.capture.mesh.objects.len();

@@ -318,7 +318,7 @@ fn telephones_write_eight_bits_at_exposures_that_differ_and_dim_the_corners() {
 fn scans_have_no_objects_and_a_mesh_with_holes_near_the_true_one() {
     let room = Family::Scanned.generate(1, TINY).expect("a room");
     assert_eq!(room.capture.mesh.objects.len(), 1);
-    assert!(room.capture.cut.is_some() && room.truth().objects.is_empty());
+    assert!(room.capture.segmentation.is_some() && room.truth().objects.is_empty());
     let fused = Scene::new(&room.capture).expect("a scene");
     let (mut off, mut missed) = (Vec::new(), 0);
     for (index, frame) in room.capture.frames.iter().enumerate() {

@@ -79,7 +79,7 @@ fn capture(groups: &[(&str, Vec<[DVec3; 3]>)]) -> Capture {
     Capture {
         name: "test".to_owned(),
         folder: None,
-        cut: None,
+        segmentation: None,
         mesh,
         frames: vec![Frame {
             intrinsics: Intrinsics {

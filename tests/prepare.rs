@@ -62,7 +62,7 @@ fn capture(rectangles: &[(f64, f64, f64, bool)], frame: Frame) -> Capture {
     Capture {
         name: "test".into(),
         folder: None,
-        cut: None,
+        segmentation: None,
         mesh,
         frames: vec![frame],
         up: DVec3::Y,

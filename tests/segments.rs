@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use relit::calibrate::held_out::HoldOut;
 use relit::capture::mesh::Mesh;
 use relit::capture::photograph::{Encoding, Photograph};
-use relit::capture::{Capture, Cut};
+use relit::capture::{Capture, Segmentation};
 use relit::math::color::{linear_to_srgb, srgb_to_linear};
 use relit::room::Room;
 use relit::room::cameras::View;
@@ -23,7 +23,7 @@ const BLIND: HoldOut = HoldOut {
 };
 
 fn open_cut(mut capture: Capture, wanted: Option<usize>, hold_out: HoldOut) -> OpenCapture {
-    capture.cut = Some(Cut {
+    capture.segmentation = Some(Segmentation {
         file: "mesh.ply".into(),
         wanted,
     });

@@ -7,7 +7,7 @@ use crate::calibrate::problem::Problem;
 use crate::capture::photograph::BELOW_SATURATION;
 use crate::capture::segment::{ShownFace, segment};
 use crate::capture::working::Working;
-use crate::capture::{Capture, Cut};
+use crate::capture::{Capture, Segmentation};
 use crate::error::Result;
 use crate::scene::prepare::prepare;
 use glam::DVec3;
@@ -56,7 +56,7 @@ pub fn shown(problem: &Problem, hold_out: HoldOut) -> Vec<ShownFace> {
 /// The mesh has no triangle with an area, or no photograph sees the mesh.
 pub fn cut_up(
     capture: &mut Capture,
-    cut: &Cut,
+    cut: &Segmentation,
     working: &Working,
     hold_out: HoldOut,
 ) -> Result<()> {

@@ -38,7 +38,7 @@ pub struct Capture {
     /// Triangles grouped in objects.
     pub mesh: Mesh,
     /// How to segment a mesh without objects. The reader does not segment it.
-    pub cut: Option<Cut>,
+    pub segmentation: Option<Segmentation>,
     /// Posed photographs, in the order of transforms.json.
     pub frames: Vec<Frame>,
     /// Unit up vector: the cameras' mean up unless overruled.
@@ -49,7 +49,7 @@ pub struct Capture {
 
 /// How to segment a mesh without objects (see [`segment`]).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Cut {
+pub struct Segmentation {
     /// The mesh's file.
     pub file: PathBuf,
     /// The number of segments that the person gave.

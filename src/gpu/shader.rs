@@ -51,3 +51,24 @@ pub(super) fn source(stack_size: u32) -> String {
     }
     text
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wgpu::naga::front::wgsl::parse_str;
+    use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
+
+    #[test]
+    fn the_shader_is_valid_without_an_adapter() {
+        let text = source(32);
+        let parsed = parse_str(&text).map_err(|error| error.emit_to_string(&text));
+        let module = parsed.unwrap_or_else(|error| panic!("{error}"));
+        let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+        let valid = validator.validate(&module);
+        assert!(valid.is_ok(), "{valid:?}");
+        for kernel in [Kernel::Render, Kernel::Insert, Kernel::Trace] {
+            let mut entries = module.entry_points.iter();
+            assert!(entries.any(|entry| entry.name == kernel.entry()));
+        }
+    }
+}

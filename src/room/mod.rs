@@ -61,7 +61,7 @@ impl Room {
         Capture {
             name: self.name.clone(),
             folder: None,
-            cut: None,
+            segmentation: None,
             mesh: self.mesh.clone(),
             frames: cameras
                 .into_iter()

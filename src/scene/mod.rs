@@ -128,7 +128,7 @@ impl Scene {
             cameras,
             up: capture.up.as_vec3(),
             diameter: (high - low).length() as f32,
-            scanned: capture.cut.is_some(),
+            scanned: capture.segmentation.is_some(),
             bvh,
             ids: OnceLock::new(),
         })

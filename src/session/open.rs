@@ -60,7 +60,7 @@ impl OpenCapture {
         if let Some(alignment) = &alignment {
             leave_out_astray(&capture, &mut working, &alignment.astray);
         }
-        if let Some(cut) = capture.cut.clone() {
+        if let Some(cut) = capture.segmentation.clone() {
             cut_up(&mut capture, &cut, &working, options.hold_out)?;
         }
         regroup(&mut capture.mesh, &options.objects)?;

@@ -103,7 +103,7 @@ pub fn room() -> Capture {
     let mut capture = Capture {
         name: "tiny".to_owned(),
         folder: None,
-        cut: None,
+        segmentation: None,
         mesh,
         frames: frames.to_vec(),
         up: DVec3::Y,

@@ -48,7 +48,7 @@ fn lit(positions: Vec<DVec3>) -> Lit {
     let capture = Capture {
         name: "soup".into(),
         folder: None,
-        cut: None,
+        segmentation: None,
         frames: vec![frame],
         mesh,
         up: DVec3::Y,

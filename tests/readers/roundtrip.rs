@@ -45,7 +45,7 @@ fn capture() -> Capture {
     Capture {
         name: "test".into(),
         folder: None,
-        cut: None,
+        segmentation: None,
         mesh: Mesh {
             positions: (0..6)
                 .map(|i| DVec3::new(third + f64::from(i), f64::from(i * i) * third, 1e6 * third))

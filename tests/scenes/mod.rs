@@ -241,7 +241,7 @@ pub fn capture(mesh: Mesh, views: &[View], [width, height]: [u32; 2]) -> Capture
     Capture {
         name: "test".into(),
         folder: None,
-        cut: None,
+        segmentation: None,
         frames: frames.collect(),
         mesh,
         up: DVec3::Y,

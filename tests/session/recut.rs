@@ -2,7 +2,7 @@
 
 use crate::{ROOM, Rig, common, iterations};
 use relit::calibrate::held_out::HoldOut;
-use relit::capture::{Capture, Cut};
+use relit::capture::{Capture, Segmentation};
 use relit::error::Error;
 use relit::inverse::settings::Settings;
 use relit::session::command::Command;
@@ -14,7 +14,7 @@ fn whole() -> Capture {
     let mut capture = ROOM.clone();
     capture.mesh.object_of.fill(0);
     capture.mesh.objects.truncate(1);
-    capture.cut = Some(Cut {
+    capture.segmentation = Some(Segmentation {
         file: "mesh.ply".into(),
         wanted: Some(common::truth().objects.len()),
     });

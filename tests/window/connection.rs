@@ -140,7 +140,7 @@ pub fn room() -> OpenCapture {
     let capture = Capture {
         name: "small room".into(),
         folder: None,
-        cut: None,
+        segmentation: None,
         mesh: Mesh {
             positions: vec![
                 corner(-1.0, 0.0, 1.0),

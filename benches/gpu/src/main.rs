@@ -197,7 +197,7 @@ fn lit(scene: &Scene) -> Lit {
     let capture = Capture {
         name: "bench".into(),
         folder: None,
-        cut: None,
+        segmentation: None,
         frames: vec![frame],
         mesh,
         up: DVec3::Y,

@@ -35,7 +35,7 @@ pub mod tests {
         let capture = Capture {
             name: "corner".into(),
             folder: None,
-            cut: None,
+            segmentation: None,
             mesh: Mesh {
                 positions: vec![
                     corner(-1.0, 0.0, 1.0),

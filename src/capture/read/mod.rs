@@ -32,7 +32,7 @@ mod transforms;
 
 use crate::capture::read::raw_mesh::RawMesh;
 use crate::capture::reading::Reading;
-use crate::capture::{Capture, Cut};
+use crate::capture::{Capture, Segmentation};
 use crate::error::{Error, Result};
 use confine::Confine;
 use glam::DVec3;
@@ -80,12 +80,12 @@ pub fn read(folder: &Path, options: &ReadOptions) -> Result<Capture> {
         &mut warnings,
     )?;
     let raw = mesh::read(&transforms.mesh, &confine, &mut warnings)?;
-    let cut = cut(&raw, &transforms.mesh, options.segments, &mut warnings);
+    let segmentation = segmentation(&raw, &transforms.mesh, options.segments, &mut warnings);
     let capture = Capture {
         name: name_of(folder),
         folder: Some(folder.to_path_buf()),
         mesh: raw.mesh,
-        cut,
+        segmentation,
         frames: transforms.frames,
         up: transforms.up,
         warnings,
@@ -94,12 +94,12 @@ pub fn read(folder: &Path, options: &ReadOptions) -> Result<Capture> {
 }
 
 /// How to segment the mesh, if it has no objects. A single object with many triangles counts as none.
-fn cut(
+fn segmentation(
     raw: &RawMesh,
     path: &Path,
     wanted: Option<usize>,
     warnings: &mut Vec<String>,
-) -> Option<Cut> {
+) -> Option<Segmentation> {
     let mesh = &raw.mesh;
     let whole = !raw.has_objects
         || (mesh.objects.len() == 1 && mesh.triangles.len() > MAX_TRIANGLES_OF_ONE_OBJECT);
@@ -114,7 +114,7 @@ fn cut(
             None
         }
         None if !whole => None,
-        _ => Some(Cut {
+        _ => Some(Segmentation {
             file: path.to_path_buf(),
             wanted,
         }),

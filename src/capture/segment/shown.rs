@@ -230,10 +230,10 @@ mod tests {
     fn what_no_pixel_sees_is_as_what_is_around_it_and_much_seen_faces_stay() {
         let unseen = ShownFace::default();
         let (colors, _) = strip(&[face(4.0, 0.0, 4000), unseen, unseen, face(1.0, 0.0, 4000)]);
-        let told: Vec<f64> = colors.iter().map(|c| c.x).collect();
+        let found: Vec<f64> = colors.iter().map(|c| c.x).collect();
         let expected = [2.0, 2.0, 1.0, 1.0];
-        for (told, expected) in told.iter().zip(expected) {
-            assert!((told - expected).abs() < 0.01, "{told} {expected}");
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 0.01, "{found} {expected}");
         }
         // One pixel alone is not believed.
         let (colors, _) = strip(&[face(4.0, 0.0, 9), face(0.0, 0.0, 1), face(4.0, 0.0, 9)]);

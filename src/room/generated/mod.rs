@@ -38,7 +38,7 @@ pub struct Generated {
     pub family: Family,
     /// Its seed.
     pub seed: u64,
-    /// What a solver is given: mesh and photographs in memory. Where `capture.cut` is set, the mesh is to be cut into segments as
+    /// What a solver is given: mesh and photographs in memory. Where `capture.segmentation` is set, the mesh is to be cut into segments as
     /// for any scan.
     pub capture: Capture,
     /// The true room, in which the photographs were rendered: its geometry, materials, light and cameras. Frames are in the
@@ -49,7 +49,7 @@ pub struct Generated {
 impl Generated {
     /// What is true of each object by name; empty where the capture's mesh has no objects.
     pub fn truth(&self) -> Truth {
-        let objects = match self.capture.cut {
+        let objects = match self.capture.segmentation {
             Some(_) => BTreeMap::new(),
             None => truth::objects(&self.lit),
         };

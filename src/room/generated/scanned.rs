@@ -1,6 +1,6 @@
 //! Rooms as a scan shows them: photographs of a telephone, and a mesh fused from noisy depth images.
 
-use crate::capture::Cut;
+use crate::capture::Segmentation;
 use crate::capture::camera::Pose;
 use crate::capture::fuse::{MAX_BYTES, fuse};
 use crate::capture::import::{DepthImage, ImportedFrame, Lens};
@@ -91,7 +91,7 @@ pub fn scan(draft: Draft) -> Result<Generated> {
         frame.pose = imported.pose;
     }
     capture.mesh = fused.mesh;
-    capture.cut = Some(Cut {
+    capture.segmentation = Some(Segmentation {
         file: PathBuf::from("fused mesh"),
         wanted: None,
     });

@@ -64,7 +64,7 @@ impl Worker {
                 let open = self.capture.as_ref()?;
                 let hold_out = HoldOut::from(&self.settings);
                 // Segments that were changed by hand stay.
-                let is_cut = open.capture.cut.is_some() && open.options.objects.is_empty();
+                let is_cut = open.capture.segmentation.is_some() && open.options.objects.is_empty();
                 return Some(match is_cut && open.options.hold_out != hold_out {
                     true => Next::Recut(hold_out),
                     false => Next::Solve(None),

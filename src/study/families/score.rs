@@ -43,7 +43,7 @@ pub fn solved(family: Family, seed: u64, plan: &Plan) -> Result<Solved> {
     let room = family.generate(seed, plan.size)?;
     let mut capture = room.capture.clone();
     let working = load_working(&capture, u64::MAX)?;
-    if let Some(cut) = capture.cut.clone() {
+    if let Some(cut) = capture.segmentation.clone() {
         cut_up(&mut capture, &cut, &working, HoldOut::from(&settings))?;
     }
     let prepared = prepare(&capture, &working)?;
@@ -72,7 +72,7 @@ pub fn measure(family: Family, seed: u64, plan: &Plan) -> Result<Row> {
         solution,
     } = solved(family, seed, plan)?;
     let (scene, estimate) = (&problem.scene, &solution.estimate);
-    let truth = match room.capture.cut {
+    let truth = match room.capture.segmentation {
         Some(_) => segments::truth(&room, scene),
         None => room.truth(),
     };
