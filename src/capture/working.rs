@@ -58,7 +58,7 @@ pub fn load_working(capture: &Capture, max_pixels: u64) -> Result<Working> {
                 PhotographSource::Memory(_) => format!("frame {index}"),
             };
             warnings.push(format!(
-                "{place}: {invalid} pixels are negative or no finite number and are left out"
+                "{place}: {invalid} pixels are negative or not finite and are left out"
             ));
         }
         photographs.push(photograph);
@@ -66,7 +66,7 @@ pub fn load_working(capture: &Capture, max_pixels: u64) -> Result<Working> {
     if !photographs.iter().any(|photograph| holds_light(photograph)) {
         return Err(Error::new(
             &capture.name,
-            "no photograph holds light: all pixels are black, masked or no finite number",
+            "no photograph holds light: all pixels are black, masked or not finite",
             "check how the photographs were exported",
         ));
     }
@@ -161,7 +161,7 @@ fn reduce(photograph: &Photograph, factor: u32) -> Photograph {
                     let pixel = photograph.pixels[index];
                     sum += pixel.as_dvec3();
                     saturated |= photograph.saturated(index);
-                    usable &= photograph.usable.get(index).copied().unwrap_or(true);
+                    usable &= photograph.is_usable(index);
                 }
             }
             let mean = (sum / count).as_vec3();

@@ -60,7 +60,7 @@ pub fn turn_over(
     let mut own: Vec<Vec<f64>> = vec![Vec::new(); scene.objects.len()];
     for (photograph, triangles) in photographs.iter().zip(&ids.triangles) {
         for (index, (pixel, &triangle)) in photograph.pixels.iter().zip(triangles).enumerate() {
-            if triangle == NOTHING || !photograph.usable.get(index).copied().unwrap_or(true) {
+            if triangle == NOTHING || !photograph.is_usable(index) {
                 continue;
             }
             let object = scene.object_of[triangle as usize] as usize;

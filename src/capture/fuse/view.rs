@@ -103,7 +103,7 @@ impl View {
             return None;
         }
         let index = pixel.y as usize * width as usize + pixel.x as usize;
-        let usable = self.photograph.usable.get(index).copied().unwrap_or(true);
+        let usable = self.photograph.is_usable(index);
         usable.then(|| self.photograph.pixels[index])
     }
 }

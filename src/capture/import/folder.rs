@@ -105,7 +105,7 @@ impl Folder {
         if length > max {
             return Err(Error::file(
                 &file,
-                format!("{length} bytes are more than the {max} that are read"),
+                format!("has {length} bytes, more than the limit of {max}"),
                 "split the scan",
             ));
         }

@@ -98,7 +98,7 @@ pub fn rotation(x: f64, y: f64, z: f64, w: f64) -> Option<DMat3> {
 pub fn no_quaternion(place: &str) -> Error {
     Error::new(
         place,
-        "the quaternion has no length",
+        "the quaternion is zero",
         "correct the pose or leave the line out",
     )
 }

@@ -58,7 +58,7 @@ pub fn read(
     if options.up.is_some_and(|up| up.try_normalize().is_none()) {
         return Err(Error::usage(
             "--up",
-            "the up vector has no length",
+            "the up vector is zero",
             "give a direction, e.g. 0,0,1",
         ));
     }

@@ -252,7 +252,7 @@ fn check_size(path: &Path, width: u64, height: u64) -> Result<()> {
     if width.saturating_mul(height) > MAX_PIXELS {
         return Err(Error::file(
             path,
-            format!("claims {width}×{height} pixels, more than the {MAX_PIXELS} that are read"),
+            format!("claims {width}×{height} pixels, more than the limit of {MAX_PIXELS}"),
             "make it smaller",
         ));
     }

@@ -69,7 +69,7 @@ fn check(path: &Path, mesh: &Mesh) -> Result<()> {
         return Err(Error::file(
             path,
             format!(
-                "triangle {index} (counted from 0) refers to a vertex beyond the {count} there are"
+                "triangle {index} (counted from 0) refers to a vertex beyond the {count} of the mesh"
             ),
             "repair the mesh",
         ));
@@ -128,7 +128,7 @@ fn make_names_unique(path: &Path, names: &mut [String], warnings: &mut Vec<Strin
     }
     if !renamed.is_empty() {
         warnings.push(format!(
-            "{}: {} objects had the name of another one and got a number: {}",
+            "{}: {} objects had duplicate names and were numbered: {}",
             path.display(),
             renamed.len(),
             listed(&renamed)

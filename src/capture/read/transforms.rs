@@ -46,7 +46,7 @@ pub fn read(
     if length > MAX_BYTES {
         return Err(Error::file(
             &file,
-            format!("{length} bytes are more than the {MAX_BYTES} that are read"),
+            format!("has {length} bytes, more than the limit of {MAX_BYTES}"),
             "split the capture",
         ));
     }
@@ -239,7 +239,7 @@ fn find_mesh(confine: &Confine, shared: &Fields) -> Result<PathBuf> {
 
 fn unit(up: DVec3, place: &str) -> Result<DVec3> {
     up.try_normalize()
-        .ok_or_else(|| Error::new(place, "the up vector has no length", "give a direction"))
+        .ok_or_else(|| Error::new(place, "the up vector is zero", "give a direction"))
 }
 
 /// The cameras' mean up; +y with a warning if it vanishes.
