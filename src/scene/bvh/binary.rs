@@ -37,17 +37,33 @@ impl Binary {
 
 /// Granularity of a build.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Granularity {
+struct Granularity {
     /// Ranges of more primitives are built in parallel.
-    pub parallel_above: usize,
+    parallel_above: usize,
     /// Maximum number of triangles in a leaf, or one group.
-    pub max_leaf: usize,
+    max_leaf: usize,
 }
 
-/// Builds the hierarchy over primitives and reorders them.
-pub(super) fn build(primitives: &mut [Primitive], granularity: Granularity) -> Vec<Binary> {
+/// Subtrees with more primitives than this, and than 1 / [`TASKS`] of all, are built and laid out in parallel.
+const MIN_PARALLEL: usize = 8192;
+/// See [`MIN_PARALLEL`].
+const TASKS: usize = 64;
+
+/// Number of primitives above which a subtree is a parallel task.
+pub(super) fn parallel_above(primitives: usize) -> usize {
+    MIN_PARALLEL.max(primitives / TASKS)
+}
+
+/// Builds the hierarchy over primitives and reorders them; empty without primitives.
+pub(super) fn build(primitives: &mut [Primitive], max_leaf: usize) -> Vec<Binary> {
+    let granularity = Granularity {
+        parallel_above: parallel_above(primitives.len()),
+        max_leaf,
+    };
     let mut nodes = Vec::new();
-    grow(primitives, 0, granularity, &mut nodes);
+    if !primitives.is_empty() {
+        grow(primitives, 0, granularity, &mut nodes);
+    }
     nodes
 }
 

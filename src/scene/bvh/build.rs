@@ -1,6 +1,6 @@
 //! Lays out the binary hierarchy as nodes of eight children and groups of four triangles.
 
-use crate::scene::bvh::binary::{Binary, Granularity, MAX_LEAF};
+use crate::scene::bvh::binary::{Binary, MAX_LEAF, parallel_above};
 use crate::scene::bvh::pages::Pages;
 use crate::scene::bvh::split::{Bounds, Primitive};
 use crate::scene::bvh::{
@@ -10,23 +10,10 @@ use glam::Vec3;
 use rayon::prelude::*;
 use std::cmp::Reverse;
 
-/// Subtrees with more primitives than this, and than 1 / [`TASKS`] of all, are built and laid out in parallel.
-const MIN_PARALLEL: usize = 8192;
-/// See [`MIN_PARALLEL`].
-const TASKS: usize = 64;
-
 pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Bvh {
     let corners = |triangle: u32| triangles[triangle as usize].map(|i| positions[i as usize]);
     let mut primitives = primitives(triangles.len(), corners);
-    let granularity = Granularity {
-        parallel_above: parallel_above(primitives.len()),
-        max_leaf: MAX_LEAF,
-    };
-    let binary = if primitives.is_empty() {
-        Vec::new()
-    } else {
-        binary::build(&mut primitives, granularity)
-    };
+    let binary = binary::build(&mut primitives, MAX_LEAF);
     lay_out(&corners, &primitives, &binary, triangles.len())
 }
 
@@ -41,19 +28,15 @@ impl Tree {
     /// Builds the hierarchy over triangles, with at most four per leaf. Triangles with non-finite corners are left out.
     pub fn new(corners: &[[Vec3; 3]]) -> Self {
         let mut primitives = primitives(corners.len(), |triangle| corners[triangle as usize]);
-        if primitives.is_empty() {
+        let binary = binary::build(&mut primitives, GROUP);
+        let Some(root) = binary.first() else {
             return Self::default();
-        }
-        let granularity = Granularity {
-            parallel_above: parallel_above(primitives.len()),
-            max_leaf: GROUP,
         };
-        let binary = binary::build(&mut primitives, granularity);
         let mut tree = Self {
             nodes: Vec::with_capacity(binary.len()),
             order: primitives.iter().map(|p| p.triangle).collect(),
         };
-        tree.nodes.push(leaf(&binary[0]));
+        tree.nodes.push(leaf(root));
         // (Index in the tree, index in the binary hierarchy) of nodes whose children are not placed yet.
         let mut pending = vec![(0, 0)];
         while let Some((place, index)) = pending.pop() {
@@ -91,11 +74,6 @@ fn primitives(count: usize, corners: impl Fn(u32) -> [Vec3; 3]) -> Vec<Primitive
         .filter(|(_, c)| c.iter().all(|v| v.is_finite()))
         .map(|(triangle, c)| Primitive::of(triangle, c))
         .collect()
-}
-
-/// Number of primitives above which a subtree is a parallel task.
-fn parallel_above(primitives: usize) -> usize {
-    MIN_PARALLEL.max(primitives / TASKS)
 }
 
 fn lay_out<C: Fn(u32) -> [Vec3; 3] + Sync>(
