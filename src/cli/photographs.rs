@@ -1,4 +1,4 @@
-//! Photographs in one go, with progress; Ctrl-C ends after what is whole.
+//! Writes composited photographs with a progress bar; Ctrl-C stops after the last complete one.
 
 use crate::cli::interrupt::Interrupt;
 use crate::compose::object::surface::ObjectSurface;
@@ -10,13 +10,14 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 
-/// Steps of the bar.
+/// Steps of the progress bar.
 const LENGTH: u64 = 1000;
 
-/// Writes photographs and prints the paths of their files; the exit code. `materials` as in [`Photographs::write_made_of`].
+/// Writes photographs and prints the paths of their files. Returns the exit code. `materials` is as in
+/// [`Photographs::write_made_of`].
 ///
 /// # Errors
-/// Something cannot be read or written.
+/// A file cannot be read or written.
 pub fn write_with_progress(
     work: &Photographs,
     renderer: &Renderer,

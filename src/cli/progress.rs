@@ -1,4 +1,4 @@
-//! How far a solve is: a bar on a terminal, a line every few seconds otherwise.
+//! Progress of a solve: a bar on a terminal, otherwise a line every few seconds.
 
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{LossPoint, Progress};
@@ -8,11 +8,11 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
-/// Time between two plain lines.
+/// Time between two lines without a terminal.
 const LINE: Duration = Duration::from_secs(3);
-/// Time between two changes of the bar.
+/// Time between two updates of the bar.
 const FRAME: Duration = Duration::from_millis(100);
-/// Steps of the bar.
+/// Steps of the progress bar.
 const LENGTH: u64 = 1000;
 
 /// Shows progress on stderr.
@@ -25,7 +25,7 @@ pub struct Meter {
 }
 
 impl Meter {
-    /// A bar if stderr is a terminal.
+    /// A bar if stderr is a terminal, else lines.
     pub fn new() -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
             let style = ProgressStyle::with_template("{bar:24} {msg}");
@@ -40,7 +40,7 @@ impl Meter {
         }
     }
 
-    /// Shows how far a solve is, if it is time to.
+    /// Shows the progress if the last update is old enough or the phase has changed.
     pub fn show(&mut self, progress: &Progress, settings: &Settings) {
         self.rates.note(progress);
         let pause = if self.bar.is_some() { FRAME } else { LINE };
@@ -66,7 +66,7 @@ impl Meter {
         }
     }
 
-    /// Says something beside the progress.
+    /// Prints a line without breaking the bar.
     pub fn say(&self, line: &str) {
         match &self.bar {
             Some(bar) => bar.suspend(|| say::aside(line)),
@@ -74,7 +74,7 @@ impl Meter {
         }
     }
 
-    /// Ends the bar, so that other output can follow.
+    /// Removes the bar, so that other output can follow.
     pub fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

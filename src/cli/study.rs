@@ -1,7 +1,7 @@
-//! `relit study`: the paper's experiments.
+//! `relit study`: the experiments of the paper.
 
-use crate::cli::arguments::{ReadOptions, Replace};
 use crate::cli::numbers::{from_one, seeds, threads};
+use crate::cli::options::{ReadOptions, Replace};
 use crate::cli::solve::use_threads;
 use crate::cli::trade::time;
 use crate::error::{Error, Result};
@@ -18,9 +18,9 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// The word for every study.
+/// Selects all studies.
 const ALL: &str = "all";
-/// Seeds in the quick form where none are named.
+/// Default number of seeds with `--quick`.
 const QUICK_SEEDS: u64 = 2;
 
 /// `relit study`.
@@ -71,7 +71,7 @@ fn names() -> PossibleValuesParser {
     PossibleValuesParser::new(studies.chain([PossibleValue::new(ALL).help("All of them")]))
 }
 
-/// Runs the studies and writes what they found, each as soon as it is done.
+/// Runs the studies and writes the findings of each as soon as it is done.
 ///
 /// # Errors
 /// The capture cannot be read, a solve cannot start, or a file cannot be written.
@@ -120,10 +120,10 @@ pub fn study(arguments: &StudyArguments) -> Result<()> {
     Ok(())
 }
 
-/// `insertion` over generated rooms: writes insertion-FAMILY.csv and prints what holds over them.
+/// Runs the study `insertion` over generated rooms: writes insertion-FAMILY.csv and prints the decision over all rooms.
 ///
 /// # Errors
-/// A room cannot be drawn or solved, or the table cannot be written.
+/// A room cannot be generated or solved, or the table cannot be written.
 fn insertions(arguments: &StudyArguments, rooms: u32, family: &str) -> Result<()> {
     let known = Family::of_name(family).zip(
         Preset::ALL
