@@ -52,7 +52,7 @@ struct Placed {
 impl Placed {
     fn new(inserted: Inserted, seed: u64) -> Self {
         Self {
-            beside: inserted.composite.beside(seed),
+            beside: inserted.composite.with_seed(seed),
             samples: 0,
             picture: Arc::new(inserted.composite.composite()),
             inserted,
@@ -64,9 +64,9 @@ impl Placed {
         self.inserted.composite.samples() + self.beside.samples()
     }
 
-    fn put_behind(&mut self, photograph: &Arc<Picture>) {
-        self.inserted.composite.put_behind(photograph.clone());
-        self.beside.put_behind(photograph.clone());
+    fn set_photograph(&mut self, photograph: &Arc<Picture>) {
+        self.inserted.composite.set_photograph(photograph.clone());
+        self.beside.set_photograph(photograph.clone());
         self.paint();
     }
 
@@ -267,7 +267,7 @@ impl Inserting {
                 relit.samples = samples;
                 relit.photograph = Arc::new(relit.relighting.photograph());
                 if let Some(placed) = &mut self.placed {
-                    placed.put_behind(&relit.photograph);
+                    placed.set_photograph(&relit.photograph);
                 }
             }
             return better;
