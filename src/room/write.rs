@@ -44,5 +44,5 @@ pub fn write(out: &Path, rendering: Option<&Rendering>) -> Result<()> {
     capture::write_truth(out, &truth, &albedo)?;
     let cameras = cameras::cameras(&room.views, made.size);
     capture::write_transforms(out, cameras.into_iter(), world.scene.up.as_dvec3())?;
-    folder.take_its_place()
+    folder.commit()
 }
