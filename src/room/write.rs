@@ -1,21 +1,22 @@
-//! The room as a capture folder, with its truth.
+//! Writes the room as a capture folder, with its truth.
 
 use crate::error::Result;
 use crate::export::capture;
 use crate::export::new_folder::NewFolder;
 use crate::math::picture::Picture;
+use crate::room::cameras;
+use crate::room::model::Room;
 use crate::room::photographs::{self, KEPT, Rendering};
 use crate::room::truth::{self, Truth};
-use crate::room::{Room, cameras};
 use std::path::Path;
 
-/// Writes the room into a folder that is new or empty, whole or not at all: transforms.json, mesh.obj, images, truth.json and
+/// Writes the room into a new or empty folder, atomically: transforms.json, mesh.obj, images, truth.json and
 /// truth/albedo_NNN.exr.
 ///
-/// The photographs are the kept ones, byte for byte, or newly rendered.
+/// The photographs are the stored ones, byte for byte, or newly rendered.
 ///
 /// # Errors
-/// The folder holds something (see [`NewFolder`]), or a file cannot be written.
+/// The folder is not empty (see [`NewFolder`]), or a file cannot be written.
 pub fn write(out: &Path, rendering: Option<&Rendering>) -> Result<()> {
     let folder = NewFolder::new(out)?;
     let out = folder.path();

@@ -9,7 +9,7 @@ use crate::capture::photograph::Photograph;
 use crate::inverse::unknowns::Unknowns;
 use crate::room::Room;
 use crate::room::cameras::cameras;
-use crate::room::photographs::linear;
+use crate::room::linear_photograph;
 use crate::study::experiments::box_room;
 use glam::{DVec2, DVec3};
 use std::f64::consts::FRAC_1_PI;
@@ -53,7 +53,7 @@ pub fn photographs(room: &Room, size: [u32; 2]) -> Vec<Photograph> {
                     add(facet, &lamps, lens, pose, &mut pixels);
                 }
             }
-            linear(size, pixels.iter().map(|sum| sum.as_vec3()).collect())
+            linear_photograph(size, pixels.iter().map(|sum| sum.as_vec3()).collect())
         })
         .collect()
 }

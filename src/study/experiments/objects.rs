@@ -4,7 +4,8 @@ use crate::capture::photograph::Photograph;
 use crate::error::{Error, Result};
 use crate::room::Room;
 use crate::room::cameras::View;
-use crate::room::photographs::{Rendering, linear, render};
+use crate::room::linear_photograph;
+use crate::room::photographs::{Rendering, render};
 use crate::room::shape::Modeller;
 use crate::room::truth::seen_pixels;
 use crate::scene::visibility::NOTHING;
@@ -183,7 +184,7 @@ fn photographed(room: &Room, rendering: &Rendering, object: &str) -> Result<(Sub
     let mean = |(a, b): (&Photograph, &Photograph)| {
         let pixels = a.pixels.iter().zip(&b.pixels);
         let means = pixels.map(|(&a, &b)| (a + b) * 0.5).collect();
-        linear(rendering.size, means)
+        linear_photograph(rendering.size, means)
     };
     let photographs: Vec<Photograph> = halves[0].iter().zip(&halves[1]).map(mean).collect();
     let subject = Subject::of_photographs(room, photographs)?;
