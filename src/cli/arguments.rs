@@ -25,7 +25,8 @@ use std::path::PathBuf;
     after_help = EXIT_CODES
 )]
 pub struct Arguments {
-    /// What to open in the window: a capture, a scan of another program, or results to go on from; the built-in room if none is named
+    /// What to open in the window: a capture, a scan of another program, or results to go on from; the built-in room
+    /// if none is named
     pub capture: Option<PathBuf>,
     #[command(flatten)]
     pub solve: SolveOptions,

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::inverse::settings::Preset;
 use crate::room::generated::Family;
 use crate::say;
-use crate::study::families::{Heard, Plan, Row, run};
+use crate::study::families::{Plan, RoomEvent, Row, run};
 use crate::study::trade::rooms::SIZE;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -42,10 +42,12 @@ pub fn families(
     let started = Instant::now();
     let stopped = || interrupt.asked() || time.is_some_and(|time| started.elapsed() >= time);
     let mut failed: Option<Error> = None;
-    let summary = run(out, &plan, &stopped, &mut |heard| match heard {
-        Heard::Begins(family, seed) => say::aside(format_args!("{} room {seed} …", family.name())),
-        Heard::Solved(row) => say::aside(line(row)),
-        Heard::Failed(error) => {
+    let summary = run(out, &plan, &stopped, &mut |event| match event {
+        RoomEvent::Begins(family, seed) => {
+            say::aside(format_args!("{} room {seed} …", family.name()))
+        }
+        RoomEvent::Solved(row) => say::aside(line(row)),
+        RoomEvent::Failed(error) => {
             say::aside(error);
             failed.get_or_insert(error.clone());
         }

@@ -1,6 +1,5 @@
-//! Requests to terminate: Ctrl-C, SIGTERM, and a closed terminal (SIGHUP). Running work stops cleanly, saves its results,
-//! and the
-//! program exits with the code that shells expect. A second Ctrl-C aborts at once.
+//! Requests to terminate: Ctrl-C, SIGTERM, and a closed terminal (SIGHUP). Running work stops cleanly, saves its
+//! results, and the program exits with the code that shells expect. A second Ctrl-C aborts at once.
 
 use crate::error::{Error, Result};
 use signal_hook::consts::{SIGINT, SIGTERM};

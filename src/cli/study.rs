@@ -45,8 +45,8 @@ pub struct StudyArguments {
     /// on its twin, a room with its mesh, its views and the colours and lamps found in it, whose truth is known
     #[arg(long, value_name = "CAPTURE")]
     capture: Option<PathBuf>,
-    /// `insertion` in N generated rooms of a family instead: a chair put into two photographs of each, compared with the chair truly
-    /// there
+    /// `insertion` in N generated rooms of a family instead: a chair put into two photographs of each, compared with
+    /// the chair truly there
     #[arg(long, value_name = "N", requires = "family", conflicts_with = "capture", value_parser = from_one::<u32>)]
     rooms: Option<u32>,
     /// The family of the generated rooms

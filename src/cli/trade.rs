@@ -15,7 +15,7 @@ use crate::session::command::Source;
 use crate::session::open::open;
 use crate::session::snapshot::OpenCapture;
 use crate::study::trade::plan::{self, Run};
-use crate::study::trade::{Curve, Heard, Trade, combine, measure, rooms};
+use crate::study::trade::{Curve, SolveEvent, Trade, combine, measure, rooms};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use std::path::{Path, PathBuf};
@@ -41,7 +41,8 @@ pub struct TradeArguments {
     /// The preset that generated rooms are solved with [default: balanced]
     #[arg(long, value_name = "PRESET", requires = "rooms", conflicts_with_all = ["presets", "around", "capture"], value_parser = PossibleValuesParser::new(Preset::WORDS))]
     preset: Option<String>,
-    /// Time for all solves together, loading excluded [default: 5m]; of a family, no further room is started after it [default: none]
+    /// Time for all solves together, loading excluded [default: 5m]; of a family, no further room is started after it
+    /// [default: none]
     #[arg(long, value_name = "TIME", value_parser = time)]
     time: Option<Duration>,
     /// The presets alone, without the settings around them
@@ -206,10 +207,10 @@ fn over_rooms(
 }
 
 /// Prints a line when a solve begins and when it ends.
-fn print_progress(heard: Heard) {
-    match heard {
-        Heard::Begins(run) => say::aside(format_args!("{} …", run.name)),
-        Heard::Ended(curve) => say::aside(format_args!("{}: {}", curve.name, ending(curve))),
+fn print_progress(event: SolveEvent) {
+    match event {
+        SolveEvent::Begins(run) => say::aside(format_args!("{} …", run.name)),
+        SolveEvent::Ended(curve) => say::aside(format_args!("{}: {}", curve.name, ending(curve))),
     }
 }
 

@@ -95,9 +95,8 @@ impl Backdrop {
         self.exposure.value(light, self.saturation)
     }
 
-    /// Composites objects into the photograph, with its blur and grain. A pixel that nothing changes, not even within the
-    /// reach of
-    /// the blur, keeps its value to the bit.
+    /// Composites objects into the photograph, with its blur and grain. A pixel that nothing changes, not even within
+    /// the reach of the blur, keeps its value to the bit.
     pub fn composite(&self, layers: &[LayeredPixel]) -> Picture {
         let size = [self.photograph.width, self.photograph.height].map(|side| side as usize);
         if self.finish.is_none() {
@@ -153,9 +152,8 @@ impl Backdrop {
         Vec3::select(saturated, light.max(under), light)
     }
 
-    /// Composites one pixel: α · over + (1 − α) · (photograph + over − under), in exposed light, where `over` and `under`
-    /// are the
-    /// radiances with and without the objects.
+    /// Composites one pixel: α · over + (1 − α) · (photograph + over − under), in exposed light, where `over` and
+    /// `under` are the radiances with and without the objects.
     ///
     /// `under` is a lower bound of the light in saturated channels. The composite saturates like the photograph.
     pub fn blend(&self, pixel: usize, alpha: f32, over: Vec3, under: Vec3) -> Vec3 {

@@ -116,16 +116,14 @@ impl Insertion {
         }
     }
 
-    /// Adds `samples` paths to every pixel, in parallel. The result is the same to the bit for any split into calls and
-    /// any number
-    /// of threads.
+    /// Adds `samples` paths to every pixel, in parallel. The result is the same to the bit for any split into calls
+    /// and any number of threads.
     pub fn pass(&mut self, samples: u32) {
         self.refine_to(self.samples() + samples, || true);
     }
 
-    /// Samples every pixel up to `samples` paths. Stops between two bands of rows once `go_on` returns false; the next
-    /// call continues
-    /// there. Returns whether all samples are done.
+    /// Samples every pixel up to `samples` paths. Stops between two bands of rows once `go_on` returns false; the
+    /// next call continues there. Returns whether all samples are done.
     pub fn refine_to(&mut self, samples: u32, go_on: impl Fn() -> bool) -> bool {
         if self.objects.is_empty() {
             return true;
@@ -147,9 +145,8 @@ impl Insertion {
         true
     }
 
-    /// [`Insertion::refine_to`] on a graphics card that holds the scene and the objects. After an error some rows have
-    /// more samples
-    /// than others; [`Insertion::refine_to`] completes the rest.
+    /// [`Insertion::refine_to`] on a graphics card that holds the scene and the objects. After an error some rows
+    /// have more samples than others; [`Insertion::refine_to`] completes the rest.
     ///
     /// # Errors
     /// The card failed.

@@ -120,9 +120,8 @@ pub struct Pasted {
 }
 
 impl Pasted {
-    /// Shades objects in front of a backdrop, each by its own harmonics. `exposure` maps their light to the photograph's
-    /// values:
-    /// identity for harmonics of photographs, the backdrop's for harmonics of the estimate.
+    /// Shades objects in front of a backdrop, each by its own harmonics. `exposure` maps their light to the
+    /// photograph's values: identity for harmonics of photographs, the backdrop's for harmonics of the estimate.
     pub fn new(
         backdrop: &Backdrop,
         lit: &Lit,

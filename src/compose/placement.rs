@@ -43,8 +43,7 @@ impl Placement {
     /// The transform from the file's to the capture's coordinates; `up` is the capture's unit up vector.
     ///
     /// With `at`, the file's +y axis is first rotated to `up` along the shortest arc. Without it, only `scale` and
-    /// `rotate` apply,
-    /// about the file's origin.
+    /// `rotate` apply, about the file's origin.
     ///
     /// # Errors
     /// The scale is not positive, or a number is not finite.

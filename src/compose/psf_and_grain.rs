@@ -51,8 +51,7 @@ const GRAIN_KEY: u64 = 0x6772_6169;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PsfAndGrain {
     /// Standard deviations in pixels of the Gaussian that blurs a sharp render like the photograph, along rows and
-    /// columns; 0 where
-    /// the photograph is sharp.
+    /// columns; 0 where the photograph is sharp.
     pub blur: Vec2,
     /// Standard deviation of the grain in each channel by luminance, ascending.
     pub grain: Vec<(f32, Vec3)>,
@@ -230,9 +229,8 @@ fn softness(
     if found < min { 0.0 } else { found.min(max) }
 }
 
-/// Standard deviation in pixels of a step edge's blur, beyond the pixel's box filter. `ratio`: slope before over after
-/// the known
-/// blur.
+/// Standard deviation in pixels of a step edge's blur, beyond the pixel's box filter. `ratio`: slope before over
+/// after the known blur.
 fn softness_of(ratio: f64) -> f64 {
     // Difference between the pixels after and before a step of height 1.
     let slope = |variance: f64| libm::erf((2.0 * (variance + PIXEL_VARIANCE)).sqrt().recip());

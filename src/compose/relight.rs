@@ -108,9 +108,8 @@ impl Relighting {
         self.samples() >= self.pairs.len() as u32
     }
 
-    /// Samples every pixel up to `samples` paths. Stops between two bands of rows once `go_on` returns false; the next
-    /// call continues
-    /// there. Returns whether all samples are done.
+    /// Samples every pixel up to `samples` paths. Stops between two bands of rows once `go_on` returns false; the
+    /// next call continues there. Returns whether all samples are done.
     pub fn refine_to(&mut self, samples: u32, go_on: impl Fn() -> bool) -> bool {
         let height = self.backdrop.camera.intrinsics.height;
         let band = BAND.max(2 * rayon::current_num_threads() as u32);
@@ -134,8 +133,7 @@ impl Relighting {
     }
 
     /// [`Relighting::refine_to`] on a graphics card that holds the scene in both lights; call it only between passes.
-    /// After an error
-    /// no pair is changed in part, and [`Relighting::refine_to`] continues.
+    /// After an error no pair is changed in part, and [`Relighting::refine_to`] continues.
     ///
     /// # Errors
     /// The card failed.

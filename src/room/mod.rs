@@ -1,8 +1,7 @@
 //! The built-in room: geometry, lights and materials, photographs and ground truth. Also rooms generated at random.
 //!
-//! All but the photographs is computed at start-up. They are path-traced renderings of the room, stored in `assets/room`
-//! so that
-//! the program starts at once; `relit demo --seed` renders them again.
+//! All but the photographs is computed at start-up. They are path-traced renderings of the room, stored in
+//! `assets/room` so that the program starts at once; `relit demo --seed` renders them again.
 
 pub mod build;
 pub mod cameras;

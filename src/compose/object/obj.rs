@@ -102,8 +102,7 @@ fn open_library(referrer: &Path, name: &Path) -> Result<(PathBuf, Vec<u8>)> {
 }
 
 /// Completes an MTL file for tobj, which requires three numbers a colour: a single number is repeated. `None` where a
-/// colour has
-/// two numbers or none.
+/// colour has two numbers or none.
 fn with_three_number_colors(bytes: &[u8]) -> Option<String> {
     let text = String::from_utf8_lossy(bytes);
     let mut whole = String::with_capacity(text.len());

@@ -18,8 +18,7 @@ pub struct Generated {
     /// Its seed.
     pub seed: u64,
     /// Input of a solver: mesh and photographs in memory. If `capture.segmentation` is set, the mesh is to be cut into segments
-    /// like that of a
-    /// scan.
+    /// like that of a scan.
     pub capture: Capture,
     /// The true room, of which the photographs were rendered: geometry, materials, light and cameras, in the capture's order of
     /// frames.

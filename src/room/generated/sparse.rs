@@ -57,9 +57,8 @@ pub fn photograph(draft: Draft) -> Result<Generated> {
     Ok(draft.photographed(lit, photographs))
 }
 
-/// Renders a picture. Returns it with the standard deviation of its pixels relative to their values: below `noise`, or,
-/// where that
-/// takes too many samples, below the largest of all rooms.
+/// Renders a picture. Returns it with the standard deviation of its pixels relative to their values: below `noise`,
+/// or, where that takes too many samples, below the largest of all rooms.
 fn trace(lit: &Lit, camera: &Camera, seed: u64, frame: u64, noise: f64) -> (Vec<Vec3>, f64) {
     let mut films = [Film::new(camera), Film::new(camera)];
     let options = PathOptions::default();

@@ -1,13 +1,14 @@
-//! The rooms of each family as dots: albedo error, and how often the truth lies within two standard errors.
+//! Strip plot of the rooms of each family: albedo error, and coverage of two standard errors.
 
 use crate::export::strips::{Panel, Strips};
 use crate::room::generated::Family;
-use crate::study::families::{Row, Summary};
+use crate::study::families::row::Row;
+use crate::study::families::summary::Summary;
 
-/// How often a normal deviate lies within two standard deviations.
+/// Probability of a normal deviate within two standard deviations.
 const TWO_DEVIATIONS: f64 = 0.954_5;
 
-/// The picture of a summary and the rows that it is of.
+/// The plot of a summary and its rows.
 pub fn plot<'a>(summary: &Summary, rows: impl Iterator<Item = &'a Row>) -> Strips {
     let rows: Vec<&Row> = rows.collect();
     let families = Family::ALL.into_iter().map(Family::name);
