@@ -133,7 +133,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
         say::aside("interrupted: saving what there is (again Ctrl-C to abort)");
     }
     let results = Results {
-        estimate: Arc::new(capture.in_doubt(solution.estimate)),
+        estimate: Arc::new(capture.marked_doubtful(solution.estimate)),
         progress: Arc::new(solution.progress),
         stopped_because: Some(solution.termination),
         checkpoint: solution.checkpoint,

@@ -1,4 +1,4 @@
-//! A capture as something to be measured on: its problem, and what tells the errors of its estimates.
+//! An open capture as a subject of measurements.
 
 use crate::calibrate::problem::Problem;
 use crate::capture::truth::Truth;
@@ -6,13 +6,13 @@ use crate::error::Result;
 use crate::room::Room;
 use crate::room::photographs::KEPT;
 use crate::session::command::Source;
-use crate::session::snapshot::OpenCapture;
+use crate::session::open_capture::OpenCapture;
 use crate::study::evaluate::Reference;
 use crate::study::experiments::Subject;
 use crate::study::trade::Judge;
 
 impl OpenCapture {
-    /// The truth where there is one, else held-out pixels.
+    /// Measures estimates by the truth if there is one, else by held-out pixels.
     ///
     /// # Errors
     /// The truth is broken.
@@ -26,7 +26,7 @@ impl OpenCapture {
         Ok(Judge::Truth(Box::new(reference)))
     }
 
-    /// The capture for studies, with its truth where there is one.
+    /// The capture as a subject of studies.
     ///
     /// # Errors
     /// The truth is broken.
