@@ -66,7 +66,7 @@ pub enum Action {
     Evaluate(EvaluateArguments),
     /// Render the room in its estimated light
     Render(RenderArguments),
-    /// Put objects into a photograph
+    /// Insert objects into photographs
     #[command(after_help = EXIT_CODES)]
     Insert(InsertArguments),
     /// Switch lamps, recolour walls, and render the result
@@ -74,11 +74,11 @@ pub enum Action {
     Edit(EditArguments),
     /// Write the scene or its light for another program
     Export(ExportArguments),
-    /// Turn a scan of another program into a capture
+    /// Import a scan of another program as a capture
     Import(ImportArguments),
     /// Write the built-in room as a capture, with its truth
     Demo(DemoArguments),
-    /// Measure what exactness costs in seconds, over presets and settings
+    /// Measure the error over time of presets and settings
     #[command(after_help = EXIT_CODES)]
     Trade(TradeArguments),
     /// Rerun experiments of the paper

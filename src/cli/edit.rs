@@ -29,19 +29,19 @@ pub struct EditArguments {
     /// Diffuse reflectance of an object, 0 to 1
     #[arg(long, value_name = "NAME=R,G,B", value_parser = named_color)]
     albedo: Vec<(String, Vec3)>,
-    /// GGX roughness of an object's specular lobe, above 0 (mirror-like) to 1; gives it a lobe if it has none
+    /// GGX roughness of an object's specular lobe, above 0 (mirror-like) to 1; adds a lobe if there is none
     #[arg(long, value_name = "NAME=V", value_parser = named_number)]
     roughness: Vec<(String, f32)>,
-    /// Specular reflectance of an object at normal incidence, 0 to 1; gives it a lobe if it has none, 0 takes it away
+    /// Specular reflectance of an object at normal incidence, 0 to 1; adds a lobe if there is none, and 0 removes it
     #[arg(long, value_name = "NAME=V", value_parser = named_number)]
     specular: Vec<(String, f32)>,
     /// Pictures to write: all frames at full size, N frames, or none [default: 16, long side 1024]
     #[arg(long, value_name = "all|N|none", value_parser = crate::cli::options::frames)]
     views: Option<Frames>,
-    /// Also writes every photograph in the changed light, as photographs/NNN.relit.{exr,png}
+    /// Also write every photograph relit, as photographs/NNN.relit.{exr,png}
     #[arg(long)]
     photographs: bool,
-    /// Samples a pixel of the light in photographs
+    /// Samples per pixel of relit photographs
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = from_one::<u32>)]
     spp: u32,
     #[command(flatten)]

@@ -24,7 +24,7 @@ pub struct EvaluateArguments {
     /// Write JSON instead of a table
     #[arg(long)]
     json: bool,
-    /// Threads to work with [default: one a core]
+    /// Number of threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<u16>,
 }

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::export::overwrite;
 use crate::export::scene::{self, Format};
 use crate::room;
-use crate::room::photographs::{KEPT, Rendering};
+use crate::room::photographs::{Rendering, STORED};
 use crate::say;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
@@ -102,8 +102,8 @@ pub struct DemoArguments {
     /// Render the photographs again with this random seed, instead of using those stored in the program
     #[arg(long, value_name = "N", value_parser = whole::<u64>)]
     seed: Option<u64>,
-    /// Samples a pixel of photographs that are rendered again
-    #[arg(long, value_name = "N", default_value_t = KEPT.samples, requires = "seed",
+    /// Samples per pixel of photographs that are rendered again
+    #[arg(long, value_name = "N", default_value_t = STORED.samples, requires = "seed",
           value_parser = from_one::<u32>)]
     samples: u32,
 }
@@ -144,7 +144,7 @@ pub fn demo(arguments: &DemoArguments) -> Result<()> {
     let rendering = arguments.seed.map(|seed| Rendering {
         seed,
         samples: arguments.samples,
-        ..KEPT
+        ..STORED
     });
     room::write(&arguments.out, rendering.as_ref())?;
     say::line(arguments.out.display());

@@ -40,7 +40,7 @@ pub fn families(
         preset,
     };
     let started = Instant::now();
-    let stopped = || interrupt.asked() || time.is_some_and(|time| started.elapsed() >= time);
+    let stopped = || interrupt.requested() || time.is_some_and(|time| started.elapsed() >= time);
     let mut failed: Option<Error> = None;
     let summary = run(out, &plan, &stopped, &mut |event| match event {
         RoomEvent::Begins(family, seed) => {

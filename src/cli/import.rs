@@ -4,6 +4,7 @@ use crate::capture::import::{self, AppliedTransform, Format, Import, ImportOptio
 use crate::capture::read::CAMERAS;
 use crate::cli::numbers::{above_zero, from_one, triple};
 use crate::cli::options::Replace;
+use crate::cli::progress::bar;
 use crate::error::Result;
 use crate::export;
 use crate::say;
@@ -11,8 +12,6 @@ use crate::session::given::Given;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 /// `relit import`.
@@ -135,19 +134,11 @@ pub fn beside_results(scan: &Path) -> Result<PathBuf> {
 
 /// Reads a scan, with a progress bar where depth images are fused.
 fn read(source: &Path, options: &ImportOptions) -> Result<Import> {
-    let bar = std::io::stderr().is_terminal().then(|| {
-        let style = ProgressStyle::with_template("{bar:24} {pos} of {len} depth images fused");
-        ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr())
-            .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-    });
+    let bar = bar("{bar:24} {pos} of {len} depth images fused");
     let scan = import::read(source, options, &mut |done, all| {
-        if let Some(bar) = &bar {
-            bar.set_length(all as u64);
-            bar.set_position(done as u64);
-        }
-    })?;
-    if let Some(bar) = &bar {
-        bar.finish_and_clear();
-    }
-    Ok(scan)
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    });
+    bar.finish_and_clear();
+    scan
 }

@@ -24,17 +24,17 @@ pub struct InsertArguments {
     frame: FrameChoice,
     #[command(flatten)]
     objects: Objects,
-    /// Samples a pixel
+    /// Samples per pixel
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = from_one::<u32>)]
     spp: u32,
     #[command(flatten)]
     denoise: DenoiseOptions,
-    /// Whether objects take the blur and the grain of 8-bit photographs
+    /// Whether objects get the blur and grain of 8-bit photographs
     #[arg(long, value_name = "BOOL", default_value_t = true, action = ArgAction::Set)]
     finish: bool,
     #[command(flatten)]
     device: DeviceOptions,
-    /// Beginning of the names of the files to write
+    /// Prefix of the files to write
     #[arg(long, value_name = "PREFIX")]
     out: PathBuf,
     #[command(flatten)]
@@ -148,7 +148,7 @@ impl Args for Objects {
                 option(
                     "at",
                     "X,Y,Z",
-                    "Where the middle of its base stands, in the capture's coordinates",
+                    "Position of the centre of its base, in the capture's coordinates",
                 )
                 .allow_hyphen_values(true)
                 .value_parser(triple),
@@ -157,7 +157,7 @@ impl Args for Objects {
                 option(
                     "as-modelled",
                     "",
-                    "Take the file's coordinates for the capture's",
+                    "Use the file's coordinates as the capture's",
                 )
                 .num_args(0)
                 .default_missing_value("true")
@@ -171,7 +171,7 @@ impl Args for Objects {
                 option(
                     "rotate",
                     "DEG",
-                    "Turn about the up axis, counter-clockwise from above [default: 0]",
+                    "Rotation about the up axis, counter-clockwise from above [default: 0]",
                 )
                 .allow_hyphen_values(true)
                 .value_parser(degrees),

@@ -47,7 +47,7 @@ impl Interrupt {
     }
 
     /// Whether termination was requested.
-    pub fn asked(&self) -> bool {
+    pub fn requested(&self) -> bool {
         self.0.load(Ordering::SeqCst) != 0
     }
 

@@ -22,7 +22,7 @@ use std::time::Duration;
 /// Which pictures are denoised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Denoise {
-    /// Pictures that people look at are, measurements are not
+    /// Pictures for viewing, not measurements
     Auto,
     /// Always, by relit's own denoiser
     Builtin,
@@ -35,7 +35,7 @@ pub enum Denoise {
 /// Denoising of pictures.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct DenoiseOptions {
-    /// Takes out noise, guided by what each pixel sees; `auto` does so in pictures to look at, by Open Image Denoise where it is installed, and leaves radiance in .exr as it was rendered
+    /// Denoise pictures; `auto` denoises all but renders written as .exr, by Open Image Denoise if it is installed
     #[arg(long, value_name = "HOW", default_value = "auto", default_missing_value = "builtin", num_args = 0..=1)]
     denoise: Denoise,
 }
@@ -67,7 +67,8 @@ impl DenoiseOptions {
 /// What traces the paths of pictures.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct DeviceOptions {
-    /// What traces paths: a graphics card where there is one and else the processor, the processor, or any graphics adapter
+    /// What traces paths: a graphics card if there is one, else the processor (auto); the processor (cpu); any
+    /// graphics adapter (gpu)
     #[arg(long, value_name = "auto|cpu|gpu", default_value = "auto", value_parser = str::parse::<Device>)]
     pub device: Device,
 }
@@ -94,10 +95,10 @@ pub struct SolveOptions {
     /// Folder to write into [default: relit-out/<capture>]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Threads to work with [default: one a core]
+    /// Number of threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<u16>,
-    /// Go on from what an earlier solve left in the output folder
+    /// Resume the earlier solve in the output folder
     #[arg(long)]
     pub resume: bool,
     /// Pictures to write: all frames at full size, N frames, or none [default: 16, long side 1024]
@@ -107,7 +108,7 @@ pub struct SolveOptions {
     pub denoise: DenoiseOptions,
     #[command(flatten)]
     pub device: DeviceOptions,
-    /// Time between two checkpoints, from which a killed solve goes on
+    /// Time between checkpoints, from which a killed solve can be resumed
     #[arg(long, value_name = "TIME", default_value = "8s", value_parser = time)]
     pub checkpoint: Duration,
     #[command(flatten)]
@@ -121,7 +122,7 @@ pub struct SolveOptions {
 /// Permission to replace files.
 #[derive(Debug, Args)]
 pub struct Replace {
-    /// Replace files of captures and results of other captures too
+    /// Also replace files of captures, and results of other captures
     #[arg(long)]
     overwrite: bool,
 }
@@ -140,7 +141,7 @@ impl Replace {
 pub struct ReadOptions {
     #[command(flatten)]
     pub reading: ReadingOptions,
-    /// Solve even where the photographs do not show the mesh from their poses
+    /// Solve even if the photographs do not seem to show the mesh from their poses
     #[arg(long)]
     pub trust_poses: bool,
     /// Up axis of the capture [default: the cameras' mean up]
@@ -163,25 +164,25 @@ pub struct ReadingOptions {
     /// Axes of the poses: x right, y up, looking down -z (opengl), or x right, y down, looking down +z (opencv)
     #[arg(long, value_name = "AXES", value_parser = ["opengl", "opencv"])]
     pub axes: Option<String>,
-    /// Turn the mesh about the x axis by so many degrees, to agree with the poses
+    /// Rotate the mesh about the x axis by this many degrees, to match the poses
     #[arg(long, value_name = "90|180|270", value_parser = quarters)]
     pub mesh_turn: Option<u8>,
-    /// Multiply the mesh's coordinates, to be in the unit of the poses
+    /// Scale the mesh's coordinates to the unit of the poses
     #[arg(long, value_name = "FACTOR", value_parser = above_zero)]
     pub mesh_scale: Option<f64>,
-    /// Multiply all focal lengths
+    /// Scale all focal lengths
     #[arg(long, value_name = "FACTOR", value_parser = above_zero)]
     pub focal: Option<f64>,
-    /// Multiply focal lengths and principal points, for photographs of another size than the lens is given for
+    /// Scale focal lengths and principal points, for photographs of another size than the intrinsics are for
     #[arg(long, value_name = "FACTOR", value_parser = above_zero)]
     pub lens_scale: Option<f64>,
-    /// Turn all photographs clockwise by so many degrees
+    /// Rotate all photographs clockwise by this many degrees
     #[arg(long, value_name = "90|180|270", value_parser = quarters)]
     pub turn: Option<u8>,
-    /// Exchange left and right of all photographs
+    /// Mirror all photographs horizontally
     #[arg(long)]
     pub mirror: bool,
-    /// Give each pose the photograph of the frame N later
+    /// Use for each pose the photograph of the frame N later
     #[arg(long, value_name = "N", value_parser = shift)]
     pub shift: Option<i32>,
 }

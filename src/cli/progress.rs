@@ -12,8 +12,19 @@ use std::time::{Duration, Instant};
 const LINE: Duration = Duration::from_secs(3);
 /// Time between two updates of the bar.
 const FRAME: Duration = Duration::from_millis(100);
-/// Steps of the progress bar.
-const LENGTH: u64 = 1000;
+/// Steps of a progress bar.
+pub const LENGTH: u64 = 1000;
+
+/// A progress bar of [`LENGTH`] steps on stderr, hidden unless that is a terminal.
+pub fn bar(template: &str) -> ProgressBar {
+    let target = match std::io::stderr().is_terminal() {
+        true => ProgressDrawTarget::stderr(),
+        false => ProgressDrawTarget::hidden(),
+    };
+    let style = ProgressStyle::with_template(template);
+    ProgressBar::with_draw_target(Some(LENGTH), target)
+        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
 
 /// Shows progress on stderr.
 #[derive(Debug)]
@@ -27,13 +38,9 @@ pub struct Meter {
 impl Meter {
     /// A bar if stderr is a terminal, else lines.
     pub fn new() -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
-            let style = ProgressStyle::with_template("{bar:24} {msg}");
-            ProgressBar::with_draw_target(Some(LENGTH), ProgressDrawTarget::stderr())
-                .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-        });
+        let is_terminal = std::io::stderr().is_terminal();
         Self {
-            bar,
+            bar: is_terminal.then(|| bar("{bar:24} {msg}")),
             shown: None,
             phase: String::new(),
             rates: Rates::default(),

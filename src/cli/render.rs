@@ -37,7 +37,7 @@ pub struct RenderArguments {
     /// Camera file: JSON with w, h, fl_x, fl_y, cx, cy and transform_matrix; optionally other values of a frame of transforms.json
     #[arg(long, value_name = "FILE")]
     camera: Option<PathBuf>,
-    /// Samples a pixel
+    /// Samples per pixel
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = from_one::<u32>)]
     spp: u32,
     #[command(flatten)]

@@ -20,7 +20,7 @@ pub struct SavedOptions {
     /// Where the capture is now, if it was moved
     #[arg(long, value_name = "DIR")]
     pub capture: Option<PathBuf>,
-    /// Threads to work with [default: one a core]
+    /// Number of threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<u16>,
     /// Let paths in the capture lead out of its folder; only for captures that you trust

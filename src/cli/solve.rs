@@ -88,7 +88,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
     drop(Staging::new(&folder, &CaptureId::from(capture.as_ref()))?);
 
     // Solve.
-    if interrupt.asked() {
+    if interrupt.requested() {
         say::aside(NOTHING_TO_SAVE);
         return Ok(interrupt.exit_code());
     }
@@ -124,7 +124,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
     let solution = solution?;
 
     // Write.
-    if interrupt.asked() {
+    if interrupt.requested() {
         // Before the first loss the estimate is the initial guess, and must not replace earlier results.
         if solution.progress.losses.is_empty() {
             say::aside(NOTHING_TO_SAVE);
@@ -181,7 +181,7 @@ impl Observer for Watch<'_> {
             }
             self.written = Instant::now();
         }
-        if self.interrupt.asked() {
+        if self.interrupt.requested() {
             return Control::Stop;
         }
         Control::Continue

@@ -38,15 +38,15 @@ pub struct StudyArguments {
     /// Seeds that each solve is repeated with: 1, 2, … [default: 5, of table1 10; quick: 2]
     #[arg(long, value_name = "N", value_parser = seeds)]
     seeds: Option<u64>,
-    /// Only try it, in seconds: fewer values, smaller scenes, solves cut short
+    /// Quick trial of some seconds: fewer values, smaller scenes, shorter solves
     #[arg(long)]
     quick: bool,
-    /// A capture to run on instead of rooms of the study's own: batch, textures and readings on its photographs, the others
-    /// on its twin, a room with its mesh, its views and the colours and lamps found in it, whose truth is known
+    /// A capture to run on instead of the study's own rooms: batch, textures and readings use its photographs, the
+    /// others its twin: a room with its mesh, its views, and the colours and lamps found in it, whose truth is known
     #[arg(long, value_name = "CAPTURE")]
     capture: Option<PathBuf>,
-    /// `insertion` in N generated rooms of a family instead: a chair put into two photographs of each, compared with
-    /// the chair truly there
+    /// Run `insertion` in N generated rooms of a family instead: a chair inserted into two photographs is compared
+    /// with the chair truly in the room
     #[arg(long, value_name = "N", requires = "family", conflicts_with = "capture", value_parser = from_one::<u32>)]
     rooms: Option<u32>,
     /// The family of the generated rooms
@@ -55,7 +55,7 @@ pub struct StudyArguments {
     /// The preset that generated rooms are solved with
     #[arg(long, value_name = "PRESET", requires = "rooms", default_value = "balanced", value_parser = PossibleValuesParser::new(Preset::WORDS))]
     preset: String,
-    /// Threads to work with [default: one a core]
+    /// Number of threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<u16>,
     #[command(flatten)]

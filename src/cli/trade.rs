@@ -45,16 +45,16 @@ pub struct TradeArguments {
     /// [default: none]
     #[arg(long, value_name = "TIME", value_parser = time)]
     time: Option<Duration>,
-    /// The presets alone, without the settings around them
+    /// Only the presets, without variations of their settings
     #[arg(long)]
     presets: bool,
-    /// One preset and the settings around it alone, each with as much of the time; all presets and all settings for `all`
+    /// Only one preset and variations of its settings, with equal times; `all` for all presets and variations
     #[arg(long, value_name = "PRESET|all", conflicts_with = "presets", value_parser = PossibleValuesParser::new(Preset::WORDS.iter().copied().chain([families::ALL])))]
     around: Option<String>,
     /// Random seed, and seed of the first generated room
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>)]
     seed: u64,
-    /// Threads to work with [default: one a core]
+    /// Number of threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<u16>,
     #[command(flatten)]
@@ -162,7 +162,7 @@ fn of_capture(
         &judge,
         runs,
         arguments.limit(),
-        &|| interrupt.asked(),
+        &|| interrupt.requested(),
         &mut print_progress,
     )?;
     Ok(Trade::new(
@@ -187,11 +187,11 @@ fn over_rooms(
         let (problem, judge) = rooms::problem(seed, rooms::SIZE)?;
         let started = Instant::now();
         let limit = arguments.limit().div_f64(count as f64);
-        let stopped = || interrupt.asked();
+        let stopped = || interrupt.requested();
         let curves = measure(&problem, &judge, runs, limit, &stopped, &mut print_progress)?;
         seconds += started.elapsed();
         // Drop a room that was interrupted: its solves are incomplete.
-        if interrupt.asked() {
+        if interrupt.requested() {
             break;
         }
         measured.push(curves);

@@ -37,9 +37,9 @@ pub struct LayeredPixel {
     /// Fraction of the pixel that the objects cover, 0 to 1.
     pub alpha: f32,
     /// Radiance with the objects.
-    pub over: Vec3,
+    pub with: Vec3,
     /// Radiance without them.
-    pub under: Vec3,
+    pub without: Vec3,
     /// Whether the objects change the pixel.
     pub changed: bool,
 }
@@ -103,8 +103,11 @@ impl Backdrop {
             return self.each(|pixel| match layers[pixel] {
                 LayeredPixel { changed: false, .. } => self.photograph.pixels[pixel],
                 LayeredPixel {
-                    alpha, over, under, ..
-                } => self.blend(pixel, alpha, over, under),
+                    alpha,
+                    with,
+                    without,
+                    ..
+                } => self.blend(pixel, alpha, with, without),
             });
         }
 
@@ -117,9 +120,9 @@ impl Backdrop {
                 .collect();
             self.finish.softened(&values, size)
         };
-        let covers = soft(&|pixel, layer| layer.over * layer.alpha * self.exposure_at(pixel));
+        let covers = soft(&|pixel, layer| layer.with * layer.alpha * self.exposure_at(pixel));
         let changes = soft(&|pixel, layer| match layer.changed {
-            true => (layer.over - layer.under) * (1.0 - layer.alpha) * self.exposure_at(pixel),
+            true => (layer.with - layer.without) * (1.0 - layer.alpha) * self.exposure_at(pixel),
             false => Vec3::ZERO,
         });
         self.each(|pixel| {
@@ -127,7 +130,8 @@ impl Backdrop {
             if alpha == 0.0 && change == Vec3::ZERO {
                 return self.photograph.pixels[pixel];
             }
-            let behind = self.behind(pixel, layers[pixel].under * self.exposure_at(pixel));
+            let behind =
+                self.background_light(pixel, layers[pixel].without * self.exposure_at(pixel));
             let exact = self.value(cover + behind * (1.0 - alpha) + change);
             let place = [self.frame, pixel as u64];
             let grain = self.finish.grain(place, luminance(exact), alpha);
@@ -144,25 +148,25 @@ impl Backdrop {
         }
     }
 
-    /// The photograph's exposed light at a pixel. `under` (exposed light without the objects) is a lower bound where it
+    /// The photograph's exposed light at a pixel. `without` (exposed light without the objects) is a lower bound where it
     /// saturates.
-    fn behind(&self, pixel: usize, under: Vec3) -> Vec3 {
+    fn background_light(&self, pixel: usize, without: Vec3) -> Vec3 {
         let saturated = self.photograph.pixels[pixel].cmpge(self.saturation);
         let light = self.light(pixel);
-        Vec3::select(saturated, light.max(under), light)
+        Vec3::select(saturated, light.max(without), light)
     }
 
-    /// Composites one pixel: α · over + (1 − α) · (photograph + over − under), in exposed light, where `over` and
-    /// `under` are the radiances with and without the objects.
+    /// Composites one pixel: α · with + (1 − α) · (photograph + with − without), in exposed light, where `with` and
+    /// `without` are the radiances with and without the objects.
     ///
-    /// `under` is a lower bound of the light in saturated channels. The composite saturates like the photograph.
-    pub fn blend(&self, pixel: usize, alpha: f32, over: Vec3, under: Vec3) -> Vec3 {
+    /// `without` is a lower bound of the light in saturated channels. The composite saturates like the photograph.
+    pub fn blend(&self, pixel: usize, alpha: f32, with: Vec3, without: Vec3) -> Vec3 {
         let exposure = self.exposure_at(pixel);
-        let (over, under) = (over * exposure, under * exposure);
-        let behind = self.behind(pixel, under);
+        let (with, without) = (with * exposure, without * exposure);
+        let behind = self.background_light(pixel, without);
         // The estimated shadow may exceed the photograph's light; light is never negative.
-        let beside = (behind + over - under).max(Vec3::ZERO);
-        let light = over * alpha + beside * (1.0 - alpha);
+        let uncovered = (behind + with - without).max(Vec3::ZERO);
+        let light = with * alpha + uncovered * (1.0 - alpha);
         if !self.saturation.is_finite() {
             return light;
         }
@@ -188,11 +192,11 @@ mod tests {
                 let (x, y) = (pixel % SIDE, pixel / SIDE);
                 let inside = (12..22).contains(&x) && (12..22).contains(&y);
                 let shadow = (22..26).contains(&x) && (12..22).contains(&y);
-                let over = if inside { OBJECT } else { 0.1 };
+                let with = if inside { OBJECT } else { 0.1 };
                 LayeredPixel {
                     alpha: f32::from(u8::from(inside)),
-                    over: Vec3::splat(over),
-                    under: Vec3::splat(LEVEL),
+                    with: Vec3::splat(with),
+                    without: Vec3::splat(LEVEL),
                     changed: inside || shadow,
                 }
             })
@@ -254,9 +258,9 @@ mod tests {
     #[test]
     fn a_shadow_is_never_darker_than_black() {
         let shadow = backdrop(PsfAndGrain::default(), Vec3::INFINITY);
-        let [over, under] = [0.0, LEVEL * 2.0].map(Vec3::splat);
-        assert_eq!(shadow.blend(0, 0.0, over, under), Vec3::ZERO);
-        assert_eq!(shadow.blend(0, 0.0, under, under), Vec3::splat(LEVEL));
+        let [with, without] = [0.0, LEVEL * 2.0].map(Vec3::splat);
+        assert_eq!(shadow.blend(0, 0.0, with, without), Vec3::ZERO);
+        assert_eq!(shadow.blend(0, 0.0, without, without), Vec3::splat(LEVEL));
     }
 
     #[test]

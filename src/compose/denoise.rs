@@ -22,16 +22,16 @@ pub fn denoised(halves: [&Insertion; 2], denoiser: Denoiser) -> (Picture, Layers
     let objects = guides_where(&world, camera, |pixel, ray| {
         alpha[pixel] > 0.0 && world.sees_object(ray)
     });
-    let [mut over_a, mut over_b] = halves.map(Insertion::object_radiance);
+    let [mut object_a, mut object_b] = halves.map(Insertion::object_radiance);
     for pixel in 0..alpha.len() {
         // Where only one half has hit the object, its value is used for both.
         match (a.alpha[pixel] > 0.0, b.alpha[pixel] > 0.0) {
-            (true, false) => over_b.pixels[pixel] = over_a.pixels[pixel],
-            (false, true) => over_a.pixels[pixel] = over_b.pixels[pixel],
+            (true, false) => object_b.pixels[pixel] = object_a.pixels[pixel],
+            (false, true) => object_a.pixels[pixel] = object_b.pixels[pixel],
             _ => {}
         }
     }
-    let over = denoiser.denoise(&over_a, &over_b, &objects);
+    let object = denoiser.denoise(&object_a, &object_b, &objects);
 
     // The background and its change. Emission cancels in a difference, so its guides have none. A difference has both signs,
     // which only the built-in filter supports.
@@ -44,24 +44,24 @@ pub fn denoised(halves: [&Insertion; 2], denoiser: Denoiser) -> (Picture, Layers
             })
         })
         .collect();
-    let [beside_a, beside_b] = halves.map(Insertion::uncovered_change);
-    let beside = denoise(&beside_a, &beside_b, &dark);
+    let [change_a, change_b] = halves.map(Insertion::uncovered_change);
+    let change = denoise(&change_a, &change_b, &dark);
     let without = denoiser.denoise(&a.without, &b.without, &behind);
     let each = |value: &dyn Fn(usize) -> Vec3| Picture {
         pixels: (0..alpha.len()).map(value).collect(),
         ..*backdrop.photograph
     };
     let with = each(&|pixel| {
-        let free = without.pixels[pixel] + beside.pixels[pixel];
-        free.lerp(over.pixels[pixel], alpha[pixel])
+        let free = without.pixels[pixel] + change.pixels[pixel];
+        free.lerp(object.pixels[pixel], alpha[pixel])
     });
     let delta = each(&|pixel| with.pixels[pixel] - without.pixels[pixel]);
     let mixed: Vec<LayeredPixel> = (alpha.iter().enumerate())
         .map(|(pixel, &alpha)| LayeredPixel {
             alpha,
-            over: with.pixels[pixel],
-            under: without.pixels[pixel],
-            changed: alpha != 0.0 || beside.pixels[pixel] != Vec3::ZERO,
+            with: with.pixels[pixel],
+            without: without.pixels[pixel],
+            changed: alpha != 0.0 || change.pixels[pixel] != Vec3::ZERO,
         })
         .collect();
     let composite = backdrop.composite(&mixed);

@@ -211,11 +211,11 @@ impl Insertion {
     /// objects, all do.
     pub fn composite(&self) -> Picture {
         let mixed = |pixel: usize| {
-            let (over, under, alpha) = self.means(pixel);
+            let (with, without, alpha) = self.means(pixel);
             LayeredPixel {
                 alpha,
-                over,
-                under,
+                with,
+                without,
                 changed: self.pixels[pixel].changed,
             }
         };

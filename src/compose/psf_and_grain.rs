@@ -192,7 +192,7 @@ fn softness(
     }
     let (along, other) = if down { (width, 1) } else { (1, width) };
     // Average three pixels along the edge to reduce grain.
-    let own: Vec<f32> = (0..levels.len())
+    let smooth: Vec<f32> = (0..levels.len())
         .map(|at| {
             let near = [
                 at.saturating_sub(other),
@@ -202,13 +202,13 @@ fn softness(
             near.iter().map(|&i| levels[i]).sum::<f32>() / near.len() as f32
         })
         .collect();
-    let known = blurred(&own, [width, height], KNOWN_BLUR, down);
-    let slope = |at: usize, step: usize| own[at + step] - own[at - step];
+    let reblurred = blurred(&smooth, [width, height], KNOWN_BLUR, down);
+    let slope = |at: usize, step: usize| smooth[at + step] - smooth[at - step];
     let mut ratios: Vec<f64> = (2..height - 2)
         .flat_map(|y| (2..width - 2).map(move |x| y * width + x))
         .filter(|&at| {
             let here = slope(at, along).abs();
-            let level = own[at + along].max(own[at - along]);
+            let level = smooth[at + along].max(smooth[at - along]);
             valid[at]
                 && here > (EDGE * level).max(ABOVE_GRAIN * grain(level))
                 && slope(at, other).abs() < ACROSS * here
@@ -216,7 +216,7 @@ fn softness(
                 && here > slope(at + along, along).abs()
         })
         .filter_map(|at| {
-            let after = (known[at + along] - known[at - along]).abs();
+            let after = (reblurred[at + along] - reblurred[at - along]).abs();
             (after > 0.0).then(|| f64::from(slope(at, along).abs() / after))
         })
         .collect();
@@ -234,12 +234,12 @@ fn softness(
 fn softness_of(ratio: f64) -> f64 {
     // Difference between the pixels after and before a step of height 1.
     let slope = |variance: f64| libm::erf((2.0 * (variance + PIXEL_VARIANCE)).sqrt().recip());
-    let known = f64::from(KNOWN_BLUR * KNOWN_BLUR);
+    let known_variance = f64::from(KNOWN_BLUR * KNOWN_BLUR);
     let (mut low, mut high) = (0.0, f64::from(BLUR_RANGE[1] * BLUR_RANGE[1]));
     for _ in 0..HALVINGS {
         let middle: f64 = 0.5 * (low + high);
         // The more an edge is blurred already, the less the known blur reduces its slope.
-        match slope(middle) / slope(middle + known) > ratio {
+        match slope(middle) / slope(middle + known_variance) > ratio {
             true => low = middle,
             false => high = middle,
         }

@@ -32,7 +32,7 @@ pub const CHECKPOINT: &str = "checkpoint.json";
 /// Folder of the pictures within results.
 pub const VIEWS: &str = "views";
 /// Other files of results, except maps.
-const BESIDE: [&str; 5] = [REPORT, "loss.csv", "loss.png", "scene.glb", VIEWS];
+const OTHER_FILES: [&str; 5] = [REPORT, "loss.csv", "loss.png", "scene.glb", VIEWS];
 
 static PERMITTED: AtomicBool = AtomicBool::new(false);
 
@@ -61,16 +61,16 @@ pub fn check(path: &Path) -> Result<()> {
 /// The file is protected.
 pub fn check_input(path: &Path) -> Result<()> {
     refuse(path, |owner| match owner {
-        Owner::Capture(..) | Owner::Run => Some(owner),
+        Owner::Capture(..) | Owner::Inputs => Some(owner),
         Owner::Results(_) => None,
     })
 }
 
-fn refuse(path: &Path, counts: impl Fn(Owner) -> Option<Owner>) -> Result<()> {
+fn refuse(path: &Path, selects: impl Fn(Owner) -> Option<Owner>) -> Result<()> {
     if is_permitted() {
         return Ok(());
     }
-    let what = match owner(path).and_then(counts) {
+    let what = match owner(path).and_then(selects) {
         None => return Ok(()),
         Some(Owner::Capture(folder, what)) => {
             format!("is {what} of the capture in {}", folder.display())
@@ -78,7 +78,7 @@ fn refuse(path: &Path, counts: impl Fn(Owner) -> Option<Owner>) -> Result<()> {
         Some(Owner::Results(folder)) => {
             format!("belongs to the results in {}", folder.display())
         }
-        Some(Owner::Run) => "was read as an input".to_owned(),
+        Some(Owner::Inputs) => "was read as an input".to_owned(),
     };
     let remedy = "name another file; the command line replaces it where --overwrite is added";
     Err(Error::file(path, what, remedy))
@@ -110,14 +110,14 @@ pub fn check_results(folder: &Path, capture: &CaptureId) -> Result<()> {
             continue;
         }
         is_results = true;
-        let there = Reference::read(&path)
+        let existing = Reference::read(&path)
             .ok_or_else(|| Error::file(&path, "is there and holds no results of relit", remedy))?;
-        if !there.is_of(folder, capture) {
-            let problem = format!("holds the results of another capture, {}", there.name);
+        if !existing.is_of(folder, capture) {
+            let problem = format!("holds the results of another capture, {}", existing.name);
             return Err(Error::file(folder, problem, remedy));
         }
     }
-    let other = BESIDE.iter().map(|name| folder.join(name));
+    let other = OTHER_FILES.iter().map(|name| folder.join(name));
     match other.into_iter().find(|path| !is_results && path.exists()) {
         Some(path) => Err(Error::file(
             &path,
@@ -135,19 +135,19 @@ enum Owner {
     /// The results in a folder.
     Results(PathBuf),
     /// The inputs of this run.
-    Run,
+    Inputs,
 }
 
 fn owner(path: &Path) -> Option<Owner> {
     let place = place(path)?;
     let of_folder = place.ancestors().skip(1).find_map(|folder| {
         let name = place.strip_prefix(folder).ok()?;
-        if let Some(what) = of_capture(folder, name, &place) {
+        if let Some(what) = role_in_capture(folder, name, &place) {
             return Some(Owner::Capture(folder.to_owned(), what));
         }
-        of_results(folder, name, &place).then(|| Owner::Results(folder.to_owned()))
+        is_of_results(folder, name, &place).then(|| Owner::Results(folder.to_owned()))
     });
-    let was_read = || (place.exists() && inputs::holds(&place)).then_some(Owner::Run);
+    let was_read = || (place.exists() && inputs::holds(&place)).then_some(Owner::Inputs);
     of_folder.or_else(was_read)
 }
 
@@ -165,7 +165,7 @@ fn place(path: &Path) -> Option<PathBuf> {
     }
 }
 
-fn of_results(folder: &Path, name: &Path, place: &Path) -> bool {
+fn is_of_results(folder: &Path, name: &Path, place: &Path) -> bool {
     let is_results = || {
         [ESTIMATE, CHECKPOINT]
             .iter()
@@ -177,13 +177,13 @@ fn of_results(folder: &Path, name: &Path, place: &Path) -> bool {
         .and_then(|n| n.to_str())
         .unwrap_or_default();
     let is_one = [ESTIMATE, CHECKPOINT].contains(&first)
-        || BESIDE.contains(&first)
+        || OTHER_FILES.contains(&first)
         || (first.starts_with("maps-") && first.ends_with(".safetensors"));
     is_one && place.exists() && is_results()
 }
 
 /// The role of a file in the capture of a folder, if it belongs to it.
-fn of_capture(folder: &Path, name: &Path, place: &Path) -> Option<&'static str> {
+fn role_in_capture(folder: &Path, name: &Path, place: &Path) -> Option<&'static str> {
     let cameras = folder.join(CAMERAS);
     if !cameras.is_file() {
         return None;
@@ -217,7 +217,7 @@ fn of_capture(folder: &Path, name: &Path, place: &Path) -> Option<&'static str> 
     if exists && named(&file, "mesh_path").as_ref().is_some_and(same_stem) {
         return Some("the mesh");
     }
-    let beside = |file: &PathBuf| {
+    let is_beside = |file: &PathBuf| {
         file == place
             || (exists && file.parent() == place.parent() && file.parent() != Some(folder))
     };
@@ -229,7 +229,7 @@ fn of_capture(folder: &Path, name: &Path, place: &Path) -> Option<&'static str> 
             ("mask_path", "a mask"),
         ]
         .into_iter()
-        .find(|(field, _)| named(frame, field).as_ref().is_some_and(beside))
+        .find(|(field, _)| named(frame, field).as_ref().is_some_and(is_beside))
         .map(|(_, what)| what)
     })
 }
@@ -272,11 +272,11 @@ impl Reference {
         let Ok(folder) = folder.canonicalize() else {
             return false;
         };
-        let lay = [
+        let places = [
             self.relative.as_ref().map(|path| results.join(path)),
             self.absolute.clone(),
         ];
-        (lay.into_iter().flatten()).any(|path| path.canonicalize().is_ok_and(|p| p == folder))
+        (places.into_iter().flatten()).any(|path| path.canonicalize().is_ok_and(|p| p == folder))
     }
 }
 

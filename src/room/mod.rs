@@ -25,5 +25,5 @@ use crate::error::Result;
 /// # Errors
 /// The program file is damaged.
 pub fn capture() -> Result<Capture> {
-    Room::new().kept()
+    Room::new().with_stored_photographs()
 }

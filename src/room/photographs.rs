@@ -14,7 +14,7 @@ use image::ImageFormat;
 use std::path::Path;
 
 /// The rendering that is stored in the program.
-pub const KEPT: Rendering = Rendering {
+pub const STORED: Rendering = Rendering {
     seed: 7,
     samples: 256,
     size: [160, 120],
@@ -56,8 +56,8 @@ impl Room {
     ///
     /// # Errors
     /// The program file is damaged.
-    pub fn kept(&self) -> Result<Capture> {
-        Ok(self.capture_of(kept()?, KEPT.size))
+    pub fn with_stored_photographs(&self) -> Result<Capture> {
+        Ok(self.capture_of(stored()?, STORED.size))
     }
 
     /// The room with newly rendered photographs.
@@ -93,7 +93,7 @@ pub fn render_lit(world: &Lit, rendering: &Rendering) -> Vec<Photograph> {
 ///
 /// # Errors
 /// The program file is damaged.
-pub fn kept() -> Result<Vec<Photograph>> {
+pub fn stored() -> Result<Vec<Photograph>> {
     let decode = |(index, bytes): (usize, &&[u8])| {
         let image = image::load_from_memory_with_format(bytes, ImageFormat::OpenExr)
             .map_err(|error| {
@@ -114,7 +114,7 @@ pub fn kept() -> Result<Vec<Photograph>> {
 ///
 /// # Errors
 /// The folder cannot be written.
-pub fn write_kept(folder: &Path) -> Result<()> {
+pub fn write_stored(folder: &Path) -> Result<()> {
     for (index, bytes) in FILES.iter().enumerate() {
         write_bytes(&folder.join(format!("{index:03}.exr")), bytes)?;
     }

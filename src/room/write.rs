@@ -6,7 +6,7 @@ use crate::export::new_folder::NewFolder;
 use crate::math::picture::Picture;
 use crate::room::cameras;
 use crate::room::model::Room;
-use crate::room::photographs::{self, KEPT, Rendering};
+use crate::room::photographs::{self, Rendering, STORED};
 use crate::room::truth::{self, Truth};
 use std::path::Path;
 
@@ -21,11 +21,11 @@ pub fn write(out: &Path, rendering: Option<&Rendering>) -> Result<()> {
     let folder = NewFolder::new(out)?;
     let out = folder.path();
     let room = Room::new();
-    let made = rendering.unwrap_or(&KEPT);
+    let made = rendering.unwrap_or(&STORED);
     let images = out.join("images");
     match rendering {
         Some(rendering) => photographs::write(&images, &photographs::render(&room, rendering)?)?,
-        None => photographs::write_kept(&images)?,
+        None => photographs::write_stored(&images)?,
     }
     capture::write_mesh(out, &room.mesh)?;
 

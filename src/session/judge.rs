@@ -4,7 +4,7 @@ use crate::calibrate::problem::Problem;
 use crate::capture::truth::Truth;
 use crate::error::Result;
 use crate::room::Room;
-use crate::room::photographs::KEPT;
+use crate::room::photographs::STORED;
 use crate::session::command::Source;
 use crate::session::open_capture::OpenCapture;
 use crate::study::evaluate::Reference;
@@ -18,7 +18,7 @@ impl OpenCapture {
     /// The truth is broken.
     pub fn judge(&self) -> Result<Judge> {
         let truth = match &self.source {
-            Source::BuiltInRoom => Room::new().truth(KEPT.size)?,
+            Source::BuiltInRoom => Room::new().truth(STORED.size)?,
             Source::Folder(folder) if folder.join("truth.json").is_file() => Truth::read(folder)?,
             Source::Folder(_) => return Ok(Judge::HeldOut),
         };

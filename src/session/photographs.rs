@@ -77,7 +77,7 @@ impl Photographs {
         prefix: &dyn Fn(usize) -> PathBuf,
         report: &dyn Fn(WriteProgress) -> bool,
     ) -> Result<Written> {
-        self.write_made_of(&Renderer::processor(), &[], prefix, report)
+        self.write_with(&Renderer::processor(), &[], prefix, report)
     }
 
     /// [`Photographs::write`] with a renderer, and with materials that replace those of object files: one for each
@@ -85,7 +85,7 @@ impl Photographs {
     ///
     /// # Errors
     /// As [`Photographs::write`].
-    pub fn write_made_of(
+    pub fn write_with(
         &self,
         renderer: &Renderer,
         materials: &[Option<ObjectSurface>],

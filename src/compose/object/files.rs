@@ -34,7 +34,7 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
 }
 
 /// Resolves a file name in `referrer`. Refuses a file outside the referrer's folder.
-pub fn beside(referrer: &Path, name: &str) -> Result<PathBuf> {
+pub fn resolve(referrer: &Path, name: &str) -> Result<PathBuf> {
     let folder = match referrer.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),

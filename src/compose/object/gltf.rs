@@ -27,7 +27,7 @@ pub(super) fn read(path: &Path) -> Result<Parts> {
         )
     };
     let gltf = gltf_file::parse(path, &files::read_bytes(path)?)?;
-    let file = |_: &str, name: &str| files::read_bytes(&files::beside(path, name)?);
+    let file = |_: &str, name: &str| files::read_bytes(&files::resolve(path, name)?);
     let buffers = gltf_file::buffers(&gltf, path, &file)?;
 
     let mut parts = Parts::default();

@@ -96,7 +96,7 @@ pub(super) fn read(path: &Path) -> Result<Parts> {
 }
 
 fn open_library(referrer: &Path, name: &Path) -> Result<(PathBuf, Vec<u8>)> {
-    let found = files::beside(referrer, &name.to_string_lossy())?;
+    let found = files::resolve(referrer, &name.to_string_lossy())?;
     let bytes = files::read_bytes(&found)?;
     Ok((found, bytes))
 }
@@ -216,7 +216,7 @@ fn surface(
         let texture = match textures.get(name) {
             Some(texture) => texture.clone(),
             None => {
-                let found = files::beside(library, name)?;
+                let found = files::resolve(library, name)?;
                 let bytes = files::read_bytes(&found)?;
                 Arc::new(files::decode(
                     &bytes,

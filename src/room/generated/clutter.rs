@@ -26,7 +26,7 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
         half: DVec2::new(f.size.x, f.size.z) * 0.5 - 0.05,
         headroom: f.size.y,
     };
-    let blocked = f.taken.clone();
+    let blocked = f.occupied.clone();
     let mut supports = vec![floor];
     supports.append(&mut f.supports);
     let mut places: Vec<Vec<(DVec2, f64)>> = vec![Vec::new(); supports.len()];

@@ -41,7 +41,7 @@ pub struct Furnisher {
     /// Width, height and depth in metres; the floor is y = 0, with its centre at the origin.
     pub size: DVec3,
     /// Occupied circles on the floor: centre and radius in metres.
-    pub taken: Vec<(DVec2, f64)>,
+    pub occupied: Vec<(DVec2, f64)>,
     /// Tops of furniture.
     pub supports: Vec<Support>,
     /// Views of its photographs.
@@ -60,7 +60,7 @@ impl Furnisher {
             modeller: Modeller::default(),
             materials: Vec::new(),
             size: DVec3::ZERO,
-            taken: Vec::new(),
+            occupied: Vec::new(),
             supports: Vec::new(),
             views: Vec::new(),
             outside: None,
@@ -118,20 +118,12 @@ impl Furnisher {
 
     /// The same, but `wall` builds each wall from its index (north, south, west, east), corner and two sides.
     pub fn shell_with(&mut self, wall: impl Fn(&mut Modeller, usize, [DVec3; 3])) {
-        let (half, height) = (self.size * 0.5, DVec3::Y * self.size.y);
-        let low = DVec3::new(-half.x, 0.0, -half.z);
-        let high = DVec3::new(half.x, self.size.y, half.z);
-        let (width, depth) = (DVec3::X * self.size.x, DVec3::Z * self.size.z);
+        let walls = walls(self.size);
+        let [[low, width, _], [high, ..], [_, _, depth], _] = walls;
         self.plain("floor", [0.05, 0.7], |m| m.grid(low, depth, width, 4, 4));
         self.plain("ceiling", [0.5, 0.92], |m| {
             m.grid(high, -width, -depth, 4, 4)
         });
-        let walls = [
-            [low, width, height],
-            [high, -height, -width],
-            [low, height, depth],
-            [high, -depth, -height],
-        ];
         let together = [1, 2, 4][self.stream.below(3)];
         for (index, group) in walls.chunks(together).enumerate() {
             self.plain(&format!("wall-{index}"), [0.15, 0.92], |m| {
@@ -277,14 +269,30 @@ impl Furnisher {
             .into_iter()
             .find(|at| {
                 let clear = |(center, other): &(DVec2, f64)| at.distance(*center) > radius + other;
-                self.taken.iter().all(clear)
+                self.occupied.iter().all(clear)
             })
     }
 
     /// Draws a free point and occupies its circle.
     pub fn free(&mut self, radius: f64) -> Option<DVec2> {
         let at = self.free_point(radius)?;
-        self.taken.push((at, radius));
+        self.occupied.push((at, radius));
         Some(at)
     }
+}
+
+/// Corner and two sides of each wall of a room: north, south, west and east.
+pub fn walls(size: DVec3) -> [[DVec3; 3]; 4] {
+    let half = size * 0.5;
+    let (low, high) = (
+        DVec3::new(-half.x, 0.0, -half.z),
+        DVec3::new(half.x, size.y, half.z),
+    );
+    let [width, height, depth] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * size);
+    [
+        [low, width, height],
+        [high, -height, -width],
+        [low, height, depth],
+        [high, -depth, -height],
+    ]
 }

@@ -1,6 +1,6 @@
 //! Rooms lit by sky and sun through openings in their walls.
 
-use crate::room::generated::furnisher::Furnisher;
+use crate::room::generated::furnisher::{Furnisher, walls};
 use crate::room::shape::Modeller;
 use crate::transport::environment::{Environment, direction_of, pixel_of};
 use glam::{DVec3, Vec3};
@@ -70,22 +70,6 @@ fn openings(f: &mut Furnisher) -> Vec<Opening> {
             }
         })
         .collect()
-}
-
-/// Corner and sides of the walls, in the order of [`Furnisher::shell_with`].
-fn walls(size: DVec3) -> [[DVec3; 3]; 4] {
-    let half = size * 0.5;
-    let (low, high) = (
-        DVec3::new(-half.x, 0.0, -half.z),
-        DVec3::new(half.x, size.y, half.z),
-    );
-    let [width, height, depth] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * size);
-    [
-        [low, width, height],
-        [high, -height, -width],
-        [low, height, depth],
-        [high, -depth, -height],
-    ]
 }
 
 /// The opening's range along each side of its wall.

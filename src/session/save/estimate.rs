@@ -275,11 +275,11 @@ impl CaptureReference {
         if self.built_in {
             return Source::BuiltInRoom;
         }
-        let beside = self.relative.as_ref().map(|path| folder.join(path));
-        match (beside, &self.absolute) {
-            (Some(beside), _) if beside.is_dir() => Source::Folder(beside),
+        let relative = self.relative.as_ref().map(|path| folder.join(path));
+        match (relative, &self.absolute) {
+            (Some(relative), _) if relative.is_dir() => Source::Folder(relative),
             (_, Some(absolute)) => Source::Folder(absolute.clone()),
-            (Some(beside), None) => Source::Folder(beside),
+            (Some(relative), None) => Source::Folder(relative),
             (None, None) => Source::Folder(folder.to_owned()),
         }
     }

@@ -26,10 +26,14 @@ pub(super) struct Earlier {
 
 impl Worker {
     /// Loads the last session of a capture. `None` if there is none, or if other options or parameters are requested
-    /// now. `asked`: the parameters were given explicitly.
-    pub(super) fn last_session(&mut self, capture: &OpenCapture, asked: bool) -> Option<Earlier> {
+    /// now. `explicit_settings`: the parameters were given explicitly.
+    pub(super) fn last_session(
+        &mut self,
+        capture: &OpenCapture,
+        explicit_settings: bool,
+    ) -> Option<Earlier> {
         let folder = self.keeper.last(&capture.hash)?;
-        self.session_in(&folder, capture, asked)
+        self.session_in(&folder, capture, explicit_settings)
             .unwrap_or_else(|error| {
                 let message =
                     format!("a new session begins, as the last cannot be gone on with: {error}");
@@ -42,7 +46,7 @@ impl Worker {
         &self,
         folder: &Path,
         capture: &OpenCapture,
-        asked: bool,
+        explicit_settings: bool,
     ) -> Result<Option<Earlier>> {
         let mut saved = save::load(folder)?;
         let (now, then) = (&capture.options, &mut saved.options);
@@ -50,7 +54,7 @@ impl Worker {
             || (now.segments.is_some() && now.segments != then.segments)
             || (!now.reading.is_default() && now.reading != then.reading)
             || (now.coordinates != Coordinates::default() && now.coordinates != then.coordinates);
-        if other || (asked && saved.settings != self.settings) {
+        if other || (explicit_settings && saved.settings != self.settings) {
             return Ok(None);
         }
         then.check_alignment = now.check_alignment;

@@ -55,7 +55,7 @@ pub(super) struct Worker {
     /// Name of the session that the open capture continues.
     pub continued: Option<String>,
     /// Whether the parameters were given explicitly at the start of the program, and so take precedence over a session's.
-    pub asked: bool,
+    pub explicit_settings: bool,
     /// Until when views get more of the solver's time.
     pub priority_until: Option<Instant>,
     /// Number of answered commands to change objects.
@@ -97,7 +97,7 @@ impl Worker {
             inserted: Arc::default(),
             frame: 0,
             continued: None,
-            asked: settings != Settings::default(),
+            explicit_settings: settings != Settings::default(),
             priority_until: None,
             regroupings: 0,
             edited: Edited::default(),

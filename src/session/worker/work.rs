@@ -95,12 +95,12 @@ impl Worker {
         self.started = Instant::now();
         let before = std::mem::replace(&mut self.phase, Phase::Loading);
         self.publish(true);
-        let asked = std::mem::take(&mut self.asked);
+        let explicit_settings = std::mem::take(&mut self.explicit_settings);
         match (self.backend.open)(source, options) {
             Ok(capture) => {
                 self.seconds_load = self.started.elapsed().as_secs_f64();
                 let earlier = match begin {
-                    Begin::GoingOn => self.last_session(&capture, asked),
+                    Begin::GoingOn => self.last_session(&capture, explicit_settings),
                     Begin::Anew => None,
                 };
                 if let Some(earlier) = earlier {

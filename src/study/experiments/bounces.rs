@@ -351,10 +351,10 @@ mod tests {
     #[test]
     fn two_bounces_are_enough_by_the_errors_and_nothing_is_said_of_no_room() {
         assert!(seen(&[]).is_empty());
-        let said = seen(&[room([0.1, 0.009, 0.001]), room([0.1, 0.05, 0.001])]).join(" ");
-        assert!(said.contains("Two are enough.") && said.contains("Two are not enough."));
+        let text = seen(&[room([0.1, 0.009, 0.001]), room([0.1, 0.05, 0.001])]).join(" ");
+        assert!(text.contains("Two are enough.") && text.contains("Two are not enough."));
         assert!(
-            said.contains("enough for the transport cache in 1 of 2 rooms tried; not in a room.")
+            text.contains("enough for the transport cache in 1 of 2 rooms tried; not in a room.")
         );
     }
 }

@@ -6,7 +6,7 @@ use crate::compose::object::ObjectModel;
 use crate::compose::placement::Placement;
 use crate::error::{Error, Result};
 use crate::room::Room;
-use crate::room::photographs::{KEPT, Rendering, kept, render};
+use crate::room::photographs::{Rendering, STORED, render, stored};
 use crate::room::shape::Modeller;
 use crate::scene::visibility::NOTHING;
 use crate::study::experiments::chair::chair;
@@ -44,7 +44,7 @@ const LIFT: f64 = 2e-3;
 /// Photographs of the room without textures; those of the textured one are stored in the program.
 const PLAIN: Rendering = Rendering {
     samples: 64,
-    ..KEPT
+    ..STORED
 };
 const QUICK: Rendering = Rendering {
     seed: 7,
@@ -83,7 +83,7 @@ pub fn built_in(textured: bool, quick: bool) -> Result<Furnished> {
     }
     let photographs = match (quick, textured) {
         (true, _) => render(&room, &QUICK)?,
-        (false, true) => kept()?,
+        (false, true) => stored()?,
         (false, false) => render(&room, &PLAIN)?,
     };
     let stands = CHAIRS.map(|(_, _, place, turn)| {

@@ -279,12 +279,12 @@ fn summary(scenes: &[Scene]) -> Summary {
         )
     };
     let rows = scenes.iter().flat_map(|scene| {
-        (WAYS.iter().zip(&scene.likeness)).map(move |(way, [inside, beside])| {
+        (WAYS.iter().zip(&scene.likeness)).map(move |(way, [objects, shadow])| {
             vec![
                 scene.name.clone(),
                 (*way).to_owned(),
-                words(inside),
-                words(beside),
+                words(objects),
+                words(shadow),
             ]
         })
     });

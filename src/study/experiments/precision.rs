@@ -286,7 +286,7 @@ mod tests {
 
     #[test]
     fn an_error_that_is_too_large_once_is_not_said_to_be_so_beyond() {
-        let said = |errors: [f64; 4]| {
+        let text = |errors: [f64; 4]| {
             let points = (0..4).map(|i| 10f64.powi(i)).zip(errors).collect();
             sentence(&Line {
                 axis: "size",
@@ -295,8 +295,8 @@ mod tests {
                 points,
             })
         };
-        assert!(said([0.0, 0.01, 0.0, 0.05]).starts_with("below 0.100 at all 4 values"));
-        assert!(said([0.0, 0.2, 0.0, 0.0]).ends_with("in all at 1 of 4 values tried"));
-        assert!(said([0.0, 0.0, 0.2, f64::NAN]).ends_with("at all values tried beyond"));
+        assert!(text([0.0, 0.01, 0.0, 0.05]).starts_with("below 0.100 at all 4 values"));
+        assert!(text([0.0, 0.2, 0.0, 0.0]).ends_with("in all at 1 of 4 values tried"));
+        assert!(text([0.0, 0.0, 0.2, f64::NAN]).ends_with("at all values tried beyond"));
     }
 }

@@ -227,13 +227,13 @@ fn seen(kinds: &[Kind], evenness: &[Evenness]) -> Vec<String> {
             let (Some(uniform), Some(other)) = (uniform, at(kind)) else {
                 continue;
             };
-            let verdict = match (other.differs(&uniform), other.mean < uniform.mean) {
+            let conclusion = match (other.differs(&uniform), other.mean < uniform.mean) {
                 (false, _) => "no difference beyond what seeds tell of the noise",
                 (true, true) => "better",
                 (true, false) => "worse",
             };
             seen.push(format!(
-                "Pixels {}, at {:.2} million rays: albedo off by {}, uniformly {}: {verdict}.",
+                "Pixels {}, at {:.2} million rays: albedo off by {}, uniformly {}: {conclusion}.",
                 kind.name,
                 rays_at(mark) as f64 * 1e-6,
                 other.words(),

@@ -394,7 +394,7 @@ fn seen(states: &[State]) -> Vec<String> {
 mod tests {
     use super::*;
 
-    fn said(scores: [f64; 5]) -> String {
+    fn text(scores: [f64; 5]) -> String {
         let names = [
             "cache",
             "cache, textures",
@@ -418,12 +418,12 @@ mod tests {
 
     #[test]
     fn the_paper_s_gain_is_seen_where_patches_are_better_than_one_colour_of_both_solvers() {
-        let gains = said([24.0, 37.0, 23.5, 26.0, 30.0]);
+        let gains = text([24.0, 37.0, 23.5, 26.0, 30.0]);
         assert!(
             gains.contains("\"cut 1\": +6.5 dB from its own") && gains.contains("of it was seen")
         );
         assert!(gains.contains("+6.0 dB from the transport"));
-        let worse = said([24.0, 37.0, 20.0, 22.0, 23.0]);
+        let worse = text([24.0, 37.0, 20.0, 22.0, 23.0]);
         assert!(worse.contains("+3.0 dB from its own") && worse.contains("was not seen"));
     }
 }

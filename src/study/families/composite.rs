@@ -89,8 +89,8 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
         .collect::<Result<Vec<_>>>()?;
     let count = scores.len() as f64;
     let mean = |of: fn(&Scores) -> f64| scores.iter().map(of).sum::<f64>() / count;
-    let changed: Vec<Beside> = scores.iter().filter_map(|s| s.beside).collect();
-    let beside = |of: fn(&Beside) -> f64| {
+    let changed: Vec<AroundScores> = scores.iter().filter_map(|s| s.around).collect();
+    let around = |of: fn(&AroundScores) -> f64| {
         let sum: f64 = changed.iter().map(of).sum();
         (!changed.is_empty()).then(|| sum / changed.len() as f64)
     };
@@ -101,9 +101,9 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
         chair: mean(|s| s.chair),
         naive: mean(|s| s.naive),
         brightness: mean(|s| s.brightness),
-        shadow: beside(|b| b.shadow),
-        untouched: beside(|b| b.untouched),
-        slope: beside(|b| b.slope),
+        shadow: around(|b| b.shadow),
+        untouched: around(|b| b.untouched),
+        slope: around(|b| b.slope),
     }))
 }
 
@@ -111,11 +111,11 @@ impl CompositeRow {
     /// As a line of text.
     pub fn words(&self) -> String {
         let scores = self.shadow.zip(self.untouched).zip(self.slope);
-        let beside = scores.map_or("none".to_owned(), |((shadow, untouched), slope)| {
+        let around = scores.map_or("none".to_owned(), |((shadow, untouched), slope)| {
             format!("{shadow:.1} dB (untouched {untouched:.1}), slope {slope:.2}")
         });
         format!(
-            "{} room {}: chair {:.1} dB (naive {:.1}), brightness {:.2}; shadow {beside}; {:.0} s",
+            "{} room {}: chair {:.1} dB (naive {:.1}), brightness {:.2}; shadow {around}; {:.0} s",
             self.family.name(),
             self.seed,
             self.chair,
@@ -251,12 +251,12 @@ struct Scores {
     naive: f64,
     brightness: f64,
     /// Scores beside the chair, if it changes any pixel there.
-    beside: Option<Beside>,
+    around: Option<AroundScores>,
 }
 
 /// Scores over the shadow and bleed.
 #[derive(Debug, Clone, Copy)]
-struct Beside {
+struct AroundScores {
     shadow: f64,
     untouched: f64,
     slope: f64,
@@ -333,7 +333,7 @@ fn scores(
     let covered: Vec<usize> = (0..pixels.len())
         .filter(|&i| layers.alpha[i] > 0.95)
         .collect();
-    let beside: Vec<usize> = (0..pixels.len())
+    let around: Vec<usize> = (0..pixels.len())
         .filter(|&i| {
             layers.alpha[i] == 0.0 && valid[i] && change_at(i).abs().max_element() > CHANGED
         })
@@ -357,16 +357,16 @@ fn scores(
     let ours_at = |i: usize| ours.pixels[i];
     let slope = || {
         let ours = |i: usize| (ours_at(i) - pixels[i]).dot(change_at(i));
-        sum(&ours, &beside) / sum(&|i| change_at(i).length_squared(), &beside)
+        sum(&ours, &around) / sum(&|i| change_at(i).length_squared(), &around)
     };
     let bright = |of: &dyn Fn(usize) -> Vec3| sum(&|i| shown(of(i)).element_sum(), &covered);
     Ok(Scores {
         chair: psnr(&covered, &ours_at, &truth_at),
         naive: psnr(&covered, &|i| naive.pixels[i], &truth_at),
         brightness: bright(&ours_at) / bright(&truth_at),
-        beside: (!beside.is_empty()).then(|| Beside {
-            shadow: psnr(&beside, &ours_at, &true_at),
-            untouched: psnr(&beside, &|i| pixels[i], &true_at),
+        around: (!around.is_empty()).then(|| AroundScores {
+            shadow: psnr(&around, &ours_at, &true_at),
+            untouched: psnr(&around, &|i| pixels[i], &true_at),
             slope: slope(),
         }),
     })
