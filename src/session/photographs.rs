@@ -66,9 +66,8 @@ pub struct Written {
 }
 
 impl Photographs {
-    /// Writes `prefix(frame)`.relit.{exr,png} and the files of an insertion for each photograph. `report` is called
-    /// from time to time with the progress, and stops the work by returning false; files already written are
-    /// complete.
+    /// Writes `prefix(frame)`.relit.{exr,png} and the files of an insertion for each photograph. `report` is called from time
+    /// to time with the progress, and stops the work by returning false; files already written are complete.
     ///
     /// # Errors
     /// An object or a photograph cannot be read, or a file cannot be written.
