@@ -66,7 +66,7 @@ pub fn edit(arguments: &EditArguments) -> Result<i32> {
     if absolute(&arguments.out).is_some_and(|out| absolute(&arguments.saved.dir) == Some(out)) {
         return Err(Error::usage(
             "--out",
-            "is the folder of the results that are to be changed",
+            "is the folder of the results themselves",
             "choose another folder",
         ));
     }

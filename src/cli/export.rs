@@ -81,9 +81,9 @@ impl FormatName {
         };
         Err(Error::usage(
             path.display(),
-            format!("is no name for --format {}", name(self)),
+            format!("has the wrong extension for --format {}", name(self)),
             format!(
-                "let it end with .{}, or choose --format {}",
+                "use the extension .{}, or choose --format {}",
                 self.endings().join(" or ."),
                 name(*other)
             ),

@@ -77,7 +77,7 @@ impl ObjectValues {
             if !(*roughness > 0.0 && *roughness <= 1.0) {
                 return Err(Error::usage(
                     format!("roughness of {name}"),
-                    "a lobe's GGX roughness lies above 0 and not above 1",
+                    "a GGX roughness is above 0 and at most 1",
                     "give a value like 0.3",
                 ));
             }

@@ -87,7 +87,7 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
     if arguments.layers && arguments.device.device == Device::Gpu {
         return Err(Error::usage(
             "--device gpu",
-            "the light of each lamp apart is traced by the processor",
+            "the light of each lamp is traced separately by the processor",
             "leave out one of --layers and --device",
         ));
     }

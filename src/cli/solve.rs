@@ -66,7 +66,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
             earlier.estimate_for(&capture)?;
             edits = earlier.edits_for(&capture)?;
             if earlier.checkpoint.is_none() {
-                say::warning("the earlier solve left nothing to go on from; starting over");
+                say::warning("the earlier solve left no checkpoint; starting over");
             }
             earlier.checkpoint.as_ref()
         }

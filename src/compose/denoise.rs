@@ -47,15 +47,15 @@ pub fn denoised(halves: [&Insertion; 2], denoiser: Denoiser) -> (Picture, Layers
     let [change_a, change_b] = halves.map(Insertion::uncovered_change);
     let change = denoise(&change_a, &change_b, &dark);
     let without = denoiser.denoise(&a.without, &b.without, &behind);
-    let each = |value: &dyn Fn(usize) -> Vec3| Picture {
+    let picture = |value: &dyn Fn(usize) -> Vec3| Picture {
         pixels: (0..alpha.len()).map(value).collect(),
         ..*backdrop.photograph
     };
-    let with = each(&|pixel| {
+    let with = picture(&|pixel| {
         let free = without.pixels[pixel] + change.pixels[pixel];
         free.lerp(object.pixels[pixel], alpha[pixel])
     });
-    let delta = each(&|pixel| with.pixels[pixel] - without.pixels[pixel]);
+    let delta = picture(&|pixel| with.pixels[pixel] - without.pixels[pixel]);
     let mixed: Vec<LayeredPixel> = (alpha.iter().enumerate())
         .map(|(pixel, &alpha)| LayeredPixel {
             alpha,

@@ -110,7 +110,7 @@ impl PlacedObject {
         if !corners.iter().flatten().all(|p| p.is_finite()) {
             return Err(Error::file(
                 &placement.file,
-                "comes to lie outside the range of coordinates",
+                "is placed outside the range of coordinates",
                 "check --at and --scale",
             ));
         }

@@ -26,7 +26,7 @@ pub fn write_atomically(
     if std::fs::metadata(path).is_ok_and(|there| !there.is_file()) {
         return Err(Error::file(
             path,
-            "is there already and is no regular file",
+            "exists and is no regular file",
             "name another file",
         ));
     }

@@ -168,11 +168,11 @@ fn write_obj(out: &mut impl Write, mesh: &Mesh) -> std::result::Result<(), Write
         writeln!(out, "vt {} {}", uv.x, uv.y)?;
     }
     let textured = !mesh.corner_uvs.is_empty();
-    let mut own = vec![Vec::new(); mesh.objects.len()];
+    let mut triangles_of = vec![Vec::new(); mesh.objects.len()];
     for (triangle, &object) in mesh.object_of.iter().enumerate() {
-        own[object as usize].push(triangle);
+        triangles_of[object as usize].push(triangle);
     }
-    for (name, triangles) in mesh.objects.iter().zip(own) {
+    for (name, triangles) in mesh.objects.iter().zip(triangles_of) {
         writeln!(out, "o {}", name.replace(char::is_control, " "))?;
         for triangle in triangles {
             write!(out, "f")?;

@@ -42,7 +42,7 @@ pub fn write<'a>(
         return Err(Error::file(
             path,
             "nothing emits light in this estimate, so there are no layers",
-            "solve on, or give an object an emission",
+            "continue the solve, or give an object an emission",
         ));
     };
     write_layers(path, width, height, &named)

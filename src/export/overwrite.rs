@@ -111,7 +111,7 @@ pub fn check_results(folder: &Path, capture: &CaptureId) -> Result<()> {
         }
         is_results = true;
         let existing = Reference::read(&path)
-            .ok_or_else(|| Error::file(&path, "is there and holds no results of relit", remedy))?;
+            .ok_or_else(|| Error::file(&path, "exists and holds no results of relit", remedy))?;
         if !existing.is_of(folder, capture) {
             let problem = format!("holds the results of another capture, {}", existing.name);
             return Err(Error::file(folder, problem, remedy));
@@ -121,7 +121,7 @@ pub fn check_results(folder: &Path, capture: &CaptureId) -> Result<()> {
     match other.into_iter().find(|path| !is_results && path.exists()) {
         Some(path) => Err(Error::file(
             &path,
-            "is there and belongs to no results of relit",
+            "exists and belongs to no results of relit",
             remedy,
         )),
         None => Ok(()),

@@ -21,7 +21,7 @@ pub fn write(out: &Path, rendering: Option<&Rendering>) -> Result<()> {
     let folder = NewFolder::new(out)?;
     let out = folder.path();
     let room = Room::new();
-    let made = rendering.unwrap_or(&STORED);
+    let rendering_used = rendering.unwrap_or(&STORED);
     let images = out.join("images");
     match rendering {
         Some(rendering) => photographs::write(&images, &photographs::render(&room, rendering)?)?,
@@ -29,7 +29,7 @@ pub fn write(out: &Path, rendering: Option<&Rendering>) -> Result<()> {
     }
     capture::write_mesh(out, &room.mesh)?;
 
-    let world = room.lit(made.size)?;
+    let world = room.lit(rendering_used.size)?;
     let albedo: Vec<Picture> = (world.scene.cameras.iter())
         .map(|camera| truth::albedo_picture(&world, camera))
         .collect();
@@ -37,13 +37,13 @@ pub fn write(out: &Path, rendering: Option<&Rendering>) -> Result<()> {
         name: "room",
         renderer: format!("relit {}", env!("CARGO_PKG_VERSION")),
         max_bounces: None,
-        spp: made.samples,
-        seed: made.seed,
+        spp: rendering_used.samples,
+        seed: rendering_used.seed,
         outside_light: None,
         objects: truth::objects(&world),
     };
     capture::write_truth(out, &truth, &albedo)?;
-    let cameras = cameras::cameras(&room.views, made.size);
+    let cameras = cameras::cameras(&room.views, rendering_used.size);
     capture::write_transforms(out, cameras.into_iter(), world.scene.up.as_dvec3())?;
     folder.commit()
 }

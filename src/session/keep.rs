@@ -100,10 +100,10 @@ impl Keeper {
     /// The newest session of a capture, by its hash, that no other program has open.
     pub fn last(&self, hash: &str) -> Option<PathBuf> {
         let home = self.base.as_ref()?.join(hash);
-        let ours = self.open.as_ref().map(|(folder, _)| folder);
+        let open_here = self.open.as_ref().map(|(folder, _)| folder);
         let mut folders = self.kept.iter().map(|kept| &kept.folder);
         let free = |folder: &&PathBuf| {
-            folder.starts_with(&home) && (ours == Some(*folder) || lock(folder).is_some())
+            folder.starts_with(&home) && (open_here == Some(*folder) || lock(folder).is_some())
         };
         folders.find(free).cloned()
     }
@@ -122,8 +122,8 @@ impl Keeper {
     /// Continues the session in a folder. Begins a new one if the folder is none, or another program has it open.
     pub fn resume(&mut self, hash: &str, folder: &Path, held: &SessionRecord) {
         self.begin(hash);
-        let ours = (self.base.as_ref()).is_some_and(|base| folder.starts_with(base));
-        if let Some(lock) = ours.then(|| lock(folder)).flatten() {
+        let in_base = (self.base.as_ref()).is_some_and(|base| folder.starts_with(base));
+        if let Some(lock) = in_base.then(|| lock(folder)).flatten() {
             self.capture = folder.parent().map(Path::to_owned);
             self.open = Some((folder.to_owned(), Some(lock)));
             self.precious = held.precious;
@@ -180,8 +180,8 @@ impl Keeper {
     /// # Errors
     /// The session is open, or cannot be deleted.
     pub fn remove(&mut self, folder: &Path) -> Result<()> {
-        let ours = self.kept.iter().any(|kept| kept.folder == folder);
-        if !ours || lock(folder).is_none() {
+        let is_kept = self.kept.iter().any(|kept| kept.folder == folder);
+        if !is_kept || lock(folder).is_none() {
             let remedy = "open another session first";
             return Err(Error::file(folder, "this session is open", remedy));
         }

@@ -124,8 +124,14 @@ impl Library {
                 .photographed
                 .get_or_insert_with(|| light_of_photographs(capture)),
         };
-        let same = vec![photographed; objects.len()];
-        let naive = Pasted::new(&backdrop, &lit, &objects, &same, Exposure::default());
+        let photographed = vec![photographed; objects.len()];
+        let naive = Pasted::new(
+            &backdrop,
+            &lit,
+            &objects,
+            &photographed,
+            Exposure::default(),
+        );
         let estimated: Vec<Harmonics> = objects
             .iter()
             .map(|object| harmonics_of_estimate(&lit, object.center, options, seed))

@@ -193,13 +193,13 @@ fn surface(
         roughness *= values.y;
         metallic *= values.z;
         warnings.push(format!(
-            "{place}: of the metallic-roughness texture only the mean is used."
+            "{place}: only the mean of the metallic-roughness texture is used."
         ));
     }
 
     if material.alpha_mode() != AlphaMode::Opaque {
         warnings.push(format!(
-            "{place}: see-through is not supported and is taken as opaque."
+            "{place}: see-through materials are not supported and are treated as opaque."
         ));
     }
     if material.emissive_factor() != [0.0; 3] {

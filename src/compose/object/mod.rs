@@ -52,7 +52,7 @@ impl ObjectModel {
             _ => {
                 return Err(Error::file(
                     path,
-                    "not a file that objects are read from",
+                    "is no object file",
                     "give an .obj, .glb or .gltf file",
                 ));
             }

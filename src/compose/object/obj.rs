@@ -234,7 +234,7 @@ fn surface(
         || material.dissolve_texture.is_some();
     if transparent {
         warnings.push(format!(
-            "{}: see-through (d, Tr) is not supported and is taken as opaque.",
+            "{}: see-through materials (d, Tr) are not supported and are treated as opaque.",
             place()
         ));
     }

@@ -45,8 +45,10 @@ pub fn photograph(draft: Draft) -> Result<Generated> {
     let mut stream = Stream::new(draft.seed, NOISE_KEY, 0, 0);
     let noise = NOISE[0] + (NOISE[1] - NOISE[0]) * stream.uniform_f64();
     let photographs = (0..).zip(&lit.scene.cameras).map(|(frame, camera)| {
-        let (mut pixels, own) = trace(&lit, camera, draft.rendering.seed, frame, noise);
-        let missing = (noise * noise - own * own).max(0.0).sqrt();
+        let (mut pixels, rendered_noise) = trace(&lit, camera, draft.rendering.seed, frame, noise);
+        let missing = (noise * noise - rendered_noise * rendered_noise)
+            .max(0.0)
+            .sqrt();
         for pixel in &mut pixels {
             let factor = Vec3::from([(); 3].map(|()| stream.normal()));
             *pixel *= (Vec3::ONE + factor * missing as f32).max(Vec3::ZERO);
@@ -73,15 +75,15 @@ fn trace(lit: &Lit, camera: &Camera, seed: u64, frame: u64, noise: f64) -> (Vec<
             .map(|[a, b]| (a - b).abs() / (a + b))
             .collect();
         // Half the difference of two half-sample pictures has the standard deviation of their mean.
-        let own = quantile(&mut differences, 0.5).unwrap_or(0.0) / NORMAL_MEDIAN;
+        let rendered_noise = quantile(&mut differences, 0.5).unwrap_or(0.0) / NORMAL_MEDIAN;
         let samples = 2 * films[0].samples;
         let wanted = match samples < ENOUGH_SAMPLES {
             true => 0.9 * noise,
             false => 0.9 * NOISE[1],
         };
-        if own <= wanted || samples >= MAX_SAMPLES {
+        if rendered_noise <= wanted || samples >= MAX_SAMPLES {
             let mean = a.iter().zip(&b).map(|(a, b)| (*a + *b) * 0.5);
-            return (mean.collect(), own);
+            return (mean.collect(), rendered_noise);
         }
     }
 }

@@ -173,7 +173,7 @@ impl EstimateFile {
         if Path::new(name).file_name() != Some(name.as_ref()) {
             return Err(Error::file(
                 &path,
-                "maps that do not lie beside estimate.json are not read",
+                "maps have to lie beside estimate.json",
                 "put the file there and name it without a folder",
             ));
         }

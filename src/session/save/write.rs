@@ -115,7 +115,7 @@ pub fn write_checkpoint(folder: &Path, results: &Results) -> Result<()> {
     if let (Some(name), Some(bytes)) = (&estimate.maps, &maps) {
         staging.write(name, bytes)?;
     }
-    let own = estimate.maps.clone().map(PathBuf::from);
+    let own_maps = estimate.maps.clone().map(PathBuf::from);
     let checkpoint = CheckpointFile {
         estimate,
         checkpoint: results.checkpoint.clone(),
@@ -124,7 +124,7 @@ pub fn write_checkpoint(folder: &Path, results: &Results) -> Result<()> {
     // Remove the maps of the previous checkpoint, unless finished results use them.
     staging.commit(|folder| {
         let mut stale = earlier_maps(folder);
-        stale.retain(|name| Some(name) != own.as_ref());
+        stale.retain(|name| Some(name) != own_maps.as_ref());
         if !stale.is_empty() {
             let finished = fs::read(folder.join(ESTIMATE)).unwrap_or_default();
             let finished: Option<EstimateFile> = serde_json::from_slice(&finished).ok();

@@ -304,10 +304,10 @@ pub fn differs(a: &Estimate, b: &Estimate) -> bool {
     let brightest = (a.objects.iter().chain(&b.objects))
         .map(|o| o.emission.max_element())
         .fold(0.0f32, f32::max);
-    let apart = |a: Vec3, b: Vec3, scale: f32| (a - b).abs().max_element() > VISIBLE * scale;
+    let differ = |a: Vec3, b: Vec3, scale: f32| (a - b).abs().max_element() > VISIBLE * scale;
     a.objects.iter().zip(&b.objects).any(|(a, b)| {
-        apart(a.albedo, b.albedo, 1.0)
-            || apart(a.emission, b.emission, brightest)
+        differ(a.albedo, b.albedo, 1.0)
+            || differ(a.emission, b.emission, brightest)
             || (a.roughness, a.specular) != (b.roughness, b.specular)
     })
 }

@@ -36,7 +36,7 @@ impl Worker {
         self.session_in(&folder, capture, explicit_settings)
             .unwrap_or_else(|error| {
                 let message =
-                    format!("a new session begins, as the last cannot be gone on with: {error}");
+                    format!("the last session cannot be continued, so a new one begins: {error}");
                 self.say(Level::Warning, message);
                 None
             })

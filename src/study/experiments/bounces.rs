@@ -168,7 +168,7 @@ fn of_albedo(scenes: &[TestRoom]) -> Plot {
 
 /// Error at the transport cache's end over the depth of its fit, one curve a room.
 fn over_depth(scenes: &[TestRoom], label: &str, quantity: Quantity) -> Plot {
-    let of = |scene: &TestRoom| {
+    let curve = |scene: &TestRoom| {
         let mut series = Series {
             name: scene.name.clone(),
             ..Series::default()
@@ -190,7 +190,7 @@ fn over_depth(scenes: &[TestRoom], label: &str, quantity: Quantity) -> Plot {
         title: "Bounces of the fit, transport cache".to_owned(),
         x: Axis::logarithmic("bounces of the fit"),
         y: Axis::logarithmic(label),
-        series: scenes.iter().map(of).collect(),
+        series: scenes.iter().map(curve).collect(),
         marks: vec![(CHOSEN_AT, "adaptive".to_owned())],
         ..Plot::default()
     }

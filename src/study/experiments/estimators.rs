@@ -82,12 +82,12 @@ fn run(bench: &Bench) -> Result<Findings> {
         true => ([24, 18], 256, QUICK_SAMPLES),
         false => ([48, 36], 1024, SAMPLES),
     };
-    let own = || {
+    let own_room = || {
         let room = box_room::box_room("box room", ALBEDO, LAMP);
         let rendering = box_room::rendering(bench.quick);
         (room, Rendering { size, ..rendering })
     };
-    let studied = studied(bench, &words, own)?;
+    let studied = studied(bench, &words, own_room)?;
     let lit = studied.room.lit(studied.rendering.size)?;
 
     // BSDF sampling alone is noisy, like light through a door; MIS is not.

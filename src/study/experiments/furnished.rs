@@ -125,7 +125,7 @@ pub fn of_twin(twin: Studied) -> Result<Furnished> {
     let (places, height) = found.ok_or_else(|| {
         Error::new(
             &twin.room.name,
-            "no level ground that is seen and free holds two chairs",
+            "it has no free, visible and level floor for two chairs",
             "run the study on rooms of its own",
         )
     })?;
@@ -144,7 +144,7 @@ pub fn of_twin(twin: Studied) -> Result<Furnished> {
     if furnished.frames.is_empty() {
         return Err(Error::new(
             &furnished.name,
-            "no photograph sees the two chairs from far enough away",
+            "no photograph shows both chairs from far enough away",
             "run the study on rooms of its own",
         ));
     }

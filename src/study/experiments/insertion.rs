@@ -166,7 +166,7 @@ fn scene(
             .collect();
         let of_photographs = vec![photographed; objects.len()];
         // The descent's estimate is only right with the bounces that it was fitted with.
-        let two = PathOptions {
+        let two_bounces = PathOptions {
             max_bounces: paper_settings(1).max_bounces(),
             ..full
         };
@@ -179,7 +179,7 @@ fn scene(
             pasted(&of_photographs),
             pasted(&estimated),
             composite(&lit, full).composite(),
-            composite(&Arc::new(paper.lit(scene)), two).composite(),
+            composite(&Arc::new(paper.lit(scene)), two_bounces).composite(),
             with_truth.composite(),
         ];
 

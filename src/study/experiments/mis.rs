@@ -150,7 +150,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         let lobes: Vec<Option<Lobe>> = room.materials.iter().map(|m| m.lobe).collect();
         let bounces = paper_settings(1).max_bounces();
         let gauge = Gauge::new(&subject, bounces).with_lobes(lobes.clone());
-        let deep = Gauge::new(&subject, u32::MAX);
+        let all_bounces = Gauge::new(&subject, u32::MAX);
         let course = |index: usize, seed| {
             let settings = Settings {
                 light_sampling: SAMPLINGS[index],
@@ -162,7 +162,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         let over_rays = |kinds: &[Kind]| drawn(name, "rays", |mark| mark.rays as f64, kinds, &[]);
         let kinds = courses::run(bench, names, course, over_rays)?;
         bench.begin(&format!("{name}, variance of gradients"))?;
-        let of = |sampling: &LightSampling| {
+        let measure = |sampling: &LightSampling| {
             noise(&subject.problem, &truth, &lobes, *sampling, pixels, paths)
         };
         let cache = |seed| Settings {
@@ -173,9 +173,9 @@ fn run(bench: &Bench) -> Result<Findings> {
             name: name.to_owned(),
             files: *files,
             kinds,
-            noises: SAMPLINGS.iter().map(of).collect(),
+            noises: SAMPLINGS.iter().map(measure).collect(),
             cache: (bench.seeds())
-                .map(|seed| cached(bench, &deep, &cache(seed)))
+                .map(|seed| cached(bench, &all_bounces, &cache(seed)))
                 .collect::<Result<_>>()?,
         });
     }

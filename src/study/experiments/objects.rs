@@ -156,7 +156,7 @@ pub fn of_twin(twin: &Studied) -> Result<Posed> {
         .ok_or_else(|| {
             Error::new(
                 &room.name,
-                "every object of it that is seen is a lamp",
+                "every visible object is a lamp",
                 "run the study on rooms of its own",
             )
         })?;

@@ -46,11 +46,11 @@ fn run(bench: &Bench) -> Result<Findings> {
         (low..=high).step_by(step).map(|k| 10f64.powi(k)).collect()
     };
     let words = format!("A box room of mean albedo {ALBEDO}");
-    let own = || {
+    let own_room = || {
         let room = box_room::box_room("box room", ALBEDO, LAMP);
         (room, box_room::rendering(true))
     };
-    let studied = studied(bench, &words, own)?;
+    let studied = studied(bench, &words, own_room)?;
     let subject = studied.photographed()?;
     let (words, room) = (studied.words, studied.room);
     let reflects: Vec<bool> = (room.materials.iter())
@@ -234,13 +234,13 @@ fn plot(lines: &[Line]) -> Plot {
 
 /// The range of parameter values with a tolerable error.
 fn reach(line: &Line) -> String {
-    let good = || {
+    let tolerable = || {
         line.points
             .iter()
             .filter(|p| p.1 <= line.tolerable)
             .map(|p| p.0)
     };
-    match (good().reduce(f64::min), good().reduce(f64::max)) {
+    match (tolerable().reduce(f64::min), tolerable().reduce(f64::max)) {
         (Some(low), Some(high)) => format!("{low:.0e} to {high:.0e}"),
         _ => "nowhere".to_owned(),
     }

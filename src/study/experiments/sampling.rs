@@ -61,11 +61,11 @@ const STRATEGIES: [(&str, Strategy); 5] = [
 fn run(bench: &Bench) -> Result<Findings> {
     let limits = bench.limits(STRATEGIES.len() * bench.seeds as usize);
     let words = format!("A box room of mean albedo {ALBEDO}");
-    let own = || {
+    let own_room = || {
         let room = box_room::box_room("box room", ALBEDO, LAMP);
         (room, box_room::rendering(bench.quick))
     };
-    let studied = studied(bench, &words, own)?;
+    let studied = studied(bench, &words, own_room)?;
     let subject = studied.photographed()?;
     let gauge = Gauge::new(&subject, paper_settings(1).max_bounces());
     let names = STRATEGIES.iter().map(|(name, _)| (*name).to_owned());
@@ -164,10 +164,10 @@ fn of_paths(evenness: &[Evenness]) -> Table {
 }
 
 fn evenness_plot(evenness: &[Evenness]) -> Plot {
-    let series = |name: &str, of: fn(&Evenness) -> f64| Series {
+    let series = |name: &str, noise: fn(&Evenness) -> f64| Series {
         name: name.to_owned(),
         points: (evenness.iter())
-            .map(|at| [at.paths as f64, of(at)])
+            .map(|at| [at.paths as f64, noise(at)])
             .collect(),
         ..Series::default()
     };

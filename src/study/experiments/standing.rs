@@ -66,9 +66,9 @@ fn ground(scene: &Scene, up: Vec3) -> Vec<Vec3> {
     let mut points = Vec::new();
     for camera in &scene.cameras {
         let lens = &camera.intrinsics;
-        let apart = lens.width.div_ceil(ACROSS).max(1) as usize;
-        let rows = (0..lens.height).step_by(apart);
-        for (x, y) in rows.flat_map(|y| (0..lens.width).step_by(apart).map(move |x| (x, y))) {
+        let step = lens.width.div_ceil(ACROSS).max(1) as usize;
+        let rows = (0..lens.height).step_by(step);
+        for (x, y) in rows.flat_map(|y| (0..lens.width).step_by(step).map(move |x| (x, y))) {
             let ray = camera.ray(Vec2::new(x as f32, y as f32) + 0.5);
             let level = |triangle: u32| {
                 let normal = scene.normals[triangle as usize];

@@ -98,7 +98,7 @@ impl Bench<'_> {
     /// An error if the study is stopped.
     pub(super) fn go_on(&self) -> Result<()> {
         match (self.stopped)() {
-            true => Err(Error::new("study", "it was ended", "start it again")),
+            true => Err(Error::new("study", "it was stopped", "start it again")),
             false => Ok(()),
         }
     }

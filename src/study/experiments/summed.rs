@@ -64,8 +64,8 @@ impl Paths {
     /// The first `count` paths.
     fn first(&self, count: usize) -> impl Iterator<Item = &[Vertex]> {
         let starts = std::iter::once(0).chain(self.path_ends.iter().copied());
-        let each = starts.zip(&self.path_ends).take(count);
-        each.map(|(start, &end)| &self.vertices[start..end])
+        let ranges = starts.zip(&self.path_ends).take(count);
+        ranges.map(|(start, &end)| &self.vertices[start..end])
     }
 
     /// Sum over the first `count` paths with lamps of radiance one, accumulated in 32 bits.
@@ -115,7 +115,7 @@ impl Paths {
             let lamp = self.lamps.iter().position(|&l| l == surface as usize);
             lamp.map_or(0.0, |lamp| radiances[lamp])
         };
-        let of = |path: &[Vertex]| {
+        let radiance = |path: &[Vertex]| {
             path.iter().rev().fold(0.0, |beyond, v| {
                 let lamp = if v.lamp == NO_LAMP {
                     0.0
@@ -126,6 +126,6 @@ impl Paths {
                     + f64::from(ALBEDO) * (beyond + lamp)
             })
         };
-        self.first(count).map(of).sum()
+        self.first(count).map(radiance).sum()
     }
 }

@@ -169,8 +169,8 @@ fn root_mean_square(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
-fn mean(marks: &[Mark], of: impl Fn(&Mark) -> f64) -> f64 {
-    marks.iter().map(of).sum::<f64>() / marks.len().max(1) as f64
+fn mean(marks: &[Mark], value: impl Fn(&Mark) -> f64) -> f64 {
+    marks.iter().map(value).sum::<f64>() / marks.len().max(1) as f64
 }
 
 fn table(all: &[Solved]) -> Table {

@@ -187,8 +187,8 @@ fn unknowns(estimate: &Estimate) -> usize {
         let layout = &texels.colors.layout;
         let mut count = 0;
         for triangle in layout.first.windows(2) {
-            let own = triangle[0] as usize..triangle[1] as usize;
-            let mut colors: Vec<[u32; 3]> = (own.filter(|&t| texels.seen[t] > 0))
+            let range = triangle[0] as usize..triangle[1] as usize;
+            let mut colors: Vec<[u32; 3]> = (range.filter(|&t| texels.seen[t] > 0))
                 .map(|t| texels.colors.colors[t].to_array().map(f32::to_bits))
                 .collect();
             colors.sort_unstable();

@@ -88,10 +88,10 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
         .map(|&frame| scores(&solved, frame, &truth, &true_chair, &chair))
         .collect::<Result<Vec<_>>>()?;
     let count = scores.len() as f64;
-    let mean = |of: fn(&Scores) -> f64| scores.iter().map(of).sum::<f64>() / count;
+    let mean = |score: fn(&Scores) -> f64| scores.iter().map(score).sum::<f64>() / count;
     let changed: Vec<AroundScores> = scores.iter().filter_map(|s| s.around).collect();
-    let around = |of: fn(&AroundScores) -> f64| {
-        let sum: f64 = changed.iter().map(of).sum();
+    let around = |score: fn(&AroundScores) -> f64| {
+        let sum: f64 = changed.iter().map(score).sum();
         (!changed.is_empty()).then(|| sum / changed.len() as f64)
     };
     Ok((!scores.is_empty()).then(|| CompositeRow {
@@ -351,15 +351,16 @@ fn scores(
         };
     // Beside the chair, the true change is added to the photograph itself, so that its noise is no error.
     let true_at = |i: usize| pixels[i] + change_at(i);
-    let sum = |of: &dyn Fn(usize) -> f32, indices: &[usize]| -> f64 {
-        indices.iter().map(|&i| f64::from(of(i))).sum()
+    let sum = |value: &dyn Fn(usize) -> f32, indices: &[usize]| -> f64 {
+        indices.iter().map(|&i| f64::from(value(i))).sum()
     };
     let ours_at = |i: usize| ours.pixels[i];
     let slope = || {
         let ours = |i: usize| (ours_at(i) - pixels[i]).dot(change_at(i));
         sum(&ours, &around) / sum(&|i| change_at(i).length_squared(), &around)
     };
-    let bright = |of: &dyn Fn(usize) -> Vec3| sum(&|i| shown(of(i)).element_sum(), &covered);
+    let bright =
+        |picture: &dyn Fn(usize) -> Vec3| sum(&|i| shown(picture(i)).element_sum(), &covered);
     Ok(Scores {
         chair: psnr(&covered, &ours_at, &truth_at),
         naive: psnr(&covered, &|i| naive.pixels[i], &truth_at),

@@ -16,11 +16,11 @@ pub fn plot<'a>(summary: &Summary, rows: impl Iterator<Item = &'a Row>) -> Strip
         .filter(|name| summary.families.contains_key(name))
         .collect();
     let dots = |value: fn(&Row) -> Option<f64>| -> Vec<Vec<f64>> {
-        let of = |name: &&str| {
+        let values = |name: &&str| {
             let rows = rows.iter().filter(|row| row.family.name() == *name);
             rows.filter_map(|row| value(row)).collect()
         };
-        families.iter().map(of).collect()
+        families.iter().map(values).collect()
     };
     Strips {
         title: format!(
