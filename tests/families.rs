@@ -9,7 +9,7 @@ use relit::math::stats::quantile;
 use relit::room::generated::{Family, Generated, generate};
 use relit::room::photographs::{self, Rendering};
 use relit::scene::Scene;
-use relit::study::families::{Heard, Plan, Quantiles, Row, run, summarize};
+use relit::study::families::{Plan, Quantiles, RoomEvent, Row, run, summarize};
 use relit::transport::material::Albedo;
 
 /// Size of photographs that are rendered in a moment.
@@ -371,7 +371,7 @@ fn rooms_that_are_in_the_table_are_not_solved_again() {
             plan,
             &|| count.get() >= limit,
             &mut |heard| {
-                if matches!(heard, Heard::Begins(..)) {
+                if matches!(heard, RoomEvent::Begins(..)) {
                     count.set(count.get() + 1);
                 }
             },

@@ -277,7 +277,7 @@ fn broken_files_get_one_line() {
     let long = png(20_000, 1, |_, _| [0; 3]);
     let textured = format!("mtllib m.mtl\n{SQUARE}{FACE}");
     let cases: &[(&str, &[u8], &str)] = &[
-        ("a.stl", b"solid", "not a file that objects are read from"),
+        ("a.stl", b"solid", "is no object file"),
         ("empty.obj", b"", "no triangle"),
         (
             "face.obj",

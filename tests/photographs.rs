@@ -151,7 +151,7 @@ fn the_screen_shows_what_the_files_hold() {
     let light = Light::new(work.found.clone(), work.edited.clone(), &work.settings);
     let shown = |placements: &[Placement]| {
         let mut inserting = Inserting::default();
-        inserting.look(1, u32::MAX);
+        inserting.show(1, u32::MAX);
         inserting.place(placements.to_vec());
         while inserting.is_busy() {
             inserting.draw(&work.capture, &light, 1.0).expect("drawn");

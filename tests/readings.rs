@@ -182,7 +182,7 @@ fn photographs_of_nothing_agree_with_nothing() {
         objects: vec![ObjectEstimate::default()],
         ..Estimate::default()
     };
-    let held = |capture: &OpenCapture| capture.in_doubt(exact.clone()).objects.remove(0);
+    let held = |capture: &OpenCapture| capture.marked_doubtful(exact.clone()).objects.remove(0);
     let doubted = held(&open(&capture, true));
     assert!(!doubted.identifiable && doubted.albedo_stderr.min_element() > 0.25);
     assert!(doubted.note.contains("poses"), "{}", doubted.note);

@@ -6,7 +6,7 @@ use relit::math::color::luminance;
 use relit::math::rng::Stream;
 use relit::math::stats::Moments;
 use relit::math::warp::uniform_sphere;
-use relit::room::photographs::{self, KEPT, Rendering};
+use relit::room::photographs::{self, Rendering, STORED};
 use relit::room::{self, Room, truth};
 use relit::scene::geometry::{Ray, offset_origin};
 
@@ -21,7 +21,7 @@ fn it_is_a_furnished_room_with_two_lamps_seen_from_all_sides() {
     assert_eq!(names.len(), room.mesh.objects.len(), "names are unique");
     assert!(capture.up.y > 0.999_9, "{}", capture.up);
 
-    let world = room.lit(KEPT.size).expect("the room");
+    let world = room.lit(STORED.size).expect("the room");
     let lamps: Vec<usize> = (0..world.materials.len())
         .filter(|&i| world.materials[i].emission != Vec3::ZERO)
         .collect();
@@ -52,7 +52,7 @@ fn it_is_a_furnished_room_with_two_lamps_seen_from_all_sides() {
 
 #[test]
 fn no_triangle_is_degenerate_and_every_one_that_is_seen_shows_its_front() {
-    let world = Room::new().lit(KEPT.size).expect("the room");
+    let world = Room::new().lit(STORED.size).expect("the room");
     let scene = &world.scene;
     let smallest = scene.areas.iter().copied().fold(f32::INFINITY, f32::min);
     assert!(
@@ -94,17 +94,17 @@ fn no_triangle_is_degenerate_and_every_one_that_is_seen_shows_its_front() {
 #[test]
 fn kept_photographs_agree_with_a_fresh_rendering() {
     let room = Room::new();
-    let kept = photographs::kept().expect("the kept photographs decode");
+    let kept = photographs::stored().expect("the kept photographs decode");
     let rendering = Rendering {
         seed: 99,
         samples: 2,
-        size: KEPT.size,
+        size: STORED.size,
     };
     let fresh = photographs::render(&room, &rendering).expect("rendered");
-    let width = KEPT.size[0] as usize;
+    let width = STORED.size[0] as usize;
     let mut total = Moments::default();
     for (frame, (a, b)) in kept.iter().zip(&fresh).enumerate() {
-        assert_eq!([a.width, a.height], KEPT.size);
+        assert_eq!([a.width, a.height], STORED.size);
         let mut blocks = vec![Moments::default(); 12];
         for (index, (a, b)) in a.pixels.iter().zip(&b.pixels).enumerate() {
             assert!(a.is_finite() && a.min_element() >= 0.0);
@@ -184,9 +184,9 @@ fn written_as_a_capture_it_is_read_back_the_same() {
 /// The rows that show a lamp directly hold its exitance: emission and what it reflects.
 #[test]
 fn lamps_in_the_photographs_show_their_exitance() {
-    let world = Room::new().lit(KEPT.size).expect("the room");
+    let world = Room::new().lit(STORED.size).expect("the room");
     let objects = truth::objects(&world);
-    let kept = photographs::kept().expect("the kept photographs decode");
+    let kept = photographs::stored().expect("the kept photographs decode");
     for name in ["ceiling-lamp", "floor-lamp"] {
         let index = world.scene.objects.iter().position(|o| o.name == name);
         let mut seen = Moments::default();

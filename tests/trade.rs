@@ -5,7 +5,7 @@ use relit::inverse::solver::Termination;
 use relit::room::generated::generate;
 use relit::room::truth;
 use relit::study::trade::plan::{self, Run};
-use relit::study::trade::{Curve, Heard, Judge, Measure, Trade, measure, rooms};
+use relit::study::trade::{Curve, Judge, Measure, SolveEvent, Trade, measure, rooms};
 use std::cell::Cell;
 use std::time::Duration;
 
@@ -130,7 +130,7 @@ fn a_measurement_that_is_stopped_keeps_what_it_has() {
         Duration::from_secs(3600),
         &|| ended.get() > 0,
         &mut |heard| {
-            if matches!(heard, Heard::Ended(_)) {
+            if matches!(heard, SolveEvent::Ended(_)) {
                 ended.set(ended.get() + 1);
             }
         },

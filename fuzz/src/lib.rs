@@ -244,7 +244,7 @@ pub fn truth(bytes: &[u8]) {
 /// What a session that saved by itself holds beside its estimate.
 pub fn session(bytes: &[u8]) {
     if let Ok(folder) = results_with("session.json", bytes) {
-        let _ = keep::held(folder.path());
+        let _ = keep::read_record(folder.path());
     }
 }
 

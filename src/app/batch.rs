@@ -3,7 +3,7 @@
 use crate::app::state::App;
 use crate::error::{Error, Result};
 use crate::session::edits::Edits;
-use crate::session::photographs::{Doing, Photographs, Written};
+use crate::session::photographs::{Photographs, WriteProgress, Written};
 use crate::session::snapshot::Level;
 use crate::transport::denoise::Denoiser;
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ pub struct Batch {
 #[derive(Default)]
 struct Course {
     cancelled: AtomicBool,
-    doing: Mutex<Option<Doing>>,
+    doing: Mutex<Option<WriteProgress>>,
 }
 
 impl Batch {
@@ -69,7 +69,7 @@ impl Batch {
     }
 
     /// What it is at.
-    pub fn doing(&self) -> Option<Doing> {
+    pub fn doing(&self) -> Option<WriteProgress> {
         let doing = self.course.doing.lock();
         *doing.unwrap_or_else(PoisonError::into_inner)
     }
@@ -97,7 +97,7 @@ impl Drop for Batch {
 
 impl Course {
     /// Notes how far it is; whether that is worth a look (another photograph, or half a percent).
-    fn tell(&self, doing: Doing) -> bool {
+    fn tell(&self, doing: WriteProgress) -> bool {
         let last = &mut *self.doing.lock().unwrap_or_else(PoisonError::into_inner);
         let same =
             last.is_some_and(|l| l.frame == doing.frame && doing.fraction - l.fraction < 0.005);

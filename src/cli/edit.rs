@@ -1,8 +1,8 @@
-//! `relit edit`: lamps off, walls recoloured, surfaces polished.
+//! `relit edit`: changes the emission and materials of objects in an estimate.
 
-use crate::cli::arguments::{DenoiseOptions, DeviceOptions, Replace};
 use crate::cli::numbers::from_one;
 use crate::cli::object_values::{ObjectValues, named_color, named_number};
+use crate::cli::options::{DenoiseOptions, DeviceOptions, Replace};
 use crate::cli::photographs::write_with_progress;
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
@@ -29,19 +29,19 @@ pub struct EditArguments {
     /// Diffuse reflectance of an object, 0 to 1
     #[arg(long, value_name = "NAME=R,G,B", value_parser = named_color)]
     albedo: Vec<(String, Vec3)>,
-    /// GGX roughness of an object's specular lobe, above 0 (mirror-like) to 1; gives it a lobe if it has none
+    /// GGX roughness of an object's specular lobe, above 0 (mirror-like) to 1; adds a lobe if there is none
     #[arg(long, value_name = "NAME=V", value_parser = named_number)]
     roughness: Vec<(String, f32)>,
-    /// Specular reflectance of an object at normal incidence, 0 to 1; gives it a lobe if it has none, 0 takes it away
+    /// Specular reflectance of an object at normal incidence, 0 to 1; adds a lobe if there is none, and 0 removes it
     #[arg(long, value_name = "NAME=V", value_parser = named_number)]
     specular: Vec<(String, f32)>,
     /// Pictures to write: all frames at full size, N frames, or none [default: 16, long side 1024]
-    #[arg(long, value_name = "all|N|none", value_parser = crate::cli::arguments::frames)]
+    #[arg(long, value_name = "all|N|none", value_parser = crate::cli::options::frames)]
     views: Option<Frames>,
-    /// Also writes every photograph in the changed light, as photographs/NNN.relit.{exr,png}
+    /// Also write every photograph relit, as photographs/NNN.relit.{exr,png}
     #[arg(long)]
     photographs: bool,
-    /// Samples a pixel of the light in photographs
+    /// Samples per pixel of relit photographs
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = from_one::<u32>)]
     spp: u32,
     #[command(flatten)]
@@ -55,22 +55,22 @@ pub struct EditArguments {
     replace: Replace,
 }
 
-/// Changes objects of an estimate and writes it with new re-renders; the exit code.
+/// Edits objects of an estimate and writes it with new renders. Returns the exit code.
 ///
 /// # Errors
-/// An object is not there, or files cannot be read or written.
+/// An object does not exist, or files cannot be read or written.
 pub fn edit(arguments: &EditArguments) -> Result<i32> {
     arguments.replace.apply();
-    // What was found would be lost, with the pictures of it.
-    let place = |path: &PathBuf| path.canonicalize().ok();
-    if place(&arguments.out).is_some_and(|out| place(&arguments.saved.dir) == Some(out)) {
+    // Writing into the folder of the results would replace the estimate that was found.
+    let absolute = |path: &PathBuf| path.canonicalize().ok();
+    if absolute(&arguments.out).is_some_and(|out| absolute(&arguments.saved.dir) == Some(out)) {
         return Err(Error::usage(
             "--out",
-            "is the folder of the results that are to be changed",
+            "is the folder of the results themselves",
             "choose another folder",
         ));
     }
-    // Neither is what another solve found.
+    // Nor may the results of another solve be replaced.
     overwrite::check(&arguments.out.join(save::REPORT))?;
     let renderer = arguments.device.renderer()?;
     let Loaded {

@@ -15,7 +15,7 @@ use std::path::PathBuf;
 pub struct EvaluateArguments {
     /// Folder that relit solve wrote
     dir: PathBuf,
-    /// Capture with truth.json, and truth/albedo_NNN.exr where there are such
+    /// Capture with truth.json and, for textures, truth/albedo_NNN.exr
     #[arg(long, value_name = "CAPTURE")]
     truth: PathBuf,
     /// Let paths in the capture lead out of its folder; only for captures that you trust
@@ -24,15 +24,15 @@ pub struct EvaluateArguments {
     /// Write JSON instead of a table
     #[arg(long)]
     json: bool,
-    /// Threads to work with [default: one a core]
+    /// Number of threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<u16>,
 }
 
-/// Prints the errors.
+/// Prints the errors of an estimate.
 ///
 /// # Errors
-/// The results or the truth cannot be read, or belong to other objects.
+/// The results or the truth cannot be read, or they belong to different objects.
 pub fn evaluate(arguments: &EvaluateArguments) -> Result<()> {
     crate::cli::solve::use_threads(arguments.threads)?;
     let saved = save::load(&arguments.dir)?;

@@ -1,13 +1,13 @@
 //! `relit export` and `relit demo`: files for other programs, and the built-in room as a capture.
 
-use crate::cli::arguments::Replace;
 use crate::cli::numbers::{from_one, triple, whole};
+use crate::cli::options::Replace;
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
 use crate::export::overwrite;
 use crate::export::scene::{self, Format};
 use crate::room;
-use crate::room::photographs::{KEPT, Rendering};
+use crate::room::photographs::{Rendering, STORED};
 use crate::say;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
@@ -20,8 +20,8 @@ pub struct ExportArguments {
     saved: SavedOptions,
     /// What to write
     #[arg(long, value_enum)]
-    format: Word,
-    /// For a probe: where, in the capture's coordinates
+    format: FormatName,
+    /// Position of a probe in the capture's coordinates
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
     at: Option<DVec3>,
     /// File to write
@@ -31,9 +31,9 @@ pub struct ExportArguments {
     replace: Replace,
 }
 
-/// The formats by name.
+/// The formats by their names on the command line.
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum Word {
+enum FormatName {
     /// Scene with base colours and emissive strength
     Glb,
     /// Scene as OBJ and MTL, with textures as images
@@ -48,8 +48,8 @@ enum Word {
     Probe,
 }
 
-impl Word {
-    /// The format, with the place of a probe.
+impl FormatName {
+    /// The format; a probe is taken at `at`.
     fn format(self, at: DVec3) -> Format {
         match self {
             Self::Glb => Format::Glb,
@@ -61,12 +61,12 @@ impl Word {
         }
     }
 
-    /// What names of its files end with.
+    /// File extensions of the format.
     fn endings(self) -> &'static [&'static str] {
         self.format(DVec3::ZERO).endings()
     }
 
-    /// Refuses a name that says that the file is of another format; one that says nothing is as good as any.
+    /// Refuses a path whose extension belongs to another format. An unknown extension is accepted.
     fn check(self, path: &Path) -> Result<()> {
         let ending = path.extension().and_then(|ending| ending.to_str());
         let ending = ending.unwrap_or_default().to_ascii_lowercase();
@@ -81,9 +81,9 @@ impl Word {
         };
         Err(Error::usage(
             path.display(),
-            format!("is no name for --format {}", name(self)),
+            format!("has the wrong extension for --format {}", name(self)),
             format!(
-                "let it end with .{}, or choose --format {}",
+                "use the extension .{}, or choose --format {}",
                 self.endings().join(" or ."),
                 name(*other)
             ),
@@ -99,11 +99,11 @@ pub struct DemoArguments {
     out: PathBuf,
     #[command(flatten)]
     replace: Replace,
-    /// Renders the photographs anew with this key of all random numbers, instead of those kept in the program
+    /// Render the photographs again with this random seed, instead of using those stored in the program
     #[arg(long, value_name = "N", value_parser = whole::<u64>)]
     seed: Option<u64>,
-    /// Paths a pixel of photographs that are rendered anew
-    #[arg(long, value_name = "N", default_value_t = KEPT.samples, requires = "seed",
+    /// Samples per pixel of photographs that are rendered again
+    #[arg(long, value_name = "N", default_value_t = STORED.samples, requires = "seed",
           value_parser = from_one::<u32>)]
     samples: u32,
 }
@@ -116,7 +116,7 @@ pub fn export(arguments: &ExportArguments) -> Result<()> {
     arguments.replace.apply();
     arguments.format.check(&arguments.out)?;
     overwrite::check(&arguments.out)?;
-    if matches!(arguments.format, Word::Probe) && arguments.at.is_none() {
+    if matches!(arguments.format, FormatName::Probe) && arguments.at.is_none() {
         return Err(Error::usage(
             "--format probe",
             "a probe needs a place",
@@ -135,18 +135,18 @@ pub fn export(arguments: &ExportArguments) -> Result<()> {
     Ok(())
 }
 
-/// Writes the built-in room with its truth.
+/// Writes the built-in room with its truth as a capture.
 ///
 /// # Errors
 /// The folder cannot be written.
 pub fn demo(arguments: &DemoArguments) -> Result<()> {
     arguments.replace.apply();
-    let anew = arguments.seed.map(|seed| Rendering {
+    let rendering = arguments.seed.map(|seed| Rendering {
         seed,
         samples: arguments.samples,
-        ..KEPT
+        ..STORED
     });
-    room::write(&arguments.out, anew.as_ref())?;
+    room::write(&arguments.out, rendering.as_ref())?;
     say::line(arguments.out.display());
     Ok(())
 }

@@ -5,21 +5,21 @@ use crate::error::{Error, Result};
 use crate::inverse::settings::Preset;
 use crate::room::generated::Family;
 use crate::say;
-use crate::study::families::{Heard, Plan, Row, run};
+use crate::study::families::{Plan, RoomEvent, Row, run};
 use crate::study::trade::rooms::SIZE;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// The word for all families.
+/// Selects all families.
 pub const ALL: &str = "all";
 
-/// Names of families, and the word for all.
+/// Names of the families, and [`ALL`].
 pub fn names() -> Vec<&'static str> {
     Family::NAMES.into_iter().chain([ALL]).collect()
 }
 
-/// Solves rooms `seed` and up of the families named, of which no further one is begun after `time`, writes rooms.csv, rooms.json and
-/// rooms.png, and prints a table.
+/// Solves generated rooms of the named families with the given seeds. Starts no further room after `time`. Writes rooms.csv,
+/// rooms.json and rooms.png, and prints a table.
 ///
 /// # Errors
 /// The results cannot be written, or a room could not be solved.
@@ -39,13 +39,15 @@ pub fn families(
         size: SIZE,
         preset,
     };
-    let begun = Instant::now();
-    let stopped = || interrupt.asked() || time.is_some_and(|time| begun.elapsed() >= time);
+    let started = Instant::now();
+    let stopped = || interrupt.requested() || time.is_some_and(|time| started.elapsed() >= time);
     let mut failed: Option<Error> = None;
-    let summary = run(out, &plan, &stopped, &mut |heard| match heard {
-        Heard::Begins(family, seed) => say::aside(format_args!("{} room {seed} …", family.name())),
-        Heard::Solved(row) => say::aside(line(row)),
-        Heard::Failed(error) => {
+    let summary = run(out, &plan, &stopped, &mut |event| match event {
+        RoomEvent::Begins(family, seed) => {
+            say::aside(format_args!("{} room {seed} …", family.name()))
+        }
+        RoomEvent::Solved(row) => say::aside(line(row)),
+        RoomEvent::Failed(error) => {
             say::aside(error);
             failed.get_or_insert(error.clone());
         }

@@ -2,8 +2,9 @@
 
 use crate::capture::import::{self, AppliedTransform, Format, Import, ImportOptions};
 use crate::capture::read::CAMERAS;
-use crate::cli::arguments::Replace;
 use crate::cli::numbers::{above_zero, from_one, triple};
+use crate::cli::options::Replace;
+use crate::cli::progress::bar;
 use crate::error::Result;
 use crate::export;
 use crate::say;
@@ -11,8 +12,6 @@ use crate::session::given::Given;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 /// `relit import`.
@@ -43,7 +42,7 @@ pub struct ImportArguments {
     /// Up axis of the capture [default: the cameras' mean up]
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
     up: Option<DVec3>,
-    /// Colour camera of a scan that does not say, in pixels with centres at whole numbers
+    /// Intrinsics of the colour camera, in pixels with centres at whole numbers, for a scan that has none
     #[arg(long, value_name = "FX,FY,CX,CY", value_parser = intrinsics, allow_hyphen_values = true)]
     intrinsics: Option<Intrinsics>,
     /// Nerfstudio's applied_transform [default: undone for a mesh that comes from elsewhere]
@@ -51,7 +50,7 @@ pub struct ImportArguments {
     applied_transform: Option<Applied>,
 }
 
-/// What becomes of an applied_transform.
+/// What to do with an applied_transform.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Applied {
     /// The mesh has the coordinates from before it
@@ -75,7 +74,7 @@ fn intrinsics(text: &str) -> std::result::Result<Intrinsics, String> {
     }
 }
 
-/// Turns a scan into a capture and says what was found and guessed.
+/// Imports a scan as a capture and prints what was found and guessed.
 ///
 /// # Errors
 /// The scan cannot be read, or the capture cannot be written.
@@ -105,10 +104,11 @@ pub fn import(arguments: &ImportArguments) -> Result<()> {
     Ok(())
 }
 
-/// The capture of a scan that was named where a capture could be: imported into the folder of its results, once.
+/// Imports a scan that was given where a capture is expected, into the folder of its results, unless it was imported before.
+/// Returns the folder of the capture.
 ///
 /// # Errors
-/// It is no scan, or the capture cannot be written.
+/// The folder holds no scan, or the capture cannot be written.
 pub fn beside_results(scan: &Path) -> Result<PathBuf> {
     let out = Given::imported(scan);
     if out.join(CAMERAS).exists() {
@@ -134,19 +134,11 @@ pub fn beside_results(scan: &Path) -> Result<PathBuf> {
 
 /// Reads a scan, with a progress bar where depth images are fused.
 fn read(source: &Path, options: &ImportOptions) -> Result<Import> {
-    let bar = std::io::stderr().is_terminal().then(|| {
-        let style = ProgressStyle::with_template("{bar:24} {pos} of {len} depth images fused");
-        ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr())
-            .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-    });
+    let bar = bar("{bar:24} {pos} of {len} depth images fused");
     let scan = import::read(source, options, &mut |done, all| {
-        if let Some(bar) = &bar {
-            bar.set_length(all as u64);
-            bar.set_position(done as u64);
-        }
-    })?;
-    if let Some(bar) = &bar {
-        bar.finish_and_clear();
-    }
-    Ok(scan)
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    });
+    bar.finish_and_clear();
+    scan
 }

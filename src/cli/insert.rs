@@ -1,7 +1,7 @@
-//! `relit insert`: objects into a photograph, naively and by differential rendering.
+//! `relit insert`: objects in photographs, by differential rendering and naively.
 
-use crate::cli::arguments::{DenoiseOptions, DeviceOptions, Replace};
 use crate::cli::numbers::{above_zero, degrees, from_one, triple};
+use crate::cli::options::{DenoiseOptions, DeviceOptions, Replace};
 use crate::cli::photographs::write_with_progress;
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::compose::object::surface::ObjectSurface;
@@ -19,29 +19,29 @@ use std::path::{Path, PathBuf};
 pub struct InsertArguments {
     #[command(flatten)]
     saved: SavedOptions,
-    /// The photograph, counted from 0, or all of them, as PREFIX.NNN
-    #[arg(long, value_name = "N|all", value_parser = which)]
-    frame: Which,
+    /// Photograph to insert into, counted from 0; or all of them, written as PREFIX.NNN
+    #[arg(long, value_name = "N|all", value_parser = frame_choice)]
+    frame: FrameChoice,
     #[command(flatten)]
     objects: Objects,
-    /// Samples a pixel
+    /// Samples per pixel
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = from_one::<u32>)]
     spp: u32,
     #[command(flatten)]
     denoise: DenoiseOptions,
-    /// Whether objects take the blur and the grain of 8-bit photographs
+    /// Whether objects get the blur and grain of 8-bit photographs
     #[arg(long, value_name = "BOOL", default_value_t = true, action = ArgAction::Set)]
     finish: bool,
     #[command(flatten)]
     device: DeviceOptions,
-    /// Beginning of the names of the files to write
+    /// Prefix of the files to write
     #[arg(long, value_name = "PREFIX")]
     out: PathBuf,
     #[command(flatten)]
     replace: Replace,
 }
 
-/// Inserts objects and writes the composites; the exit code.
+/// Inserts objects and writes the composites. Returns the exit code.
 ///
 /// # Errors
 /// The results or an object cannot be read, the frame does not exist, or a file cannot be written.
@@ -58,8 +58,8 @@ pub fn insert(arguments: &InsertArguments) -> Result<i32> {
     let (placements, materials): (_, Vec<_>) = arguments.objects.0.iter().cloned().unzip();
     let work = Photographs {
         frames: match arguments.frame {
-            Which::One(frame) => vec![frame],
-            Which::All => (0..capture.scene.cameras.len()).collect(),
+            FrameChoice::One(frame) => vec![frame],
+            FrameChoice::All => (0..capture.scene.cameras.len()).collect(),
         },
         capture,
         found,
@@ -76,8 +76,8 @@ pub fn insert(arguments: &InsertArguments) -> Result<i32> {
         &renderer,
         &materials,
         &|frame| match arguments.frame {
-            Which::One(_) => arguments.out.clone(),
-            Which::All => {
+            FrameChoice::One(_) => arguments.out.clone(),
+            FrameChoice::All => {
                 let mut name = OsString::from(&arguments.out);
                 name.push(format!(".{frame:03}"));
                 PathBuf::from(name)
@@ -86,28 +86,28 @@ pub fn insert(arguments: &InsertArguments) -> Result<i32> {
     )
 }
 
-/// Which photographs.
+/// FrameChoice photographs to insert into.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Which {
+enum FrameChoice {
     One(usize),
     All,
 }
 
-fn which(text: &str) -> std::result::Result<Which, String> {
+fn frame_choice(text: &str) -> std::result::Result<FrameChoice, String> {
     match text {
-        "all" => Ok(Which::All),
+        "all" => Ok(FrameChoice::All),
         _ => text
             .parse()
-            .map(Which::One)
+            .map(FrameChoice::One)
             .map_err(|_| "a frame's number or all is wanted".to_owned()),
     }
 }
 
-/// The objects with their placements and the materials that replace those of their files, in the order of the command line.
+/// The objects in the order of the command line: placement, and the material that replaces those of the file.
 #[derive(Debug, Clone, Default)]
 struct Objects(Vec<(Placement, Option<ObjectSurface>)>);
 
-/// KIND:R,G,B or KIND:R,G,B,ROUGHNESS: a linear base colour and GGX roughness α, all from 0 to 1.
+/// Parses KIND:R,G,B or KIND:R,G,B,ROUGHNESS: linear base colour and GGX roughness α, all from 0 to 1.
 fn material(text: &str) -> std::result::Result<ObjectSurface, String> {
     const WANTED: &str = "diffuse:R,G,B, plastic:R,G,B,ROUGHNESS or metal:R,G,B,ROUGHNESS is wanted, with numbers from 0 to 1";
     let (kind, numbers) = text.split_once(':').ok_or(WANTED)?;
@@ -148,7 +148,7 @@ impl Args for Objects {
                 option(
                     "at",
                     "X,Y,Z",
-                    "Where the middle of its base stands, in the capture's coordinates",
+                    "Position of the centre of its base, in the capture's coordinates",
                 )
                 .allow_hyphen_values(true)
                 .value_parser(triple),
@@ -157,7 +157,7 @@ impl Args for Objects {
                 option(
                     "as-modelled",
                     "",
-                    "Take the file's coordinates for the capture's",
+                    "Use the file's coordinates as the capture's",
                 )
                 .num_args(0)
                 .default_missing_value("true")
@@ -171,7 +171,7 @@ impl Args for Objects {
                 option(
                     "rotate",
                     "DEG",
-                    "Turn about the up axis, counter-clockwise from above [default: 0]",
+                    "Rotation about the up axis, counter-clockwise from above [default: 0]",
                 )
                 .allow_hyphen_values(true)
                 .value_parser(degrees),
@@ -191,7 +191,7 @@ impl Args for Objects {
     }
 }
 
-/// An object as its file has it.
+/// An object with the placement of its file.
 fn unplaced(file: &Path) -> Placement {
     Placement {
         file: file.to_owned(),
@@ -202,21 +202,24 @@ fn unplaced(file: &Path) -> Placement {
     }
 }
 
-/// The values of an option with their places on the command line.
-fn given<T: Clone + Send + Sync + 'static>(matches: &ArgMatches, name: &str) -> Vec<(usize, T)> {
+/// The values of an option with their indices on the command line.
+fn indexed_values<T: Clone + Send + Sync + 'static>(
+    matches: &ArgMatches,
+    name: &str,
+) -> Vec<(usize, T)> {
     let values = matches.get_many::<T>(name).into_iter().flatten().cloned();
-    let places = matches.indices_of(name).into_iter().flatten();
-    places.zip(values).collect()
+    let indices = matches.indices_of(name).into_iter().flatten();
+    indices.zip(values).collect()
 }
 
 impl FromArgMatches for Objects {
     fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
-        let files = given::<PathBuf>(matches, "object");
+        let files = indexed_values::<PathBuf>(matches, "object");
         let wrong =
             |problem: String| clap::Error::raw(clap::error::ErrorKind::ArgumentConflict, problem);
-        // The object that an option at a place on the command line belongs to.
-        let owner = |place: usize, name: &str| {
-            let before = files.iter().filter(|(at, _)| *at < place).count();
+        // Index of the object that an option belongs to: the last --object before it.
+        let owner = |index: usize, name: &str| {
+            let before = files.iter().filter(|(at, _)| *at < index).count();
             before
                 .checked_sub(1)
                 .ok_or_else(|| wrong(format!("--{name} stands before any --object")))
@@ -228,20 +231,20 @@ impl FromArgMatches for Objects {
                 .collect(),
         );
         let mut as_modelled = vec![false; files.len()];
-        for (place, at) in given::<DVec3>(matches, "at") {
-            objects.0[owner(place, "at")?].0.at = Some(at);
+        for (index, at) in indexed_values::<DVec3>(matches, "at") {
+            objects.0[owner(index, "at")?].0.at = Some(at);
         }
-        for (place, flag) in given::<bool>(matches, "as-modelled") {
-            as_modelled[owner(place, "as-modelled")?] = flag;
+        for (index, flag) in indexed_values::<bool>(matches, "as-modelled") {
+            as_modelled[owner(index, "as-modelled")?] = flag;
         }
-        for (place, scale) in given::<f64>(matches, "scale") {
-            objects.0[owner(place, "scale")?].0.scale = scale;
+        for (index, scale) in indexed_values::<f64>(matches, "scale") {
+            objects.0[owner(index, "scale")?].0.scale = scale;
         }
-        for (place, rotate) in given::<f64>(matches, "rotate") {
-            objects.0[owner(place, "rotate")?].0.rotate = rotate;
+        for (index, rotate) in indexed_values::<f64>(matches, "rotate") {
+            objects.0[owner(index, "rotate")?].0.rotate = rotate;
         }
-        for (place, surface) in given::<ObjectSurface>(matches, "material") {
-            objects.0[owner(place, "material")?].1 = Some(surface);
+        for (index, surface) in indexed_values::<ObjectSurface>(matches, "material") {
+            objects.0[owner(index, "material")?].1 = Some(surface);
         }
         for ((placement, _), as_modelled) in objects.0.iter().zip(as_modelled) {
             if placement.at.is_some() == as_modelled {

@@ -1,5 +1,5 @@
-//! Requests to end: Ctrl-C, the system's request to terminate, and a terminal that is closed. Work ends cleanly, and the program
-//! with the exit code that shells expect, so that what was to follow does not. Ctrl-C again aborts.
+//! Requests to terminate: Ctrl-C, SIGTERM, and a closed terminal (SIGHUP). Running work stops cleanly, saves its
+//! results, and the program exits with the code that shells expect. A second Ctrl-C aborts at once.
 
 use crate::error::{Error, Result};
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -7,22 +7,22 @@ use signal_hook::flag;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// What a shell adds to a signal's number for the exit code of a program that it ended.
+/// Shells report 128 + the signal's number as the exit code of a program that a signal ended.
 const ENDED_BY_SIGNAL: i32 = 128;
 
-/// What help says of exit codes.
+/// Help text on exit codes.
 pub const EXIT_CODES: &str = "Exit codes: 0 done; 1 an error; 2 wrong usage; 130 interrupted by Ctrl-C, 143 asked to terminate, 129 \
                               its terminal closed, each after what there was is saved";
 
-/// Whether the person asked to end.
+/// The number of the signal that asked the program to terminate; 0 if none.
 #[derive(Debug, Clone, Default)]
 pub struct Interrupt(Arc<AtomicUsize>);
 
 impl Interrupt {
-    /// Listens for the requests.
+    /// Installs the signal handlers.
     ///
     /// # Errors
-    /// The system grants no handler.
+    /// A handler cannot be installed.
     pub fn listen() -> Result<Self> {
         let interrupt = Self::default();
         (interrupt.register())
@@ -31,7 +31,7 @@ impl Interrupt {
     }
 
     fn register(&self) -> std::io::Result<()> {
-        // A closing terminal may say so twice, so that only Ctrl-C aborts.
+        // A closing terminal may send SIGHUP twice, so only a second Ctrl-C aborts.
         let again = Arc::new(AtomicBool::new(false));
         flag::register_conditional_shutdown(SIGINT, ENDED_BY_SIGNAL + SIGINT, again.clone())?;
         flag::register(SIGINT, again)?;
@@ -46,12 +46,12 @@ impl Interrupt {
         Ok(())
     }
 
-    /// Whether it came.
-    pub fn asked(&self) -> bool {
+    /// Whether termination was requested.
+    pub fn requested(&self) -> bool {
         self.0.load(Ordering::SeqCst) != 0
     }
 
-    /// The program's exit code when all is saved: 0 where nobody asked.
+    /// The program's exit code after saving: 0 if termination was not requested.
     pub fn exit_code(&self) -> i32 {
         match self.0.load(Ordering::SeqCst) {
             0 => 0,
@@ -60,12 +60,13 @@ impl Interrupt {
     }
 }
 
-/// Whether the program was started to outlive its terminal, as by nohup.
+/// Whether SIGHUP is ignored, as under nohup: the program is to outlive its terminal.
 #[cfg(unix)]
-#[allow(unsafe_code, reason = "nothing safe tells how a signal is treated now")]
+#[allow(unsafe_code, reason = "no safe API reads a signal's disposition")]
 fn is_hangup_ignored() -> bool {
     let mut action = std::mem::MaybeUninit::<libc::sigaction>::zeroed();
-    // SAFETY: nothing is set; what is asked for is written where there is room for it, and zeros are a valid value of it.
+    // SAFETY: with a null `act`, sigaction only writes the current disposition to `oldact`; all-zero bytes are a valid
+    // sigaction.
     let action = unsafe {
         libc::sigaction(libc::SIGHUP, std::ptr::null(), action.as_mut_ptr());
         action.assume_init()

@@ -10,6 +10,7 @@ mod insert;
 mod interrupt;
 mod numbers;
 mod object_values;
+mod options;
 mod parameters;
 mod photographs;
 mod progress;
@@ -27,32 +28,33 @@ use crate::say;
 use crate::session::command::{Source, Start};
 use crate::session::given::Given;
 use crate::session::save;
-use arguments::{Action, Arguments, SolveOptions};
+use arguments::{Action, Arguments};
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 use object_values::ObjectValues;
+use options::SolveOptions;
 use std::path::Path;
 
-/// Letters that may be wrong, missing or swapped in a command that is still known for what it was meant as.
-const MAX_SLIPS: usize = 2;
+/// Typing errors (letters wrong, missing or swapped) up to which a word is matched to a command.
+const MAX_TYPOS: usize = 2;
 
-/// Opens the window and returns when it is closed.
+/// Opens the window; returns when it is closed.
 pub type Window = fn(Option<Start>, Settings) -> Result<()>;
 
-/// Runs the program with the process's arguments; the exit code: 0 done, 1 an error, 2 wrong usage, 128 and a signal's number
-/// where that ended the work.
+/// Runs the program with the process's arguments. Returns the exit code: 0 done, 1 an error, 2 wrong usage, 128 + n terminated
+/// by signal n.
 ///
-/// `window` is absent from builds without one; every command but the plain `relit` does without.
+/// `window` is `None` in builds without a window; only the plain `relit` command needs it.
 pub fn run(window: Option<Window>) -> i32 {
     let outcome = match Arguments::from_words(std::env::args_os()) {
         Ok(arguments) => act(arguments, window),
         Err(error) => match error.kind() {
             ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
-                // Help that cannot be printed has no reader.
+                // Nothing can be done if help cannot be printed.
                 let _ = error.print();
                 return 0;
             }
-            _ => Err(mistyped().unwrap_or_else(|| misuse(&error))),
+            _ => Err(misspelt_command().unwrap_or_else(|| usage_error(&error))),
         },
     };
     match outcome {
@@ -64,7 +66,7 @@ pub fn run(window: Option<Window>) -> i32 {
     }
 }
 
-/// The exit code: 0, or what tells how the work was interrupted.
+/// Runs the command. Returns the exit code: 0, or that of an interrupt.
 fn act(arguments: Arguments, window: Option<Window>) -> Result<i32> {
     let done = |()| 0;
     match arguments.action {
@@ -85,35 +87,35 @@ fn act(arguments: Arguments, window: Option<Window>) -> Result<i32> {
                 ..ObjectValues::default()
             };
             let mut options = capture.solve;
-            let source = take(&capture.capture, &mut options)?;
+            let source = source_of(&capture.capture, &mut options)?;
             solve::solve(&source, &options, &known)
         }
     }
 }
 
-/// The error for a first word that was meant as a command, where what clap makes of the line is a riddle.
-fn mistyped() -> Option<Error> {
+/// The error for a first word that is a misspelt command; clap takes it for the capture.
+fn misspelt_command() -> Option<Error> {
     let first = std::env::args_os().nth(1)?;
     let first = first.to_str().filter(|word| !word.starts_with('-'))?;
     let is_command = |name: &str| Arguments::command().find_subcommand(name).is_some();
     if is_command(first) || Path::new(first).exists() {
         return None;
     }
-    // Behind a capture's path nothing but options may follow.
+    // Only options may follow a capture's path.
     let second = std::env::args_os().nth(2);
     let extra = second.is_some_and(|word| !word.to_string_lossy().starts_with('-'));
-    command_meant(first).or_else(|| extra.then(|| unknown_command(first, "see relit --help")))
+    similar_command(first).or_else(|| extra.then(|| unknown_command(first, "see relit --help")))
 }
 
-/// The error for a word that is nearly a command's name.
-fn command_meant(word: &str) -> Option<Error> {
+/// The error for a word that is close to a command's name.
+fn similar_command(word: &str) -> Option<Error> {
     let command = Arguments::command();
     let names = command.get_subcommands().map(|known| known.get_name());
     let (distance, name) = names
         .map(|name| (strsim::osa_distance(word, name), name))
         .min()?;
-    // Two slips of the hand, but not half of the word.
-    let near = distance <= MAX_SLIPS && 2 * distance < name.len();
+    // At most MAX_TYPOS errors, and fewer than half of the letters.
+    let near = distance <= MAX_TYPOS && 2 * distance < name.len();
     near.then(|| unknown_command(word, &format!("did you mean '{name}'?")))
 }
 
@@ -122,21 +124,21 @@ fn unknown_command(word: &str, remedy: &str) -> Error {
     Error::usage("command line", problem, remedy)
 }
 
-/// `relit [CAPTURE]`: the window, or where none can be opened the same work headless.
+/// `relit [CAPTURE]`: opens the window, or solves headless if there is no display.
 fn open(arguments: Arguments, window: Option<Window>) -> Result<i32> {
     if let Some(folder) = arguments.capture.as_ref().filter(|folder| !folder.exists())
-        && let Some(error) = folder.to_str().and_then(command_meant)
+        && let Some(error) = folder.to_str().and_then(similar_command)
     {
         return Err(error);
     }
     let mut options = arguments.solve;
     let source = match &arguments.capture {
         None => Source::BuiltInRoom,
-        Some(path) => take(path, &mut options)?,
+        Some(path) => source_of(path, &mut options)?,
     };
     let reason = match window {
         None => "this build has no window".to_owned(),
-        Some(_) if !display() => "no display".to_owned(),
+        Some(_) if !has_display() => "no display".to_owned(),
         Some(window) => {
             solve::use_threads(options.threads)?;
             let settings = options.settings();
@@ -154,8 +156,8 @@ fn open(arguments: Arguments, window: Option<Window>) -> Result<i32> {
     solve::solve(&source, &options, &ObjectValues::default())
 }
 
-/// The source of whatever a person names. A scan is imported first; results are gone on from, which the options then say.
-fn take(path: &Path, options: &mut SolveOptions) -> Result<Source> {
+/// The source that a path names. A scan is imported first. For results, `options` are changed to resume them.
+fn source_of(path: &Path, options: &mut SolveOptions) -> Result<Source> {
     match Given::at(path)? {
         Given::Capture(folder) => Ok(Source::Folder(folder)),
         Given::Results(folder) => {
@@ -169,8 +171,8 @@ fn take(path: &Path, options: &mut SolveOptions) -> Result<Source> {
     }
 }
 
-/// Whether there may be a display to open a window on.
-fn display() -> bool {
+/// Whether a display for the window may exist.
+fn has_display() -> bool {
     let named = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     !cfg!(all(unix, not(target_os = "macos")))
         || named("DISPLAY")
@@ -178,19 +180,19 @@ fn display() -> bool {
         || named("WAYLAND_SOCKET")
 }
 
-/// A usage error on one line: what clap says before its usage text.
-fn misuse(error: &clap::Error) -> Error {
+/// A usage error on one line: clap's message without its usage text.
+fn usage_error(error: &clap::Error) -> Error {
     let text = error.render().to_string();
-    let said: Vec<&str> = text
+    let message: Vec<&str> = text
         .lines()
         .map(str::trim)
         .take_while(|line| !line.starts_with("Usage:"))
         .filter(|line| !line.is_empty() && !line.starts_with("For more information"))
         .collect();
-    let said = said.join(" ");
+    let message = message.join(" ");
     Error::usage(
         "command line",
-        said.strip_prefix("error: ").unwrap_or(&said),
+        message.strip_prefix("error: ").unwrap_or(&message),
         "see relit --help",
     )
 }

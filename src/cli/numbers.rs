@@ -1,17 +1,17 @@
-//! Numbers as people type them. What is refused is said with what is allowed.
+//! Parsers of numbers on the command line. The error of each says what is expected.
 
 use glam::DVec3;
 use std::ops::RangeInclusive;
 
-/// What a parser hands back: the value, or what is wanted instead.
+/// A parsed value, or what is expected instead.
 type Parsed<T> = std::result::Result<T, String>;
 
-/// A whole number from 0.
+/// An integer ≥ 0.
 pub fn whole<T: TryFrom<u64>>(text: &str) -> Parsed<T> {
     within(text, 0..=u64::MAX).ok_or_else(|| "a whole number from 0 is wanted".to_owned())
 }
 
-/// A whole number from 1.
+/// An integer ≥ 1.
 pub fn from_one<T: TryFrom<u64>>(text: &str) -> Parsed<T> {
     within(text, 1..=u64::MAX).ok_or_else(|| "a whole number from 1 is wanted".to_owned())
 }
@@ -32,13 +32,13 @@ fn within<T: TryFrom<u64>>(text: &str, range: RangeInclusive<u64>) -> Option<T> 
     T::try_from(number).ok()
 }
 
-/// A number of frames to move on by, or back.
+/// A signed offset in frames.
 pub fn shift(text: &str) -> Parsed<i32> {
     text.parse()
         .map_err(|_| "a whole number such as 1 or -1 is wanted".to_owned())
 }
 
-/// A factor or a length above zero.
+/// A factor or length above 0.
 pub fn above_zero(text: &str) -> Parsed<f64> {
     finite(text)
         .filter(|number| *number > 0.0)
@@ -50,7 +50,7 @@ pub fn degrees(text: &str) -> Parsed<f64> {
     finite(text).ok_or_else(|| "a number of degrees is wanted".to_owned())
 }
 
-/// Quarter turns of an angle in degrees.
+/// Quarter turns of an angle in degrees, modulo 4.
 pub fn quarters(text: &str) -> Parsed<u8> {
     match text.parse::<i32>().map(|degrees| degrees.rem_euclid(360)) {
         Ok(degrees) if degrees % 90 == 0 => Ok((degrees / 90) as u8),
@@ -58,7 +58,7 @@ pub fn quarters(text: &str) -> Parsed<u8> {
     }
 }
 
-/// Three numbers with commas between.
+/// Three numbers separated by commas.
 pub fn triple(text: &str) -> Parsed<DVec3> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|part| finite(part.trim())).collect();
     match numbers.as_deref() {

@@ -1,4 +1,4 @@
-//! Values of objects as the command line names them: NAME=R,G,B and NAME=V.
+//! Object values on the command line: NAME=R,G,B and NAME=V.
 
 use crate::cli::numbers::triple;
 use crate::error::{Error, Result};
@@ -15,36 +15,41 @@ pub struct ObjectValues {
     pub albedo: Vec<(String, Vec3)>,
     /// GGX roughness α, above 0 and up to 1.
     pub roughness: Vec<(String, f32)>,
-    /// Specular reflectance at normal incidence, 0 to 1; 0 takes the lobe away.
+    /// Specular reflectance at normal incidence, 0 to 1; 0 removes the lobe.
     pub specular: Vec<(String, f32)>,
 }
 
 impl ObjectValues {
-    /// Makes them changes to an estimate.
+    /// Adds the values to `edits` as changes of an estimate.
     ///
     /// # Errors
-    /// An object is not there, or a value is none that a surface can have.
+    /// An object does not exist, or a value is out of range.
     pub fn change(&self, scene: &Scene, edits: &mut Edits) -> Result<()> {
-        self.each(scene, edits, |_| {})
+        self.apply(scene, edits, |_| {})
     }
 
-    /// Makes them values that are known and held while the rest is solved.
+    /// Adds the values to `edits` as known values, which a solve holds fixed.
     ///
     /// # Errors
     /// As [`ObjectValues::change`].
     pub fn hold(&self, scene: &Scene, edits: &mut Edits) -> Result<()> {
-        self.each(scene, edits, |edit| {
+        self.apply(scene, edits, |edit| {
             edit.emission_known |= edit.emission.is_some();
             edit.albedo_known |= edit.albedo.is_some();
         })
     }
 
-    fn each(&self, scene: &Scene, edits: &mut Edits, and: impl Fn(&mut ObjectEdit)) -> Result<()> {
+    fn apply(
+        &self,
+        scene: &Scene,
+        edits: &mut Edits,
+        then: impl Fn(&mut ObjectEdit),
+    ) -> Result<()> {
         let mut set = |name: &str, set: &dyn Fn(&mut ObjectEdit)| {
             let object = find(scene, name)?;
             let mut edit = edits.object(object);
             set(&mut edit);
-            and(&mut edit);
+            then(&mut edit);
             edits.set(object, edit);
             Ok(())
         };
@@ -72,7 +77,7 @@ impl ObjectValues {
             if !(*roughness > 0.0 && *roughness <= 1.0) {
                 return Err(Error::usage(
                     format!("roughness of {name}"),
-                    "a lobe's GGX roughness lies above 0 and not above 1",
+                    "a GGX roughness is above 0 and at most 1",
                     "give a value like 0.3",
                 ));
             }
@@ -104,7 +109,7 @@ fn find(scene: &Scene, name: &str) -> Result<usize> {
     })
 }
 
-/// NAME=R,G,B.
+/// Parses NAME=R,G,B.
 pub fn named_color(text: &str) -> std::result::Result<(String, Vec3), String> {
     let (name, color) = text
         .rsplit_once('=')
@@ -112,7 +117,7 @@ pub fn named_color(text: &str) -> std::result::Result<(String, Vec3), String> {
     Ok((name.to_owned(), triple(color)?.as_vec3()))
 }
 
-/// NAME=V.
+/// Parses NAME=V.
 pub fn named_number(text: &str) -> std::result::Result<(String, f32), String> {
     let (name, value) = text.rsplit_once('=').ok_or("NAME=v is wanted".to_owned())?;
     let value: f32 = value

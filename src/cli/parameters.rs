@@ -1,23 +1,23 @@
-//! The table of parameters as options of the command line.
+//! The parameters of a solve as options of the command line.
 
 use crate::inverse::settings::{Kind, PARAMETERS, Parameter, Settings, Value};
 use clap::builder::ValueParser;
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 
-/// Parameters that the command line gives.
+/// Parameters given on the command line, with their values.
 #[derive(Debug, Clone, Default)]
 pub struct Parameters(Vec<(&'static Parameter, Value)>);
 
 impl Parameters {
-    /// `settings` with the given values in place.
+    /// `settings` with the given values set.
     pub fn over(&self, settings: &Settings) -> Settings {
         let mut settings = settings.clone();
         for (parameter, value) in &self.0 {
-            // Values were tried when they were parsed.
+            // `parse` has checked the values.
             let accepted = parameter.set(&mut settings, value);
             debug_assert_eq!(accepted, Ok(()));
         }
-        // An explicit 0 holds nothing out; by default single pixels are.
+        // `--hold-out 0` holds nothing out, whereas single pixels are held out by default.
         let explicit = |name: &str| self.0.iter().any(|(p, _)| p.name == name);
         if explicit("hold_out") && settings.hold_out == 0 && !explicit("held_out") {
             settings.held_out = 0.0;
@@ -26,7 +26,7 @@ impl Parameters {
     }
 }
 
-/// Reads a value as typed: `auto` bounces, and times with s, m or h behind, are written so for people alone.
+/// Parses a value. Only the command line accepts `auto` bounces, and times with a unit s, m or h.
 fn parse(parameter: &'static Parameter, text: &str) -> Result<Value, String> {
     let value = match (parameter.name, parameter.unit) {
         ("bounces", _) if text == "auto" => Value::Whole(0),
@@ -43,7 +43,7 @@ fn parse(parameter: &'static Parameter, text: &str) -> Result<Value, String> {
     Ok(value)
 }
 
-/// Seconds of a time such as 90, 60s, 1.5m or 2h.
+/// Parses a time such as 90, 60s, 1.5m or 2h; in seconds.
 pub fn duration(text: &str) -> Option<f64> {
     let split = text.find(|c: char| c.is_ascii_alphabetic() && c != 'e');
     let (number, unit) = text.split_at(split.unwrap_or(text.len()));

@@ -1,22 +1,19 @@
-//! Photographs in one go, with progress; Ctrl-C ends after what is whole.
+//! Writes composited photographs with a progress bar; Ctrl-C stops after the last complete one.
 
 use crate::cli::interrupt::Interrupt;
+use crate::cli::progress::{LENGTH, bar};
 use crate::compose::object::surface::ObjectSurface;
 use crate::error::Result;
 use crate::render::Renderer;
 use crate::say;
 use crate::session::photographs::Photographs;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::IsTerminal;
 use std::path::PathBuf;
 
-/// Steps of the bar.
-const LENGTH: u64 = 1000;
-
-/// Writes photographs and prints the paths of their files; the exit code. `materials` as in [`Photographs::write_made_of`].
+/// Writes photographs and prints the paths of their files. Returns the exit code. `materials` is as in
+/// [`Photographs::write_with`].
 ///
 /// # Errors
-/// Something cannot be read or written.
+/// A file cannot be read or written.
 pub fn write_with_progress(
     work: &Photographs,
     renderer: &Renderer,
@@ -24,18 +21,11 @@ pub fn write_with_progress(
     prefix: &dyn Fn(usize) -> PathBuf,
 ) -> Result<i32> {
     let interrupt = Interrupt::listen()?;
-    let target = if std::io::stderr().is_terminal() {
-        ProgressDrawTarget::stderr()
-    } else {
-        ProgressDrawTarget::hidden()
-    };
-    let style = ProgressStyle::with_template("{bar:24} photograph {msg}, {eta} left");
-    let bar = ProgressBar::with_draw_target(Some(LENGTH), target)
-        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    let written = work.write_made_of(renderer, materials, prefix, &|doing| {
+    let bar = bar("{bar:24} photograph {msg}, {eta} left");
+    let written = work.write_with(renderer, materials, prefix, &|doing| {
         bar.set_position((f64::from(doing.fraction) * LENGTH as f64) as u64);
         bar.set_message(format!("{:03}", doing.frame));
-        !interrupt.asked()
+        !interrupt.requested()
     });
     bar.finish_and_clear();
     let written = written?;

@@ -1,4 +1,4 @@
-//! How far a solve is: a bar on a terminal, a line every few seconds otherwise.
+//! Progress of a solve: a bar on a terminal, otherwise a line every few seconds.
 
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{LossPoint, Progress};
@@ -8,12 +8,23 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
-/// Time between two plain lines.
+/// Time between two lines without a terminal.
 const LINE: Duration = Duration::from_secs(3);
-/// Time between two changes of the bar.
+/// Time between two updates of the bar.
 const FRAME: Duration = Duration::from_millis(100);
-/// Steps of the bar.
-const LENGTH: u64 = 1000;
+/// Steps of a progress bar.
+pub const LENGTH: u64 = 1000;
+
+/// A progress bar of [`LENGTH`] steps on stderr, hidden unless that is a terminal.
+pub fn bar(template: &str) -> ProgressBar {
+    let target = match std::io::stderr().is_terminal() {
+        true => ProgressDrawTarget::stderr(),
+        false => ProgressDrawTarget::hidden(),
+    };
+    let style = ProgressStyle::with_template(template);
+    ProgressBar::with_draw_target(Some(LENGTH), target)
+        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
 
 /// Shows progress on stderr.
 #[derive(Debug)]
@@ -25,22 +36,18 @@ pub struct Meter {
 }
 
 impl Meter {
-    /// A bar if stderr is a terminal.
+    /// A bar if stderr is a terminal, else lines.
     pub fn new() -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
-            let style = ProgressStyle::with_template("{bar:24} {msg}");
-            ProgressBar::with_draw_target(Some(LENGTH), ProgressDrawTarget::stderr())
-                .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-        });
+        let is_terminal = std::io::stderr().is_terminal();
         Self {
-            bar,
+            bar: is_terminal.then(|| bar("{bar:24} {msg}")),
             shown: None,
             phase: String::new(),
             rates: Rates::default(),
         }
     }
 
-    /// Shows how far a solve is, if it is time to.
+    /// Shows the progress if the last update is old enough or the phase has changed.
     pub fn show(&mut self, progress: &Progress, settings: &Settings) {
         self.rates.note(progress);
         let pause = if self.bar.is_some() { FRAME } else { LINE };
@@ -66,7 +73,7 @@ impl Meter {
         }
     }
 
-    /// Says something beside the progress.
+    /// Prints a line without breaking the bar.
     pub fn say(&self, line: &str) {
         match &self.bar {
             Some(bar) => bar.suspend(|| say::aside(line)),
@@ -74,7 +81,7 @@ impl Meter {
         }
     }
 
-    /// Ends the bar, so that other output can follow.
+    /// Removes the bar, so that other output can follow.
     pub fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

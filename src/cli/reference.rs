@@ -1,11 +1,11 @@
-//! The chapter on the command line, made from the commands themselves (see `tests/docs.rs`).
+//! The manual's chapter on the command line, generated from the commands themselves (see `tests/docs.rs`).
 
 use crate::cli::arguments::Arguments;
 use crate::inverse::settings::PARAMETERS;
 use clap::{Arg, ArgAction, Command, CommandFactory};
 use std::collections::BTreeSet;
 
-/// What holds for all commands.
+/// Beginning of the chapter: what holds for all commands.
 const INTRODUCTION: &str = "\
 # Command line
 
@@ -24,10 +24,10 @@ alone; the choices of an import are the command line's alone.
 
 ";
 
-/// The heading under which the parameters of a solve stand in the help.
+/// Help heading of the parameters of a solve.
 const PARAMETERS_HEADING: &str = "Parameters of the solve";
 
-/// Lines to type, by command; the first argument of each is the command.
+/// Example command lines; the first argument of each is its command.
 const EXAMPLES: &[&str] = &[
     "relit solve room --out results",
     "relit solve room --out results --preset reference --time 5m",
@@ -49,10 +49,10 @@ const EXAMPLES: &[&str] = &[
     "relit study table1 --quick --out studies",
 ];
 
-/// Whether the program takes a line, given as its words without `relit` in front.
+/// Checks a command line, given as its words without `relit` in front.
 ///
 /// # Errors
-/// What is wrong with it.
+/// Returns clap's message if the command line is wrong.
 pub fn check(words: &[&str]) -> Result<(), String> {
     let line = std::iter::once(&"relit").chain(words);
     match Arguments::from_words(line) {
@@ -63,7 +63,7 @@ pub fn check(words: &[&str]) -> Result<(), String> {
     }
 }
 
-/// The chapter, as Markdown: what the help ends with, every command with its arguments and options, and the parameters of a solve.
+/// The chapter as Markdown: introduction, every command with its arguments and options, and the parameters of a solve.
 pub fn markdown() -> String {
     let mut root = Arguments::command();
     root.build();
@@ -85,7 +85,7 @@ pub fn markdown() -> String {
     text
 }
 
-/// One command: what it does, how it is called, examples, arguments, options.
+/// One command: what it does, usage, examples, arguments, options.
 fn section(title: &str, command: &Command) -> String {
     let usage = command.clone().render_usage().to_string();
     let usage: Vec<&str> = usage.lines().map(str::trim).collect();
@@ -102,9 +102,9 @@ fn section(title: &str, command: &Command) -> String {
     if !examples.is_empty() {
         text += &format!("\n```sh\n{}\n```\n", examples.join("\n"));
     }
-    let arguments: Vec<&Arg> = command.get_arguments().filter(|a| is_shown(a)).collect();
-    let (places, options): (Vec<&Arg>, _) = arguments.iter().partition(|a| a.is_positional());
-    text += &table("argument", &places);
+    let arguments: Vec<&Arg> = command.get_arguments().filter(|a| is_listed(a)).collect();
+    let (positional, options): (Vec<&Arg>, _) = arguments.iter().partition(|a| a.is_positional());
+    text += &table("argument", &positional);
     let headings: BTreeSet<Option<&str>> = options.iter().map(|a| a.get_help_heading()).collect();
     for heading in headings {
         if heading == Some(PARAMETERS_HEADING) {
@@ -125,19 +125,19 @@ fn section(title: &str, command: &Command) -> String {
     text
 }
 
-/// Whether an argument is worth a row; help and version are everywhere the same.
-fn is_shown(argument: &Arg) -> bool {
+/// Whether an argument gets a row: help and version, which are the same everywhere, do not.
+fn is_listed(argument: &Arg) -> bool {
     !argument.is_hide_set() && !["help", "version"].contains(&argument.get_id().as_str())
 }
 
-/// What a command does, in a sentence without its full stop.
+/// What a command does, without the full stop.
 fn about(command: &Command) -> String {
     command
         .get_about()
         .map_or_else(String::new, ToString::to_string)
 }
 
-/// A row an argument; nothing for none.
+/// One row per argument; empty without arguments.
 fn table(title: &str, arguments: &[&Arg]) -> String {
     if arguments.is_empty() {
         return String::new();
@@ -156,12 +156,12 @@ fn table(title: &str, arguments: &[&Arg]) -> String {
         if repeats && argument.get_help_heading().is_none() {
             meaning += ". May repeat";
         }
-        text += &row(&[&format!("`{}`", spelling(argument)), &meaning, &default]);
+        text += &row(&[&format!("`{}`", syntax(argument)), &meaning, &default]);
     }
     text
 }
 
-/// The values of an argument that have a meaning each.
+/// A table of an argument's possible values; empty unless they have help texts.
 fn values(argument: &Arg) -> String {
     let values = argument.get_possible_values();
     let explained = values
@@ -175,12 +175,12 @@ fn values(argument: &Arg) -> String {
     }
     format!(
         "\nValues of `{}`:\n\n| value | meaning |\n| --- | --- |\n{}",
-        spelling(argument),
+        syntax(argument),
         rows.concat()
     )
 }
 
-/// The parameters, once for all commands that take them.
+/// The parameters of a solve, listed once for all commands that take them.
 fn parameters(root: &Command) -> String {
     let mut text = "\n## Parameters of the solve\n\n\
         `relit` and `relit solve` take them all. The pane *Settings* of the window shows the same table. Those that say *at once* \
@@ -200,13 +200,13 @@ fn parameters(root: &Command) -> String {
         };
         let allowed = parameter.allowed() + &unit;
         let when = if parameter.live { "at once" } else { "" };
-        let option = format!("`{}`", spelling(argument));
+        let option = format!("`{}`", syntax(argument));
         text += &row(&[&option, &meaning, &default, &allowed, when]);
     }
     text
 }
 
-/// Help without the default that it ends with, and that default.
+/// The help text without its "[default: …]", and the default.
 fn meaning(argument: &Arg) -> (String, String) {
     let help = argument
         .get_help()
@@ -230,7 +230,7 @@ fn meaning(argument: &Arg) -> (String, String) {
 }
 
 /// How an argument is typed.
-fn spelling(argument: &Arg) -> String {
+fn syntax(argument: &Arg) -> String {
     let names = argument.get_value_names().unwrap_or_default();
     let value = names.first().map_or("", |name| name.as_str());
     match argument.get_long() {
@@ -247,7 +247,7 @@ fn takes_value(argument: &Arg) -> bool {
         .map_or(argument.get_action().takes_values(), |n| n.takes_values())
 }
 
-/// A row of a table. What would end a cell or begin a tag is escaped.
+/// A row of a Markdown table, with `|` and `<` escaped.
 fn row(cells: &[&str]) -> String {
     let cells: Vec<String> = cells.iter().map(|cell| escaped(cell)).collect();
     format!("| {} |\n", cells.join(" | "))

@@ -1,8 +1,8 @@
-//! `relit render`: a picture of the room in its estimated light, from a photograph's camera or any other.
+//! `relit render`: a picture of the room in its estimated light, from a photograph's camera or another.
 
 use crate::capture::read::camera_file;
-use crate::cli::arguments::{DenoiseOptions, DeviceOptions, Replace};
 use crate::cli::numbers::{from_one, whole};
+use crate::cli::options::{DenoiseOptions, DeviceOptions, Replace};
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
 use crate::export::exr::{Precision, write_rgb};
@@ -34,15 +34,15 @@ pub struct RenderArguments {
         conflicts_with = "camera"
     )]
     frame: Option<usize>,
-    /// A camera of its own: JSON with w, h, fl_x, fl_y, cx, cy and transform_matrix, and what else a frame of transforms.json has
+    /// Camera file: JSON with w, h, fl_x, fl_y, cx, cy and transform_matrix; optionally other values of a frame of transforms.json
     #[arg(long, value_name = "FILE")]
     camera: Option<PathBuf>,
-    /// Samples a pixel
+    /// Samples per pixel
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = from_one::<u32>)]
     spp: u32,
     #[command(flatten)]
     denoise: DenoiseOptions,
-    /// Writes the light of each lamp apart, as named layers of one .exr that add up to the picture
+    /// Write the light of each lamp as a named layer of one .exr; the layers add up to the picture
     #[arg(long, conflicts_with = "denoise")]
     layers: bool,
     #[command(flatten)]
@@ -54,7 +54,7 @@ pub struct RenderArguments {
     replace: Replace,
 }
 
-/// How a picture is written, by its name's ending.
+/// File format of the picture.
 enum Format {
     Exr,
     Png,
@@ -63,7 +63,7 @@ enum Format {
 /// Renders one picture.
 ///
 /// # Errors
-/// The results, the camera or the picture cannot be read or written.
+/// The results or the camera cannot be read, or the picture cannot be written.
 pub fn render(arguments: &RenderArguments) -> Result<()> {
     let ending = arguments.out.extension().and_then(|e| e.to_str());
     let format = match ending.map(str::to_ascii_lowercase).as_deref() {
@@ -87,13 +87,13 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
     if arguments.layers && arguments.device.device == Device::Gpu {
         return Err(Error::usage(
             "--device gpu",
-            "the light of each lamp apart is traced by the processor",
+            "the light of each lamp is traced separately by the processor",
             "leave out one of --layers and --device",
         ));
     }
     arguments.replace.apply();
     overwrite::check(&arguments.out)?;
-    // Light apart by lamps is the processor's work.
+    // Only the processor traces light by lamp.
     let renderer = match arguments.layers {
         true => Renderer::processor(),
         false => arguments.device.renderer()?,
@@ -137,7 +137,7 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
     };
     let denoiser = arguments.denoise.denoiser(matches!(format, Format::Png))?;
     let mut picture = if let Some(denoiser) = denoiser {
-        // Two independent halves tell the noise.
+        // The denoiser estimates the noise from two independent halves.
         let half = spp.div_ceil(2);
         let [a, b] = [seed, seed.wrapping_add(1)].map(|seed| rendered(seed, half));
         denoiser.denoise(&a, &b, &guides(&lit, &camera))
@@ -147,7 +147,7 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
     match format {
         Format::Exr => write_rgb(&arguments.out, &picture, Precision::Float),
         Format::Png => {
-            // As the photograph is shown, where it saturates.
+            // Exposed like the photograph where it saturates.
             let saturation = match arguments.camera {
                 None => capture.frame(frame as usize)?.1.saturation,
                 Some(_) => Vec3::INFINITY,

@@ -1,4 +1,4 @@
-//! The table at the end of a solve.
+//! The table that ends a solve.
 
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::inverse::solver::{Progress, Termination};
@@ -8,10 +8,10 @@ use glam::Vec3;
 use std::borrow::Cow;
 use std::fmt::Write;
 
-/// Rows shown at most; the rest is in report.json.
+/// Most rows printed; report.json has all.
 const ROWS: usize = 24;
 
-/// Objects by emission, then by pixels seen, with standard errors.
+/// Table of objects with standard errors, sorted by emission, then by the number of pixels that see them.
 pub fn objects(scene: &Scene, estimate: &Estimate) -> String {
     let mut rows: Vec<(Cow<str>, &ObjectEstimate)> = scene
         .objects
@@ -62,7 +62,7 @@ pub fn objects(scene: &Scene, estimate: &Estimate) -> String {
 
 fn error(stderr: Vec3, digits: usize) -> String {
     let worst = stderr.max_element();
-    // Nothing at all is known of an error as large as numbers go.
+    // f32::MAX stands for an unknown error.
     if worst < f32::MAX {
         format!("{worst:.digits$}")
     } else {
@@ -70,7 +70,7 @@ fn error(stderr: Vec3, digits: usize) -> String {
     }
 }
 
-/// One line on how the solve ended.
+/// One line on why and when the solve ended.
 pub fn ending(progress: &Progress, termination: Termination) -> String {
     let why = match termination {
         Termination::Converged => "converged",

@@ -1,4 +1,4 @@
-//! Commands on the results of an earlier solve.
+//! Options and loading of earlier results, shared by several commands.
 
 use crate::cli::numbers::threads;
 use crate::error::Result;
@@ -12,7 +12,7 @@ use clap::Args;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Which results.
+/// Which results to load.
 #[derive(Debug, Args)]
 pub struct SavedOptions {
     /// Folder that relit solve wrote
@@ -20,7 +20,7 @@ pub struct SavedOptions {
     /// Where the capture is now, if it was moved
     #[arg(long, value_name = "DIR")]
     pub capture: Option<PathBuf>,
-    /// Threads to work with [default: one a core]
+    /// Number of threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<u16>,
     /// Let paths in the capture lead out of its folder; only for captures that you trust
@@ -28,25 +28,25 @@ pub struct SavedOptions {
     pub allow_outside: bool,
 }
 
-/// Results with the capture that they belong to.
+/// Results with their capture.
 pub struct Loaded {
-    /// What the folder holds.
+    /// What the results folder holds.
     pub saved: Saved,
-    /// The capture, read again.
+    /// The capture, opened again.
     pub capture: Arc<OpenCapture>,
-    /// The estimate of its objects, as it was found.
+    /// The estimate as it was solved.
     pub found: Arc<Estimate>,
-    /// What was changed of it by hand.
+    /// Edits by hand.
     pub edits: Edits,
-    /// The estimate with that.
+    /// The estimate with the edits.
     pub estimate: Arc<Estimate>,
 }
 
 impl SavedOptions {
-    /// Reads both.
+    /// Loads the results and opens their capture.
     ///
     /// # Errors
-    /// One of them is missing or broken, or they do not belong together.
+    /// The results or the capture are missing or broken, or they do not belong together.
     pub fn load(&self) -> Result<Loaded> {
         crate::cli::solve::use_threads(self.threads)?;
         let saved = save::load(&self.dir)?;

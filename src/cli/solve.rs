@@ -1,9 +1,9 @@
-//! `relit solve`: headless, with progress, saving what there is when interrupted.
+//! `relit solve`: a headless solve with progress; an interrupt saves the estimate reached so far.
 
 use crate::calibrate::problem::Problem;
-use crate::cli::arguments::SolveOptions;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::object_values::ObjectValues;
+use crate::cli::options::SolveOptions;
 use crate::cli::progress::Meter;
 use crate::cli::report;
 use crate::error::{Error, Result};
@@ -22,10 +22,10 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// What is said where work ends before it began.
-const NOTHING: &str = "interrupted before there was anything to save";
+/// Message of an interrupt before there is an estimate.
+const NOTHING_TO_SAVE: &str = "interrupted before there was anything to save";
 
-/// Solves a source and writes the results; the exit code.
+/// Solves a source and writes the results. Returns the exit code.
 ///
 /// # Errors
 /// The capture cannot be read or solved, or the results cannot be written.
@@ -35,7 +35,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
     use_threads(options.threads)?;
     let interrupt = Interrupt::listen()?;
 
-    // Take up earlier work.
+    // Load the earlier solve.
     let folder = options.out.clone().unwrap_or_else(|| source.default_out());
     let earlier = if options.resume {
         Some(save::load_checkpoint(&folder)?)
@@ -66,7 +66,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
             earlier.estimate_for(&capture)?;
             edits = earlier.edits_for(&capture)?;
             if earlier.checkpoint.is_none() {
-                say::warning("the earlier solve left nothing to go on from; starting over");
+                say::warning("the earlier solve left no checkpoint; starting over");
             }
             earlier.checkpoint.as_ref()
         }
@@ -84,12 +84,12 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
         ));
     }
 
-    // Find out now, not after the work, whether there is a place for its results.
+    // Check before the solve, not after it, that the results can be written.
     drop(Staging::new(&folder, &CaptureId::from(capture.as_ref()))?);
 
     // Solve.
-    if interrupt.asked() {
-        say::aside(NOTHING);
+    if interrupt.requested() {
+        say::aside(NOTHING_TO_SAVE);
         return Ok(interrupt.exit_code());
     }
     let problem = Problem {
@@ -116,7 +116,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
         interrupt: &interrupt,
         meter: Meter::new(),
         every: options.checkpoint,
-        offered: None,
+        pending: None,
         written: Instant::now(),
     };
     let solution = crate::inverse::solve(&problem, &settings, checkpoint, &mut watch);
@@ -124,16 +124,16 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
     let solution = solution?;
 
     // Write.
-    if interrupt.asked() {
-        // Before its first loss an estimate is what was supposed, and worth no earlier results.
+    if interrupt.requested() {
+        // Before the first loss the estimate is the initial guess, and must not replace earlier results.
         if solution.progress.losses.is_empty() {
-            say::aside(NOTHING);
+            say::aside(NOTHING_TO_SAVE);
             return Ok(interrupt.exit_code());
         }
         say::aside("interrupted: saving what there is (again Ctrl-C to abort)");
     }
     let results = Results {
-        estimate: Arc::new(capture.in_doubt(solution.estimate)),
+        estimate: Arc::new(capture.marked_doubtful(solution.estimate)),
         progress: Arc::new(solution.progress),
         stopped_because: Some(solution.termination),
         checkpoint: solution.checkpoint,
@@ -150,7 +150,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
     Ok(interrupt.exit_code())
 }
 
-/// Listens to the solver: shows progress, writes checkpoints, hears Ctrl-C.
+/// Observer of the solver: shows progress, writes checkpoints, and stops at an interrupt.
 struct Watch<'a> {
     results: Results,
     folder: &'a Path,
@@ -159,8 +159,8 @@ struct Watch<'a> {
     meter: Meter,
     /// Time between two checkpoints.
     every: Duration,
-    /// A checkpoint to be written at the next report.
-    offered: Option<Checkpoint>,
+    /// The checkpoint to write at the next report.
+    pending: Option<Checkpoint>,
     written: Instant,
 }
 
@@ -171,17 +171,17 @@ impl Observer for Watch<'_> {
 
     fn observe(&mut self, progress: &Progress, estimate: &Estimate) -> Control {
         self.meter.show(progress, self.settings);
-        if let Some(checkpoint) = self.offered.take() {
+        if let Some(checkpoint) = self.pending.take() {
             self.results.checkpoint = Some(checkpoint);
             self.results.estimate = Arc::new(estimate.clone());
             self.results.progress = Arc::new(progress.clone());
-            // The solve goes on without a checkpoint; the results are written in any case.
+            // A checkpoint that cannot be written does not end the solve.
             if let Err(error) = save::write_checkpoint(self.folder, &self.results) {
                 self.meter.say(&format!("warning: {error}"));
             }
             self.written = Instant::now();
         }
-        if self.interrupt.asked() {
+        if self.interrupt.requested() {
             return Control::Stop;
         }
         Control::Continue
@@ -189,19 +189,19 @@ impl Observer for Watch<'_> {
 
     fn offer(&mut self, make: &dyn Fn() -> Checkpoint) {
         if self.written.elapsed() >= self.every {
-            self.offered = Some(make());
+            self.pending = Some(make());
         }
     }
 }
 
-/// More threads a core than this gain nothing: whoever looks for work walks over the list of all of them, which takes most of
-/// the time of a thousand.
+/// More threads per core than this gain nothing: an idle worker scans the list of all threads for work, which takes most of the
+/// time with a thousand of them.
 const MAX_THREADS_A_CORE: usize = 4;
 
-/// Sets the number of worker threads for the whole process; says so where it is less than was asked for.
+/// Sets the number of worker threads of the process. Warns if fewer are used than `threads`.
 ///
 /// # Errors
-/// The system grants no threads.
+/// The threads cannot be started.
 pub fn use_threads(threads: Option<u16>) -> Result<()> {
     let Some(threads) = threads.map(usize::from) else {
         return Ok(());

@@ -1,7 +1,7 @@
-//! `relit study`: the paper's experiments.
+//! `relit study`: the experiments of the paper.
 
-use crate::cli::arguments::{ReadOptions, Replace};
 use crate::cli::numbers::{from_one, seeds, threads};
+use crate::cli::options::{ReadOptions, Replace};
 use crate::cli::solve::use_threads;
 use crate::cli::trade::time;
 use crate::error::{Error, Result};
@@ -18,9 +18,9 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// The word for every study.
+/// Selects all studies.
 const ALL: &str = "all";
-/// Seeds in the quick form where none are named.
+/// Default number of seeds with `--quick`.
 const QUICK_SEEDS: u64 = 2;
 
 /// `relit study`.
@@ -38,15 +38,15 @@ pub struct StudyArguments {
     /// Seeds that each solve is repeated with: 1, 2, … [default: 5, of table1 10; quick: 2]
     #[arg(long, value_name = "N", value_parser = seeds)]
     seeds: Option<u64>,
-    /// Only try it, in seconds: fewer values, smaller scenes, solves cut short
+    /// Quick trial of some seconds: fewer values, smaller scenes, shorter solves
     #[arg(long)]
     quick: bool,
-    /// A capture to run on instead of rooms of the study's own: batch, textures and readings on its photographs, the others
-    /// on its twin, a room with its mesh, its views and the colours and lamps found in it, whose truth is known
+    /// A capture to run on instead of the study's own rooms: batch, textures and readings use its photographs, the
+    /// others its twin: a room with its mesh, its views, and the colours and lamps found in it, whose truth is known
     #[arg(long, value_name = "CAPTURE")]
     capture: Option<PathBuf>,
-    /// `insertion` in N generated rooms of a family instead: a chair put into two photographs of each, compared with the chair truly
-    /// there
+    /// Run `insertion` in N generated rooms of a family instead: a chair inserted into two photographs is compared
+    /// with the chair truly in the room
     #[arg(long, value_name = "N", requires = "family", conflicts_with = "capture", value_parser = from_one::<u32>)]
     rooms: Option<u32>,
     /// The family of the generated rooms
@@ -55,7 +55,7 @@ pub struct StudyArguments {
     /// The preset that generated rooms are solved with
     #[arg(long, value_name = "PRESET", requires = "rooms", default_value = "balanced", value_parser = PossibleValuesParser::new(Preset::WORDS))]
     preset: String,
-    /// Threads to work with [default: one a core]
+    /// Number of threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<u16>,
     #[command(flatten)]
@@ -71,7 +71,7 @@ fn names() -> PossibleValuesParser {
     PossibleValuesParser::new(studies.chain([PossibleValue::new(ALL).help("All of them")]))
 }
 
-/// Runs the studies and writes what they found, each as soon as it is done.
+/// Runs the studies and writes the findings of each as soon as it is done.
 ///
 /// # Errors
 /// The capture cannot be read, a solve cannot start, or a file cannot be written.
@@ -120,10 +120,10 @@ pub fn study(arguments: &StudyArguments) -> Result<()> {
     Ok(())
 }
 
-/// `insertion` over generated rooms: writes insertion-FAMILY.csv and prints what holds over them.
+/// Runs the study `insertion` over generated rooms: writes insertion-FAMILY.csv and prints the decision over all rooms.
 ///
 /// # Errors
-/// A room cannot be drawn or solved, or the table cannot be written.
+/// A room cannot be generated or solved, or the table cannot be written.
 fn insertions(arguments: &StudyArguments, rooms: u32, family: &str) -> Result<()> {
     let known = Family::of_name(family).zip(
         Preset::ALL

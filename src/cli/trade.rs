@@ -1,10 +1,10 @@
-//! `relit trade`: what exactness costs on a capture, or on generated rooms.
+//! `relit trade`: error over time of presets and settings, on a capture or on generated rooms.
 
 use crate::calibrate::problem::Problem;
-use crate::cli::arguments::{ReadOptions, Replace};
 use crate::cli::families;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::numbers::{from_one, threads, whole};
+use crate::cli::options::{ReadOptions, Replace};
 use crate::cli::parameters::duration;
 use crate::cli::solve::use_threads;
 use crate::error::Result;
@@ -15,14 +15,14 @@ use crate::session::command::Source;
 use crate::session::open::open;
 use crate::session::snapshot::OpenCapture;
 use crate::study::trade::plan::{self, Run};
-use crate::study::trade::{Curve, Heard, Trade, combine, measure, rooms};
+use crate::study::trade::{Curve, SolveEvent, Trade, combine, measure, rooms};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Time for all solves of curves, where none is given.
-const CURVES: Duration = Duration::from_secs(5 * 60);
+/// Default time for all solves of curves.
+const DEFAULT_TIME: Duration = Duration::from_secs(5 * 60);
 
 /// `relit trade`.
 #[derive(Debug, Args)]
@@ -41,19 +41,20 @@ pub struct TradeArguments {
     /// The preset that generated rooms are solved with [default: balanced]
     #[arg(long, value_name = "PRESET", requires = "rooms", conflicts_with_all = ["presets", "around", "capture"], value_parser = PossibleValuesParser::new(Preset::WORDS))]
     preset: Option<String>,
-    /// Time for all solves together, loading excluded [default: 5m]; of a family, no further room is begun after it [default: none]
+    /// Time for all solves together, loading excluded [default: 5m]; of a family, no further room is started after it
+    /// [default: none]
     #[arg(long, value_name = "TIME", value_parser = time)]
     time: Option<Duration>,
-    /// The presets alone, without the settings around them
+    /// Only the presets, without variations of their settings
     #[arg(long)]
     presets: bool,
-    /// One preset and the settings around it alone, each with as much of the time; all presets and all settings for `all`
+    /// Only one preset and variations of its settings, with equal times; `all` for all presets and variations
     #[arg(long, value_name = "PRESET|all", conflicts_with = "presets", value_parser = PossibleValuesParser::new(Preset::WORDS.iter().copied().chain([families::ALL])))]
     around: Option<String>,
-    /// Key of all random numbers, and of the first generated room
+    /// Random seed, and seed of the first generated room
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>)]
     seed: u64,
-    /// Threads to work with [default: one a core]
+    /// Number of threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<u16>,
     #[command(flatten)]
@@ -62,7 +63,7 @@ pub struct TradeArguments {
     read: ReadOptions,
 }
 
-/// A time above zero, as typed.
+/// Parses a time above zero.
 pub fn time(text: &str) -> std::result::Result<Duration, String> {
     let seconds = duration(text).filter(|seconds| *seconds > 0.0);
     let time = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
@@ -70,13 +71,13 @@ pub fn time(text: &str) -> std::result::Result<Duration, String> {
 }
 
 impl TradeArguments {
-    /// Seeds of so many generated rooms.
+    /// Seeds of `count` generated rooms.
     fn seeds(&self, count: u64) -> impl Iterator<Item = u64> {
         let first = self.seed;
         (0..count).map(move |index| first.wrapping_add(index))
     }
 
-    /// The preset of solves of rooms of a family.
+    /// The preset that generated rooms are solved with.
     fn preset(&self) -> Preset {
         let named = self.preset.as_deref();
         let preset = Preset::ALL.iter().find(|p| Some(p.word()) == named);
@@ -85,12 +86,12 @@ impl TradeArguments {
 
     /// Time for all solves of curves.
     fn limit(&self) -> Duration {
-        self.time.unwrap_or(CURVES)
+        self.time.unwrap_or(DEFAULT_TIME)
     }
 }
 
-/// Measures, writes trade.csv, trade.png and trade.json, or of families rooms.csv, rooms.png and rooms.json, and prints what was found; the
-/// exit code.
+/// Measures and prints what was found. Writes trade.csv, trade.png and trade.json, or for families rooms.csv, rooms.png and
+/// rooms.json. Returns the exit code.
 ///
 /// # Errors
 /// The capture cannot be read or solved, or the results cannot be written.
@@ -98,12 +99,12 @@ pub fn trade(arguments: &TradeArguments) -> Result<i32> {
     arguments.replace.apply();
     use_threads(arguments.threads)?;
     let interrupt = Interrupt::listen()?;
-    let of_generated = || Path::new("relit-out").join("generated-rooms");
+    let rooms_folder = || Path::new("relit-out").join("generated-rooms");
     if let Some(count) = arguments.rooms
         && !arguments.presets
         && arguments.around.is_none()
     {
-        let out = arguments.out.clone().unwrap_or_else(of_generated);
+        let out = arguments.out.clone().unwrap_or_else(rooms_folder);
         let family = arguments.family.as_deref().unwrap_or(Family::Plain.name());
         let (preset, seeds) = (arguments.preset(), arguments.seeds(count));
         families::families(&out, family, preset, seeds, arguments.time, &interrupt)?;
@@ -122,7 +123,7 @@ pub fn trade(arguments: &TradeArguments) -> Result<i32> {
     let (trade, folder) = match arguments.rooms {
         Some(count) => {
             let trade = over_rooms(arguments, count, &runs, &interrupt)?;
-            (trade, of_generated())
+            (trade, rooms_folder())
         }
         None => {
             let folder = arguments.capture.clone();
@@ -155,20 +156,20 @@ fn of_capture(
         scene: capture.scene.clone(),
         photographs: capture.photographs.clone(),
     };
-    let begun = Instant::now();
+    let started = Instant::now();
     let curves = measure(
         &problem,
         &judge,
         runs,
         arguments.limit(),
-        &|| interrupt.asked(),
-        &mut told,
+        &|| interrupt.requested(),
+        &mut print_progress,
     )?;
     Ok(Trade::new(
         &capture.name,
         Some(capture.hash.clone()),
         judge.measure(),
-        begun.elapsed(),
+        started.elapsed(),
         curves,
     ))
 }
@@ -184,13 +185,13 @@ fn over_rooms(
     for seed in arguments.seeds(count) {
         say::aside(format_args!("generated room {seed}"));
         let (problem, judge) = rooms::problem(seed, rooms::SIZE)?;
-        let begun = Instant::now();
+        let started = Instant::now();
         let limit = arguments.limit().div_f64(count as f64);
-        let stopped = || interrupt.asked();
-        let curves = measure(&problem, &judge, runs, limit, &stopped, &mut told)?;
-        seconds += begun.elapsed();
-        // A room that was broken off would stand for solves that it does not have.
-        if interrupt.asked() {
+        let stopped = || interrupt.requested();
+        let curves = measure(&problem, &judge, runs, limit, &stopped, &mut print_progress)?;
+        seconds += started.elapsed();
+        // Drop a room that was interrupted: its solves are incomplete.
+        if interrupt.requested() {
             break;
         }
         measured.push(curves);
@@ -205,11 +206,11 @@ fn over_rooms(
     })
 }
 
-/// A line a solve.
-fn told(heard: Heard) {
-    match heard {
-        Heard::Begins(run) => say::aside(format_args!("{} …", run.name)),
-        Heard::Ended(curve) => say::aside(format_args!("{}: {}", curve.name, ending(curve))),
+/// Prints a line when a solve begins and when it ends.
+fn print_progress(event: SolveEvent) {
+    match event {
+        SolveEvent::Begins(run) => say::aside(format_args!("{} …", run.name)),
+        SolveEvent::Ended(curve) => say::aside(format_args!("{}: {}", curve.name, ending(curve))),
     }
 }
 

@@ -1,4 +1,4 @@
-//! The photograph that objects are put into, and how light becomes its values.
+//! The photograph that objects are inserted into, and the conversion between radiance and its values.
 
 use crate::capture::exposure::Exposure;
 use crate::capture::photograph::Photograph;
@@ -19,36 +19,36 @@ pub struct Backdrop {
     pub frame: u64,
     /// Where the photograph was taken from; its size is the photograph's.
     pub camera: Camera,
-    /// The photograph's values, linear.
+    /// The photograph's linear values.
     pub photograph: Arc<Picture>,
-    /// From the estimate's radiance to light on the sensor and to the photograph's values.
+    /// Maps the estimate's radiance to exposed light, and exposed light to the photograph's values.
     pub exposure: Exposure,
     /// The value at which each channel of the photograph saturates; infinite for linear files.
     pub saturation: Vec3,
-    /// How soft and how grainy what is put into it becomes: not at all, or as it is itself.
+    /// Blur and grain given to what is inserted; by default none.
     pub finish: PsfAndGrain,
-    /// The exposure at which it is shown as 8-bit sRGB: its own, or the 99th percentile of the photograph as taken at 1.
+    /// Exposure for display as 8-bit sRGB: the photograph's own, or the one that maps the 99th percentile of its values to 1.
     pub shown_at: f32,
 }
 
-/// A pixel with and without what is put there.
+/// A rendered pixel with and without the inserted objects.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Mixed {
-    /// The fraction of it that is covered.
+pub struct LayeredPixel {
+    /// Fraction of the pixel that the objects cover, 0 to 1.
     pub alpha: f32,
-    /// Radiance with it.
-    pub over: Vec3,
-    /// Radiance without it.
-    pub under: Vec3,
-    /// Whether anything changes.
+    /// Radiance with the objects.
+    pub with: Vec3,
+    /// Radiance without them.
+    pub without: Vec3,
+    /// Whether the objects change the pixel.
     pub changed: bool,
 }
 
 impl Backdrop {
-    /// The backdrop of a frame, what is put into it exact; `exposure` is the estimate's for it.
+    /// The backdrop of a frame, without blur or grain; `exposure` is the estimate's for the frame.
     ///
     /// # Errors
-    /// Camera and photograph differ in size.
+    /// The camera and the photograph differ in size.
     pub fn new(
         frame: usize,
         camera: &Camera,
@@ -78,49 +78,51 @@ impl Backdrop {
         })
     }
 
-    /// The factor from radiance to light on the sensor at a pixel.
+    /// Exposure factor from radiance to exposed light at a pixel.
     pub fn exposure_at(&self, pixel: usize) -> Vec3 {
         let size = [self.photograph.width, self.photograph.height];
         self.exposure.at(&self.camera.intrinsics, size, pixel)
     }
 
-    /// The light on the sensor that the photograph shows at a pixel.
+    /// Exposed light that the photograph shows at a pixel.
     pub fn light(&self, pixel: usize) -> Vec3 {
         self.exposure
             .light(self.photograph.pixels[pixel], self.saturation)
     }
 
-    /// What light on the sensor shows as.
+    /// The photograph's value of exposed light.
     pub fn value(&self, light: Vec3) -> Vec3 {
         self.exposure.value(light, self.saturation)
     }
 
-    /// The photograph with surfaces over a fraction of its pixels, by the radiance with and without them; as soft and as grainy as it
-    /// is itself. Pixels that nothing changes, and none around them either as far as a soft edge reaches, are the photograph's to
-    /// the bit.
-    pub fn composite(&self, layers: &[Mixed]) -> Picture {
+    /// Composites objects into the photograph, with its blur and grain. A pixel that nothing changes, not even within
+    /// the reach of the blur, keeps its value to the bit.
+    pub fn composite(&self, layers: &[LayeredPixel]) -> Picture {
         let size = [self.photograph.width, self.photograph.height].map(|side| side as usize);
         if self.finish.is_none() {
             return self.each(|pixel| match layers[pixel] {
-                Mixed { changed: false, .. } => self.photograph.pixels[pixel],
-                Mixed {
-                    alpha, over, under, ..
-                } => self.blend(pixel, alpha, over, under),
+                LayeredPixel { changed: false, .. } => self.photograph.pixels[pixel],
+                LayeredPixel {
+                    alpha,
+                    with,
+                    without,
+                    ..
+                } => self.blend(pixel, alpha, with, without),
             });
         }
 
-        // What covers, what it covers, and what changes beside it, each as soft as the photograph.
+        // The objects' light, its coverage, and the change of the light around them, each blurred like the photograph.
         let alphas: Vec<f32> = layers.iter().map(|layer| layer.alpha).collect();
         let alphas = self.finish.softened(&alphas, size);
-        let soft = |value: &(dyn Fn(usize, &Mixed) -> Vec3 + Sync)| {
+        let soft = |value: &(dyn Fn(usize, &LayeredPixel) -> Vec3 + Sync)| {
             let values: Vec<Vec3> = (layers.par_iter().enumerate())
                 .map(|(pixel, layer)| value(pixel, layer))
                 .collect();
             self.finish.softened(&values, size)
         };
-        let covers = soft(&|pixel, layer| layer.over * layer.alpha * self.exposure_at(pixel));
+        let covers = soft(&|pixel, layer| layer.with * layer.alpha * self.exposure_at(pixel));
         let changes = soft(&|pixel, layer| match layer.changed {
-            true => (layer.over - layer.under) * (1.0 - layer.alpha) * self.exposure_at(pixel),
+            true => (layer.with - layer.without) * (1.0 - layer.alpha) * self.exposure_at(pixel),
             false => Vec3::ZERO,
         });
         self.each(|pixel| {
@@ -128,7 +130,8 @@ impl Backdrop {
             if alpha == 0.0 && change == Vec3::ZERO {
                 return self.photograph.pixels[pixel];
             }
-            let behind = self.behind(pixel, layers[pixel].under * self.exposure_at(pixel));
+            let behind =
+                self.background_light(pixel, layers[pixel].without * self.exposure_at(pixel));
             let exact = self.value(cover + behind * (1.0 - alpha) + change);
             let place = [self.frame, pixel as u64];
             let grain = self.finish.grain(place, luminance(exact), alpha);
@@ -136,7 +139,7 @@ impl Backdrop {
         })
     }
 
-    /// A picture of the photograph's size.
+    /// A picture of the photograph's size, pixel by pixel.
     fn each(&self, color: impl Fn(usize) -> Vec3 + Sync + Send) -> Picture {
         let pixels = 0..self.photograph.pixels.len();
         Picture {
@@ -145,25 +148,25 @@ impl Backdrop {
         }
     }
 
-    /// The light that the photograph shows at a pixel; a channel that is saturated was at least as bright as the estimate says.
-    fn behind(&self, pixel: usize, under: Vec3) -> Vec3 {
+    /// The photograph's exposed light at a pixel. `without` (exposed light without the objects) is a lower bound where it
+    /// saturates.
+    fn background_light(&self, pixel: usize, without: Vec3) -> Vec3 {
         let saturated = self.photograph.pixels[pixel].cmpge(self.saturation);
         let light = self.light(pixel);
-        Vec3::select(saturated, light.max(under), light)
+        Vec3::select(saturated, light.max(without), light)
     }
 
-    /// The pixel with a surface over `alpha` of it: α · over + (1 − α) · (photograph + over − under), in light on the sensor, where
-    /// `over` and `under` are radiances with and without.
+    /// Composites one pixel: α · with + (1 − α) · (photograph + with − without), in exposed light, where `with` and
+    /// `without` are the radiances with and without the objects.
     ///
-    /// A channel that is saturated in the photograph was at least as bright as the estimate says, and a saturating
-    /// photograph's composite saturates with it.
-    pub fn blend(&self, pixel: usize, alpha: f32, over: Vec3, under: Vec3) -> Vec3 {
+    /// `without` is a lower bound of the light in saturated channels. The composite saturates like the photograph.
+    pub fn blend(&self, pixel: usize, alpha: f32, with: Vec3, without: Vec3) -> Vec3 {
         let exposure = self.exposure_at(pixel);
-        let (over, under) = (over * exposure, under * exposure);
-        let behind = self.behind(pixel, under);
-        // A shadow that the estimate takes for deeper than the photograph is bright leaves nothing.
-        let beside = (behind + over - under).max(Vec3::ZERO);
-        let light = over * alpha + beside * (1.0 - alpha);
+        let (with, without) = (with * exposure, without * exposure);
+        let behind = self.background_light(pixel, without);
+        // The estimated shadow may exceed the photograph's light; light is never negative.
+        let uncovered = (behind + with - without).max(Vec3::ZERO);
+        let light = with * alpha + uncovered * (1.0 - alpha);
         if !self.saturation.is_finite() {
             return light;
         }
@@ -181,19 +184,19 @@ mod tests {
     const LEVEL: f32 = 0.3;
     const OBJECT: f32 = 0.7;
 
-    /// A square object, with a shadow right of it, before a grey photograph with some finish.
+    /// A square object with a shadow to its right, in front of a grey photograph with given blur and grain.
     fn composite(finish: PsfAndGrain) -> Vec<f32> {
         let backdrop = backdrop(finish, Vec3::ONE);
-        let layers: Vec<Mixed> = (0..SIDE * SIDE)
+        let layers: Vec<LayeredPixel> = (0..SIDE * SIDE)
             .map(|pixel| {
                 let (x, y) = (pixel % SIDE, pixel / SIDE);
                 let inside = (12..22).contains(&x) && (12..22).contains(&y);
                 let shadow = (22..26).contains(&x) && (12..22).contains(&y);
-                let over = if inside { OBJECT } else { 0.1 };
-                Mixed {
+                let with = if inside { OBJECT } else { 0.1 };
+                LayeredPixel {
                     alpha: f32::from(u8::from(inside)),
-                    over: Vec3::splat(over),
-                    under: Vec3::splat(LEVEL),
+                    with: Vec3::splat(with),
+                    without: Vec3::splat(LEVEL),
                     changed: inside || shadow,
                 }
             })
@@ -202,7 +205,7 @@ mod tests {
         composite.pixels.iter().map(|p| p.x).collect()
     }
 
-    /// A grey photograph that saturates at a value.
+    /// A grey photograph with a given saturation.
     fn backdrop(finish: PsfAndGrain, saturation: Vec3) -> Backdrop {
         let intrinsics = Intrinsics {
             width: SIDE,
@@ -242,7 +245,7 @@ mod tests {
             blur: Vec2::new(1.2, 0.8),
             grain: Vec::new(),
         });
-        // Half of the step falls on either side, nothing is lost, and the middle is as it was.
+        // Half of the step lies on either side, the sum is conserved, and the middle is unchanged.
         let sum = at(&soft, 11, 17) + at(&soft, 12, 17);
         assert!((sum - (LEVEL + OBJECT)).abs() < 1e-4, "{sum}");
         assert!(at(&soft, 11, 17) > LEVEL + 0.05);
@@ -255,9 +258,9 @@ mod tests {
     #[test]
     fn a_shadow_is_never_darker_than_black() {
         let shadow = backdrop(PsfAndGrain::default(), Vec3::INFINITY);
-        let [over, under] = [0.0, LEVEL * 2.0].map(Vec3::splat);
-        assert_eq!(shadow.blend(0, 0.0, over, under), Vec3::ZERO);
-        assert_eq!(shadow.blend(0, 0.0, under, under), Vec3::splat(LEVEL));
+        let [with, without] = [0.0, LEVEL * 2.0].map(Vec3::splat);
+        assert_eq!(shadow.blend(0, 0.0, with, without), Vec3::ZERO);
+        assert_eq!(shadow.blend(0, 0.0, without, without), Vec3::splat(LEVEL));
     }
 
     #[test]

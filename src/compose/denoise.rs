@@ -1,40 +1,40 @@
-//! A composite with its noise smoothed: the objects' own light, and what they change around them, each by itself.
+//! Denoises a composite: the objects' own light and the change of the light around them are denoised separately.
 
-use crate::compose::backdrop::Mixed;
+use crate::compose::backdrop::LayeredPixel;
 use crate::compose::insert::{Insertion, Layers};
 use crate::compose::world::FurnishedScene;
 use crate::math::picture::Picture;
 use crate::transport::denoise::{Denoiser, Guide, denoise, guides, guides_where};
 use glam::Vec3;
 
-/// The composite and its layers, from two independent insertions of the same objects into the same photograph.
+/// The denoised composite and its layers, from two independent renderings of the same insertion.
 ///
-/// Pixels that no object changes in either, nor around them, stay the photograph's to the bit.
+/// Pixels that no object changes in either, nor within the reach of the filter, keep the photograph's value to the bit.
 pub fn denoised(halves: [&Insertion; 2], denoiser: Denoiser) -> (Picture, Layers) {
     let [a, b] = halves.map(Insertion::layers);
     let (backdrop, lit) = (halves[0].backdrop(), halves[0].lit());
     let camera = &backdrop.camera;
-    let halved = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a + b) * 0.5).collect();
-    let alpha: Vec<f32> = halved(&a.alpha, &b.alpha);
+    let average = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a + b) * 0.5).collect();
+    let alpha: Vec<f32> = average(&a.alpha, &b.alpha);
 
-    // The objects by themselves, on their outlines too.
+    // Radiance of the objects, up to their outlines.
     let world = FurnishedScene::new(lit, halves[0].objects());
     let objects = guides_where(&world, camera, |pixel, ray| {
         alpha[pixel] > 0.0 && world.sees_object(ray)
     });
-    let [mut over_a, mut over_b] = halves.map(Insertion::covers);
+    let [mut object_a, mut object_b] = halves.map(Insertion::object_radiance);
     for pixel in 0..alpha.len() {
-        // What one half alone has met stands for both.
+        // Where only one half has hit the object, its value is used for both.
         match (a.alpha[pixel] > 0.0, b.alpha[pixel] > 0.0) {
-            (true, false) => over_b.pixels[pixel] = over_a.pixels[pixel],
-            (false, true) => over_a.pixels[pixel] = over_b.pixels[pixel],
+            (true, false) => object_b.pixels[pixel] = object_a.pixels[pixel],
+            (false, true) => object_a.pixels[pixel] = object_b.pixels[pixel],
             _ => {}
         }
     }
-    let over = denoiser.denoise(&over_a, &over_b, &objects);
+    let object = denoiser.denoise(&object_a, &object_b, &objects);
 
-    // What is behind them, and how they change it. A difference holds no light of lamps, which is the same with and
-    // without; it has both signs, which only the built-in filter takes.
+    // The background and its change. Emission cancels in a difference, so its guides have none. A difference has both signs,
+    // which only the built-in filter supports.
     let behind = guides(&**lit, camera);
     let dark: Vec<Option<Guide>> = (behind.iter())
         .map(|guide| {
@@ -44,24 +44,24 @@ pub fn denoised(halves: [&Insertion; 2], denoiser: Denoiser) -> (Picture, Layers
             })
         })
         .collect();
-    let [beside_a, beside_b] = halves.map(Insertion::beside_them);
-    let beside = denoise(&beside_a, &beside_b, &dark);
+    let [change_a, change_b] = halves.map(Insertion::uncovered_change);
+    let change = denoise(&change_a, &change_b, &dark);
     let without = denoiser.denoise(&a.without, &b.without, &behind);
-    let each = |value: &dyn Fn(usize) -> Vec3| Picture {
+    let picture = |value: &dyn Fn(usize) -> Vec3| Picture {
         pixels: (0..alpha.len()).map(value).collect(),
         ..*backdrop.photograph
     };
-    let with = each(&|pixel| {
-        let free = without.pixels[pixel] + beside.pixels[pixel];
-        free.lerp(over.pixels[pixel], alpha[pixel])
+    let with = picture(&|pixel| {
+        let free = without.pixels[pixel] + change.pixels[pixel];
+        free.lerp(object.pixels[pixel], alpha[pixel])
     });
-    let delta = each(&|pixel| with.pixels[pixel] - without.pixels[pixel]);
-    let mixed: Vec<Mixed> = (alpha.iter().enumerate())
-        .map(|(pixel, &alpha)| Mixed {
+    let delta = picture(&|pixel| with.pixels[pixel] - without.pixels[pixel]);
+    let mixed: Vec<LayeredPixel> = (alpha.iter().enumerate())
+        .map(|(pixel, &alpha)| LayeredPixel {
             alpha,
-            over: with.pixels[pixel],
-            under: without.pixels[pixel],
-            changed: alpha != 0.0 || beside.pixels[pixel] != Vec3::ZERO,
+            with: with.pixels[pixel],
+            without: without.pixels[pixel],
+            changed: alpha != 0.0 || change.pixels[pixel] != Vec3::ZERO,
         })
         .collect();
     let composite = backdrop.composite(&mixed);

@@ -1,9 +1,9 @@
-//! Differential rendering (Debevec 1998): the photograph changed by what the objects change.
+//! Differential rendering (Debevec 1998): adds to the photograph the difference between renders with and without the objects.
 //!
-//! The scene is rendered with and without the objects from the same random numbers, so that paths that no object
-//! touches cancel to the bit, and the photograph stays what it was wherever the objects do nothing.
+//! Both renders use the same random numbers. Paths that meet no object cancel to the bit, so the photograph is unchanged
+//! wherever the objects have no effect.
 
-use crate::compose::backdrop::{Backdrop, Mixed};
+use crate::compose::backdrop::{Backdrop, LayeredPixel};
 use crate::compose::placement::PlacedObject;
 use crate::compose::world::FurnishedScene;
 use crate::error::Result;
@@ -19,10 +19,10 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Blocks of pixels that the first, coarse result is made of, at most.
+/// Most pixel blocks of the first, coarse result.
 const COARSE_BLOCKS: usize = 40_000;
 
-/// A photograph with objects in it, refined pass by pass.
+/// An insertion of objects into a photograph, refined progressively.
 #[derive(Debug)]
 pub struct Insertion {
     backdrop: Backdrop,
@@ -31,23 +31,23 @@ pub struct Insertion {
     options: PathOptions,
     seed: u64,
     pixels: Vec<PairSums>,
-    /// Paths of each row's pixels so far.
+    /// Samples per pixel of each row so far.
     row_samples: Vec<u32>,
     next_row: usize,
     rays: u64,
     rejected: u64,
 }
 
-/// Everything that a composite is made from, one entry a pixel.
+/// The layers that a composite is made of, one entry a pixel.
 #[derive(Debug, Clone)]
 pub struct Layers {
     /// Radiance with the objects.
     pub with: Picture,
     /// Radiance without.
     pub without: Picture,
-    /// Radiance that the objects add or take away.
+    /// Difference in radiance, with − without.
     pub delta: Picture,
-    /// Fraction of the light that the objects leave where they shadow it, 0 to 1; 1 where they cover the pixel or lighten it.
+    /// Ratio of radiance with to without the objects where they darken it, 0 to 1; 1 where they cover the pixel or brighten it.
     pub shadow: Picture,
     /// Fraction of the pixel that the objects cover, 0 to 1.
     pub alpha: Vec<f32>,
@@ -58,7 +58,7 @@ pub struct Layers {
 }
 
 impl Layers {
-    /// [`Layers::shadow`] of the other layers.
+    /// Computes [`Layers::shadow`] from other layers.
     pub fn shadow_of(with: &Picture, without: &Picture, alpha: &[f32]) -> Picture {
         let pixels = with.pixels.iter().zip(&without.pixels).zip(alpha);
         let shadow = pixels.map(|((&with, &without), &alpha)| {
@@ -73,7 +73,7 @@ impl Layers {
 }
 
 impl Insertion {
-    /// Starts an insertion and makes its first, coarse result: exact outlines, light by blocks of pixels.
+    /// Starts an insertion with a coarse result: exact outlines, but light by blocks of pixels.
     pub fn new(
         backdrop: Backdrop,
         lit: Arc<Lit>,
@@ -100,8 +100,8 @@ impl Insertion {
         insertion
     }
 
-    /// The same insertion by other random numbers, with nothing traced yet.
-    pub fn beside(&self, seed: u64) -> Self {
+    /// The same insertion with other random numbers and no samples yet.
+    pub fn with_seed(&self, seed: u64) -> Self {
         Self {
             backdrop: self.backdrop.clone(),
             lit: self.lit.clone(),
@@ -116,14 +116,14 @@ impl Insertion {
         }
     }
 
-    /// Adds `samples` paths to every pixel, in parallel. Any split into calls, on any number of threads, gives the
-    /// same bits.
+    /// Adds `samples` paths to every pixel, in parallel. The result is the same to the bit for any split into calls
+    /// and any number of threads.
     pub fn pass(&mut self, samples: u32) {
         self.refine_to(self.samples() + samples, || true);
     }
 
-    /// Brings every pixel to `samples` paths, but stops early, between two bands of rows, once `go_on` says no; the
-    /// next call takes up the work there. Returns whether all was done.
+    /// Samples every pixel up to `samples` paths. Stops between two bands of rows once `go_on` returns false; the
+    /// next call continues there. Returns whether all samples are done.
     pub fn refine_to(&mut self, samples: u32, go_on: impl Fn() -> bool) -> bool {
         if self.objects.is_empty() {
             return true;
@@ -135,9 +135,9 @@ impl Insertion {
                 return false;
             }
             let rows = band.min(height - self.next_row);
-            // The card may have been here already.
-            let taken = &self.row_samples[self.next_row..self.next_row + rows];
-            if taken.iter().any(|&taken| taken < samples) {
+            // Rows that the graphics card has sampled already are skipped.
+            let samples_so_far = &self.row_samples[self.next_row..self.next_row + rows];
+            if samples_so_far.iter().any(|&n| n < samples) {
                 self.add_rows(self.next_row, rows);
             }
             self.next_row = (self.next_row + rows) % height;
@@ -145,8 +145,8 @@ impl Insertion {
         true
     }
 
-    /// [`Insertion::refine_to`] on a graphics card that holds the scene and the objects. After an error some rows have more paths
-    /// than others; [`Insertion::refine_to`] fills up the rest.
+    /// [`Insertion::refine_to`] on a graphics card that holds the scene and the objects. After an error some rows
+    /// have more samples than others; [`Insertion::refine_to`] completes the rest.
     ///
     /// # Errors
     /// The card failed.
@@ -156,7 +156,7 @@ impl Insertion {
         samples: u32,
         go_on: impl Fn() -> bool,
     ) -> Result<bool> {
-        /// Pixels between two questions whether to go on, at most, but for a row.
+        /// Most pixels between two calls of `go_on`, but at least a row.
         const BAND: usize = 1 << 18;
         let (width, height) = (self.width(), self.row_samples.len());
         if self.objects.is_empty() || width == 0 {
@@ -178,17 +178,17 @@ impl Insertion {
                 frame: self.backdrop.frame,
             };
             let added = tracer.pairs(&view, pixels, from..samples)?;
-            self.take(rows, samples.saturating_sub(from), &added);
+            self.accumulate(rows, samples.saturating_sub(from), &added);
         }
         Ok(true)
     }
 
-    /// Adds what was found in some rows, in so many samples.
-    fn take(&mut self, rows: Range<usize>, samples: u32, added: &[PairSums]) {
+    /// Adds `samples` new samples, summed in `added`, to a range of rows.
+    fn accumulate(&mut self, rows: Range<usize>, samples: u32, added: &[PairSums]) {
         let width = self.width();
         for (row, added) in rows.zip(added.chunks(width)) {
             for (sums, pair) in self.pixels[row * width..].iter_mut().zip(added) {
-                // The first true sample takes the coarse result's place.
+                // The first sample replaces the coarse result.
                 if self.row_samples[row] == 0 {
                     *sums = PairSums::default();
                 }
@@ -205,34 +205,34 @@ impl Insertion {
         }
     }
 
-    /// The photograph with the objects, in the photograph's values.
+    /// The composite in the photograph's values.
     ///
-    /// Pixels that no object changes, and none around them as far as soft edges reach, and all of them where none is inserted, are
-    /// the photograph's to the bit.
+    /// Pixels that no object changes, not even within the reach of the blur, keep the photograph's value to the bit; without
+    /// objects, all do.
     pub fn composite(&self) -> Picture {
         let mixed = |pixel: usize| {
-            let (over, under, alpha) = self.means(pixel);
-            Mixed {
+            let (with, without, alpha) = self.means(pixel);
+            LayeredPixel {
                 alpha,
-                over,
-                under,
+                with,
+                without,
                 changed: self.pixels[pixel].changed,
             }
         };
-        let layers: Vec<Mixed> = (0..self.pixels.len()).into_par_iter().map(mixed).collect();
+        let layers: Vec<LayeredPixel> = (0..self.pixels.len()).into_par_iter().map(mixed).collect();
         self.backdrop.composite(&layers)
     }
 
-    /// Radiance of the objects where they cover a pixel, as a picture; black where none does.
-    pub fn covers(&self) -> Picture {
+    /// Mean radiance of the objects where they cover a pixel; black where none does.
+    pub fn object_radiance(&self) -> Picture {
         self.picture(|pixel| {
             let sums = &self.pixels[pixel];
             (sums.covered_with / f64::from(sums.covered.max(1))).as_vec3()
         })
     }
 
-    /// Radiance that the objects add or take away where they do not cover a pixel; black where they cover all of it.
-    pub fn beside_them(&self) -> Picture {
+    /// Change in radiance in the part of each pixel that no object object_radiance; black where they cover all of it.
+    pub fn uncovered_change(&self) -> Picture {
         self.picture(|pixel| {
             let sums = &self.pixels[pixel];
             let free = self.row_samples[pixel / self.width()].max(1) - sums.covered;
@@ -242,7 +242,7 @@ impl Insertion {
         })
     }
 
-    /// What the composite is made from.
+    /// The layers of the composite.
     pub fn layers(&self) -> Layers {
         let world = FurnishedScene::new(&self.lit, &self.objects);
         let camera = &self.backdrop.camera;
@@ -275,13 +275,13 @@ impl Insertion {
         }
     }
 
-    /// The photograph inserted into.
+    /// The photograph that is inserted into.
     pub fn backdrop(&self) -> &Backdrop {
         &self.backdrop
     }
 
-    /// Puts another photograph of the same view behind the objects.
-    pub fn put_behind(&mut self, photograph: Arc<Picture>) {
+    /// Replaces the photograph by another one of the same view.
+    pub fn set_photograph(&mut self, photograph: Arc<Picture>) {
         self.backdrop.photograph = photograph;
     }
 
@@ -295,7 +295,7 @@ impl Insertion {
         &self.objects
     }
 
-    /// Paths a pixel, at least; 0 while the result is coarse.
+    /// Fewest samples of any pixel; 0 while the result is coarse.
     pub fn samples(&self) -> u32 {
         self.row_samples.iter().copied().min().unwrap_or(0)
     }
@@ -322,7 +322,7 @@ impl Insertion {
         }
     }
 
-    /// Mean radiance with and without, and coverage.
+    /// Mean radiance with and without the objects, and coverage.
     fn means(&self, pixel: usize) -> (Vec3, Vec3, f32) {
         let sums = &self.pixels[pixel];
         // The coarse result counts as one sample.
@@ -345,7 +345,7 @@ impl Insertion {
         Stream::new(self.seed, frame, pixel as u64, u64::from(sample))
     }
 
-    /// One pair of paths through a pixel, both from the same random numbers.
+    /// A pair of paths through a pixel, with and without the objects, from the same random numbers.
     fn pair(&self, world: &FurnishedScene<'_>, pixel: usize, sample: u32) -> PairSums {
         let mut stream = self.stream(pixel, sample);
         let ray = self.ray(pixel, stream.uniform2());
@@ -353,14 +353,14 @@ impl Insertion {
         let covered = world.sees_object(&ray);
         world.take_touched();
         let with = radiance(world, &ray, &mut stream, &self.options);
-        // A path that met no object would be the same without them.
+        // A path that met no object is the same without them.
         let without = if world.take_touched() {
             radiance(&*self.lit, &ray, &mut again, &self.options)
         } else {
             PathSample { rays: 0, ..with }
         };
         let rejected = with.rejected || without.rejected;
-        // A pair is dropped as a whole, or the difference would be biased.
+        // If one of the pair is rejected both are, or the difference would be biased.
         let keep = |sample: PathSample| {
             if rejected {
                 DVec3::ZERO
@@ -394,11 +394,11 @@ impl Insertion {
                     .collect()
             })
             .collect();
-        self.take(first..first + rows, 1, &added.concat());
+        self.accumulate(first..first + rows, 1, &added.concat());
     }
 
-    /// The coarse result: in each block one pair of paths where an object is seen and one where none is, whose
-    /// differences are then averaged over neighbouring blocks.
+    /// The coarse result: in each block one pair of paths where an object is visible and one where none is. The differences
+    /// outside of the objects are then averaged over neighbouring blocks.
     fn coarse(&mut self) {
         let (width, height) = (self.width(), self.row_samples.len());
         let side = (1..)
@@ -420,7 +420,7 @@ impl Insertion {
         }
     }
 
-    /// The coarse result's rows from `top` on, and each block's difference where no object is seen.
+    /// A band of the coarse result from row `top`, and for each block the difference where no object is visible.
     fn coarse_band(&self, top: usize, side: usize) -> (Vec<PairSums>, Vec<Option<DVec3>>) {
         let (width, height) = (self.width(), self.row_samples.len());
         let rows = side.min(height - top);
@@ -428,7 +428,7 @@ impl Insertion {
         let mut band = vec![PairSums::default(); rows * width];
         let mut deltas = Vec::with_capacity(width.div_ceil(side));
         for left in (0..width).step_by(side) {
-            // Indexed by whether an object is seen.
+            // Indexed by whether an object is visible.
             let mut found: [Option<PairSums>; 2] = [None; 2];
             let columns = side.min(width - left);
             for index in 0..rows * columns {
@@ -448,9 +448,9 @@ impl Insertion {
     }
 }
 
-/// Means over squares of blocks around each, of the blocks that have a value.
+/// Box filter over neighbouring blocks; ignores blocks without a value.
 fn smooth(deltas: &[Vec<Option<DVec3>>]) -> Vec<Vec<DVec3>> {
-    /// Blocks to each side.
+    /// Radius in blocks.
     const REACH: usize = 3;
     let around = |i: usize, len: usize| i.saturating_sub(REACH)..len.min(i + REACH + 1);
     (0..deltas.len())

@@ -1,4 +1,4 @@
-//! Virtual objects in photographs: reading them, placing them, lighting them, and compositing.
+//! Virtual objects in photographs: loading, placement, lighting and compositing.
 
 pub mod backdrop;
 pub mod denoise;

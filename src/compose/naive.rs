@@ -1,5 +1,5 @@
-//! What augmented reality does without knowing the room: an object lit by nine harmonics and pasted over the
-//! photograph with a depth test. It casts no shadow and takes no part in the light of the room.
+//! The baseline of augmented reality without a reconstruction: an object lit by nine spherical harmonics, pasted over the
+//! photograph with a depth test. It casts no shadow and takes no part in interreflection.
 
 use crate::capture::exposure::Exposure;
 use crate::compose::backdrop::Backdrop;
@@ -19,24 +19,24 @@ use rayon::prelude::*;
 use std::f32::consts::{FRAC_1_PI, PI};
 use std::sync::Arc;
 
-/// Columns and rows of the panorama that photographs are gathered on.
+/// Columns and rows of the panorama that photographs are projected onto.
 const PANORAMA: (usize, usize) = (64, 32);
-/// Most pixels of a photograph that are looked at, along each side.
-const LOOKS: u32 = 256;
-/// Directions that a probe looks along, on a square lattice.
+/// Most pixels read along each side of a photograph.
+const MAX_PIXELS_A_SIDE: u32 = 256;
+/// Rows and columns of the stratified directions of a light probe.
 const PROBE_SIDE: usize = 64;
 /// Sub-pixels along a side, for coverage.
 const GRID: usize = 4;
 
-/// The light as the photographs show it, taken as coming from infinitely far away: all their pixels by direction, and
-/// the mean of what was seen wherever no photograph looked.
+/// Spherical harmonics of the photographs, as if their light came from infinitely far away. Directions that no photograph shows
+/// get the mean of those that are shown.
 pub fn harmonics_of_photographs<'a>(
     frames: impl IntoIterator<Item = (&'a Camera, &'a Picture)>,
 ) -> Harmonics {
     let (columns, rows) = PANORAMA;
     let mut cells = vec![(DVec3::ZERO, 0u32); columns * rows];
     for (camera, picture) in frames {
-        let stride = |length: u32| length.div_ceil(LOOKS).max(1) as usize;
+        let stride = |length: u32| length.div_ceil(MAX_PIXELS_A_SIDE).max(1) as usize;
         for y in (0..picture.height).step_by(stride(picture.height)) {
             for x in (0..picture.width).step_by(stride(picture.width)) {
                 let color = picture.pixels[(y * picture.width + x) as usize];
@@ -46,7 +46,7 @@ pub fn harmonics_of_photographs<'a>(
                 let d = camera
                     .ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5))
                     .direction;
-                // Rows of equal height on the sphere have equal solid angle.
+                // Bands of equal height on a sphere have equal solid angle.
                 let row = ((d.z + 1.0) * 0.5 * rows as f32) as usize;
                 let turn = (d.y.atan2(d.x) / (2.0 * PI)).rem_euclid(1.0);
                 let column = (turn * columns as f32) as usize;
@@ -79,7 +79,7 @@ pub fn harmonics_of_photographs<'a>(
     harmonics
 }
 
-/// The light at a point of the estimated scene, by paths in all directions.
+/// Spherical harmonics of the radiance that arrives at a point of the estimated scene, by path tracing.
 pub fn harmonics_of_estimate(
     lit: &Lit,
     point: Vec3,
@@ -111,17 +111,17 @@ pub fn harmonics_of_estimate(
     harmonics
 }
 
-/// Objects to be laid over a photograph.
+/// Naively lit objects, ready to be pasted over a photograph.
 #[derive(Debug, Clone)]
 pub struct Pasted {
-    /// Pixels with an object in them, its light in the photograph's values, and how much of the pixel it covers.
+    /// Covered pixels: index, the objects' light in the photograph's values times coverage, and coverage.
     covered: Vec<(usize, Vec3, f32)>,
     saturation: Vec3,
 }
 
 impl Pasted {
-    /// Objects before a backdrop. Each has its own harmonics; `exposure` turns their light into the photograph's values
-    /// (one for harmonics of the photographs, the backdrop's for those of the estimate).
+    /// Shades objects in front of a backdrop, each by its own harmonics. `exposure` maps their light to the
+    /// photograph's values: identity for harmonics of photographs, the backdrop's for harmonics of the estimate.
     pub fn new(
         backdrop: &Backdrop,
         lit: &Lit,
@@ -154,7 +154,7 @@ impl Pasted {
                     } else {
                         surface.shading_normal
                     };
-                    // Gloss is beyond nine harmonics: what a lobe reflects is spread as if diffuse.
+                    // Nine harmonics cannot represent gloss: specular reflectance is treated as diffuse.
                     let specular = surface.lobe.map_or(Vec3::ZERO, |lobe| lobe.specular);
                     let reflectance = specular + surface.albedo * (Vec3::ONE - specular);
                     sum += reflectance * harmonics.irradiance(normal) * FRAC_1_PI;
@@ -182,7 +182,7 @@ impl Pasted {
         }
     }
 
-    /// The photograph with the objects over it.
+    /// The photograph with the objects pasted over it.
     pub fn over(&self, photograph: &Picture) -> Picture {
         let mut picture = photograph.clone();
         for &(pixel, light, alpha) in &self.covered {

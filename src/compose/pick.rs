@@ -1,4 +1,4 @@
-//! From a pixel to the place it shows, and from a place to the surface below it.
+//! Finds the surface at a pixel, and the surface below a point.
 
 use crate::compose::placement::PlacedObject;
 use crate::scene::Scene;
@@ -6,7 +6,7 @@ use crate::scene::camera::Camera;
 use crate::scene::geometry::{Ray, offset_origin};
 use glam::{Vec2, Vec3};
 
-/// Most corners of an object that are let fall.
+/// Most object corners whose fall is traced.
 const MAX_FALLING: usize = 4096;
 
 /// A point of the scene's surface.
@@ -14,13 +14,13 @@ const MAX_FALLING: usize = 4096;
 pub struct Pick {
     /// Position in scene coordinates.
     pub point: Vec3,
-    /// Unit normal on the side that is seen.
+    /// Unit normal towards the viewer.
     pub normal: Vec3,
     /// Object index.
     pub object: u32,
 }
 
-/// The surface that a camera sees at a point of its image, in pixels from the top-left corner.
+/// The surface at an image point, in pixels from the top-left corner.
 pub fn pick(scene: &Scene, camera: &Camera, pixel: Vec2) -> Option<Pick> {
     let ray = camera.ray(pixel);
     let hit = scene.intersect(&ray)?;
@@ -36,7 +36,7 @@ pub fn pick(scene: &Scene, camera: &Camera, pixel: Vec2) -> Option<Pick> {
     })
 }
 
-/// The point of the surface nearest below a point, starting clear of a surface that the point lies on.
+/// The first surface below a point. The ray starts outside of the surface that the point lies on.
 pub fn below(scene: &Scene, pick: &Pick) -> Option<Vec3> {
     let down = -scene.up;
     let from = offset_origin(pick.point, pick.normal, &[pick.point; 3], pick.normal);
@@ -45,9 +45,9 @@ pub fn below(scene: &Scene, pick: &Pick) -> Option<Vec3> {
         .map(|hit| scene.point(&hit))
 }
 
-/// How far an object falls along the scene's down direction until one of its corners meets a surface.
+/// How far an object falls along the scene's down direction until a corner meets a surface. `None` where nothing is below.
 ///
-/// `None` where nothing is below it. An object that starts a little inside a surface is first lifted by `lift`.
+/// Corners are first raised by `lift`, so that an object may start slightly inside a surface.
 pub fn fall(scene: &Scene, object: &PlacedObject, lift: f32) -> Option<f32> {
     let corners = object.corners.len() * 3;
     let stride = corners.div_ceil(MAX_FALLING).max(1);

@@ -1,4 +1,4 @@
-//! Where an inserted object stands, and its triangles there.
+//! Placement of an inserted object, and its triangles in scene coordinates.
 
 use crate::compose::object::ObjectModel;
 use crate::error::{Error, Result};
@@ -16,20 +16,20 @@ use std::sync::Arc;
 pub struct Placement {
     /// OBJ or GLB file.
     pub file: PathBuf,
-    /// Where the middle of the object's base stands, in the capture's coordinates; `None` takes the file's own
-    /// coordinates for the capture's.
+    /// Position of the centre of the object's base in the capture's coordinates; `None` if the file's coordinates are the
+    /// capture's.
     pub at: Option<DVec3>,
     /// Factor on the file's size.
     pub scale: f64,
-    /// Degrees about the up axis, counter-clockwise from above.
+    /// Rotation about the up axis in degrees, counter-clockwise seen from above.
     pub rotate: f64,
-    /// Whether it is in no picture for now.
+    /// Whether the object is left out of all pictures.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub hidden: bool,
 }
 
 impl Placement {
-    /// An object of a name where its own coordinates say.
+    /// An object placed by its file's own coordinates.
     pub fn as_modelled(file: &str) -> Self {
         Self {
             file: PathBuf::from(file),
@@ -40,10 +40,10 @@ impl Placement {
         }
     }
 
-    /// The map from the file's coordinates to the capture's, whose unit up vector is `up`.
+    /// The transform from the file's to the capture's coordinates; `up` is the capture's unit up vector.
     ///
-    /// With `at` the file's +y is first turned to `up` by the shortest way. As modelled, nothing is but what `scale`
-    /// and `rotate` ask for, about the file's origin.
+    /// With `at`, the file's +y axis is first rotated to `up` along the shortest arc. Without it, only `scale` and
+    /// `rotate` apply, about the file's origin.
     ///
     /// # Errors
     /// The scale is not positive, or a number is not finite.
@@ -75,14 +75,14 @@ impl Placement {
     }
 }
 
-/// An object's triangles in scene coordinates, ready for rays.
+/// An object's triangles in scene coordinates, with their BVH.
 #[derive(Debug)]
 pub struct PlacedObject {
     /// The object.
     pub model: Arc<ObjectModel>,
     /// Corners of each triangle.
     pub corners: Vec<[Vec3; 3]>,
-    /// Unit geometric normal of each triangle's front.
+    /// Unit geometric normal of each triangle, on its front side.
     pub normals: Vec<Vec3>,
     /// Unit shading normals at the corners; empty where the object has none.
     pub corner_normals: Vec<[Vec3; 3]>,
@@ -90,7 +90,7 @@ pub struct PlacedObject {
     pub center: Vec3,
     /// Half the bounding box's diagonal.
     pub radius: f32,
-    /// Closest-hit and any-hit queries.
+    /// BVH over the triangles.
     pub bvh: Bvh,
 }
 
@@ -98,7 +98,7 @@ impl PlacedObject {
     /// Places an object in a scene.
     ///
     /// # Errors
-    /// The scale is not positive, a number is not finite, or the object comes to lie too far away for f32.
+    /// The scale is not positive, a number is not finite, or a coordinate is too large for f32.
     pub fn new(model: Arc<ObjectModel>, placement: &Placement, scene: &Scene) -> Result<Self> {
         let transform = placement.transform(&model, scene.up.as_dvec3().normalize_or(DVec3::Y))?;
         let rotation = transform.matrix3 * placement.scale.recip();
@@ -110,7 +110,7 @@ impl PlacedObject {
         if !corners.iter().flatten().all(|p| p.is_finite()) {
             return Err(Error::file(
                 &placement.file,
-                "comes to lie outside the range of coordinates",
+                "is placed outside the range of coordinates",
                 "check --at and --scale",
             ));
         }
@@ -146,7 +146,7 @@ impl PlacedObject {
         })
     }
 
-    /// The object as a graphics card takes it.
+    /// The object's arrays for a graphics card.
     pub fn for_card(&self) -> Inserted<'_> {
         Inserted {
             corners: &self.corners,
@@ -158,7 +158,7 @@ impl PlacedObject {
         }
     }
 
-    /// Whether a ray, widened by an angle in radians, could meet the object.
+    /// Whether a cone around a ray, with a half-angle in radians, may meet the object's bounding sphere.
     pub fn is_near(&self, ray: &Ray, angle: f32) -> bool {
         let to_center = self.center - ray.origin;
         let distance = to_center.cross(ray.direction.normalize_or_zero()).length();
@@ -174,7 +174,7 @@ impl PlacedObject {
             .map_or(geometric, |n| interpolate(n, hit).normalize_or(geometric))
     }
 
-    /// Diffuse reflectance at a hit, vertex colours included.
+    /// Diffuse reflectance at a hit, times the vertex colours.
     pub fn albedo(&self, hit: &Hit) -> Vec3 {
         let triangle = hit.triangle as usize;
         let material = &self.model.materials[self.model.material_of[triangle] as usize];
@@ -187,7 +187,7 @@ impl PlacedObject {
     }
 }
 
-/// A value at a hit from those at the triangle's corners.
+/// Barycentric interpolation of values at a triangle's corners.
 #[inline]
 pub fn interpolate(corners: &[Vec3; 3], hit: &Hit) -> Vec3 {
     corners[0] * (1.0 - hit.b1 - hit.b2) + corners[1] * hit.b1 + corners[2] * hit.b2

@@ -1,8 +1,8 @@
-//! What a camera did to a photograph besides its exposure: soft edges and grain, which inserted objects are given too.
+//! Blur and grain of a photograph, to be given to inserted objects.
 //!
-//! Softness by how much a known blur takes from the strongest edges (Zhuo and Sim 2011, "Defocus map estimation from a
-//! single image"), along rows and columns apart, as a hand moves. Grain by second differences (Immerkær 1996, "Fast noise
-//! variance estimation") where the photograph is smooth, in steps of brightness.
+//! The blur is estimated from how much a known blur reduces the slope of strong edges (Zhuo and Sim 2011, "Defocus map
+//! estimation from a single image"), separately along rows and columns because of motion blur. The grain is estimated from
+//! second differences (Immerkær 1996, "Fast noise variance estimation") where the photograph is smooth, by level of brightness.
 
 use crate::capture::photograph::{Encoding, Photograph};
 use crate::math::color::luminance;
@@ -14,75 +14,75 @@ use std::f32::consts::TAU;
 use std::iter::Sum;
 use std::ops::{Div, Mul};
 
-/// Standard deviation in pixels of the blur that edges are compared with.
+/// Standard deviation in pixels of the known blur.
 const KNOWN_BLUR: f32 = 1.0;
-/// A slope counts as an edge from this fraction of the local level on, ...
+/// Smallest slope of an edge, as a fraction of the local level.
 const EDGE: f32 = 0.25;
-/// ... and is across if the other one is smaller than this fraction of it.
+/// Largest slope along an edge, as a fraction of the slope across it.
 const ACROSS: f32 = 0.25;
-/// An edge is so many times the grain.
+/// Smallest slope of an edge, in standard deviations of the grain.
 const ABOVE_GRAIN: f32 = 6.0;
-/// Edges needed to tell.
+/// Fewest edges for an estimate of the blur.
 const MIN_EDGES: usize = 50;
-/// Variance in pixels² of a pixel's own area.
-const PIXEL: f64 = 1.0 / 12.0;
-/// Halvings that find a softness.
+/// Variance in pixels² of a pixel's box filter.
+const PIXEL_VARIANCE: f64 = 1.0 / 12.0;
+/// Bisection steps of the blur estimate.
 const HALVINGS: u32 = 40;
-/// Pixels on all sides that what tells something needs to be sound.
-const AROUND: usize = 4;
-/// A Gaussian narrower than this is not what its samples say; three pixels of its variance are.
+/// A pixel is used only if all pixels within this distance are valid, as far as slopes and blurs reach.
+const MASK_MARGIN: usize = 4;
+/// Below this standard deviation a sampled Gaussian has the wrong variance; a three-tap kernel of the exact variance is used.
 const NARROW: f32 = 0.6;
-/// Softness in pixels below which pictures are left as they are, and above which it is none of the camera's.
-const SOFT: [f32; 2] = [0.3, 4.0];
-/// Steps of brightness, each with as many pixels as any other.
+/// Range of the blur in pixels: below, photographs count as sharp; above, the blur is not the camera's.
+const BLUR_RANGE: [f32; 2] = [0.3, 4.0];
+/// Levels of brightness, with equally many pixels each.
 const STEPS: usize = 8;
-/// Pixels that a step needs.
+/// Fewest pixels of a level.
 const MIN_PIXELS: usize = 100;
-/// Fraction of a step's pixels that are taken to be smooth.
+/// Fraction of a level's pixels, those with the smallest slopes, that count as smooth.
 const SMOOTH: f64 = 0.3;
-/// Median of the absolute value of a normal number of variance one.
+/// Median absolute value of the standard normal distribution.
 const NORMAL_MEDIAN: f32 = 0.674_49;
-/// Root of the sum of squared weights of the second difference.
+/// Root of the sum of the squared weights of the second difference.
 const SECOND_DIFFERENCE: f32 = 6.0;
-/// Sample key of grain, far from those of paths.
-const KEY: u64 = 0x6772_6169;
+/// Key of the grain's random numbers; differs from those of paths.
+const GRAIN_KEY: u64 = 0x6772_6169;
 
-/// The softness and the grain of a photograph.
+/// Point-spread function and grain of a photograph.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PsfAndGrain {
-    /// Standard deviation in pixels of the blur that makes an exact picture as soft as the photograph, along rows and
-    /// columns; 0 where it is as sharp.
+    /// Standard deviations in pixels of the Gaussian that blurs a sharp render like the photograph, along rows and
+    /// columns; 0 where the photograph is sharp.
     pub blur: Vec2,
-    /// Standard deviation of each channel by luminance, ascending.
+    /// Standard deviation of the grain in each channel by luminance, ascending.
     pub grain: Vec<(f32, Vec3)>,
 }
 
 impl PsfAndGrain {
-    /// Of an 8-bit or 16-bit photograph; none of linear ones, which are mostly rendered.
+    /// Estimates blur and grain of an 8- or 16-bit photograph. Linear files have none, since most are rendered.
     pub fn of(photograph: &Photograph) -> Self {
         if photograph.encoding == Encoding::Linear {
             return Self::default();
         }
         let shape = [photograph.width, photograph.height].map(|side| side as usize);
-        let told: Vec<bool> = (photograph.pixels.iter().enumerate())
+        let valid: Vec<bool> = (photograph.pixels.iter().enumerate())
             .map(|(index, pixel)| {
                 let usable = photograph.is_usable(index);
                 usable && pixel.is_finite() && !photograph.is_saturated(index)
             })
             .collect();
-        let told = eroded(&told, shape[0]);
+        let valid = eroded(&valid, shape[0]);
         let levels: Vec<f32> = photograph.pixels.iter().map(|&p| luminance(p)).collect();
         let mut found = Self {
             blur: Vec2::ZERO,
-            grain: grain(&photograph.pixels, &levels, &told, shape),
+            grain: grain(&photograph.pixels, &levels, &valid, shape),
         };
         let grain = |level: f32| luminance(found.grain_at(level));
-        let blur = [false, true].map(|down| softness(&levels, &told, &grain, shape, down));
+        let blur = [false, true].map(|down| softness(&levels, &valid, &grain, shape, down));
         found.blur = Vec2::from(blur);
         found
     }
 
-    /// Standard deviation of the grain at a brightness.
+    /// Standard deviation of the grain at a luminance, interpolated.
     fn grain_at(&self, level: f32) -> Vec3 {
         let above = self.grain.partition_point(|(step, _)| *step <= level);
         match (
@@ -90,30 +90,30 @@ impl PsfAndGrain {
             self.grain.get(above),
         ) {
             (None, None) => Vec3::ZERO,
-            // In the dark and beyond the brightest step as there.
+            // Constant below the darkest and above the brightest level.
             (Some((_, only)), None) | (None, Some((_, only))) => *only,
             (Some((low, a)), Some((high, b))) => a.lerp(*b, (level - low) / (high - low)),
         }
     }
 
-    /// Whether there is anything to do.
+    /// Whether there is neither blur nor grain.
     pub fn is_none(&self) -> bool {
         self.blur == Vec2::ZERO && self.grain.is_empty()
     }
 
-    /// A picture, or one number a pixel, made as soft as the photograph.
+    /// Blurs a picture, or a scalar field, like the photograph.
     pub fn softened<T: Blend>(&self, values: &[T], [width, height]: [usize; 2]) -> Vec<T> {
         let rows = blurred(values, [width, height], self.blur.x, false);
         blurred(&rows, [width, height], self.blur.y, true)
     }
 
-    /// Grain for a pixel of a photograph in which something new of some brightness covers `alpha` of it. The rest keeps its own.
+    /// Grain for a pixel that something new of luminance `level` covers by `alpha`; the rest of the pixel has its own grain.
     pub fn grain(&self, [frame, pixel]: [u64; 2], level: f32, alpha: f32) -> Vec3 {
         let deviation = self.grain_at(level);
         if alpha <= 0.0 || deviation == Vec3::ZERO {
             return Vec3::ZERO;
         }
-        let mut stream = Stream::new(KEY, frame, pixel, 0);
+        let mut stream = Stream::new(GRAIN_KEY, frame, pixel, 0);
         let mut normal = || {
             let [a, b] = stream.uniform2();
             (-2.0 * (1.0 - a).ln()).sqrt() * (TAU * b).cos()
@@ -122,24 +122,24 @@ impl PsfAndGrain {
     }
 }
 
-/// Which pixels are so and all around them too, as far as slopes and blurs look.
-fn eroded(told: &[bool], width: usize) -> Vec<bool> {
-    let height = told.len() / width.max(1);
-    let along = |told: &[bool], down: bool| -> Vec<bool> {
-        (0..told.len())
+/// Erodes the mask of valid pixels by [`MASK_MARGIN`] pixels in both directions.
+fn eroded(valid: &[bool], width: usize) -> Vec<bool> {
+    let height = valid.len() / width.max(1);
+    let along = |valid: &[bool], down: bool| -> Vec<bool> {
+        (0..valid.len())
             .map(|index| {
                 let (x, y) = (index % width, index / width);
                 let (at, side) = if down { (y, height) } else { (x, width) };
-                let near = at.saturating_sub(AROUND)..(at + AROUND + 1).min(side);
+                let near = at.saturating_sub(MASK_MARGIN)..(at + MASK_MARGIN + 1).min(side);
                 let place = |i: usize| if down { i * width + x } else { y * width + i };
-                near.map(place).all(|i| told[i])
+                near.map(place).all(|i| valid[i])
             })
             .collect()
     };
-    along(&along(told, false), true)
+    along(&along(valid, false), true)
 }
 
-/// What can be blurred.
+/// A type that can be blurred.
 pub trait Blend:
     Copy + Send + Sync + Sum + Mul<f32, Output = Self> + Div<f32, Output = Self>
 {
@@ -148,7 +148,7 @@ pub trait Blend:
 impl Blend for f32 {}
 impl Blend for Vec3 {}
 
-/// A Gaussian blur along rows or columns; the picture goes on as its border beyond it.
+/// Gaussian blur along rows, or along columns if `down`; the border pixel is repeated.
 fn blurred<T: Blend>(values: &[T], shape: [usize; 2], deviation: f32, down: bool) -> Vec<T> {
     if deviation <= 0.0 || values.is_empty() {
         return values.to_vec();
@@ -179,10 +179,10 @@ fn blurred<T: Blend>(values: &[T], shape: [usize; 2], deviation: f32, down: bool
         .collect()
 }
 
-/// Standard deviation of the blur that edges across rows (or columns, `down`) have beyond that of pixels.
+/// Standard deviation in pixels of the blur along rows (or columns if `down`), beyond the box filter of pixels; 0 if unknown.
 fn softness(
     levels: &[f32],
-    told: &[bool],
+    valid: &[bool],
     grain: &dyn Fn(f32) -> f32,
     [width, height]: [usize; 2],
     down: bool,
@@ -191,8 +191,8 @@ fn softness(
         return 0.0;
     }
     let (along, other) = if down { (width, 1) } else { (1, width) };
-    // Three pixels along an edge are alike but for their grain.
-    let own: Vec<f32> = (0..levels.len())
+    // Average three pixels along the edge to reduce grain.
+    let smooth: Vec<f32> = (0..levels.len())
         .map(|at| {
             let near = [
                 at.saturating_sub(other),
@@ -202,21 +202,21 @@ fn softness(
             near.iter().map(|&i| levels[i]).sum::<f32>() / near.len() as f32
         })
         .collect();
-    let known = blurred(&own, [width, height], KNOWN_BLUR, down);
-    let slope = |at: usize, step: usize| own[at + step] - own[at - step];
+    let reblurred = blurred(&smooth, [width, height], KNOWN_BLUR, down);
+    let slope = |at: usize, step: usize| smooth[at + step] - smooth[at - step];
     let mut ratios: Vec<f64> = (2..height - 2)
         .flat_map(|y| (2..width - 2).map(move |x| y * width + x))
         .filter(|&at| {
             let here = slope(at, along).abs();
-            let level = own[at + along].max(own[at - along]);
-            told[at]
+            let level = smooth[at + along].max(smooth[at - along]);
+            valid[at]
                 && here > (EDGE * level).max(ABOVE_GRAIN * grain(level))
                 && slope(at, other).abs() < ACROSS * here
                 && here >= slope(at - along, along).abs()
                 && here > slope(at + along, along).abs()
         })
         .filter_map(|at| {
-            let after = (known[at + along] - known[at - along]).abs();
+            let after = (reblurred[at + along] - reblurred[at - along]).abs();
             (after > 0.0).then(|| f64::from(slope(at, along).abs() / after))
         })
         .collect();
@@ -225,20 +225,21 @@ fn softness(
     }
     let ratio = quantile(&mut ratios, 0.5).unwrap_or(f64::INFINITY);
     let found = softness_of(ratio) as f32;
-    let [least, most] = SOFT;
-    if found < least { 0.0 } else { found.min(most) }
+    let [min, max] = BLUR_RANGE;
+    if found < min { 0.0 } else { found.min(max) }
 }
 
-/// The softness beyond a pixel's own of a step whose slope the known blur makes smaller by a factor.
+/// Standard deviation in pixels of a step edge's blur, beyond the pixel's box filter. `ratio`: slope before over
+/// after the known blur.
 fn softness_of(ratio: f64) -> f64 {
-    // Brightness from one pixel before a step to one after it, in steps.
-    let slope = |variance: f64| libm::erf((2.0 * (variance + PIXEL)).sqrt().recip());
-    let known = f64::from(KNOWN_BLUR * KNOWN_BLUR);
-    let (mut low, mut high) = (0.0, f64::from(SOFT[1] * SOFT[1]));
+    // Difference between the pixels after and before a step of height 1.
+    let slope = |variance: f64| libm::erf((2.0 * (variance + PIXEL_VARIANCE)).sqrt().recip());
+    let known_variance = f64::from(KNOWN_BLUR * KNOWN_BLUR);
+    let (mut low, mut high) = (0.0, f64::from(BLUR_RANGE[1] * BLUR_RANGE[1]));
     for _ in 0..HALVINGS {
         let middle: f64 = 0.5 * (low + high);
-        // The softer a step is, the less a blur takes from it.
-        match slope(middle) / slope(middle + known) > ratio {
+        // The more an edge is blurred already, the less the known blur reduces its slope.
+        match slope(middle) / slope(middle + known_variance) > ratio {
             true => low = middle,
             false => high = middle,
         }
@@ -246,17 +247,17 @@ fn softness_of(ratio: f64) -> f64 {
     low.sqrt()
 }
 
-/// Standard deviations by luminance where the photograph is smooth.
+/// Standard deviation of the grain by luminance, where the photograph is smooth.
 fn grain(
     pixels: &[Vec3],
     levels: &[f32],
-    told: &[bool],
+    valid: &[bool],
     [width, height]: [usize; 2],
 ) -> Vec<(f32, Vec3)> {
     if width < 7 || height < 7 {
         return Vec::new();
     }
-    // Slopes over a distance hold little of the grain, so that choosing by them keeps it as it is.
+    // Slopes between distant 3 × 3 means contain little grain, so selecting by them does not bias its estimate.
     let mean = |at: usize| -> f32 {
         let rows = [at - width, at, at + width];
         rows.iter()
@@ -266,7 +267,7 @@ fn grain(
     };
     let mut seen: Vec<(f32, f32, usize)> = (3..height - 3)
         .flat_map(|y| (3..width - 3).map(move |x| y * width + x))
-        .filter(|&at| told[at])
+        .filter(|&at| valid[at])
         .map(|at| {
             let across = mean(at + 2) - mean(at - 2);
             let down = mean(at + 2 * width) - mean(at - 2 * width);
@@ -307,12 +308,12 @@ mod tests {
 
     const SIZE: [usize; 2] = [240, 180];
 
-    /// Bricks of random colours, exact to the pixel's area, then blurred, with grain that grows with the level.
+    /// Bricks of random colours, antialiased, then blurred, with grain proportional to the level.
     fn bricks(blur: Vec2, grain: f32) -> Photograph {
         let [width, height] = SIZE;
         let mut stream = Stream::new(7, 0, 0, 0);
         let colors: Vec<f32> = (0..400).map(|_| 0.1 + 0.8 * stream.uniform()).collect();
-        // Joints that fall at all places within a pixel.
+        // Joints at all positions within a pixel.
         let cell = |at: f32| ((at / 11.3).floor() as usize).min(19);
         let exact: Vec<Vec3> = (0..width * height)
             .map(|index| {
@@ -392,7 +393,7 @@ mod tests {
     fn what_is_masked_says_nothing() {
         let mut picture = bricks(Vec2::splat(1.0), 0.02);
         let whole = PsfAndGrain::of(&picture);
-        // Stripes of nothing, as sharp as can be.
+        // Stripes without noise or blur.
         let usable: Vec<bool> = (0..picture.pixels.len())
             .map(|index| index % SIZE[0] % 60 >= 8)
             .collect();

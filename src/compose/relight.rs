@@ -1,5 +1,5 @@
-//! A photograph in other light: multiplied by the ratio of two renders of its view (Marschner and Greenberg 1997), which
-//! keeps all that the estimate does not model.
+//! Relights a photograph by the ratio of two renders of its view (Marschner and Greenberg 1997), which keeps detail that the
+//! estimate does not model.
 
 use crate::compose::backdrop::Backdrop;
 use crate::error::Result;
@@ -12,18 +12,17 @@ use crate::transport::path::PathOptions;
 use glam::Vec3;
 use std::sync::Arc;
 
-/// Above this ratio light is added rather than multiplied, since dark pixels have no detail to be brightened.
-const MOST: f32 = 4.0;
-/// Rows between two questions whether to go on, at least.
+/// Largest ratio. Light beyond it is added, since dark pixels hold no detail to amplify.
+const MAX_RATIO: f32 = 4.0;
+/// Fewest rows between two calls of `go_on`.
 const BAND: u32 = 16;
-/// Long side and samples a pixel of the renders for a first look.
+/// Long side and samples per pixel of the renders for a preview.
 const COARSE_LONG_SIDE: u32 = 128;
 const COARSE_SAMPLES: u32 = 4;
 
-/// The photograph's values, were its view lit by `after` instead of `before` (radiances, one a pixel).
+/// The photograph's values if its view were lit by `after` instead of `before` (radiances, one a pixel).
 ///
-/// A pixel whose radiance is the same keeps its value to the bit. A channel that is saturated was at least as bright as
-/// `before` says, and what saturates stays saturated.
+/// A pixel with equal radiances keeps its value to the bit. `before` is a lower bound of the light in saturated channels.
 pub fn relit(backdrop: &Backdrop, before: &[Vec3], after: &[Vec3]) -> Picture {
     let photograph = &backdrop.photograph;
     let pixels = photograph.pixels.iter().zip(before).zip(after).enumerate();
@@ -34,7 +33,8 @@ pub fn relit(backdrop: &Backdrop, before: &[Vec3], after: &[Vec3]) -> Picture {
                 let (before, after) = (*before * exposure, *after * exposure);
                 let light = backdrop.light(pixel);
                 let saturated = photograph.cmpge(backdrop.saturation);
-                let channel = |c: usize| changed(light[c], before[c], after[c], saturated.test(c));
+                let channel =
+                    |c: usize| relit_channel(light[c], before[c], after[c], saturated.test(c));
                 let relit = Vec3::new(channel(0), channel(1), channel(2));
                 let value = backdrop.value(relit).clamp(Vec3::ZERO, backdrop.saturation);
                 Vec3::select(before.cmpeq(after), *photograph, value)
@@ -44,29 +44,30 @@ pub fn relit(backdrop: &Backdrop, before: &[Vec3], after: &[Vec3]) -> Picture {
     }
 }
 
-/// The light in a channel of the photograph, from two renders of it.
-fn changed(photograph: f32, before: f32, after: f32, saturated: bool) -> f32 {
-    let seen = if saturated {
+/// Exposed light of one channel, from two renders of it.
+fn relit_channel(photograph: f32, before: f32, after: f32, saturated: bool) -> f32 {
+    let light = if saturated {
         photograph.max(before)
     } else {
         photograph
     };
     let ratio = if before > 0.0 {
-        (after / before).min(MOST)
+        (after / before).min(MAX_RATIO)
     } else {
         1.0
     };
-    seen * ratio + (after - before * ratio).max(0.0)
+    light * ratio + (after - before * ratio).max(0.0)
 }
 
-/// A photograph on its way from one light into another, a band of rows at a time.
+/// A photograph being relit, refined progressively by bands of rows.
 #[derive(Debug)]
 pub struct Relighting {
     backdrop: Backdrop,
     lights: [Arc<Lit>; 2],
     options: PathOptions,
     seed: u64,
-    /// Renders in both lights from the same random numbers; two independent pairs where noise is smoothed, which tell it.
+    /// Renders in both lights from the same random numbers. With denoising there are two independent pairs, to estimate
+    /// the noise.
     pairs: Vec<[Film; 2]>,
     next_row: u32,
     denoiser: Option<Denoiser>,
@@ -74,8 +75,7 @@ pub struct Relighting {
 }
 
 impl Relighting {
-    /// Brings the photograph of `backdrop` from the first light into the second. A denoiser takes the noise out of
-    /// both renders in the same way.
+    /// Relights the photograph of `backdrop` from the first light to the second. With a denoiser both renders are denoised.
     pub fn new(
         backdrop: Backdrop,
         lights: [Arc<Lit>; 2],
@@ -98,18 +98,18 @@ impl Relighting {
         }
     }
 
-    /// Paths a pixel and light.
+    /// Samples per pixel in each light.
     pub fn samples(&self) -> u32 {
         self.pairs.iter().map(|pair| pair[1].samples).sum()
     }
 
-    /// Whether [`Relighting::photograph`] can be asked for.
+    /// Whether [`Relighting::photograph`] has samples to work from.
     pub fn is_begun(&self) -> bool {
         self.samples() >= self.pairs.len() as u32
     }
 
-    /// Brings every pixel to `samples` paths, but stops early, between two bands of rows, once `go_on` says no; the
-    /// next call takes up the work there. Returns whether all was done.
+    /// Samples every pixel up to `samples` paths. Stops between two bands of rows once `go_on` returns false; the
+    /// next call continues there. Returns whether all samples are done.
     pub fn refine_to(&mut self, samples: u32, go_on: impl Fn() -> bool) -> bool {
         let height = self.backdrop.camera.intrinsics.height;
         let band = BAND.max(2 * rayon::current_num_threads() as u32);
@@ -118,7 +118,7 @@ impl Relighting {
                 return false;
             }
             let rows = self.next_row..(self.next_row + band).min(height);
-            // The first of those with the fewest samples.
+            // Continue with the first of the pairs with the fewest samples.
             let parts = 0..self.pairs.len();
             let part = parts.min_by_key(|&p| self.pairs[p][1].samples);
             let part = part.unwrap_or(0);
@@ -132,8 +132,8 @@ impl Relighting {
         true
     }
 
-    /// [`Relighting::refine_to`] on a graphics card that holds the scene in both lights; only between passes. After an error all is as
-    /// it was, or one of two parts is ahead, and [`Relighting::refine_to`] takes up the work.
+    /// [`Relighting::refine_to`] on a graphics card that holds the scene in both lights; call it only between passes.
+    /// After an error no pair is changed in part, and [`Relighting::refine_to`] continues.
     ///
     /// # Errors
     /// The card failed.
@@ -148,7 +148,7 @@ impl Relighting {
             if !go_on() {
                 return Ok(false);
             }
-            // The first part takes the odd sample.
+            // The first pair takes an odd sample.
             let wanted = (samples + parts - 1 - part) / parts;
             let missing = wanted.saturating_sub(pair[1].samples);
             let view = View {
@@ -166,13 +166,13 @@ impl Relighting {
         Ok(true)
     }
 
-    /// The photograph in the other light, by the samples taken so far; only between passes.
+    /// The relit photograph from the samples so far; call it only between passes.
     pub fn photograph(&mut self) -> Picture {
         let [before, after] = self.renders();
         relit(&self.backdrop, &before.pixels, &after.pixels)
     }
 
-    /// The same at once, by renders of few pixels.
+    /// A preview from small renders.
     pub fn coarse(&self) -> Picture {
         let (width, height) = (
             self.backdrop.photograph.width,
@@ -194,7 +194,7 @@ impl Relighting {
         relit(&self.backdrop, &before.pixels, &after.pixels)
     }
 
-    /// Radiance in both lights.
+    /// Renders in both lights, denoised if there are two pairs.
     fn renders(&mut self) -> [Picture; 2] {
         let mean = |film: &Film| Picture {
             width: film.width,
@@ -224,7 +224,7 @@ mod tests {
     use crate::scene::camera::Camera;
     use glam::{DMat3, DVec3};
 
-    /// One pixel of a photograph that saturates at a value, from one light into another.
+    /// One relit pixel of a photograph with a given saturation.
     fn pixel(photograph: f32, before: f32, after: f32, saturation: f32) -> f32 {
         by(Exposure::default(), photograph, before, after, saturation)
     }
@@ -260,12 +260,12 @@ mod tests {
     fn light_is_multiplied_added_where_it_was_dark_and_left_where_nothing_changes() {
         let linear = f32::INFINITY;
         assert_eq!(pixel(0.3, 0.2, 0.2, linear), 0.3);
-        // Detail that the estimate misses keeps its contrast.
+        // Detail that the estimate does not model keeps its contrast.
         assert!((pixel(0.3, 0.2, 0.1, linear) - 0.15).abs() < 1e-7);
         assert!((pixel(0.3, 0.2, 0.4, linear) - 0.6).abs() < 1e-7);
         assert_eq!(pixel(0.0, 0.0, 0.7, linear), 0.7);
         assert_eq!(pixel(0.5, 0.5, 0.0, linear), 0.0);
-        // Beyond the greatest ratio the rest is added; a photograph that agrees shows `after` all the same.
+        // Beyond the largest ratio light is added; a photograph that agrees with `before` still becomes `after`.
         assert!((pixel(0.01, 0.01, 1.0, linear) - 1.0).abs() < 1e-6);
     }
 
@@ -276,7 +276,7 @@ mod tests {
         assert_eq!(pixel(0.9, 0.5, 5.0, 1.0), 1.0);
     }
 
-    /// Half of the light shows as the camera would have shown it, not as half of the value.
+    /// Half of the light has the value that the camera would give it, not half of the value.
     #[test]
     fn light_is_changed_before_the_camera_bends_it() {
         let exposure = Exposure {

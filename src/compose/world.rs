@@ -1,4 +1,4 @@
-//! The scene with inserted objects: what the path tracer meets when something new stands in the room.
+//! The scene with inserted objects, as the path tracer sees it.
 
 use crate::compose::placement::{PlacedObject, interpolate};
 use crate::scene::geometry::{Hit, Ray};
@@ -9,7 +9,7 @@ use glam::Vec3;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A lit scene and the objects in it. Lights are the scene's alone.
+/// A lit scene with objects in it. Only the scene emits light.
 #[derive(Debug)]
 pub struct FurnishedScene<'a> {
     lit: &'a Lit,
@@ -29,12 +29,12 @@ impl<'a> FurnishedScene<'a> {
 
     /// Whether an object has changed the answer to any query since the last call.
     ///
-    /// Where it has not, the same path in the scene alone would have been the same to the bit.
+    /// If not, the path would be the same to the bit without the objects.
     pub fn take_touched(&self) -> bool {
         self.touched.swap(false, Ordering::Relaxed)
     }
 
-    /// Whether the first surface along a ray is an object's.
+    /// Whether the first surface along a ray belongs to an inserted object.
     pub fn sees_object(&self, ray: &Ray) -> bool {
         self.nearest_object(ray, ray.t_max).is_some_and(|(_, hit)| {
             let before = Ray {

@@ -1,4 +1,4 @@
-//! The files of an insertion and of a relit photograph.
+//! Writes the files of an insertion and of a relit photograph.
 
 use crate::compose::backdrop::Backdrop;
 use crate::compose::insert::Layers;
@@ -10,8 +10,8 @@ use crate::math::picture::Picture;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-/// Writes PREFIX.composite.{exr,png}, PREFIX.naive.{exr,png}, PREFIX.delta.exr, PREFIX.layers.exr and
-/// PREFIX.compare.png, which shows photograph, both naive pictures and the composite; returns their paths.
+/// Writes PREFIX.composite.{exr,png}, PREFIX.naive.{exr,png}, PREFIX.delta.exr, PREFIX.layers.exr and PREFIX.compare.png, which
+/// shows the photograph, both naive pictures and the composite. Returns the paths.
 ///
 /// `naive` is lit by harmonics of the photographs, `naive_estimate` by those of the estimate.
 ///
@@ -73,7 +73,7 @@ pub fn write_insertion(
     Ok(written)
 }
 
-/// Writes PREFIX.relit.{exr,png}, the photograph of a backdrop that was relit; returns their paths.
+/// Writes PREFIX.relit.{exr,png}, the relit photograph of a backdrop. Returns the paths.
 ///
 /// # Errors
 /// A file cannot be written.

@@ -1,4 +1,4 @@
-//! Textures baked into one picture, a chart for each triangle.
+//! Bakes the texels of all textured objects into one picture, with a chart for each triangle.
 
 use crate::inverse::estimate::TexelEstimate;
 use crate::math::picture::Picture;
@@ -6,14 +6,14 @@ use crate::scene::Scene;
 use crate::scene::geometry::Hit;
 use glam::{Vec2, Vec3};
 
-/// Pixels along the edge of a texel, so that both texels of a square have some of their own.
-const FINENESS: u32 = 2;
-/// Pixels around each chart that repeat its edge, so that filtering meets no other chart.
+/// Pixels along a texel's edge; two are needed to resolve both triangular texels of a square.
+const PIXELS_A_TEXEL: u32 = 2;
+/// Border pixels around each chart that repeat its edge, so that bilinear filtering does not mix charts.
 const MARGIN: u32 = 1;
-/// The largest width and height, which nearly all graphics hardware takes.
-const MOST: u32 = 8192;
+/// Largest width and height; nearly all graphics hardware supports it.
+const MAX_SIDE: u32 = 8192;
 
-/// A picture with the albedo of all textured objects, and where their triangles lie in it.
+/// The albedo of all textured objects in one picture, and the texture coordinates of their triangles.
 #[derive(Debug, Clone)]
 pub struct Atlas {
     /// Linear albedo.
@@ -23,7 +23,7 @@ pub struct Atlas {
     pub corners: Vec<Option<[Vec2; 3]>>,
 }
 
-/// The place of a triangle's chart: its upper left corner without the margin, and its side.
+/// Position of a triangle's chart: upper-left corner without the border, and side.
 #[derive(Debug, Clone, Copy)]
 struct Chart {
     triangle: u32,
@@ -33,8 +33,7 @@ struct Chart {
 }
 
 impl Atlas {
-    /// Bakes the textured objects; `None` where there are none. Texels are made coarser where the picture would
-    /// otherwise be too large.
+    /// Bakes the textured objects; `None` where there are none. Coarsens texels if the picture would exceed the largest size.
     pub fn new(scene: &Scene, texels: &TexelEstimate) -> Option<Self> {
         let textured = |&t: &u32| {
             let object = scene.object_of[t as usize] as usize;
@@ -48,7 +47,7 @@ impl Atlas {
         }
         let finest = levels[triangles[0] as usize];
         let (charts, size) = (0..=finest).find_map(|coarser| {
-            let side = |t: u32| FINENESS << levels[t as usize].saturating_sub(coarser);
+            let side = |t: u32| PIXELS_A_TEXEL << levels[t as usize].saturating_sub(coarser);
             pack(&triangles, side, coarser == finest)
         })?;
         let mut atlas = Self {
@@ -68,8 +67,8 @@ impl Atlas {
     fn bake(&mut self, chart: &Chart, texels: &TexelEstimate) {
         let layout = &texels.colors.layout;
         let side = chart.side as f32;
-        // Half a texel's width to either side of a square's diagonal lies in one texel each.
-        let apart = 0.1 / (1u32 << layout.levels[chart.triangle as usize]) as f32;
+        // Near the diagonal of a square, sample half a texel to both sides, so that each sample lies in one texel.
+        let half_texel = 0.1 / (1u32 << layout.levels[chart.triangle as usize]) as f32;
         for j in 0..chart.side + 2 * MARGIN {
             for i in 0..chart.side + 2 * MARGIN {
                 let place = |k: u32| ((k as f32 + 0.5 - MARGIN as f32) / side).max(0.0);
@@ -86,7 +85,7 @@ impl Atlas {
                 };
                 let (x, y) = (chart.x + i - MARGIN, chart.y + j - MARGIN);
                 let at = y as usize * self.picture.width as usize + x as usize;
-                self.picture.pixels[at] = (color(apart) + color(-apart)) * 0.5;
+                self.picture.pixels[at] = (color(half_texel) + color(-half_texel)) * 0.5;
             }
         }
         let size = Vec2::new(self.picture.width as f32, self.picture.height as f32);
@@ -97,7 +96,7 @@ impl Atlas {
     }
 }
 
-/// Barycentric coordinates brought onto the triangle.
+/// Clamps barycentric coordinates to the triangle.
 fn onto_triangle(b1: f32, b2: f32) -> (f32, f32) {
     let (b1, b2) = (b1.clamp(0.0, 1.0), b2.clamp(0.0, 1.0));
     let beyond = ((b1 + b2 - 1.0) * 0.5).max(0.0);
@@ -105,23 +104,23 @@ fn onto_triangle(b1: f32, b2: f32) -> (f32, f32) {
     (b1, b2.min(1.0 - b1))
 }
 
-/// Puts squares, largest first, into rows of a picture that is about square; `None` where it would be too large,
-/// unless it must do.
+/// Packs squares, sorted by decreasing size, into rows of a nearly square picture. `None` if it exceeds [`MAX_SIDE`], unless
+/// `any_size`.
 fn pack(
     triangles: &[u32],
     side: impl Fn(u32) -> u32,
-    must: bool,
+    any_size: bool,
 ) -> Option<(Vec<Chart>, [u32; 2])> {
-    let whole = |t: u32| side(t) + 2 * MARGIN;
-    let area: u64 = triangles.iter().map(|&t| u64::from(whole(t)).pow(2)).sum();
-    let widest = triangles.iter().map(|&t| whole(t)).max()?;
+    let padded = |t: u32| side(t) + 2 * MARGIN;
+    let area: u64 = triangles.iter().map(|&t| u64::from(padded(t)).pow(2)).sum();
+    let widest = triangles.iter().map(|&t| padded(t)).max()?;
     let width = ((area as f64).sqrt().ceil() as u32)
         .max(widest)
         .next_multiple_of(4);
     let (mut x, mut y, mut row) = (0, 0, 0);
     let mut charts = Vec::with_capacity(triangles.len());
     for &triangle in triangles {
-        let size = whole(triangle);
+        let size = padded(triangle);
         if x + size > width {
             (x, y, row) = (0, y + row, 0);
         }
@@ -135,7 +134,7 @@ fn pack(
         row = row.max(size);
     }
     let height = (y + row).next_multiple_of(4);
-    (must || width.max(height) <= MOST).then_some((charts, [width, height]))
+    (any_size || width.max(height) <= MAX_SIDE).then_some((charts, [width, height]))
 }
 
 #[cfg(test)]

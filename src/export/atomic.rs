@@ -1,4 +1,4 @@
-//! Files that appear whole or not at all.
+//! Writes files atomically: complete or not at all.
 
 use crate::error::{Error, Result};
 use crate::export::overwrite;
@@ -6,13 +6,13 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-/// Why a writer gave up: an input/output error, or anything with a message.
+/// Why a writer gave up: an I/O error, or any other with a message.
 pub type WriteError = Box<dyn std::error::Error + Send + Sync>;
 
-/// Writes a file through `write`, so that `path` holds either the complete new content or what it held before.
+/// Writes a file through `write`. `path` then holds either the complete new content or what it held before.
 ///
-/// The bytes go to a temporary file in the same folder, are flushed to the disk, and the file is renamed. Missing
-/// folders are made. The file gets the permissions of any newly created file.
+/// Writes to a temporary file in the same folder, flushes it to disk and renames it. Creates missing folders. The file gets the
+/// default permissions of new files.
 ///
 /// # Errors
 /// The file is a capture's or of results (see [`overwrite`]), the folder or file cannot be written, the disk is full, or
@@ -22,11 +22,11 @@ pub fn write_atomically(
     write: impl FnOnce(&mut BufWriter<File>) -> std::result::Result<(), WriteError>,
 ) -> Result<()> {
     let io = |error: std::io::Error| Error::io(path, &error);
-    // A device or a pipe would be replaced by a file.
+    // Renaming would replace a device or pipe by a file.
     if std::fs::metadata(path).is_ok_and(|there| !there.is_file()) {
         return Err(Error::file(
             path,
-            "is there already and is no regular file",
+            "exists and is no regular file",
             "name another file",
         ));
     }
@@ -42,7 +42,7 @@ pub fn write_atomically(
     let mut writer = BufWriter::new(temporary.as_file().try_clone().map_err(io)?);
     write(&mut writer).map_err(|error| match error.downcast::<std::io::Error>() {
         Ok(error) => Error::io(path, &error),
-        // Encoders of pictures and scenes hide that a disk is full.
+        // The encoders' own errors may hide that the disk is full.
         Err(error) => Error::file(
             path,
             error,
@@ -55,7 +55,7 @@ pub fn write_atomically(
     Ok(())
 }
 
-/// How what is not complete yet is named, and the permissions that it gets (the umask takes away from them).
+/// Names temporary files and folders, and sets their permissions before the umask.
 pub(super) fn temporary_names(mode: u32) -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".relit-").suffix(".partial");
@@ -69,7 +69,7 @@ pub(super) fn temporary_names(mode: u32) -> tempfile::Builder<'static, 'static> 
     builder
 }
 
-/// Writes bytes as a whole file or not at all; see [`write_atomically`].
+/// Writes bytes to a file atomically; see [`write_atomically`].
 ///
 /// # Errors
 /// The folder or file cannot be written.

@@ -1,25 +1,25 @@
-//! An 8-bit picture to draw text and pictures on, with the program's own font.
+//! An 8-bit picture for drawing text and pictures, with a built-in font.
 
 use plotters::prelude::{BitMapBackend, DrawingBackend, FontStyle, IntoFont, RGBColor};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{IntoTextStyle, register_font};
 use std::sync::Once;
 
-/// Name under which plots find the built-in font.
+/// Name under which plotters finds the built-in font.
 pub const FONT: &str = "sans-serif";
 
-/// Makes the built-in font known to plotters, so that no system font is needed.
+/// Registers the built-in font with plotters, so that no system font is needed.
 pub fn register_fonts() {
     static REGISTERED: Once = Once::new();
     REGISTERED.call_once(|| {
         for style in [FontStyle::Normal, FontStyle::Bold] {
-            // The bytes are a font compiled into the program; should they not parse, plots are drawn without text.
+            // The compiled-in font always parses; if it did not, plots would lack text.
             let _ = register_font(FONT, style, epaint_default_fonts::UBUNTU_LIGHT);
         }
     });
 }
 
-/// 8-bit sRGB pixels that can be drawn on.
+/// An 8-bit sRGB picture to draw on.
 #[derive(Debug, Clone)]
 pub struct Canvas {
     /// Width in pixels.
@@ -40,8 +40,7 @@ impl Canvas {
         }
     }
 
-    /// Copies sRGB bytes of a `width` × `height` picture so that its top left corner lies at (x, y); what falls
-    /// outside is left out.
+    /// Copies sRGB bytes of a picture `width` pixels wide, with its top-left corner at (x, y). Clips what falls outside.
     pub fn paste(&mut self, bytes: &[u8], width: u32, x: u32, y: u32) {
         if width == 0 || x >= self.width {
             return;
@@ -72,7 +71,7 @@ impl Canvas {
             .color(&RGBColor(r, g, b))
             .pos(Pos::new(HPos::Center, VPos::Center))
             .into_text_style(&dimensions);
-        // Text that cannot be drawn leaves the picture readable, so a failure is not one of the whole file.
+        // A picture without its text is still of use, so a failure is ignored.
         let _ = backend.draw_text(text, &style, (x as i32, y as i32));
     }
 }

@@ -1,4 +1,4 @@
-//! A capture as a folder that every reader of the format opens: transforms.json, mesh.obj, images/NNN.exr, truth.json.
+//! Writes a capture folder: transforms.json, mesh.obj, images/NNN.exr, truth.json.
 
 use crate::capture::Capture;
 use crate::capture::camera::{Intrinsics, Pose};
@@ -14,8 +14,8 @@ use serde_json::{Map, Value, json};
 use std::io::Write;
 use std::path::Path;
 
-/// Writes a capture; photographs become linear EXR files that hold radiance. Transforms come last, so that a folder that has
-/// them is complete.
+/// Writes a capture. Photographs become linear EXR files of radiance. transforms.json is written last, so that a
+/// folder that has it is complete.
 ///
 /// # Errors
 /// A photograph cannot be read or a file cannot be written.
@@ -38,7 +38,7 @@ pub fn write_mesh(folder: &Path, mesh: &Mesh) -> Result<()> {
     write_atomically(&folder.join("mesh.obj"), |out| write_obj(out, mesh))
 }
 
-/// Writes transforms.json of photographs that are linear EXR files, images/NNN.exr.
+/// Writes transforms.json for photographs in images/NNN.exr.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -59,7 +59,7 @@ pub fn write_transforms(
     write_bytes(&folder.join(CAMERAS), text.as_bytes())
 }
 
-/// Writes truth.json (as [`crate::capture::truth::Truth`] reads it) and truth/albedo_NNN.exr, one picture a frame.
+/// Writes truth.json (see [`crate::capture::truth::Truth`]) and truth/albedo_NNN.exr, one picture a frame.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -78,7 +78,7 @@ fn image_name(index: usize) -> String {
     format!("images/{index:03}.exr")
 }
 
-/// A frame of transforms.json.
+/// One frame of transforms.json.
 #[derive(Debug, Clone)]
 pub struct Entry {
     /// The photograph, relative to the folder.
@@ -87,13 +87,13 @@ pub struct Entry {
     pub intrinsics: Intrinsics,
     /// Camera to world.
     pub pose: Pose,
-    /// Linear multiplier, if it is to be written.
+    /// Linear exposure factor, if known.
     pub exposure: Option<f64>,
     /// Depth image relative to the folder, and metres per unit.
     pub depth: Option<(String, f64)>,
 }
 
-/// transforms.json: intrinsics, poses and up; numbers are written so that they read back to the bit.
+/// The content of transforms.json. Numbers are written so that they read back to the bit.
 pub fn transforms(entries: &[Entry], mesh_path: &str, up: Option<DVec3>) -> Value {
     let shared = entries.first().map(|entry| entry.intrinsics);
     let mut file = Map::new();
@@ -156,7 +156,7 @@ fn lens(k: &Intrinsics) -> impl Iterator<Item = (String, Value)> {
     .map(|(name, value)| (name.to_owned(), value))
 }
 
-/// Objects with `o`, texture coordinates a corner, vertex colours; positions read back to the bit.
+/// Writes objects as `o`, texture coordinates per corner, and vertex colours. Positions read back to the bit.
 fn write_obj(out: &mut impl Write, mesh: &Mesh) -> std::result::Result<(), WriteError> {
     for (index, p) in mesh.positions.iter().enumerate() {
         match mesh.vertex_colors.get(index) {
@@ -168,11 +168,11 @@ fn write_obj(out: &mut impl Write, mesh: &Mesh) -> std::result::Result<(), Write
         writeln!(out, "vt {} {}", uv.x, uv.y)?;
     }
     let textured = !mesh.corner_uvs.is_empty();
-    let mut own = vec![Vec::new(); mesh.objects.len()];
+    let mut triangles_of = vec![Vec::new(); mesh.objects.len()];
     for (triangle, &object) in mesh.object_of.iter().enumerate() {
-        own[object as usize].push(triangle);
+        triangles_of[object as usize].push(triangle);
     }
-    for (name, triangles) in mesh.objects.iter().zip(own) {
+    for (name, triangles) in mesh.objects.iter().zip(triangles_of) {
         writeln!(out, "o {}", name.replace(char::is_control, " "))?;
         for triangle in triangles {
             write!(out, "f")?;

@@ -8,10 +8,10 @@ use std::path::Path;
 
 /// Height of the caption above each picture, in pixels.
 const CAPTION: u32 = 26;
-/// White between pictures, in pixels.
+/// White space between pictures, in pixels.
 const GAP: u32 = 6;
 
-/// Writes pictures in a row, top-aligned, each below its caption, all at one exposure.
+/// Writes pictures in a row, top-aligned, each below its caption, all at the same exposure.
 ///
 /// # Errors
 /// The file cannot be written, or there is no picture.
@@ -19,10 +19,10 @@ pub fn write_row(path: &Path, pictures: &[(&str, &Picture)], exposure: f32) -> R
     write_grid(path, pictures, pictures.len().max(1), exposure)
 }
 
-/// Writes pictures row by row in `columns` columns, each below its caption, all at one exposure.
+/// Writes pictures in a grid of `columns` columns, each below its caption, all at the same exposure.
 ///
 /// # Errors
-/// The file cannot be written, there is no picture, or one has not one colour a pixel.
+/// The file cannot be written, there is no picture, or a picture's size does not match its pixels.
 pub fn write_grid(
     path: &Path,
     pictures: &[(&str, &Picture)],

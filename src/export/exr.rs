@@ -1,4 +1,4 @@
-//! OpenEXR files: linear pictures, single channels, and named layers, all compressed without loss.
+//! OpenEXR files of linear pictures, single channels, and named layers, losslessly compressed.
 
 use crate::error::{Error, Result};
 use crate::export::atomic::write_atomically;
@@ -9,7 +9,7 @@ use exr::prelude::{
 };
 use std::path::Path;
 
-/// How exactly numbers are stored.
+/// Storage format of floating-point values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Precision {
     /// 16-bit floats: 11 significant bits, largest value 65504.
@@ -27,7 +27,7 @@ pub struct Layer {
     pub channels: Vec<Channel>,
 }
 
-/// One number a pixel.
+/// A channel: one value a pixel.
 #[derive(Debug, Clone)]
 pub struct Channel {
     /// Name, such as "R" or "Z".
@@ -43,7 +43,7 @@ pub enum Samples {
     Half(Vec<f16>),
     /// 32-bit floats.
     Float(Vec<f32>),
-    /// Whole numbers, such as object indices.
+    /// Integers, such as object indices.
     Index(Vec<u32>),
 }
 
@@ -110,7 +110,7 @@ pub fn write_rgb(path: &Path, picture: &Picture, precision: Precision) -> Result
     write_layers(path, picture.width, picture.height, &[layer])
 }
 
-/// Writes one number a pixel as the channel Y, which viewers show as grey.
+/// Writes one value a pixel as the channel Y, which viewers show as grey.
 ///
 /// # Errors
 /// The file cannot be written, or there is not one value a pixel.
@@ -119,10 +119,10 @@ pub fn write_scalar(path: &Path, width: u32, height: u32, values: &[f32]) -> Res
     write_layers(path, width, height, &[layer])
 }
 
-/// Writes named layers of one size. A single layer may have an empty name; its channels are then plain R, G, B, ….
+/// Writes named layers of one size. A single layer may have an empty name; its channels are then R, G, B, ….
 ///
 /// # Errors
-/// The file cannot be written, there is nothing to write, or a channel has not one value a pixel.
+/// The file cannot be written, there is nothing to write, or a channel's length does not match the size.
 pub fn write_layers(path: &Path, width: u32, height: u32, layers: &[Layer]) -> Result<()> {
     let count = width as usize * height as usize;
     let wrong = layers

@@ -1,4 +1,4 @@
-//! Numbers as colours, with a legend that says which colour is which number.
+//! False-colour pictures of scalar values, with a legend.
 
 use crate::error::Result;
 use crate::export::canvas::Canvas;
@@ -12,7 +12,7 @@ use std::path::Path;
 /// Height of the legend below the picture, in pixels.
 const LEGEND: u32 = 34;
 
-/// Blue for negative, white for zero, red for positive values (in [−1, 1]); magenta for what is not a number.
+/// Diverging colour map: blue for negative, white for zero, red for positive values in [−1, 1]; magenta for NaN.
 pub fn diverging(value: f32) -> [u8; 3] {
     const STOPS: [[f32; 3]; 5] = [
         [5.0, 48.0, 97.0],
@@ -24,7 +24,7 @@ pub fn diverging(value: f32) -> [u8; 3] {
     ramp(&STOPS, (value + 1.0) * 0.5)
 }
 
-/// Dark violet through green to yellow for values in [0, 1], rising evenly in lightness.
+/// Sequential colour map: dark violet through green to yellow for values in [0, 1], with lightness rising evenly.
 pub fn sequential(value: f32) -> [u8; 3] {
     const STOPS: [[f32; 3]; 5] = [
         [68.0, 1.0, 84.0],
@@ -51,7 +51,7 @@ fn ramp(stops: &[[f32; 3]; 5], position: f32) -> [u8; 3] {
 
 /// Writes the signed luminance of a picture (render − photograph) in diverging colours with a legend.
 ///
-/// The ends of the scale are ± the 99th percentile of the magnitudes.
+/// The scale is ± the 99th percentile of the magnitudes.
 ///
 /// # Errors
 /// The file cannot be written, or the picture has no pixels.
@@ -73,20 +73,20 @@ pub fn write_magnitude(path: &Path, picture: &Picture, unit: &str) -> Result<()>
     write(path, picture, &values, |v| sequential(v / end), 0.0, unit)
 }
 
-/// The 99th percentile of the finite magnitudes; their maximum where that is zero, and 1 where all are zero.
+/// The 99th percentile of the finite magnitudes; their maximum if it is zero, and 1 if all are zero.
 fn scale_end(values: &[f32]) -> f32 {
     let magnitudes: Vec<glam::Vec3> = values.iter().map(|v| glam::Vec3::splat(v.abs())).collect();
     crate::export::picture::percentile_exposure(&magnitudes).recip()
 }
 
-/// A value in three significant digits.
+/// Formats a value with three significant digits.
 fn three_digits(value: f32) -> String {
     format!("{value:.2e}")
         .parse()
         .map_or_else(|_| value.to_string(), |v: f64| Scale::format(&v))
 }
 
-/// Lays out colours and legend. `low` is the value at the left end; the right end is where `color_of` saturates.
+/// Writes picture and legend. `low` is the legend's left end; its right end is [`scale_end`].
 fn write(
     path: &Path,
     picture: &Picture,
@@ -101,7 +101,7 @@ fn write(
     let bytes: Vec<u8> = values.iter().flat_map(|&v| color_of(v)).collect();
     canvas.paste(&bytes, width, 0, 0);
 
-    // A bar over the middle of the picture, and the values of its ends and middle below.
+    // A colour bar, with the values of its ends and middle below.
     let margin = width / 8;
     let bar = (width - 2 * margin).max(1);
     for x in 0..bar {

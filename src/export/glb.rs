@@ -1,9 +1,9 @@
-//! Binary glTF 2.0: one node, mesh and material an object, and the cameras.
+//! Binary glTF 2.0: a node, mesh and material for each object, and the cameras.
 
 use crate::error::{Error, Result};
 use crate::export::atomic::write_atomically;
+use crate::export::part::Part;
 use crate::export::picture::png_bytes;
-use crate::export::scene::Part;
 use crate::math::picture::Picture;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
@@ -15,9 +15,9 @@ use std::path::Path;
 
 /// Writes parts and cameras as a GLB file.
 ///
-/// Base colour is the albedo, from the atlas (8-bit sRGB PNG) where it varies; emission is emissiveFactor ×
-/// KHR_materials_emissive_strength; glTF's roughness is √α, and 1 where no specular lobe was found. Positions are
-/// the capture's, in f32. Cameras have no distortion there and their principal point in the middle.
+/// Base colour is the albedo, from the atlas (8-bit sRGB PNG) where it varies. Emission is emissiveFactor ×
+/// KHR_materials_emissive_strength. glTF's roughness is √α, and 1 without a specular lobe. Positions are the capture's, in
+/// f32. The cameras lack distortion and have their principal point in the middle.
 ///
 /// # Errors
 /// The file cannot be written, or it would be larger than the format's 4 GiB.
@@ -183,11 +183,11 @@ impl Document {
         })
     }
 
-    /// Appends the atlas, to be sampled linearly without repeating.
+    /// Appends the atlas, sampled linearly and clamped at its edges.
     fn image(&mut self, encoded: &[u8]) {
         let start = self.bytes.len();
         self.bytes.extend(encoded);
-        // What follows must lie at a multiple of four bytes.
+        // What follows must be aligned to four bytes.
         let length = encoded.len();
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let view = self.root.push(json::buffer::View {
@@ -239,7 +239,7 @@ impl Document {
         self.root.push(accessor)
     }
 
-    /// Appends an array of vectors; `bounds` are its least and greatest components.
+    /// Appends an array of vectors; `bounds` are the componentwise minimum and maximum.
     fn vectors(
         &mut self,
         values: &[Vec3],

@@ -1,4 +1,4 @@
-//! An imported scan as a capture: images, mesh.ply, transforms.json.
+//! Writes an imported scan as a capture: images, mesh.ply, transforms.json.
 
 use crate::capture::import::{DepthImage, Import, ImportedFrame, Lens};
 use crate::capture::orientation::Orientation;
@@ -12,13 +12,13 @@ use crate::export::{ply, resample};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// Writes a capture into a folder that is new or empty, whole or not at all; see [`NewFolder`].
+/// Writes a capture into a new or empty folder, atomically; see [`NewFolder`].
 ///
-/// Photographs are copied as they are where the capture's format holds their lens, and resampled to a pinhole otherwise; a
-/// mask becomes the alpha of a PNG or EXR. Depth goes along where it shows what the photograph shows.
+/// Copies photographs whose lens the capture format supports, and resamples others to a pinhole. A mask becomes the alpha of a
+/// PNG or EXR. Depth is written where it is registered to the photograph.
 ///
 /// # Errors
-/// The folder holds something, an image is broken, or a file cannot be written.
+/// The folder is not empty, an image is broken, or a file cannot be written.
 pub fn write(folder: &Path, import: &Import) -> Result<()> {
     let staging = NewFolder::new(folder)?;
     let entries: Result<Vec<Entry>> = import
@@ -37,10 +37,10 @@ pub fn write(folder: &Path, import: &Import) -> Result<()> {
         &staging.path().join(CAMERAS),
         format!("{file:#}\n").as_bytes(),
     )?;
-    staging.take_its_place()
+    staging.commit()
 }
 
-/// Writes a frame's images; what transforms.json says of it.
+/// Writes a frame's images and returns its entry in transforms.json.
 fn write_frame(folder: &Path, index: usize, frame: &ImportedFrame) -> Result<Entry> {
     let name = format!("images/{index:05}");
     let ending = if frame.lens.fits_a_capture() && frame.mask.is_none() {
@@ -100,7 +100,7 @@ fn write_frame(folder: &Path, index: usize, frame: &ImportedFrame) -> Result<Ent
     })
 }
 
-/// Copies a depth image, or writes it anew where its values or lens have to change.
+/// Copies a depth image, or rewrites it if its values or lens have to change.
 fn write_depth(path: &Path, depth: &DepthImage) -> Result<()> {
     let is_png = depth.path.extension().is_some_and(|e| e == "png");
     if is_png && depth.invalid.is_none() && depth.lens.fits_a_capture() {
@@ -114,7 +114,7 @@ fn write_depth(path: &Path, depth: &DepthImage) -> Result<()> {
     resample::write_depth(path, [k.width, k.height], values)
 }
 
-/// Makes pixels unusable where the mask is dark (below one half).
+/// Marks pixels as unusable where the mask is dark: below one half in sRGB, 0.2 linear.
 fn apply_mask(photograph: &mut Photograph, path: &Path, lens: &Lens) -> Result<()> {
     let (mask, _) = image::read(path, Orientation::default(), &lens.pinhole, None)?;
     let count = photograph.pixels.len();

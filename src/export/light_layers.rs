@@ -1,4 +1,4 @@
-//! The light of each lamp as a layer of one OpenEXR file.
+//! The light of each lamp as a layer of an OpenEXR file.
 
 use crate::error::{Error, Result};
 use crate::export::exr::{Layer, Precision, write_layers};
@@ -7,7 +7,7 @@ use crate::scene::Scene;
 use crate::transport::layers::LightSource;
 use std::path::Path;
 
-/// The name of a layer: its lamp's, `other lamps`, or `outside light`.
+/// Name of a layer: the lamp's object, `other lamps`, or `outside light`.
 pub fn name(source: LightSource, scene: &Scene) -> &str {
     match source {
         LightSource::Lamp(object) => {
@@ -18,10 +18,10 @@ pub fn name(source: LightSource, scene: &Scene) -> &str {
     }
 }
 
-/// Writes layers of one size under their names, in 32-bit floats. They add up to the whole picture.
+/// Writes named layers of one size as 32-bit floats. They add up to the whole picture.
 ///
 /// # Errors
-/// There are none, or the file cannot be written.
+/// There are no layers, or the file cannot be written.
 pub fn write<'a>(
     path: &Path,
     scene: &Scene,
@@ -32,7 +32,7 @@ pub fn write<'a>(
     for (source, picture) in layers {
         size = Some((picture.width, picture.height));
         let mut name = name(source, scene).to_owned();
-        // An object may bear the name of another layer.
+        // An object may have the name of another layer.
         while named.iter().any(|layer| layer.name == name) {
             name.push('\'');
         }
@@ -42,7 +42,7 @@ pub fn write<'a>(
         return Err(Error::file(
             path,
             "nothing emits light in this estimate, so there are no layers",
-            "solve on, or give an object an emission",
+            "continue the solve, or give an object an emission",
         ));
     };
     write_layers(path, width, height, &named)

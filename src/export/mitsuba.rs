@@ -1,19 +1,19 @@
-//! Mitsuba 3: an XML file with one PLY an object in a folder beside it.
+//! Mitsuba 3: an XML file, and a PLY file for each object in a folder beside it.
 
 use crate::error::{Error, Result};
 use crate::export::atomic::write_bytes;
+use crate::export::part::Part;
 use crate::export::ply::write_part;
-use crate::export::scene::Part;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use glam::{DMat4, DVec4, Vec3};
 use std::fmt::Write;
 use std::path::Path;
 
-/// Writes PATH and the folder PATH without its ending + "-meshes".
+/// Writes PATH, and the meshes into a folder named like PATH with "-meshes" for its extension.
 ///
-/// Surfaces are two-sided and diffuse, or `principled` (roughness √α, specular F₀ / 0.08) where a lobe was found.
-/// Every photograph's camera is a sensor, without its distortion.
+/// Materials are two-sided: diffuse, or `principled` (roughness √α, specular F₀ / 0.08) with a specular lobe. Every
+/// photograph's camera becomes a sensor, without its distortion.
 ///
 /// # Errors
 /// A file cannot be written.

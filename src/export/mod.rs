@@ -1,4 +1,4 @@
-//! What goes out: pictures, plots, tables, and scenes for other programs. Every file appears whole or not at all.
+//! Output: pictures, plots, tables, and scenes for other programs. Every file is written atomically.
 
 pub mod atlas;
 pub mod atomic;
@@ -15,6 +15,7 @@ pub mod new_folder;
 pub mod obj;
 pub mod objects;
 pub mod overwrite;
+pub mod part;
 pub mod picture;
 pub mod plot;
 pub mod ply;

@@ -1,4 +1,4 @@
-//! Folders that appear whole or not at all.
+//! Creates folders atomically: complete or not at all.
 
 use crate::capture::read::CAMERAS;
 use crate::error::{Error, Result};
@@ -9,18 +9,18 @@ use std::io::ErrorKind::NotFound;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// A folder beside the one wanted, which takes its place when it is complete and vanishes otherwise.
+/// A temporary folder that is moved to its place when complete, and deleted otherwise.
 #[derive(Debug)]
 pub struct NewFolder {
-    aside: TempDir,
+    temporary: TempDir,
     place: PathBuf,
 }
 
 impl NewFolder {
-    /// Starts to fill one.
+    /// Creates the temporary folder beside `place`.
     ///
     /// # Errors
-    /// There is something in the place where it is to be and that may not be replaced, or nothing can be written there.
+    /// The folder `place` is not empty and may not be replaced, or nothing can be written there.
     pub fn new(place: &Path) -> Result<Self> {
         let is_empty = match fs::read_dir(place) {
             Ok(mut entries) => entries.next().is_none(),
@@ -42,36 +42,36 @@ impl NewFolder {
             _ => Path::new("."),
         };
         fs::create_dir_all(parent).map_err(|e| Error::io(parent, &e))?;
-        let aside = temporary_names(0o777)
+        let temporary = temporary_names(0o777)
             .tempdir_in(parent)
             .map_err(|e| Error::io(parent, &e))?;
         Ok(Self {
-            aside,
+            temporary,
             place: place.to_path_buf(),
         })
     }
 
-    /// Where to write what will be in it.
+    /// The temporary folder, to be written into.
     pub fn path(&self) -> &Path {
-        self.aside.path()
+        self.temporary.path()
     }
 
-    /// Puts it into its place; into a folder that is there, file by file.
+    /// Moves the folder to its place; into an existing folder, file by file.
     ///
     /// # Errors
-    /// Something cannot be moved.
-    pub fn take_its_place(self) -> Result<()> {
+    /// A file cannot be moved.
+    pub fn commit(self) -> Result<()> {
         if self.place.is_dir() {
-            return merge(self.aside.path(), &self.place);
+            return merge(self.temporary.path(), &self.place);
         }
-        fs::rename(self.aside.path(), &self.place).map_err(|e| Error::io(&self.place, &e))?;
-        // Nothing is left to take away.
-        let _ = self.aside.keep();
+        fs::rename(self.temporary.path(), &self.place).map_err(|e| Error::io(&self.place, &e))?;
+        // The folder was moved, so there is nothing to delete.
+        let _ = self.temporary.keep();
         Ok(())
     }
 }
 
-/// Moves all files of a folder into another one, over those of the same names.
+/// Moves all files of a folder into another one, replacing those of the same names.
 fn merge(from: &Path, to: &Path) -> Result<()> {
     let io = |path: &Path| {
         let path = path.to_owned();
@@ -82,7 +82,7 @@ fn merge(from: &Path, to: &Path) -> Result<()> {
     for entry in fs::read_dir(from).map_err(io(from))? {
         names.push(entry.map_err(io(from))?.file_name());
     }
-    // A folder that has them is complete.
+    // transforms.json last: a folder that has it is complete.
     names.sort_by_key(|name| (name == CAMERAS, name.clone()));
     for name in names {
         let (source, target) = (from.join(&name), to.join(&name));

@@ -1,19 +1,19 @@
-//! Wavefront OBJ with its MTL and the images of its textures beside it.
+//! Wavefront OBJ with MTL and textures.
 
 use crate::error::Result;
 use crate::export::atomic::write_atomically;
 use crate::export::exr::{Precision, write_rgb};
+use crate::export::part::Part;
 use crate::export::picture::write_png;
-use crate::export::scene::Part;
 use crate::math::picture::Picture;
 use std::io::Write;
 use std::path::Path;
 
-/// Writes parts as PATH and their materials beside it with the ending .mtl.
+/// Writes parts to PATH, and their materials beside it with the extension .mtl.
 ///
-/// One `o` an object. Kd and Ke are linear albedo and emission. Where the albedo of an object varies, Kd is 1 and map_Kd names
-/// the atlas (8-bit sRGB, ending .albedo.png); the same with linear albedo is beside it (.albedo.exr). A specular lobe is Ks
-/// with Pr, the physically based extension's roughness (√α).
+/// One `o` for each object. Kd and Ke are linear albedo and emission. Where an object's albedo varies, Kd is 1 and map_Kd names
+/// the atlas (8-bit sRGB, .albedo.png); beside it is the linear one (.albedo.exr). A specular lobe is Ks with Pr, the roughness
+/// √α of the physically based extension.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -79,7 +79,7 @@ fn file_name(path: &Path) -> std::borrow::Cow<'_, str> {
     path.file_name().unwrap_or_default().to_string_lossy()
 }
 
-/// A name without spaces, unique by its number.
+/// A material name without spaces, unique by its number.
 fn material_name(index: usize, part: &Part) -> String {
     format!("{}_{index}", part.plain_name())
 }

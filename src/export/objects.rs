@@ -4,7 +4,7 @@ use crate::export::table::{Cell, Table};
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::scene::Scene;
 
-/// One row an object: what was estimated, how surely, and from how much.
+/// A row for each object: estimates, standard errors, and how much it was seen.
 pub fn table(scene: &Scene, estimate: &Estimate) -> Table {
     let colors = |name: &str| ["r", "g", "b"].map(|channel| format!("{name}_{channel}"));
     let mut columns = vec!["name".to_owned()];

@@ -1,17 +1,17 @@
-//! What may be replaced: no output takes the place of an input or of somebody else's results.
+//! Protects inputs and other results from being overwritten.
 //!
-//! Every file is asked about before it is written, by whatever command or by the window:
+//! Every file is checked before it is written, by commands and by the window:
 //!
-//! - A file of a capture stays: its transforms.json, its truth, its mesh, and what a transforms.json in a folder above it
-//!   names, with what lies beside that in a folder of its own. A mesh that the reader would take for the capture's is not
-//!   put there either.
-//! - A file of results (estimate.json and what `relit solve` writes beside it) is replaced only by results of the same
-//!   capture: one with the same content, or the one that lies where theirs lay.
-//! - A file that the same run has read stays: an inserted object with its textures, a camera, a scan, and what a capture names
+//! - Files of a capture are kept: transforms.json, its truth, its mesh, and what a transforms.json in a folder above names,
+//!   together with the other files in a subfolder that it names. Nor is a mesh written where the reader would take it for the
+//!   capture's.
+//! - Files of results (estimate.json and what `relit solve` writes beside it) are replaced only by results of the same capture:
+//!   one with the same content or in the same place.
+//! - Files that the same run has read are kept: inserted objects with their textures, cameras, scans, and what a capture names
 //!   outside of its folder.
-//! - Any other file is the person's, and is replaced as by any program.
+//! - Any other file is replaced, as by any program.
 //!
-//! [`permit`] lifts all of it, where a person says `--overwrite`.
+//! [`permit`] (`--overwrite`) disables all checks.
 
 use crate::capture::inputs;
 use crate::capture::read::{CAMERAS, MESHES};
@@ -23,53 +23,54 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// The estimate, for later commands.
+/// File name of the estimate, which later commands read.
 pub const ESTIMATE: &str = "estimate.json";
-/// What the solve did.
+/// File name of the report on the solve.
 pub const REPORT: &str = "report.json";
-/// Where a solve can be taken up again.
+/// File name of the checkpoint, from which a solve resumes.
 pub const CHECKPOINT: &str = "checkpoint.json";
-/// The folder of the pictures within results.
+/// Folder of the pictures within results.
 pub const VIEWS: &str = "views";
-/// What else is written beside an estimate, besides its maps.
-const BESIDE: [&str; 5] = [REPORT, "loss.csv", "loss.png", "scene.glb", VIEWS];
+/// Other files of results, except maps.
+const OTHER_FILES: [&str; 5] = [REPORT, "loss.csv", "loss.png", "scene.glb", VIEWS];
 
 static PERMITTED: AtomicBool = AtomicBool::new(false);
 
-/// Lets everything be replaced, for the rest of the program's life.
+/// Permits replacing any file, for the rest of the process.
 pub fn permit() {
     PERMITTED.store(true, Ordering::Relaxed);
 }
 
-/// Whether everything may be replaced.
+/// Whether any file may be replaced.
 pub fn is_permitted() -> bool {
     PERMITTED.load(Ordering::Relaxed)
 }
 
-/// Refuses to write a file that is a capture's, of results, or another one that was read.
+/// Refuses a file that belongs to a capture or to results, or that the run has read.
 ///
 /// # Errors
-/// It is one.
+/// The file is protected.
 pub fn check(path: &Path) -> Result<()> {
     refuse(path, Some)
 }
 
-/// Refuses to write a file that is a capture's or another one that was read; for those of results, [`check_results`] is asked about the folder.
+/// Refuses a file that belongs to a capture or that the run has read. For files of results, use [`check_results`] on the
+/// folder.
 ///
 /// # Errors
-/// It is one.
+/// The file is protected.
 pub fn check_input(path: &Path) -> Result<()> {
     refuse(path, |owner| match owner {
-        Owner::Capture(..) | Owner::Run => Some(owner),
+        Owner::Capture(..) | Owner::Inputs => Some(owner),
         Owner::Results(_) => None,
     })
 }
 
-fn refuse(path: &Path, counts: impl Fn(Owner) -> Option<Owner>) -> Result<()> {
+fn refuse(path: &Path, selects: impl Fn(Owner) -> Option<Owner>) -> Result<()> {
     if is_permitted() {
         return Ok(());
     }
-    let what = match owner(path).and_then(counts) {
+    let what = match owner(path).and_then(selects) {
         None => return Ok(()),
         Some(Owner::Capture(folder, what)) => {
             format!("is {what} of the capture in {}", folder.display())
@@ -77,26 +78,26 @@ fn refuse(path: &Path, counts: impl Fn(Owner) -> Option<Owner>) -> Result<()> {
         Some(Owner::Results(folder)) => {
             format!("belongs to the results in {}", folder.display())
         }
-        Some(Owner::Run) => "was read as an input".to_owned(),
+        Some(Owner::Inputs) => "was read as an input".to_owned(),
     };
     let remedy = "name another file; the command line replaces it where --overwrite is added";
     Err(Error::file(path, what, remedy))
 }
 
-/// The capture that results are of.
+/// Identifies the capture of results.
 #[derive(Debug, Clone)]
 pub struct CaptureId {
     /// Hash of its content.
     pub hash: String,
-    /// Its folder; `None` for the room built into the program.
+    /// Its folder; `None` for the built-in room.
     pub folder: Option<PathBuf>,
 }
 
-/// Refuses a folder for results of a capture: those of another one are there, or files that results would replace and that
-/// belong to none.
+/// Refuses a folder for the results of `capture` if it holds results of another capture, or files of the same names that belong
+/// to no results.
 ///
 /// # Errors
-/// So it is.
+/// The folder is refused.
 pub fn check_results(folder: &Path, capture: &CaptureId) -> Result<()> {
     if is_permitted() {
         return Ok(());
@@ -109,48 +110,48 @@ pub fn check_results(folder: &Path, capture: &CaptureId) -> Result<()> {
             continue;
         }
         is_results = true;
-        let there = Reference::read(&path)
-            .ok_or_else(|| Error::file(&path, "is there and holds no results of relit", remedy))?;
-        if !there.is_of(folder, capture) {
-            let problem = format!("holds the results of another capture, {}", there.name);
+        let existing = Reference::read(&path)
+            .ok_or_else(|| Error::file(&path, "exists and holds no results of relit", remedy))?;
+        if !existing.is_of(folder, capture) {
+            let problem = format!("holds the results of another capture, {}", existing.name);
             return Err(Error::file(folder, problem, remedy));
         }
     }
-    let other = BESIDE.iter().map(|name| folder.join(name));
+    let other = OTHER_FILES.iter().map(|name| folder.join(name));
     match other.into_iter().find(|path| !is_results && path.exists()) {
         Some(path) => Err(Error::file(
             &path,
-            "is there and belongs to no results of relit",
+            "exists and belongs to no results of relit",
             remedy,
         )),
         None => Ok(()),
     }
 }
 
-/// To what a file belongs.
+/// What a file belongs to.
 enum Owner {
-    /// The capture in a folder, and what it is of it.
+    /// The capture in a folder; and its role there.
     Capture(PathBuf, &'static str),
     /// The results in a folder.
     Results(PathBuf),
-    /// The run that is writing, which has read it.
-    Run,
+    /// The inputs of this run.
+    Inputs,
 }
 
 fn owner(path: &Path) -> Option<Owner> {
     let place = place(path)?;
     let of_folder = place.ancestors().skip(1).find_map(|folder| {
         let name = place.strip_prefix(folder).ok()?;
-        if let Some(what) = of_capture(folder, name, &place) {
+        if let Some(what) = role_in_capture(folder, name, &place) {
             return Some(Owner::Capture(folder.to_owned(), what));
         }
-        of_results(folder, name, &place).then(|| Owner::Results(folder.to_owned()))
+        is_of_results(folder, name, &place).then(|| Owner::Results(folder.to_owned()))
     });
-    let was_read = || (place.exists() && inputs::holds(&place)).then_some(Owner::Run);
+    let was_read = || (place.exists() && inputs::holds(&place)).then_some(Owner::Inputs);
     of_folder.or_else(was_read)
 }
 
-/// The path with its folder resolved; a link in the last place is replaced itself, not what it leads to.
+/// The path with its folder resolved. A symbolic link at its end is not followed, since the link itself would be replaced.
 fn place(path: &Path) -> Option<PathBuf> {
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -158,13 +159,13 @@ fn place(path: &Path) -> Option<PathBuf> {
     };
     let named = folder.canonicalize().ok()?.join(path.file_name()?);
     match named.symlink_metadata() {
-        // Also in the letters that the disk has, where it takes capitals for small ones.
+        // On case-insensitive disks, canonicalize gives the spelling on disk.
         Ok(metadata) if !metadata.is_symlink() => named.canonicalize().ok().or(Some(named)),
         _ => Some(named),
     }
 }
 
-fn of_results(folder: &Path, name: &Path, place: &Path) -> bool {
+fn is_of_results(folder: &Path, name: &Path, place: &Path) -> bool {
     let is_results = || {
         [ESTIMATE, CHECKPOINT]
             .iter()
@@ -176,13 +177,13 @@ fn of_results(folder: &Path, name: &Path, place: &Path) -> bool {
         .and_then(|n| n.to_str())
         .unwrap_or_default();
     let is_one = [ESTIMATE, CHECKPOINT].contains(&first)
-        || BESIDE.contains(&first)
+        || OTHER_FILES.contains(&first)
         || (first.starts_with("maps-") && first.ends_with(".safetensors"));
     is_one && place.exists() && is_results()
 }
 
-/// What a file is of the capture in a folder.
-fn of_capture(folder: &Path, name: &Path, place: &Path) -> Option<&'static str> {
+/// The role of a file in the capture of a folder, if it belongs to it.
+fn role_in_capture(folder: &Path, name: &Path, place: &Path) -> Option<&'static str> {
     let cameras = folder.join(CAMERAS);
     if !cameras.is_file() {
         return None;
@@ -199,7 +200,7 @@ fn of_capture(folder: &Path, name: &Path, place: &Path) -> Option<&'static str> 
     }
     let text = std::fs::read(&cameras).ok()?;
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&text);
-    // What cannot be read may name anything.
+    // An unreadable file may name anything.
     let Ok(file) = serde_json::from_slice::<Value>(text) else {
         return Some("beside the broken cameras");
     };
@@ -216,7 +217,7 @@ fn of_capture(folder: &Path, name: &Path, place: &Path) -> Option<&'static str> 
     if exists && named(&file, "mesh_path").as_ref().is_some_and(same_stem) {
         return Some("the mesh");
     }
-    let beside = |file: &PathBuf| {
+    let is_beside = |file: &PathBuf| {
         file == place
             || (exists && file.parent() == place.parent() && file.parent() != Some(folder))
     };
@@ -228,12 +229,12 @@ fn of_capture(folder: &Path, name: &Path, place: &Path) -> Option<&'static str> 
             ("mask_path", "a mask"),
         ]
         .into_iter()
-        .find(|(field, _)| named(frame, field).as_ref().is_some_and(beside))
+        .find(|(field, _)| named(frame, field).as_ref().is_some_and(is_beside))
         .map(|(_, what)| what)
     })
 }
 
-/// Of which capture results are, as estimate.json and checkpoint.json say.
+/// The capture of results, as recorded in estimate.json and checkpoint.json.
 #[derive(Deserialize)]
 struct Reference {
     name: String,
@@ -271,11 +272,11 @@ impl Reference {
         let Ok(folder) = folder.canonicalize() else {
             return false;
         };
-        let lay = [
+        let places = [
             self.relative.as_ref().map(|path| results.join(path)),
             self.absolute.clone(),
         ];
-        (lay.into_iter().flatten()).any(|path| path.canonicalize().is_ok_and(|p| p == folder))
+        (places.into_iter().flatten()).any(|path| path.canonicalize().is_ok_and(|p| p == folder))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Linear pictures as PNG: exposure, then the sRGB curve, no tone curve.
+//! Linear pictures as PNG: exposure, then the sRGB curve, without tone mapping.
 
 use crate::error::{Error, Result};
 use crate::export::atomic::write_atomically;
@@ -8,10 +8,10 @@ use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use std::path::Path;
 
-/// The exposure that puts the 99th percentile of the picture's finite channel values at 1.
+/// The exposure that maps the 99th percentile of the finite channel values to 1.
 ///
-/// Where that percentile is not positive (a black picture with a few lights), the brightest value is put at 1;
-/// 1 for a picture with nothing above zero.
+/// If that percentile is not positive (a black picture with few lights), it maps the largest value to 1. It is 1 for a picture
+/// without positive values.
 pub fn percentile_exposure(pixels: &[glam::Vec3]) -> f32 {
     let mut values: Vec<f32> = pixels
         .iter()
@@ -32,7 +32,7 @@ pub fn percentile_exposure(pixels: &[glam::Vec3]) -> f32 {
     if white > 0.0 { white.recip() } else { 1.0 }
 }
 
-/// The exposure at which a photograph is shown: its own where it saturates, else the [`percentile_exposure`] of `pixels`.
+/// The exposure for display: that of a saturating photograph, else the [`percentile_exposure`] of `pixels`.
 pub fn shown_at(saturation: glam::Vec3, pixels: &[glam::Vec3]) -> f32 {
     if saturation.is_finite() {
         saturation.max_element().recip()
@@ -50,7 +50,7 @@ pub fn to_srgb_bytes(picture: &Picture, exposure: f32) -> Vec<u8> {
         .collect()
 }
 
-/// Writes a linear picture times an exposure as an 8-bit sRGB PNG. What is not a number shows as magenta.
+/// Writes a linear picture times an exposure as an 8-bit sRGB PNG. NaN shows as magenta.
 ///
 /// # Errors
 /// The file cannot be written, or the picture has no pixels.
@@ -77,7 +77,7 @@ pub fn png_bytes(picture: &Picture, exposure: f32) -> image::ImageResult<Vec<u8>
 /// Writes 8-bit sRGB bytes (three a pixel, row by row) as a PNG.
 ///
 /// # Errors
-/// The file cannot be written, or there are not three bytes a pixel.
+/// The file cannot be written, or the number of bytes does not match the size.
 pub fn write_png_bytes(path: &Path, width: u32, height: u32, bytes: &[u8]) -> Result<()> {
     let expected = u64::from(width) * u64::from(height) * 3;
     if expected == 0 || bytes.len() as u64 != expected {

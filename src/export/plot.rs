@@ -1,4 +1,4 @@
-//! Curves over time or cost, as PNG, with linear or logarithmic axes and without any system font.
+//! Line plots as PNG, with linear or logarithmic axes, without system fonts.
 
 use crate::error::{Error, Result};
 use crate::export::canvas::{Canvas, FONT, register_fonts};
@@ -13,7 +13,7 @@ use plotters::style::TextStyle;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::path::Path;
 
-/// Colours that stay apart for most eyes (Okabe and Ito 2008).
+/// Colours that most colour-blind readers can distinguish (Okabe and Ito 2008).
 const COLORS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -26,29 +26,29 @@ const COLORS: [RGBColor; 7] = [
 
 /// Width and height of a plot in pixels.
 const SIZE: (u32, u32) = (960, 600);
-/// Room that a letter of the name of a line needs, in pixels.
+/// Width of a letter of a mark's name, in pixels.
 const LETTER: i32 = 8;
-/// Room that the name of a point needs, in pixels.
+/// Width of a point's name, in pixels.
 const LABEL: i32 = 100;
 
-/// What an axis shows and how.
+/// Label and scale of an axis.
 #[derive(Debug, Clone, Default)]
 pub struct Axis {
     /// Name and unit.
     pub label: String,
-    /// Whether equal factors, rather than equal differences, take equal room. Values ≤ 0 are then left out.
+    /// Whether the scale is logarithmic; values ≤ 0 are then left out.
     pub logarithmic: bool,
 }
 
 /// How a series is drawn.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Draw {
-    /// Straight lines from point to point, with dots where there are few.
+    /// Straight lines between points, with dots if they are few.
     #[default]
     Line,
     /// Dots alone.
     Dots,
-    /// Level from each point to below the next, in black: what is reached, and kept.
+    /// A black staircase: each value holds until the next point.
     Steps,
 }
 
@@ -76,13 +76,13 @@ pub struct Plot {
     pub y: Axis,
     /// Curves, each in its own colour.
     pub series: Vec<Series>,
-    /// Named vertical lines.
+    /// Vertical lines with names.
     pub marks: Vec<(f64, String)>,
-    /// Named points.
+    /// Points with names.
     pub labels: Vec<([f64; 2], String)>,
 }
 
-/// The first row in which a name that begins at a pixel lies on no other; `rows` holds where the last name of each ends.
+/// The first row in which a name that starts at pixel `left` overlaps no other; `rows` holds the end of the last name in each.
 fn row_for(rows: &mut Vec<i32>, left: i32, name: &str) -> i32 {
     let row = (rows.iter().position(|&end| end <= left)).unwrap_or_else(|| {
         rows.push(0);
@@ -93,7 +93,7 @@ fn row_for(rows: &mut Vec<i32>, left: i32, name: &str) -> i32 {
 }
 
 impl Plot {
-    /// Draws the plot and writes it as a PNG. Points that are not finite are left out.
+    /// Draws the plot and writes it as a PNG. Leaves out points that are not finite.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -135,7 +135,7 @@ impl Plot {
             .bold_line_style(RGBColor(225, 225, 225))
             .draw()?;
 
-        // Marks lie below the curves.
+        // Marks below the curves.
         let mut rows: Vec<i32> = Vec::new();
         for (x, name) in self.marks.iter().filter(|(x, _)| self.x.shows(*x)) {
             let line = vec![(*x, bottom), (*x, top)];
@@ -147,7 +147,7 @@ impl Plot {
             chart.draw_series([EmptyElement::at((*x, top)) + text])?;
         }
 
-        // Bands, curves, and points where there are few.
+        // Bands, curves, and dots.
         for (series, color) in self.series.iter().zip(COLORS.iter().cycle()) {
             let banded = series.points.iter().zip(&series.band);
             let (lower, upper): (Vec<_>, Vec<_>) = banded
@@ -194,7 +194,7 @@ impl Plot {
         for (point, name) in self.labels.iter().filter(|(point, _)| shown(point)) {
             let at = (point[0], point[1]);
             chart.draw_series([Circle::new(at, 6, BLACK.stroke_width(2))])?;
-            // A name has no room to the right of what is near the right edge.
+            // Near the right edge, put the name to the left of its point.
             let near_edge = chart.backend_coord(&at).0 > SIZE.0 as i32 - LABEL;
             let (text, side) = match near_edge {
                 true => (format!("{name}   "), HPos::Right),
@@ -220,7 +220,7 @@ impl Plot {
 }
 
 impl Axis {
-    /// An axis with equal room for equal differences.
+    /// A linear axis.
     pub fn linear(label: &str) -> Self {
         Self {
             label: label.to_owned(),
@@ -228,7 +228,7 @@ impl Axis {
         }
     }
 
-    /// An axis with equal room for equal factors.
+    /// A logarithmic axis.
     pub fn logarithmic(label: &str) -> Self {
         Self {
             label: label.to_owned(),
@@ -236,13 +236,13 @@ impl Axis {
         }
     }
 
-    /// Whether a value has a place on the axis.
+    /// Whether a value can be shown.
     fn shows(&self, value: f64) -> bool {
         value.is_finite() && (value > 0.0 || !self.logarithmic)
     }
 }
 
-/// Corners of the staircase through points in order: level to the next point's place, then up or down to it.
+/// Corners of the staircase through points in order: horizontal to the next point's x, then vertical.
 fn steps(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let turns = points.windows(2).flat_map(|pair| {
         let [from, to] = [pair[0], pair[1]];
@@ -251,8 +251,8 @@ fn steps(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     points.first().copied().into_iter().chain(turns).collect()
 }
 
-/// The course of a solve over seconds, with its stages marked: loss in the fit and on held-out pixels, and the relative residual of
-/// the fit after each iteration.
+/// Loss of a solve over seconds, in the fit and on held-out pixels, and the relative residual of the fit after each
+/// iteration, with the stages marked.
 pub fn loss_plot(losses: &[LossPoint], fits: &[FitPoint], stages: &[Stage]) -> Plot {
     let curve = |name: &str, value: fn(&LossPoint) -> Option<f64>| Series {
         name: name.to_owned(),
@@ -303,7 +303,7 @@ mod tests {
         image::open(&path).expect("a PNG").to_rgb8()
     }
 
-    /// The mean row of the pixels near a colour, over some columns.
+    /// The mean row of the pixels near a colour, in a range of columns.
     fn height_of(image: &image::RgbImage, color: RGBColor, columns: std::ops::Range<u32>) -> f64 {
         let rows: Vec<f64> = image
             .enumerate_pixels()

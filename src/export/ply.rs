@@ -3,13 +3,13 @@
 use crate::capture::mesh::Mesh;
 use crate::error::Result;
 use crate::export::atomic::write_atomically;
-use crate::export::scene::Part;
+use crate::export::part::Part;
 use glam::Vec3;
 use std::io::Write;
 use std::path::Path;
 
-/// Writes all parts as one mesh: positions, albedo as linear 8-bit `red green blue`, and for each face `object_id`,
-/// whose names are in the comments, and the emitted radiance. [`crate::capture::read`] reads it back.
+/// Writes all parts as one mesh: positions, albedo as linear 8-bit `red green blue`, and for each face its emission and
+/// `object_id`, whose names are in the comments. [`crate::capture::read`] reads it back.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -62,7 +62,7 @@ pub fn write_scene(path: &Path, parts: &[Part]) -> Result<()> {
     })
 }
 
-/// Writes one part with linear vertex colours `r g b` where its albedo varies, as Mitsuba's mesh attributes want it.
+/// Writes one part, with linear vertex colours `r g b` where its albedo varies, as Mitsuba's mesh attributes require.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -93,8 +93,8 @@ pub fn write_part(path: &Path, part: &Part) -> Result<()> {
     })
 }
 
-/// Writes a mesh as it is: positions in double precision, linear vertex colours as floats, texture coordinates a corner, and
-/// each face's `object_id` with the names in comments if `with_objects`. [`crate::capture::read`] reads it back.
+/// Writes a mesh: positions in double precision, linear vertex colours as floats, texture coordinates per corner, and, if
+/// `with_objects`, each face's `object_id` with the names in comments. [`crate::capture::read`] reads it back.
 ///
 /// # Errors
 /// The file cannot be written.

@@ -1,4 +1,4 @@
-//! The light at a point, as a panorama for other renderers.
+//! Light probes: the light at a point as a panorama.
 
 use crate::error::{Error, Result};
 use crate::export::atomic::write_atomically;
@@ -15,13 +15,13 @@ use std::path::Path;
 
 /// Rows of a written panorama; it has twice as many columns.
 const HEIGHT: u32 = 128;
-/// Paths a pixel of a written panorama.
+/// Samples per pixel of a written panorama.
 const SAMPLES: u32 = 64;
 
 /// Writes the radiance that arrives at a point of the capture as an equirectangular panorama (.exr or .hdr).
 ///
 /// # Errors
-/// The file cannot be written or has another ending, or the point is not finite.
+/// The file cannot be written or has another extension, or the point is not finite.
 pub fn write(path: &Path, world: &Lit, at: DVec3) -> Result<()> {
     if !at.is_finite() {
         return Err(Error::usage(
@@ -54,7 +54,7 @@ pub fn write(path: &Path, world: &Lit, at: DVec3) -> Result<()> {
     }
 }
 
-/// Radiance arriving at a point in scene coordinates, over all directions: the mean over each pixel in angle.
+/// Radiance arriving at a point in scene coordinates from all directions, averaged over each pixel.
 ///
 /// Row 0 is around +y and columns turn from +x to +z, as in [`crate::transport::environment::Environment`].
 pub fn panorama(world: &Lit, point: Vec3, height: u32, samples: u32, seed: u64) -> Picture {

@@ -1,4 +1,4 @@
-//! Photographs and depth images of lenses that a capture does not have, resampled to a pinhole of the same focal length.
+//! Resamples photographs and depth images of lenses that captures do not support to a pinhole of the same focal length.
 
 use crate::capture::import::Lens;
 use crate::capture::photograph::{Encoding, Photograph};
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use std::io::Cursor;
 use std::path::Path;
 
-/// Where the pixel centre (i, j) of the pinhole lies in the lens's own image; `None` where the lens says nothing.
+/// Position in the lens's image of the pinhole's pixel centre (i, j); `None` where the lens is not defined.
 fn source_of(lens: &Lens, i: u32, j: u32) -> Option<DVec2> {
     let k = lens.intrinsics();
     let p = DVec2::new(
@@ -22,8 +22,8 @@ fn source_of(lens: &Lens, i: u32, j: u32) -> Option<DVec2> {
     lens.project(p.extend(1.0))
 }
 
-/// The photograph as the pinhole of [`Lens::intrinsics`] would have taken it, interpolated bilinearly in linear light; pixels
-/// that the lens did not see, and mixtures with unusable ones, are unusable.
+/// The photograph as the pinhole of [`Lens::intrinsics`] would have taken it, interpolated bilinearly in linear light. Pixels
+/// outside of the lens's image, or interpolated from unusable ones, are unusable.
 pub fn photograph(source: &Photograph, lens: &Lens) -> Photograph {
     let (width, height) = (source.width, source.height);
     let usable = |i: usize| source.usable.get(i).copied().unwrap_or(true);
@@ -61,7 +61,7 @@ pub fn photograph(source: &Photograph, lens: &Lens) -> Photograph {
     }
 }
 
-/// Depth values as the pinhole would have seen them: the nearest pixel's, 0 where the lens saw nothing.
+/// Depth values as the pinhole would have seen them: the nearest pixel's, 0 outside of the lens's image.
 pub fn depth(values: &[u16], lens: &Lens) -> Vec<u16> {
     let k = lens.intrinsics();
     let (width, height) = (k.width, k.height);
@@ -82,7 +82,7 @@ pub fn depth(values: &[u16], lens: &Lens) -> Vec<u16> {
 }
 
 /// Writes a photograph with its unusable pixels transparent: `NAME.exr` for linear values, else `NAME.png` with 16 bits a
-/// channel. Returns the name's ending.
+/// channel. Returns the extension.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -118,10 +118,10 @@ pub fn write_photograph(stem: &Path, photograph: &Photograph) -> Result<&'static
     Ok("png")
 }
 
-/// Writes 16-bit values as a grey PNG.
+/// Writes 16-bit values as a greyscale PNG.
 ///
 /// # Errors
-/// The file cannot be written, or there is not one value a pixel.
+/// The file cannot be written, or the number of values does not match the size.
 pub fn write_depth(path: &Path, size: [u32; 2], values: Vec<u16>) -> Result<()> {
     let image: ImageBuffer<Luma<u16>, Vec<u16>> =
         ImageBuffer::from_raw(size[0], size[1], values)

@@ -1,4 +1,4 @@
-//! A plot axis' range, with round ticks, linear or logarithmic.
+//! A plot axis with round ticks, linear or logarithmic.
 
 use plotters::coord::ranged1d::{
     KeyPointHint, NoDefaultFormatting, Ranged, ReversibleRanged, ValueFormatter,
@@ -14,7 +14,7 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// A scale that holds all values with a little room, and is never empty. A logarithmic scale needs values > 0.
+    /// A scale that holds all values with a margin, and is never empty. A logarithmic scale needs values > 0.
     pub fn around(values: impl Iterator<Item = f64>, logarithmic: bool) -> Self {
         let (mut low, mut high) = values
             .map(|v| if logarithmic { v.log10() } else { v })
@@ -74,7 +74,7 @@ impl Ranged for Scale {
         let span = self.high - self.low;
         let decades = if self.logarithmic { span.ceil() } else { 0.0 };
 
-        // Logarithmic: 1, 2 and 5 in each decade, or decades alone where there are many.
+        // Logarithmic: ticks at 1, 2 and 5 of each decade, or only at decades if there are many.
         if self.logarithmic && decades > 1.0 {
             let step = (span / wanted).ceil().max(1.0);
             let digits: &[f64] = if span < 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
@@ -90,15 +90,15 @@ impl Ranged for Scale {
                 .collect();
         }
 
-        // Linear: the smallest of 1, 2, 5 × 10ⁿ that gives no more ticks than wanted.
+        // Linear: the smallest step of 1, 2 or 5 × 10ⁿ that gives at most the wanted number of ticks.
         let (low, high) = (self.low(), self.high());
-        let raw = (high - low) / wanted;
-        let power = 10f64.powf(raw.log10().floor());
+        let min_step = (high - low) / wanted;
+        let power = 10f64.powf(min_step.log10().floor());
         let step = [1.0, 2.0, 5.0, 10.0]
             .into_iter()
             .map(|m| m * power)
-            .find(|&step| step >= raw)
-            .unwrap_or(raw);
+            .find(|&step| step >= min_step)
+            .unwrap_or(min_step);
         let first = (low / step).ceil();
         (0..=wanted as usize)
             .map(|i| (first + i as f64) * step)

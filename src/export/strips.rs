@@ -1,4 +1,4 @@
-//! Numbers in named rows as dots, in two panels side by side, as PNG.
+//! Strip plots as PNG: the values of named rows as dots, in two panels side by side.
 
 use crate::error::{Error, Result};
 use crate::export::canvas::{Canvas, FONT, register_fonts};
@@ -17,38 +17,41 @@ const DOT: RGBColor = RGBColor(0, 114, 178);
 const MARK: RGBColor = RGBColor(213, 94, 0);
 const GRID: RGBColor = RGBColor(225, 225, 225);
 
-/// Width of the picture, of the names of rows, height of a row and of all else, in pixels.
+/// Width of the picture in pixels.
 const WIDTH: u32 = 1200;
+/// Width of the column of row names in pixels.
 const NAMES: i32 = 110;
+/// Height of a row in pixels.
 const ROW: u32 = 44;
+/// Height of title, axis and margins in pixels.
 const FRAME: u32 = 130;
 
-/// Numbers of rows, in two panels.
+/// A strip plot.
 #[derive(Debug, Clone)]
 pub struct Strips {
     /// Title above.
     pub title: String,
     /// Names of the rows, from the top.
     pub rows: Vec<String>,
-    /// Left and right.
+    /// Left and right panel.
     pub panels: [Panel; 2],
 }
 
-/// One number of everything.
+/// One quantity for all rows.
 #[derive(Debug, Clone, Default)]
 pub struct Panel {
-    /// What it is.
+    /// Label of the axis.
     pub label: String,
-    /// Whether equal factors, rather than equal differences, take equal room. Values ≤ 0 are then left out.
+    /// Whether the scale is logarithmic; values ≤ 0 are then left out.
     pub logarithmic: bool,
-    /// The numbers of each row.
+    /// The values of each row.
     pub values: Vec<Vec<f64>>,
-    /// A number to compare with.
+    /// A reference value, drawn as a vertical line.
     pub mark: Option<f64>,
 }
 
 impl Strips {
-    /// Draws and writes a PNG. What is not finite is left out.
+    /// Draws the plot and writes it as a PNG. Leaves out values that are not finite.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -127,7 +130,7 @@ impl Panel {
                 chart.draw_series([PathElement::new(bar, style)])?;
             }
         }
-        // Names stand beside the left panel alone.
+        // Only the left panel has row names.
         if names >= NAMES {
             for (row, name) in rows.iter().enumerate() {
                 let (_, y) = chart.backend_coord(&(low, row as f64 + 0.5));

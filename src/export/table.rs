@@ -17,9 +17,9 @@ pub enum Cell {
     Text(String),
     /// A number in its shortest exact form.
     Number(f64),
-    /// A whole number.
+    /// An integer.
     Whole(u64),
-    /// Nothing.
+    /// An empty cell.
     Empty,
 }
 
@@ -39,7 +39,7 @@ impl Table {
         self.text.push_str(&Self::line(cells));
     }
 
-    /// A row as text, with the end of its line.
+    /// A row as text, with its newline.
     pub fn line(cells: &[Cell]) -> String {
         let fields: Vec<String> = cells.iter().map(Cell::field).collect();
         fields.join(",") + "\n"

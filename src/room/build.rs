@@ -1,4 +1,4 @@
-//! Where everything stands and what it is made of.
+//! Geometry and materials of the built-in room.
 
 use crate::capture::mesh::Mesh;
 use crate::math::picture::Picture;
@@ -9,11 +9,11 @@ use crate::transport::material::{Albedo, Material, Texture};
 use glam::{DAffine3, DVec2, DVec3, Vec3};
 use std::sync::Arc;
 
-/// Half the room's width and depth, and its height, in metres. The floor is y = 0, its middle the origin.
+/// Half the room's width in metres. The floor is y = 0, with its centre at the origin.
 pub const HALF_WIDTH: f64 = 2.5;
-/// See [`HALF_WIDTH`].
+/// Half the room's depth in metres.
 pub const HALF_DEPTH: f64 = 2.0;
-/// See [`HALF_WIDTH`].
+/// The room's height in metres.
 pub const HEIGHT: f64 = 2.55;
 
 /// Radiance of the ceiling lamp, a neutral white panel.
@@ -21,41 +21,41 @@ const CEILING_LAMP: Vec3 = Vec3::new(17.0, 16.0, 14.2);
 /// Radiance of the floor lamp, a warm paper lantern.
 const FLOOR_LAMP: Vec3 = Vec3::new(9.5, 5.2, 2.1);
 
-/// What an object is made of, before its texture knows the mesh.
-enum Finish {
+/// Material of an object; a texture still lacks its coordinates.
+enum ObjectMaterial {
     Plain(Vec3),
     Lamp { albedo: Vec3, emission: Vec3 },
     Printed(Picture),
 }
 
-/// Collects objects with their finishes.
+/// Collects objects with their materials.
 #[derive(Default)]
 struct Builder {
     modeller: Modeller,
-    finishes: Vec<Finish>,
+    materials: Vec<ObjectMaterial>,
 }
 
 impl Builder {
-    /// An object made in room coordinates.
-    fn add(&mut self, name: &str, finish: Finish, shapes: impl FnOnce(&mut Modeller)) {
+    /// Adds an object built in room coordinates.
+    fn add(&mut self, name: &str, material: ObjectMaterial, shapes: impl FnOnce(&mut Modeller)) {
         self.modeller.object(name);
-        self.finishes.push(finish);
+        self.materials.push(material);
         shapes(&mut self.modeller);
     }
 
-    /// A plain object.
+    /// Adds an object of constant albedo.
     fn plain(&mut self, name: &str, albedo: [f32; 3], shapes: impl FnOnce(&mut Modeller)) {
-        self.add(name, Finish::Plain(albedo.into()), shapes);
+        self.add(name, ObjectMaterial::Plain(albedo.into()), shapes);
     }
 }
 
-/// Stands something at (x, y, z), turned by degrees about the vertical, counter-clockwise from above.
+/// Placement at (x, y, z), rotated by degrees about the vertical, counter-clockwise seen from above.
 fn at(x: f64, y: f64, z: f64, degrees: f64) -> DAffine3 {
     DAffine3::from_translation(DVec3::new(x, y, z))
         * DAffine3::from_rotation_y(degrees.to_radians())
 }
 
-/// The room's mesh and one material an object.
+/// The room's mesh and the material of each object.
 pub fn build() -> (Mesh, Vec<Material>) {
     let mut b = Builder::default();
     shell(&mut b);
@@ -68,12 +68,12 @@ pub fn build() -> (Mesh, Vec<Material>) {
     let mesh = b.modeller.mesh;
     let corner_uvs = Arc::new(mesh.corner_uvs.clone());
     let materials = b
-        .finishes
+        .materials
         .into_iter()
-        .map(|finish| match finish {
-            Finish::Plain(albedo) => Material::diffuse(albedo, Vec3::ZERO),
-            Finish::Lamp { albedo, emission } => Material::diffuse(albedo, emission),
-            Finish::Printed(picture) => Material {
+        .map(|material| match material {
+            ObjectMaterial::Plain(albedo) => Material::diffuse(albedo, Vec3::ZERO),
+            ObjectMaterial::Lamp { albedo, emission } => Material::diffuse(albedo, emission),
+            ObjectMaterial::Printed(picture) => Material {
                 albedo: Albedo::Image(
                     Arc::new(Texture {
                         width: picture.width,
@@ -136,15 +136,15 @@ fn shell(b: &mut Builder) {
     });
 }
 
-/// The ceiling panel in its rim and the lantern on its stand.
+/// The ceiling lamp in its rim, and the floor lamp on its stand.
 fn lamps(b: &mut Builder) {
     let (width, depth) = (0.84, 0.46);
     let emission = CEILING_LAMP;
-    let finish = Finish::Lamp {
+    let material = ObjectMaterial::Lamp {
         albedo: Vec3::splat(0.70),
         emission,
     };
-    b.add("ceiling-lamp", finish, |m| {
+    b.add("ceiling-lamp", material, |m| {
         let corner = DVec3::new(-width * 0.5, HEIGHT - 0.035, -depth * 0.5);
         m.grid(corner, DVec3::X * width, DVec3::Z * depth, 4, 2);
     });
@@ -156,11 +156,11 @@ fn lamps(b: &mut Builder) {
         });
     });
     let place = at(-1.72, 0.0, -1.52, 0.0);
-    let finish = Finish::Lamp {
+    let material = ObjectMaterial::Lamp {
         albedo: Vec3::new(0.72, 0.66, 0.54),
         emission: FLOOR_LAMP,
     };
-    b.add("floor-lamp", finish, |m| {
+    b.add("floor-lamp", material, |m| {
         m.placed(place, |m| vessels::lantern(m, 1.42))
     });
     b.plain("floor-lamp-stand", [0.045, 0.045, 0.05], |m| {
@@ -198,18 +198,18 @@ fn seats(b: &mut Builder) {
     });
 }
 
-/// The rug, the coffee table and what stands on it.
+/// The rug, and the coffee table with its vessels.
 fn tables(b: &mut Builder) {
     let center = DVec3::new(0.02, 0.0, 0.22);
     let (length, width) = (2.5, 1.65);
-    b.add("rug", Finish::Printed(texture::rug()), |m| {
+    b.add("rug", ObjectMaterial::Printed(texture::rug()), |m| {
         m.projection = Some(Projection {
             origin: center,
             u_axis: DVec3::X / length,
             v_axis: DVec3::NEG_Z / width,
             offset: DVec2::splat(0.5),
         });
-        // Sunk so far that its edge leaves the floor upright.
+        // Sunk into the floor to hide the rounding of its lower edge.
         let half = DVec3::new(length * 0.5, 0.0125, width * 0.5);
         m.rounded_box(center + DVec3::Y * 0.0005, half, 0.005, 1);
     });
@@ -232,7 +232,7 @@ fn shelves(b: &mut Builder) {
     b.plain("bookcase", [0.16, 0.085, 0.045], |m| {
         m.placed(bookcase, |m| woodwork::bookcase(m, 0.98, 0.30));
     });
-    b.add("books", Finish::Printed(texture::books()), |m| {
+    b.add("books", ObjectMaterial::Printed(texture::books()), |m| {
         m.placed(bookcase, |m| woodwork::books(m, 0.98, 0.30));
     });
     b.plain("sideboard", [0.78, 0.77, 0.74], |m| {
@@ -256,7 +256,7 @@ fn shelves(b: &mut Builder) {
 fn decoration(b: &mut Builder) {
     let (width, height) = (1.0, 0.70);
     let wall = at(0.05, 1.52, -HALF_DEPTH, 0.0);
-    b.add("poster", Finish::Printed(texture::poster()), |m| {
+    b.add("poster", ObjectMaterial::Printed(texture::poster()), |m| {
         m.projection = Some(Projection {
             origin: wall.translation,
             u_axis: DVec3::X / width,

@@ -1,4 +1,4 @@
-//! Where the room's photographs are taken from.
+//! Camera poses of the room's photographs.
 
 use crate::capture::camera::{Intrinsics, Pose};
 use glam::{DMat3, DVec3};
@@ -6,20 +6,20 @@ use glam::{DMat3, DVec3};
 /// Width and height of the embedded photographs in pixels.
 pub const SIZE: [u32; 2] = [160, 120];
 
-/// Half the horizontal field of view of rooms of our own, as a tangent.
+/// Tangent of half the horizontal field of view in the built-in and generated rooms.
 const HALF_FIELD: f64 = 0.82;
 
-/// From where a photograph is taken, and how wide.
+/// Pose and field of view of a photograph.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
     /// The camera in room coordinates.
     pub pose: Pose,
-    /// Half the horizontal field of view, as a tangent.
+    /// Tangent of half the horizontal field of view.
     pub half_field: f64,
 }
 
 impl View {
-    /// From `eye` towards `target` with a level camera, as wide as the photographs of the built-in room.
+    /// A level view from `eye` towards `target`, with the built-in room's field of view.
     pub fn towards(eye: DVec3, target: DVec3) -> Self {
         Self {
             pose: look_at(eye, target),
@@ -27,14 +27,14 @@ impl View {
         }
     }
 
-    /// The same for eyes and targets in a table.
+    /// Views from a table of eyes and targets.
     pub fn all(table: &[[[f64; 3]; 2]]) -> Vec<Self> {
         let view = |&[eye, target]: &[[f64; 3]; 2]| Self::towards(eye.into(), target.into());
         table.iter().map(view).collect()
     }
 }
 
-/// The views of the built-in room.
+/// Eye and target of the views of the built-in room.
 const VIEWS: [[[f64; 3]; 2]; 16] = [
     // The four corners, across the room.
     [[1.95, 1.55, 1.75], [-0.6, 0.75, -0.9]],
@@ -63,7 +63,7 @@ pub fn built_in() -> Vec<View> {
     View::all(&VIEWS)
 }
 
-/// Lens and pose of each view's photograph at a size in pixels: square pixels, and nothing bent or off its middle.
+/// Intrinsics and poses of the views at a size in pixels: square pixels, no distortion, principal point in the middle.
 pub fn cameras(views: &[View], [width, height]: [u32; 2]) -> Vec<(Intrinsics, Pose)> {
     let lens = |half_field: f64| {
         let focal = f64::from(width) * 0.5 / half_field;
@@ -82,7 +82,7 @@ pub fn cameras(views: &[View], [width, height]: [u32; 2]) -> Vec<(Intrinsics, Po
         .collect()
 }
 
-/// A level camera at `eye` whose optical axis goes through `target`.
+/// Pose of a level camera at `eye` that looks at `target`.
 fn look_at(eye: DVec3, target: DVec3) -> Pose {
     let back = (eye - target).normalize_or_zero();
     let right = DVec3::Y.cross(back).normalize_or_zero();

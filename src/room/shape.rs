@@ -1,10 +1,10 @@
-//! A small modeller: boxes, rounded boxes and lofted rings, collected into one mesh of named objects.
+//! A small modeller: boxes, rounded boxes and lofted rings, collected in one mesh of named objects.
 
 use crate::capture::mesh::Mesh;
 use glam::{DAffine3, DVec2, DVec3, Vec2};
 use std::f64::consts::{FRAC_PI_4, TAU};
 
-/// Texture coordinates as a linear function of position: u = (p − origin) · u_axis + offset.x, v likewise.
+/// Texture coordinates linear in position: u = (p − origin) · u_axis + offset.x, v likewise.
 #[derive(Debug, Clone, Copy)]
 pub struct Projection {
     /// The point whose coordinates are `offset`.
@@ -17,26 +17,26 @@ pub struct Projection {
     pub offset: DVec2,
 }
 
-/// Collects triangles, counter-clockwise seen from outside, into objects.
+/// Collects triangles, counter-clockwise seen from outside, in named objects.
 #[derive(Debug, Default)]
 pub struct Modeller {
-    /// What has been built so far.
+    /// Mesh built so far.
     pub mesh: Mesh,
-    /// Where shapes go: local to room coordinates.
+    /// Transform from local to room coordinates.
     pub placement: DAffine3,
-    /// Texture coordinates of the shapes to come; zero where there are none.
+    /// Texture coordinates of the next shapes; zero if `None`.
     pub projection: Option<Projection>,
 }
 
 impl Modeller {
-    /// Starts an object; shapes belong to it until the next one starts.
+    /// Starts an object; the shapes that follow belong to it.
     pub fn object(&mut self, name: &str) {
         self.mesh.objects.push(name.to_owned());
         self.placement = DAffine3::IDENTITY;
         self.projection = None;
     }
 
-    /// Runs `shapes` in coordinates placed within the present ones.
+    /// Runs `shapes` in local coordinates with a further transform.
     pub fn placed(&mut self, placement: DAffine3, shapes: impl FnOnce(&mut Self)) {
         let outer = self.placement;
         self.placement = outer * placement;
@@ -71,7 +71,7 @@ impl Modeller {
         self.mesh.corner_uvs.push(points.map(uv));
     }
 
-    /// A grid of `columns` × `rows` cells over a parallelogram, seen from the side of `u × v`.
+    /// A grid of `columns` × `rows` cells over a parallelogram; its front is on the side of `u × v`.
     pub fn grid(&mut self, corner: DVec3, u: DVec3, v: DVec3, columns: u32, rows: u32) {
         let lines = |count: u32| (0..=count).map(move |i| f64::from(i) / f64::from(count));
         let points: Vec<Vec<DVec3>> = lines(rows)
@@ -80,7 +80,7 @@ impl Modeller {
         self.surface(&points, false);
     }
 
-    /// Joins rows of equally many points by quads whose front is on the side of (along the row) × (to the next row).
+    /// Joins rows of equally many points by quads; their front is on the side of (along the row) × (to the next row).
     pub fn surface(&mut self, rows: &[Vec<DVec3>], closed: bool) {
         let rows: Vec<Vec<u32>> = rows
             .iter()
@@ -102,14 +102,14 @@ impl Modeller {
         self.rounded_box((low + high) * 0.5, half, 0.0, 0);
     }
 
-    /// A box of half sizes `half` with edges rounded by `radius` in `steps` facets a quarter turn.
+    /// A box of half sizes `half` whose edges are rounded by `radius`, in `steps` facets per quarter turn.
     pub fn rounded_box(&mut self, center: DVec3, half: DVec3, radius: f64, steps: u32) {
         let inner = half - DVec3::splat(radius);
         let ticks = |extent: f64| -> Vec<f64> {
             if steps == 0 {
                 return vec![-extent - radius, extent + radius];
             }
-            // tan spreads the facets evenly over the quarter turn.
+            // tan spaces the facets evenly over the quarter turn.
             let spread = |i: u32| radius * (FRAC_PI_4 * f64::from(i) / f64::from(steps)).tan();
             let end = (0..=steps).map(|i| extent + spread(i));
             end.clone().rev().map(|x| -x).chain(end).collect()
@@ -139,7 +139,7 @@ impl Modeller {
         }
     }
 
-    /// Joins rings of equally many points, each counter-clockwise seen from the last ring's side, and closes both ends.
+    /// Joins rings of equally many points, counter-clockwise seen from the last ring's side, and closes both ends.
     pub fn loft(&mut self, rings: &[Vec<DVec3>]) {
         let middle = |ring: &Vec<DVec3>| {
             let mean = ring.iter().sum::<DVec3>() / ring.len() as f64;
@@ -154,7 +154,7 @@ impl Modeller {
         self.surface(&closed, true);
     }
 
-    /// A solid of revolution about the local y axis through `profile` = (radius, height) points from bottom to top.
+    /// A solid of revolution about the local y axis; `profile` has (radius, height) points from bottom to top.
     pub fn lathe(&mut self, profile: &[[f64; 2]], sides: u32) {
         let rings: Vec<Vec<DVec3>> = profile
             .iter()
@@ -163,7 +163,7 @@ impl Modeller {
         self.loft(&rings);
     }
 
-    /// A straight round bar from one point to another, thickening or thinning on the way.
+    /// A straight round bar with a radius at each end.
     pub fn bar(&mut self, from: DVec3, to: DVec3, radii: [f64; 2], sides: u32) {
         let axis = (to - from).normalize_or_zero();
         let (u, v) = axis.any_orthonormal_pair();
@@ -175,7 +175,7 @@ impl Modeller {
     }
 }
 
-/// Points around an ellipse, turning from `u` to `v`.
+/// Points on an ellipse, turning from `u` to `v`.
 pub fn ring(center: DVec3, u: DVec3, v: DVec3, sides: u32) -> Vec<DVec3> {
     (0..sides)
         .map(|i| TAU * f64::from(i) / f64::from(sides))
@@ -187,7 +187,7 @@ pub fn ring(center: DVec3, u: DVec3, v: DVec3, sides: u32) -> Vec<DVec3> {
 mod tests {
     use super::*;
 
-    /// Volume by the divergence theorem: positive only if every face of a closed surface looks outwards.
+    /// Volume by the divergence theorem; positive only if the faces of a closed surface point outwards.
     fn volume(modeller: &Modeller) -> f64 {
         let mesh = &modeller.mesh;
         let corner = |i: u32| mesh.positions[i as usize];

@@ -1,10 +1,10 @@
-//! The pictures on textured objects, computed.
+//! Procedural textures of the built-in room.
 
 use crate::math::picture::Picture;
 use crate::math::rng::splitmix64;
 use glam::{Vec2, Vec3};
 
-/// Spines in the row that [`books`] paints.
+/// Number of spines in the picture of [`books`].
 pub const SPINES: u32 = 16;
 
 /// A woven rug: a border and two rows of nested diamonds, (u, v) over its length and width.
@@ -66,7 +66,7 @@ pub fn poster() -> Picture {
     })
 }
 
-/// Book spines side by side: one column of colour a book, with a pale title band.
+/// Book spines side by side: a column of colour for each book, with a pale title band.
 pub fn books() -> Picture {
     const INKS: [Vec3; 8] = [
         Vec3::new(0.42, 0.05, 0.04),
@@ -89,7 +89,7 @@ pub fn books() -> Picture {
     })
 }
 
-/// A fixed number in [0, 1) for a pair of whole numbers.
+/// Hash of two integers to a number in [0, 1).
 pub fn hash(x: u32, y: u32) -> f32 {
     (splitmix64(u64::from(x) << 32 | u64::from(y)) >> 40) as f32 / 16_777_216.0
 }

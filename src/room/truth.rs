@@ -1,4 +1,4 @@
-//! The truth about the room, as `relit evaluate` reads it.
+//! The ground truth of the room, in the format that `relit evaluate` reads.
 
 use crate::math::frame::Frame;
 use crate::math::picture::Picture;
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Points per object for its mean albedo, and paths per emitter for its irradiance.
+/// Sample points per object for its mean albedo, and paths per emitter for its irradiance.
 const SAMPLES: u64 = 1 << 16;
 
 /// The content of truth.json.
@@ -24,35 +24,35 @@ pub struct Truth {
     pub name: &'static str,
     /// The program that rendered the photographs.
     pub renderer: String,
-    /// Every bounce is in the photographs, with unbiased termination.
+    /// Most bounces in the photographs; `None` if unbounded.
     pub max_bounces: Option<u32>,
-    /// Paths a pixel in the photographs.
+    /// Samples per pixel of the photographs.
     pub spp: u32,
-    /// Key of the photographs' noise.
+    /// Random seed of the photographs.
     pub seed: u64,
-    /// Nothing shines in from outside.
+    /// Radiance from outside; `None` in the built-in room.
     pub outside_light: Option<[f32; 3]>,
-    /// By name.
+    /// Truth of each object by name.
     pub objects: BTreeMap<String, ObjectTruth>,
 }
 
-/// What is true of one object.
+/// The truth of one object.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ObjectTruth {
-    /// Diffuse reflectance, its mean over the area where it is textured.
+    /// Diffuse reflectance; the mean over the area if textured.
     pub albedo: [f32; 3],
     /// Emitted radiance.
     pub emission: [f32; 3],
-    /// Mean radiance that leaves an emitter, its own and what it reflects: emission + albedo · irradiance / π.
+    /// Mean radiance leaving an emitter: emission + albedo · irradiance / π.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exitance: Option<[f32; 3]>,
-    /// Roughness of its specular lobe; `None` where it is diffuse.
+    /// GGX roughness α of its specular lobe; `None` if diffuse.
     pub roughness: Option<f32>,
     /// Whether the albedo varies over the object.
     pub textured: bool,
     /// Number of triangles.
     pub triangles: usize,
-    /// Pixels of all photographs whose centre sees the object.
+    /// Number of pixels of all photographs whose centre sees the object.
     pub pixels: u64,
     /// Area in square metres.
     pub area: f64,
@@ -71,7 +71,7 @@ impl From<ObjectTruth> for crate::capture::truth::ObjectTruth {
     }
 }
 
-/// The truth about each object of a lit scene.
+/// The truth of each object of a lit scene.
 pub fn objects(world: &Lit) -> BTreeMap<String, ObjectTruth> {
     let scene = &world.scene;
     let seen = seen_pixels(world);
@@ -105,7 +105,7 @@ pub fn objects(world: &Lit) -> BTreeMap<String, ObjectTruth> {
         .collect()
 }
 
-/// Pixels of all cameras whose centre sees each object.
+/// Number of pixels of all cameras whose centre sees each object.
 pub fn seen_pixels(world: &Lit) -> Vec<u64> {
     let scene = &world.scene;
     let mut seen = vec![0; scene.objects.len()];
@@ -122,7 +122,7 @@ pub fn seen_pixels(world: &Lit) -> Vec<u64> {
     seen
 }
 
-/// The true albedo that a camera sees, the mean over 4 × 4 points of each pixel.
+/// The true albedo seen by a camera, averaged over 4 × 4 points of each pixel.
 pub fn albedo_picture(world: &Lit, camera: &Camera) -> Picture {
     const SIDE: u32 = 4;
     let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
@@ -138,7 +138,7 @@ pub fn albedo_picture(world: &Lit, camera: &Camera) -> Picture {
     })
 }
 
-/// The mean of a quantity over an object's area, from keyed random points.
+/// Mean of a quantity over an object's area, from stratified random points with fixed keys.
 fn mean_over_area(
     world: &Lit,
     object: usize,
@@ -146,22 +146,22 @@ fn mean_over_area(
 ) -> Vec3 {
     let scene = &world.scene;
     let triangles = &scene.objects[object].triangles;
-    let ends: Vec<f64> = triangles
+    let cumulative_areas: Vec<f64> = triangles
         .iter()
         .scan(0.0, |sum, &t| {
             *sum += f64::from(scene.areas[t as usize]);
             Some(*sum)
         })
         .collect();
-    let total = ends.last().copied().unwrap_or(0.0);
+    let total = cumulative_areas.last().copied().unwrap_or(0.0);
     let values: Vec<Vec3> = (0..SAMPLES)
         .into_par_iter()
         .map(|index| {
             let mut stream = Stream::new(0, object as u64, 0, index);
-            // Equal steps along the area, so that every triangle gets its fraction.
-            let along = (index as f64 + stream.uniform_f64()) / SAMPLES as f64 * total;
-            let chosen = ends
-                .partition_point(|&end| end <= along)
+            // Strata of equal area.
+            let area = (index as f64 + stream.uniform_f64()) / SAMPLES as f64 * total;
+            let chosen = cumulative_areas
+                .partition_point(|&sum| sum <= area)
                 .min(triangles.len() - 1);
             let [b1, b2] = uniform_triangle(stream.uniform2());
             let triangle = triangles[chosen];
@@ -180,7 +180,7 @@ fn mean_over_area(
     (sum / SAMPLES as f64).as_vec3()
 }
 
-/// Radiance arriving along a cosine-distributed direction on the front of a hit: its mean is irradiance / π.
+/// Radiance arriving at the front of a hit from a cosine-distributed direction; its mean is irradiance / π.
 fn arriving_radiance(world: &Lit, hit: &Hit, stream: &mut Stream) -> Vec3 {
     let normal = world.scene.normals[hit.triangle as usize];
     let direction = Frame::around(normal).to_world(cosine_hemisphere(stream.uniform2()));

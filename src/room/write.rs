@@ -1,34 +1,35 @@
-//! The room as a capture folder, with its truth.
+//! Writes the room as a capture folder, with its truth.
 
 use crate::error::Result;
 use crate::export::capture;
 use crate::export::new_folder::NewFolder;
 use crate::math::picture::Picture;
-use crate::room::photographs::{self, KEPT, Rendering};
+use crate::room::cameras;
+use crate::room::model::Room;
+use crate::room::photographs::{self, Rendering, STORED};
 use crate::room::truth::{self, Truth};
-use crate::room::{Room, cameras};
 use std::path::Path;
 
-/// Writes the room into a folder that is new or empty, whole or not at all: transforms.json, mesh.obj, images, truth.json and
+/// Writes the room into a new or empty folder, atomically: transforms.json, mesh.obj, images, truth.json and
 /// truth/albedo_NNN.exr.
 ///
-/// The photographs are the kept ones, byte for byte, or newly rendered.
+/// The photographs are the stored ones, byte for byte, or newly rendered.
 ///
 /// # Errors
-/// The folder holds something (see [`NewFolder`]), or a file cannot be written.
+/// The folder is not empty (see [`NewFolder`]), or a file cannot be written.
 pub fn write(out: &Path, rendering: Option<&Rendering>) -> Result<()> {
     let folder = NewFolder::new(out)?;
     let out = folder.path();
     let room = Room::new();
-    let made = rendering.unwrap_or(&KEPT);
+    let rendering_used = rendering.unwrap_or(&STORED);
     let images = out.join("images");
     match rendering {
         Some(rendering) => photographs::write(&images, &photographs::render(&room, rendering)?)?,
-        None => photographs::write_kept(&images)?,
+        None => photographs::write_stored(&images)?,
     }
     capture::write_mesh(out, &room.mesh)?;
 
-    let world = room.lit(made.size)?;
+    let world = room.lit(rendering_used.size)?;
     let albedo: Vec<Picture> = (world.scene.cameras.iter())
         .map(|camera| truth::albedo_picture(&world, camera))
         .collect();
@@ -36,13 +37,13 @@ pub fn write(out: &Path, rendering: Option<&Rendering>) -> Result<()> {
         name: "room",
         renderer: format!("relit {}", env!("CARGO_PKG_VERSION")),
         max_bounces: None,
-        spp: made.samples,
-        seed: made.seed,
+        spp: rendering_used.samples,
+        seed: rendering_used.seed,
         outside_light: None,
         objects: truth::objects(&world),
     };
     capture::write_truth(out, &truth, &albedo)?;
-    let cameras = cameras::cameras(&room.views, made.size);
+    let cameras = cameras::cameras(&room.views, rendering_used.size);
     capture::write_transforms(out, cameras.into_iter(), world.scene.up.as_dvec3())?;
-    folder.take_its_place()
+    folder.commit()
 }

@@ -1,4 +1,4 @@
-//! What the window or the command line asks of the worker.
+//! Commands of the window and the command line to the worker.
 
 use crate::calibrate::held_out::HoldOut;
 use crate::capture::place::Coordinates;
@@ -22,7 +22,7 @@ pub enum Source {
     Folder(PathBuf),
 }
 
-/// What a window begins with.
+/// What a window opens at its start.
 #[derive(Debug, Clone)]
 pub enum Start {
     /// A capture.
@@ -32,7 +32,7 @@ pub enum Start {
 }
 
 impl Source {
-    /// The folder that results go into where none is named: `relit-out/<capture>`.
+    /// Default folder of results: `relit-out/<capture>`.
     pub fn default_out(&self) -> PathBuf {
         let name = match self {
             Self::BuiltInRoom => "built-in-room".into(),
@@ -45,7 +45,7 @@ impl Source {
     }
 }
 
-/// What a capture is called by its folder: an imported one lies in `relit-out/NAME/capture`.
+/// Name of a capture by its folder; an imported one lies in `relit-out/NAME/capture`.
 fn named(folder: &Path) -> Option<&std::ffi::OsStr> {
     let name = folder.file_name()?;
     let imported = || {
@@ -56,121 +56,121 @@ fn named(folder: &Path) -> Option<&std::ffi::OsStr> {
     Some(imported().unwrap_or(name))
 }
 
-/// A request to the worker, taken between iterations.
+/// A command to the worker, carried out between iterations.
 #[derive(Debug, Clone)]
 pub enum Command {
-    /// Loads a capture and goes on with its last session; without one it is solved.
+    /// Open a capture and continue its last session; without one, solve it.
     Open(Source),
-    /// Reads the open capture anew and solves it as if it had never been open; the session so far is kept.
+    /// Read the open capture again and solve it from scratch, in a new session.
     StartOver,
-    /// Starts or goes on.
+    /// Start or continue solving.
     Run,
-    /// Stops between two iterations and keeps everything.
+    /// Pause between two iterations.
     Pause,
-    /// One iteration, then pause.
+    /// Run one iteration, then pause.
     Step,
-    /// Solves anew, with the changes made by hand and the inserted objects; the session so far is kept.
+    /// Solve from the start in a new session, keeping edits and inserted objects.
     Reset,
-    /// Ends the solve, keeping the estimate.
+    /// End the solve and keep the estimate.
     Finish,
-    /// Solves on from the last checkpoint, or from the start where there is none, with what the edits say is known.
+    /// Continue from the last checkpoint, or from the start without one, with the known values of the edits.
     SolveOn,
-    /// Replaces the parameters; those that are not live take effect at the next reset.
+    /// Replace the parameters. Those that are not live take effect at the next reset.
     Set(Box<Settings>),
-    /// Which view to keep rendering; replaces the view asked for before.
+    /// Render this view from now on.
     View(ViewRequest),
-    /// The inserted objects, all of them; replaces those before. Empty takes them away.
+    /// Replace the inserted objects; an empty list removes all.
     Insert(Vec<Placement>),
-    /// Whether inserted objects take the blur and the grain of 8-bit photographs; they do unless told otherwise.
+    /// Whether inserted objects get the blur and grain of 8-bit photographs; by default they do.
     Match(bool),
-    /// The changes made by hand to what is found, all of them; replaces those before.
+    /// Replace the edits of the estimate.
     Edit(Edits),
-    /// Writes what `relit solve` writes, into a folder, from the worker's own estimate.
+    /// Write what `relit solve` writes, from the worker's estimate, into a folder.
     Save(PathBuf),
-    /// Writes one file for another program.
+    /// Write a file for another program.
     Export(ExportRequest),
-    /// Writes the layers of the shown view's light as one OpenEXR file, as `relit render --layers` does.
+    /// Write the layers of the shown view's light as one OpenEXR file, like `relit render --layers`.
     SaveLayers(PathBuf),
-    /// Goes on with a session that is kept, or with what `Save` or `relit solve` wrote into a folder.
+    /// Continue a kept session, or results written by `Save` or `relit solve`.
     Resume(PathBuf),
-    /// Removes a session that is kept, for good.
+    /// Delete a kept session.
     Remove(PathBuf),
-    /// Reads the open capture again with other options, keeping what was found and changed.
+    /// Read the open capture again with other options, keeping estimate and edits.
     Reframe(Box<OpenOptions>),
-    /// Changes the objects of the open capture. What was found is forgotten, and the solve starts over.
+    /// Change the objects of the open capture, drop the estimate, and solve from the start.
     Regroup(Box<Regrouping>),
-    /// Ends the worker.
+    /// End the worker.
     Quit,
 }
 
-/// Other objects of a capture.
+/// A change of a capture's objects.
 #[derive(Debug, Clone)]
 pub struct Regrouping {
-    /// Which capture, by its hash; nothing happens where another one is open by now.
+    /// Hash of the capture. The command is ignored if another capture is open.
     pub hash: String,
-    /// All changes since the capture was read, in place of those before.
+    /// All changes since the capture was read; they replace earlier ones.
     pub changes: Vec<Regroup>,
-    /// The changes made by hand to what is found, by the new objects' places.
+    /// Edits of the estimate, by the indices of the new objects.
     pub edits: Edits,
 }
 
-/// What to look at.
+/// A view to render.
 #[derive(Debug, Clone)]
 pub struct ViewRequest {
-    /// From where.
+    /// The camera.
     pub camera: ViewCamera,
     /// Long side of the picture in pixels, at most the photograph's.
     pub long_side: u32,
-    /// Long side in pixels of the frame's photograph as it was changed, at most its file's; 0 where nobody looks at it.
+    /// Long side of the composite in pixels, at most the photograph file's; 0 if it is not shown.
     pub composite: u32,
-    /// Whether anybody looks at the re-render; without it there is a coarse one alone.
+    /// Whether the render is shown; if not, only a coarse one is made.
     pub render: bool,
-    /// Whether the light of each lamp is kept apart.
+    /// Whether to render the light of each lamp separately.
     pub layers: bool,
 }
 
 /// A camera to render from.
 #[derive(Debug, Clone)]
 pub enum ViewCamera {
-    /// A photograph's own.
+    /// A photograph's camera.
     Frame(usize),
-    /// Any other, in scene coordinates.
+    /// Another camera, in scene coordinates.
     Free(Box<Camera>),
 }
 
 /// A file to write for another program.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExportRequest {
-    /// What to write.
+    /// Format of the file.
     pub format: ExportFormat,
-    /// Where.
+    /// Path of the file.
     pub path: PathBuf,
 }
 
-/// How a capture is read.
+/// Options for reading a capture.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct OpenOptions {
-    /// Up axis in the capture's coordinates; `None` takes the cameras' mean up.
+    /// Up axis in the capture's coordinates; `None` for the cameras' mean up.
     pub up: Option<DVec3>,
-    /// How the files' numbers are meant.
+    /// Conventions of the files' numbers.
     #[serde(skip_serializing_if = "Reading::is_default")]
     pub reading: Reading,
-    /// Scale and ground.
+    /// Scale and ground level.
     #[serde(flatten)]
     pub coordinates: Coordinates,
-    /// Number of segments that a mesh without objects is cut into; `None` chooses.
+    /// Number of segments of a mesh without objects; `None` chooses it.
     pub segments: Option<u64>,
-    /// What says nothing when a mesh is cut into segments, as it is kept out of every fit.
+    /// Pixels held out of all fits; segmentation must not use them either.
     #[serde(flatten)]
     pub hold_out: HoldOut,
-    /// How its objects were changed by hand.
+    /// Changes of its objects by hand.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub objects: Vec<Regroup>,
-    /// Whether it is looked whether the photographs show the mesh from their poses.
+    /// Whether to check that the photographs show the mesh from their poses.
     #[serde(skip)]
     pub check_alignment: bool,
-    /// Whether paths in the capture may lead out of its folder. Never kept in files, which may be someone else's.
+    /// Whether paths in the capture may leave its folder. Not stored in files, which may come from someone else.
     #[serde(skip)]
     pub allow_outside: bool,
 }

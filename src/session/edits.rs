@@ -1,4 +1,4 @@
-//! Changes made by hand to what a solver found: lamps off, walls recoloured, surfaces polished.
+//! Edits of an estimate by hand: lamps off, walls recoloured, surfaces polished.
 
 use crate::error::{Error, Result};
 use crate::inverse::estimate::{Estimate, TexelEstimate};
@@ -13,33 +13,31 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-/// GGX roughness α and specular reflectance of a lobe of which an edit leaves one open and none was found: a satin
-/// dielectric.
+/// GGX roughness α and specular reflectance of a new lobe, where an edit gives only one of them: a satin dielectric.
 const SATIN: (f32, f32) = (0.3, DIELECTRIC);
 
-/// What is changed of one object.
+/// Edits of one object. `None` keeps the estimate's value.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct ObjectEdit {
-    /// Diffuse reflectance, linear RGB in [0, 1], instead of the estimate's colour or texture.
+    /// Diffuse reflectance, linear RGB in [0, 1]; replaces the estimate's colour or texture.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub albedo: Option<Vec3>,
-    /// Emitted radiance, W·sr⁻¹·m⁻², instead of the estimate's.
+    /// Emitted radiance, W·sr⁻¹·m⁻².
     #[serde(skip_serializing_if = "Option::is_none")]
     pub emission: Option<Vec3>,
-    /// Whether it emits nothing, whatever its emission.
+    /// Whether the object emits nothing, whatever its emission.
     pub off: bool,
-    /// GGX roughness α in (0, 1] of its lobe, instead of the estimate's; gives it a lobe where none was found.
+    /// GGX roughness α in (0, 1]; adds a lobe if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub roughness: Option<f32>,
-    /// Specular reflectance at normal incidence in [0, 1], instead of the estimate's; gives it a lobe where none was
-    /// found, and 0 takes the lobe away.
+    /// Specular reflectance at normal incidence in [0, 1]; adds a lobe if there is none, and 0 removes it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub specular: Option<f32>,
-    /// Whether `albedo` is known, and held while the rest is solved.
+    /// Whether `albedo` is known and held fixed by a solve.
     #[serde(skip_serializing_if = "is_false")]
     pub albedo_known: bool,
-    /// Whether `emission` is known, and held while the rest is solved.
+    /// Whether `emission` is known and held fixed by a solve.
     #[serde(skip_serializing_if = "is_false")]
     pub emission_known: bool,
 }
@@ -49,7 +47,7 @@ fn is_false(flag: &bool) -> bool {
 }
 
 impl ObjectEdit {
-    /// The emission of an object whose estimate is `found`.
+    /// The edited emission of an object with the estimate `found`.
     pub fn emission(&self, found: Vec3) -> Vec3 {
         match self.emission {
             _ if self.off => Vec3::ZERO,
@@ -58,14 +56,13 @@ impl ObjectEdit {
         }
     }
 
-    /// The albedo of an object whose estimate is `found`.
+    /// The edited albedo of an object with the estimate `found`.
     pub fn albedo(&self, found: Vec3) -> Vec3 {
         let albedo = self.albedo.map(|a| a.clamp(Vec3::ZERO, Vec3::ONE));
         albedo.unwrap_or(found)
     }
 
-    /// GGX roughness α and specular reflectance of an object for which an estimate has those of `found`; `None` where
-    /// it has no lobe.
+    /// The edited GGX roughness α and specular reflectance of an object with the estimate `found`; `None` without a lobe.
     pub fn lobe(&self, found: Option<(f32, f32)>) -> Option<(f32, f32)> {
         if self.roughness.is_none() && self.specular.is_none() {
             return found;
@@ -76,7 +73,7 @@ impl ObjectEdit {
         (specular > 0.0).then_some((roughness.clamp(MIN_ROUGHNESS, 1.0), specular))
     }
 
-    /// What is known of the object.
+    /// The known values of the object.
     pub fn known(&self) -> Pinned {
         Pinned {
             albedo: self.albedo.filter(|_| self.albedo_known),
@@ -86,7 +83,7 @@ impl ObjectEdit {
     }
 }
 
-/// All changes to an estimate.
+/// All edits of an estimate.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Edits {
     objects: BTreeMap<usize, ObjectEdit>,
@@ -94,12 +91,12 @@ pub struct Edits {
 }
 
 impl Edits {
-    /// What is changed of an object.
+    /// The edits of an object.
     pub fn object(&self, object: usize) -> ObjectEdit {
         self.objects.get(&object).copied().unwrap_or_default()
     }
 
-    /// Replaces what is changed of an object.
+    /// Replaces the edits of an object.
     pub fn set(&mut self, object: usize, edit: ObjectEdit) {
         if edit == ObjectEdit::default() {
             self.objects.remove(&object);
@@ -108,7 +105,7 @@ impl Edits {
         }
     }
 
-    /// The same changes where the objects have other places; those of objects that are no more are left out.
+    /// The edits for other object indices: `places` maps old to new ones. Drops those of removed objects.
     pub fn moved(&self, places: &[Option<u32>]) -> Self {
         let objects = self.objects.iter();
         Self {
@@ -121,7 +118,7 @@ impl Edits {
         }
     }
 
-    /// What is known of the scene, and held while the rest is solved.
+    /// The known values of the scene, which a solve holds fixed.
     pub fn known(&self) -> Known {
         let mut known = Known::default();
         for (&object, edit) in &self.objects {
@@ -130,7 +127,7 @@ impl Edits {
         known
     }
 
-    /// Factors on red, green and blue of the light from outside.
+    /// RGB factors on the light from outside.
     pub fn outside(&self) -> Vec3 {
         self.outside.unwrap_or(Vec3::ONE)
     }
@@ -140,12 +137,12 @@ impl Edits {
         self.outside = (factor != Vec3::ONE).then_some(factor);
     }
 
-    /// Whether nothing is changed.
+    /// Whether there are no edits.
     pub fn is_empty(&self) -> bool {
         self.objects.is_empty() && self.outside.is_none()
     }
 
-    /// An estimate with these changes. Standard errors stay those of what was found.
+    /// Applies the edits to an estimate. Standard errors remain those of the estimate.
     pub fn apply(&self, estimate: &Estimate) -> Estimate {
         let mut edited = estimate.clone();
         for (&object, edit) in &self.objects {
@@ -156,7 +153,7 @@ impl Edits {
             (entry.roughness, entry.specular) = edit.lobe(entry.lobe()).unzip();
             if edit.albedo.is_some() {
                 entry.albedo = edit.albedo(entry.albedo);
-                unpaint(&mut edited, object);
+                remove_texture(&mut edited, object);
             }
         }
         if let (Some(factor), Some(outside)) = (self.outside, &mut edited.outside) {
@@ -166,7 +163,7 @@ impl Edits {
         edited
     }
 
-    /// The changes as files hold them, by the names of objects; `None` where nothing is changed.
+    /// The edits as they are stored in files, by object name; `None` without edits.
     pub fn record(&self, scene: &Scene) -> Option<EditsRecord> {
         let named = self.objects.iter().filter_map(|(&object, edit)| {
             let name = scene.objects.get(object)?.name.clone();
@@ -179,8 +176,8 @@ impl Edits {
     }
 }
 
-/// Lets an object have one colour where texels had painted it.
-fn unpaint(estimate: &mut Estimate, object: usize) {
+/// Replaces an object's texture by its single colour.
+fn remove_texture(estimate: &mut Estimate, object: usize) {
     let Some(texels) = &estimate.texels else {
         return;
     };
@@ -194,18 +191,18 @@ fn unpaint(estimate: &mut Estimate, object: usize) {
     }));
 }
 
-/// Changes in `estimate.json`.
+/// Edits in `estimate.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EditsRecord {
-    /// What is changed of each object, by name.
+    /// Edits of objects, by name.
     pub objects: Named<ObjectEdit>,
-    /// Factors on red, green and blue of the light from outside.
+    /// RGB factors on the light from outside.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outside: Option<Vec3>,
 }
 
 impl EditsRecord {
-    /// The changes for a scene; `path` is the file that holds them.
+    /// The edits for a scene; `path` is the file that contains them.
     ///
     /// # Errors
     /// The scene has no object of a name.
@@ -228,12 +225,12 @@ impl EditsRecord {
     }
 }
 
-/// The estimate with its changes, made anew only where one of the two has changed.
+/// Caches the edited estimate until the estimate or the edits change.
 #[derive(Debug, Default)]
 pub struct Edited(Option<(Arc<Estimate>, Edits, Arc<Estimate>)>);
 
 impl Edited {
-    /// An estimate with changes; the estimate itself where nothing is changed.
+    /// The edited estimate; without edits, the estimate itself.
     pub fn of(&mut self, estimate: &Arc<Estimate>, edits: &Edits) -> Arc<Estimate> {
         if edits.is_empty() {
             self.0 = None;
@@ -309,7 +306,7 @@ mod tests {
         assert_eq!(outside.pixels, [Vec3::new(0.0, 1.0, 2.0)]);
         assert!(Arc::ptr_eq(&edited.of(&found, &edits), &changed));
 
-        // Off wins over any emission, and gives it back.
+        // `off` takes precedence over any emission, which comes back without it.
         edits.set(
             1,
             ObjectEdit {
@@ -337,7 +334,7 @@ mod tests {
         assert_eq!(edit(Some(0.5), None).lobe(found), Some((0.5, 0.1)));
         assert_eq!(edit(None, Some(0.7)).lobe(found), Some((0.2, 0.7)));
         assert_eq!(edit(Some(0.5), Some(0.0)).lobe(found), None);
-        // What was left open is a satin dielectric's; what no surface has is brought into range.
+        // Missing values are those of a satin dielectric; values out of range are clamped.
         assert_eq!(edit(Some(0.5), None).lobe(None), Some((0.5, 0.04)));
         assert_eq!(edit(None, Some(0.7)).lobe(None), Some((0.3, 0.7)));
         let odd = edit(Some(-4.0), Some(9.0)).lobe(None);

@@ -1,4 +1,4 @@
-//! Frames of an open capture, at the working resolution and at the size of their files.
+//! Frames of an open capture at the working resolution and at the size of their files.
 
 use crate::capture::Frame;
 use crate::capture::photograph::Photograph;
@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::export::picture::shown_at;
 use crate::math::picture::Picture;
 use crate::scene::camera::Camera;
-use crate::session::snapshot::OpenCapture;
+use crate::session::open_capture::OpenCapture;
 use crate::session::view::sized::box_filter;
 use std::sync::Arc;
 
@@ -21,8 +21,8 @@ impl OpenCapture {
         pair.ok_or_else(|| self.no_frame(index))
     }
 
-    /// A frame's camera and photograph with a long side of at most so many pixels: from its file, where that has more of them than
-    /// the working resolution.
+    /// A frame's camera and photograph with a long side of at most `long_side` pixels; read again from the file if the working
+    /// resolution is lower.
     ///
     /// # Errors
     /// The frame does not exist, or the file cannot be read again.
@@ -72,8 +72,8 @@ impl OpenCapture {
         self.full_frame(index)?.load()
     }
 
-    /// A frame's photograph box-filtered to a camera's size, and the exposure at which it is shown: its own where it
-    /// saturates, else the one that puts the 99th percentile at 1.
+    /// A frame's photograph, box-filtered to a camera's size, and the exposure for its display: its own if it
+    /// saturates, else the one that maps the 99th percentile to 1.
     ///
     /// # Errors
     /// As [`OpenCapture::full_photograph`].

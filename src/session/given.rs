@@ -1,4 +1,4 @@
-//! What lies at a path that a person names: a capture, results, or a scan of another program.
+//! The kind of a path that a person names: a capture, results, or a scan of another program.
 
 use crate::capture::read::CAMERAS;
 use crate::error::{Error, Result};
@@ -6,22 +6,22 @@ use crate::session::command::Source;
 use crate::session::save::{CHECKPOINT, ESTIMATE};
 use std::path::{Path, PathBuf};
 
-/// What a path holds.
+/// The content of a path.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Given {
     /// The folder of a capture.
     Capture(PathBuf),
-    /// Results of a solve, to go on from.
+    /// Results of a solve, to be resumed.
     Results(PathBuf),
-    /// A folder that may be a scan of another program; its import tells.
+    /// A folder that may be a scan of another program; only its import can tell.
     Scan(PathBuf),
 }
 
 impl Given {
-    /// Looks at a path: a folder, or the `transforms.json` of a capture.
+    /// Identifies a path: a folder, or the `transforms.json` of a capture.
     ///
     /// # Errors
-    /// Nothing is there, or a file of another kind.
+    /// The path does not exist, or is a file of another kind.
     pub fn at(path: &Path) -> Result<Self> {
         let holds = |name: &str| path.join(name).exists();
         if path.file_name().is_some_and(|name| name == CAMERAS) && path.is_file() {
@@ -48,7 +48,7 @@ impl Given {
         ))
     }
 
-    /// Where a scan is imported into: `capture` in the folder of its results.
+    /// The folder that a scan is imported into: `capture` in the folder of its results.
     pub fn imported(scan: &Path) -> PathBuf {
         Source::Folder(scan.to_owned())
             .default_out()

@@ -1,4 +1,4 @@
-//! The way in: a bounded queue of commands that the sender never waits for.
+//! The worker's inbox: a bounded queue of commands whose sender never blocks.
 
 use crate::session::command::{Command, Placement, ViewRequest};
 use crate::session::edits::Edits;
@@ -7,17 +7,17 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Commands that may wait at a time. Views, insertions and edits do not count: of each only the newest waits.
+/// Capacity of the queue. Views, insertions and edits do not count: only the newest of each is kept.
 pub const CAPACITY: usize = 256;
 
-/// What travels through the queue.
+/// An entry of the queue.
 enum Message {
     Command(Command),
-    /// A view, an insertion or an edit lies in [`Latest`].
+    /// There may be a view, an insertion or an edit in [`Latest`].
     Look,
 }
 
-/// Requests of which only the newest counts.
+/// Commands of which only the newest counts.
 #[derive(Default)]
 struct Latest {
     view: Option<ViewRequest>,
@@ -35,21 +35,21 @@ pub struct Outbox {
 pub struct Inbox {
     queue: Receiver<Message>,
     latest: Arc<Mutex<Latest>>,
-    /// Taken from the queue to be looked at, not yet handed out.
+    /// Entries received by [`Inbox::look_ahead`] that are not handed out yet.
     ahead: VecDeque<Mail>,
 }
 
-/// What waits in the inbox.
+/// An entry of the inbox.
 pub enum Mail {
     /// A command.
     Command(Command),
-    /// Nothing now.
+    /// Nothing is waiting.
     Nothing,
-    /// Nothing ever again: the sender is gone.
+    /// The sender is gone.
     Closed,
 }
 
-/// Both ends of a new queue.
+/// Creates a queue and returns both ends.
 pub fn queue() -> (Outbox, Inbox) {
     let (sender, receiver) = bounded(CAPACITY);
     let latest = Arc::new(Mutex::new(Latest::default()));
@@ -67,7 +67,7 @@ pub fn queue() -> (Outbox, Inbox) {
 }
 
 impl Outbox {
-    /// Puts a command into the queue without ever waiting; false if the queue is full or the worker has ended.
+    /// Sends a command without blocking. False if the queue is full or the worker has ended.
     pub fn send(&self, command: Command) -> bool {
         let message = {
             let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
@@ -89,7 +89,7 @@ impl Outbox {
         };
         match self.queue.try_send(message) {
             Ok(()) => true,
-            // A full queue is emptied soon, and what lies in `latest` is found then.
+            // The worker will empty a full queue, and then finds the command in `latest`.
             Err(TrySendError::Full(Message::Look)) => true,
             Err(_) => false,
         }
@@ -97,12 +97,12 @@ impl Outbox {
 }
 
 impl Inbox {
-    /// The next command, if one waits.
+    /// The next command, if one is waiting.
     pub fn poll(&mut self) -> Mail {
         self.ahead.pop_front().unwrap_or_else(|| self.receive())
     }
 
-    /// Everything that waits, without handing it out; [`Inbox::poll`] does that.
+    /// All entries that are waiting; [`Inbox::poll`] still hands them out.
     pub fn look_ahead(&mut self) -> &VecDeque<Mail> {
         loop {
             match self.receive() {
@@ -133,9 +133,9 @@ impl Inbox {
         }
     }
 
-    /// The next command; sleeps until there is one, or so long.
-    pub fn wait(&mut self, most: Option<Duration>) -> Mail {
-        let end = most.map(|most| Instant::now() + most);
+    /// Waits for the next command, at most for `limit`.
+    pub fn wait(&mut self, limit: Option<Duration>) -> Mail {
+        let end = limit.map(|limit| Instant::now() + limit);
         loop {
             match self.poll() {
                 Mail::Nothing => {}
@@ -154,7 +154,7 @@ impl Inbox {
         }
     }
 
-    /// Forgets edits and insertions that wait: they are of a capture that is no longer open.
+    /// Drops waiting edits and insertions; they belong to a capture that is no longer open.
     pub fn forget_changes(&mut self) {
         let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
         (latest.edit, latest.insert) = (None, None);
@@ -163,7 +163,7 @@ impl Inbox {
         self.ahead.retain(|mail| !is_change(mail));
     }
 
-    /// Whether nothing waits.
+    /// Whether nothing is waiting.
     pub fn is_empty(&self) -> bool {
         self.ahead.is_empty() && self.queue.is_empty()
     }

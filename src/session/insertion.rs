@@ -1,5 +1,5 @@
-//! Composites of the shown photograph: inserted objects in it, in the light as it was changed, coarse at once and refined
-//! a slice at a time.
+//! Composites of the shown photograph: relit by the edits and with inserted objects, coarse at first and refined in slices of
+//! time.
 
 use crate::compose::backdrop::Backdrop;
 use crate::compose::denoise::denoised;
@@ -7,44 +7,46 @@ use crate::compose::insert::Insertion as Composite;
 use crate::compose::placement::{PlacedObject, Placement};
 use crate::compose::relight::Relighting;
 use crate::error::{Error, Result};
+use crate::math::picture::Picture;
 use crate::session::library::{Inserted, Library};
 use crate::session::light::Light;
-use crate::session::snapshot::{Insertion, OpenCapture, Picture};
+use crate::session::open_capture::OpenCapture;
+use crate::session::snapshot::Insertion;
 use crate::session::view::differs;
 use crate::transport::denoise::Denoiser;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Samples a pixel after which a composite counts as done.
-const ENOUGH: u32 = 256;
-/// How long a slice of work may take, about.
+/// Samples per pixel at which a composite is finished.
+const MAX_SAMPLES: u32 = 256;
+/// Approximate duration of a slice of work.
 const SLICE: Duration = Duration::from_millis(15);
-/// Shortest time between two looks at a changing estimate.
-const FOLLOW: Duration = Duration::from_secs(2);
-/// Samples that a picture by a newer estimate has at least before it is shown, where the one before it had as many.
-const HOLD: u32 = 8;
-/// Samples up to which a picture counts as rough, and has more of the solver's time.
-const ROUGH: u32 = 4;
+/// Shortest time between two updates to a changing estimate.
+const UPDATE_INTERVAL: Duration = Duration::from_secs(2);
+/// A new picture replaces one with this many samples only when it has as many; also for pictures with more.
+const MIN_REPLACEMENT_SAMPLES: u32 = 8;
+/// Below this number of samples a picture is rough, and gets more of the solver's time.
+const ROUGH_SAMPLES: u32 = 4;
 
-/// The shown photograph on its way into the changed light.
+/// The shown photograph, being relit.
 #[derive(Debug)]
 struct Relit {
     relighting: Relighting,
     light: Light,
-    /// Its frame and how large it is looked at.
+    /// Frame and long side.
     size: (usize, u32),
-    /// Samples that the photograph behind the objects was made with.
+    /// Samples of `photograph`.
     samples: u32,
     photograph: Arc<Picture>,
 }
 
-/// The inserted objects on their way into the photograph.
+/// The inserted objects, being rendered into the photograph.
 #[derive(Debug)]
 struct Placed {
     inserted: Inserted,
-    /// The same by other random numbers: both together tell the noise, which is smoothed.
-    beside: Composite,
-    /// Samples that the picture of them was made with; 0 while that is coarse.
+    /// An independent insertion; the denoiser estimates the noise from both.
+    independent: Composite,
+    /// Samples of `picture`; 0 while it is coarse.
     samples: u32,
     picture: Arc<Picture>,
 }
@@ -52,67 +54,67 @@ struct Placed {
 impl Placed {
     fn new(inserted: Inserted, seed: u64) -> Self {
         Self {
-            beside: inserted.composite.beside(seed),
+            independent: inserted.composite.with_seed(seed),
             samples: 0,
             picture: Arc::new(inserted.composite.composite()),
             inserted,
         }
     }
 
-    /// Samples a pixel.
+    /// Samples per pixel of both insertions together.
     fn samples(&self) -> u32 {
-        self.inserted.composite.samples() + self.beside.samples()
+        self.inserted.composite.samples() + self.independent.samples()
     }
 
-    fn put_behind(&mut self, photograph: &Arc<Picture>) {
-        self.inserted.composite.put_behind(photograph.clone());
-        self.beside.put_behind(photograph.clone());
-        self.paint();
+    fn set_photograph(&mut self, photograph: &Arc<Picture>) {
+        self.inserted.composite.set_photograph(photograph.clone());
+        self.independent.set_photograph(photograph.clone());
+        self.update_picture();
     }
 
-    fn paint(&mut self) {
-        let halves = [&self.inserted.composite, &self.beside];
+    fn update_picture(&mut self) {
+        let halves = [&self.inserted.composite, &self.independent];
         let none = halves[0].objects().is_empty();
-        let told = !none && halves.iter().all(|half| half.samples() > 0);
-        self.samples = if told { self.samples() } else { 0 };
-        self.picture = Arc::new(match told {
+        let sampled = !none && halves.iter().all(|half| half.samples() > 0);
+        self.samples = if sampled { self.samples() } else { 0 };
+        self.picture = Arc::new(match sampled {
             true => denoised(halves, Denoiser::best()).0,
             false => halves[0].composite(),
         });
     }
 
-    /// Brings both halves to a number of samples together; whether the picture is another.
+    /// Samples both insertions up to `samples` together. Returns whether the picture changed.
     fn refine_to(&mut self, samples: u32, go_on: impl Fn() -> bool) -> bool {
         let first = (self.inserted.composite).refine_to(samples.div_ceil(2), &go_on);
-        let done = first && self.beside.refine_to(samples / 2, &go_on);
-        // Smoothing takes longer than a sample: it is done whenever there are twice as many.
+        let done = first && self.independent.refine_to(samples / 2, &go_on);
+        // Denoising takes longer than a sample, so it is done when the samples have doubled.
         let better = done && samples >= 2 && samples >= 2 * self.samples;
         if better {
-            self.paint();
+            self.update_picture();
         }
         better
     }
 }
 
-/// The worker's composites under way.
+/// The worker's composites in progress.
 #[derive(Debug, Default)]
 pub struct Inserting {
     library: Library,
     placements: Vec<Placement>,
-    /// Whether they are left without the photograph's blur and grain.
+    /// Whether objects are left without the photograph's blur and grain.
     exact: bool,
     frame: usize,
-    /// How large the photograph is looked at; 0 where nobody does.
+    /// Long side of the photograph in pixels; 0 if it is not shown.
     long_side: u32,
     stale: Option<Instant>,
-    /// The light that the pictures were begun with.
+    /// The light that the pictures are made in.
     light: Option<Light>,
-    /// Samples that new pictures must have before they are shown in place of those there are.
+    /// Samples that new pictures must have before they replace the shown ones.
     hold: u32,
     relit: Option<Relit>,
     placed: Option<Placed>,
     begun: Option<Instant>,
-    /// When the last slice of refinement ended, and how long it took.
+    /// End and duration of the last slice of refinement.
     slice: Option<(Instant, Duration)>,
     shown: Option<Arc<Insertion>>,
     sequence: u64,
@@ -125,7 +127,7 @@ impl Inserting {
         self.update();
     }
 
-    /// The frame that is shown.
+    /// The shown frame.
     pub fn frame(&self) -> usize {
         self.frame
     }
@@ -135,52 +137,60 @@ impl Inserting {
         &self.placements
     }
 
-    /// Chooses whether objects take the blur and the grain of their photograph.
-    pub fn take_finish(&mut self, matched: bool) {
+    /// Chooses whether objects get the blur and grain of their photograph.
+    pub fn match_photograph(&mut self, matched: bool) {
         if self.exact == matched {
             self.exact = !matched;
             self.update();
         }
     }
 
-    /// Moves to another frame, or looks at it with other pixels along its long side; 0 of them stop the work.
-    pub fn look(&mut self, frame: usize, long_side: u32) {
+    /// Shows a frame with a long side in pixels; 0 stops the work.
+    pub fn show(&mut self, frame: usize, long_side: u32) {
         if (frame, long_side) != (self.frame, self.long_side) {
             (self.frame, self.long_side) = (frame, long_side);
             self.update();
         }
     }
 
-    /// Moves to another frame, looked at as the one before.
-    pub fn turn_to(&mut self, frame: usize) {
-        self.look(frame, self.long_side);
+    /// Shows a frame at the same size as the one before.
+    pub fn show_frame(&mut self, frame: usize) {
+        self.show(frame, self.long_side);
     }
 
-    /// Begins anew, coarsely at once.
+    /// Starts over with a coarse picture.
     pub fn update(&mut self) {
         self.stale = Some(Instant::now());
         self.hold = 0;
     }
 
-    /// Takes up another estimate where that differs to the eye and the last one had its time. What is shown stays until the new
-    /// picture is as good.
+    /// Switches to a new estimate if it is visibly different and the last one has been shown for long enough. The
+    /// shown picture stays until the new one has as many samples.
     pub fn follow(&mut self, light: &Light) {
         let Some(last) = self.light.as_ref().filter(|_| self.stale.is_none()) else {
             return;
         };
         let first = last.found.objects.is_empty() && !light.found.objects.is_empty();
         let waited = self.begun.map_or(Duration::MAX, |at| at.elapsed());
-        let told = self.samples().is_none_or(|samples| samples >= ROUGH);
-        let rested = self.hold == 0 && waited >= if told { FOLLOW } else { 5 * FOLLOW };
+        let refined = self
+            .samples()
+            .is_none_or(|samples| samples >= ROUGH_SAMPLES);
+        let rested = self.hold == 0
+            && waited
+                >= if refined {
+                    UPDATE_INTERVAL
+                } else {
+                    5 * UPDATE_INTERVAL
+                };
         if first {
             self.update();
-        } else if rested && !last.is(light) && differs(&last.edited, &light.edited) {
-            self.hold = self.samples().unwrap_or(0).min(HOLD);
+        } else if rested && !last.is_same(light) && differs(&last.edited, &light.edited) {
+            self.hold = self.samples().unwrap_or(0).min(MIN_REPLACEMENT_SAMPLES);
             self.stale = Some(Instant::now());
         }
     }
 
-    /// Forgets the objects, as when another capture is opened; files stay read.
+    /// Drops the objects when another capture is opened; files stay loaded.
     pub fn reset(&mut self) {
         self.library.forget_capture();
         *self = Self {
@@ -198,18 +208,21 @@ impl Inserting {
         self.shown.clone()
     }
 
-    /// Whether there is more to draw.
+    /// Whether there is more to render.
     pub fn is_busy(&self) -> bool {
-        let more = self.stale.is_some() || self.samples().is_some_and(|samples| samples < ENOUGH);
+        let more =
+            self.stale.is_some() || self.samples().is_some_and(|samples| samples < MAX_SAMPLES);
         self.long_side > 0 && more
     }
 
-    /// Whether what a person asked for has few samples.
+    /// Whether the requested picture has few samples.
     pub fn is_rough(&self) -> bool {
-        self.is_busy() && self.hold == 0 && self.samples().is_none_or(|samples| samples < ROUGH)
+        self.is_busy()
+            && self.hold == 0
+            && self.samples().is_none_or(|samples| samples < ROUGH_SAMPLES)
     }
 
-    /// Samples a pixel of what has the fewest; `None` where there is nothing to composite.
+    /// Fewest samples per pixel of relighting and objects; `None` if there is nothing to composite.
     fn samples(&self) -> Option<u32> {
         let relit = self.relit.as_ref().map(|relit| relit.relighting.samples());
         let placed = (self.placed.as_ref())
@@ -218,10 +231,10 @@ impl Inserting {
         relit.into_iter().chain(placed).min()
     }
 
-    /// Draws for a moment, refining for at most about `fraction` of the time; whether the pictures changed.
+    /// Renders for a moment, for at most about `fraction` of the time. Returns whether the pictures changed.
     ///
     /// # Errors
-    /// An object cannot be read or placed, and is taken away; or the frame does not exist, and all are.
+    /// An object cannot be loaded or placed, and is removed; or the frame does not exist, and all objects are removed.
     pub fn draw(&mut self, capture: &OpenCapture, light: &Light, fraction: f32) -> Result<bool> {
         let started = Instant::now();
         if let Some(asked) = self.stale.take() {
@@ -241,7 +254,7 @@ impl Inserting {
         let rested = self.slice.is_none_or(|(end, took)| {
             end.elapsed().as_secs_f32() * fraction >= took.as_secs_f32() * (1.0 - fraction)
         });
-        let Some(samples) = self.samples().filter(|&s| rested && s < ENOUGH) else {
+        let Some(samples) = self.samples().filter(|&s| rested && s < MAX_SAMPLES) else {
             return Ok(false);
         };
         let better = self.refine(samples + 1, started);
@@ -254,20 +267,20 @@ impl Inserting {
         Ok(false)
     }
 
-    /// Brings what has fewer samples a slice further; whether a picture is better by it.
+    /// Refines what has the fewest samples for a slice. Returns whether a picture changed.
     fn refine(&mut self, samples: u32, started: Instant) -> bool {
         let go_on = || started.elapsed() < SLICE;
         if let Some(relit) = &mut self.relit
             && relit.relighting.samples() < samples
         {
-            // Smoothing takes longer than a sample: it is done whenever there are twice as many.
+            // Denoising takes longer than a sample, so it is done when the samples have doubled.
             let done = relit.relighting.refine_to(samples, go_on);
             let better = done && relit.relighting.is_begun() && samples >= 2 * relit.samples;
             if better {
                 relit.samples = samples;
                 relit.photograph = Arc::new(relit.relighting.photograph());
                 if let Some(placed) = &mut self.placed {
-                    placed.put_behind(&relit.photograph);
+                    placed.set_photograph(&relit.photograph);
                 }
             }
             return better;
@@ -276,7 +289,7 @@ impl Inserting {
         placed.is_some_and(|placed| placed.refine_to(samples, go_on))
     }
 
-    /// Begins to composite all that can be; what was wrong with the first object that cannot be read or placed.
+    /// Starts compositing all objects that can be placed. Returns the error of the first that cannot.
     fn begin(&mut self, capture: &OpenCapture, light: &Light) -> Result<Option<Error>> {
         let (mut objects, mut unplaced) = (Vec::new(), None);
         let library = &mut self.library;
@@ -316,14 +329,14 @@ impl Inserting {
         Ok(unplaced)
     }
 
-    /// Begins to bring the photograph into the changed light, unless that is under way.
+    /// Starts relighting the photograph, unless that is in progress already.
     fn relight(&mut self, capture: &OpenCapture, light: &Light, taken: &Backdrop) {
-        if !light.is_changed() || light.found.objects.is_empty() {
+        if !light.is_edited() || light.found.objects.is_empty() {
             self.relit = None;
             return;
         }
         let size = (self.frame, self.long_side);
-        let same = |relit: &Relit| relit.size == size && relit.light.is(light);
+        let same = |relit: &Relit| relit.size == size && relit.light.is_same(light);
         if self.relit.as_ref().is_some_and(same) {
             return;
         }

@@ -1,24 +1,24 @@
-//! A capture as something to be measured on: its problem, and what tells the errors of its estimates.
+//! An open capture as a subject of measurements.
 
 use crate::calibrate::problem::Problem;
 use crate::capture::truth::Truth;
 use crate::error::Result;
 use crate::room::Room;
-use crate::room::photographs::KEPT;
+use crate::room::photographs::STORED;
 use crate::session::command::Source;
-use crate::session::snapshot::OpenCapture;
+use crate::session::open_capture::OpenCapture;
 use crate::study::evaluate::Reference;
 use crate::study::experiments::Subject;
 use crate::study::trade::Judge;
 
 impl OpenCapture {
-    /// The truth where there is one, else held-out pixels.
+    /// Measures estimates by the truth if there is one, else by held-out pixels.
     ///
     /// # Errors
     /// The truth is broken.
     pub fn judge(&self) -> Result<Judge> {
         let truth = match &self.source {
-            Source::BuiltInRoom => Room::new().truth(KEPT.size)?,
+            Source::BuiltInRoom => Room::new().truth(STORED.size)?,
             Source::Folder(folder) if folder.join("truth.json").is_file() => Truth::read(folder)?,
             Source::Folder(_) => return Ok(Judge::HeldOut),
         };
@@ -26,7 +26,7 @@ impl OpenCapture {
         Ok(Judge::Truth(Box::new(reference)))
     }
 
-    /// The capture for studies, with its truth where there is one.
+    /// The capture as a subject of studies.
     ///
     /// # Errors
     /// The truth is broken.

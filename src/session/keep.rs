@@ -1,5 +1,5 @@
-//! Sessions that save by themselves: of each capture as many as were begun, each in a folder of its own. Opening a capture goes on
-//! with the newest, and starting over leaves it as it is.
+//! Sessions that are saved automatically. A capture may have several, each in a folder of its own. Opening a capture
+//! continues the newest; starting over leaves it unchanged.
 
 use crate::compose::placement::Placement;
 use crate::error::{Error, Result};
@@ -14,71 +14,71 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-/// Shortest time between two saves while a solve runs.
-const EVERY: Duration = Duration::from_secs(8);
-/// Sessions that are kept of those that never ended and in which nothing was changed by hand. All others stay.
+/// Shortest time between two saves during a solve.
+const SAVE_INTERVAL: Duration = Duration::from_secs(8);
+/// Most sessions kept that neither finished nor have edits; all others are kept anyway.
 const MAX_UNFINISHED: usize = 8;
-/// What a session holds beside its estimate is written as.
+/// File of a session's state beside the estimate.
 const SESSION: &str = "session.json";
-/// Where programs of before wrote inserted objects.
+/// File in which earlier versions stored inserted objects.
 const INSERTED: &str = "inserted.json";
-/// What is seen of a session in the list.
+/// File of the picture for the list of sessions.
 pub const THUMBNAIL: &str = "thumbnail.png";
-/// Whoever has the session open holds a lock on this file.
+/// File that is locked while a program has the session open.
 const LOCK: &str = "in-use";
 
-/// Where a session stands.
+/// State of a session's solve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum State {
-    /// Its solve runs.
+    /// Running.
     #[default]
     Solving,
-    /// Its solve is held.
+    /// Paused.
     Paused,
-    /// Its solve has ended.
+    /// Ended.
     Finished(Termination),
 }
 
-/// What a session holds beside its estimate.
+/// The content of `session.json`: a session's state beside its estimate.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Held {
+pub struct SessionRecord {
     /// The capture's name.
     pub capture: String,
-    /// Where it stands.
+    /// State of its solve.
     pub state: State,
-    /// Whether it ended once, or was changed by hand: only a person removes it.
+    /// Whether it finished once or has edits; such a session is only deleted by the user.
     pub precious: bool,
-    /// The photograph that was shown.
+    /// The frame that was shown.
     pub frame: usize,
     /// The inserted objects.
     pub inserted: Vec<Placement>,
-    /// How far its solve has come.
+    /// Progress of its solve.
     #[serde(default)]
     pub progress: Option<Progress>,
 }
 
-/// A session in the list of all.
+/// A session in the list.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kept {
     /// Its folder.
     pub folder: PathBuf,
-    /// The capture's name and its own.
+    /// Name of the capture and of the session.
     pub name: String,
-    /// Where it stands.
+    /// State of its solve.
     pub state: State,
-    /// Whether only a person removes it.
+    /// Whether only the user deletes it.
     pub precious: bool,
-    /// When it was saved last.
+    /// Time of the last save.
     pub saved: SystemTime,
 }
 
-/// Keeps the sessions of a program.
+/// Saves and lists sessions.
 #[derive(Debug, Default)]
 pub struct Keeper {
     base: Option<PathBuf>,
     capture: Option<PathBuf>,
-    /// The open session's folder, locked, once it has one.
+    /// Folder and lock of the open session, once it has been saved.
     open: Option<(PathBuf, Option<File>)>,
     precious: bool,
     due: bool,
@@ -87,7 +87,7 @@ pub struct Keeper {
 }
 
 impl Keeper {
-    /// Keeps sessions under `base`; none where there is no such folder.
+    /// Keeps sessions in the folder `base`; without one, none are kept.
     pub fn new(base: Option<PathBuf>) -> Self {
         let mut keeper = Self {
             base,
@@ -97,69 +97,69 @@ impl Keeper {
         keeper
     }
 
-    /// The newest session of a capture, told by its hash, that no other program has open.
+    /// The newest session of a capture, by its hash, that no other program has open.
     pub fn last(&self, hash: &str) -> Option<PathBuf> {
         let home = self.base.as_ref()?.join(hash);
-        let ours = self.open.as_ref().map(|(folder, _)| folder);
+        let open_here = self.open.as_ref().map(|(folder, _)| folder);
         let mut folders = self.kept.iter().map(|kept| &kept.folder);
         let free = |folder: &&PathBuf| {
-            folder.starts_with(&home) && (ours == Some(*folder) || lock(folder).is_some())
+            folder.starts_with(&home) && (open_here == Some(*folder) || lock(folder).is_some())
         };
         folders.find(free).cloned()
     }
 
-    /// A new session of a capture begins, told by its hash.
+    /// Begins a new session of a capture, by its hash.
     pub fn begin(&mut self, hash: &str) {
         self.capture = self.base.as_ref().map(|base| base.join(hash));
-        self.begin_anew();
+        self.begin_another();
     }
 
-    /// Another session of the same capture begins.
-    pub fn begin_anew(&mut self) {
+    /// Begins another session of the same capture.
+    pub fn begin_another(&mut self) {
         (self.open, self.precious, self.due) = (None, false, false);
     }
 
-    /// Goes on with the session in a folder, or begins one where the folder is no session or another program has it open.
-    pub fn go_on(&mut self, hash: &str, folder: &Path, held: &Held) {
+    /// Continues the session in a folder. Begins a new one if the folder is none, or another program has it open.
+    pub fn resume(&mut self, hash: &str, folder: &Path, held: &SessionRecord) {
         self.begin(hash);
-        let ours = (self.base.as_ref()).is_some_and(|base| folder.starts_with(base));
-        if let Some(lock) = ours.then(|| lock(folder)).flatten() {
+        let in_base = (self.base.as_ref()).is_some_and(|base| folder.starts_with(base));
+        if let Some(lock) = in_base.then(|| lock(folder)).flatten() {
             self.capture = folder.parent().map(Path::to_owned);
             self.open = Some((folder.to_owned(), Some(lock)));
             self.precious = held.precious;
         }
     }
 
-    /// Something has changed that is worth keeping.
+    /// Marks the session as changed.
     pub fn touch(&mut self) {
         self.due = true;
     }
 
-    /// Whether it is time to save: something has changed, and the last save is a while ago or `now` is the time.
+    /// Whether to save: the session has changed, and the last save is long enough ago, or `now`.
     pub fn is_due(&self, now: bool) -> bool {
         (self.rest()).is_some_and(|rest| now || rest.is_zero())
     }
 
-    /// How long until it is time to save; `None` where nothing is to be saved.
+    /// Time until the next save; `None` if nothing has changed.
     pub fn rest(&self) -> Option<Duration> {
         let written = self.written.map_or(Duration::MAX, |at| at.elapsed());
-        (self.base.is_some() && self.due).then(|| EVERY.saturating_sub(written))
+        (self.base.is_some() && self.due).then(|| SAVE_INTERVAL.saturating_sub(written))
     }
 
-    /// Saves the state of the open session, with a small picture of it and the exposure to show it at. After a failure nothing more is kept.
+    /// Saves the open session, with a thumbnail and its exposure. After a failure nothing more is saved.
     ///
     /// # Errors
     /// The folder cannot be written.
     pub fn write(
         &mut self,
         results: &Results,
-        held: Held,
+        held: SessionRecord,
         seen: Option<(Picture, f32)>,
     ) -> Result<()> {
         self.due = false;
         self.written = Some(Instant::now());
         self.precious |= held.precious;
-        let held = Held {
+        let held = SessionRecord {
             precious: self.precious,
             ..held
         };
@@ -175,13 +175,13 @@ impl Keeper {
         written
     }
 
-    /// Removes a session for good, unless it is open.
+    /// Deletes a session, unless it is open.
     ///
     /// # Errors
-    /// It is open, or cannot be removed.
+    /// The session is open, or cannot be deleted.
     pub fn remove(&mut self, folder: &Path) -> Result<()> {
-        let ours = self.kept.iter().any(|kept| kept.folder == folder);
-        if !ours || lock(folder).is_none() {
+        let is_kept = self.kept.iter().any(|kept| kept.folder == folder);
+        if !is_kept || lock(folder).is_none() {
             let remedy = "open another session first";
             return Err(Error::file(folder, "this session is open", remedy));
         }
@@ -190,12 +190,12 @@ impl Keeper {
         Ok(())
     }
 
-    /// All sessions, the newest first.
+    /// All sessions, newest first.
     pub fn kept(&self) -> Arc<Vec<Kept>> {
         self.kept.clone()
     }
 
-    /// The folder of the open session, made and locked where it is still to be; `None` where none are kept.
+    /// The folder of the open session, created and locked if need be; `None` if none are kept.
     fn folder(&mut self) -> Result<Option<PathBuf>> {
         if let Some((folder, _)) = &self.open {
             return Ok(Some(folder.clone()));
@@ -218,7 +218,7 @@ impl Keeper {
         Ok(None)
     }
 
-    /// Looks for all sessions.
+    /// Lists all sessions.
     fn list(&mut self) {
         let inside = |folder: &Path| fs::read_dir(folder).into_iter().flatten().flatten();
         let captures = self.base.iter().flat_map(|base| inside(base));
@@ -228,12 +228,12 @@ impl Keeper {
         self.kept = Arc::new(kept);
     }
 
-    /// Removes the oldest of those that never ended and were not changed by hand.
+    /// Deletes the oldest sessions that neither finished nor have edits.
     fn prune(&mut self) {
         let unfinished = self.kept.iter().filter(|kept| !kept.precious);
         let mut removed = false;
         for kept in unfinished.skip(MAX_UNFINISHED) {
-            // What cannot be removed now is tried again at the next save.
+            // Deletion is tried again at the next save.
             removed |= lock(&kept.folder).is_some() && fs::remove_dir_all(&kept.folder).is_ok();
         }
         if removed {
@@ -245,7 +245,7 @@ impl Keeper {
 impl Kept {
     fn read(folder: PathBuf) -> Option<Self> {
         let saved = fs::metadata(folder.join(CHECKPOINT)).and_then(|m| m.modified());
-        let held = held(&folder).ok()?.unwrap_or_default();
+        let held = read_record(&folder).ok()?.unwrap_or_default();
         let own = folder.file_name()?.to_string_lossy();
         Some(Self {
             saved: saved.ok()?,
@@ -260,7 +260,7 @@ impl Kept {
     }
 }
 
-/// Takes a session for this program, as long as the result lives; `None` where another one has it.
+/// Locks a session for as long as the result lives; `None` if another program has it open.
 fn lock(folder: &Path) -> Option<File> {
     let file = File::create(folder.join(LOCK)).ok()?;
     file.try_lock().is_ok().then_some(file)
@@ -269,7 +269,7 @@ fn lock(folder: &Path) -> Option<File> {
 fn write(
     folder: &Path,
     results: &Results,
-    held: &Held,
+    held: &SessionRecord,
     seen: Option<(Picture, f32)>,
 ) -> Result<()> {
     save::write_checkpoint(folder, results)?;
@@ -282,11 +282,11 @@ fn write(
     }
 }
 
-/// What a session's folder holds beside the estimate; `None` in a folder of other results.
+/// Reads the state of a session's folder; `None` in another folder of results.
 ///
 /// # Errors
 /// The file is broken.
-pub fn held(folder: &Path) -> Result<Option<Held>> {
+pub fn read_record(folder: &Path) -> Result<Option<SessionRecord>> {
     let broken = |path: &Path, error: serde_json::Error| {
         let remedy = "remove the file, which gives up the inserted objects";
         Error::file(path, error, remedy)
@@ -304,10 +304,10 @@ pub fn held(folder: &Path) -> Result<Option<Held>> {
         return Ok(None);
     };
     let inserted = serde_json::from_slice(&bytes).map_err(|error| broken(&path, error))?;
-    Ok(Some(Held {
+    Ok(Some(SessionRecord {
         inserted,
         precious: true,
-        ..Held::default()
+        ..SessionRecord::default()
     }))
 }
 
@@ -319,10 +319,10 @@ mod tests {
     fn made(base: &Path, name: &str, precious: bool) -> PathBuf {
         let folder = base.join(name);
         fs::create_dir_all(&folder).expect("made");
-        let held = Held {
+        let held = SessionRecord {
             capture: "room".to_owned(),
             precious,
-            ..Held::default()
+            ..SessionRecord::default()
         };
         fs::write(
             folder.join(SESSION),
@@ -361,15 +361,15 @@ mod tests {
         let mut one = keeper();
         assert_eq!(one.last("a"), Some(first.clone()));
         assert_eq!(one.last("b"), None);
-        one.go_on("a", &first, &Held::default());
+        one.resume("a", &first, &SessionRecord::default());
         assert!(one.remove(&first).is_err());
         let mut two = keeper();
         assert_eq!(two.last("a"), None);
-        two.go_on("a", &first, &Held::default());
+        two.resume("a", &first, &SessionRecord::default());
         let second = two.folder().expect("made").expect("a folder");
         assert_eq!(second, base.path().join("a/session 2"));
         // Starting over leaves the session as it is.
-        one.begin_anew();
+        one.begin_another();
         assert_eq!(
             one.folder().expect("made"),
             Some(base.path().join("a/session 3"))

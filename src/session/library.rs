@@ -1,4 +1,4 @@
-//! Objects that are read, the photographs' light, and the shown photograph: what outlasts a change of placement.
+//! Loaded objects, the photographs' light, and the shown photograph, which outlast changes of placement.
 
 use crate::capture::exposure::Exposure;
 use crate::capture::photograph::Photograph;
@@ -10,25 +10,26 @@ use crate::compose::placement::PlacedObject;
 use crate::compose::psf_and_grain::PsfAndGrain;
 use crate::error::Result;
 use crate::inverse::estimate::Estimate;
+use crate::math::picture::Picture;
 use crate::math::sh::Harmonics;
-use crate::session::snapshot::{OpenCapture, Picture};
+use crate::session::open_capture::OpenCapture;
 use crate::transport::path::PathOptions;
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Objects in one frame's photograph, with both kinds of light.
+/// An insertion into one frame, with its naive variants.
 #[derive(Debug)]
 pub struct Inserted {
-    /// The photograph with the objects, refined pass by pass.
+    /// The composite, refined progressively.
     pub composite: Composite,
-    /// Pasted, lit by harmonics of the photographs alone.
+    /// Pasted objects, lit by harmonics of the photographs.
     pub naive: Pasted,
-    /// Pasted, lit by harmonics of the estimate.
+    /// Pasted objects, lit by harmonics of the estimate.
     pub naive_estimate: Pasted,
 }
 
-/// Objects already read, the photographs' light, and how the last photograph looks; all outlast a change of placement.
+/// Loaded objects, the photographs' light, and the last photograph, which outlast changes of placement.
 #[derive(Debug, Default)]
 pub struct Library {
     models: HashMap<PathBuf, Arc<ObjectModel>>,
@@ -36,10 +37,10 @@ pub struct Library {
     taken: Option<Taken>,
 }
 
-/// A photograph at the size at which it is looked at.
+/// A photograph at the size of its display.
 #[derive(Debug)]
 struct Taken {
-    /// Its frame and how large it was asked for.
+    /// Frame and requested long side.
     size: (usize, u32),
     backdrop: Backdrop,
     photograph: Arc<Photograph>,
@@ -47,7 +48,7 @@ struct Taken {
 }
 
 impl Library {
-    /// The object in a file; read once.
+    /// The object in a file; each file is read once.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -60,18 +61,18 @@ impl Library {
         Ok(model)
     }
 
-    /// Forgets what belongs to the capture; files stay read.
+    /// Drops what belongs to the capture; files stay loaded.
     pub(super) fn forget_capture(&mut self) {
         self.photographed = None;
         self.taken = None;
     }
 
-    /// The photograph that a backdrop was asked for last, as it was taken.
+    /// The photograph of the last backdrop, unchanged.
     pub(super) fn as_taken(&self) -> Option<&Arc<Picture>> {
         Some(&self.taken.as_ref()?.backdrop.photograph)
     }
 
-    /// The photograph of a frame at a size, with its blur and grain; found once while it is shown.
+    /// The backdrop of a frame at a size, with the photograph's blur and grain if `soft`. Cached for the shown frame.
     ///
     /// # Errors
     /// The frame does not exist, or its file cannot be read again.
@@ -106,7 +107,7 @@ impl Library {
         Ok(backdrop)
     }
 
-    /// Puts objects into a backdrop; the composite is coarse at first.
+    /// Inserts objects into a backdrop; the composite is coarse at first.
     pub fn insert(
         &mut self,
         capture: &OpenCapture,
@@ -123,8 +124,14 @@ impl Library {
                 .photographed
                 .get_or_insert_with(|| light_of_photographs(capture)),
         };
-        let same = vec![photographed; objects.len()];
-        let naive = Pasted::new(&backdrop, &lit, &objects, &same, Exposure::default());
+        let photographed = vec![photographed; objects.len()];
+        let naive = Pasted::new(
+            &backdrop,
+            &lit,
+            &objects,
+            &photographed,
+            Exposure::default(),
+        );
         let estimated: Vec<Harmonics> = objects
             .iter()
             .map(|object| harmonics_of_estimate(&lit, object.center, options, seed))

@@ -1,25 +1,25 @@
-//! The light that pictures are made in.
+//! The light and materials that pictures are rendered with.
 
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::transport::path::PathOptions;
 use std::sync::Arc;
 
-/// The light and the materials that were found, those that are shown, and how their paths are traced.
+/// The estimate, the edited estimate, and options of their paths.
 #[derive(Debug, Clone)]
 pub struct Light {
-    /// What was found.
+    /// The estimate.
     pub found: Arc<Estimate>,
-    /// The same with the changes made by hand; the same allocation where there are none.
+    /// The estimate with the edits; the same allocation without edits.
     pub edited: Arc<Estimate>,
-    /// How its paths are traced.
+    /// Options of the paths.
     pub options: PathOptions,
     /// Seed of all random numbers.
     pub seed: u64,
 }
 
 impl Light {
-    /// Light as a solver with these settings found it and as it was changed.
+    /// The light of an estimate and its edits, with the paths of the solver's settings.
     pub fn new(found: Arc<Estimate>, edited: Arc<Estimate>, settings: &Settings) -> Self {
         Self {
             found,
@@ -29,13 +29,13 @@ impl Light {
         }
     }
 
-    /// Whether anything was changed by hand.
-    pub fn is_changed(&self) -> bool {
+    /// Whether there are edits.
+    pub fn is_edited(&self) -> bool {
         !Arc::ptr_eq(&self.found, &self.edited)
     }
 
-    /// Whether it is the very same light.
-    pub fn is(&self, other: &Self) -> bool {
+    /// Whether both are identical: the same allocations, options and seed.
+    pub fn is_same(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.found, &other.found)
             && Arc::ptr_eq(&self.edited, &other.edited)
             && self.options == other.options
@@ -43,7 +43,7 @@ impl Light {
     }
 }
 
-/// Paths as the solver took them: an estimate fitted with few bounces is only right with as few.
+/// Options of the solver's paths: an estimate that was fitted with few bounces is only right with as few.
 pub fn path_options(settings: &Settings) -> PathOptions {
     PathOptions {
         max_bounces: settings.max_bounces(),

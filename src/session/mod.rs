@@ -1,4 +1,4 @@
-//! The worker thread: commands in, snapshots out, save and resume. Knows no window; wakes it by a callback.
+//! The worker thread: it takes commands, publishes snapshots, saves and resumes. It wakes the window by a callback.
 
 pub mod command;
 pub mod edits;
@@ -11,6 +11,7 @@ pub mod keep;
 pub mod library;
 pub mod light;
 pub mod open;
+pub mod open_capture;
 pub mod photographs;
 pub mod rates;
 pub mod save;

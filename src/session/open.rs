@@ -1,4 +1,4 @@
-//! From a source to a capture that can be solved and shown.
+//! Opens a capture for solving and display.
 
 use crate::calibrate::alignment::{Alignment, Decision};
 use crate::calibrate::photographs::{leave_out, leave_out_astray, name, without_hot_pixels};
@@ -15,17 +15,17 @@ use crate::room;
 use crate::scene::Scene;
 use crate::scene::prepare::{Prepared, prepare};
 use crate::session::command::{OpenOptions, Source};
-use crate::session::snapshot::OpenCapture;
+use crate::session::open_capture::OpenCapture;
 use std::fs;
 use std::sync::Arc;
 
-/// Most pixels that are solved for; larger photographs are reduced together.
+/// Most pixels used in a solve; larger photographs are reduced together.
 const WORKING_PIXELS: u64 = 4_000_000;
 
 /// Reads a capture and its photographs.
 ///
 /// # Errors
-/// Something in it is missing or broken.
+/// A part of the capture is missing or broken.
 pub fn open(source: &Source, options: &OpenOptions) -> Result<OpenCapture> {
     let capture = match source {
         Source::BuiltInRoom => Ok(room::capture()?.read_as(&options.reading)),
@@ -46,9 +46,9 @@ impl OpenCapture {
     /// Prepares a capture for solving: scene, photographs, summary, hash.
     ///
     /// # Errors
-    /// The mesh holds nothing to solve, or a photograph cannot be read.
+    /// The mesh is empty, or a photograph cannot be read.
     pub fn new(source: Source, options: OpenOptions, capture: Capture) -> Result<Self> {
-        // Results belong to a capture in whatever coordinates.
+        // Hash before the change of coordinates: results belong to a capture in any coordinates.
         let hash = hash(&capture)?;
         let mut capture = capture.placed(options.up, &options.coordinates)?;
         let mut working = load_working(&capture, WORKING_PIXELS)?;
@@ -71,7 +71,7 @@ impl OpenCapture {
             read_wrongly.unwrap_or(error)
         })?;
         let mut warnings = prepared.warnings.clone();
-        let photographs = cool(&capture, &prepared, &mut warnings);
+        let photographs = remove_hot_pixels(&capture, &prepared, &mut warnings);
         warnings.extend(alignment.as_ref().and_then(Alignment::warning));
         Ok(Self {
             name: capture.name.clone(),
@@ -87,7 +87,7 @@ impl OpenCapture {
         })
     }
 
-    /// The reading with which the photographs agree with the mesh, where they plainly do not as the capture is read now.
+    /// The reading with which photographs and mesh agree, if they clearly disagree as the capture is read now.
     pub fn other_reading(&self) -> Option<Reading> {
         match self.alignment.as_ref()?.decision {
             Decision::Wrong { reading, .. } => Some(self.options.reading.then(&reading)),
@@ -95,9 +95,9 @@ impl OpenCapture {
         }
     }
 
-    /// An estimate from this capture. Where its photographs may not show the mesh from their poses, or plainly do not, nothing is
-    /// determined by them: the standard error of an albedo is at least that of any albedo from 0 to 1 about what was found.
-    pub fn in_doubt(&self, mut estimate: Estimate) -> Estimate {
+    /// Marks an estimate as undetermined if the photographs may not show the mesh from their poses. The standard
+    /// error of each albedo is then at least that of a uniform distribution over [0, 1], about the estimate.
+    pub fn marked_doubtful(&self, mut estimate: Estimate) -> Estimate {
         match self.alignment.as_ref().map(|alignment| &alignment.decision) {
             None | Some(Decision::Sound) => return estimate,
             Some(Decision::Doubtful | Decision::Wrong { .. }) => {}
@@ -112,10 +112,10 @@ impl OpenCapture {
         estimate
     }
 
-    /// Refuses a capture whose photographs plainly do not show the mesh from their poses.
+    /// Refuses a capture whose photographs clearly do not show the mesh from their poses.
     ///
     /// # Errors
-    /// It is read wrongly; the remedy says how to read it.
+    /// The capture is read wrongly; the remedy says how to read it.
     pub fn aligned(self) -> Result<Self> {
         let error = self
             .alignment
@@ -125,35 +125,35 @@ impl OpenCapture {
     }
 }
 
-/// The photographs without hot pixels, which are counted in a warning for each photograph.
-fn cool(
+/// Removes hot pixels from the photographs, with a warning for each photograph.
+fn remove_hot_pixels(
     capture: &Capture,
     prepared: &Prepared,
     warnings: &mut Vec<String>,
 ) -> Vec<Arc<Photograph>> {
     let scene = &prepared.scene;
-    let cooled = (prepared.photographs.iter().enumerate()).map(|(frame, photograph)| {
+    let cleaned = (prepared.photographs.iter().enumerate()).map(|(frame, photograph)| {
         let seen = &scene.ids().triangles[frame];
         let object = |pixel: usize| scene.object_of.get(seen[pixel] as usize).copied();
-        let Some((cooled, count)) = without_hot_pixels(photograph, object) else {
+        let Some((cleaned, count)) = without_hot_pixels(photograph, object) else {
             return photograph.clone();
         };
         warnings.push(format!(
             "{}: {count} pixels are a thousand times as bright as all around them and are left out",
             name(capture, frame)
         ));
-        cooled
+        cleaned
     });
-    cooled.collect()
+    cleaned.collect()
 }
 
-/// How well the photographs agree with the mesh.
+/// Checks how well the photographs agree with the mesh.
 fn alignment(capture: &Capture, working: &Working) -> Result<Alignment> {
     let scene = Scene::new(&capture.at(working))?;
     Ok(Alignment::new(&scene, &working.photographs))
 }
 
-/// Hash of what an estimate depends on: mesh, cameras, exposures and the bytes of the photographs.
+/// Hash of everything that an estimate depends on: mesh, cameras, exposures and photograph files.
 fn hash(capture: &Capture) -> Result<String> {
     let mut hasher = blake3::Hasher::new();
     let mesh = &capture.mesh;

@@ -1,5 +1,4 @@
-//! Photographs in one go: each relit by the changes made by hand and with the inserted objects in it, at the size of
-//! its file.
+//! Writes photographs at the size of their files, relit by the edits and with the inserted objects.
 
 use crate::compose::backdrop::Backdrop;
 use crate::compose::denoise::denoised;
@@ -15,82 +14,82 @@ use crate::inverse::settings::Settings;
 use crate::render::{Renderer, warn_card_failed};
 use crate::session::library::{Inserted, Library};
 use crate::session::light::path_options;
-use crate::session::snapshot::OpenCapture;
+use crate::session::open_capture::OpenCapture;
 use crate::transport::denoise::Denoiser;
 use crate::transport::lit::Lit;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What is made of which photographs.
+/// Which photographs to write, and how.
 #[derive(Debug, Clone)]
 pub struct Photographs {
-    /// What they were taken of.
+    /// The open capture.
     pub capture: Arc<OpenCapture>,
-    /// The light and the materials that were found.
+    /// The estimate.
     pub found: Arc<Estimate>,
-    /// The same with the changes made by hand.
+    /// The estimate with the edits.
     pub edited: Arc<Estimate>,
-    /// The solve's parameters: depth of paths and seed.
+    /// Settings of the solve, for depth of paths and seed.
     pub settings: Settings,
-    /// The objects to put in; none leaves the composites out.
+    /// The objects to insert; without any, no composites are written.
     pub placements: Vec<Placement>,
-    /// Whether the photographs are brought from the light found to the changed one.
+    /// Whether to relight the photographs from `found` to `edited`.
     pub relight: bool,
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub samples: u32,
-    /// Whether the light's noise is smoothed.
+    /// The denoiser of the renders, if any.
     pub denoise: Option<Denoiser>,
-    /// Whether objects take the blur and the grain of 8-bit photographs.
+    /// Whether objects get the blur and grain of 8-bit photographs.
     pub finish: bool,
-    /// Which photographs, by frame.
+    /// Frames of the photographs.
     pub frames: Vec<usize>,
 }
 
-/// What is being done.
+/// Progress of writing.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Doing {
-    /// The photograph's frame.
+pub struct WriteProgress {
+    /// The frame in progress.
     pub frame: usize,
-    /// Fraction of the whole work that is done, 0 to 1.
+    /// Completed fraction of the whole work, 0 to 1.
     pub fraction: f32,
 }
 
 /// What was written.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Written {
-    /// Photographs that are done.
+    /// Number of completed photographs.
     pub photographs: usize,
     /// Their files.
     pub files: Vec<PathBuf>,
-    /// What was odd about the objects.
+    /// Warnings about the objects.
     pub warnings: Vec<String>,
 }
 
 impl Photographs {
-    /// Writes `prefix(frame)`.relit.{exr,png} and the files of an insertion, one photograph after the other. Between
-    /// pieces of work `tell` hears how far it is and may end it; what is written by then is whole.
+    /// Writes `prefix(frame)`.relit.{exr,png} and the files of an insertion for each photograph. `report` is called from time
+    /// to time with the progress, and stops the work by returning false; files already written are complete.
     ///
     /// # Errors
     /// An object or a photograph cannot be read, or a file cannot be written.
     pub fn write(
         &self,
         prefix: &dyn Fn(usize) -> PathBuf,
-        tell: &dyn Fn(Doing) -> bool,
+        report: &dyn Fn(WriteProgress) -> bool,
     ) -> Result<Written> {
-        self.write_made_of(&Renderer::processor(), &[], prefix, tell)
+        self.write_with(&Renderer::processor(), &[], prefix, report)
     }
 
-    /// [`Photographs::write`] with light traced by a renderer, and with materials that replace all those of an object's file: one a
-    /// placement, in their order; `None`, or none at all, leaves the file's own.
+    /// [`Photographs::write`] with a renderer, and with materials that replace those of object files: one for each
+    /// placement, `None` to keep the file's; empty to keep all.
     ///
     /// # Errors
     /// As [`Photographs::write`].
-    pub fn write_made_of(
+    pub fn write_with(
         &self,
         renderer: &Renderer,
         materials: &[Option<ObjectSurface>],
         prefix: &dyn Fn(usize) -> PathBuf,
-        tell: &dyn Fn(Doing) -> bool,
+        report: &dyn Fn(WriteProgress) -> bool,
     ) -> Result<Written> {
         let mut library = Library::default();
         let mut written = Written::default();
@@ -121,7 +120,7 @@ impl Photographs {
             let fraction = |part: u8, fraction: f32| {
                 let part = (f32::from(part) + fraction) / f32::from(parts.max(1));
                 let fraction = (index as f32 + part) / self.frames.len() as f32;
-                tell(Doing { frame, fraction })
+                report(WriteProgress { frame, fraction })
             };
             let prefix = prefix(frame);
             let lights = lights.as_ref();
@@ -160,13 +159,13 @@ impl Photographs {
         Ok(written)
     }
 
-    /// The scene with the objects on the renderer's card.
+    /// The scene with the objects on the renderer's graphics card.
     fn tracer(&self, renderer: &Renderer, objects: &[Arc<PlacedObject>]) -> Option<Tracer> {
         let inserted: Vec<gpu::Inserted<'_>> = objects.iter().map(|o| o.for_card()).collect();
         renderer.tracer(&self.edited.lit(&self.capture.scene), &inserted)
     }
 
-    /// The photograph, relit where there are two lights; `None` if that was ended.
+    /// The photograph, relit if there are two lights; `None` if the work was stopped.
     fn backdrop(
         &self,
         frame: usize,
@@ -186,7 +185,7 @@ impl Photographs {
             let taken = backdrop.clone();
             let mut relighting =
                 Relighting::new(taken, lights.clone(), options, seed, self.denoise);
-            let samples = self.in_parts();
+            let samples = self.even_samples();
             let step = step(tracers.is_some());
             for before in (0..samples).step_by(step as usize) {
                 let pass = (before + step).min(samples);
@@ -203,17 +202,18 @@ impl Photographs {
         Ok(Some(backdrop))
     }
 
-    /// Independent renders of a picture: two where they are to tell the noise.
+    /// Independent renders of a picture: the denoiser needs two.
     fn halves(&self) -> u32 {
         1 + u32::from(self.denoise.is_some())
     }
 
-    /// Samples a pixel, an even number where two halves tell the noise.
-    fn in_parts(&self) -> u32 {
+    /// Samples per pixel, a multiple of the number of halves.
+    fn even_samples(&self) -> u32 {
         self.samples.next_multiple_of(self.halves())
     }
 
-    /// Puts the objects in and writes the composites; returns the files and whether any object is seen, or `None` if that was ended.
+    /// Inserts the objects and writes the composites. Returns the files, and whether any object is visible; `None` if
+    /// the work was stopped.
     fn composite(
         &self,
         library: &mut Library,
@@ -223,9 +223,9 @@ impl Photographs {
         prefix: &Path,
         go_on: &dyn Fn(f32) -> bool,
     ) -> Result<Option<(Vec<PathBuf>, bool)>> {
-        // What is to be smoothed is made in two independent halves, which tell the noise.
+        // The denoiser needs two independent halves.
         let parts = self.halves();
-        let samples = self.in_parts() / parts;
+        let samples = self.even_samples() / parts;
         let mut made: Vec<Inserted> = Vec::new();
         for part in 0..parts {
             let mut inserted = library.insert(
@@ -266,12 +266,12 @@ impl Photographs {
     }
 }
 
-/// Samples between two questions whether to go on: a card is kept busy by more than one.
+/// Samples between two calls of `report`; a graphics card needs more work at a time.
 fn step(has_card: bool) -> u32 {
     if has_card { 16 } else { 1 }
 }
 
-/// Work done on the card while there is one; `None` where there is none, or where it failed, which is said.
+/// Does work on the graphics card; `None` if there is none, or if it failed, which is reported.
 fn on_card<W, C>(
     work: &mut W,
     card: &mut Option<C>,

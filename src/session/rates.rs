@@ -1,13 +1,13 @@
-//! Iterations and rays a second, and the time left.
+//! Iterations and rays per second, and the remaining time.
 
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::Progress;
 use std::collections::VecDeque;
 
-/// Seconds of solving over which rates are taken.
+/// Seconds of solving over which rates are measured.
 const WINDOW: f64 = 1.0;
 
-/// Counters of the last second or so of solving time.
+/// Counters over about the last second of solving.
 #[derive(Debug, Default)]
 pub struct Rates {
     marks: VecDeque<Mark>,
@@ -21,8 +21,7 @@ struct Mark {
 }
 
 impl Rates {
-    /// Takes note of how far the solve is. Time that stands still (a pause) or runs backwards (a new solve) is
-    /// no progress.
+    /// Records the progress of a solve. Ignores a pause; restarts with a new solve.
     pub fn note(&mut self, progress: &Progress) {
         let mark = Mark {
             seconds: progress.seconds,
@@ -65,7 +64,7 @@ impl Rates {
         }
     }
 
-    /// Seconds until a limit of the settings ends the solve; `None` where no limit is set. It may converge earlier.
+    /// Seconds until a limit of the settings ends the solve; `None` without a limit. It may converge earlier.
     pub fn seconds_left(&self, progress: &Progress, settings: &Settings) -> Option<f64> {
         let by_time = (settings.time > 0.0).then(|| (settings.time - progress.seconds).max(0.0));
         let rate = self.iterations();

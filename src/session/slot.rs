@@ -1,9 +1,9 @@
-//! Where the newest snapshot lies: whoever looks finds the latest, and nobody waits.
+//! Holds the newest snapshot. Neither writer nor readers wait.
 
 use crate::session::snapshot::Snapshot;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A latest-wins slot between the worker and those who look at it.
+/// The newest snapshot, shared between the worker and its readers.
 #[derive(Debug, Default)]
 pub struct Slot {
     latest: Mutex<Arc<Snapshot>>,
@@ -15,7 +15,7 @@ impl Slot {
         *self.latest.lock().unwrap_or_else(PoisonError::into_inner) = snapshot;
     }
 
-    /// The newest snapshot. The lock is held for the copy of one pointer only.
+    /// The newest snapshot. The lock is only held to copy a pointer.
     pub fn latest(&self) -> Arc<Snapshot> {
         self.latest
             .lock()

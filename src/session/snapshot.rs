@@ -1,14 +1,9 @@
-//! What the worker shows: immutable, shared, latest wins.
+//! Snapshots of the worker's state: immutable and shared; readers take the newest.
 
-use crate::calibrate::alignment::Alignment;
-use crate::capture::Capture;
-use crate::capture::photograph::Photograph;
 use crate::compose::placement::Placement;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Progress, Termination};
-use crate::scene::Scene;
-use crate::session::command::{OpenOptions, Source};
 use crate::session::edits::Edits;
 use crate::session::keep::Kept;
 use crate::transport::layers;
@@ -16,44 +11,45 @@ use glam::Vec3;
 use std::sync::Arc;
 
 pub use crate::math::picture::Picture;
+pub use crate::session::open_capture::OpenCapture;
 pub use crate::transport::layers::LightSource;
 
 /// The state of a session at one moment.
 #[derive(Debug, Clone, Default)]
 pub struct Snapshot {
-    /// Grows with every snapshot.
+    /// Incremented with every snapshot.
     pub sequence: u64,
     /// What the worker is doing.
     pub phase: Phase,
-    /// What is open.
+    /// The open capture.
     pub capture: Option<Arc<OpenCapture>>,
-    /// The parameters in force.
+    /// The current parameters.
     pub settings: Settings,
-    /// How far the solve has come.
+    /// Progress of the solve.
     pub progress: Arc<Progress>,
-    /// Iterations a second over the last second or so.
+    /// Iterations per second, over about the last second.
     pub iterations_per_second: f64,
-    /// Rays a second over the last second or so.
+    /// Rays per second, over about the last second.
     pub rays_per_second: f64,
-    /// Seconds until the end, where that can be said.
+    /// Remaining seconds, if known.
     pub seconds_left: Option<f64>,
-    /// The estimate so far, as it was found.
+    /// The current estimate, without the edits.
     pub estimate: Arc<Estimate>,
-    /// The changes made by hand to the estimate, which all pictures and exports show.
+    /// Edits of the estimate, which all pictures and exports show.
     pub edits: Edits,
-    /// How many requests for other objects were answered, whether or not they could be met.
+    /// Number of commands to change objects that were answered, successfully or not.
     pub regroupings: u64,
-    /// The inserted objects that the open capture came with, as a session that was taken up.
+    /// The inserted objects of the session that the open capture continues.
     pub inserted: Arc<Vec<Placement>>,
-    /// The photograph that was shown when the open capture's session was saved.
+    /// The frame that was shown when the session was saved.
     pub frame: usize,
-    /// Which session the open capture goes on with, in words; `None` where a new one began.
+    /// Name of the session that the open capture continues; `None` for a new session.
     pub continued: Option<String>,
-    /// All sessions that are kept, the newest first.
+    /// All kept sessions, newest first.
     pub kept: Arc<Vec<Kept>>,
     /// Pictures of the requested view.
     pub view: Option<Arc<View>>,
-    /// The requested frame's photograph as it was changed, once that was looked at.
+    /// Composites of the requested frame, if they are shown.
     pub insertion: Option<Arc<Insertion>>,
     /// Events since the session began, oldest first.
     pub events: Arc<Vec<Event>>,
@@ -69,55 +65,30 @@ pub enum Phase {
     Loading,
     /// Solving.
     Solving,
-    /// Held between two iterations.
+    /// Paused between two iterations.
     Paused,
-    /// At the end.
+    /// The solve has ended.
     Finished(Termination),
-    /// The worker met an error it could not go on from; the message is in `events`.
+    /// The worker stopped at an error; the message is in `events`.
     Failed,
-}
-
-/// What is open, unchanging while it is.
-#[derive(Debug)]
-pub struct OpenCapture {
-    /// Where it came from.
-    pub source: Source,
-    /// How it was read.
-    pub options: OpenOptions,
-    /// Hash of the mesh, the cameras and the photographs.
-    pub hash: String,
-    /// The capture itself, with cameras at the photographs' full size.
-    pub capture: Arc<Capture>,
-    /// Name shown to people.
-    pub name: String,
-    /// Geometry and cameras.
-    pub scene: Arc<Scene>,
-    /// Photographs at the working resolution, one a camera.
-    pub photographs: Vec<Arc<Photograph>>,
-    /// The checked summary, one fact a line.
-    pub summary: Vec<String>,
-    /// What is odd about it.
-    pub warnings: Vec<String>,
-    /// How well the photographs agree with the mesh, where the options ask for that.
-    pub alignment: Option<Alignment>,
 }
 
 /// Pictures of one view.
 #[derive(Debug, Clone)]
 pub struct View {
-    /// Grows with every change, so that uploads can be skipped.
+    /// Incremented with every change, so that uploads can be skipped.
     pub sequence: u64,
     /// The frame, if the view is a photograph's.
     pub frame: Option<usize>,
-    /// The photograph, radiance.
+    /// The photograph, in radiance.
     pub photograph: Option<Arc<Picture>>,
-    /// The re-render from the estimate, radiance.
+    /// The render of the estimate, in radiance.
     pub render: Option<Arc<Picture>>,
-    /// Samples a pixel in `render`.
+    /// Samples per pixel of `render`.
     pub samples: u32,
     /// Estimated diffuse reflectance.
     pub albedo: Option<Arc<Picture>>,
-    /// Estimated emission, radiance.
+    /// Estimated emission, in radiance.
     pub emission: Option<Arc<Picture>>,
     /// Render − photograph, signed radiance.
     pub error: Option<Arc<Picture>>,
@@ -125,65 +96,64 @@ pub struct View {
     pub stderr: Option<Arc<Picture>>,
     /// Object index of each pixel; `u32::MAX` where the ray leaves the mesh.
     pub objects: Option<Arc<Vec<u32>>>,
-    /// The re-render by lamp, where the request asked for it.
+    /// The render by lamp, if requested.
     pub layers: Option<Arc<LightLayers>>,
 }
 
-/// A re-render with the light of each lamp apart; the layers add up to it.
+/// A render as layers by lamp, which add up to it.
 #[derive(Debug, Clone)]
 pub struct LightLayers {
-    /// What each layer holds the light of, and that light, radiance.
+    /// Source and radiance of each layer.
     pub layers: Vec<(LightSource, Arc<Picture>)>,
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub samples: u32,
 }
 
 impl LightLayers {
-    /// The picture with each layer's red, green and blue times a factor; `None` where nothing emits.
+    /// The sum of the layers, each times an RGB factor; `None` if nothing emits.
     pub fn mix(&self, factor: impl Fn(LightSource) -> Vec3) -> Option<Picture> {
         let layers = self.layers.iter();
         layers::mix(layers.map(|(source, picture)| (&**picture, factor(*source))))
     }
 }
 
-/// Composites of the requested frame: its photograph in the light as it was changed, with the inserted objects.
+/// Composites of the requested frame: its photograph, relit by the edits, with the inserted objects.
 #[derive(Debug, Clone)]
 pub struct Insertion {
-    /// Grows with every change.
+    /// Incremented with every change.
     pub sequence: u64,
     /// The frame.
     pub frame: usize,
-    /// The photograph as it was taken.
+    /// The photograph, unchanged.
     pub photograph: Arc<Picture>,
-    /// The same in the changed light, with the objects lit and shadowed by the estimate.
+    /// The relit photograph with the inserted objects.
     pub composite: Arc<Picture>,
-    /// Pasted, lit by harmonics of the photographs alone.
+    /// Pasted objects, lit by harmonics of the photographs.
     pub naive: Arc<Picture>,
-    /// Pasted, lit by harmonics of the estimate.
+    /// Pasted objects, lit by harmonics of the estimate.
     pub naive_estimate: Arc<Picture>,
-    /// Samples a pixel in `composite`, of the changed light or of the objects, whichever are fewer; `None` where it is the
-    /// photograph as taken.
+    /// Samples per pixel of relighting or objects, whichever are fewer; `None` if `composite` is the unchanged photograph.
     pub samples: Option<u32>,
     /// Seconds from the request to this picture.
     pub seconds: f64,
 }
 
-/// Something that happened.
+/// An event to report to the user.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Event {
-    /// How bad.
+    /// Its severity.
     pub level: Level,
-    /// What happened, in one line.
+    /// Its message in one line.
     pub message: String,
 }
 
-/// How much an event matters.
+/// Severity of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
-    /// Worth knowing.
+    /// Information.
     Info,
-    /// Worked around.
+    /// A problem that was worked around.
     Warning,
-    /// Failed.
+    /// A failure.
     Error,
 }

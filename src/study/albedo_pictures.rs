@@ -1,4 +1,4 @@
-//! Albedo against true albedo pictures, pixel by pixel.
+//! Compares estimated with true albedo, pixel by pixel.
 
 use crate::capture::truth::Truth;
 use crate::capture::{Capture, Frame};
@@ -10,27 +10,27 @@ use crate::transport::material::Material;
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-/// Points along a pixel's side over which the estimate is box-filtered, as the truth is.
+/// Points along a pixel's side at which the estimate is sampled; the truth is box-filtered in the same way.
 const SIDE: u32 = 4;
 
-/// Squared errors pooled over frames, and what was seen of each object.
+/// Squared errors pooled over frames, and the visibility of objects.
 #[derive(Debug, Clone, Default)]
 pub struct PictureErrors {
-    /// For each object, the pixels whose centre sees it.
+    /// For each object, the number of pixels whose centre sees it.
     pub seen_pixels: Vec<u64>,
     squares: f64,
     values: u64,
-    /// For each object: pixels compared, and the sums of the true albedo and of its square.
+    /// For each object: number of compared pixels, sum of the true albedo, and sum of its squared length.
     objects: Vec<(u64, DVec3, f64)>,
 }
 
 impl PictureErrors {
-    /// Peak signal-to-noise ratio in dB; `None` without true pictures. Infinite where there is no error.
+    /// Peak signal-to-noise ratio in dB with peak 1. `None` without true pictures or without any error.
     pub fn psnr(&self) -> Option<f64> {
         decibel(self.squares, self.values)
     }
 
-    /// The same for the best choice of one colour an object: its mean.
+    /// The same for the best estimate of one colour per object: the mean of its true albedo.
     pub fn psnr_constant_per_object(&self) -> Option<f64> {
         let squares = self
             .objects
@@ -42,22 +42,22 @@ impl PictureErrors {
     }
 }
 
-/// Peak 1 over the mean square; a perfect score has no finite number and is `None`.
+/// Peak signal-to-noise ratio in dB with peak 1; `None` without values or without any error.
 fn decibel(squares: f64, values: u64) -> Option<f64> {
     (values > 0 && squares > 0.0).then(|| -10.0 * (squares / values as f64).log10())
 }
 
-/// What the estimate says of one pixel.
+/// One pixel of the estimate.
 #[derive(Clone, Copy)]
 struct Seen {
-    /// Object at the centre.
+    /// Object at the pixel's centre.
     object: Option<u32>,
-    /// Mean albedo over the pixel; `None` where a part of it is an emitter or leaves the mesh.
+    /// Mean albedo over the pixel; `None` if part of it sees an emitter or no surface.
     albedo: Option<Vec3>,
 }
 
-/// Compares the estimated albedo with the true albedo of each frame's pixels, row by row, of which `true_albedo` tells that of the frames
-/// that have one, and counts seen pixels in all.
+/// Compares estimated and true albedo in all frames, and counts the pixels that see each object. `true_albedo`
+/// returns a frame's true albedo by rows, or `None` if it has none.
 ///
 /// # Errors
 /// As `true_albedo`.
@@ -83,7 +83,7 @@ pub fn compare(
         let camera = Camera::new(&frame.intrinsics, &frame.pose, scene.origin);
         let known = true_albedo(index, frame)?;
         let grid = if known.is_some() { SIDE } else { 0 };
-        let seen = look(scene, &camera, &materials, &emitters, grid);
+        let seen = sample_pixels(scene, &camera, &materials, &emitters, grid);
         for (pixel, seen) in seen.iter().enumerate() {
             let Some(object) = seen.object.map(|o| o as usize) else {
                 continue;
@@ -104,12 +104,12 @@ pub fn compare(
     Ok(errors)
 }
 
-/// For each object, the pixels of all photographs whose centre sees it.
+/// For each object, the number of pixels of all photographs whose centre sees it.
 pub fn seen_pixels(capture: &Capture, scene: &Scene) -> Vec<u64> {
     let mut seen = vec![0; scene.objects.len()];
     for frame in &capture.frames {
         let camera = Camera::new(&frame.intrinsics, &frame.pose, scene.origin);
-        for object in look(scene, &camera, &[], &[], 0)
+        for object in sample_pixels(scene, &camera, &[], &[], 0)
             .into_iter()
             .filter_map(|seen| seen.object)
         {
@@ -119,8 +119,8 @@ pub fn seen_pixels(capture: &Capture, scene: &Scene) -> Vec<u64> {
     seen
 }
 
-/// Looks through every pixel: at its centre, and at `grid` × `grid` points for the mean albedo.
-fn look(
+/// Samples every pixel: its object at the centre, and its mean albedo at `grid` × `grid` points.
+fn sample_pixels(
     scene: &Scene,
     camera: &Camera,
     materials: &[Material],

@@ -1,13 +1,12 @@
-//! Emitters found and missed, and how bright.
+//! Errors of the emission: which emitters are found, and how bright.
 
 use crate::capture::truth::{ObjectTruth, Truth};
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::math::color::luminance_f64;
 use crate::scene::Scene;
-use crate::study::evaluate::mean;
 use glam::DVec3;
 
-/// Fraction of the brightest luminance above which an object counts as an emitter.
+/// An object counts as an emitter above this fraction of the largest luminance.
 const THRESHOLD: f64 = 0.01;
 
 /// Errors over all emitters.
@@ -17,11 +16,11 @@ pub struct EmissionErrors {
     pub iou: Option<f64>,
     /// Mean squared logarithmic error over true emitters.
     pub log_mse: Option<f64>,
-    /// Factor on the estimate that fits the truth best, where it is open.
+    /// Factor on the estimate that fits the truth best; 1 unless the scale is open.
     pub scale: f64,
 }
 
-/// The truth that an estimated emission stands for: exitance where no more was determined, else emission.
+/// The true value of an estimated emission: exitance if the albedo could not be determined, else emission.
 pub fn comparable(estimated: &ObjectEstimate, known: &ObjectTruth) -> DVec3 {
     match known.exitance {
         Some(exitance) if !estimated.albedo_identifiable => exitance,
@@ -36,7 +35,7 @@ struct Lamp {
     emits: bool,
 }
 
-/// Compares the emission of all objects that the truth knows.
+/// Compares the emission of all objects that the truth contains. With `open_scale` the estimate is scaled to fit first.
 pub fn compare(
     scene: &Scene,
     estimate: &Estimate,
@@ -77,14 +76,14 @@ fn errors(lamps: &[Lamp], open_scale: bool) -> EmissionErrors {
     let (mut both, mut either) = (0.0, 0.0);
     for lamp in lamps {
         let found = luminance_f64(lamp.estimated) > THRESHOLD * top_estimated;
-        let there = lamp.emits && luminance_f64(lamp.known) > THRESHOLD * top_known;
-        both += if found && there { lamp.area } else { 0.0 };
-        either += if found || there { lamp.area } else { 0.0 };
+        let emits = lamp.emits && luminance_f64(lamp.known) > THRESHOLD * top_known;
+        both += if found && emits { lamp.area } else { 0.0 };
+        either += if found || emits { lamp.area } else { 0.0 };
     }
     let iou = match (lamps.is_empty(), either > 0.0) {
         (true, _) => None,
         (false, true) => Some(both / either),
-        // No light was there and none was found.
+        // Neither true nor estimated emitters.
         (false, false) => Some(1.0),
     };
 
@@ -107,6 +106,11 @@ fn errors(lamps: &[Lamp], open_scale: bool) -> EmissionErrors {
         log_mse: mean(&logs),
         scale,
     }
+}
+
+/// The mean; `None` without values.
+pub(super) fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
 #[cfg(test)]

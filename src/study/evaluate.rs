@@ -1,4 +1,4 @@
-//! The errors of an estimate against the truth of a capture.
+//! Errors of an estimate against the truth of a capture.
 
 use crate::capture::Capture;
 use crate::capture::photograph::Photograph;
@@ -8,16 +8,16 @@ use crate::inverse::estimate::{ENOUGH_PIXELS, Estimate, ObjectEstimate};
 use crate::math::stats::quantile;
 use crate::scene::Scene;
 use crate::study::albedo_pictures;
-use crate::study::emission::{self, EmissionErrors};
+use crate::study::emission::{self, EmissionErrors, mean};
 use glam::DVec3;
 use serde::{Serialize, Serializer};
 use std::path::Path;
 use std::sync::Arc;
 
-/// The errors of an estimate; `null` where nothing could be compared.
+/// Errors of an estimate; `null` where nothing could be compared.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Evaluation {
-    /// Objects scored for their albedo: known and no emitter in the truth, seen by 50 or more pixels, not textured.
+    /// Objects whose albedo is scored: in the truth, no emitter, not textured, and seen by 50 or more pixels.
     pub objects: usize,
     /// Mean absolute error of albedo over scored objects and RGB.
     pub albedo_mae: Option<f64>,
@@ -27,15 +27,15 @@ pub struct Evaluation {
     pub albedo_rel_p95: Option<f64>,
     /// Peak signal-to-noise ratio in dB against the true albedo pictures, peak 1.
     pub albedo_psnr: Option<f64>,
-    /// The best that one colour an object could score.
+    /// The same for the best estimate of one colour per object.
     pub albedo_psnr_constant_per_object: Option<f64>,
-    /// Intersection over union of the emitters by area; an emitter is brighter than 1 % of the brightest.
+    /// Intersection over union of the emitters by area; an emitter exceeds 1 % of the largest luminance.
     pub emission_iou: Option<f64>,
-    /// Mean over true emitters and RGB of ln² of the ratio, both sides raised by 1 % of the brightest.
+    /// Mean over true emitters and RGB of ln² of the ratio, both sides raised by 1 % of the largest luminance.
     pub emission_log_mse: Option<f64>,
     /// Median over true emitters of the relative error over RGB.
     pub emission_rel_median: Option<f64>,
-    /// The scale on the estimated light that fits the truth best; 1 but for 8-bit photographs, which leave it open.
+    /// Factor on the estimated light that fits the truth best; 1 unless the photographs are 8-bit, which leave the scale open.
     pub emission_scale: f64,
     /// Every object of the truth.
     #[serde(serialize_with = "as_map")]
@@ -45,7 +45,7 @@ pub struct Evaluation {
 /// The errors of one object.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ObjectErrors {
-    /// Pixels whose centre sees it.
+    /// Number of pixels whose centre sees it.
     pub pixels: u64,
     /// Whether it emits in the truth.
     pub emitter: bool,
@@ -55,29 +55,29 @@ pub struct ObjectErrors {
     pub scored: bool,
     /// Estimated albedo.
     pub albedo: [f32; 3],
-    /// True albedo, the mean where textured; `None` where the truth does not say.
+    /// True albedo, the mean if textured; `None` if the truth has none.
     pub albedo_true: Option<[f64; 3]>,
     /// Relative error of albedo over RGB.
     pub albedo_rel: Option<f64>,
-    /// Estimated emission, or exitance where that is all that is determined, times the scale.
+    /// Estimated emission times the scale; exitance where the albedo could not be determined.
     pub emission: [f64; 3],
-    /// The truth to compare it with.
+    /// The true value of `emission`.
     pub emission_true: [f64; 3],
     /// Relative error of emission over RGB, for emitters.
     pub emission_rel: Option<f64>,
 }
 
-/// The truth of a capture and what its photographs see: what estimates are compared with again and again.
+/// The truth of a capture and the visibility of its objects, for comparing many estimates.
 #[derive(Debug, Clone)]
 pub struct Reference {
     truth: Truth,
-    /// Pixels of all photographs, at the size of their files, whose centre sees each object.
+    /// For each object, the number of pixels of all photographs, at full size, whose centre sees it.
     seen_pixels: Vec<u64>,
     /// Whether the photographs leave the scale of the light open.
     open_scale: bool,
 }
 
-/// The errors that need no pictures.
+/// Errors that need no pictures.
 #[derive(Debug, Clone)]
 pub struct ObjectSummary {
     /// Objects scored for their albedo.
@@ -90,14 +90,14 @@ pub struct ObjectSummary {
     pub albedo_rel_p95: Option<f64>,
     /// Median over true emitters of the relative error over RGB.
     pub emission_rel_median: Option<f64>,
-    /// Emitters found and missed.
+    /// Errors of the emission.
     pub emission: EmissionErrors,
     /// Every object of the truth.
     pub per_object: Vec<(String, ObjectErrors)>,
 }
 
 impl Reference {
-    /// The truth about `scene`, whose `capture` has cameras at the full size of their `photographs`.
+    /// The reference of `scene`; `capture` has cameras at the full size of their `photographs`.
     pub fn new(
         truth: Truth,
         capture: &Capture,
@@ -152,8 +152,8 @@ impl Reference {
     }
 }
 
-/// Compares an estimate with the truth of the capture in `folder`, whose `capture` and `scene` it belongs to;
-/// `photographs` say whether the scale of the light is open.
+/// Compares an estimate with the truth of the capture in `folder`; `capture` and `scene` are the estimate's. `photographs`
+/// determine whether the scale of the light is open.
 ///
 /// # Errors
 /// The truth is missing or broken, or a true picture is of another size than its frame.
@@ -190,7 +190,7 @@ pub fn evaluate(
     })
 }
 
-/// Photographs that saturate were exposed by a camera that does not say how long.
+/// Whether the scale is open: photographs that saturate come from a camera with unknown exposure.
 fn open_scale(photographs: &[Arc<Photograph>]) -> bool {
     photographs.iter().any(|p| p.saturation.is_finite())
 }
@@ -218,14 +218,9 @@ fn of_object(
     }
 }
 
-/// ‖a − b‖₂ / ‖b‖₂; `None` where b is zero.
+/// Relative error ‖a − b‖₂ / ‖b‖₂; `None` where b is zero.
 fn relative(a: DVec3, b: DVec3) -> Option<f64> {
     (b != DVec3::ZERO).then(|| (a - b).length() / b.length())
-}
-
-/// The mean; `None` of nothing.
-pub(super) fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
 fn as_map<S: Serializer>(

@@ -1,21 +1,21 @@
-//! What a measurement of seconds was made on.
+//! The machine that times were measured on.
 
 use serde::{Deserialize, Serialize};
 use sysinfo::{CpuRefreshKind, System};
 
-/// The processor and how much of it was used.
+/// Processor and number of threads.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Machine {
-    /// Name of the processor as it calls itself; "unknown" where it does not.
+    /// Brand of the processor; "unknown" if it has none.
     pub cpu: String,
-    /// Logical cores that there are.
+    /// Number of logical cores.
     pub cores: usize,
-    /// Threads that worked.
+    /// Number of worker threads.
     pub threads: usize,
 }
 
 impl Machine {
-    /// This machine, with the threads that work now.
+    /// This machine, with the current number of worker threads.
     pub fn here() -> Self {
         let brand = System::new().ok().and_then(|mut system| {
             system.refresh_cpu_list(CpuRefreshKind::nothing());
@@ -29,7 +29,7 @@ impl Machine {
         }
     }
 
-    /// In words: "2 threads of Intel Xeon (2 cores)".
+    /// As text: "2 threads of Intel Xeon (2 cores)".
     pub fn words(&self) -> String {
         let Self {
             cpu,

@@ -1,5 +1,4 @@
-//! Measurements on finished work: how far an estimate is from the truth, what exactness costs, and the paper's
-//! experiments rerun.
+//! Measurements on finished work: errors against the truth, error over time, and the paper's experiments.
 
 mod albedo_pictures;
 mod emission;

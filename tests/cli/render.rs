@@ -222,7 +222,7 @@ fn results_are_rendered_edited_and_moved() {
     assert_eq!(edited["objects"]["floor"]["specular"], 0.5);
     for (value, words) in [
         ("floor=0", "above 0"),
-        ("floor=1.5", "not above 1"),
+        ("floor=1.5", "at most 1"),
         ("moon=0.5", "lamp"),
         ("floor=NaN", "NaN"),
         ("floor", "NAME=v"),

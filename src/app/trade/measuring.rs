@@ -4,7 +4,7 @@ use crate::app::task::{Course, Task};
 use crate::error::Result;
 use crate::inverse::settings::Settings;
 use crate::session::snapshot::OpenCapture;
-use crate::study::trade::{Curve, Heard, Trade, measure, plan};
+use crate::study::trade::{Curve, SolveEvent, Trade, measure, plan};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -50,9 +50,9 @@ fn run(
     });
     let begun = Instant::now();
     let mut curves: Vec<Curve> = Vec::new();
-    let mut tell = |heard: Heard| match heard {
-        Heard::Begins(run) => course.say(format!("measuring {}", run.name)),
-        Heard::Ended(curve) => {
+    let mut tell = |heard: SolveEvent| match heard {
+        SolveEvent::Begins(run) => course.say(format!("measuring {}", run.name)),
+        SolveEvent::Ended(curve) => {
             curves.push(curve.clone());
             course.show(Arc::new(Trade::new(
                 &subject.name,

@@ -1,4 +1,4 @@
-//! Files that an object file refers to: only from its own folder, and of bounded size.
+//! Files that an object file refers to. They must lie in its own folder and be of bounded size.
 
 use crate::capture::inputs;
 use crate::error::{Error, Result};
@@ -9,14 +9,14 @@ use image::{DynamicImage, ImageReader, Limits};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-/// Largest file that is read into memory.
+/// Largest file that is read, in bytes.
 const MAX_BYTES: u64 = 1 << 30;
-/// Longest side that a texture may have in its file.
+/// Longest side of a texture file, in pixels.
 const MAX_SIDE: u32 = 16_384;
-/// Longest side that a texture is kept at; larger ones are halved until they fit.
+/// Longest side of a texture in memory; larger ones are halved until they fit.
 const KEPT_SIDE: u32 = 4096;
 
-/// Reads a whole file of bounded size, and remembers it as an input.
+/// Reads a file of bounded size and records it as an input.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     let metadata = std::fs::metadata(path).map_err(|e| Error::io(path, &e))?;
     if !metadata.is_file() {
@@ -33,8 +33,8 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     std::fs::read(path).map_err(|e| Error::io(path, &e))
 }
 
-/// The path of a file that `referrer` names, refused where it leaves the referrer's folder.
-pub fn beside(referrer: &Path, name: &str) -> Result<PathBuf> {
+/// Resolves a file name in `referrer`. Refuses a file outside the referrer's folder.
+pub fn resolve(referrer: &Path, name: &str) -> Result<PathBuf> {
     let folder = match referrer.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -47,7 +47,7 @@ pub fn beside(referrer: &Path, name: &str) -> Result<PathBuf> {
             "put that file beside it",
         )
     };
-    // Backslashes are how some exporters on Windows write folders.
+    // Some exporters on Windows write backslashes.
     let wanted = folder.join(name.replace('\\', "/"));
     let found = wanted.canonicalize().map_err(missing)?;
     if !found.starts_with(&folder) {
@@ -60,9 +60,9 @@ pub fn beside(referrer: &Path, name: &str) -> Result<PathBuf> {
     Ok(found)
 }
 
-/// What the numbers of a texture mean.
+/// Encoding of a texture's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Meaning {
+pub enum TextureKind {
     /// Colours: 8- and 16-bit files hold the sRGB curve, floating-point ones linear values.
     Color,
     /// Parameters, linear in every file.
@@ -70,7 +70,7 @@ pub enum Meaning {
 }
 
 /// Decodes an image to linear values. `place` names it in errors.
-pub fn decode(bytes: &[u8], meaning: Meaning, place: &str) -> Result<Picture> {
+pub fn decode(bytes: &[u8], meaning: TextureKind, place: &str) -> Result<Picture> {
     let broken = |e: &dyn std::fmt::Display| {
         Error::new(
             place,
@@ -86,7 +86,7 @@ pub fn decode(bytes: &[u8], meaning: Meaning, place: &str) -> Result<Picture> {
     limits.max_image_height = Some(MAX_SIDE);
     reader.limits(limits);
     let image = reader.decode().map_err(|e| broken(&e))?;
-    let linear = meaning == Meaning::Data
+    let linear = meaning == TextureKind::Data
         || matches!(
             image,
             DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)
@@ -109,7 +109,7 @@ pub fn decode(bytes: &[u8], meaning: Meaning, place: &str) -> Result<Picture> {
     Ok(picture)
 }
 
-/// The picture at half its size, rounded up, each pixel the mean of up to four.
+/// The picture at half size, rounded up; each pixel is the mean of 2 × 2.
 fn halved(picture: &Picture) -> Picture {
     let (width, height) = (picture.width.div_ceil(2), picture.height.div_ceil(2));
     Picture::from_fn(width, height, |x, y| {

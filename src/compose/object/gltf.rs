@@ -1,9 +1,9 @@
-//! Binary and JSON glTF 2.0: the default scene's triangles with their metallic-roughness materials.
+//! glTF 2.0 (.glb and .gltf): the triangles of the default scene with their metallic-roughness materials.
 
 use crate::capture::read::accessor::numbers;
 use crate::capture::read::gltf_file::{self, Buffer, ReadFile};
 use crate::capture::read::gltf_scene;
-use crate::compose::object::files::Meaning;
+use crate::compose::object::files::TextureKind;
 use crate::compose::object::surface::{ObjectSurface, mean};
 use crate::compose::object::{Corners, Parts, files};
 use crate::error::{Error, Result};
@@ -17,7 +17,7 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Reads a GLB or glTF file with the buffers and images that it names.
+/// Reads a glTF file with its buffers and images.
 pub(super) fn read(path: &Path) -> Result<Parts> {
     let broken = |problem: String| {
         Error::file(
@@ -27,7 +27,7 @@ pub(super) fn read(path: &Path) -> Result<Parts> {
         )
     };
     let gltf = gltf_file::parse(path, &files::read_bytes(path)?)?;
-    let file = |_: &str, name: &str| files::read_bytes(&files::beside(path, name)?);
+    let file = |_: &str, name: &str| files::read_bytes(&files::resolve(path, name)?);
     let buffers = gltf_file::buffers(&gltf, path, &file)?;
 
     let mut parts = Parts::default();
@@ -51,7 +51,7 @@ pub(super) fn read(path: &Path) -> Result<Parts> {
         )?;
         parts.surfaces.push(surface);
     }
-    // Primitives without a material are what the format calls its default: white, wholly metal, wholly rough.
+    // glTF's default material, for primitives without one: white, fully metallic, roughness 1.
     parts.surfaces.push(ObjectSurface {
         base_color: Vec3::ONE,
         texture: None,
@@ -72,7 +72,7 @@ pub(super) fn read(path: &Path) -> Result<Parts> {
     Ok(parts)
 }
 
-/// Adds a primitive's triangles where they stand; `plain` is the surface of those without a material.
+/// Adds a primitive's transformed triangles; `plain` is the index of the default material.
 fn push_primitive(
     parts: &mut Parts,
     primitive: &Primitive<'_>,
@@ -88,7 +88,7 @@ fn push_primitive(
         None => Ok((Vec::new(), 1)),
     };
 
-    // Attributes; positions must be there, the others may.
+    // Positions are required, other attributes optional.
     let positions: Vec<DVec3> = (numbers(&accessor, buffers, &[Dimensions::Vec3])?.0)
         .chunks_exact(3)
         .map(|p| transform.transform_point3(DVec3::from_slice(p)))
@@ -153,7 +153,7 @@ fn surface(
     material: &::gltf::Material<'_>,
     (path, file): (&Path, ReadFile<'_>),
     buffers: &[Buffer],
-    images: &mut HashMap<(usize, Meaning), Arc<Picture>>,
+    images: &mut HashMap<(usize, TextureKind), Arc<Picture>>,
     warnings: &mut Vec<String>,
 ) -> Result<ObjectSurface> {
     let place = format!(
@@ -163,7 +163,7 @@ fn surface(
     );
     let pbr = material.pbr_metallic_roughness();
     let [r, g, b, _] = pbr.base_color_factor();
-    let mut image = |texture: ::gltf::Texture<'_>, meaning: Meaning| -> Result<Arc<Picture>> {
+    let mut image = |texture: ::gltf::Texture<'_>, meaning: TextureKind| -> Result<Arc<Picture>> {
         let source = texture.source();
         let key = (source.index(), meaning);
         if let Some(known) = images.get(&key) {
@@ -182,24 +182,24 @@ fn surface(
         Ok(decoded)
     };
     let texture = match pbr.base_color_texture() {
-        Some(info) => Some(image(info.texture(), Meaning::Color)?),
+        Some(info) => Some(image(info.texture(), TextureKind::Color)?),
         None => None,
     };
-    // One lobe an object: roughness (green) and metalness (blue) are the texture's means.
+    // An object has one lobe, so roughness (green) and metalness (blue) are means of the texture.
     let (mut roughness, mut metallic) = (pbr.roughness_factor(), pbr.metallic_factor());
     if let Some(info) = pbr.metallic_roughness_texture() {
-        let data = image(info.texture(), Meaning::Data)?;
+        let data = image(info.texture(), TextureKind::Data)?;
         let values = mean(&data);
         roughness *= values.y;
         metallic *= values.z;
         warnings.push(format!(
-            "{place}: of the metallic-roughness texture only the mean is used."
+            "{place}: only the mean of the metallic-roughness texture is used."
         ));
     }
 
     if material.alpha_mode() != AlphaMode::Opaque {
         warnings.push(format!(
-            "{place}: see-through is not supported and is taken as opaque."
+            "{place}: see-through materials are not supported and are treated as opaque."
         ));
     }
     if material.emissive_factor() != [0.0; 3] {

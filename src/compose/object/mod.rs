@@ -1,4 +1,4 @@
-//! Objects to insert: triangles with their own known materials, read from OBJ or glTF.
+//! Objects to insert: triangles with known materials, read from OBJ or glTF.
 
 mod files;
 mod gltf;
@@ -12,15 +12,15 @@ use std::path::Path;
 use std::sync::Arc;
 use surface::ObjectSurface;
 
-/// Most triangles that an object may have.
+/// Most triangles of an object.
 const MAX_TRIANGLES: usize = 20_000_000;
 
 /// An object in its file's coordinates.
 ///
-/// The file's up axis is +y, as glTF demands and OBJ writers agree on.
+/// The up axis is +y: the standard of glTF and the custom of OBJ.
 #[derive(Debug, Clone)]
 pub struct ObjectModel {
-    /// The file's name without its folder and ending.
+    /// The file's name without folder and extension.
     pub name: String,
     /// Corners of each triangle in the file's coordinates and units, counter-clockwise seen from the front.
     pub corners: Vec<[DVec3; 3]>,
@@ -30,14 +30,14 @@ pub struct ObjectModel {
     pub corner_colors: Vec<[Vec3; 3]>,
     /// For each triangle, an index into `materials`.
     pub material_of: Vec<u32>,
-    /// What it is made of.
+    /// Materials.
     pub materials: Vec<Material>,
-    /// What was replaced or left out, each a full sentence naming the file.
+    /// What was replaced or left out: full sentences that name the file.
     pub warnings: Vec<String>,
 }
 
 impl ObjectModel {
-    /// Reads an OBJ, GLB or glTF file, told apart by the name's ending.
+    /// Reads an OBJ, GLB or glTF file, by its extension.
     ///
     /// # Errors
     /// The file cannot be read, is of another kind, is broken, holds no triangle with an area, or names a texture
@@ -52,7 +52,7 @@ impl ObjectModel {
             _ => {
                 return Err(Error::file(
                     path,
-                    "not a file that objects are read from",
+                    "is no object file",
                     "give an .obj, .glb or .gltf file",
                 ));
             }
@@ -63,7 +63,7 @@ impl ObjectModel {
         parts.finish(name, path)
     }
 
-    /// An object from parts in memory, of one material.
+    /// Builds an object with one material from triangles.
     ///
     /// # Errors
     /// No triangle has an area, or a coordinate is not finite.
@@ -77,9 +77,7 @@ impl ObjectModel {
         Ok(model)
     }
 
-    /// Replaces every material by one.
-    ///
-    /// Textures and vertex colours go with the materials that they belonged to.
+    /// Replaces all materials by one, and drops textures and vertex colours.
     pub fn with_material(mut self, surface: &ObjectSurface) -> Self {
         self.materials = vec![surface.material(None)];
         self.material_of.fill(0);
@@ -97,14 +95,14 @@ impl ObjectModel {
             })
     }
 
-    /// The middle of the base: the lowest height, in the middle of the bounding box.
+    /// Centre of the base: lowest height, centre of the bounding box.
     pub fn base(&self) -> DVec3 {
         let (low, high) = self.bounds();
         DVec3::new((low.x + high.x) * 0.5, low.y, (low.z + high.z) * 0.5)
     }
 }
 
-/// One triangle as the readers meet it.
+/// A triangle as it was read.
 struct Corners {
     positions: [DVec3; 3],
     normals: Option<[Vec3; 3]>,
@@ -123,7 +121,7 @@ impl Corners {
     }
 }
 
-/// What the readers gather, before gaps are filled.
+/// Triangles and surfaces as they were read, before missing attributes are filled in.
 #[derive(Default)]
 struct Parts {
     triangles: Vec<(Corners, u32)>,
@@ -134,7 +132,7 @@ struct Parts {
 }
 
 impl Parts {
-    /// Adds a triangle; those without an area or with a coordinate that is not finite are counted and left out.
+    /// Adds a triangle. One without area or with a coordinate that is not finite is only counted.
     fn push(&mut self, corners: Corners, material: u32) {
         let [a, b, c] = corners.positions;
         let finite = a.is_finite() && b.is_finite() && c.is_finite();
@@ -179,7 +177,7 @@ impl Parts {
             }
         }
 
-        // Attributes that only some triangles have are completed for all.
+        // If some triangles have an attribute, the others get a default value.
         let has_normals = self.triangles.iter().any(|(c, _)| c.normals.is_some());
         let has_colors = self.triangles.iter().any(|(c, _)| c.colors.is_some());
         let corner_uvs: Arc<Vec<[Vec2; 3]>> = Arc::new(
@@ -225,7 +223,7 @@ fn usable_color(color: Vec3) -> Vec3 {
     }
 }
 
-/// Texture coordinates, or zero where they are no place on a repeated image.
+/// Texture coordinates; zero where they are not finite or far out of range.
 fn usable_uv(uv: Vec2) -> Vec2 {
     const MANY_REPEATS: f32 = 1e5;
     if uv.abs().max_element() < MANY_REPEATS && uv.is_finite() {
@@ -235,7 +233,7 @@ fn usable_uv(uv: Vec2) -> Vec2 {
     }
 }
 
-/// The file's normals, turned to the front where they look back, or the geometric one where they are missing.
+/// Corner normals on the triangle's front side; the geometric normal where the file has none.
 fn front_normals(corners: &Corners) -> [Vec3; 3] {
     let [a, b, c] = corners.positions;
     let geometric = (b - a).cross(c - a).normalize_or_zero().as_vec3();

@@ -1,11 +1,11 @@
 //! Wavefront OBJ with MTL.
 //!
-//! Base colour is Kd × map_Kd (and × vertex colours). Ns and Ks become a rough lobe where `illum` asks for highlights:
-//! α = √(2 / (Ns + 2)), Blinn–Phong's exponent at GGX's curvature (Walter et al. 2007), and specular reflectance
-//! 0.08 × Ks, the convention of the exporters that write Ks as a strength rather than a colour. `Pr` and `Pm`, where
-//! a file has them, are roughness (α = Pr²) and metalness.
+//! Base colour is Kd × map_Kd × vertex colour. Where `illum` asks for highlights, Ns and Ks become a specular lobe:
+//! α = √(2 / (Ns + 2)), which matches the curvature of Blinn–Phong at its peak (Walter et al. 2007), and specular reflectance
+//! 0.08 × Ks, since exporters write Ks as a strength rather than a colour. `Pr` and `Pm`, if present, are roughness (α = Pr²)
+//! and metalness.
 
-use crate::compose::object::files::Meaning;
+use crate::compose::object::files::TextureKind;
 use crate::compose::object::surface::ObjectSurface;
 use crate::compose::object::{Corners, Parts, files};
 use crate::error::{Error, Result};
@@ -21,7 +21,7 @@ use std::sync::Arc;
 /// Specular reflectance at normal incidence for Ks = 1.
 const SPECULAR_OF_KS: f32 = 0.08;
 
-/// Reads an OBJ file and the MTL files and textures that it names.
+/// Reads an OBJ file with its MTL files and textures.
 pub(super) fn read(path: &Path) -> Result<Parts> {
     let bytes = files::read_bytes(path)?;
     let options = tobj::LoadOptions {
@@ -30,7 +30,7 @@ pub(super) fn read(path: &Path) -> Result<Parts> {
         ignore_lines: true,
         ..Default::default()
     };
-    // Libraries are found by a callback that cannot carry an error of ours, so the first one is kept aside.
+    // tobj's callback cannot return our error, so the first one is kept here.
     let library_error = RefCell::new(None);
     let library_path = RefCell::new(path.to_path_buf());
     let loaded = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, |name| {
@@ -40,7 +40,7 @@ pub(super) fn read(path: &Path) -> Result<Parts> {
                 Err(tobj::LoadError::OpenFileFailed)
             },
             |(found, bytes)| {
-                let bytes = with_whole_colors(&bytes);
+                let bytes = with_three_number_colors(&bytes);
                 *library_path.borrow_mut() = found;
                 tobj::load_mtl_buf(&mut Cursor::new(
                     bytes.ok_or(tobj::LoadError::MaterialParseError)?,
@@ -96,14 +96,14 @@ pub(super) fn read(path: &Path) -> Result<Parts> {
 }
 
 fn open_library(referrer: &Path, name: &Path) -> Result<(PathBuf, Vec<u8>)> {
-    let found = files::beside(referrer, &name.to_string_lossy())?;
+    let found = files::resolve(referrer, &name.to_string_lossy())?;
     let bytes = files::read_bytes(&found)?;
     Ok((found, bytes))
 }
 
-/// An MTL file in which every colour has three numbers, which tobj takes for granted: a single one stands for all three.
-/// `None` where there are two or none.
-fn with_whole_colors(bytes: &[u8]) -> Option<String> {
+/// Completes an MTL file for tobj, which requires three numbers a colour: a single number is repeated. `None` where a
+/// colour has two numbers or none.
+fn with_three_number_colors(bytes: &[u8]) -> Option<String> {
     let text = String::from_utf8_lossy(bytes);
     let mut whole = String::with_capacity(text.len());
     for line in text.lines() {
@@ -131,7 +131,7 @@ fn push_mesh(parts: &mut Parts, mesh: &tobj::Mesh, material: u32) -> Option<()> 
         Some(DVec3::new(v[0], v[1], v[2]))
     };
     for (number, triangle) in mesh.indices.chunks_exact(3).enumerate() {
-        // Normals and texture coordinates are indexed apart from positions.
+        // Normals and texture coordinates have indices of their own.
         let corner_indices = |indices: &[u32]| -> Option<[u32; 3]> {
             indices.get(number * 3..number * 3 + 3)?.try_into().ok()
         };
@@ -165,7 +165,7 @@ fn push_mesh(parts: &mut Parts, mesh: &tobj::Mesh, material: u32) -> Option<()> 
     Some(())
 }
 
-/// What an MTL entry describes; each texture is read once.
+/// The surface that an MTL material describes; each texture is read once.
 fn surface(
     material: &tobj::Material,
     library: &Path,
@@ -175,7 +175,7 @@ fn surface(
     let place = || format!("{}: material `{}`", library.display(), material.name);
     let number =
         |key: &str| -> Option<f32> { material.unknown_param.get(key)?.trim().parse().ok() };
-    // A texture alone is the base colour.
+    // With a texture, the default of Kd is 1.
     let missing = match material.diffuse_texture {
         Some(_) => Vec3::ONE,
         None => Vec3::splat(0.8),
@@ -216,11 +216,11 @@ fn surface(
         let texture = match textures.get(name) {
             Some(texture) => texture.clone(),
             None => {
-                let found = files::beside(library, name)?;
+                let found = files::resolve(library, name)?;
                 let bytes = files::read_bytes(&found)?;
                 Arc::new(files::decode(
                     &bytes,
-                    Meaning::Color,
+                    TextureKind::Color,
                     &found.display().to_string(),
                 )?)
             }
@@ -234,7 +234,7 @@ fn surface(
         || material.dissolve_texture.is_some();
     if transparent {
         warnings.push(format!(
-            "{}: see-through (d, Tr) is not supported and is taken as opaque.",
+            "{}: see-through materials (d, Tr) are not supported and are treated as opaque.",
             place()
         ));
     }

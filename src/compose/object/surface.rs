@@ -1,20 +1,20 @@
-//! A material as files describe it, made into what light transport knows.
+//! Materials as object files describe them, converted to those of light transport.
 
 use crate::math::picture::Picture;
 use crate::transport::material::{Albedo, Lobe, Material, Texture};
 use glam::{Vec2, Vec3};
 use std::sync::Arc;
 
-/// Base colour, metalness and roughness.
+/// Metallic-roughness material.
 #[derive(Debug, Clone)]
 pub struct ObjectSurface {
-    /// Linear base colour, a factor on the texture where there is one.
+    /// Linear base colour; multiplies the texture if there is one.
     pub base_color: Vec3,
     /// Linear image of the base colour.
     pub texture: Option<Arc<Picture>>,
-    /// 0 a dielectric, 1 a metal; between them a mixture.
+    /// 0 for a dielectric, 1 for a metal; in between, a blend.
     pub metallic: f32,
-    /// GGX roughness α; `None` is diffuse alone.
+    /// GGX roughness α; `None` for a purely diffuse surface.
     pub alpha: Option<f32>,
     /// Specular reflectance of the dielectric part at normal incidence.
     pub dielectric: f32,
@@ -41,7 +41,7 @@ impl ObjectSurface {
         }
     }
 
-    /// The surface with every value inside its physical range; `None` where one is not a number.
+    /// The surface with every value clamped to its physical range; `None` where one is not finite.
     pub fn checked(self) -> Option<Self> {
         let finite = self.base_color.is_finite()
             && self.metallic.is_finite()
@@ -56,10 +56,10 @@ impl ObjectSurface {
         })
     }
 
-    /// The material; `corner_uvs` are the texture coordinates that a texture is looked up with.
+    /// The material. `corner_uvs` are the texture coordinates of a texture.
     ///
-    /// A metal's specular reflectance is its base colour (the mean of its texture: the lobe is one an object), and its
-    /// diffuse reflectance is zero.
+    /// A metal has no diffuse reflectance; its specular reflectance is its base colour, or the mean of its texture,
+    /// since an object has one lobe.
     pub fn material(&self, corner_uvs: Option<&Arc<Vec<[Vec2; 3]>>>) -> Material {
         let diffuse = self.base_color * (1.0 - self.metallic);
         let (albedo, mean) = match (&self.texture, corner_uvs) {

@@ -1,4 +1,4 @@
-//! Furniture in its own coordinates: standing on y = 0, facing +z, in metres.
+//! Furniture in local coordinates: standing on y = 0, facing +z, in metres.
 
 pub mod seats;
 pub mod vessels;

@@ -1,10 +1,10 @@
-//! Things to sit on.
+//! Seats and cushions.
 
 use crate::room::furniture::pad;
 use crate::room::shape::Modeller;
 use glam::{DAffine3, DVec3};
 
-/// Upholstery of a seat `width` wide and `depth` deep with `cushions` side by side; its feet are apart.
+/// A seat without its feet, `width` × `depth` metres, with `cushions` side by side.
 pub fn upholstery(m: &mut Modeller, width: f64, depth: f64, cushions: u32) {
     let arm = 0.17;
     let half = width * 0.5;
@@ -53,9 +53,9 @@ pub fn feet(m: &mut Modeller, width: f64, depth: f64) {
     }
 }
 
-/// A square cushion leaning on its lower edge, centred over the origin.
+/// A square cushion, centred at the origin.
 pub fn cushion(m: &mut Modeller, size: f64) {
-    // A pillow: two domes over a square with pinched corners.
+    // Two domes over a square with pinched corners.
     let steps = 6;
     let dome = |side: f64| -> Vec<Vec<DVec3>> {
         let line = |i: u32| 2.0 * f64::from(i) / f64::from(steps) - 1.0;

@@ -1,4 +1,4 @@
-//! Turned things, what grows in them, and the floor lamp.
+//! Surfaces of revolution (vessels, lamps), and a plant.
 
 use crate::room::shape::{Modeller, ring};
 use crate::room::texture::hash;
@@ -63,7 +63,7 @@ pub fn pot(m: &mut Modeller, radius: f64, height: f64) {
     );
 }
 
-/// Arching leaves that spring from the origin to about `height`.
+/// Arching leaves from the origin, up to about `height`.
 pub fn leaves(m: &mut Modeller, count: u32, height: f64) {
     const STATIONS: u32 = 6;
     for leaf in 0..count {
@@ -75,7 +75,7 @@ pub fn leaves(m: &mut Modeller, count: u32, height: f64) {
         let rings: Vec<Vec<DVec3>> = (0..=STATIONS)
             .map(|i| {
                 let t = f64::from(i) / f64::from(STATIONS);
-                // Up at first, then out and over.
+                // First upwards, then outwards and down.
                 let center =
                     outward * (0.03 + reach * t * t) + DVec3::Y * (rise * t * (1.45 - 0.6 * t));
                 let width = 0.004 + 0.05 * (std::f64::consts::PI * t.powf(0.8)).sin().max(0.0);
@@ -88,7 +88,7 @@ pub fn leaves(m: &mut Modeller, count: u32, height: f64) {
     }
 }
 
-/// The foot and pole of a floor lamp, and the cap that closes its lantern above.
+/// Foot and pole of a floor lamp, and the cap above its lantern at height `lantern`.
 pub fn lamp_stand(m: &mut Modeller, lantern: f64) {
     m.lathe(
         &[
@@ -107,7 +107,7 @@ pub fn lamp_stand(m: &mut Modeller, lantern: f64) {
     );
 }
 
-/// A lantern around a height, round and a little flat.
+/// A slightly flattened round lantern at height `lantern`.
 pub fn lantern(m: &mut Modeller, lantern: f64) {
     let outline: Vec<[f64; 2]> = (0..=10)
         .map(|i| {

@@ -57,13 +57,13 @@ pub fn bookcase(m: &mut Modeller, width: f64, depth: f64) {
     }
 }
 
-/// Books on the boards of [`bookcase`], each with its column of the spine picture.
+/// Books on the boards of [`bookcase`], textured by columns of the spine picture.
 pub fn books(m: &mut Modeller, width: f64, depth: f64) {
     let mut spine = 0;
     for (shelf, pair) in BOARDS.windows(2).enumerate() {
         let shelf = shelf as u32;
         let (floor, room) = (pair[0] + 0.025, pair[1] - pair[0] - 0.025);
-        // Some shelves are filled from the left, some from the right, none completely.
+        // Shelves are filled from alternating sides, none completely.
         let fill = (0.55 + 0.4 * f64::from(hash(shelf, 99))) * (width - 0.06);
         let from_right = shelf % 2 == 1;
         let mut along = 0.0;
@@ -119,7 +119,7 @@ pub fn sideboard(m: &mut Modeller, width: f64, depth: f64, height: f64) {
     }
 }
 
-/// A door leaf with two raised fields and a handle in its casing, its face near z = 0.
+/// A door leaf with two panels, handle and casing; its face is near z = 0.
 pub fn door(m: &mut Modeller) {
     let (width, height) = (0.86, 2.02);
     m.cuboid(
@@ -146,7 +146,7 @@ pub fn door(m: &mut Modeller) {
     m.bar(grip, grip + DVec3::X * 0.13, [0.011, 0.009], 8);
 }
 
-/// Four bars around a rectangle in the xy plane, lying on the side of +z.
+/// A frame of four bars in the xy plane, extending towards +z.
 pub fn rim(m: &mut Modeller, width: f64, height: f64, thick: f64, deep: f64) {
     let (x, y) = (width * 0.5, height * 0.5);
     for sign in [-1.0, 1.0] {

@@ -1,19 +1,19 @@
-//! Rooms full of small things.
+//! Rooms full of small objects.
 
 use crate::room::furniture::woodwork;
 use crate::room::generated::furnisher::{Furnisher, Support};
 use glam::{DAffine3, DVec2, DVec3};
 
-/// Number of things.
-const THINGS: [f64; 2] = [300.0, 1000.0];
-/// Things on each square metre of floor, at most, so that small rooms hold them.
+/// Range of the number of objects.
+const COUNT: [f64; 2] = [300.0, 1000.0];
+/// Most objects per square metre of floor, so that small rooms have space for them.
 const DENSITY: f64 = 60.0;
-/// Radius of a thing in metres.
+/// Range of the radius of an object in metres.
 const RADIUS: [f64; 2] = [0.015, 0.07];
-/// Tries at finding a free place before a smaller thing is taken.
-const TRIES: u32 = 20;
+/// Attempts at finding a free place before the object is made smaller.
+const ATTEMPTS: u32 = 20;
 
-/// A plain room with shelves, and hundreds of boxes, drums, cups and cones on its floor, furniture and shelves.
+/// A plain room with shelves, and hundreds of boxes, cylinders and cones on floor, furniture and shelves.
 pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     f.shell();
     f.lamps();
@@ -26,13 +26,13 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
         half: DVec2::new(f.size.x, f.size.z) * 0.5 - 0.05,
         headroom: f.size.y,
     };
-    let blocked = f.taken.clone();
+    let blocked = f.occupied.clone();
     let mut supports = vec![floor];
     supports.append(&mut f.supports);
     let mut places: Vec<Vec<(DVec2, f64)>> = vec![Vec::new(); supports.len()];
     places[0] = blocked;
-    let most = (DENSITY * f.size.x * f.size.z).clamp(THINGS[0], THINGS[1]);
-    let wanted = f.scaled(THINGS[0], most.max(THINGS[0] + 1.0)) as usize;
+    let max = (DENSITY * f.size.x * f.size.z).clamp(COUNT[0], COUNT[1]);
+    let wanted = f.scaled(COUNT[0], max.max(COUNT[0] + 1.0)) as usize;
     for index in 0..wanted {
         thing(f, index, &supports, &mut places);
     }
@@ -40,7 +40,7 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     f.expose(8.0, 48.0);
 }
 
-/// An open bookcase on the floor, whose boards are supports.
+/// An open bookcase whose boards support objects.
 fn shelves(f: &mut Furnisher, index: usize) {
     let (width, depth) = (f.between(0.6, 1.1), f.between(0.25, 0.4));
     let radius = 0.5 * width.hypot(depth);
@@ -62,7 +62,7 @@ fn shelves(f: &mut Furnisher, index: usize) {
     }
 }
 
-/// Stands a thing where there is room for it, however small it has to be.
+/// Adds an object at a free place, shrinking it until it fits.
 fn thing(f: &mut Furnisher, index: usize, supports: &[Support], places: &mut [Vec<(DVec2, f64)>]) {
     let mut radius = f.scaled(RADIUS[0], RADIUS[1]);
     let (which, at) = loop {
@@ -92,14 +92,14 @@ fn thing(f: &mut Furnisher, index: usize, supports: &[Support], places: &mut [Ve
     });
 }
 
-/// A support and a place on it that nothing has taken within a radius. Half of all things lie on the floor.
+/// A support and a free place on it for a radius. Half of the attempts are on the floor.
 fn free(
     f: &mut Furnisher,
     radius: f64,
     supports: &[Support],
     places: &[Vec<(DVec2, f64)>],
 ) -> Option<(usize, DVec2)> {
-    for _ in 0..TRIES {
+    for _ in 0..ATTEMPTS {
         let which = match f.count(0, 1) {
             0 => 0,
             _ => f.count(0, supports.len() - 1),

@@ -1,20 +1,21 @@
-//! A furnished room before it is photographed.
+//! A furnished room that is yet to be photographed.
 
 use crate::capture::photograph::Photograph;
 use crate::error::Result;
 use crate::math::rng::splitmix64;
-use crate::room::Room;
+use crate::room::generated::family::Family;
 use crate::room::generated::furnisher::Furnisher;
-use crate::room::generated::{Family, Generated};
+use crate::room::generated::photographed::Generated;
+use crate::room::model::Room;
 use crate::room::photographs::Rendering;
 use crate::transport::environment::Environment;
 use crate::transport::lit::Lit;
 use std::sync::Arc;
 
-/// Key of the noise of a room's photographs.
-const NOISE: u64 = 0x6e6f_6973_6500;
+/// Key of the photographs' random seed.
+const PHOTOGRAPH_KEY: u64 = 0x6e6f_6973_6500;
 
-/// A room, its light from outside, and how it is to be photographed.
+/// A room, its light from outside, and the settings of its photographs.
 pub struct Draft {
     /// Its family.
     pub family: Family,
@@ -24,15 +25,13 @@ pub struct Draft {
     pub room: Room,
     /// Light from outside.
     pub outside: Option<Arc<Environment>>,
-    /// Noise and size of its photographs.
+    /// Random seed, samples and size of its photographs.
     pub rendering: Rendering,
 }
 
 impl Draft {
-    /// Furnishes room `seed` of a family.
-    pub fn new(family: Family, seed: u64, size: [u32; 2]) -> Self {
-        let mut furnisher = Furnisher::new(seed, family as u64);
-        family.furnish(&mut furnisher, size);
+    /// Room `seed` of a family, as furnished.
+    pub fn new(family: Family, seed: u64, size: [u32; 2], furnisher: Furnisher) -> Self {
         Self {
             family,
             seed,
@@ -47,7 +46,7 @@ impl Draft {
             },
             outside: furnisher.outside,
             rendering: Rendering {
-                seed: splitmix64(seed ^ NOISE),
+                seed: splitmix64(seed ^ PHOTOGRAPH_KEY),
                 samples: furnisher.samples,
                 size,
             },
@@ -66,7 +65,7 @@ impl Draft {
         })
     }
 
-    /// The room with photographs, one a view.
+    /// The room with its photographs, one a view.
     pub fn photographed(self, lit: Lit, photographs: Vec<Photograph>) -> Generated {
         Generated {
             family: self.family,

@@ -1,11 +1,6 @@
-//! The table of families.
+//! The families of generated rooms.
 
-use crate::room::generated::furnisher::Furnisher;
-use crate::room::generated::{
-    clutter, glossy, patterned, phone, plain, scanned, sparse, unseen, white, window,
-};
-
-/// A kind of generated room. The numbers are part of the keys of its random numbers.
+/// A kind of generated room. Its number is a key of the random numbers of its rooms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Family {
     /// Lamps in view.
@@ -24,18 +19,17 @@ pub enum Family {
     White = 6,
     /// Few and noisy photographs.
     Sparse = 7,
-    /// Photographs as a telephone takes them.
+    /// Photographs like a phone's.
     Phone = 8,
-    /// Such photographs, and a mesh from depth images.
+    /// Photographs like a phone's, and a mesh fused from depth images.
     Scanned = 9,
 }
 
-/// What is said of a family, and how its rooms are furnished for photographs of a size in pixels.
+/// A row of the table of families.
 struct Row {
     family: Family,
     name: &'static str,
     about: &'static str,
-    furnish: fn(&mut Furnisher, [u32; 2]),
 }
 
 const TABLE: [Row; Family::ALL.len()] = [
@@ -43,61 +37,51 @@ const TABLE: [Row; Family::ALL.len()] = [
         family: Family::Plain,
         name: "plain",
         about: "boxes, drums and tables in the light of lamps that are in view",
-        furnish: plain::furnish,
     },
     Row {
         family: Family::Unseen,
         name: "unseen",
         about: "lamps light the room, and no photograph sees one",
-        furnish: unseen::furnish,
     },
     Row {
         family: Family::Window,
         name: "window",
         about: "sky and sun through openings that photographs see in part; no lamps, or a weak one",
-        furnish: window::furnish,
     },
     Row {
         family: Family::Clutter,
         name: "clutter",
         about: "300 to 1000 small objects on floor, furniture and shelves",
-        furnish: clutter::furnish,
     },
     Row {
         family: Family::Patterned,
         name: "patterned",
         about: "stripes, checks, noise and prints on most surfaces",
-        furnish: patterned::furnish,
     },
     Row {
         family: Family::Glossy,
         name: "glossy",
         about: "GGX lobes of roughness 0.1 and more over the diffuse base of several objects",
-        furnish: glossy::furnish,
     },
     Row {
         family: Family::White,
         name: "white",
         about: "albedos of 0.9 and more on the shell and most furniture",
-        furnish: white::furnish,
     },
     Row {
         family: Family::Sparse,
         name: "sparse",
         about: "6 photographs with 5 to 15 % noise a pixel",
-        furnish: sparse::furnish,
     },
     Row {
         family: Family::Phone,
         name: "phone",
         about: "8-bit JPEG, automatic exposure, vignetting and slight blur",
-        furnish: phone::furnish,
     },
     Row {
         family: Family::Scanned,
         name: "scanned",
         about: "as phone, the mesh fused from noisy depth images with holes, poses jittered, no objects",
-        furnish: scanned::furnish,
     },
 ];
 
@@ -127,24 +111,19 @@ impl Family {
         names
     };
 
-    /// Its name on the command line and in files.
+    /// Name on the command line and in files.
     pub fn name(self) -> &'static str {
         self.row().name
     }
 
-    /// What its rooms are, in a line.
+    /// One-line description.
     pub fn about(self) -> &'static str {
         self.row().about
     }
 
-    /// The family of a name.
+    /// The family with a name.
     pub fn of_name(name: &str) -> Option<Self> {
         (TABLE.iter().find(|row| row.name == name)).map(|row| row.family)
-    }
-
-    /// Furnishes an empty room.
-    pub(super) fn furnish(self, furnisher: &mut Furnisher, size: [u32; 2]) {
-        (self.row().furnish)(furnisher, size);
     }
 
     fn row(self) -> &'static Row {

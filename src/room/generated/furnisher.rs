@@ -1,4 +1,4 @@
-//! What rooms of all families are furnished with: shell, lamps, boxes, drums and tables, and views of them.
+//! The elements of generated rooms: shell, lamps, furniture, and views.
 
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
@@ -10,57 +10,57 @@ use crate::transport::material::Material;
 use glam::{DAffine3, DVec2, DVec3, Vec3};
 use std::sync::Arc;
 
-/// First of the keys of a room's random numbers: far from those of solvers.
-const KEY: u64 = 0x726f_6f6d;
-/// Tries at finding a free place before going without.
-const TRIES: u32 = 40;
-/// Eyes and furniture keep this far from each other and from walls, in metres.
+/// First key of a room's random numbers; differs from those of solvers.
+const ROOM_KEY: u64 = 0x726f_6f6d;
+/// Attempts at finding a free place before giving up.
+const ATTEMPTS: u32 = 40;
+/// Distance of cameras from furniture and walls in metres.
 const MARGIN: f64 = 0.25;
-/// Eyes are at this height above the floor, in metres.
-pub const EYES: [f64; 2] = [1.0, 1.8];
+/// Range of the cameras' height above the floor in metres.
+pub const EYE_HEIGHT: [f64; 2] = [1.0, 1.8];
 
-/// A level rectangle on which things can stand.
+/// A horizontal rectangle that objects can stand on.
 #[derive(Debug, Clone, Copy)]
 pub struct Support {
-    /// Its middle, its sides along x and z.
+    /// Its centre, with its sides along x and z.
     pub place: DAffine3,
     /// Half its sides in metres.
     pub half: DVec2,
-    /// What stands on it is at most so high.
+    /// Largest height of an object on it in metres.
     pub headroom: f64,
 }
 
-/// Puts a room together.
+/// Builds a generated room.
 pub struct Furnisher {
-    /// All draws.
+    /// Source of all random numbers.
     pub stream: Stream,
-    /// What has been built so far.
+    /// Mesh built so far.
     pub modeller: Modeller,
-    /// One an object.
+    /// Material of each object.
     pub materials: Vec<Material>,
-    /// Width, height and depth in metres; the floor is y = 0, its middle the origin.
+    /// Width, height and depth in metres; the floor is y = 0, with its centre at the origin.
     pub size: DVec3,
-    /// Circles on the floor that are taken.
-    pub taken: Vec<(DVec2, f64)>,
+    /// Occupied circles on the floor: centre and radius in metres.
+    pub occupied: Vec<(DVec2, f64)>,
     /// Tops of furniture.
     pub supports: Vec<Support>,
-    /// From where it is photographed.
+    /// Views of its photographs.
     pub views: Vec<View>,
     /// Light from outside.
     pub outside: Option<Arc<Environment>>,
-    /// Paths a pixel in the photographs.
+    /// Samples per pixel of its photographs.
     pub samples: u32,
 }
 
 impl Furnisher {
-    /// An empty room of a size drawn by (seed, family).
+    /// An empty room whose size is drawn from (seed, family).
     pub fn new(seed: u64, family: u64) -> Self {
         let mut furnisher = Self {
-            stream: Stream::new(seed, KEY, family, 0),
+            stream: Stream::new(seed, ROOM_KEY, family, 0),
             modeller: Modeller::default(),
             materials: Vec::new(),
             size: DVec3::ZERO,
-            taken: Vec::new(),
+            occupied: Vec::new(),
             supports: Vec::new(),
             views: Vec::new(),
             outside: None,
@@ -74,36 +74,36 @@ impl Furnisher {
         furnisher
     }
 
-    /// A number between two, all equally likely.
+    /// Draws a uniform number.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.stream.uniform_f64()
     }
 
-    /// A number between two, all factors equally likely.
+    /// Draws a log-uniform number.
     pub fn scaled(&mut self, low: f64, high: f64) -> f64 {
         low * (high / low).powf(self.stream.uniform_f64())
     }
 
-    /// A whole number from `low` to `high`.
+    /// Draws an integer from `low` to `high`, both included.
     pub fn count(&mut self, low: usize, high: usize) -> usize {
         low + self.stream.below(high + 1 - low)
     }
 
-    /// A colour with the given largest channel; the others are up to `saturation` less.
+    /// Draws a colour whose largest channel is `value`; the others are smaller by a factor of down to 1 − `saturation`.
     pub fn color(&mut self, value: f64, saturation: f64) -> Vec3 {
         let channel = |f: &mut Self| 1.0 - f.between(0.0, saturation);
         let color = Vec3::from([(); 3].map(|()| channel(self) as f32));
         color / color.max_element() * value as f32
     }
 
-    /// An object of a material.
+    /// Adds an object with a material.
     pub fn object(&mut self, name: &str, material: Material, shapes: impl FnOnce(&mut Modeller)) {
         self.modeller.object(name);
         self.materials.push(material);
         shapes(&mut self.modeller);
     }
 
-    /// A diffuse object whose largest channel is `low` to `high`.
+    /// Adds a diffuse object of random colour with its largest channel from `low` to `high`.
     pub fn plain(&mut self, name: &str, [low, high]: [f64; 2], shapes: impl FnOnce(&mut Modeller)) {
         let value = self.between(low, high);
         let saturation = self.between(0.0, 0.8);
@@ -111,27 +111,19 @@ impl Furnisher {
         self.object(name, Material::diffuse(albedo, Vec3::ZERO), shapes);
     }
 
-    /// Floor, ceiling and walls; the walls are one object, two or four.
+    /// Adds floor, ceiling and walls; the walls are one object, two or four.
     pub fn shell(&mut self) {
         self.shell_with(|m, _, [corner, u, v]| m.grid(corner, u, v, 4, 4));
     }
 
-    /// The same with walls built by a function of their number, north, south, west and east, and of a corner and two sides.
+    /// The same, but `wall` builds each wall from its index (north, south, west, east), corner and two sides.
     pub fn shell_with(&mut self, wall: impl Fn(&mut Modeller, usize, [DVec3; 3])) {
-        let (half, height) = (self.size * 0.5, DVec3::Y * self.size.y);
-        let low = DVec3::new(-half.x, 0.0, -half.z);
-        let high = DVec3::new(half.x, self.size.y, half.z);
-        let (width, depth) = (DVec3::X * self.size.x, DVec3::Z * self.size.z);
+        let walls = walls(self.size);
+        let [[low, width, _], [high, ..], [_, _, depth], _] = walls;
         self.plain("floor", [0.05, 0.7], |m| m.grid(low, depth, width, 4, 4));
         self.plain("ceiling", [0.5, 0.92], |m| {
             m.grid(high, -width, -depth, 4, 4)
         });
-        let walls = [
-            [low, width, height],
-            [high, -height, -width],
-            [low, height, depth],
-            [high, -depth, -height],
-        ];
         let together = [1, 2, 4][self.stream.below(3)];
         for (index, group) in walls.chunks(together).enumerate() {
             self.plain(&format!("wall-{index}"), [0.15, 0.92], |m| {
@@ -142,7 +134,7 @@ impl Furnisher {
         }
     }
 
-    /// One to five lamps, dim or bright.
+    /// Adds one to five lamps, dim or bright.
     pub fn lamps(&mut self) {
         let brightness = self.scaled(0.3, 300.0);
         for index in 0..self.count(1, 5) {
@@ -150,7 +142,7 @@ impl Furnisher {
         }
     }
 
-    /// What a lamp of about a brightness is made of.
+    /// Draws an emitting material of about the given luminance.
     pub fn luminous(&mut self, brightness: f64) -> Material {
         let value = brightness * self.scaled(0.3, 3.0);
         let color = self.color(1.0, 0.6);
@@ -160,7 +152,7 @@ impl Furnisher {
         Material::diffuse(albedo, emission)
     }
 
-    /// A lamp: a panel below the ceiling, a box that hangs or a lantern that stands.
+    /// Adds a lamp: a panel below the ceiling, a hanging box, or a lantern on the floor.
     pub fn lamp(&mut self, index: usize, brightness: f64) {
         let material = self.luminous(brightness);
         let name = format!("lamp-{index}");
@@ -194,7 +186,7 @@ impl Furnisher {
         }
     }
 
-    /// Up to fourteen boxes, drums and tables that do not touch each other.
+    /// Adds up to fourteen boxes, cylinders and tables that do not overlap.
     pub fn furniture(&mut self) {
         for index in 0..self.count(2, 14) {
             let radius = self.scaled(0.12, 0.6);
@@ -229,7 +221,7 @@ impl Furnisher {
         }
     }
 
-    /// Views from free places at eye level to points all over the room, `low` to `high` of them.
+    /// Adds `low` to `high` views from free places at eye level to random points in the room.
     pub fn look_around(&mut self, low: usize, high: usize) {
         for _ in 0..self.count(low, high) {
             let eye = self.eye();
@@ -239,15 +231,15 @@ impl Furnisher {
         }
     }
 
-    /// A free place at eye level.
+    /// Draws a free place at eye level.
     pub fn eye(&mut self) -> DVec3 {
         let at = self.free_point(MARGIN).unwrap_or_default();
-        DVec3::new(at.x, self.between(EYES[0], EYES[1]), at.y)
+        DVec3::new(at.x, self.between(EYE_HEIGHT[0], EYE_HEIGHT[1]), at.y)
     }
 
-    /// A view from an eye to a target.
+    /// Adds a view from `eye` to `target`.
     pub fn look(&mut self, eye: DVec3, target: DVec3) {
-        // Never straight up or down, where a level camera is not defined.
+        // A level camera is not defined for looking straight up or down.
         let ahead = (eye - target).with_y(0.0).length() > 0.2;
         self.views.push(View::towards(
             eye,
@@ -255,12 +247,12 @@ impl Furnisher {
         ));
     }
 
-    /// Lets the photographs carry from much to little noise.
+    /// Draws the samples per pixel of the photographs, hence their noise.
     pub fn expose(&mut self, low: f64, high: f64) {
         self.samples = self.scaled(low, high) as u32;
     }
 
-    /// A point of the floor at least `radius` from the walls, where the room is that large.
+    /// Draws a point on the floor at least `radius` from the walls, if the room is large enough.
     pub fn place(&mut self, radius: f64) -> DVec2 {
         let reach = (DVec2::new(self.size.x, self.size.z) * 0.5 - radius - 0.05).max(DVec2::ZERO);
         DVec2::new(
@@ -269,22 +261,38 @@ impl Furnisher {
         )
     }
 
-    /// A point of the floor that nothing within `radius` has taken.
+    /// Draws a point on the floor whose circle of `radius` is free.
     pub fn free_point(&mut self, radius: f64) -> Option<DVec2> {
-        (0..TRIES)
+        (0..ATTEMPTS)
             .map(|_| self.place(radius))
             .collect::<Vec<_>>()
             .into_iter()
             .find(|at| {
                 let clear = |(center, other): &(DVec2, f64)| at.distance(*center) > radius + other;
-                self.taken.iter().all(clear)
+                self.occupied.iter().all(clear)
             })
     }
 
-    /// A free point, which is taken from now on.
+    /// Draws a free point and occupies its circle.
     pub fn free(&mut self, radius: f64) -> Option<DVec2> {
         let at = self.free_point(radius)?;
-        self.taken.push((at, radius));
+        self.occupied.push((at, radius));
         Some(at)
     }
+}
+
+/// Corner and two sides of each wall of a room: north, south, west and east.
+pub fn walls(size: DVec3) -> [[DVec3; 3]; 4] {
+    let half = size * 0.5;
+    let (low, high) = (
+        DVec3::new(-half.x, 0.0, -half.z),
+        DVec3::new(half.x, size.y, half.z),
+    );
+    let [width, height, depth] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * size);
+    [
+        [low, width, height],
+        [high, -height, -width],
+        [low, height, depth],
+        [high, -depth, -height],
+    ]
 }

@@ -1,7 +1,7 @@
-//! Rooms furnished at random, each from a seed, in families: to choose settings on, and to test with, without a capture's help.
+//! Rooms generated at random from a seed, in families. Settings are chosen and tested on them instead of on captures.
 //!
-//! A family is a kind of room that is hard in its own way. Rooms of one family differ in size, light, colours and number of
-//! photographs; the same (family, seed, size) gives the same bits.
+//! Each family has its own difficulty. Its rooms differ in size, light, colours and number of photographs. The same
+//! (family, seed, size) gives the same bits.
 
 mod clutter;
 mod draft;
@@ -10,6 +10,7 @@ mod furnisher;
 mod glossy;
 mod patterned;
 mod phone;
+mod photographed;
 mod plain;
 mod scanned;
 mod sparse;
@@ -18,80 +19,47 @@ mod white;
 mod window;
 
 pub use family::Family;
+pub use photographed::Generated;
 
-use crate::capture::Capture;
-use crate::capture::truth::Truth;
 use crate::error::Result;
-use crate::math::picture::Picture;
+use crate::room::Room;
 use crate::room::photographs::{self, Rendering};
-use crate::room::{Room, truth};
-use crate::scene::geometry::Hit;
-use crate::transport::lit::Lit;
 use draft::Draft;
-use glam::{Vec2, Vec3};
-use std::collections::BTreeMap;
+use furnisher::Furnisher;
 
-/// A generated room, photographed, with all that is true of it.
-#[derive(Debug, Clone)]
-pub struct Generated {
-    /// Its family.
-    pub family: Family,
-    /// Its seed.
-    pub seed: u64,
-    /// What a solver is given: mesh and photographs in memory. Where `capture.segmentation` is set, the mesh is to be cut into segments as
-    /// for any scan.
-    pub capture: Capture,
-    /// The true room, in which the photographs were rendered: its geometry, materials, light and cameras. Frames are in the
-    /// capture's order.
-    pub lit: Lit,
+/// Furnishes room `seed` of a family for photographs of a size in pixels.
+fn draft(family: Family, seed: u64, size: [u32; 2]) -> Draft {
+    let furnish = match family {
+        Family::Plain => plain::furnish,
+        Family::Unseen => unseen::furnish,
+        Family::Window => window::furnish,
+        Family::Clutter => clutter::furnish,
+        Family::Patterned => patterned::furnish,
+        Family::Glossy => glossy::furnish,
+        Family::White => white::furnish,
+        Family::Sparse => sparse::furnish,
+        Family::Phone => phone::furnish,
+        Family::Scanned => scanned::furnish,
+    };
+    let mut furnisher = Furnisher::new(seed, family as u64);
+    furnish(&mut furnisher, size);
+    Draft::new(family, seed, size, furnisher)
 }
 
-impl Generated {
-    /// What is true of each object by name; empty where the capture's mesh has no objects.
-    pub fn truth(&self) -> Truth {
-        let objects = match self.capture.segmentation {
-            Some(_) => BTreeMap::new(),
-            None => truth::objects(&self.lit),
-        };
-        Truth {
-            objects: objects.into_iter().map(|(n, o)| (n, o.into())).collect(),
-        }
-    }
-
-    /// The true albedo that a frame's pixels see, the mean over each; black where they see nothing.
-    pub fn albedo(&self, frame: usize) -> Picture {
-        truth::albedo_picture(&self.lit, &self.lit.scene.cameras[frame])
-    }
-
-    /// The true emission that the centres of a frame's pixels see; black where they see nothing, or light from outside.
-    pub fn emission(&self, frame: usize) -> Picture {
-        let camera = &self.lit.scene.cameras[frame];
-        let emitted = |hit: &Hit| {
-            let object = self.lit.scene.object_of[hit.triangle as usize];
-            self.lit.materials[object as usize].emission
-        };
-        Picture::from_fn(camera.intrinsics.width, camera.intrinsics.height, |x, y| {
-            let center = Vec2::new(x as f32, y as f32) + 0.5;
-            let hit = self.lit.scene.intersect(&camera.ray(center));
-            hit.as_ref().map_or(Vec3::ZERO, emitted)
-        })
-    }
-}
-
-/// Plain room `seed`, and how it is photographed at a size in pixels: 8 to 64 paths a pixel, so that the photographs carry
-/// from much to little noise.
+/// Plain room `seed` and the rendering of its photographs at a size in pixels, with 8 to 64 samples per pixel, so
+/// that their noise varies widely.
 pub fn generate(seed: u64, size: [u32; 2]) -> (Room, Rendering) {
-    let draft = Draft::new(Family::Plain, seed, size);
-    (draft.room, draft.rendering)
+    let plain = draft(Family::Plain, seed, size);
+    (plain.room, plain.rendering)
 }
 
 impl Family {
-    /// Room `seed` of the family with photographs of a size in pixels.
+    /// Generates room `seed` of the family, with photographs of a size in pixels.
     ///
     /// # Errors
-    /// A temporary file cannot be written (`scanned`), or photographs of this size see nothing of the room.
+    /// A temporary file cannot be written (`scanned`), or photographs of this size see no surface.
     pub fn generate(self, seed: u64, size: [u32; 2]) -> Result<Generated> {
-        let draft = Draft::new(self, seed, size);
+        let draft = draft(self, seed, size);
         match self {
             Self::Sparse => sparse::photograph(draft),
             Self::Phone => phone::photograph(draft),

@@ -1,4 +1,4 @@
-//! Rooms with patterns on most surfaces.
+//! Rooms with textures on most surfaces.
 
 use crate::math::picture::Picture;
 use crate::room::generated::furnisher::Furnisher;
@@ -9,12 +9,12 @@ use std::sync::Arc;
 
 /// Side of a pattern's picture in pixels.
 const SIDE: u32 = 128;
-/// Length after which a pattern repeats, in metres.
+/// Range of a pattern's period in metres.
 const PERIOD: [f64; 2] = [0.25, 2.0];
-/// Fraction of the surfaces that have a pattern.
+/// Fraction of the objects that have a pattern.
 const FRACTION: f64 = 0.85;
 
-/// A plain room whose surfaces, lamps and a few others left out, have stripes, checks, noise or a print.
+/// A plain room most of whose objects, except lamps, have stripes, checks, noise or a print.
 pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     f.shell();
     f.lamps();
@@ -22,7 +22,7 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     let mut chosen = Vec::new();
     for object in 0..f.materials.len() {
         let is_lamp = f.materials[object].emission != Vec3::ZERO;
-        // The floor, which is seen most, always has one.
+        // The floor, the most visible object, always has a pattern.
         if !is_lamp && (object == 0 || f.between(0.0, 1.0) < FRACTION) {
             project(f, object as u32);
             chosen.push((object, pattern(f)));
@@ -42,7 +42,7 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     f.expose(16.0, 64.0);
 }
 
-/// Texture coordinates from positions along the axes that a face lies along, turned by an angle.
+/// Sets an object's texture coordinates by projecting each triangle along its dominant axis, rotated by a random angle.
 fn project(f: &mut Furnisher, object: u32) {
     let period = f.scaled(PERIOD[0], PERIOD[1]);
     let turn = DVec2::from_angle(f.between(0.0, std::f64::consts::TAU));
@@ -56,15 +56,15 @@ fn project(f: &mut Furnisher, object: u32) {
             .cross(corners[2] - corners[0])
             .abs();
         let flat = |p: DVec3| match normal.max_element() {
-            most if most == normal.x => DVec2::new(p.z, p.y),
-            most if most == normal.y => DVec2::new(p.x, p.z),
+            max if max == normal.x => DVec2::new(p.z, p.y),
+            max if max == normal.y => DVec2::new(p.x, p.z),
             _ => DVec2::new(p.x, p.y),
         };
         mesh.corner_uvs[triangle] = corners.map(|p| (turn.rotate(flat(p)) / period).as_vec2());
     }
 }
 
-/// A picture that repeats without a seam, in two or three colours.
+/// Draws a seamless pattern of two or three colours.
 fn pattern(f: &mut Furnisher) -> Picture {
     let colors = [(); 3].map(|()| {
         let value = f.between(0.05, 0.9);
@@ -98,7 +98,7 @@ fn checks(p: Vec2, repeats: f32, colors: &[Vec3; 3]) -> Vec3 {
     colors[((cell.x + cell.y) as usize) % 2]
 }
 
-/// Smooth noise in two octaves, 0 to 1.
+/// Smooth value noise of two octaves, 0 to 1.
 fn noise(p: Vec2, key: u32) -> f32 {
     let octave = |cells: u32| {
         let q = p * cells as f32;
@@ -115,7 +115,7 @@ fn noise(p: Vec2, key: u32) -> f32 {
     0.6 * octave(5) + 0.4 * octave(17)
 }
 
-/// Discs of different sizes on a ground, each with a rim.
+/// Discs of different sizes, each with a rim.
 fn print(p: Vec2, repeats: f32, key: u32, colors: &[Vec3; 3]) -> Vec3 {
     let q = p * repeats * 2.0;
     let cell = q.floor();

@@ -1,4 +1,4 @@
-//! Photographs as a telephone takes them.
+//! Photographs like a phone's: JPEG, automatic exposure, vignetting, blur and noise.
 
 use crate::capture::camera::Intrinsics;
 use crate::capture::exposure::{Exposure, Vignetting};
@@ -7,9 +7,9 @@ use crate::error::{Error, Result};
 use crate::math::color::{luminance, srgb_to_linear, to_srgb8};
 use crate::math::picture::Picture;
 use crate::math::rng::Stream;
-use crate::room::generated::Generated;
 use crate::room::generated::draft::Draft;
 use crate::room::generated::furnisher::Furnisher;
+use crate::room::generated::photographed::Generated;
 use crate::room::photographs::render_lit;
 use crate::transport::lit::Lit;
 use glam::Vec3;
@@ -17,11 +17,11 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageFormat};
 
 /// Key of the camera's random numbers.
-const KEY: u64 = 0x0070_686f_6e65;
-/// Where automatic exposure puts the geometric mean of the luminances, as a fraction of saturation.
-const MIDDLE: f64 = 0.18;
-/// Darkest luminance that automatic exposure counts, relative to the mean.
-const DARKEST: f32 = 1e-3;
+const CAMERA_KEY: u64 = 0x0070_686f_6e65;
+/// Automatic exposure maps the geometric mean of the luminances to this fraction of saturation.
+const MIDDLE_GREY: f64 = 0.18;
+/// Smallest luminance for automatic exposure, relative to the arithmetic mean.
+const MIN_LUMINANCE: f32 = 1e-3;
 
 /// A plain room.
 pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
@@ -32,7 +32,7 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     f.expose(24.0, 96.0);
 }
 
-/// The room in photographs of one telephone.
+/// The room, photographed by a phone.
 pub fn photograph(draft: Draft) -> Result<Generated> {
     let lit = draft.lit()?;
     let files = files(&draft, &lit)?;
@@ -43,21 +43,21 @@ pub fn photograph(draft: Draft) -> Result<Generated> {
     Ok(draft.photographed(lit, photographs))
 }
 
-/// The camera of a room.
+/// Properties of a phone's camera.
 struct Phone {
-    /// How the lens dims the corners.
+    /// Vignetting of the lens.
     vignetting: Vignetting,
     /// Standard deviation of the blur in pixels.
     blur: f64,
-    /// Of JPEG, in percent.
+    /// JPEG quality in percent.
     quality: u8,
-    /// Standard deviation of a pixel at saturation; in the dark as that of the number of photons.
+    /// Standard deviation of the noise at saturation; below, it falls with the square root of the light (shot noise).
     noise: f32,
 }
 
 /// The photographs as JPEG files.
 pub fn files(draft: &Draft, lit: &Lit) -> Result<Vec<Vec<u8>>> {
-    let mut stream = Stream::new(draft.seed, KEY, draft.family as u64, 0);
+    let mut stream = Stream::new(draft.seed, CAMERA_KEY, draft.family as u64, 0);
     let mut between = |low: f64, high: f64| low + (high - low) * stream.uniform_f64();
     let phone = Phone {
         vignetting: Vignetting {
@@ -77,14 +77,14 @@ pub fn files(draft: &Draft, lit: &Lit) -> Result<Vec<Vec<u8>>> {
                 pixels: photograph.pixels,
             };
             let compensation = 2f64.powf(-0.5 + stream.uniform_f64());
-            let shot = phone.expose(&picture, &camera.intrinsics, compensation, &mut stream);
-            encode(&shot, phone.quality)
+            let exposed = phone.expose(&picture, &camera.intrinsics, compensation, &mut stream);
+            encode(&exposed, phone.quality)
         })
         .collect()
 }
 
 impl Phone {
-    /// What the sensor makes of radiance, as fractions of saturation.
+    /// Exposes radiance to sensor values, as fractions of saturation.
     fn expose(
         &self,
         radiance: &Picture,
@@ -94,7 +94,7 @@ impl Phone {
     ) -> Picture {
         let mut picture = blurred(radiance, self.blur);
         let exposure = Exposure {
-            factor: Vec3::splat((MIDDLE * compensation / middle(&picture)) as f32),
+            factor: Vec3::splat((MIDDLE_GREY * compensation / geometric_mean(&picture)) as f32),
             vignetting: Some(self.vignetting),
             response: None,
         };
@@ -109,16 +109,16 @@ impl Phone {
     }
 }
 
-/// The geometric mean of the luminances; positive.
-fn middle(picture: &Picture) -> f64 {
+/// Geometric mean of the luminances; always positive.
+fn geometric_mean(picture: &Picture) -> f64 {
     let luminances = || picture.pixels.iter().map(|p| luminance(*p));
     let count = picture.pixels.len().max(1) as f32;
-    let darkest = (luminances().sum::<f32>() / count * DARKEST).max(f32::MIN_POSITIVE);
-    let logs: f64 = luminances().map(|l| f64::from(l.max(darkest)).ln()).sum();
+    let min = (luminances().sum::<f32>() / count * MIN_LUMINANCE).max(f32::MIN_POSITIVE);
+    let logs: f64 = luminances().map(|l| f64::from(l.max(min)).ln()).sum();
     (logs / f64::from(count)).exp()
 }
 
-/// The picture through a Gaussian blur; what lies beyond its edge is as the edge.
+/// Gaussian blur; the border pixels are repeated.
 fn blurred(picture: &Picture, sigma: f64) -> Picture {
     const REACH: i64 = 2;
     let weights = (-REACH..=REACH).map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp());
@@ -156,7 +156,7 @@ fn encode(picture: &Picture, quality: u8) -> Result<Vec<u8>> {
     Ok(file)
 }
 
-/// The photograph in a JPEG file.
+/// Decodes a JPEG photograph.
 pub fn decode(file: &[u8]) -> Result<Photograph> {
     let image = image::load_from_memory_with_format(file, ImageFormat::Jpeg)
         .map_err(|error| broken(&error))?

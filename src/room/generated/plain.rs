@@ -1,4 +1,4 @@
-//! Rooms with nothing odd about them.
+//! Plain rooms without a special difficulty.
 
 use crate::room::generated::furnisher::Furnisher;
 

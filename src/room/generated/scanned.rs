@@ -1,4 +1,4 @@
-//! Rooms as a scan shows them: photographs of a telephone, and a mesh fused from noisy depth images.
+//! Scanned rooms: photographs like a phone's, and a mesh fused from noisy depth images.
 
 use crate::capture::Segmentation;
 use crate::capture::camera::Pose;
@@ -9,29 +9,31 @@ use crate::math::rng::Stream;
 use crate::room::cameras;
 use crate::room::generated::draft::Draft;
 use crate::room::generated::furnisher::Furnisher;
-use crate::room::generated::{Generated, phone};
+use crate::room::generated::phone;
+use crate::room::generated::photographed::Generated;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use glam::{DMat3, DVec3, Vec2};
 use std::path::{Path, PathBuf};
 
 /// Key of the depth camera's random numbers.
-const KEY: u64 = 0x7363_616e;
+const DEPTH_KEY: u64 = 0x7363_616e;
 /// Width of the depth images in pixels.
 const WIDTH: u32 = 160;
-/// Edge of a voxel in metres: meshes as fine as those that telephones make of rooms.
+/// Edge of a voxel in metres; gives meshes about as fine as phone scans of rooms.
 const VOXEL: f64 = 0.05;
-/// Metres a unit of the depth images.
+/// Metres per unit of the depth images.
 const UNIT: f64 = 0.001;
-/// Farthest depth in metres.
-const FARTHEST: f64 = 5.0;
-/// Depth is lost where the cosine between ray and normal is smaller.
-const GRAZING: f32 = 0.2;
-/// Standard deviations of the poses, along each axis in metres and about each in radians.
-const SHIFT: f64 = 0.003;
-const TURN: f64 = 0.12 / 180.0 * std::f64::consts::PI;
+/// Largest measured depth in metres.
+const MAX_DEPTH: f64 = 5.0;
+/// Smallest cosine between ray and normal at which depth is measured.
+const MIN_COSINE: f32 = 0.2;
+/// Standard deviation of the camera positions along each axis, in metres.
+const POSITION_DEVIATION: f64 = 0.003;
+/// Standard deviation of the camera rotations about each axis, in radians.
+const ROTATION_DEVIATION: f64 = 0.12 / 180.0 * std::f64::consts::PI;
 
-/// A plain room, seen from many places.
+/// A plain room with many views.
 pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     f.shell();
     f.lamps();
@@ -40,16 +42,16 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     f.expose(24.0, 64.0);
 }
 
-/// Standard deviation of a depth in metres: a structured-light camera's (Nguyen, Izadi and Lovell 2012).
+/// Standard deviation in metres of a structured-light camera's depth (Nguyen, Izadi and Lovell 2012).
 pub fn deviation(depth: f64) -> f64 {
     0.0012 + 0.0019 * (depth - 0.4).powi(2)
 }
 
-/// Scans the room: photographs and depth images from the same poses, known with an error; the mesh is what fusing makes of them.
+/// Scans the room: photographs and depth images from the same poses, known with an error, and a mesh fused from the depth.
 pub fn scan(draft: Draft) -> Result<Generated> {
     let lit = draft.lit()?;
     let files = phone::files(&draft, &lit)?;
-    let mut stream = Stream::new(draft.seed, KEY, 0, 0);
+    let mut stream = Stream::new(draft.seed, DEPTH_KEY, 0, 0);
     let folder = tempfile::tempdir().map_err(|e| Error::io(&std::env::temp_dir(), &e))?;
     let known = cameras::cameras(&draft.room.views, draft.rendering.size);
     let mut frames = Vec::new();
@@ -103,18 +105,18 @@ pub fn scan(draft: Draft) -> Result<Generated> {
     })
 }
 
-/// A pose as tracking finds it.
+/// Adds a tracking error to a pose.
 fn jittered(pose: &Pose, stream: &mut Stream) -> Pose {
     let mut normal = || DVec3::from([(); 3].map(|()| f64::from(stream.normal())));
-    let turn = normal() * TURN;
+    let turn = normal() * ROTATION_DEVIATION;
     Pose {
         rotation: DMat3::from_axis_angle(turn.try_normalize().unwrap_or(DVec3::X), turn.length())
             * pose.rotation,
-        center: pose.center + normal() * SHIFT,
+        center: pose.center + normal() * POSITION_DEVIATION,
     }
 }
 
-/// Depth in metres along the viewing direction; 0 where it was lost: far away, at grazing angles, and in a few discs.
+/// Depth in metres along the viewing direction; 0 where it is missing: far away, at grazing angles, and in a few discs.
 fn measure(scene: &Scene, camera: &Camera, stream: &mut Stream) -> Vec<f64> {
     let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
     let discs: Vec<[f32; 3]> = (0..2 + stream.below(5))
@@ -137,7 +139,7 @@ fn measure(scene: &Scene, camera: &Camera, stream: &mut Stream) -> Vec<f64> {
         let cosine = scene.normals[hit.triangle as usize]
             .dot(ray.direction)
             .abs();
-        if depth > FARTHEST || cosine < GRAZING {
+        if depth > MAX_DEPTH || cosine < MIN_COSINE {
             return 0.0;
         }
         (depth + noise * deviation(depth)).max(0.0)

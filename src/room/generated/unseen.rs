@@ -1,19 +1,19 @@
-//! Rooms in the light of lamps that no photograph sees: in bowls and coves above all eyes, or beside all fields of view.
+//! Rooms whose lamps no photograph sees: in bowls and coves above eye level, or outside of all fields of view.
 
 use crate::room::cameras::View;
 use crate::room::furniture::vessels;
-use crate::room::generated::furnisher::{EYES, Furnisher};
+use crate::room::generated::furnisher::{EYE_HEIGHT, Furnisher};
 use crate::transport::material::Material;
 use glam::{DAffine3, DVec3};
 
-/// Tries at finding a place beside all fields of view.
-const TRIES: u32 = 60;
-/// Lamps that face upwards are at most so far up between the eyes and the ceiling.
-const LIFT: f64 = 0.3;
-/// Radius around a lamp, relative to its own, that is kept out of all fields.
+/// Attempts at finding a place outside of all fields of view.
+const ATTEMPTS: u32 = 60;
+/// Lamps that face upwards are at most at this fraction of the way from eye level to the ceiling.
+const MAX_LIFT: f64 = 0.3;
+/// Radius around a lamp that is kept out of all fields of view, relative to the lamp's.
 const CLEARANCE: f64 = 1.2;
 
-/// A plain room whose lamps face upwards from above all eyes, or hang where no field of view reaches.
+/// A plain room whose lamps face upwards from above eye level, or hang outside of all fields of view.
 pub fn furnish(f: &mut Furnisher, size: [u32; 2]) {
     f.shell();
     f.furniture();
@@ -27,8 +27,8 @@ pub fn furnish(f: &mut Furnisher, size: [u32; 2]) {
             0 => bowl(f, index, &name, lamp),
             1 => cove(f, index, &name, lamp),
             _ => {
-                // Where photographs see everything, a bowl hides it.
-                if !beside(f, &name, &lamp, aspect) {
+                // If photographs see the whole room, hide the lamp in a bowl.
+                if !unseen_box(f, &name, &lamp, aspect) {
                     bowl(f, index, &name, lamp);
                 }
             }
@@ -37,14 +37,14 @@ pub fn furnish(f: &mut Furnisher, size: [u32; 2]) {
     f.expose(32.0, 96.0);
 }
 
-/// An opaque bowl on a cord with a lamp in it that shines on the ceiling.
+/// An opaque hanging bowl with a lamp in it that lights the ceiling.
 fn bowl(f: &mut Furnisher, index: usize, name: &str, lamp: Material) {
     let radius = f.scaled(0.15, 0.35);
     let at = f.place(radius);
     let rim = 0.52 * radius;
-    // The rim hides the lamp from below it. Near the ceiling it would light a spot too small for paths to find.
-    let lowest = EYES[1] + 0.05;
-    let height = f.between(lowest, lowest + LIFT * (f.size.y - rim - lowest));
+    // The rim hides the lamp from below. Near the ceiling the lit spot would be too small for paths to find.
+    let lowest = EYE_HEIGHT[1] + 0.05;
+    let height = f.between(lowest, lowest + MAX_LIFT * (f.size.y - rim - lowest));
     let place = DAffine3::from_translation(DVec3::new(at.x, height, at.y));
     f.plain(&format!("bowl-{index}"), [0.1, 0.9], |m| {
         m.placed(place, |m| vessels::bowl(m, radius));
@@ -58,7 +58,7 @@ fn bowl(f: &mut Furnisher, index: usize, name: &str, lamp: Material) {
     });
 }
 
-/// A ledge along a wall with a strip of light on its top.
+/// A ledge along a wall with a light strip on its top.
 fn cove(f: &mut Furnisher, index: usize, name: &str, lamp: Material) {
     let along_x = f.count(0, 1) == 0;
     let side = [-1.0, 1.0][f.count(0, 1)];
@@ -68,13 +68,13 @@ fn cove(f: &mut Furnisher, index: usize, name: &str, lamp: Material) {
     };
     let length = length * f.between(0.3, 0.95);
     let (deep, thick) = (f.between(0.12, 0.25), 0.04);
-    let lowest = EYES[1] + 0.1;
-    let top = f.between(lowest, lowest + LIFT * (f.size.y - lowest));
+    let lowest = EYE_HEIGHT[1] + 0.1;
+    let top = f.between(lowest, lowest + MAX_LIFT * (f.size.y - lowest));
     let turn = match along_x {
         true => DAffine3::IDENTITY,
         false => DAffine3::from_rotation_y(std::f64::consts::FRAC_PI_2),
     };
-    // In coordinates whose x runs along the wall.
+    // Local coordinates with x along the wall.
     let middle = side * (across * 0.5 - deep * 0.5 - 0.005);
     f.plain(&format!("ledge-{index}"), [0.3, 0.9], |m| {
         m.placed(turn, |m| {
@@ -91,15 +91,15 @@ fn cove(f: &mut Furnisher, index: usize, name: &str, lamp: Material) {
     });
 }
 
-/// A box below the ceiling that no photograph sees, if there is a place for one.
-fn beside(f: &mut Furnisher, name: &str, lamp: &Material, aspect: f64) -> bool {
-    for _ in 0..TRIES {
+/// Adds a lamp below the ceiling that no photograph sees. Returns whether there was a place for it.
+fn unseen_box(f: &mut Furnisher, name: &str, lamp: &Material, aspect: f64) -> bool {
+    for _ in 0..ATTEMPTS {
         let half = DVec3::from([(); 3].map(|()| f.scaled(0.05, 0.15)));
         let radius = half.length();
         let at = f.place(radius);
         let below = f.between(0.05, 0.5) + half.y;
         let center = DVec3::new(at.x, f.size.y - below, at.y);
-        let hidden = |view: &View| is_beside(view, center, radius * CLEARANCE, aspect);
+        let hidden = |view: &View| is_outside(view, center, radius * CLEARANCE, aspect);
         if f.views.iter().all(hidden) {
             f.object(name, lamp.clone(), |m| m.rounded_box(center, half, 0.0, 0));
             return true;
@@ -108,8 +108,8 @@ fn beside(f: &mut Furnisher, name: &str, lamp: &Material, aspect: f64) -> bool {
     false
 }
 
-/// Whether a ball lies wholly beside a field of view whose height is `aspect` times its width.
-fn is_beside(view: &View, center: DVec3, radius: f64, aspect: f64) -> bool {
+/// Whether a ball lies completely outside of a field of view whose height is `aspect` times its width.
+fn is_outside(view: &View, center: DVec3, radius: f64, aspect: f64) -> bool {
     let p = view.pose.rotation.transpose() * (center - view.pose.center);
     let ahead = -p.z;
     let outside = |offset: f64, slope: f64| {
@@ -126,10 +126,10 @@ mod tests {
     fn a_ball_is_beside_a_field_where_no_part_of_it_reaches_in() {
         let view = View::towards(DVec3::ZERO, DVec3::NEG_Z * 2.0);
         let edge = 2.0 * view.half_field;
-        let beside = |x: f64, y: f64, z: f64| is_beside(&view, DVec3::new(x, y, z), 0.1, 0.75);
-        assert!(!beside(0.0, 0.0, -2.0));
-        assert!(!beside(edge + 0.12, 0.0, -2.0) && beside(edge + 0.14, 0.0, -2.0));
-        assert!(!beside(0.0, 0.75 * edge + 0.11, -2.0) && beside(0.0, 0.75 * edge + 0.13, -2.0));
-        assert!(beside(0.0, 0.0, 0.11) && !beside(0.0, 0.0, 0.05));
+        let outside = |x: f64, y: f64, z: f64| is_outside(&view, DVec3::new(x, y, z), 0.1, 0.75);
+        assert!(!outside(0.0, 0.0, -2.0));
+        assert!(!outside(edge + 0.12, 0.0, -2.0) && outside(edge + 0.14, 0.0, -2.0));
+        assert!(!outside(0.0, 0.75 * edge + 0.11, -2.0) && outside(0.0, 0.75 * edge + 0.13, -2.0));
+        assert!(outside(0.0, 0.0, 0.11) && !outside(0.0, 0.0, 0.05));
     }
 }

@@ -1,12 +1,12 @@
-//! Rooms in which light goes far: albedos of 0.9 and more on the shell and most furniture.
+//! Rooms with strong interreflection: albedos of 0.9 and more on the shell and most furniture.
 
 use crate::room::generated::furnisher::Furnisher;
 use crate::transport::material::Albedo;
 use glam::Vec3;
 
-/// Least and greatest albedo of what is white, in any channel. Fresh white paint reaches about 0.95.
+/// Range of a white albedo in each channel. Fresh white paint reaches about 0.95.
 const WHITE: [f64; 2] = [0.9, 0.96];
-/// One piece of furniture in so many is not white.
+/// One in this many pieces of furniture is not white.
 const OTHER: usize = 5;
 
 /// A plain room, painted white.

@@ -1,25 +1,25 @@
-//! Rooms in the light of sky and sun, through openings in their walls.
+//! Rooms lit by sky and sun through openings in their walls.
 
-use crate::room::generated::furnisher::Furnisher;
+use crate::room::generated::furnisher::{Furnisher, walls};
 use crate::room::shape::Modeller;
 use crate::transport::environment::{Environment, direction_of, pixel_of};
 use glam::{DVec3, Vec3};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-/// Width and height of the map of the light from outside: a sun of three degrees.
+/// Width and height of the environment map; a pixel, such as the sun, has about three degrees.
 const MAP: [usize; 2] = [128, 64];
 
-/// A rectangle of a wall, in fractions of its width and height.
+/// An opening in a wall, in fractions of the wall's width and height.
 struct Opening {
     wall: usize,
     across: [f64; 2],
     up: [f64; 2],
-    /// How thick the wall is, in metres.
+    /// Thickness of the wall in metres.
     reveal: f64,
 }
 
-/// A plain room with one or two openings; in two of five rooms a weak lamp.
+/// A plain room with one or two openings; in two of five rooms with a weak lamp.
 pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     let openings = openings(f);
     f.shell_with(
@@ -42,7 +42,7 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     }
     f.furniture();
     f.look_around(3, 6);
-    // Towards the openings, past their middle.
+    // Views towards the openings, past their centres.
     for opening in &openings {
         let eye = f.eye();
         let [corner, u, v] = opening_sides(opening, walls[opening.wall]);
@@ -70,22 +70,6 @@ fn openings(f: &mut Furnisher) -> Vec<Opening> {
             }
         })
         .collect()
-}
-
-/// Corner and sides of the walls, as [`Furnisher::shell_with`] has them.
-fn walls(size: DVec3) -> [[DVec3; 3]; 4] {
-    let half = size * 0.5;
-    let (low, high) = (
-        DVec3::new(-half.x, 0.0, -half.z),
-        DVec3::new(half.x, size.y, half.z),
-    );
-    let [width, height, depth] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * size);
-    [
-        [low, width, height],
-        [high, -height, -width],
-        [low, height, depth],
-        [high, -depth, -height],
-    ]
 }
 
 /// The opening's range along each side of its wall.
@@ -122,7 +106,7 @@ fn around(m: &mut Modeller, opening: &Opening, sides: [DVec3; 3]) {
     part([s[1], 1.0], t);
 }
 
-/// The four sides of an opening through the thickness of its wall, seen from within it.
+/// The four inner faces of an opening through the thickness of its wall.
 fn reveal(m: &mut Modeller, opening: &Opening, sides: [DVec3; 3]) {
     let [corner, u, v] = opening_sides(opening, sides);
     let out = -u.cross(v).normalize_or_zero() * opening.reveal;
@@ -132,8 +116,8 @@ fn reveal(m: &mut Modeller, opening: &Opening, sides: [DVec3; 3]) {
     m.grid(corner + u, v, out, 2, 1);
 }
 
-/// A sky of about a radiance, brighter towards the horizon, over darker ground; in three of five rooms with a sun that looks into
-/// an opening.
+/// A sky of about the given radiance, brighter towards the horizon, over darker ground; in three of five rooms with a sun that
+/// shines into an opening.
 fn sky(f: &mut Furnisher, level: f64, opening: &Opening) -> Option<Environment> {
     let tint = f.color(1.0, 0.4);
     let ground = f.color(1.0, 0.5) * f.between(0.1, 0.4) as f32;
@@ -154,7 +138,7 @@ fn sky(f: &mut Furnisher, level: f64, opening: &Opening) -> Option<Environment> 
     let out = -u.cross(v).normalize_or_zero();
     let azimuth = out.z.atan2(out.x) + f.between(-1.1, 1.1);
     let elevation = f.between(0.15, 1.0);
-    // Its irradiance, relative to that of an even sky.
+    // The sun's irradiance relative to that of a uniform sky.
     let strength = f.scaled(0.3, 6.0);
     let warmth = f.color(1.0, 0.3);
     if shines {

@@ -1,77 +1,84 @@
-//! `estimate.json`: everything that later commands need, with the maps beside it.
+//! `estimate.json`: everything that later commands need, except the maps beside it.
 
 use crate::capture::exposure::Vignetting;
 use crate::capture::response::{Response, TERMS};
 use crate::error::{Error, Result};
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::inverse::settings::{PARAMETERS, Settings};
-use crate::inverse::solver::Termination;
+use crate::inverse::solver::{Checkpoint, Termination};
 use crate::math::nullable::{Rgb, rgb};
 use crate::session::command::{OpenOptions, Source};
 use crate::session::edits::{Edits, EditsRecord};
+use crate::session::open_capture::OpenCapture;
 use crate::session::save::maps::{self, Maps};
 use crate::session::save::named::Named;
-use crate::session::snapshot::OpenCapture;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Version of the format; a reader refuses newer ones.
+/// Version of the format; newer ones are refused.
 pub const VERSION: u32 = 1;
 
-/// No lens dims by a greater power of the cosine.
+/// Largest power of the cosine in a lens's vignetting.
 const MAX_POWER: f32 = 100.0;
 
-/// The contents of `estimate.json`.
+/// The content of `estimate.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EstimateFile {
-    /// [`VERSION`] when it was written.
+    /// [`VERSION`] at the time of writing.
     pub version: u32,
     /// The program's version.
     pub relit: String,
-    /// Which capture it belongs to.
+    /// The capture it belongs to.
     pub capture: CaptureReference,
-    /// The parameters it was found with.
+    /// The parameters of the solve.
     pub settings: Settings,
-    /// Why the solve ended; `null` while it runs.
+    /// Why the solve ended; `null` during a solve.
     pub stopped_because: Option<Termination>,
-    /// One entry an object, in the scene's order.
+    /// Estimates of the objects, in the scene's order.
     pub objects: Named<ObjectEstimate>,
-    /// The file with the maps (see [`maps::encode`]), beside this one.
+    /// File name of the maps (see [`maps::encode`]).
     pub maps: Option<String>,
-    /// Each frame's linear exposure and white balance, their median 1 in each channel.
+    /// Each frame's linear exposure and white balance; their median is 1 in each channel.
     pub exposures: Option<Vec<Rgb>>,
-    /// The power of all frames' [`Vignetting`].
+    /// The power of the [`Vignetting`] of all frames.
     #[serde(default)]
     pub vignetting: Option<Rgb>,
     /// The terms of the camera's [`Response`].
     #[serde(default)]
     pub response: Option<[Rgb; TERMS]>,
-    /// What was changed by hand; `objects` and maps hold what was found.
+    /// Edits by hand; `objects` and the maps are without them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edits: Option<EditsRecord>,
 }
 
-/// Where a capture is, and how to know that it is the same.
+/// The content of `checkpoint.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct CheckpointFile {
+    pub(super) estimate: EstimateFile,
+    pub(super) checkpoint: Option<Checkpoint>,
+}
+
+/// Reference to a capture: where it is, and its hash.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CaptureReference {
-    /// Name shown to people.
+    /// Display name.
     pub name: String,
-    /// Whether it is the room built into the program; it then has no path.
+    /// Whether it is the built-in room, which has no path.
     pub built_in: bool,
-    /// Path from the folder of `estimate.json`, with forward slashes.
+    /// Path relative to the folder of `estimate.json`, with forward slashes.
     pub relative: Option<String>,
     /// Absolute path.
     pub absolute: Option<PathBuf>,
-    /// Hash of its contents.
+    /// Hash of its content.
     pub hash: String,
-    /// How it was read.
+    /// Options for reading it.
     pub options: OpenOptions,
 }
 
 impl EstimateFile {
-    /// What to write into `folder`, and the bytes of the maps.
+    /// The content to write into `folder`, and the bytes of the maps.
     ///
     /// # Errors
     /// The maps do not fit their layout.
@@ -84,7 +91,7 @@ impl EstimateFile {
         stopped_because: Option<Termination>,
     ) -> Result<(Self, Option<Vec<u8>>)> {
         let bytes = maps::encode(estimate)?;
-        // Named by its contents, so that estimate.json never meets the maps of another run.
+        // Named by its content, so that estimate.json never refers to maps of another run.
         let maps = bytes.as_ref().map(|bytes| {
             let hash = blake3::hash(bytes).to_hex();
             format!("maps-{}.safetensors", &hash.as_str()[..12])
@@ -108,10 +115,10 @@ impl EstimateFile {
         Ok((file, bytes))
     }
 
-    /// Refuses files of a later version, and parameters, surfaces and what cameras do out of their ranges.
+    /// Checks the version and the ranges of all values.
     ///
     /// # Errors
-    /// The version is not known, or a value is out of range.
+    /// The version is newer, or a value is out of range.
     pub fn check(&self, path: &Path) -> Result<()> {
         if self.version > VERSION {
             return Err(Error::new(
@@ -144,8 +151,8 @@ impl EstimateFile {
         if !exposures.into_iter().all(|&e| e.is_finite() && e > 0.0) {
             return impossible("exposures");
         }
-        let most = Vec3::splat(MAX_POWER);
-        if (self.vignetting()).is_some_and(|v| !v.power.abs().cmple(most).all()) {
+        let max = Vec3::splat(MAX_POWER);
+        if (self.vignetting()).is_some_and(|v| !v.power.abs().cmple(max).all()) {
             return impossible("vignetting");
         }
         if (self.response()).is_some_and(|response| !response.is_possible()) {
@@ -154,7 +161,7 @@ impl EstimateFile {
         Ok(())
     }
 
-    /// Reads the maps that this file names; `folder` is where it lies.
+    /// Reads the maps of this file, which lies in `folder`.
     ///
     /// # Errors
     /// They are missing or broken.
@@ -166,17 +173,17 @@ impl EstimateFile {
         if Path::new(name).file_name() != Some(name.as_ref()) {
             return Err(Error::file(
                 &path,
-                "maps that do not lie beside estimate.json are not read",
+                "maps have to lie beside estimate.json",
                 "put the file there and name it without a folder",
             ));
         }
         maps::decode(&path, &read_whole(&path)?)
     }
 
-    /// The estimate of a capture's objects.
+    /// The estimate for a capture's objects.
     ///
     /// # Errors
-    /// The capture has an object that the file does not know, or maps of another mesh.
+    /// An object of the capture has no entry, or the maps belong to another mesh.
     pub fn estimate(&self, path: &Path, maps: &Maps, capture: &OpenCapture) -> Result<Estimate> {
         let scene = &capture.scene;
         let place = |field: &str| format!("{}: {field}", path.display());
@@ -263,25 +270,25 @@ impl CaptureReference {
         }
     }
 
-    /// Where the capture is now: where it lies from `folder`, else where it was.
+    /// Where the capture is: at the relative path from `folder` if it exists, else at the absolute path.
     pub fn source(&self, folder: &Path) -> Source {
         if self.built_in {
             return Source::BuiltInRoom;
         }
-        let beside = self.relative.as_ref().map(|path| folder.join(path));
-        match (beside, &self.absolute) {
-            (Some(beside), _) if beside.is_dir() => Source::Folder(beside),
+        let relative = self.relative.as_ref().map(|path| folder.join(path));
+        match (relative, &self.absolute) {
+            (Some(relative), _) if relative.is_dir() => Source::Folder(relative),
             (_, Some(absolute)) => Source::Folder(absolute.clone()),
-            (Some(beside), None) => Source::Folder(beside),
+            (Some(relative), None) => Source::Folder(relative),
             (None, None) => Source::Folder(folder.to_owned()),
         }
     }
 }
 
-/// Reads a file that is one: a pipe or a device may never end.
+/// Reads a regular file; a pipe or device might never end.
 ///
 /// # Errors
-/// It is none, or cannot be read.
+/// It is no regular file, or cannot be read.
 pub(super) fn read_whole(path: &Path) -> Result<Vec<u8>> {
     let io = |error: std::io::Error| Error::io(path, &error);
     let metadata = fs::metadata(path).map_err(io)?;
@@ -291,7 +298,7 @@ pub(super) fn read_whole(path: &Path) -> Result<Vec<u8>> {
     fs::read(path).map_err(io)
 }
 
-/// The path from one absolute folder to another, with forward slashes; `None` where they share no root.
+/// The relative path between two absolute folders, with forward slashes; `None` if they have no common root.
 fn relative(from: &Path, to: &Path) -> Option<String> {
     let (from, to): (Vec<_>, Vec<_>) = (from.components().collect(), to.components().collect());
     let shared = from.iter().zip(&to).take_while(|(a, b)| a == b).count();

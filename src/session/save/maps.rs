@@ -1,4 +1,4 @@
-//! Spatial detail beside `estimate.json`, in the safetensors format, which many programs read.
+//! Textures and light from outside, beside `estimate.json`, in the safetensors format.
 
 use crate::error::{Error, Result};
 use crate::inverse::estimate::{Estimate, Outside, TexelEstimate};
@@ -10,23 +10,23 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use std::path::Path;
 use std::sync::Arc;
 
-/// What the maps file holds.
+/// The content of the maps file.
 #[derive(Debug, Clone, Default)]
 pub struct Maps {
-    /// Albedo a texel.
+    /// Albedo of each texel.
     pub texels: Option<Arc<TexelEstimate>>,
     /// Light from outside the mesh.
     pub outside: Option<Outside>,
 }
 
-/// The bytes of the maps file; `None` where the estimate has no maps.
+/// The bytes of the maps file; `None` if the estimate has no maps.
 ///
 /// Tensors: `texel_levels` (u8, one a triangle: subdivision level, see [`TexelLayout`]), `texel_albedo` and
 /// `texel_albedo_stderr` (f32, texels × 3, linear RGB), `texel_seen` (u32), `textured` (u8, one an object),
 /// `outside` (f32, rows × columns × 3, radiance).
 ///
 /// # Errors
-/// The maps do not fit their own layout.
+/// The maps do not fit their layout.
 pub fn encode(estimate: &Estimate) -> Result<Option<Vec<u8>>> {
     let mut tensors: Vec<(&str, Dtype, Vec<usize>, Vec<u8>)> = Vec::new();
     if let Some(texels) = &estimate.texels {
@@ -90,10 +90,10 @@ pub fn encode(estimate: &Estimate) -> Result<Option<Vec<u8>>> {
         .map_err(misfit)
 }
 
-/// Reads a maps file back.
+/// Reads a maps file.
 ///
 /// # Errors
-/// The bytes are no such file, or its tensors do not fit together.
+/// The bytes are no maps file, or its tensors do not fit together.
 pub fn decode(path: &Path, bytes: &[u8]) -> Result<Maps> {
     let file = SafeTensors::deserialize(bytes)
         .map_err(|error| Error::file(path, error, "solve or save again"))?;
@@ -147,7 +147,7 @@ impl<'a> Tensors<'a> {
     }
 
     fn texels(&self, levels: &[u8]) -> Result<TexelEstimate> {
-        // Levels beyond this would overflow the count of texels.
+        // Higher levels would overflow the number of texels.
         let total: u64 = levels
             .iter()
             .map(|&level| 1u64.checked_shl(2 * u32::from(level)).unwrap_or(u64::MAX))

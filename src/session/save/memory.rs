@@ -1,9 +1,9 @@
-//! How much memory the program held at most.
+//! Peak memory of the program.
 
 use std::fs;
 use sysinfo::{ProcessRefreshKind, ProcessesToUpdate, System, get_current_pid};
 
-/// The greatest resident memory so far where the system keeps it (Linux), else what is resident now.
+/// Peak resident memory in bytes where the system records it (Linux), else the current one.
 pub fn peak_memory_bytes() -> Option<u64> {
     fs::read_to_string("/proc/self/status")
         .ok()
@@ -11,7 +11,7 @@ pub fn peak_memory_bytes() -> Option<u64> {
         .or_else(resident)
 }
 
-/// The `VmHWM` line of a Linux process status, which counts kibibytes.
+/// Peak memory in bytes from the `VmHWM` line of a Linux process status, in KiB.
 fn high_water_mark(status: &str) -> Option<u64> {
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
     let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;

@@ -1,4 +1,4 @@
-//! A map in files that keeps the scene's order of objects.
+//! A JSON object that keeps the scene's order of objects.
 
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::scene::Scene;
@@ -22,7 +22,7 @@ impl<T> Named<T> {
 }
 
 impl Named<ObjectEstimate> {
-    /// All objects of an estimate by name.
+    /// All objects of an estimate, by name.
     pub fn objects(scene: &Scene, estimate: &Estimate) -> Self {
         let named = scene.objects.iter().zip(&estimate.objects);
         Self(

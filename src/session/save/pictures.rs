@@ -1,4 +1,4 @@
-//! Pictures of each frame beside the results: what the estimate says that the camera sees.
+//! Pictures of each frame: the render, and maps of the estimate as seen by the camera.
 
 use crate::error::Result;
 use crate::export::exr::{Precision, write_rgb};
@@ -9,7 +9,7 @@ use crate::math::picture::Picture;
 use crate::render::Pictures;
 use crate::scene::camera::Camera;
 use crate::session::light::path_options;
-use crate::session::save::Results;
+use crate::session::save::results::Results;
 use crate::session::save::staging::Staging;
 use crate::session::view::hits::Hits;
 use crate::transport::denoise::guides;
@@ -20,49 +20,16 @@ use std::sync::Arc;
 
 /// Folder of the pictures within the results.
 pub use crate::export::overwrite::VIEWS as FOLDER;
-/// What is written of each frame.
+pub use crate::session::save::frames::Frames;
+/// Kinds of pictures of each frame.
 pub const KINDS: [&str; 6] = ["render", "albedo", "emission", "error", "stderr", "seen"];
 
-/// Long side of the pictures where their number is limited.
-const LONG_SIDE: u32 = 1024;
-/// Paths over all pictures, shared out to their pixels …
+/// Total number of paths of all pictures, ...
 const PATHS: u64 = 8_000_000;
-/// … within these samples a pixel.
+/// ... within this range of samples per pixel.
 const SAMPLES: (u64, u64) = (4, 64);
 
-/// Which frames get pictures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Frames {
-    /// Every frame, at the photograph's size.
-    All,
-    /// At most so many, evenly spaced, of limited size.
-    AtMost(usize),
-}
-
-impl Default for Frames {
-    fn default() -> Self {
-        Self::AtMost(16)
-    }
-}
-
-impl Frames {
-    /// The chosen frames of `count`.
-    pub fn chosen(self, count: usize) -> Vec<usize> {
-        match self {
-            Self::AtMost(most) if most < count => (0..most).map(|i| i * count / most).collect(),
-            _ => (0..count).collect(),
-        }
-    }
-
-    fn long_side(self) -> u32 {
-        match self {
-            Self::All => u32::MAX,
-            Self::AtMost(_) => LONG_SIDE,
-        }
-    }
-}
-
-/// Renders and writes the pictures of the chosen frames, `views/NNN.KIND.{exr,png}`. Noise is taken out of `render.png` alone.
+/// Renders and writes the pictures of the chosen frames, `views/NNN.KIND.{exr,png}`. Only `render.png` is denoised.
 ///
 /// # Errors
 /// A photograph cannot be read again, or a file cannot be written.
@@ -94,7 +61,7 @@ pub fn write(staging: &mut Staging, results: &Results) -> Result<()> {
     Ok(())
 }
 
-/// What the pictures show: the estimate as it was changed by hand.
+/// What the pictures show: the estimate with the edits.
 struct Shown<'a> {
     estimate: Arc<Estimate>,
     lit: &'a Lit,
@@ -114,7 +81,7 @@ fn frame(
     let scene = &capture.scene;
     let (photograph, shown_at) = capture.sized_photograph(index, camera)?;
 
-    // Two independent renders, which tell the noise.
+    // The denoiser estimates the noise from two independent renders.
     let options = path_options(&results.settings);
     let [a, b] = [0, 1].map(|half| {
         let key = (results.settings.seed.wrapping_add(half), index as u64);
@@ -134,7 +101,7 @@ fn frame(
         Some(denoiser) => denoiser.denoise(&a, &b, &guides(lit, camera)),
         None => render.clone(),
     };
-    // In the photograph's values, so that the two can be subtracted.
+    // In the photograph's values, so that the photograph can be subtracted.
     let exposure = estimate.exposure(index);
     let saturation = capture.frame(index)?.1.saturation;
     for picture in [&mut render, &mut clean] {
@@ -179,13 +146,13 @@ pub fn earlier(folder: &Path) -> Vec<PathBuf> {
     entries
         .flatten()
         .filter_map(|entry| entry.file_name().into_string().ok())
-        .filter(|name| ours(name))
+        .filter(|name| is_picture(name))
         .map(|name| Path::new(FOLDER).join(name))
         .collect()
 }
 
 /// Whether a file is named NNN.KIND.exr or NNN.KIND.png.
-fn ours(name: &str) -> bool {
+fn is_picture(name: &str) -> bool {
     let parts: Vec<&str> = name.split('.').collect();
     matches!(parts[..], [number, kind, "exr" | "png"]
         if number.len() >= 3 && number.bytes().all(|b| b.is_ascii_digit()) && KINDS.contains(&kind))
@@ -205,7 +172,7 @@ mod tests {
 
     #[test]
     fn only_our_own_pictures_count_as_earlier_ones() {
-        assert!(ours("000.render.exr") && ours("1234.seen.png"));
+        assert!(is_picture("000.render.exr") && is_picture("1234.seen.png"));
         for other in [
             "notes.txt",
             "000.render.jpg",
@@ -213,7 +180,7 @@ mod tests {
             "abc.render.png",
             "000.mine.png",
         ] {
-            assert!(!ours(other), "{other}");
+            assert!(!is_picture(other), "{other}");
         }
     }
 }

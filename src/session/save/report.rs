@@ -1,4 +1,4 @@
-//! `report.json`: what a solve did and found, in numbers.
+//! `report.json`: figures of a solve.
 
 use crate::capture::response::TERMS;
 use crate::inverse::estimate::ObjectEstimate;
@@ -6,64 +6,64 @@ use crate::inverse::settings::Preset;
 use crate::inverse::solver::{Stage, Termination};
 use crate::math::color::luminance;
 use crate::math::nullable::{Rgb, rgb};
-use crate::session::save::Results;
 use crate::session::save::memory::peak_memory_bytes;
 use crate::session::save::named::Named;
+use crate::session::save::results::Results;
 use crate::transport::denoise::Denoiser;
 use crate::transport::surroundings::Surroundings;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// The contents of `report.json`. Seconds, linear radiance.
+/// The content of `report.json`. Times in seconds, linear radiance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// The program's version.
     pub relit: String,
-    /// Key of all random numbers.
+    /// Random seed.
     pub seed: u64,
     /// Which solver ran.
     pub preset: Preset,
-    /// Threads that worked.
+    /// Number of worker threads.
     pub threads: usize,
-    /// From start to end.
+    /// Total time.
     pub seconds: f64,
-    /// Reading the capture.
+    /// Time of reading the capture.
     pub seconds_load: f64,
-    /// Solving, pauses excluded.
+    /// Time of solving, without pauses.
     pub seconds_solve: f64,
-    /// Rendering and writing the results, this file excluded.
+    /// Time of rendering and writing the results, without this file.
     pub seconds_write: f64,
-    /// From the solve's start to the first estimate that could be shown.
+    /// Time from the start of the solve to the first estimate.
     pub seconds_to_first_estimate: Option<f64>,
-    /// How much there was.
+    /// Size of the capture.
     pub capture: Counts,
-    /// What traced the paths of the pictures: a graphics card's name, or `cpu`. The fit's are the processor's.
+    /// Device that rendered the pictures: name of a graphics card, or `cpu`. The fit always runs on the processor.
     pub device: String,
-    /// What took the noise out of `render.png`: `builtin`, `oidn` or `none`.
+    /// Denoiser of `render.png`: `builtin`, `oidn` or `none`.
     pub denoiser: &'static str,
     /// Rays traced by the solver.
     pub rays: u64,
-    /// The same over `seconds_solve`.
+    /// `rays` over `seconds_solve`.
     pub rays_per_second: f64,
-    /// Most memory held at a time; `null` where the system does not say.
+    /// Peak memory; `null` if the system does not report it.
     pub peak_memory_bytes: Option<u64>,
-    /// Why the solve ended; `null` for a save while it runs.
+    /// Why the solve ended; `null` during a solve.
     pub stopped_because: Option<Termination>,
-    /// The model ladder.
+    /// Stages of the solver's pipeline.
     pub stages: Vec<Stage>,
-    /// One entry an object.
+    /// Estimates of the objects.
     pub objects: Named<ObjectEstimate>,
     /// Light from outside the mesh.
     pub outside_light: Option<OutsideSummary>,
-    /// Each frame's linear exposure and white balance, their median 1 in each channel.
+    /// Each frame's linear exposure and white balance; their median is 1 in each channel.
     pub exposures: Option<Vec<Rgb>>,
-    /// The power of the cosine of the angle off the axis by which the lens dims all frames.
+    /// Vignetting of all frames: the power of the cosine of the angle to the optical axis.
     pub vignetting: Option<Rgb>,
     /// The terms of the camera's [`Response`](crate::capture::response::Response).
     pub response: Option<[Rgb; TERMS]>,
-    /// Samples dropped, by cause.
+    /// Rejected samples, by cause.
     pub rejected_samples: BTreeMap<String, u64>,
-    /// What a person should know.
+    /// Warnings to the user.
     pub warnings: Vec<String>,
 }
 
@@ -76,11 +76,11 @@ pub struct Counts {
     pub objects: usize,
     /// Photographs.
     pub frames: usize,
-    /// Pixels of all photographs, as the solver used them.
+    /// Pixels of all photographs at the working resolution.
     pub pixels: u64,
 }
 
-/// Light from outside, in short; the map itself lies beside `estimate.json`.
+/// Summary of the light from outside; the map is beside `estimate.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OutsideSummary {
     /// Columns of the map.
@@ -89,17 +89,17 @@ pub struct OutsideSummary {
     pub height: u32,
     /// Mean radiance over the sphere.
     pub mean: Rgb,
-    /// Greatest luminance.
+    /// Largest luminance.
     pub brightest: Option<f32>,
-    /// How far away it comes from.
+    /// Its distance.
     #[serde(default)]
     pub from: String,
 }
 
-/// Where the time went.
+/// Durations in seconds.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Seconds {
-    /// From start to end.
+    /// Total.
     pub total: f64,
     /// Reading the capture.
     pub load: f64,

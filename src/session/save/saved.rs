@@ -1,39 +1,39 @@
-//! Results read back from their folder.
+//! Loads results from their folder.
 
 use crate::error::{Error, Result};
+use crate::export::overwrite::{CHECKPOINT, ESTIMATE};
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Termination};
 use crate::session::command::{OpenOptions, Source};
 use crate::session::edits::Edits;
-use crate::session::save::estimate::{EstimateFile, read_whole};
+use crate::session::open_capture::OpenCapture;
+use crate::session::save::estimate::{CheckpointFile, EstimateFile, read_whole};
 use crate::session::save::maps::Maps;
-use crate::session::save::{CHECKPOINT, CheckpointFile, ESTIMATE};
-use crate::session::snapshot::OpenCapture;
 use std::path::{Path, PathBuf};
 
-/// A folder of results, read back.
+/// Loaded results.
 #[derive(Debug, Clone)]
 pub struct Saved {
     path: PathBuf,
     file: EstimateFile,
     maps: Maps,
-    /// Which capture it belongs to.
+    /// The capture they belong to.
     pub source: Source,
-    /// How the capture was read.
+    /// Options for reading the capture.
     pub options: OpenOptions,
     /// The parameters.
     pub settings: Settings,
-    /// Where to go on from; `None` where the solve converged.
+    /// The checkpoint to resume from; `None` if the solve converged.
     pub checkpoint: Option<Checkpoint>,
     /// Why the solve ended.
     pub termination: Termination,
 }
 
-/// Reads the results in a folder, or where a solve did not come to its end, the checkpoint that it left.
+/// Loads the results in a folder, or the checkpoint if the solve has not ended.
 ///
 /// # Errors
-/// There are none, or they are broken.
+/// There are no results, or they are broken.
 pub fn load(folder: &Path) -> Result<Saved> {
     let path = folder.join(ESTIMATE);
     let at = folder.join(CHECKPOINT);
@@ -48,10 +48,10 @@ pub fn load(folder: &Path) -> Result<Saved> {
     Saved::new(folder, path, file, checkpoint.and_then(|c| c.checkpoint))
 }
 
-/// Reads the newest checkpoint in a folder; the results where there is none.
+/// Loads the newest checkpoint in a folder, or the results without one.
 ///
 /// # Errors
-/// There is neither, or it is broken.
+/// There are no results, or they are broken.
 pub fn load_checkpoint(folder: &Path) -> Result<Saved> {
     let at = folder.join(CHECKPOINT);
     if !at.exists() {
@@ -81,7 +81,7 @@ impl Saved {
         })
     }
 
-    /// The contents of `estimate.json`.
+    /// The content of `estimate.json`.
     pub fn file(&self) -> &EstimateFile {
         &self.file
     }
@@ -104,7 +104,7 @@ impl Saved {
         self.estimate_by_name(capture)
     }
 
-    /// What was changed of the estimate by hand.
+    /// The edits of the estimate.
     ///
     /// # Errors
     /// The capture has no object of a name.
@@ -116,7 +116,7 @@ impl Saved {
         )
     }
 
-    /// The estimate for a capture with the same objects and mesh, wherever its photographs come from.
+    /// The estimate for any capture with the same objects and mesh, whatever its photographs.
     ///
     /// # Errors
     /// An object is missing, or the maps belong to another mesh.

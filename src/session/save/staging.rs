@@ -1,9 +1,9 @@
-//! All files of a result appear together, or none does. They take the place of those of the same capture alone, and of no
-//! input (see [`crate::export::overwrite`]).
+//! Writes all files of results together: either all appear or none. They replace only results of the same capture,
+//! and no inputs (see [`crate::export::overwrite`]).
 //!
-//! Several programs may write into one folder: each fills a folder of its own, and they move their files into place one
-//! after the other. What a killed program left aside is removed by the next one. Both rest on locks on folders, which
-//! Windows and some network drives do not have; there, programs must not share a folder.
+//! Several programs may write into the same folder: each fills a temporary folder, and they move their files one
+//! after the other. Temporary folders of killed programs are deleted by the next one. Both need locks on folders,
+//! which Windows and some network drives lack; there, programs must not share a folder.
 
 use crate::error::{Error, Result};
 use crate::export::atomic::write_bytes;
@@ -12,47 +12,47 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// Names of folders being filled begin with this.
+/// Prefix of the names of temporary folders.
 const UNFINISHED: &str = ".relit-unfinished-";
 
-/// A folder being filled aside; [`Staging::commit`] moves its files over those of an earlier run.
+/// A temporary folder; [`Staging::commit`] moves its files to the target.
 #[derive(Debug)]
 pub struct Staging {
     target: PathBuf,
-    aside: TempDir,
+    temporary: TempDir,
     files: Vec<PathBuf>,
-    /// Says to others that the folder aside is in use, as long as it lives.
+    /// Lock on the temporary folder, which shows others that it is in use.
     _in_use: Option<File>,
 }
 
 impl Staging {
-    /// Starts filling with results of a capture; creates the target folder if need be.
+    /// Creates the temporary folder for results of a capture, and the target folder if need be.
     ///
     /// # Errors
     /// The target holds something else, or cannot be written.
     pub fn new(target: &Path, capture: &CaptureId) -> Result<Self> {
         overwrite::check_results(target, capture)?;
         fs::create_dir_all(target).map_err(|error| Error::io(target, &error))?;
-        let _alone = locked(target);
+        let _lock = locked(target);
         remove_abandoned(target);
-        let aside = tempfile::Builder::new()
+        let temporary = tempfile::Builder::new()
             .prefix(UNFINISHED)
             .tempdir_in(target)
             .map_err(|error| Error::io(target, &error))?;
         Ok(Self {
             target: target.to_owned(),
-            _in_use: locked(aside.path()),
-            aside,
+            _in_use: locked(temporary.path()),
+            temporary,
             files: Vec::new(),
         })
     }
 
-    /// Where to write the file that will be `name` in the target, e.g. `views/000.render.exr`.
+    /// The path to write the file to that will be `name` in the target, e.g. `views/000.render.exr`.
     ///
     /// # Errors
-    /// A folder on the way cannot be made.
+    /// A subfolder cannot be created.
     pub fn file(&mut self, name: impl AsRef<Path>) -> Result<PathBuf> {
-        let path = self.aside.path().join(&name);
+        let path = self.temporary.path().join(&name);
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(|error| Error::io(folder, &error))?;
         }
@@ -69,22 +69,22 @@ impl Staging {
         write_bytes(&path, bytes).map_err(|error| self.named(error))
     }
 
-    /// An error about a file aside, as one about the file that it will be.
+    /// Replaces the temporary path in an error by the target.
     pub fn named(&self, error: Error) -> Error {
         let place = error.place.replace(
-            &self.aside.path().display().to_string(),
+            &self.temporary.path().display().to_string(),
             &self.target.display().to_string(),
         );
         Error { place, ..error }
     }
 
-    /// Moves everything into place, in the order in which it was asked for, and removes those files of an earlier run
-    /// that this one did not write: what `stale` names once nobody else moves files.
+    /// Moves all files to the target, in the order of their creation, and deletes files of an earlier run that this
+    /// one did not write: `stale` lists them while the target is locked.
     ///
     /// # Errors
-    /// A file cannot be moved, or would take the place of an input.
+    /// A file cannot be moved, or would replace an input.
     pub fn commit(self, stale: impl FnOnce(&Path) -> Vec<PathBuf>) -> Result<()> {
-        let _alone = locked(&self.target);
+        let _lock = locked(&self.target);
         for name in &self.files {
             overwrite::check_input(&self.target.join(name))?;
         }
@@ -94,7 +94,7 @@ impl Staging {
             if let Some(folder) = target.parent() {
                 fs::create_dir_all(folder).map_err(|error| Error::io(folder, &error))?;
             }
-            fs::rename(self.aside.path().join(name), &target)
+            fs::rename(self.temporary.path().join(name), &target)
                 .map_err(|error| Error::io(&target, &error))?;
         }
         for name in stale.iter().filter(|name| !self.files.contains(name)) {
@@ -109,20 +109,20 @@ impl Staging {
     }
 }
 
-/// Waits for a folder's lock and holds it as long as the result lives; `None` where folders have no locks.
+/// Locks a folder for as long as the result lives, waiting if need be; `None` where folders have no locks.
 fn locked(folder: &Path) -> Option<File> {
     let file = File::open(folder).ok()?;
     file.lock().ok()?;
     Some(file)
 }
 
-/// Removes folders aside that no living program fills.
+/// Deletes temporary folders of killed programs.
 fn remove_abandoned(target: &Path) {
     for entry in fs::read_dir(target).into_iter().flatten().flatten() {
         let unfinished = entry.file_name().to_string_lossy().starts_with(UNFINISHED);
         let abandoned = || File::open(entry.path()).is_ok_and(|folder| folder.try_lock().is_ok());
         if unfinished && abandoned() {
-            // One that cannot be removed does no harm.
+            // Failing to delete it does no harm.
             let _ = fs::remove_dir_all(entry.path());
         }
     }

@@ -1,28 +1,29 @@
-//! Results written into their folder.
+//! Writes results into their folder.
 
 use crate::error::{Error, Result};
+use crate::export::overwrite::{CHECKPOINT, ESTIMATE, REPORT};
 use crate::export::plot::loss_plot;
 use crate::export::scene::{self, Format};
 use crate::export::table::{Cell, Table};
 use crate::inverse::solver::Progress;
-use crate::session::save::estimate::EstimateFile;
+use crate::session::save::estimate::{CheckpointFile, EstimateFile};
 use crate::session::save::pictures;
 use crate::session::save::report::{Report, Seconds};
+use crate::session::save::results::Results;
 use crate::session::save::staging::Staging;
-use crate::session::save::{CHECKPOINT, CheckpointFile, ESTIMATE, REPORT, Results};
 use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// The scene for other programs.
+/// File name of the exported scene.
 const SCENE: &str = "scene.glb";
 
-/// Writes a folder of results: the estimate with its report and losses first, then the scene and the pictures. Each step is
-/// written aside and moved into place at its end, so that a failure leaves what was there before it.
+/// Writes a folder of results: first the estimate with report and losses, then the scene and the pictures. Each step
+/// is atomic, so a failure leaves the files of the step before.
 ///
 /// # Errors
-/// The folder cannot be written, or is another capture's. Where the error says so, the estimate is written.
+/// The folder cannot be written, or holds results of another capture. The error says whether the estimate was written.
 pub fn write(folder: &Path, results: &Results) -> Result<()> {
     let started = Instant::now();
     let report = || {
@@ -51,7 +52,7 @@ pub fn write(folder: &Path, results: &Results) -> Result<()> {
     })
 }
 
-/// Writes an estimate that was changed by hand and the pictures of it.
+/// Writes an edited estimate and its pictures.
 ///
 /// # Errors
 /// As [`write()`].
@@ -62,7 +63,7 @@ pub fn write_edited(folder: &Path, results: &Results) -> Result<()> {
     write_shown(folder, results, |_| Ok(()))
 }
 
-/// The estimate with its maps and checkpoint, which must be there before it is.
+/// Stages the estimate with its maps and checkpoint.
 fn stage_estimate(staging: &mut Staging, folder: &Path, results: &Results) -> Result<()> {
     let (file, maps) = results.file(folder)?;
     if let (Some(name), Some(bytes)) = (&file.maps, &maps) {
@@ -78,11 +79,11 @@ fn stage_estimate(staging: &mut Staging, folder: &Path, results: &Results) -> Re
     staging.write(ESTIMATE, &json(ESTIMATE, &file)?)
 }
 
-/// Writes what is seen of an estimate that is in its place: the scene, the pictures, and what `and` adds.
+/// Writes the scene and the pictures of an estimate that is already written, and what `extra` adds.
 fn write_shown(
     folder: &Path,
     results: &Results,
-    and: impl FnOnce(&mut Staging) -> Result<()>,
+    extra: impl FnOnce(&mut Staging) -> Result<()>,
 ) -> Result<()> {
     let mut staging = Staging::new(folder, &results.capture_id())?;
     let scene = |staging: &mut Staging| {
@@ -92,7 +93,7 @@ fn write_shown(
     };
     scene(&mut staging)
         .and_then(|()| pictures::write(&mut staging, results))
-        .and_then(|()| and(&mut staging))
+        .and_then(|()| extra(&mut staging))
         .map_err(|error| staging.named(error))
         .and_then(|()| staging.commit(|_| Vec::new()))
         .map_err(|error| Error {
@@ -104,7 +105,7 @@ fn write_shown(
         })
 }
 
-/// Writes `checkpoint.json` alone, while the solve runs.
+/// Writes only `checkpoint.json`, during a solve.
 ///
 /// # Errors
 /// The folder cannot be written.
@@ -114,16 +115,16 @@ pub fn write_checkpoint(folder: &Path, results: &Results) -> Result<()> {
     if let (Some(name), Some(bytes)) = (&estimate.maps, &maps) {
         staging.write(name, bytes)?;
     }
-    let own = estimate.maps.clone().map(PathBuf::from);
+    let own_maps = estimate.maps.clone().map(PathBuf::from);
     let checkpoint = CheckpointFile {
         estimate,
         checkpoint: results.checkpoint.clone(),
     };
     staging.write(CHECKPOINT, &json(CHECKPOINT, &checkpoint)?)?;
-    // Maps of the checkpoint before, unless they are those of finished results.
+    // Remove the maps of the previous checkpoint, unless finished results use them.
     staging.commit(|folder| {
         let mut stale = earlier_maps(folder);
-        stale.retain(|name| Some(name) != own.as_ref());
+        stale.retain(|name| Some(name) != own_maps.as_ref());
         if !stale.is_empty() {
             let finished = fs::read(folder.join(ESTIMATE)).unwrap_or_default();
             let finished: Option<EstimateFile> = serde_json::from_slice(&finished).ok();
@@ -147,8 +148,8 @@ impl Results {
     }
 }
 
-/// The course of a solve as a table, in order of time: losses in the fit and on held-out pixels where they were measured, and
-/// after each iteration the relative residual of the fit, the relative error that the estimate claims, and the free parameters.
+/// The course of a solve as a table, in order of time: losses in the fit and on held-out pixels where they were measured, and after
+/// each iteration the relative residual of the fit, the relative error that the estimate reports, and the number of unknowns.
 fn losses(progress: &Progress) -> Table {
     let mut table = Table::new(&[
         "seconds",
@@ -193,7 +194,7 @@ fn losses(progress: &Progress) -> Table {
     table
 }
 
-/// Files of an earlier run that a new one replaces: those that it may not write again under the same name.
+/// Files of an earlier run that a new one replaces, but may not write again under the same name.
 fn earlier(folder: &Path) -> Vec<PathBuf> {
     let mut names = pictures::earlier(folder);
     names.extend([CHECKPOINT, SCENE, "loss.png"].map(PathBuf::from));

@@ -1,15 +1,15 @@
-//! What each pixel's centre sees, and what the estimate says about it.
+//! The surface at each pixel's centre, and maps of the estimate there.
 
 use crate::inverse::estimate::Estimate;
+use crate::math::picture::Picture;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::geometry::Hit;
-use crate::session::snapshot::Picture;
 use crate::transport::material::Material;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-/// The nearest surface behind each pixel's centre, row by row.
+/// The nearest hit at each pixel's centre, row by row.
 #[derive(Debug)]
 pub struct Hits {
     width: u32,
@@ -18,7 +18,7 @@ pub struct Hits {
 }
 
 impl Hits {
-    /// Casts one ray a pixel.
+    /// Casts one ray per pixel.
     pub fn new(scene: &Scene, camera: &Camera) -> Self {
         let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
         let hits = (0..width as usize * height as usize)
@@ -52,7 +52,7 @@ impl Hits {
         })
     }
 
-    /// Emitted radiance towards the camera: that of front sides.
+    /// Radiance emitted towards the camera; only front sides emit.
     pub fn emission(&self, scene: &Scene, camera: &Camera, estimate: &Estimate) -> Picture {
         self.paint(scene, |object, hit| {
             let to_camera = camera.center - scene.point(hit);
@@ -64,8 +64,9 @@ impl Hits {
         })
     }
 
-    /// The same picture with −1 where no photograph tells anything: past the mesh, and where nothing was seen.
-    pub fn told(&self, mut picture: Picture, scene: &Scene, estimate: &Estimate) -> Picture {
+    /// Sets the pixels of a picture to −1 that no photograph determines: beyond the mesh, and on surfaces that no
+    /// photograph sees.
+    pub fn mark_unseen(&self, mut picture: Picture, scene: &Scene, estimate: &Estimate) -> Picture {
         let seen = self.seen(scene, estimate);
         for (pixel, seen) in picture.pixels.iter_mut().zip(&seen.pixels) {
             if seen.x == 0.0 {
@@ -91,7 +92,7 @@ impl Hits {
         })
     }
 
-    /// How many pixels of all photographs saw what each pixel sees: its texel, else its object.
+    /// Number of pixels of all photographs that see a pixel's texel, or its object without texture.
     pub fn seen(&self, scene: &Scene, estimate: &Estimate) -> Picture {
         self.paint(scene, |object, hit| {
             let texels = estimate.texels.as_ref();

@@ -1,4 +1,4 @@
-//! Pictures of the requested view, drawn a slice at a time between other work.
+//! Pictures of the requested view, rendered in slices between other work.
 
 pub mod hits;
 pub mod progressive;
@@ -7,7 +7,8 @@ mod target;
 
 use crate::inverse::estimate::Estimate;
 use crate::session::command::{ViewCamera, ViewRequest};
-use crate::session::snapshot::{OpenCapture, View};
+use crate::session::open_capture::OpenCapture;
+use crate::session::snapshot::View;
 use crate::transport::path::PathOptions;
 use std::sync::Arc;
 use std::time::Instant;
@@ -17,12 +18,12 @@ pub use target::differs;
 
 /// Long side in pixels of the first picture after a camera move.
 const FIRST_LONG_SIDE: u32 = 96;
-/// Drawing time, in seconds, that may be saved up while the solver is busy.
+/// Most rendering time, in seconds, that can be saved up while the solver is busy.
 const MAX_CREDIT: f32 = 0.05;
-/// Shortest time between two looks at a changing estimate, in seconds.
-const LOOK_AGAIN: f32 = 0.4;
+/// Shortest time between two checks for a changed estimate, in seconds.
+const CHECK_INTERVAL: f32 = 0.4;
 
-/// Draws the requested view progressively: at once coarse, then sharper.
+/// Renders the requested view progressively.
 #[derive(Debug, Default)]
 pub struct Views {
     request: Option<ViewRequest>,
@@ -32,12 +33,12 @@ pub struct Views {
     sequence: u64,
     credit: f32,
     last: Option<Instant>,
-    looked: Option<Instant>,
+    checked: Option<Instant>,
 }
 
 impl Views {
-    /// Asks for a view; it replaces the one before.
-    pub fn look(&mut self, request: ViewRequest) {
+    /// Requests a view; replaces the previous request.
+    pub fn request(&mut self, request: ViewRequest) {
         self.request = Some(request);
         self.changed = true;
     }
@@ -47,7 +48,7 @@ impl Views {
         self.shown.clone()
     }
 
-    /// Forgets all pictures, as when another capture is opened; a frame that was asked for is drawn anew.
+    /// Drops all pictures when another capture is opened. A request for a frame is kept.
     pub fn reset(&mut self) {
         let request = self
             .request
@@ -61,7 +62,7 @@ impl Views {
         };
     }
 
-    /// Stops drawing; what was asked for is forgotten.
+    /// Stops rendering and drops the request.
     pub fn stop(&mut self) {
         *self = Self {
             sequence: self.sequence,
@@ -69,20 +70,20 @@ impl Views {
         };
     }
 
-    /// Draws the requested view anew, coarsely at once, as when the light was changed by hand.
-    pub fn look_again(&mut self) {
+    /// Renders the requested view again from a coarse picture, after the light was edited.
+    pub fn redraw(&mut self) {
         self.changed = self.request.is_some();
     }
 
-    /// Starts the render over with an estimate that is final.
+    /// Restarts the render with a final estimate.
     pub fn refresh(&mut self, estimate: &Arc<Estimate>) {
         if let Some(target) = &mut self.target {
             target.start_over(estimate);
         }
     }
 
-    /// Draws for a moment, taking at most about `fraction` of the time since the last call, but a new request at once.
-    /// Returns whether the pictures changed, and whether there is more to draw.
+    /// Renders for a moment: for at most about `fraction` of the time since the last call, but at once for a new
+    /// request. Returns whether the pictures changed, and whether there is more to render.
     pub fn draw(
         &mut self,
         capture: &OpenCapture,
@@ -100,7 +101,7 @@ impl Views {
             self.changed = false;
             let request = self.request.as_ref();
             self.target = request.and_then(|r| Target::new(capture, estimate, r, FIRST_LONG_SIDE));
-            self.looked = Some(now);
+            self.checked = Some(now);
             let drawn = self.sharpen(options);
             return (drawn, self.target.is_some());
         }
@@ -114,18 +115,18 @@ impl Views {
         (drawn, more)
     }
 
-    /// Takes up a newer estimate, where it differs to the eye and the last one had its time.
+    /// Switches to a new estimate if it is visibly different and the last one has been shown for long enough.
     fn follow(&mut self, estimate: &Arc<Estimate>, now: Instant) {
         let rested = self
-            .looked
-            .is_none_or(|at| (now - at).as_secs_f32() >= LOOK_AGAIN);
+            .checked
+            .is_none_or(|at| (now - at).as_secs_f32() >= CHECK_INTERVAL);
         if let Some(target) = self.target.as_mut().filter(|_| rested) {
-            self.looked = Some(now);
+            self.checked = Some(now);
             target.follow(estimate);
         }
     }
 
-    /// Whether the first complete picture of the requested view is still to come.
+    /// Whether the first complete picture of the requested view is still missing.
     pub fn is_rough(&self) -> bool {
         self.target.as_ref().is_some_and(Target::is_rough)
     }

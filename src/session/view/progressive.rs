@@ -1,8 +1,8 @@
-//! A render that sharpens a slice of rows at a time.
+//! A progressive render, in slices of rows.
 
+use crate::math::picture::Picture;
 use crate::math::rng::Stream;
 use crate::scene::camera::Camera;
-use crate::session::snapshot::Picture;
 use crate::transport::layers::{Parts, Split, layer_of};
 use crate::transport::lit::Lit;
 use crate::transport::path::{PathOptions, radiance};
@@ -11,28 +11,28 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Seconds that a slice should take.
+/// Duration of a slice in seconds.
 const SLICE: f64 = 0.012;
-/// Samples a pixel after which a picture counts as sharp.
-pub const ENOUGH: u32 = 512;
-/// Samples that count of those taken with an earlier estimate.
-const MEMORY: f64 = 3.0;
+/// Samples per pixel at which a picture is finished.
+pub const MAX_SAMPLES: u32 = 512;
+/// Most samples that earlier estimates count as.
+const MAX_EARLIER_SAMPLES: f64 = 3.0;
 
-/// Radiance of a view, accumulated pass by pass; in layers by lamp where a split is given.
+/// Radiance of a view, accumulated pass by pass; in layers by lamp with a split.
 #[derive(Debug)]
 pub struct Progressive {
     width: usize,
     height: usize,
     split: Option<Arc<Split>>,
-    /// Row by row, all layers of a pixel together.
+    /// Sums by rows, all layers of a pixel together.
     sums: Vec<DVec3>,
-    /// The sums of every other pass alone, where no split is given: with the rest they tell the noise.
+    /// Sums of every other pass, without a split: an independent half for estimating the noise.
     half: Vec<DVec3>,
-    /// Samples that `half` stands for.
+    /// Number of samples in `half`.
     half_weight: f64,
-    /// Whether earlier samples are to count for less once the pass is complete.
+    /// Whether to reduce the weight of earlier samples at the end of the pass.
     fades: bool,
-    /// Samples that `sums` stand for, in whole passes.
+    /// Number of samples in `sums`, in whole passes.
     weight: f64,
     pass: u32,
     row: usize,
@@ -40,7 +40,7 @@ pub struct Progressive {
 }
 
 impl Progressive {
-    /// Nothing yet.
+    /// An empty render.
     pub fn new(camera: &Camera, split: Option<Arc<Split>>) -> Self {
         let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
         let layers = split.as_ref().map_or(1, |split| split.sources().len());
@@ -64,29 +64,29 @@ impl Progressive {
         }
     }
 
-    /// How its layers are split by lamp, if they are.
+    /// The split into layers, if any.
     pub fn split(&self) -> Option<&Arc<Split>> {
         self.split.as_ref()
     }
 
-    /// Layers a pixel.
+    /// Layers per pixel.
     fn layers(&self) -> usize {
         self.split.as_ref().map_or(1, |split| split.sources().len())
     }
 
-    /// Lets earlier samples count for a few at most, because the light has changed a little; from the end of the pass under way.
+    /// Reduces the weight of earlier samples after a small change of the light, at the end of the current pass.
     pub fn fade(&mut self) {
         self.fades = self.row > 0;
-        if self.row == 0 && self.weight > MEMORY {
-            let factor = MEMORY / self.weight;
+        if self.row == 0 && self.weight > MAX_EARLIER_SAMPLES {
+            let factor = MAX_EARLIER_SAMPLES / self.weight;
             let sums = self.sums.iter_mut().chain(&mut self.half);
             sums.for_each(|sum| *sum *= factor);
             self.half_weight *= factor;
-            self.weight = MEMORY;
+            self.weight = MAX_EARLIER_SAMPLES;
         }
     }
 
-    /// Forgets all samples.
+    /// Drops all samples.
     pub fn clear(&mut self) {
         self.sums.fill(DVec3::ZERO);
         self.half.fill(DVec3::ZERO);
@@ -94,12 +94,12 @@ impl Progressive {
         self.row = 0;
     }
 
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub fn samples(&self) -> u32 {
         self.weight as u32
     }
 
-    /// Draws some rows; true when a pass over the picture is complete.
+    /// Renders some rows. Returns whether a pass is complete.
     pub fn add(&mut self, world: &Lit, camera: &Camera, options: &PathOptions) -> bool {
         let started = Instant::now();
         let (width, height, layers) = (self.width, self.height, self.layers());
@@ -158,7 +158,7 @@ impl Progressive {
         true
     }
 
-    /// Mean radiance, all layers together; only between passes.
+    /// Mean radiance of all layers together; call it only between passes.
     pub fn picture(&self, camera: &Camera) -> Picture {
         let scale = self.scale();
         let pixels = match self.layers() {
@@ -170,7 +170,7 @@ impl Progressive {
         sized(camera, pixels)
     }
 
-    /// The means of two independent halves; `None` where there are none yet.
+    /// Means of two independent halves; `None` until there are both.
     pub fn halves(&self, camera: &Camera) -> Option<[Picture; 2]> {
         let rest = self.weight - self.half_weight;
         if self.half.is_empty() || self.half_weight <= 0.0 || rest <= 0.0 {
@@ -185,7 +185,7 @@ impl Progressive {
         Some([sized(camera, one.collect()), sized(camera, other.collect())])
     }
 
-    /// Mean radiance of each layer; only between passes.
+    /// Mean radiance of each layer; call it only between passes.
     pub fn layer_pictures(&self, camera: &Camera) -> Vec<Picture> {
         let (count, scale) = (self.layers(), self.scale());
         (0..count)

@@ -1,10 +1,10 @@
 //! Photographs at the size of a view.
 
-use crate::session::snapshot::Picture;
+use crate::math::picture::Picture;
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Box-filters a picture down to another size: each new pixel is the mean over the area that it covers.
+/// Box-filters a picture to a smaller size: each new pixel is the mean over its area.
 pub fn box_filter(from: &Picture, width: u32, height: u32) -> Picture {
     if (from.width, from.height) == (width, height) {
         return from.clone();
@@ -33,7 +33,7 @@ pub fn box_filter(from: &Picture, width: u32, height: u32) -> Picture {
     }
 }
 
-/// For each of `to` intervals over `from` cells, the cells that it covers with their shares, which sum to 1.
+/// For each of `to` intervals over `from` cells: the cells that it covers, with weights that sum to 1.
 fn fractions(from: u32, to: u32) -> Vec<Vec<(usize, f32)>> {
     let step = f64::from(from) / f64::from(to.max(1));
     (0..to)

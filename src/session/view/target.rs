@@ -1,13 +1,15 @@
-//! One view being drawn.
+//! A view being rendered.
 
 use crate::capture::exposure::Exposure;
 use crate::inverse::estimate::Estimate;
+use crate::math::picture::Picture;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::session::command::{ViewCamera, ViewRequest};
-use crate::session::snapshot::{LightLayers, OpenCapture, Picture, View};
+use crate::session::open_capture::OpenCapture;
+use crate::session::snapshot::{LightLayers, View};
 use crate::session::view::hits::Hits;
-use crate::session::view::progressive::{ENOUGH, Progressive};
+use crate::session::view::progressive::{MAX_SAMPLES, Progressive};
 use crate::session::view::sized::box_filter;
 use crate::transport::denoise::{Denoiser, Guide, guides};
 use crate::transport::layers::Split;
@@ -16,14 +18,14 @@ use crate::transport::path::PathOptions;
 use glam::Vec3;
 use std::sync::Arc;
 
-/// A change of a colour by less than this fraction does not show.
+/// Smallest visible change of a colour, relative to its range.
 const VISIBLE: f32 = 0.01;
-/// Samples that a render with the final estimate has before it is shown, where the one before it had as many.
-const HOLD: u32 = 8;
-/// Longest side in pixels of a view whose light is kept apart by lamp, for the memory that the layers take.
+/// A new render replaces one with this many samples only when it has as many; also for renders with more.
+const MIN_REPLACEMENT_SAMPLES: u32 = 8;
+/// Longest side in pixels of a view with layers by lamp; limits their memory.
 const LAYERED_LONG_SIDE: u32 = 768;
 
-/// A camera's pictures on their way from coarse to sharp.
+/// A camera's pictures, from coarse to fine.
 #[derive(Debug)]
 pub struct Target {
     scene: Arc<Scene>,
@@ -31,27 +33,27 @@ pub struct Target {
     camera: Camera,
     estimate: Arc<Estimate>,
     photograph: Option<Arc<Picture>>,
-    /// Where the photograph's channels saturate.
+    /// Saturation of the photograph's channels.
     saturation: Vec3,
-    /// The camera of the coarse first picture, until that is drawn.
+    /// The camera of the coarse first picture, until it is rendered.
     coarse: Option<Camera>,
     hits: Option<Hits>,
     world: Lit,
     render: Progressive,
-    /// The newest complete render, and its samples a pixel.
+    /// The newest complete render, and its samples per pixel.
     rendered: Option<(Arc<Picture>, u32)>,
-    /// Whether anybody looks at the render.
+    /// Whether the render is shown.
     watched: bool,
-    /// Samples that a render must have before it takes the place of that.
+    /// Samples that a render must have before it replaces the shown one.
     hold: u32,
-    /// What each pixel sees, by which noise is smoothed.
+    /// Guides of the denoiser.
     guides: Option<Vec<Option<Guide>>>,
-    /// The same render by lamp, where that was asked for.
+    /// The same render by lamp, if requested.
     layers: Option<Arc<LightLayers>>,
-    /// Pictures of albedo, emission and standard error, in this order.
+    /// Pictures of albedo, emission and standard error.
     maps: [Option<Arc<Picture>>; 3],
     objects: Option<Arc<Vec<u32>>>,
-    /// Whether the pictures of albedo, emission and error are behind the estimate.
+    /// Whether these pictures are older than the estimate.
     stale: bool,
 }
 
@@ -105,7 +107,7 @@ impl Target {
         })
     }
 
-    /// Takes up another estimate if it differs to the eye.
+    /// Switches to another estimate if it is visibly different.
     pub fn follow(&mut self, estimate: &Arc<Estimate>) {
         if !Arc::ptr_eq(&self.estimate, estimate) && differs(&self.estimate, estimate) {
             self.adopt(estimate);
@@ -113,14 +115,14 @@ impl Target {
         }
     }
 
-    /// Takes up another estimate and forgets the samples of the last; its render is shown until the new one is as good.
+    /// Switches to another estimate and drops all samples; the old render is shown until the new one is as good.
     pub fn start_over(&mut self, estimate: &Arc<Estimate>) {
         self.adopt(estimate);
         self.render.clear();
-        self.wait_for(HOLD);
+        self.wait_for(MIN_REPLACEMENT_SAMPLES);
     }
 
-    /// Shows a new render once it has so many samples, or as many as the one that is shown.
+    /// Shows a new render when it has `samples`, or as many as the shown one.
     fn wait_for(&mut self, samples: u32) {
         let shown = self.rendered.as_ref().map_or(0, |(_, samples)| *samples);
         self.hold = samples.min(shown);
@@ -131,7 +133,7 @@ impl Target {
         self.world = estimate.lit(&self.scene);
         self.guides = None;
         self.stale = true;
-        // Other lamps have other layers.
+        // With other lamps the layers are others.
         if let Some(split) = self.render.split() {
             let now = Split::new(&self.world);
             if now != **split {
@@ -140,18 +142,18 @@ impl Target {
         }
     }
 
-    /// Whether there is nothing left to draw.
+    /// Whether there is nothing left to render.
     pub fn is_done(&self) -> bool {
-        let sharp = !self.watched || self.render.samples() >= ENOUGH;
+        let sharp = !self.watched || self.render.samples() >= MAX_SAMPLES;
         self.coarse.is_none() && !self.stale && sharp
     }
 
-    /// Whether the first complete picture is still to come.
+    /// Whether the first complete picture is still missing.
     pub fn is_rough(&self) -> bool {
         self.hits.is_none() || (self.watched && self.render.samples() == 0)
     }
 
-    /// Draws the next slice; the pictures, if one of them is new.
+    /// Renders the next slice. Returns the pictures if one of them changed.
     pub fn sharpen(&mut self, options: &PathOptions, sequence: u64) -> Option<View> {
         if let Some(coarse) = self.coarse.take() {
             self.sketch(&coarse, options);
@@ -168,7 +170,7 @@ impl Target {
             return None;
         } else {
             let samples = self.render.samples();
-            // Smoothing takes longer than a sample: it is done whenever there are twice as many.
+            // Denoising takes longer than a sample, so it is done when the samples have doubled.
             let split = self.render.split().is_some();
             let doubled = samples.is_power_of_two() && samples > 1;
             if samples < self.hold || !(split || doubled) {
@@ -183,7 +185,7 @@ impl Target {
         Some(self.view(sequence))
     }
 
-    /// The mean of all samples, its noise smoothed where two halves tell it.
+    /// The mean of all samples; denoised if there are two halves.
     fn smoothed(&mut self) -> Picture {
         let Some([a, b]) = self.render.halves(&self.camera) else {
             return self.render.picture(&self.camera);
@@ -192,7 +194,7 @@ impl Target {
         Denoiser::best().denoise(&a, &b, self.guides.get_or_insert_with(seen))
     }
 
-    /// All pictures at once, coarsely.
+    /// Renders coarse versions of all pictures.
     fn sketch(&mut self, coarse: &Camera, options: &PathOptions) {
         let hits = Hits::new(&self.scene, coarse);
         self.map(&hits, coarse);
@@ -203,7 +205,7 @@ impl Target {
         self.rendered = Some((picture, 1));
     }
 
-    /// The layers of a render by lamp, in the size of the shown pictures and in light on the sensor.
+    /// The layers of a render by lamp, in exposed light, at the size of the shown pictures.
     fn layers_of(&self, render: &Progressive, camera: &Camera) -> Option<Arc<LightLayers>> {
         let split = render.split()?;
         let pictures = render.layer_pictures(camera).into_iter();
@@ -219,12 +221,12 @@ impl Target {
         let maps = [
             hits.albedo(&self.scene, &self.world.materials),
             hits.emission(&self.scene, camera, &self.estimate),
-            hits.told(stderr, &self.scene, &self.estimate),
+            hits.mark_unseen(stderr, &self.scene, &self.estimate),
         ];
         self.maps = maps.map(|picture| Some(self.enlarged(picture)));
     }
 
-    /// Radiance in the values of the frame's photograph.
+    /// Converts radiance to the values of the frame's photograph.
     fn exposed(&self, radiance: Picture) -> Picture {
         self.seen_by(
             self.frame.map(|frame| self.estimate.exposure(frame)),
@@ -232,7 +234,7 @@ impl Target {
         )
     }
 
-    /// Radiance as light on the sensor of the frame's camera, in which lamps add up.
+    /// Converts radiance to exposed light of the frame's camera, in which lamps add up.
     fn on_sensor(&self, radiance: Picture) -> Picture {
         let exposure = self.frame.map(|frame| Exposure {
             response: None,
@@ -290,7 +292,7 @@ fn difference(render: &Picture, photograph: &Picture) -> Picture {
     }
 }
 
-/// Whether two estimates look different: a colour by more than 1 % of its range.
+/// Whether two estimates are visibly different: a colour by more than 1 % of its range.
 pub fn differs(a: &Estimate, b: &Estimate) -> bool {
     if a.objects.len() != b.objects.len() || a.outside != b.outside {
         return true;
@@ -302,10 +304,10 @@ pub fn differs(a: &Estimate, b: &Estimate) -> bool {
     let brightest = (a.objects.iter().chain(&b.objects))
         .map(|o| o.emission.max_element())
         .fold(0.0f32, f32::max);
-    let apart = |a: Vec3, b: Vec3, scale: f32| (a - b).abs().max_element() > VISIBLE * scale;
+    let differ = |a: Vec3, b: Vec3, scale: f32| (a - b).abs().max_element() > VISIBLE * scale;
     a.objects.iter().zip(&b.objects).any(|(a, b)| {
-        apart(a.albedo, b.albedo, 1.0)
-            || apart(a.emission, b.emission, brightest)
+        differ(a.albedo, b.albedo, 1.0)
+            || differ(a.emission, b.emission, brightest)
             || (a.roughness, a.specular) != (b.roughness, b.specular)
     })
 }

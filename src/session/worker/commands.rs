@@ -1,4 +1,4 @@
-//! What each command does.
+//! Carries out commands.
 
 use crate::calibrate::held_out::HoldOut;
 use crate::capture::place::Coordinates;
@@ -7,26 +7,26 @@ use crate::export::{light_layers, scene};
 use crate::math::picture::Picture;
 use crate::render::Renderer;
 use crate::session::command::{Command, ExportRequest, OpenOptions, ViewCamera};
-use crate::session::keep::{Held, State};
+use crate::session::keep::{SessionRecord, State};
 use crate::session::save::pictures::Frames;
 use crate::session::save::{self, Results};
 use crate::session::snapshot::{Level, Phase};
 use crate::session::view::sized::box_filter;
+use crate::session::worker::next::{Begin, Next};
 use crate::session::worker::state::Worker;
-use crate::session::worker::work::{Begin, Next};
 use crate::transport::denoise::Denoiser;
 use std::path::Path;
 use std::time::Duration;
 
-/// How long views have more of the solver's time after another one was asked for …
-const LOOKED: Duration = Duration::from_secs(2);
-/// … and after lamps, materials or inserted objects were changed, whose pictures a person waits for.
-const CHANGED: Duration = Duration::from_secs(15);
-/// Long side in pixels of the picture by which a session is listed.
+/// How long views get more of the solver's time after a new view is requested, ...
+const VIEW_PRIORITY: Duration = Duration::from_secs(2);
+/// ... and after a change of lamps, materials or inserted objects, whose result the user is waiting for.
+const CHANGE_PRIORITY: Duration = Duration::from_secs(15);
+/// Long side of a session's thumbnail in pixels.
 const THUMBNAIL: u32 = 120;
 
 impl Worker {
-    /// Carries out a command. What cannot be done beside a running solve is returned: the solve ends first.
+    /// Carries out a command. Returns what has to wait until the running solve has ended.
     pub(super) fn handle(&mut self, command: Command) -> Option<Next> {
         self.touch();
         match command {
@@ -40,7 +40,7 @@ impl Worker {
             }
             Command::StartOver => {
                 let open = self.capture.as_ref()?;
-                // As a person would open it, without the objects and the coordinates that were made by hand.
+                // Without the changes of objects and coordinates by hand.
                 let options = OpenOptions {
                     objects: Vec::new(),
                     coordinates: Coordinates::default(),
@@ -57,13 +57,13 @@ impl Worker {
             }
             Command::Reset => {
                 self.keep(true);
-                self.keeper.begin_anew();
+                self.keeper.begin_another();
                 self.continued = None;
                 self.paused = false;
                 self.step = false;
                 let open = self.capture.as_ref()?;
                 let hold_out = HoldOut::from(&self.settings);
-                // Segments that were changed by hand stay.
+                // Keep segments that were changed by hand.
                 let is_cut = open.capture.segmentation.is_some() && open.options.objects.is_empty();
                 return Some(match is_cut && open.options.hold_out != hold_out {
                     true => Next::Recut(hold_out),
@@ -73,7 +73,7 @@ impl Worker {
             Command::Reframe(mut options) => {
                 let go_on = self.solving && !self.paused;
                 let capture = self.capture.as_ref()?;
-                // Whoever asked may not have seen the newest objects.
+                // The sender may not have seen the newest objects.
                 options.objects.clone_from(&capture.options.objects);
                 return Some(Next::Reframe(options, go_on));
             }
@@ -96,7 +96,7 @@ impl Worker {
                     self.phase = Phase::Paused;
                 }
             }
-            // Without a running solve there is nothing to finish.
+            // Without a running solve there is nothing to end.
             Command::Finish => return self.solving.then_some(Next::Wait),
             Command::SolveOn => {
                 self.paused = false;
@@ -106,26 +106,26 @@ impl Worker {
             }
             Command::Set(settings) => self.settings = *settings,
             Command::View(request) => {
-                self.answer_for(LOOKED);
+                self.prioritize_views(VIEW_PRIORITY);
                 let frame = match request.camera {
                     ViewCamera::Frame(frame) => frame,
                     ViewCamera::Free(_) => self.inserting.frame(),
                 };
-                self.inserting.look(frame, request.composite);
-                self.views.look(request);
+                self.inserting.show(frame, request.composite);
+                self.views.request(request);
             }
             Command::Insert(placements) => {
-                self.answer_for(CHANGED);
+                self.prioritize_views(CHANGE_PRIORITY);
                 self.keeper.touch();
                 self.inserting.place(placements);
             }
-            Command::Match(matched) => self.inserting.take_finish(matched),
+            Command::Match(matched) => self.inserting.match_photograph(matched),
             Command::Edit(edits) => {
                 if self.edits != edits {
-                    self.answer_for(CHANGED);
+                    self.prioritize_views(CHANGE_PRIORITY);
                     self.keeper.touch();
                     self.edits = edits;
-                    self.views.look_again();
+                    self.views.redraw();
                     self.inserting.update();
                 }
             }
@@ -150,7 +150,7 @@ impl Worker {
         Some(Next::Solve(self.checkpoint.clone()))
     }
 
-    /// What `Save` writes now.
+    /// The results in their current state.
     fn results(&self) -> Option<Results> {
         Some(Results {
             capture: self.capture.clone()?,
@@ -171,7 +171,7 @@ impl Worker {
         })
     }
 
-    /// Saves the session where that is due.
+    /// Saves the session if it is due.
     pub(super) fn keep(&mut self, now: bool) {
         if !self.keeper.is_due(now) || self.estimate.objects.is_empty() {
             return;
@@ -179,7 +179,7 @@ impl Worker {
         let Some(results) = self.results() else {
             return;
         };
-        let held = Held {
+        let held = SessionRecord {
             capture: results.capture.name.clone(),
             state: match self.phase {
                 Phase::Finished(why) => State::Finished(why),
@@ -195,12 +195,12 @@ impl Worker {
             progress: Some(self.progress.as_ref().clone()),
         };
         if let Err(error) = self.keeper.write(&results, held, self.thumbnail()) {
-            let said = format!("the session is not kept any longer: {error}");
-            self.say(Level::Warning, said);
+            let message = format!("the session is not kept any longer: {error}");
+            self.say(Level::Warning, message);
         }
     }
 
-    /// The shown photograph, as it was changed, in few pixels, and the exposure to show it at.
+    /// A small version of the shown composite, and the exposure for its display.
     fn thumbnail(&self) -> Option<(Picture, f32)> {
         let capture = self.capture.as_ref()?;
         let frame = self.inserting.frame();

@@ -1,37 +1,43 @@
-//! Going on with a session that is kept, or with results of an earlier run.
+//! Continues a kept session, or results of an earlier run.
 
 use crate::capture::place::Coordinates;
 use crate::error::Result;
 use crate::inverse::estimate::Estimate;
 use crate::session::edits::Edits;
-use crate::session::keep::{self, Held, State};
+use crate::session::keep::{self, SessionRecord, State};
+use crate::session::open_capture::OpenCapture;
 use crate::session::save::{self, Saved};
-use crate::session::snapshot::{Level, OpenCapture, Phase};
+use crate::session::snapshot::{Level, Phase};
+use crate::session::worker::next::Next;
 use crate::session::worker::state::Worker;
-use crate::session::worker::work::Next;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What an earlier run left of a capture.
+/// State of a capture from an earlier run.
 pub(super) struct Earlier {
     folder: PathBuf,
     saved: Saved,
-    held: Option<Held>,
+    held: Option<SessionRecord>,
     estimate: Estimate,
     edits: Edits,
-    /// The capture as it was read then, where that is another way than now.
+    /// The capture as it was read then, if it was read differently.
     capture: Option<OpenCapture>,
 }
 
 impl Worker {
-    /// What is kept of a capture's last session; `None` where there is none, or other options or parameters are asked for now.
-    pub(super) fn last_session(&mut self, capture: &OpenCapture, asked: bool) -> Option<Earlier> {
+    /// Loads the last session of a capture. `None` if there is none, or if other options or parameters are requested
+    /// now. `explicit_settings`: the parameters were given explicitly.
+    pub(super) fn last_session(
+        &mut self,
+        capture: &OpenCapture,
+        explicit_settings: bool,
+    ) -> Option<Earlier> {
         let folder = self.keeper.last(&capture.hash)?;
-        self.session_in(&folder, capture, asked)
+        self.session_in(&folder, capture, explicit_settings)
             .unwrap_or_else(|error| {
-                let said =
-                    format!("a new session begins, as the last cannot be gone on with: {error}");
-                self.say(Level::Warning, said);
+                let message =
+                    format!("the last session cannot be continued, so a new one begins: {error}");
+                self.say(Level::Warning, message);
                 None
             })
     }
@@ -40,7 +46,7 @@ impl Worker {
         &self,
         folder: &Path,
         capture: &OpenCapture,
-        asked: bool,
+        explicit_settings: bool,
     ) -> Result<Option<Earlier>> {
         let mut saved = save::load(folder)?;
         let (now, then) = (&capture.options, &mut saved.options);
@@ -48,13 +54,13 @@ impl Worker {
             || (now.segments.is_some() && now.segments != then.segments)
             || (!now.reading.is_default() && now.reading != then.reading)
             || (now.coordinates != Coordinates::default() && now.coordinates != then.coordinates);
-        if other || (asked && saved.settings != self.settings) {
+        if other || (explicit_settings && saved.settings != self.settings) {
             return Ok(None);
         }
         then.check_alignment = now.check_alignment;
         then.allow_outside = now.allow_outside;
-        let otherwise = *then != *now;
-        let reread = otherwise.then(|| (self.backend.open)(&capture.source, then));
+        let differs = *then != *now;
+        let reread = differs.then(|| (self.backend.open)(&capture.source, then));
         let reread = reread.transpose()?;
         Earlier::new(folder, saved, reread.as_ref().unwrap_or(capture)).map(|earlier| {
             Some(Earlier {
@@ -64,7 +70,7 @@ impl Worker {
         })
     }
 
-    /// Opens what lies in a folder of results or of a session.
+    /// Opens a folder of results or of a session.
     pub(super) fn resume(&mut self, folder: &Path) -> Next {
         self.keep(true);
         let before = std::mem::replace(&mut self.phase, Phase::Loading);
@@ -77,21 +83,21 @@ impl Worker {
             Ok((earlier, capture)) => self.go_on_with(earlier, capture),
             Err(error) => {
                 self.fail(&error);
-                self.back_to(before)
+                self.recover(before)
             }
         }
     }
 
-    /// Opens a capture as an earlier run left it. What had ended is not solved again.
+    /// Opens a capture in the state of an earlier run. A solve that had ended is not repeated.
     pub(super) fn go_on_with(&mut self, earlier: Earlier, capture: OpenCapture) -> Next {
         let capture = earlier.capture.unwrap_or(capture);
         let held = earlier.held.clone().unwrap_or_default();
-        self.keeper.go_on(&capture.hash, &earlier.folder, &held);
+        self.keeper.resume(&capture.hash, &earlier.folder, &held);
         self.adopt(capture);
         self.inserting.place(held.inserted.clone());
         self.inserted = Arc::new(held.inserted);
         self.frame = held.frame;
-        self.inserting.turn_to(held.frame);
+        self.inserting.show_frame(held.frame);
         self.edits = earlier.edits;
         self.estimate = Arc::new(earlier.estimate);
         self.settings = earlier.saved.settings;
@@ -115,12 +121,12 @@ impl Worker {
 }
 
 impl Earlier {
-    /// What lies in a folder of a capture.
+    /// Loads the state of a capture from a folder.
     fn new(folder: &Path, saved: Saved, capture: &OpenCapture) -> Result<Self> {
         Ok(Self {
             estimate: saved.estimate_for(capture)?,
             edits: saved.edits_for(capture)?,
-            held: keep::held(folder)?,
+            held: keep::read_record(folder)?,
             folder: folder.to_owned(),
             saved,
             capture: None,

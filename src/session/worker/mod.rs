@@ -1,56 +1,27 @@
-//! The worker: a named thread that owns the estimate, solves, and serves views, saves and exports at any time.
+//! The worker: a thread that owns the estimate, solves, and serves views, saves and exports at any time.
 
+mod backend;
 mod commands;
 mod earlier;
+mod next;
 mod state;
 mod steering;
 mod work;
 
-use crate::calibrate::problem::Problem;
+pub use backend::{Backend, Opener, Solver, Wake};
+
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
-use crate::inverse::solver::{Checkpoint, Observer, Solution};
-use crate::session::command::{Command, OpenOptions, Source, Start};
+use crate::session::command::{Command, Start};
 use crate::session::inbox::{self, Outbox};
 use crate::session::slot::Slot;
-use crate::session::snapshot::{OpenCapture, Snapshot};
+use crate::session::snapshot::Snapshot;
+use next::{Begin, Next};
 use state::Worker;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
-use work::{Begin, Next};
 
-/// Called by the worker after a new snapshot, at most about 30 times a second.
-pub type Wake = Arc<dyn Fn() + Send + Sync>;
-
-/// Reads a capture.
-pub type Opener = dyn Fn(&Source, &OpenOptions) -> Result<OpenCapture> + Send;
-
-/// Runs a solver to its end.
-pub type Solver = dyn FnMut(&Problem, &Settings, Option<&Checkpoint>, &mut dyn Observer) -> Result<Solution>
-    + Send;
-
-/// What the worker calls to do its work.
-pub struct Backend {
-    /// Reads a capture.
-    pub open: Box<Opener>,
-    /// Runs a solver.
-    pub solve: Box<Solver>,
-    /// The folder that sessions save themselves into; none where they do not.
-    pub sessions: Option<PathBuf>,
-}
-
-impl Default for Backend {
-    fn default() -> Self {
-        Self {
-            open: Box::new(crate::session::open::open),
-            solve: Box::new(crate::inverse::solve),
-            sessions: None,
-        }
-    }
-}
-
-/// The handle on a worker. Dropping it ends the worker.
+/// A handle to a worker. Dropping it ends the worker.
 pub struct Session {
     outbox: Option<Outbox>,
     slot: Arc<Slot>,
@@ -58,18 +29,18 @@ pub struct Session {
 }
 
 impl Session {
-    /// Starts a worker and lets it begin with what is given.
+    /// Starts a worker with what to open first.
     ///
     /// # Errors
-    /// The system grants no thread.
+    /// The thread cannot be started.
     pub fn spawn(start: Option<Start>, settings: Settings, wake: Wake) -> Result<Self> {
         Self::spawn_with(start, settings, wake, Backend::default())
     }
 
-    /// Starts a worker that reads and solves by `backend`.
+    /// Starts a worker with other functions for opening and solving.
     ///
     /// # Errors
-    /// The system grants no thread.
+    /// The thread cannot be started.
     pub fn spawn_with(
         start: Option<Start>,
         settings: Settings,
@@ -101,8 +72,8 @@ impl Session {
         })
     }
 
-    /// Sends a command without ever waiting; false if the queue is full ([`inbox::CAPACITY`]) or the worker has ended.
-    /// Of views, insertions and edits only the newest waits, so that those never fill the queue.
+    /// Sends a command without blocking. False if the queue is full ([`inbox::CAPACITY`]) or the worker has ended. Of
+    /// views, insertions and edits only the newest is kept, so they never fill the queue.
     pub fn send(&self, command: Command) -> bool {
         self.outbox
             .as_ref()
@@ -114,7 +85,7 @@ impl Session {
         self.slot.latest()
     }
 
-    /// Ends the worker after the commands sent so far and waits until it has ended.
+    /// Ends the worker after the commands sent so far, and waits for it.
     pub fn join(self) {
         drop(self);
     }
@@ -122,10 +93,10 @@ impl Session {
 
 impl Drop for Session {
     fn drop(&mut self) {
-        // A closed queue is the order to end.
+        // Closing the queue ends the worker.
         self.outbox = None;
         if let Some(thread) = self.thread.take() {
-            // The worker contains its own panics; if it died all the same, there is nothing left to save.
+            // The worker catches its own panics; if it died anyway, nothing is left to save.
             let _ = thread.join();
         }
     }

@@ -1,4 +1,4 @@
-//! What the worker holds, and what it shows of it.
+//! The worker's state, and its snapshots.
 
 use crate::compose::placement::Placement;
 use crate::error::Error;
@@ -10,15 +10,16 @@ use crate::session::inbox::Inbox;
 use crate::session::insertion::Inserting;
 use crate::session::keep::Keeper;
 use crate::session::light::Light;
+use crate::session::open_capture::OpenCapture;
 use crate::session::rates::Rates;
 use crate::session::slot::Slot;
-use crate::session::snapshot::{Event, Level, OpenCapture, Phase, Snapshot};
+use crate::session::snapshot::{Event, Level, Phase, Snapshot};
 use crate::session::view::Views;
-use crate::session::worker::{Backend, Wake};
+use crate::session::worker::backend::{Backend, Wake};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Shortest time between two snapshots while nothing else asks for one.
+/// Shortest time between two snapshots, unless one is requested.
 pub(super) const FRAME: Duration = Duration::from_millis(33);
 
 /// Everything the worker owns.
@@ -29,9 +30,9 @@ pub(super) struct Worker {
     pub backend: Backend,
     pub settings: Settings,
     pub capture: Option<Arc<OpenCapture>>,
-    /// What the solver found.
+    /// The estimate of the solver.
     pub estimate: Arc<Estimate>,
-    /// What was changed of it by hand.
+    /// Edits of the estimate.
     pub edits: Edits,
     pub progress: Arc<Progress>,
     pub checkpoint: Option<Checkpoint>,
@@ -45,19 +46,19 @@ pub(super) struct Worker {
     pub step: bool,
     pub seconds_load: f64,
     pub started: Instant,
-    /// Saves the session by itself, where that was asked for.
+    /// Saves the session automatically.
     pub keeper: Keeper,
-    /// The inserted objects that the open capture came with.
+    /// The inserted objects of the session that the open capture continues.
     pub inserted: Arc<Vec<Placement>>,
-    /// The photograph that it is to be shown by at first.
+    /// The frame to show first.
     pub frame: usize,
-    /// Which session it goes on with, in words.
+    /// Name of the session that the open capture continues.
     pub continued: Option<String>,
-    /// Whether the parameters were asked for when the program began, rather than those of a session.
-    pub asked: bool,
-    /// Until when what was asked for has a larger fraction of the time.
-    pub answer_until: Option<Instant>,
-    /// Answers to requests for other objects.
+    /// Whether the parameters were given explicitly at the start of the program, and so take precedence over a session's.
+    pub explicit_settings: bool,
+    /// Until when views get more of the solver's time.
+    pub priority_until: Option<Instant>,
+    /// Number of answered commands to change objects.
     pub regroupings: u64,
     edited: Edited,
     sequence: u64,
@@ -96,8 +97,8 @@ impl Worker {
             inserted: Arc::default(),
             frame: 0,
             continued: None,
-            asked: settings != Settings::default(),
-            answer_until: None,
+            explicit_settings: settings != Settings::default(),
+            priority_until: None,
             regroupings: 0,
             edited: Edited::default(),
             sequence: 0,
@@ -108,7 +109,7 @@ impl Worker {
         }
     }
 
-    /// Forgets the estimate and everything that led to it.
+    /// Drops the estimate and the progress of its solve.
     pub fn forget(&mut self) {
         self.estimate = Arc::default();
         self.progress = Arc::default();
@@ -116,7 +117,7 @@ impl Worker {
         self.rates = Rates::default();
     }
 
-    /// The estimate with the changes made by hand, which everything but the solver and the report shows.
+    /// The estimate with the edits, which everything but the solver and the report uses.
     pub fn edited(&mut self) -> Arc<Estimate> {
         self.edited.of(&self.estimate, &self.edits)
     }
@@ -135,25 +136,26 @@ impl Worker {
         self.changed = true;
     }
 
-    /// Gives what was asked for a larger fraction of the time for a while.
-    pub fn answer_for(&mut self, time: Duration) {
+    /// Gives views more of the solver's time for a while.
+    pub fn prioritize_views(&mut self, time: Duration) {
         let end = Instant::now() + time;
-        self.answer_until = self.answer_until.max(Some(end));
+        self.priority_until = self.priority_until.max(Some(end));
     }
 
-    /// Marks the state as worth a new snapshot.
+    /// Marks the state as changed.
     pub fn touch(&mut self) {
         self.changed = true;
     }
 
-    /// Draws a slice of the requested view, taking at most about `fraction` of the time; whether there is more to draw.
+    /// Renders a slice of the requested view, for at most about `fraction` of the time. Returns whether there is more to
+    /// render.
     pub fn draw(&mut self, fraction: f32) -> bool {
         let Some(capture) = self.capture.clone() else {
             return false;
         };
         let light = Light::new(self.estimate.clone(), self.edited(), &self.settings);
         let estimate = &light.edited;
-        // Views and composites share what there is.
+        // Views and composites share the time.
         self.inserting.follow(&light);
         let composites = self.inserting.is_busy();
         let fraction = match composites && fraction < 1.0 {
@@ -174,7 +176,7 @@ impl Worker {
         true
     }
 
-    /// Hands out a snapshot if something changed: at once if `now`, else at most about 30 times a second.
+    /// Publishes a snapshot if the state has changed: at once if `now`, else at most about 30 times a second.
     pub fn publish(&mut self, now: bool) {
         if !self.changed && !now {
             return;

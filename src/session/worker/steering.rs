@@ -1,4 +1,4 @@
-//! The worker's ear on a running solver: takes commands between iterations, holds the solver while paused.
+//! Observes a running solver for the worker: carries out commands between iterations, and holds the solver while paused.
 
 use crate::inverse::estimate::Estimate;
 use crate::inverse::known::Known;
@@ -6,27 +6,27 @@ use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Control, Observer, Progress};
 use crate::session::command::Command;
 use crate::session::inbox::Mail;
+use crate::session::worker::next::Next;
 use crate::session::worker::state::{FRAME, Worker};
-use crate::session::worker::work::Next;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Fraction of the solver's time that views and composites may take while they are watched …
+/// Fraction of the solver's time for views and composites while they are shown, ...
 const VIEW_FRACTION: f32 = 0.03;
-/// … and how much more for a while after a request, and until its first complete picture.
-const ANSWER_FRACTION: f32 = 0.25;
+/// ... and for a while after a request, until the first complete picture.
+const PRIORITY_FRACTION: f32 = 0.25;
 /// Time between two checkpoints that are kept in case the solver fails.
 const CHECKPOINT: Duration = Duration::from_secs(8);
 
-/// Observes a solve on behalf of the worker.
+/// The observer of a solve.
 pub(super) struct Steering<'a> {
     worker: &'a mut Worker,
     recorded: Option<Instant>,
     settings: Settings,
     next: Option<Next>,
-    /// When a checkpoint was last kept.
+    /// Time of the last checkpoint.
     kept: Instant,
-    /// Pieces of mail that had come when a checkpoint was offered.
+    /// Number of commands that were waiting when a checkpoint was offered.
     seen: Option<usize>,
 }
 
@@ -43,12 +43,12 @@ impl<'a> Steering<'a> {
         }
     }
 
-    /// What a command asked for after the solve.
+    /// What to do after the solve.
     pub fn next(self) -> Next {
         self.next.unwrap_or(Next::Wait)
     }
 
-    /// Keeps a copy of where the solve stands: about 30 times a second, and before any command is carried out.
+    /// Copies the solver's progress and estimate: about 30 times a second, and before any command is carried out.
     fn record(&mut self, progress: &Progress, estimate: &Estimate) {
         let worker = &mut *self.worker;
         worker.rates.note(progress);
@@ -62,8 +62,8 @@ impl<'a> Steering<'a> {
         worker.touch();
     }
 
-    /// Carries out one piece of mail; whether the solve is to end.
-    fn take(&mut self, mail: Mail) -> bool {
+    /// Carries out a command. Returns whether the solve is to end.
+    fn carry_out(&mut self, mail: Mail) -> bool {
         let next = match mail {
             Mail::Nothing => None,
             Mail::Closed => Some(Next::Quit),
@@ -83,16 +83,16 @@ impl Observer for Steering<'_> {
     fn observe(&mut self, progress: &Progress, estimate: &Estimate) -> Control {
         self.record(progress, estimate);
         self.worker.keep(false);
-        // Nothing may come between a checkpoint and this report: what has come since then waits for the next one.
+        // The checkpoint belongs to this report, so only commands that were waiting when it was made are carried out.
         let mut ready = self.seen.take().unwrap_or(usize::MAX);
         loop {
-            // Carry out what waits.
+            // Carry out waiting commands.
             while ready > 0 {
                 let mail = self.worker.inbox.poll();
                 if matches!(mail, Mail::Nothing) {
                     break;
                 }
-                if self.take(mail) {
+                if self.carry_out(mail) {
                     return Control::Stop;
                 }
                 ready -= 1;
@@ -102,11 +102,11 @@ impl Observer for Steering<'_> {
                 break;
             }
             if !self.worker.paused {
-                let fresh = (self.worker.answer_until).is_some_and(|end| Instant::now() < end);
+                let fresh = (self.worker.priority_until).is_some_and(|end| Instant::now() < end);
                 let rough = self.worker.views.is_rough() || self.worker.inserting.is_rough();
-                let answer = fresh || rough;
-                self.worker.draw(if answer {
-                    ANSWER_FRACTION
+                let has_priority = fresh || rough;
+                self.worker.draw(if has_priority {
+                    PRIORITY_FRACTION
                 } else {
                     VIEW_FRACTION
                 });
@@ -114,13 +114,13 @@ impl Observer for Steering<'_> {
                 break;
             }
 
-            // Held: draw what was asked for, then sleep until a command comes.
+            // Paused: render the request, then sleep until a command comes.
             let busy = self.worker.draw(1.0);
             self.worker.publish(!busy);
             self.worker.keep(false);
             if !busy {
                 let mail = self.worker.inbox.wait(self.worker.keeper.rest());
-                if self.take(mail) {
+                if self.carry_out(mail) {
                     return Control::Stop;
                 }
             }
@@ -133,7 +133,7 @@ impl Observer for Steering<'_> {
         Control::Change(Box::new(self.settings.clone()))
     }
 
-    /// Keeps a checkpoint now and then, and whenever what is about to be carried out may save it.
+    /// Takes a checkpoint from time to time, and before a command that may save it.
     fn offer(&mut self, make: &dyn Fn() -> Checkpoint) {
         let keeps = |mail: &Mail| {
             let Mail::Command(command) = mail else {

@@ -1,4 +1,4 @@
-//! The worker's main loop: waiting, opening, resuming, solving, and what happens when one of them panics.
+//! The worker's main loop: waiting, opening, resuming and solving, with recovery from panics.
 
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
@@ -7,46 +7,18 @@ use crate::inverse::solver::{Checkpoint, Termination};
 use crate::session::command::{OpenOptions, Regrouping, Source};
 use crate::session::edits::Edits;
 use crate::session::inbox::Mail;
-use crate::session::snapshot::{Level, OpenCapture, Phase};
+use crate::session::open_capture::OpenCapture;
+use crate::session::snapshot::{Level, Phase};
+use crate::session::worker::next::{Begin, Next};
 use crate::session::worker::state::Worker;
 use crate::session::worker::steering::Steering;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// What the worker does next.
-pub(super) enum Next {
-    /// Serve commands.
-    Wait,
-    /// Read a capture, then go on with its last session or solve it.
-    Open(Source, OpenOptions, Begin),
-    /// Read what an earlier run wrote, then go on with it.
-    Resume(PathBuf),
-    /// Solve what is open, from the start or from a checkpoint.
-    Solve(Option<Checkpoint>),
-    /// Cut the mesh of what is open anew, as other pixels are kept out of the fits, and solve it from the start.
-    Recut(HoldOut),
-    /// Read what is open again with other options, and solve on if so.
-    Reframe(Box<OpenOptions>, bool),
-    /// Read what is open again with other objects, and solve it from the start; where that fails, solve on if so.
-    Regroup(Box<Regrouping>, bool),
-    /// End.
-    Quit,
-}
-
-/// What a capture that is opened begins with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Begin {
-    /// Its last session, where there is one.
-    GoingOn,
-    /// Nothing.
-    Anew,
-}
-
 impl Worker {
-    /// Works until told to quit. A panic in any step becomes an event, and the worker goes on answering.
+    /// Runs until the command to quit. A panic in a step is reported as an event, and the worker continues.
     pub fn run(mut self, first: Next) {
         let mut next = first;
         loop {
@@ -55,14 +27,14 @@ impl Worker {
                 break;
             }
             let step = std::mem::replace(&mut next, Next::Wait);
-            match catch_unwind(AssertUnwindSafe(|| self.take(step))) {
+            match catch_unwind(AssertUnwindSafe(|| self.step(step))) {
                 Ok(then) => next = then,
                 Err(payload) => self.contain(payload.as_ref()),
             }
         }
     }
 
-    fn take(&mut self, next: Next) -> Next {
+    fn step(&mut self, next: Next) -> Next {
         match next {
             Next::Wait => self.wait(),
             Next::Open(source, options, begin) => self.open(&source, &options, begin),
@@ -75,7 +47,7 @@ impl Worker {
         }
     }
 
-    /// Keeps the last estimate after a panic and says what happened.
+    /// Reports a panic; the last estimate is kept.
     fn contain(&mut self, payload: &(dyn Any + Send)) {
         let message = payload
             .downcast_ref::<String>()
@@ -123,12 +95,12 @@ impl Worker {
         self.started = Instant::now();
         let before = std::mem::replace(&mut self.phase, Phase::Loading);
         self.publish(true);
-        let asked = std::mem::take(&mut self.asked);
+        let explicit_settings = std::mem::take(&mut self.explicit_settings);
         match (self.backend.open)(source, options) {
             Ok(capture) => {
                 self.seconds_load = self.started.elapsed().as_secs_f64();
                 let earlier = match begin {
-                    Begin::GoingOn => self.last_session(&capture, asked),
+                    Begin::GoingOn => self.last_session(&capture, explicit_settings),
                     Begin::Anew => None,
                 };
                 if let Some(earlier) = earlier {
@@ -145,13 +117,13 @@ impl Worker {
             }
             Err(error) => {
                 self.fail(&error);
-                self.back_to(before)
+                self.recover(before)
             }
         }
     }
 
-    /// After a failure what was open stays open, and a solve that was under way goes on.
-    pub(super) fn back_to(&mut self, before: Phase) -> Next {
+    /// After a failure, keeps the previous capture open and continues its solve.
+    pub(super) fn recover(&mut self, before: Phase) -> Next {
         self.phase = match before {
             Phase::Solving | Phase::Paused if self.checkpoint.is_some() => {
                 self.paused = before == Phase::Paused;
@@ -179,7 +151,7 @@ impl Worker {
         self.inserting.reset();
     }
 
-    /// Reads the open capture with other options; what was found and changed by hand stays.
+    /// Reads the open capture with other options, keeping estimate and edits.
     fn reframe(&mut self, options: &OpenOptions, go_on: bool) -> Next {
         let before = std::mem::replace(&mut self.phase, Phase::Loading);
         self.publish(true);
@@ -196,8 +168,8 @@ impl Worker {
         }
     }
 
-    /// Reads the open capture with segments of which other pixels say nothing, and starts over; where that fails, with the
-    /// segments as they are.
+    /// Reads the open capture with a new segmentation that does not use the held-out pixels, and solves from the
+    /// start; on failure, with the old segments.
     fn recut(&mut self, hold_out: HoldOut) -> Next {
         let Some(old) = self.capture.clone() else {
             return Next::Wait;
@@ -211,7 +183,7 @@ impl Worker {
         Next::Solve(None)
     }
 
-    /// Reads the open capture with other objects, and starts over.
+    /// Reads the open capture with other objects, and solves from the start.
     fn regroup(&mut self, wanted: Regrouping, go_on: bool) -> Next {
         let Some(old) = self.capture.clone() else {
             return Next::Wait;
@@ -225,7 +197,7 @@ impl Worker {
         self.regroupings += 1;
         self.keep(true);
         if self.reopen(&options) {
-            self.keeper.begin_anew();
+            self.keeper.begin_another();
             self.edits = wanted.edits;
             return Next::Solve(None);
         }
@@ -237,7 +209,7 @@ impl Worker {
         }
     }
 
-    /// Reads the open capture with other options; what was inserted stays where it is. False where that failed.
+    /// Reads the open capture with other options; inserted objects stay in place. False on failure.
     fn reopen(&mut self, options: &OpenOptions) -> bool {
         let Some(old) = self.capture.clone() else {
             return false;
@@ -257,12 +229,12 @@ impl Worker {
             placement.at = files.map(|at| to.apply(at, new_up));
         }
         if capture.hash != old.hash {
-            self.keeper.begin_anew();
+            self.keeper.begin_another();
         }
         let frame = self.inserting.frame();
         self.adopt(capture);
         self.frame = frame;
-        self.inserting.turn_to(frame);
+        self.inserting.show_frame(frame);
         self.inserting.place(inserted.clone());
         self.inserted = Arc::new(inserted);
         self.keeper.touch();
@@ -289,7 +261,7 @@ impl Worker {
         self.solving = true;
         self.publish(true);
 
-        // The solver is moved out for the call, because the observer borrows the worker.
+        // The observer borrows the worker, so the solver is moved out for the call.
         let mut solver =
             std::mem::replace(&mut self.backend.solve, Box::new(crate::inverse::solve));
         let mut steering = Steering::new(self);
@@ -305,17 +277,17 @@ impl Worker {
         self.touch();
         match outcome {
             Ok(Ok(solution)) => {
-                self.estimate = Arc::new(capture.in_doubt(solution.estimate));
+                self.estimate = Arc::new(capture.marked_doubtful(solution.estimate));
                 self.progress = Arc::new(solution.progress);
                 self.checkpoint = solution.checkpoint;
-                // A solve that another command ends is not at its end: a session goes on with it.
+                // A solve that another command ended is not finished: the session continues with it.
                 self.phase = match solution.termination {
                     Termination::Cancelled if !matches!(next, Next::Wait) => held,
                     ended => {
                         let seconds = self.progress.seconds;
-                        let said =
+                        let message =
                             format!("the solve ended after {seconds:.1} s: {}", ended.word());
-                        self.say(Level::Info, said);
+                        self.say(Level::Info, message);
                         Phase::Finished(ended)
                     }
                 };

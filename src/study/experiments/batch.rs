@@ -1,15 +1,17 @@
-//! How large a batch the paper's descent should take.
+//! Study: the batch size of the paper's descent.
 
 use crate::error::Result;
 use crate::export::plot::Plot;
 use crate::inverse::settings::Settings;
+use crate::study::experiments::box_room;
 use crate::study::experiments::course::{
     CACHE_WITHOUT, Errors, Gauge, Mark, cache_settings, cached, descend, paper_settings,
 };
 use crate::study::experiments::courses::{
     self, Kind, Spread, common_mark, comparison, plot, table, words,
 };
-use crate::study::experiments::{Bench, Findings, Study, Summary, box_room};
+use crate::study::experiments::findings::{Findings, Summary};
+use crate::study::experiments::study::{Bench, Study};
 
 /// The study.
 pub const STUDY: Study = Study {
@@ -19,7 +21,7 @@ pub const STUDY: Study = Study {
     run,
 };
 
-/// Pixels of a step and paths for each pixel's colour and for its derivative.
+/// Pixels per step, and samples for each of a pixel's colour and derivative.
 const BATCHES: &[(u64, u64)] = &[
     (1, 1),
     (2, 1),
@@ -33,9 +35,9 @@ const BATCHES: &[(u64, u64)] = &[
     (8, 16),
 ];
 const QUICK: &[(u64, u64)] = &[(1, 1), (8, 1), (64, 1)];
-/// What the paper starts with.
+/// The paper's default.
 const PAPER: (u64, u64) = (8, 1);
-/// A mean further above the best than this factor is worse, whatever the noise.
+/// A mean is worse than the best only beyond this factor, whatever the noise.
 const WORSE: f64 = 1.05;
 
 fn run(bench: &Bench) -> Result<Findings> {
@@ -50,7 +52,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     let batches = if bench.quick { QUICK } else { BATCHES };
     let limits = bench.limits(batches.len() * bench.seeds as usize);
 
-    // The descents, and where the transport cache ends.
+    // The descents; the transport cache's end is measured below.
     let gauge = Gauge::new(subject, paper_settings(1).max_bounces());
     let course = |index: usize, seed| {
         let (batch, samples) = batches[index];
@@ -66,7 +68,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     };
     let names = batches.iter().map(|&batch| name(batch));
     let kinds = courses::run(bench, names, course, |kinds| over_rays(kinds, &[]))?;
-    // The cache's estimate is rendered as it was fitted, with all bounces.
+    // The cache fits all bounces, so its estimate is rendered with all.
     bench.begin("transport cache")?;
     let gauge = Gauge::new(subject, u32::MAX);
     let cache: Vec<Mark> = (bench.seeds())
@@ -97,14 +99,14 @@ fn run(bench: &Bench) -> Result<Findings> {
     })
 }
 
-/// Losses of the batches with one path a pixel.
+/// Plot of the batches with one sample per pixel.
 fn drawn(
     label: &str,
     x: fn(&Mark) -> f64,
     (kinds, batches): (&[Kind], &[(u64, u64)]),
     cache: &[Mark],
 ) -> Plot {
-    // One colour each: as many as are told apart.
+    // Only as many curves as have distinguishable colours.
     let drawn: Vec<Kind> = (kinds.iter().zip(batches))
         .filter(|(_, (batch, samples))| *samples == 1 && *batch != 2)
         .map(|(kind, _)| kind.clone())
@@ -121,7 +123,7 @@ fn name((batch, samples): (u64, u64)) -> String {
     }
 }
 
-/// Mean rays of the first kind when a mark was passed.
+/// Rays of the course that passed a mark first.
 fn rays_when(kinds: &[Kind], mark: u32) -> f64 {
     let courses = kinds.iter().flat_map(|kind| &kind.courses);
     let rays = courses.filter_map(|c| Some(c.iter().find(|m| m.index >= Some(mark))?.rays));
@@ -171,7 +173,7 @@ fn seen(
     let at_end: Vec<Option<Spread>> = kinds.iter().map(|kind| kind.at_end(|e| e.loss)).collect();
     let end = format!("At the end ({limit} each)");
     for (budget, losses) in [(&rays, at_rays), (&end, at_end)] {
-        seen.extend(verdict(budget, batches, &losses));
+        seen.extend(conclusion(budget, batches, &losses));
     }
     let albedo = |errors: &Errors| errors.albedo.or(errors.loss);
     let best = kinds.iter().filter_map(|kind| kind.at_end(albedo));
@@ -190,19 +192,19 @@ fn seen(
     seen
 }
 
-/// Which batch was best with one path a pixel, and, where seeds tell the noise, whether that is what the paper says.
-fn verdict(budget: &str, batches: &[(u64, u64)], losses: &[Option<Spread>]) -> Option<String> {
+/// Which batch was best with one sample per pixel, and, if the seeds show the noise, whether that agrees with the paper.
+fn conclusion(budget: &str, batches: &[(u64, u64)], losses: &[Option<Spread>]) -> Option<String> {
     let single: Vec<(u64, Spread)> = (batches.iter().zip(losses))
         .filter(|((_, samples), _)| *samples == 1)
         .filter_map(|(&(batch, _), spread)| Some((batch, (*spread)?)))
         .collect();
-    let (best, least) = *single.iter().min_by(|a, b| a.1.mean.total_cmp(&b.1.mean))?;
-    let worse = |spread: &Spread| spread.differs(&least) && spread.mean > WORSE * least.mean;
+    let (best, lowest) = *single.iter().min_by(|a, b| a.1.mean.total_cmp(&b.1.mean))?;
+    let worse = |spread: &Spread| spread.differs(&lowest) && spread.mean > WORSE * lowest.mean;
     let (first, last) = (single.first()?, single.last()?);
     let (_, paper) = single.iter().find(|(batch, _)| *batch == PAPER.0)?;
     let values = format!(
         "{budget} a batch of {best} has the least loss, {}; {} pixels have {}, {} {}, {} {}.",
-        least.words(),
+        lowest.words(),
         PAPER.0,
         paper.words(),
         first.0,
@@ -210,18 +212,18 @@ fn verdict(budget: &str, batches: &[(u64, u64)], losses: &[Option<Spread>]) -> O
         last.0,
         last.1.words(),
     );
-    if least.count < 2 {
+    if lowest.count < 2 {
         return Some(values);
     }
-    let says = |spread: &Spread| if worse(spread) { "yes" } else { "no" };
+    let is_worse = |spread: &Spread| if worse(spread) { "yes" } else { "no" };
     Some(format!(
         "{values} Worse than the best by more than the noise and 5 %: {} {}, {} {}, {} {} (the paper: too small and too large \
          ones are, 8 is not).",
         first.0,
-        says(&first.1),
+        is_worse(&first.1),
         PAPER.0,
-        says(paper),
+        is_worse(paper),
         last.0,
-        says(&last.1),
+        is_worse(&last.1),
     ))
 }

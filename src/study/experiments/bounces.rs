@@ -1,18 +1,21 @@
-//! How long paths must be in the fit.
+//! Study: the number of bounces of the fit.
 
 use crate::error::Result;
 use crate::export::plot::{Axis, Plot, Series};
 use crate::inverse::settings::Settings;
 use crate::room::Room;
 use crate::room::photographs::Rendering;
+use crate::study::experiments::box_room;
 use crate::study::experiments::course::{
     CACHE_WITHOUT, Gauge, Mark, cache_settings, cached, descend, paper_settings, rays_at,
 };
 use crate::study::experiments::courses::{
     Kind, Quantity, Spread, common_mark, comparison, plot, table, words,
 };
+use crate::study::experiments::findings::{Findings, Summary};
+use crate::study::experiments::study::{Bench, Study};
+use crate::study::experiments::subject::Subject;
 use crate::study::experiments::twin::{Sizes, twin};
-use crate::study::experiments::{Bench, Findings, Study, Subject, Summary, box_room};
 
 /// The study.
 pub const STUDY: Study = Study {
@@ -23,34 +26,35 @@ pub const STUDY: Study = Study {
     run,
 };
 
-/// Mean albedos of the rooms, each with the suffix of its plot.
+/// Mean albedos of the rooms, and the suffixes of their plots.
 const ALBEDOS: &[(f64, &str)] = &[
     (0.3, "-paper-30"),
     (0.5, "-paper-50"),
     (0.8, "-paper-80"),
     (0.95, "-paper-95"),
 ];
-/// Longest paths of the fit in bounces; 0 lets the solver choose by the albedo found, which the descent cannot.
+/// Largest number of bounces of the fit; 0 lets the transport cache choose it by the albedo found. The descent cannot.
 const DEPTHS: &[u64] = &[1, 2, 3, 5, 10, 0];
 const QUICK_ALBEDOS: &[(f64, &str)] = &[(0.8, "-paper-80")];
 const QUICK_DEPTHS: &[u64] = &[1, 2, 0];
-/// Where the chosen depth is drawn.
+/// Where the adaptive depth is plotted.
 const CHOSEN_AT: f64 = 20.0;
 /// Half side of the lamp in metres.
 const LAMP: f64 = 0.25;
-/// An error of albedo is too large if it is above this and above this factor on what adaptive depth reaches.
+/// An albedo error is too large if it exceeds this, ...
 const TOLERABLE: f64 = 0.01;
+/// ... and this factor times the error with adaptive depth.
 const FACTOR: f64 = 2.0;
 
-/// One room, with a kind of solve for each depth.
+/// One room, solved with each depth.
 struct TestRoom {
     /// "mean albedo 0.5", or the twin of a capture.
     name: String,
-    /// What the name of the descent's plot ends with.
+    /// Suffix of the descent's plot.
     file: &'static str,
-    /// The transport cache's ends.
+    /// By depth: where the transport cache ended.
     cache: Vec<(u64, Kind)>,
-    /// The descent's courses.
+    /// By depth: courses of the descent.
     paper: Vec<(u64, Kind)>,
 }
 
@@ -77,7 +81,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     let mut scenes: Vec<TestRoom> = Vec::new();
     for (file, room, rendering) in &rooms {
         let subject = Subject::of_room(room, rendering)?;
-        // The loss is measured with all bounces, whatever the fit had.
+        // The loss is measured with all bounces, whatever the fit has.
         let gauge = Gauge::new(&subject, u32::MAX);
         scenes.push(TestRoom {
             name: room.name.clone(),
@@ -162,9 +166,9 @@ fn of_albedo(scenes: &[TestRoom]) -> Plot {
     over_depth(scenes, "mean absolute error of albedo", |e| e.albedo)
 }
 
-/// Where the transport cache ends over the depth of its fit, a curve a room.
+/// Error at the transport cache's end over the depth of its fit, one curve a room.
 fn over_depth(scenes: &[TestRoom], label: &str, quantity: Quantity) -> Plot {
-    let of = |scene: &TestRoom| {
+    let curve = |scene: &TestRoom| {
         let mut series = Series {
             name: scene.name.clone(),
             ..Series::default()
@@ -186,13 +190,13 @@ fn over_depth(scenes: &[TestRoom], label: &str, quantity: Quantity) -> Plot {
         title: "Bounces of the fit, transport cache".to_owned(),
         x: Axis::logarithmic("bounces of the fit"),
         y: Axis::logarithmic(label),
-        series: scenes.iter().map(of).collect(),
+        series: scenes.iter().map(curve).collect(),
         marks: vec![(CHOSEN_AT, "adaptive".to_owned())],
         ..Plot::default()
     }
 }
 
-/// The descent's kinds with their errors of albedo at the last mark that all of them passed, and that mark.
+/// Albedo errors of the descent by depth at the last mark that all courses passed, and that mark.
 fn at_equal_rays(scene: &TestRoom) -> (Option<u32>, Vec<(u64, Option<Spread>)>) {
     let kinds = || scene.paper.iter().map(|(_, kind)| kind);
     let mark = common_mark(kinds());
@@ -252,7 +256,7 @@ fn summary(scenes: &[TestRoom]) -> Summary {
 
 fn seen(scenes: &[TestRoom]) -> Vec<String> {
     let mut seen = Vec::new();
-    let (mut tried, mut short) = (0, Vec::new());
+    let (mut tried, mut insufficient) = (0, Vec::new());
     for scene in scenes {
         let at = |depth: u64| {
             let found = scene.cache.iter().find(|(d, _)| *d == depth);
@@ -261,7 +265,7 @@ fn seen(scenes: &[TestRoom]) -> Vec<String> {
         if let (Some(one), Some(two), Some(deep)) = (at(1), at(2), at(0)) {
             let enough = two.mean <= TOLERABLE.max(FACTOR * deep.mean);
             tried += 1;
-            short.extend((!enough).then_some(scene.name.as_str()));
+            insufficient.extend((!enough).then_some(scene.name.as_str()));
             seen.push(format!(
                 "{}, transport cache: albedo is off by {} with one bounce, {} with two, {} with adaptive \
                  depth. Two are {}.",
@@ -275,32 +279,32 @@ fn seen(scenes: &[TestRoom]) -> Vec<String> {
         seen.extend(balance(scene));
     }
     if tried > 0 {
-        let but = match short.is_empty() {
+        let but = match insufficient.is_empty() {
             true => String::new(),
-            false => format!("; not in {}", short.join(", ")),
+            false => format!("; not in {}", insufficient.join(", ")),
         };
         seen.push(format!(
             "Two bounces are enough for the transport cache in {} of {tried} rooms tried{but}.",
-            tried - short.len(),
+            tried - insufficient.len(),
         ));
     }
     seen
 }
 
-/// Which depth served the descent best, and which are as good within the noise.
+/// Which depth is best for the descent, and which others do not differ beyond the noise.
 fn balance(scene: &TestRoom) -> Option<String> {
     let (mark, errors) = at_equal_rays(scene);
     let known: Vec<(u64, Spread)> = (errors.into_iter())
         .filter_map(|(depth, error)| Some((depth, error?)))
         .collect();
-    let (best, least) = *known.iter().min_by(|a, b| a.1.mean.total_cmp(&b.1.mean))?;
+    let (best, lowest) = *known.iter().min_by(|a, b| a.1.mean.total_cmp(&b.1.mean))?;
     let (_, two) = known.iter().find(|(depth, _)| *depth == 2)?;
     let bounces = |depth: u64| format!("{depth} bounce{}", if depth == 1 { "" } else { "s" });
     let within: Vec<String> = (known.iter())
-        .filter(|(depth, error)| *depth != best && !error.differs(&least))
+        .filter(|(depth, error)| *depth != best && !error.differs(&lowest))
         .map(|(depth, _)| bounces(*depth))
         .collect();
-    let within = match (least.count, within.as_slice()) {
+    let within = match (lowest.count, within.as_slice()) {
         (0 | 1, _) => "one seed tells no noise".to_owned(),
         (_, []) => "all others are worse beyond the noise".to_owned(),
         (_, within) => format!("no different within the noise: {}", within.join(", ")),
@@ -311,7 +315,7 @@ fn balance(scene: &TestRoom) -> Option<String> {
         scene.name,
         rays_at(mark?) as f64 * 1e-6,
         bounces(best),
-        least.words(),
+        lowest.words(),
         two.words(),
     ))
 }
@@ -321,7 +325,7 @@ mod tests {
     use super::*;
     use crate::study::experiments::course::Errors;
 
-    /// A room in which the cache ends at these errors with one bounce, two, and adaptive depth.
+    /// A room in which the cache ends with these errors at one bounce, two bounces, and adaptive depth.
     fn room(errors: [f64; 3]) -> TestRoom {
         let kind = |error: f64| Kind {
             name: String::new(),
@@ -347,10 +351,10 @@ mod tests {
     #[test]
     fn two_bounces_are_enough_by_the_errors_and_nothing_is_said_of_no_room() {
         assert!(seen(&[]).is_empty());
-        let said = seen(&[room([0.1, 0.009, 0.001]), room([0.1, 0.05, 0.001])]).join(" ");
-        assert!(said.contains("Two are enough.") && said.contains("Two are not enough."));
+        let text = seen(&[room([0.1, 0.009, 0.001]), room([0.1, 0.05, 0.001])]).join(" ");
+        assert!(text.contains("Two are enough.") && text.contains("Two are not enough."));
         assert!(
-            said.contains("enough for the transport cache in 1 of 2 rooms tried; not in a room.")
+            text.contains("enough for the transport cache in 1 of 2 rooms tried; not in a room.")
         );
     }
 }

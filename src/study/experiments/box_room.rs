@@ -1,4 +1,4 @@
-//! A small box of a room with a block and one lamp, whose mean albedo and lamp can be chosen.
+//! A box-shaped room with a block and one lamp, of chosen mean albedo and lamp size.
 
 use crate::error::Result;
 use crate::inverse::unknowns::Unknowns;
@@ -11,15 +11,15 @@ use crate::study::experiments::subject::Subject;
 use crate::transport::material::{Lobe, Material};
 use glam::{DVec3, Vec3};
 
-/// Key of the photographs' noise, far from those of solvers.
-pub const NOISE: u64 = 0x626f_7865_7300;
-/// Radiance times squared half side of the lamp, so that all lamps send out the same power.
+/// Random seed of the photographs; differs from those of solvers.
+pub const PHOTOGRAPH_SEED: u64 = 0x626f_7865_7300;
+/// Radiance times squared half side of the lamp, so that all lamps emit the same power.
 const LAMP_POWER: f64 = 0.2;
 /// Colour of the lamp.
 const LAMP_TINT: Vec3 = Vec3::new(1.0, 0.9, 0.75);
-/// Deviations of the seven reflectors from the mean albedo, in units of the largest; their sum is zero.
+/// Deviations of the seven reflectors' albedos from the mean, relative to the largest; their sum is zero.
 const DEVIATIONS: [f64; 7] = [-1.0, 0.6, -0.3, 0.0, 0.3, -0.6, 1.0];
-/// Eyes and targets of the photographs; together they see every object.
+/// Eye and target of each photograph; together they see every object.
 const VIEWS: [[[f64; 3]; 2]; 6] = [
     [[0.7, 1.1, 0.8], [-0.4, 0.7, -0.8]],
     [[-0.7, 1.2, 0.8], [0.5, 1.0, -0.8]],
@@ -31,14 +31,14 @@ const VIEWS: [[[f64; 3]; 2]; 6] = [
 
 /// The rough object of [`board_room`].
 const BOARD: &str = "board";
-/// Eyes and targets of the photographs in which the lamp is reflected by it.
+/// Eye and target of the photographs in which it reflects the lamp.
 const BOARD_VIEWS: [[[f64; 3]; 2]; 2] = [
     [[0.8, 1.5, -0.8], [0.1, 1.0, -0.1]],
     [[-0.7, 1.7, 0.5], [0.2, 1.0, -0.2]],
 ];
 
-/// A box of 2 m with six coloured sides, a block and a square lamp of half side `lamp` below the ceiling. The mean
-/// albedo over the seven reflectors is `albedo` in each channel; the lamp reflects nothing.
+/// A box of 2 m with six coloured sides, a block, and a black square lamp of half side `lamp` below the ceiling. The
+/// mean albedo of the seven reflectors is `albedo` in each channel.
 pub fn box_room(name: &str, albedo: f64, lamp: f64) -> Room {
     let block = |modeller: &mut Modeller| {
         let half = DVec3::new(0.25, 0.3, 0.2);
@@ -47,7 +47,7 @@ pub fn box_room(name: &str, albedo: f64, lamp: f64) -> Room {
     furnished(name, albedo, lamp, "block", block)
 }
 
-/// The same with another object in the place of the block.
+/// The same with another object instead of the block.
 pub fn furnished(
     name: &str,
     albedo: f64,
@@ -63,7 +63,7 @@ pub fn furnished(
         Vec3::from_array([0, 1, 2].map(|c| channel(c) as f32))
     };
 
-    // Six sides that look inwards.
+    // Six sides that face inwards.
     let (low, high) = (DVec3::new(-1.0, 0.0, -1.0), DVec3::new(1.0, 2.0, 1.0));
     let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * 2.0);
     let sides = [
@@ -97,7 +97,7 @@ pub fn furnished(
     }
 }
 
-/// The same with a rough board below the lamp in the place of the block, and two photographs more that look at it.
+/// The same with a rough board below the lamp instead of the block, and two more photographs of it.
 pub fn board_room(name: &str, albedo: f64, lamp: f64, lobe: Lobe) -> Room {
     let board = |modeller: &mut Modeller| {
         let (middle, half) = (DVec3::new(0.1, 0.95, -0.1), DVec3::new(0.5, 0.05, 0.5));
@@ -112,7 +112,7 @@ pub fn board_room(name: &str, albedo: f64, lamp: f64, lobe: Lobe) -> Room {
     room
 }
 
-/// A room's true values; its materials have one colour each.
+/// A room's true values, for materials of constant albedo.
 pub fn truth(room: &Room) -> Unknowns {
     let anywhere = Hit {
         t: 0.0,
@@ -127,7 +127,7 @@ pub fn truth(room: &Room) -> Unknowns {
     }
 }
 
-/// The box room, photographed as by [`photograph`].
+/// The box room with photographs, as by [`photograph`].
 ///
 /// # Errors
 /// Never for a lamp that fits below the ceiling.
@@ -135,15 +135,15 @@ pub fn photographed(name: &str, albedo: f64, lamp: f64, quick: bool) -> Result<S
     photograph(&box_room(name, albedo, lamp), quick)
 }
 
-/// A room, photographed with all bounces as by [`rendering`].
+/// A room with photographs of all bounces, rendered as by [`rendering`].
 ///
 /// # Errors
-/// The room's mesh holds nothing to see.
+/// The room's mesh is empty.
 pub fn photograph(room: &Room, quick: bool) -> Result<Subject> {
     Subject::of_room(room, &rendering(quick))
 }
 
-/// How these rooms are photographed: small and coarse where `quick`.
+/// Settings of these rooms' photographs; smaller and noisier if `quick`.
 pub fn rendering(quick: bool) -> Rendering {
     let (size, samples) = if quick {
         ([32, 24], 32)
@@ -151,7 +151,7 @@ pub fn rendering(quick: bool) -> Rendering {
         ([64, 48], 128)
     };
     Rendering {
-        seed: NOISE,
+        seed: PHOTOGRAPH_SEED,
         samples,
         size,
     }

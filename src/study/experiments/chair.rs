@@ -1,9 +1,9 @@
-//! A small chair, which shadows itself.
+//! A small chair that shadows itself.
 
 use crate::room::shape::Modeller;
 use glam::DVec3;
 
-/// A chair of 0.85 m that stands on y = 0 over the origin and faces +z: a seat on four legs, and a back of three slats.
+/// A chair 0.85 m high, standing on y = 0 at the origin and facing +z: a seat on four legs, with a back of three slats.
 pub fn chair(m: &mut Modeller) {
     let (half, seat, top) = (0.21, 0.44, 0.85);
     for x in [-1.0, 1.0] {

@@ -1,21 +1,21 @@
-//! Photographs in closed form: one convex reflector under lamps that reflect nothing, and nothing else.
+//! Photographs in closed form, of one convex reflector under black lamps.
 //!
-//! Such an object receives light from the lamps alone, and its radiance is ρE/π with Lambert's irradiance from polygons
-//! (Baum, Rushmeier and Winget 1989, "Improving Radiosity Solutions Through the Use of Analytically Determined
-//! Form-Factors"). A pixel is cut along the edges that it sees, and each part integrated by Gauss–Legendre points.
+//! Such a reflector receives light only from the lamps. Its radiance is ρE/π with Lambert's irradiance from polygons (Baum,
+//! Rushmeier and Winget 1989, "Improving Radiosity Solutions Through the Use of Analytically Determined Form-Factors"). Pixels
+//! are clipped against the visible edges, and each part is integrated by Gauss–Legendre quadrature.
 
 use crate::capture::camera::{Intrinsics, Pose};
 use crate::capture::photograph::Photograph;
 use crate::inverse::unknowns::Unknowns;
 use crate::room::Room;
 use crate::room::cameras::cameras;
-use crate::room::photographs::linear;
+use crate::room::linear_photograph;
 use crate::study::experiments::box_room;
 use glam::{DVec2, DVec3};
 use std::f64::consts::FRAC_1_PI;
 use std::ops::{Add, Mul, Sub};
 
-/// Gauss–Legendre points on [0, 1], with their weights.
+/// Gauss–Legendre points and weights on [0, 1].
 const GAUSS: [(f64, f64); 5] = [
     (0.046_910_077_030_668, 0.118_463_442_528_094_5),
     (0.230_765_344_947_158_5, 0.239_314_335_249_683_2),
@@ -24,7 +24,7 @@ const GAUSS: [(f64, f64); 5] = [
     (0.953_089_922_969_332, 0.118_463_442_528_094_5),
 ];
 
-/// Depth in metres in front of which nothing may be.
+/// Near clipping distance in metres.
 const NEAR: f64 = 1e-3;
 
 /// A triangle of the room.
@@ -35,9 +35,9 @@ struct Facet {
     emission: DVec3,
 }
 
-/// The mean radiance over each pixel of each of the room's cameras.
+/// Mean radiance over each pixel of each of the room's cameras.
 ///
-/// Right only if the room is one convex object and lamps of albedo zero, none of which hides another from a camera.
+/// Only valid for a room of one convex object and lamps of albedo zero, none of which occludes another.
 pub fn photographs(room: &Room, size: [u32; 2]) -> Vec<Photograph> {
     let facets = facets(room);
     let lamps: Vec<&Facet> = facets
@@ -53,7 +53,7 @@ pub fn photographs(room: &Room, size: [u32; 2]) -> Vec<Photograph> {
                     add(facet, &lamps, lens, pose, &mut pixels);
                 }
             }
-            linear(size, pixels.iter().map(|sum| sum.as_vec3()).collect())
+            linear_photograph(size, pixels.iter().map(|sum| sum.as_vec3()).collect())
         })
         .collect()
 }
@@ -75,9 +75,9 @@ fn facets(room: &Room) -> Vec<Facet> {
         .collect()
 }
 
-/// Adds what a facet sends through each pixel.
+/// Adds a facet's radiance to the pixels that it covers.
 fn add(facet: &Facet, lamps: &[&Facet], lens: &Intrinsics, pose: &Pose, pixels: &mut [DVec3]) {
-    // What lies in front of the camera on the picture, turning so that `cut` keeps the inside.
+    // Clip the facet to the near plane and project it, with the orientation that `cut` needs.
     let local = |point: DVec3| pose.rotation.transpose() * (point - pose.center);
     let front = cut(&facet.corners, |p| -local(p).z - NEAR);
     if front.len() < 3 {
@@ -98,7 +98,7 @@ fn add(facet: &Facet, lamps: &[&Facet], lens: &Intrinsics, pose: &Pose, pixels: 
     let last = DVec2::new(f64::from(lens.width), f64::from(lens.height));
     let (low, high) = (low.floor().max(DVec2::ZERO), high.ceil().min(last));
 
-    // The lamps as far as they lie before the facet.
+    // The parts of the lamps in front of the facet's plane.
     let in_front =
         |lamp: &&&Facet| cut(&lamp.corners, |p| (p - facet.corners[0]).dot(facet.normal));
     let seen: Vec<(DVec3, Vec<DVec3>)> = (lamps.iter())
@@ -135,7 +135,7 @@ fn add(facet: &Facet, lamps: &[&Facet], lens: &Intrinsics, pose: &Pose, pixels: 
     }
 }
 
-/// The part of a convex polygon on which a linear function is not negative (Sutherland and Hodgman 1974).
+/// Clips a convex polygon to where a linear function is not negative (Sutherland and Hodgman 1974).
 fn cut<P>(polygon: &[P], inside: impl Fn(P) -> f64) -> Vec<P>
 where
     P: Copy + Add<Output = P> + Sub<Output = P> + Mul<f64, Output = P>,
@@ -154,7 +154,7 @@ where
     kept
 }
 
-/// ∫ cosθ dω over a polygon that lies in front of a point, for unit radiance: ½ Σ θᵢ n · (rᵢ × rᵢ₊₁) / |rᵢ × rᵢ₊₁|.
+/// ∫ cosθ dω over a polygon in front of a point, for unit radiance: ½ Σ θᵢ n · (rᵢ × rᵢ₊₁) / |rᵢ × rᵢ₊₁|.
 fn irradiance(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
     let edge = |i: usize| {
         let a = (polygon[i] - point).normalize_or_zero();
@@ -167,11 +167,11 @@ fn irradiance(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
             0.0
         }
     };
-    // A lamp's front is seen turning clockwise; its back sends nothing.
+    // A lamp's front has clockwise corners seen from the point; its back emits nothing.
     (-0.5 * (0..polygon.len()).map(edge).sum::<f64>()).max(0.0)
 }
 
-/// Integral over a convex polygon, triangle by triangle, each as a square with one side shrunk to a corner.
+/// Integral over a convex polygon, by triangles; each is a square with one side collapsed to a corner.
 fn integrate(polygon: &[DVec2], value: impl Fn(DVec2) -> DVec3) -> DVec3 {
     let mut sum = DVec3::ZERO;
     for i in 1..polygon.len().max(2) - 1 {
@@ -199,7 +199,7 @@ mod tests {
 
     #[test]
     fn irradiance_is_the_form_factor_and_what_lies_behind_the_patch_is_cut_away() {
-        // Facing down, so that its front turns clockwise seen from above.
+        // Facing down, so its corners are clockwise from below.
         let lamp = [
             [0.0, 1.0, 0.0],
             [2.0, 1.0, 0.0],
@@ -212,7 +212,7 @@ mod tests {
         let back: Vec<DVec3> = lamp.iter().rev().copied().collect();
         assert_eq!(irradiance(DVec3::ZERO, DVec3::Y, &back), 0.0);
 
-        // An upright patch sees half of a lamp that lies on both sides of it, as much as of that half alone.
+        // An upright patch below a lamp that extends on both sides of its plane receives light only from the half in front.
         let wide = lamp.map(|p| p - DVec3::X);
         let seen = cut(&wide, |p| p.x);
         let half = lamp.map(|p| DVec3::new(p.x.min(1.0), p.y, p.z));

@@ -1,5 +1,5 @@
-//! The courses of solves that studies compare: the paper's descent as published, watched at fixed numbers of rays, and
-//! where the transport cache ends.
+//! Courses of solves that studies compare: the paper's descent, measured at fixed numbers of rays, and the end of the transport
+//! cache.
 
 use crate::calibrate::problem::Problem;
 use crate::error::Result;
@@ -8,37 +8,40 @@ use crate::inverse::loss::LossProbe;
 use crate::inverse::paper::descent::{Descent, StepOutcome};
 use crate::inverse::settings::{Preset, Settings};
 use crate::inverse::solver::Solution;
-use crate::study::experiments::{Bench, Limits, Subject};
+use crate::study::experiments::study::{Bench, Limits};
+use crate::study::experiments::subject::Subject;
 use crate::study::trade::plan::Run;
 use crate::study::trade::watch;
 use crate::transport::material::Lobe;
 use std::time::{Duration, Instant};
 
-/// Rays at the first mark, and the factor from mark to mark.
+/// Rays at the first mark.
 const FIRST: f64 = 20_000.0;
+/// Factor in rays between marks.
 const FACTOR: f64 = std::f64::consts::SQRT_2;
-/// Held-out pixels that are rendered for the loss, and paths for each.
+/// Held-out pixels that are rendered for the loss.
 const PIXELS: usize = 400;
+/// Samples for each of these pixels.
 const SAMPLES: u64 = 64;
-/// Longest that a solve is waited for.
+/// Time limit of a solve.
 const PATIENCE: Duration = Duration::from_secs(600);
 
-/// Where a solve stood.
+/// Measurement of a solve in progress.
 #[derive(Debug, Clone)]
 pub struct Mark {
-    /// The number of the mark in rays that was passed last; the same for all solves. `None` before the first.
+    /// Number of the last mark passed, the same for all solves. `None` before the first.
     pub index: Option<u32>,
     /// Rays cast by the solve.
     pub rays: u64,
-    /// Seconds of solving, without measuring.
+    /// Seconds of solving, without measurements.
     pub seconds: f64,
-    /// Steps of the optimiser.
+    /// Optimiser steps.
     pub steps: u64,
-    /// How far the estimate was off.
+    /// Errors of the estimate.
     pub errors: Errors,
 }
 
-/// How far an estimate is off.
+/// Errors of an estimate.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Errors {
     /// Mean absolute difference in radiance on held-out pixels.
@@ -47,11 +50,11 @@ pub struct Errors {
     pub albedo: Option<f64>,
     /// Median relative error of the lamps' emission.
     pub emission: Option<f64>,
-    /// Relative error of the albedo of the object that is watched, ‖ρ̂ − ρ‖₂ / ‖ρ‖₂ over RGB.
+    /// Relative error ‖ρ̂ − ρ‖₂ / ‖ρ‖₂ over RGB of the albedo of the watched object.
     pub object: Option<f64>,
 }
 
-/// Measures estimates of one subject, always on the same pixels.
+/// Measures estimates of a subject, always on the same pixels.
 pub struct Gauge<'a> {
     subject: &'a Subject,
     probe: LossProbe,
@@ -60,7 +63,7 @@ pub struct Gauge<'a> {
 }
 
 impl<'a> Gauge<'a> {
-    /// A gauge whose renders have at most `bounces` bounces.
+    /// A gauge that renders at most `bounces` bounces.
     pub fn new(subject: &'a Subject, bounces: u32) -> Self {
         let settings = Settings::default();
         let probe = LossProbe::new(&subject.problem, &settings, PIXELS, SAMPLES, bounces);
@@ -73,23 +76,23 @@ impl<'a> Gauge<'a> {
     }
 
     /// The same for descents that know the objects' lobes.
-    pub fn knowing(mut self, lobes: Vec<Option<Lobe>>) -> Self {
+    pub fn with_lobes(mut self, lobes: Vec<Option<Lobe>>) -> Self {
         self.lobes = lobes;
         self
     }
 
-    /// The same, watching an object.
-    pub fn watching(mut self, object: &'a str) -> Self {
+    /// The same with an object to watch.
+    pub fn watch_object(mut self, object: &'a str) -> Self {
         self.watched = Some(object);
         self
     }
 
-    /// What is solved.
+    /// The problem to solve.
     pub fn problem(&self) -> &'a Problem {
         &self.subject.problem
     }
 
-    /// How far an estimate is off.
+    /// Measures an estimate.
     pub fn errors(&self, estimate: &Estimate) -> Errors {
         let known =
             (self.subject.truth()).map(|truth| truth.errors(&self.subject.problem.scene, estimate));
@@ -108,10 +111,10 @@ impl<'a> Gauge<'a> {
     }
 }
 
-/// Runs the descent as published, per object and with nothing annealed, and measures it whenever its rays pass a mark.
+/// Runs the descent as published, per object and without annealing, and measures it whenever its rays pass a mark.
 ///
-/// Which rays are cast, and with them all errors at a mark, depends on the settings alone; how many marks are passed in
-/// limited seconds does not. Stops where the parameters leave the finite numbers, and where the study is to end.
+/// The rays cast, and so all errors at a mark, depend only on the settings; how many marks are reached in limited
+/// time does not. Ends when a parameter is not finite, or the study is stopped.
 pub fn descend(bench: &Bench, gauge: &Gauge, settings: &Settings, limits: Limits) -> Vec<Mark> {
     let problem = &gauge.subject.problem;
     let mut step = |descent: &mut Descent| descent.step(problem, settings, settings.max_bounces());
@@ -119,7 +122,7 @@ pub fn descend(bench: &Bench, gauge: &Gauge, settings: &Settings, limits: Limits
     descend_by(bench, gauge, start, limits, &mut step)
 }
 
-/// The same from a start and with steps of one's own.
+/// The same from a given start and with given steps.
 pub fn descend_by(
     bench: &Bench,
     gauge: &Gauge,
@@ -131,7 +134,7 @@ pub fn descend_by(
     let (mut rays, mut steps, mut seconds) = (0, 0, 0.0);
     let mut marks = Vec::new();
     loop {
-        // Step to the next mark.
+        // Step up to the next mark.
         let goal = rays_at(mark_at(rays).map_or(0, |mark| mark + 1)).min(limits.rays);
         let begun = Instant::now();
         let mut over = false;
@@ -144,7 +147,7 @@ pub fn descend_by(
         }
         seconds += begun.elapsed().as_secs_f64();
 
-        // Measure there.
+        // Measure.
         marks.push(Mark {
             index: mark_at(rays),
             rays,
@@ -158,17 +161,17 @@ pub fn descend_by(
     }
 }
 
-/// Rays at a mark.
+/// Number of rays at a mark.
 pub fn rays_at(mark: u32) -> u64 {
     (FIRST * FACTOR.powi(mark as i32)) as u64
 }
 
-/// The last mark that so many rays have passed.
+/// The last mark at or below a number of rays.
 fn mark_at(rays: u64) -> Option<u32> {
     (0..).take_while(|&mark| rays_at(mark) <= rays).last()
 }
 
-/// Where a descent per object stands, as an estimate.
+/// The current state of a descent as an estimate.
 pub fn estimate(descent: &Descent) -> Estimate {
     let values = descent.albedo.iter().zip(&descent.emission);
     Estimate {
@@ -185,10 +188,10 @@ pub fn estimate(descent: &Descent) -> Estimate {
     }
 }
 
-/// Where the transport cache ends.
+/// Solves with the transport cache and measures its end.
 ///
 /// # Errors
-/// The solver cannot start, or the study is to end.
+/// The solver cannot start, or the study is stopped.
 pub fn cached(bench: &Bench, gauge: &Gauge, settings: &Settings) -> Result<Mark> {
     let solution = solved(bench, gauge.subject, settings)?;
     Ok(Mark {
@@ -200,10 +203,10 @@ pub fn cached(bench: &Bench, gauge: &Gauge, settings: &Settings) -> Result<Mark>
     })
 }
 
-/// A whole solve by the solver of the settings' preset, as the program runs it.
+/// Solves like the program, with the solver of the settings' preset.
 ///
 /// # Errors
-/// The solver cannot start, or the study is to end.
+/// The solver cannot start, or the study is stopped.
 pub fn solved(bench: &Bench, subject: &Subject, settings: &Settings) -> Result<Solution> {
     let run = Run {
         name: settings.preset.word().to_owned(),
@@ -223,11 +226,11 @@ pub fn solved(bench: &Bench, subject: &Subject, settings: &Settings) -> Result<S
     Ok(solution)
 }
 
-/// What [`cache_settings`] differ by from the program's own, a phrase.
+/// How [`cache_settings`] differ from the program's defaults, as a phrase.
 pub const CACHE_WITHOUT: &str = "exposures, the test for photographs that disagree, light from outside, lobes and textures \
                                  switched off";
 
-/// The transport cache's settings in studies: the default preset, or the fastest where only tried.
+/// The transport cache's settings in studies: the default preset, or the fastest if `quick`.
 pub fn cache_settings(seed: u64, quick: bool) -> Settings {
     Settings {
         preset: if quick {

@@ -4,35 +4,35 @@ use crate::error::Result;
 use crate::export::plot::{Axis, Draw, Plot, Series};
 use crate::export::table::Table;
 use crate::math::stats::Moments;
-use crate::study::experiments::Bench;
 use crate::study::experiments::course::{Errors, Mark};
 use crate::study::experiments::findings::brief;
+use crate::study::experiments::study::Bench;
 
-/// Courses of one kind of solve, one a seed.
+/// Courses of one kind of solve, one for each seed.
 #[derive(Debug, Clone)]
 pub struct Kind {
     /// Its name.
     pub name: String,
-    /// One course a seed, in order of seeds from 1.
+    /// One course for each seed, in order of seeds from 1.
     pub courses: Vec<Vec<Mark>>,
 }
 
-/// An error over seeds.
+/// Mean and spread of an error over seeds.
 #[derive(Debug, Clone, Copy)]
 pub struct Spread {
     /// Geometric mean.
     pub mean: f64,
-    /// One standard deviation between seeds, as a factor.
+    /// Standard deviation between seeds, as a factor.
     pub factor: f64,
-    /// Seeds.
+    /// Number of seeds.
     pub count: u64,
 }
 
-/// Which error is looked at.
+/// Selects an error.
 pub type Quantity = fn(&Errors) -> Option<f64>;
 
 impl Spread {
-    /// Over positive values; `None` where there are none.
+    /// Over positive values; `None` without any.
     pub fn over(values: impl Iterator<Item = f64>) -> Option<Self> {
         let mut moments = Moments::default();
         values
@@ -45,13 +45,12 @@ impl Spread {
         })
     }
 
-    /// One standard deviation below and above.
+    /// Mean ± one standard deviation.
     pub fn band(&self) -> [f64; 2] {
         [self.mean / self.factor, self.mean * self.factor]
     }
 
-    /// Whether the mean differs from another by more than two standard errors of both. Never where either is of one seed,
-    /// which tells nothing of the noise.
+    /// Whether two means differ by more than two standard errors. False if either has one seed, whose noise is unknown.
     pub fn differs(&self, other: &Self) -> bool {
         if self.count.min(other.count) < 2 {
             return false;
@@ -61,7 +60,7 @@ impl Spread {
         (self.mean / other.mean).ln().abs() > 2.0 * error
     }
 
-    /// In words: "0.0123 (×/÷ 1.05)", without a factor where there is one value.
+    /// As text: "0.0123 (×/÷ 1.05)", without the factor for a single seed.
     pub fn words(&self) -> String {
         match self.count {
             1 => brief(self.mean),
@@ -70,7 +69,7 @@ impl Spread {
     }
 }
 
-/// How errors over seeds are compared, a sentence that ends with a space; another one where a single seed allows none of it.
+/// How errors over seeds are compared: a sentence that ends with a space.
 pub fn comparison(seeds: u64) -> &'static str {
     match seeds {
         0 | 1 => "One seed tells nothing of the noise: no two errors are said to differ. ",
@@ -81,15 +80,15 @@ pub fn comparison(seeds: u64) -> &'static str {
     }
 }
 
-/// A spread in words, or a dash where nothing was measured.
+/// A spread as text; a dash if there is none.
 pub fn words(spread: Option<Spread>) -> String {
     spread.map_or("-".to_owned(), |spread| spread.words())
 }
 
-/// Runs a course of each kind and seed, one after the other, and shows the plot of those there are after each.
+/// Runs a course of each kind and seed in turn, and shows the plot so far after each.
 ///
 /// # Errors
-/// The study is to end.
+/// The study is stopped.
 pub fn run(
     bench: &Bench,
     names: impl IntoIterator<Item = String>,
@@ -115,7 +114,7 @@ pub fn run(
     Ok(kinds)
 }
 
-/// The last mark in rays that every course has passed, or `None` where one passed none.
+/// The last mark that every course has passed; `None` if one has passed none.
 pub fn common_mark<'a>(kinds: impl IntoIterator<Item = &'a Kind>) -> Option<u32> {
     let ends = kinds.into_iter().flat_map(|kind| &kind.courses);
     ends.map(|course| course.last().and_then(|mark| mark.index))
@@ -124,7 +123,7 @@ pub fn common_mark<'a>(kinds: impl IntoIterator<Item = &'a Kind>) -> Option<u32>
 }
 
 impl Kind {
-    /// An error over seeds when a mark in rays was passed.
+    /// An error over seeds at a mark.
     pub fn at_mark(&self, mark: u32, quantity: Quantity) -> Option<Spread> {
         let values = self.courses.iter().filter_map(|course| {
             let passed = course.iter().find(|m| m.index >= Some(mark))?;
@@ -133,19 +132,19 @@ impl Kind {
         Spread::over(values)
     }
 
-    /// An error over seeds at the courses' ends.
+    /// An error over seeds at the ends of the courses.
     pub fn at_end(&self, quantity: Quantity) -> Option<Spread> {
         let ends = self.courses.iter().filter_map(|course| course.last());
         Spread::over(ends.filter_map(|mark| quantity(&mark.errors)))
     }
 
-    /// Mean over seeds of a count at the courses' ends.
+    /// Mean over seeds of a count at the ends of the courses.
     pub fn mean_end(&self, count: fn(&Mark) -> f64) -> f64 {
         let ends = self.courses.iter().filter_map(|course| course.last());
         ends.map(count).sum::<f64>() / self.courses.len().max(1) as f64
     }
 
-    /// Mean course over the marks in rays, with its spread: over `x`.
+    /// Mean error and spread at the marks, over `x`.
     fn series(&self, x: fn(&Mark) -> f64, quantity: Quantity) -> Series {
         let last = self.courses.iter().filter_map(|c| c.last()?.index).max();
         let mut series = Series {
@@ -184,7 +183,7 @@ pub fn plot(
     let ends: Vec<[f64; 2]> = (cache.iter())
         .filter_map(|mark| Some([x(mark), quantity(&mark.errors)?]))
         .collect();
-    // A ring without a name, which the legend gives.
+    // A ring without a label; the legend names it.
     let labels = ends.iter().map(|&end| (end, String::new())).collect();
     series.push(Series {
         name: "transport cache, ends".to_owned(),
@@ -251,7 +250,7 @@ mod tests {
         assert!((wide.factor - (2f64.ln() * 2f64.sqrt()).exp()).abs() < 1e-12);
         assert!(!wide.differs(&spread(&[1.5, 1.6])));
         assert!(spread(&[1.0, 1.01]).differs(&spread(&[1.5, 1.51])));
-        // One value tells nothing of its noise.
+        // The noise of a single value is unknown.
         assert!(!spread(&[1.0]).differs(&spread(&[9.0, 9.01])));
         assert_eq!(spread(&[0.25]).words(), "0.250");
         assert!(Spread::over([f64::NAN, 0.0].into_iter()).is_none());

@@ -1,4 +1,4 @@
-//! The bias that the noise of renders brings into a fit, by loss and by which samples the derivative uses.
+//! Study: bias of a fit from noise in its renders, by loss and by the samples of the derivative.
 
 use crate::error::Result;
 use crate::export::plot::{Axis, Plot, Series};
@@ -8,9 +8,10 @@ use crate::math::rng::Stream;
 use crate::math::stats::Moments;
 use crate::room::photographs::Rendering;
 use crate::scene::visibility::NOTHING;
-use crate::study::experiments::findings::brief;
+use crate::study::experiments::box_room;
+use crate::study::experiments::findings::{Findings, Summary, brief};
+use crate::study::experiments::study::{Bench, Study};
 use crate::study::experiments::twin::studied;
-use crate::study::experiments::{Bench, Findings, Study, Summary, box_room};
 use crate::transport::lit::Lit;
 use crate::transport::path::{PathOptions, radiance};
 use glam::{DVec3, Vec2};
@@ -25,23 +26,24 @@ pub const STUDY: Study = Study {
     run,
 };
 
-/// Samples a pixel.
+/// Samples per pixel.
 const SAMPLES: &[u32] = &[1, 2, 4, 8, 16, 32, 64];
 const QUICK_SAMPLES: &[u32] = &[1, 4, 16];
-/// Key of the samples of the fit and of the photographs, apart from each other.
+/// First key of the samples, for the photographs and the fits.
 const KEY: u64 = 0x6573_7469;
-/// Mean albedo and half side of the lamp.
+/// Mean albedo.
 const ALBEDO: f64 = 0.5;
+/// Half side of the lamp in metres.
 const LAMP: f64 = 0.25;
-/// Pixels that are rendered at most; the box room's own photographs have fewer.
+/// Most pixels that are rendered; the box room's photographs have fewer.
 const MAX_PIXELS: usize = 12_000;
-/// A bias below this is none.
+/// Largest bias that counts as none.
 const SMALL: f64 = 0.01;
 
 /// Fits the light's scale to pixels.
 type Estimator = fn(&[Pixel]) -> f64;
 
-/// The estimators, each with its name.
+/// Name and function of each estimator.
 const ESTIMATORS: [(&str, Estimator); 4] = [
     ("l1, same samples", |pixels| l1(pixels, |p| p.render[0])),
     ("l1, independent samples", |pixels| {
@@ -60,13 +62,13 @@ const ESTIMATORS: [(&str, Estimator); 4] = [
     }),
 ];
 
-/// What was measured of a pixel: the photograph, and two independent renders at the true values.
+/// Luminances of a pixel: the photograph, and two independent renders at the true values.
 struct Pixel {
     photograph: f64,
     render: [f64; 2],
 }
 
-/// One fit of the light's scale, whose true value is 1.
+/// One fit of the light's scale; the true value is 1.
 struct EstimatorFit {
     estimator: usize,
     samples: u32,
@@ -80,15 +82,15 @@ fn run(bench: &Bench) -> Result<Findings> {
         true => ([24, 18], 256, QUICK_SAMPLES),
         false => ([48, 36], 1024, SAMPLES),
     };
-    let own = || {
+    let own_room = || {
         let room = box_room::box_room("box room", ALBEDO, LAMP);
         let rendering = box_room::rendering(bench.quick);
         (room, Rendering { size, ..rendering })
     };
-    let studied = studied(bench, &words, own)?;
+    let studied = studied(bench, &words, own_room)?;
     let lit = studied.room.lit(studied.rendering.size)?;
 
-    // Light found by BSDF sampling alone is noisy, as light through a door is; that found by both is not.
+    // BSDF sampling alone is noisy, like light through a door; MIS is not.
     let options =
         [("BSDF sampling", false), ("both (MIS)", true)].map(|(name, sample_emitters)| {
             let options = PathOptions {
@@ -187,8 +189,8 @@ fn run(bench: &Bench) -> Result<Findings> {
     })
 }
 
-/// Luminance of the pixels of all cameras that see no lamp, in order: of all of them, or of so many spread over them;
-/// streams are keyed by seed and set.
+/// Luminance of the pixels of all cameras that see no lamp, in order; if they are too many, of an evenly spread
+/// subset. The random numbers are keyed by seed and set.
 fn render(lit: &Lit, options: &PathOptions, [seed, set]: [u64; 2], samples: u32) -> Vec<f64> {
     let scene = &lit.scene;
     let is_lamp = |object: u32| lit.materials[object as usize].emission.max_element() > 0.0;
@@ -213,7 +215,7 @@ fn render(lit: &Lit, options: &PathOptions, [seed, set]: [u64; 2], samples: u32)
             for sample in 0..samples {
                 let key = (set << 32) + u64::from(sample);
                 let mut stream = Stream::new(seed, frame as u64, pixel as u64, key);
-                // Through the pixel's middle, so that all noise is the light's.
+                // Through the pixel's centre, so that only the light is noisy.
                 let ray = camera.ray(corner + 0.5);
                 sum += radiance(lit, &ray, &mut stream, options)
                     .radiance
@@ -238,25 +240,25 @@ fn ratio(pixels: &[Pixel], over: impl Fn(&Pixel) -> f64, under: impl Fn(&Pixel) 
     pixels.iter().map(over).sum::<f64>() / pixels.iter().map(under).sum::<f64>()
 }
 
-/// The root θ of Σ sign(θ·x − y)·w, with x a pixel's first render, y its photograph and w the derivative: the median of
-/// y / x by the weights w. Where x is dark the sign is negative whatever θ is.
+/// The root θ of Σ sign(θ·x − y)·w, with a pixel's first render x, photograph y and derivative w: the median of y / x
+/// weighted by w. Where x = 0 the sign is negative for every θ.
 fn l1(pixels: &[Pixel], weight: impl Fn(&Pixel) -> f64) -> f64 {
-    let mut turns: Vec<(f64, f64)> = pixels
+    let mut roots: Vec<(f64, f64)> = pixels
         .iter()
         .map(|p| (p.photograph / p.render[0].max(0.0), weight(p)))
-        .filter(|(turn, weight)| !turn.is_nan() && *weight > 0.0)
+        .filter(|(root, weight)| !root.is_nan() && *weight > 0.0)
         .collect();
-    turns.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let half = 0.5 * turns.iter().map(|(_, weight)| weight).sum::<f64>();
+    roots.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * roots.iter().map(|(_, weight)| weight).sum::<f64>();
     let mut below = 0.0;
-    let median = turns.iter().find(|(_, weight)| {
+    let median = roots.iter().find(|(_, weight)| {
         below += weight;
         below >= half
     });
-    median.map_or(f64::NAN, |(turn, _)| *turn)
+    median.map_or(f64::NAN, |(root, _)| *root)
 }
 
-/// What an l2 fit with the same samples must give: Σ x² / Σ (x² + σ²), with σ² a render's variance, estimated from the
+/// Expected l2 fit with the same samples: Σ x² / Σ (x² + σ²), where the variance σ² of a render is estimated from the
 /// difference of the two.
 fn same_samples_predicted(pixels: &[Pixel]) -> f64 {
     let noise = |p: &Pixel| 0.5 * (p.render[0] - p.render[1]).powi(2);
@@ -267,7 +269,7 @@ fn same_samples_predicted(pixels: &[Pixel]) -> f64 {
     )
 }
 
-/// Mean and spread of a fit over seeds; fits without a finite root are left out.
+/// Mean and spread of a fit over seeds, without fits that have no finite root.
 fn mean(fits: &[EstimatorFit], estimator: usize, samples: u32) -> Moments {
     let mut moments = Moments::default();
     (fits.iter())
@@ -314,7 +316,7 @@ fn plot(
     }
 }
 
-/// A fit in words, of `seeds` that were tried.
+/// A fit as text, out of `seeds` attempts.
 fn value(fits: &Moments, seeds: u64) -> String {
     match fits.count {
         0 => "no finite root".to_owned(),
@@ -362,7 +364,7 @@ fn sentences(
             false => n.join(", "),
         }
     };
-    // One seed tells nothing of the noise.
+    // The noise of a single seed is unknown.
     if seeds < 2 {
         return seen;
     }
@@ -393,7 +395,7 @@ mod tests {
         for (name, fit) in ESTIMATORS {
             assert!((fit(&clean) - 3.0).abs() < 1e-12, "{name}");
         }
-        // Renders of 0 or 2 around a mean of 1: a relative variance of 1 halves the fit.
+        // Renders of 0 or 2 with mean 1: a relative variance of 1 halves the fit.
         let noisy: Vec<Pixel> = (0..4)
             .map(|i| Pixel {
                 photograph: 1.0,

@@ -1,4 +1,4 @@
-//! How noisy the mean of a pixel's paths is by random numbers and by points of a low-discrepancy sequence.
+//! Noise of a pixel's mean radiance with random numbers and with a low-discrepancy sequence.
 
 use crate::calibrate::problem::Problem;
 use crate::inverse::paths::derivative::{Gradient, differentiate};
@@ -12,30 +12,30 @@ use crate::study::experiments::gradient::{lamps, tracer};
 use glam::Vec2;
 use rayon::prelude::*;
 
-/// Key of the numbers.
+/// First key of the random numbers.
 const KEY: u64 = 0x6576_656e;
 /// Independent repetitions of each mean.
 const REPETITIONS: u64 = 16;
-/// Longest path in bounces.
+/// Most bounces.
 const BOUNCES: u32 = 64;
 
-/// Noise with some number of paths.
+/// Noise for a number of paths.
 #[derive(Debug, Clone, Copy)]
 pub struct Evenness {
-    /// Paths a pixel.
+    /// Paths per pixel.
     pub paths: u64,
-    /// Relative standard deviation of the mean by random numbers, root mean square over pixels.
+    /// Relative standard deviation of the mean with random numbers, root mean square over pixels.
     pub random: f64,
-    /// The same by a sequence.
+    /// The same with a low-discrepancy sequence.
     pub sequence: f64,
 }
 
-/// Measures at 1, 4, 16, … paths up to `most`, on so many pixels spread over all photographs; those without light are
-/// left out.
-pub fn measure(problem: &Problem, truth: &Unknowns, pixels: usize, most: u64) -> Vec<Evenness> {
+/// Measures the noise at 1, 4, 16, … up to `max` paths, on `pixels` pixels spread evenly over all photographs; leaves out those
+/// without light.
+pub fn measure(problem: &Problem, truth: &Unknowns, pixels: usize, max: u64) -> Vec<Evenness> {
     let counts: Vec<u64> = (0..)
         .map(|k| 4u64.pow(k))
-        .take_while(|&n| n <= most)
+        .take_while(|&n| n <= max)
         .collect();
     let all: Vec<(usize, u32)> = (problem.photographs.iter().enumerate())
         .flat_map(|(frame, p)| (0..p.pixels.len() as u32).map(move |pixel| (frame, pixel)))
@@ -79,7 +79,7 @@ pub fn measure(problem: &Problem, truth: &Unknowns, pixels: usize, most: u64) ->
         .collect()
 }
 
-/// Relative variance between repetitions of the mean over the first paths, for each of `counts`.
+/// For each of `counts`: relative variance, between repetitions, of the mean over that many paths.
 fn variances<U: Uniforms>(
     problem: &Problem,
     truth: &Unknowns,

@@ -1,40 +1,38 @@
-//! What a study found, as files: NAME.csv, NAME.png, NAME.md and what belongs to them.
+//! Results of a study, and their files: NAME.csv, NAME.png, NAME.md and others.
 
 use crate::error::Result;
-use crate::export::atomic::write_bytes;
 use crate::export::compare::write_grid;
 use crate::export::plot::Plot;
 use crate::export::table::Table;
 use crate::math::picture::Picture;
-use crate::study::experiments::Study;
-use crate::study::machine::Machine;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// What a study found. The first string of each pair is added to the study's name in the file's: empty, or `-rays`.
+/// Results of a study. The first string of each pair is a suffix to the study's name in the file name, such as `-rays`,
+/// or empty.
 #[derive(Debug, Clone, Default)]
 pub struct Findings {
-    /// What was run on what, in sentences.
+    /// What was run, in sentences.
     pub how: String,
     /// Every value measured.
     pub tables: Vec<(&'static str, Table)>,
-    /// The values as pictures.
+    /// Plots of the values.
     pub plots: Vec<(&'static str, Plot)>,
-    /// The few values that matter.
+    /// Table of the most important values.
     pub summary: Summary,
-    /// What was seen, each a sentence or two.
+    /// Conclusions, each of a sentence or two.
     pub seen: Vec<String>,
     /// Pictures side by side.
     pub pictures: Vec<(&'static str, Grid)>,
 }
 
-/// Pictures with captions in rows, all at one exposure.
+/// A grid of pictures with captions, all at the same exposure.
 #[derive(Debug, Clone)]
 pub struct Grid {
-    /// Pictures a row.
+    /// Pictures in a row.
     pub columns: usize,
-    /// Factor from linear values to what is shown.
+    /// Exposure for display.
     pub exposure: f32,
-    /// Each with its caption.
+    /// Captions and pictures.
     pub pictures: Vec<(String, Picture)>,
 }
 
@@ -48,7 +46,11 @@ impl Grid {
         }
     }
 
-    fn write(&self, path: &Path) -> Result<()> {
+    /// Writes the grid as a PNG.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
         let pictures = self.pictures.iter().map(|(name, p)| (name.as_str(), p));
         write_grid(
             path,
@@ -62,61 +64,15 @@ impl Grid {
 /// A small table of text.
 #[derive(Debug, Clone, Default)]
 pub struct Summary {
-    /// Its head.
+    /// Column titles.
     pub columns: Vec<&'static str>,
-    /// Its rows, one text a column.
+    /// Rows, one text for each column.
     pub rows: Vec<Vec<String>>,
 }
 
-impl Findings {
-    /// Writes everything into a folder; the paths written.
-    ///
-    /// # Errors
-    /// A file cannot be written.
-    pub fn write(&self, study: &Study, folder: &Path) -> Result<Vec<PathBuf>> {
-        let file =
-            |suffix: &str, ending: &str| folder.join(format!("{}{suffix}.{ending}", study.name));
-        let mut written = Vec::new();
-        for (suffix, table) in &self.tables {
-            written.push(file(suffix, "csv"));
-            table.write(&file(suffix, "csv"))?;
-        }
-        for (suffix, plot) in &self.plots {
-            written.push(file(suffix, "png"));
-            plot.write(&file(suffix, "png"))?;
-        }
-        for (suffix, grid) in &self.pictures {
-            written.push(file(suffix, "png"));
-            grid.write(&file(suffix, "png"))?;
-        }
-        written.push(file("", "md"));
-        write_bytes(&file("", "md"), self.markdown(study).as_bytes())?;
-        Ok(written)
-    }
-
-    /// The study in words, for people.
-    pub fn markdown(&self, study: &Study) -> String {
-        let mut text = format!("# {}\n\n{}\n\n", study.name, study.question);
-        text += &format!("{} Machine: {}.\n\n", self.how, Machine::here().words());
-        text += &self.summary.markdown();
-        text += "\n## Seen\n\n";
-        for sentence in &self.seen {
-            text += &format!("* {sentence}\n");
-        }
-        text += "\n";
-        let plots = self.plots.iter().map(|(suffix, _)| suffix);
-        for suffix in plots.chain(self.pictures.iter().map(|(suffix, _)| suffix)) {
-            text += &format!("![{0}{suffix}]({0}{suffix}.png)\n\n", study.name);
-        }
-        let tables: Vec<String> = (self.tables.iter())
-            .map(|(suffix, _)| format!("[{0}{suffix}.csv]({0}{suffix}.csv)", study.name))
-            .collect();
-        text + &format!("Every value: {}\n", tables.join(", "))
-    }
-}
-
 impl Summary {
-    fn markdown(&self) -> String {
+    /// The table in Markdown.
+    pub fn markdown(&self) -> String {
         let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
         let head: Vec<String> = self.columns.iter().map(|&c| c.to_owned()).collect();
         let rule = vec!["---".to_owned(); head.len()];
@@ -125,7 +81,7 @@ impl Summary {
     }
 }
 
-/// A number in three digits.
+/// Formats a number with three significant digits.
 pub fn brief(value: f64) -> String {
     match value.abs() {
         size if size == 0.0 || !size.is_finite() => value.to_string(),

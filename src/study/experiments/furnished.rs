@@ -1,4 +1,4 @@
-//! A room, and the same with two chairs in it: the built-in room, or the twin of a capture.
+//! A room with and without two chairs: the built-in room, or the twin of a capture.
 
 use crate::capture::mesh::Mesh;
 use crate::capture::photograph::Photograph;
@@ -6,7 +6,7 @@ use crate::compose::object::ObjectModel;
 use crate::compose::placement::Placement;
 use crate::error::{Error, Result};
 use crate::room::Room;
-use crate::room::photographs::{KEPT, Rendering, kept, render};
+use crate::room::photographs::{Rendering, STORED, render, stored};
 use crate::room::shape::Modeller;
 use crate::scene::visibility::NOTHING;
 use crate::study::experiments::chair::chair;
@@ -19,7 +19,7 @@ use glam::{DAffine3, DQuat, DVec3, Vec3};
 use std::cmp::Reverse;
 use std::sync::Arc;
 
-/// The chairs: name, albedo, place on the floor, and turn in radians. They stand between the red wall and the rug.
+/// The chairs between the red wall and the rug: name, albedo, position, and rotation in radians.
 const CHAIRS: [(&str, [f32; 3], [f64; 3], f64); 2] = [
     (
         "white chair",
@@ -31,19 +31,20 @@ const CHAIRS: [(&str, [f32; 3], [f64; 3], f64); 2] = [
 ];
 /// The photographs of the built-in room that see both.
 const FRAMES: [usize; 2] = [5, 14];
-/// The chairs' height as modelled, and the radius of a cylinder around one, in metres.
+/// Height of a chair as modelled, in metres.
 const HEIGHT: f64 = 0.85;
+/// Radius of a cylinder around it, in metres.
 const RADIUS: f64 = 0.31;
-/// Height of the chairs in a twin, in fractions of the scene's own: the largest of these that finds places for both.
+/// Heights tried for the chairs in a twin, relative to the scene's; the largest with places for both is used.
 const FRACTIONS: [f64; 5] = [0.32, 0.24, 0.16, 0.08, 0.04];
-/// Fraction of a photograph that they may cover.
+/// Largest fraction of a photograph that the chairs may cover.
 const MAX_COVERED: f64 = 0.4;
-/// How far above the ground they stand, in fractions of their height, as on a floor that is not quite flat.
+/// Gap between floor and chair, relative to its height, for floors that are not quite flat.
 const LIFT: f64 = 2e-3;
-/// How the room without textures is photographed; the one with them has photographs in the program.
+/// Photographs of the room without textures; those of the textured one are stored in the program.
 const PLAIN: Rendering = Rendering {
     samples: 64,
-    ..KEPT
+    ..STORED
 };
 const QUICK: Rendering = Rendering {
     seed: 7,
@@ -55,23 +56,23 @@ const QUICK: Rendering = Rendering {
 pub struct Furnished {
     /// In words.
     pub name: String,
-    /// What it is, a sentence about the room and where the chairs stand.
+    /// Sentence on the room and the positions of the chairs.
     pub how: String,
-    /// The room without them, photographed.
+    /// The room without the chairs, with photographs.
     pub subject: Subject,
     /// Its true light.
     pub lit: Lit,
-    /// The room with them in its mesh.
+    /// The room with the chairs in its mesh.
     pub furnished: Lit,
-    /// The objects, in the room's coordinates.
+    /// The chairs in the room's coordinates.
     pub models: Vec<Arc<ObjectModel>>,
-    /// Where they stand: as modelled.
+    /// Their placement: as modelled.
     pub placement: Placement,
-    /// The photographs that they are put into.
+    /// The frames that they are inserted into.
     pub frames: Vec<usize>,
 }
 
-/// The built-in room with two chairs, with its textures or with their mean colours.
+/// The built-in room with two chairs; its textures are replaced by their means unless `textured`.
 ///
 /// # Errors
 /// The program file is damaged.
@@ -82,7 +83,7 @@ pub fn built_in(textured: bool, quick: bool) -> Result<Furnished> {
     }
     let photographs = match (quick, textured) {
         (true, _) => render(&room, &QUICK)?,
-        (false, true) => kept()?,
+        (false, true) => stored()?,
         (false, false) => render(&room, &PLAIN)?,
     };
     let stands = CHAIRS.map(|(_, _, place, turn)| {
@@ -101,10 +102,10 @@ pub fn built_in(textured: bool, quick: bool) -> Result<Furnished> {
     })
 }
 
-/// The twin of a capture with two chairs on its ground, as large as they fit, in the photographs that see most of them.
+/// The twin of a capture with two chairs on its floor, as large as they fit, and the photographs that see most of them.
 ///
 /// # Errors
-/// They fit nowhere.
+/// There is no free place for the chairs.
 pub fn of_twin(twin: Studied) -> Result<Furnished> {
     let scene = twin.room.lit(twin.rendering.size)?.scene;
     let up = up(&scene);
@@ -124,7 +125,7 @@ pub fn of_twin(twin: Studied) -> Result<Furnished> {
     let (places, height) = found.ok_or_else(|| {
         Error::new(
             &twin.room.name,
-            "no level ground that is seen and free holds two chairs",
+            "it has no free, visible and level floor for two chairs",
             "run the study on rooms of its own",
         )
     })?;
@@ -139,11 +140,11 @@ pub fn of_twin(twin: Studied) -> Result<Furnished> {
     };
     let photographs = render(&twin.room, &twin.rendering)?;
     let mut furnished = furnish(twin.room, photographs, [stand(0), stand(1)])?;
-    furnished.frames = max_seen(&furnished);
+    furnished.frames = most_seen(&furnished);
     if furnished.frames.is_empty() {
         return Err(Error::new(
             &furnished.name,
-            "no photograph sees the two chairs from far enough away",
+            "no photograph shows both chairs from far enough away",
             "run the study on rooms of its own",
         ));
     }
@@ -154,8 +155,8 @@ pub fn of_twin(twin: Studied) -> Result<Furnished> {
     Ok(furnished)
 }
 
-/// The photographs that see most of the chairs, two at most; not those that see little else.
-fn max_seen(furnished: &Furnished) -> Vec<usize> {
+/// The (at most two) photographs that see most of the chairs, without those that they nearly fill.
+fn most_seen(furnished: &Furnished) -> Vec<usize> {
     let scene = &furnished.furnished.scene;
     let first = scene.objects.len() - CHAIRS.len();
     let seen = |frame: &Vec<u32>| {
@@ -169,11 +170,11 @@ fn max_seen(furnished: &Furnished) -> Vec<usize> {
     let pixels = scene.ids().triangles.first().map_or(0, Vec::len) as f64;
     frames.retain(|(_, count)| *count > 0 && *count as f64 <= MAX_COVERED * pixels);
     frames.sort_by_key(|&(frame, count)| (Reverse(count), frame));
-    let most = frames.into_iter().take(FRAMES.len());
-    most.map(|(frame, _)| frame).collect()
+    let best = frames.into_iter().take(FRAMES.len());
+    best.map(|(frame, _)| frame).collect()
 }
 
-/// A photographed room with chairs, as modelled, where they are told to stand.
+/// Adds the chairs, as modelled, to a photographed room.
 fn furnish(
     mut room: Room,
     photographs: Vec<Photograph>,
@@ -205,7 +206,7 @@ fn furnish(
     })
 }
 
-/// One colour in the place of a texture: its mean.
+/// Replaces a texture by its mean.
 fn flatten(material: &mut Material) {
     if let Albedo::Image(texture, tint) = &material.albedo {
         let sum: Vec3 = texture.pixels.iter().sum();
@@ -231,7 +232,7 @@ fn corners_of(mesh: &Mesh, object: u32) -> Vec<[DVec3; 3]> {
         .collect()
 }
 
-/// Adds the objects of a mesh after those of another.
+/// Appends the objects of a mesh to another.
 fn append(mesh: &mut Mesh, other: Mesh) {
     let (corners, objects) = (mesh.positions.len() as u32, mesh.objects.len() as u32);
     mesh.positions.extend(other.positions);
@@ -259,7 +260,7 @@ mod tests {
         let first = room.lit.scene.objects.len() as u32;
         let seen = crate::room::truth::seen_pixels(&room.furnished);
         assert!(seen[first as usize..].iter().all(|&n| n > 20), "{seen:?}");
-        // Each edge of a chair's triangles meets nothing but its own chair.
+        // No edge of a chair's triangles meets anything but the chair itself.
         for (triangle, &object) in scene.object_of.iter().enumerate() {
             if object < first {
                 continue;

@@ -1,4 +1,4 @@
-//! How noisy the derivatives of single paths are.
+//! Noise of single-path derivatives.
 
 use crate::calibrate::problem::Problem;
 use crate::inverse::paths::derivative::{Gradient, differentiate};
@@ -14,25 +14,25 @@ use crate::transport::material::Lobe;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-/// Key of the paths, far from those of solvers.
+/// Key of the paths; differs from those of solvers.
 const KEY: u64 = 0x6772_6164;
-/// Bounces, as the paper has them.
+/// Bounces, as in the paper.
 const BOUNCES: u32 = 2;
 
 /// Noise of the derivative of a pixel's radiance from one path.
 #[derive(Debug, Clone, Copy)]
 pub struct Noise {
-    /// Variance between paths of one pixel, summed over all unknowns and channels, mean over pixels. Emissions are taken
-    /// relative to their values, so that all derivatives are radiances.
+    /// Variance between paths of a pixel, summed over unknowns and channels, averaged over pixels. Derivatives by emission are
+    /// multiplied by its value, so that all are radiances.
     pub variance: f64,
     /// Its standard error over pixels.
     pub error: f64,
-    /// Rays a path.
+    /// Rays per path.
     pub rays: f64,
 }
 
-/// Measures the noise at given unknowns and lobes, one an object, on `pixels` pixels spread over all photographs with
-/// `paths` paths each. Lobes are held.
+/// Measures the noise at given unknowns, with `paths` paths for each of `pixels` pixels spread evenly over all photographs. The
+/// lobes, one per object, are constant.
 pub fn noise(
     problem: &Problem,
     unknowns: &Unknowns,
@@ -71,7 +71,7 @@ pub fn noise(
     }
 }
 
-/// A tracer of paths from lamps of the mesh alone, one surface an object.
+/// A tracer of paths with one surface per object, lit only by lamps of the mesh.
 pub fn tracer<'a>(
     scene: &'a Scene,
     lights: &'a Emitters,
@@ -98,7 +98,7 @@ pub fn tracer<'a>(
     }
 }
 
-/// Emitters of the mesh by area × luminance.
+/// Emitters of the mesh, weighted by area × luminance.
 pub fn lamps(scene: &Scene, emission: &[Vec3]) -> Emitters {
     let weights: Vec<f64> = (scene.objects.iter().zip(emission))
         .map(|(object, emission)| object.area * f64::from(luminance(*emission)))
@@ -106,7 +106,7 @@ pub fn lamps(scene: &Scene, emission: &[Vec3]) -> Emitters {
     Emitters::new(scene, &weights)
 }
 
-/// Summed variance of one pixel's derivatives, and the rays that it took.
+/// Summed variance of a pixel's derivatives, and the rays cast.
 fn of_pixel(
     problem: &Problem,
     tracer: &Tracer,

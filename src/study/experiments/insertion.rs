@@ -1,4 +1,4 @@
-//! How right inserted objects look.
+//! Study: composites with inserted objects against true renderings.
 
 use crate::capture::exposure::Exposure;
 use crate::compose::backdrop::Backdrop;
@@ -13,11 +13,11 @@ use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::math::picture::Picture;
 use crate::study::experiments::course::{CACHE_WITHOUT, cache_settings, paper_settings, solved};
-use crate::study::experiments::findings::{Grid, brief};
+use crate::study::experiments::findings::{Findings, Grid, Summary, brief};
 use crate::study::experiments::furnished::{Furnished, built_in, of_twin};
 use crate::study::experiments::likeness::Likeness;
+use crate::study::experiments::study::{Bench, Limits, Study};
 use crate::study::experiments::twin::{Sizes, twin};
-use crate::study::experiments::{Bench, Findings, Limits, Study, Summary};
 use crate::transport::film::Film;
 use crate::transport::lit::Lit;
 use crate::transport::path::PathOptions;
@@ -32,9 +32,9 @@ pub const STUDY: Study = Study {
     run,
 };
 
-/// Key of the true renderings' noise.
-const TRUTH: u64 = 0x7472_7574;
-/// A pixel beside the objects belongs to their shadow and bleed if they change it by this fraction.
+/// Random seed of the true renderings.
+const TRUTH_SEED: u64 = 0x7472_7574;
+/// Shadow and bleed are the pixels beside the objects that change by more than this fraction.
 const CHANGED: f32 = 0.05;
 const WAYS: [&str; 5] = [
     "naive, light of the photographs",
@@ -43,14 +43,14 @@ const WAYS: [&str; 5] = [
     "ours, the paper's descent",
     "ours, true light",
 ];
-/// What stands over the pictures, which are narrow.
+/// Short titles of the pictures.
 const TITLES: [&str; 4] = ["truth", "naive, photographs", "naive, estimate", "ours"];
 const PLACES: [&str; 2] = ["objects", "shadow and bleed"];
 
-/// What was found in one room: a likeness for each way and place.
+/// Results in one room: similarity by method and region.
 struct Scene {
     name: String,
-    /// What the name of its pictures ends with.
+    /// Suffix of its pictures.
     file: &'static str,
     likeness: [[Likeness; 2]; 5],
     grid: Grid,
@@ -115,7 +115,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     })
 }
 
-/// Time of the paper's descent in each room.
+/// Time of the paper's descent in each room, in seconds.
 fn seconds_of_paper(limits: Limits) -> f64 {
     match limits.seconds.is_finite() {
         true => limits.seconds,
@@ -123,7 +123,7 @@ fn seconds_of_paper(limits: Limits) -> f64 {
     }
 }
 
-/// Composites in both frames by every way, against the truth.
+/// Composites by every method in all frames, compared with the truth.
 fn scene(
     room: &Furnished,
     file: &'static str,
@@ -165,8 +165,8 @@ fn scene(
             .map(|object| harmonics_of_estimate(&lit, object.center, &full, 1))
             .collect();
         let of_photographs = vec![photographed; objects.len()];
-        // The descent's estimate is right with the bounces that it was fitted with.
-        let two = PathOptions {
+        // The descent's estimate is only right with the bounces that it was fitted with.
+        let two_bounces = PathOptions {
             max_bounces: paper_settings(1).max_bounces(),
             ..full
         };
@@ -179,7 +179,7 @@ fn scene(
             pasted(&of_photographs),
             pasted(&estimated),
             composite(&lit, full).composite(),
-            composite(&Arc::new(paper.lit(scene)), two).composite(),
+            composite(&Arc::new(paper.lit(scene)), two_bounces).composite(),
             with_truth.composite(),
         ];
 
@@ -189,7 +189,7 @@ fn scene(
             &room.furnished,
             camera,
             &full,
-            TRUTH,
+            TRUTH_SEED,
             frame as u64,
             truth_samples,
         );
@@ -279,12 +279,12 @@ fn summary(scenes: &[Scene]) -> Summary {
         )
     };
     let rows = scenes.iter().flat_map(|scene| {
-        (WAYS.iter().zip(&scene.likeness)).map(move |(way, [inside, beside])| {
+        (WAYS.iter().zip(&scene.likeness)).map(move |(way, [objects, shadow])| {
             vec![
                 scene.name.clone(),
                 (*way).to_owned(),
-                words(inside),
-                words(beside),
+                words(objects),
+                words(shadow),
             ]
         })
     });
@@ -301,7 +301,7 @@ fn summary(scenes: &[Scene]) -> Summary {
 
 fn seen(scene: &Scene) -> Vec<String> {
     let [photographs, estimate, ours, paper, truth] = &scene.likeness;
-    let verdict = |place: usize| {
+    let comparison = |place: usize| {
         let naive = f64::max(photographs[place].psnr(), estimate[place].psnr());
         let gain = ours[place].psnr() - naive;
         format!(
@@ -311,7 +311,7 @@ fn seen(scene: &Scene) -> Vec<String> {
         )
     };
     vec![
-        format!("{}, {}. {}.", scene.name, verdict(0), verdict(1)),
+        format!("{}, {}. {}.", scene.name, comparison(0), comparison(1)),
         format!(
             "{}: the same composite with the true light and materials is at {:.1} dB and {:.1} dB, where \
              noise and compositing are all that is left; with what the paper's descent found in its time at {:.1} dB and {:.1} dB.",

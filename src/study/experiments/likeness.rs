@@ -1,17 +1,18 @@
-//! How alike two pictures look over a part of them.
+//! Similarity of two pictures over a mask.
 
 use crate::math::color::linear_to_srgb;
 use crate::math::picture::Picture;
 use glam::Vec3;
 
-/// Reach of the Gaussian window of SSIM in pixels, and its standard deviation (Wang et al. 2004).
+/// Radius of the Gaussian window of SSIM in pixels (Wang et al. 2004).
 const REACH: i64 = 5;
+/// Standard deviation of the window in pixels.
 const DEVIATION: f64 = 1.5;
-/// The constants that keep SSIM finite, for values from 0 to 1.
+/// Stabilising constants of SSIM for values from 0 to 1.
 const C1: f64 = 1e-4;
 const C2: f64 = 9e-4;
 
-/// Differences summed over pixels of one or more pairs of pictures.
+/// Differences summed over the pixels of one or more pairs of pictures.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Likeness {
     pixels: f64,
@@ -22,7 +23,7 @@ pub struct Likeness {
 }
 
 impl Likeness {
-    /// Adds the pixels of a pair that `mask` says, both shown at one exposure.
+    /// Adds the masked pixels of a pair, both displayed at the same exposure.
     pub fn add(&mut self, picture: &Picture, truth: &Picture, exposure: f32, mask: &[bool]) {
         let similarity = similarity(&shown(picture, exposure), &shown(truth, exposure), truth);
         let pixels = picture.pixels.iter().zip(&truth.pixels);
@@ -36,22 +37,22 @@ impl Likeness {
         }
     }
 
-    /// Root mean square difference of radiance over the mean of the true one.
+    /// Root mean square difference of radiance, relative to the mean of the true one.
     pub fn relative(&self) -> f64 {
         (self.linear / self.pixels).sqrt() / (self.level / self.pixels)
     }
 
-    /// Peak signal-to-noise ratio in dB of the pictures as shown, peak 1.
+    /// Peak signal-to-noise ratio of the displayed pictures in dB, peak 1.
     pub fn psnr(&self) -> f64 {
         -10.0 * (self.shown / self.pixels).log10()
     }
 
-    /// Mean structural similarity of the pictures as shown, in grey.
+    /// Mean structural similarity of the displayed pictures in greyscale.
     pub fn ssim(&self) -> f64 {
         self.similar / self.pixels
     }
 
-    /// Pixels compared.
+    /// Number of compared pixels.
     pub fn pixels(&self) -> f64 {
         self.pixels
     }
@@ -61,7 +62,7 @@ fn to_display(value: f32) -> f32 {
     linear_to_srgb(value.clamp(0.0, 1.0))
 }
 
-/// Grey values as shown.
+/// Displayed greyscale values.
 fn shown(picture: &Picture, exposure: f32) -> Vec<f64> {
     let grey = |v: &Vec3| {
         (*v * exposure)
@@ -74,7 +75,7 @@ fn shown(picture: &Picture, exposure: f32) -> Vec<f64> {
     picture.pixels.iter().map(|v| f64::from(grey(v))).collect()
 }
 
-/// SSIM about each pixel; the window is cut at the border.
+/// SSIM at each pixel; the window is clipped at the border.
 fn similarity(a: &[f64], b: &[f64], size: &Picture) -> Vec<f64> {
     let (width, height) = (i64::from(size.width), i64::from(size.height));
     let about = |x: i64, y: i64| {
@@ -115,7 +116,7 @@ mod tests {
         assert_eq!((same.relative(), same.psnr()), (0.0, f64::INFINITY));
         assert!((same.ssim() - 1.0).abs() < 1e-12);
 
-        // Linear values 0 and 1 are shown as 0 and 1: half of the pixels all wrong is 3 dB.
+        // Linear values 0 and 1 are displayed as 0 and 1: half of the pixels completely wrong is 3 dB.
         let [black, half] =
             [0, 1].map(|n| Picture::from_fn(16, 12, |x, _| Vec3::splat(((x % 2) * n) as f32)));
         let mut wrong = Likeness::default();
@@ -123,7 +124,7 @@ mod tests {
         assert!((wrong.psnr() - 10.0 * 2f64.log10()).abs() < 1e-5);
         assert!((wrong.relative() - 2f64.sqrt()).abs() < 1e-6);
         assert!(wrong.ssim() < 0.1);
-        // What the mask leaves out does not count.
+        // Pixels outside of the mask do not count.
         let mut masked = Likeness::default();
         let even: Vec<bool> = (0..16 * 12).map(|i| i % 2 == 0).collect();
         masked.add(&black, &half, 1.0, &even);

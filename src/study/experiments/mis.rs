@@ -1,4 +1,4 @@
-//! What multiple importance sampling buys.
+//! Study: multiple importance sampling.
 
 use crate::error::Result;
 use crate::export::plot::Plot;
@@ -6,16 +6,18 @@ use crate::export::table::Table;
 use crate::inverse::settings::{LightSampling, Settings};
 use crate::room::Room;
 use crate::room::photographs::Rendering;
+use crate::study::experiments::box_room;
 use crate::study::experiments::course::{
     CACHE_WITHOUT, Errors, Gauge, Mark, cache_settings, cached, descend, paper_settings,
 };
 use crate::study::experiments::courses::{
     self, Kind, Spread, common_mark, comparison, plot, table, words,
 };
-use crate::study::experiments::findings::brief;
+use crate::study::experiments::findings::{Findings, Summary, brief};
 use crate::study::experiments::gradient::{Noise, noise};
+use crate::study::experiments::study::{Bench, Study};
+use crate::study::experiments::subject::Subject;
 use crate::study::experiments::twin::{Sizes, twin};
-use crate::study::experiments::{Bench, Findings, Study, Subject, Summary, box_room};
 use crate::transport::material::Lobe;
 use glam::Vec3;
 
@@ -59,30 +61,30 @@ const SAMPLINGS: [LightSampling; 3] = [
     LightSampling::Emitter,
     LightSampling::Bsdf,
 ];
-/// A mean apart from another by less than this factor is as good.
+/// Means within this factor of each other count as equal.
 const AS_GOOD: f64 = 1.05;
 
-/// How one of the study's own rooms is lit.
+/// The lighting of one of the study's own rooms.
 struct Lamp {
     name: &'static str,
-    /// What the names of its plots over rays and over seconds end with.
+    /// Suffixes of its plots over rays and over seconds.
     files: [&'static str; 2],
     /// Half side of the lamp in metres.
     half_side: f64,
-    /// Lobe of a board below the lamp; `None` where all is diffuse.
+    /// Lobe of a board below the lamp; `None` if all is diffuse.
     board: Option<Lobe>,
 }
 
-/// One of the rooms that are compared.
-struct Lit {
+/// A room to compare.
+struct LitByLamp {
     files: [&'static str; 2],
     room: Room,
     rendering: Rendering,
 }
 
 impl Lamp {
-    fn lit(&self, quick: bool) -> Lit {
-        Lit {
+    fn lit(&self, quick: bool) -> LitByLamp {
+        LitByLamp {
             files: self.files,
             room: match self.board {
                 Some(lobe) => box_room::board_room(self.name, ALBEDO, self.half_side, lobe),
@@ -93,7 +95,7 @@ impl Lamp {
     }
 }
 
-/// What was measured in one room.
+/// Results in one room.
 struct LitRoom {
     name: String,
     files: [&'static str; 2],
@@ -102,7 +104,7 @@ struct LitRoom {
     cache: Vec<Mark>,
 }
 
-/// The study's own rooms in a phrase.
+/// Describes the study's own rooms.
 fn own_rooms() -> String {
     let [small, large, rough] = &ROOMS;
     let lobe = rough.board.map_or_else(String::new, |lobe| {
@@ -124,8 +126,8 @@ fn run(bench: &Bench) -> Result<Findings> {
     let how = twin
         .as_ref()
         .map_or_else(own_rooms, |twin| twin.words.clone());
-    let rooms: Vec<Lit> = match twin {
-        Some(twin) => vec![Lit {
+    let rooms: Vec<LitByLamp> = match twin {
+        Some(twin) => vec![LitByLamp {
             files: ROOMS[0].files,
             room: twin.room,
             rendering: twin.rendering,
@@ -135,7 +137,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     let limits = bench.limits(rooms.len() * SAMPLINGS.len() * bench.seeds as usize);
     let (pixels, paths) = if bench.quick { (300, 128) } else { (1000, 512) };
     let mut scenes = Vec::new();
-    for Lit {
+    for LitByLamp {
         files,
         room,
         rendering,
@@ -147,8 +149,8 @@ fn run(bench: &Bench) -> Result<Findings> {
         let truth = box_room::truth(room);
         let lobes: Vec<Option<Lobe>> = room.materials.iter().map(|m| m.lobe).collect();
         let bounces = paper_settings(1).max_bounces();
-        let gauge = Gauge::new(&subject, bounces).knowing(lobes.clone());
-        let deep = Gauge::new(&subject, u32::MAX);
+        let gauge = Gauge::new(&subject, bounces).with_lobes(lobes.clone());
+        let all_bounces = Gauge::new(&subject, u32::MAX);
         let course = |index: usize, seed| {
             let settings = Settings {
                 light_sampling: SAMPLINGS[index],
@@ -160,7 +162,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         let over_rays = |kinds: &[Kind]| drawn(name, "rays", |mark| mark.rays as f64, kinds, &[]);
         let kinds = courses::run(bench, names, course, over_rays)?;
         bench.begin(&format!("{name}, variance of gradients"))?;
-        let of = |sampling: &LightSampling| {
+        let measure = |sampling: &LightSampling| {
             noise(&subject.problem, &truth, &lobes, *sampling, pixels, paths)
         };
         let cache = |seed| Settings {
@@ -171,9 +173,9 @@ fn run(bench: &Bench) -> Result<Findings> {
             name: name.to_owned(),
             files: *files,
             kinds,
-            noises: SAMPLINGS.iter().map(of).collect(),
+            noises: SAMPLINGS.iter().map(measure).collect(),
             cache: (bench.seeds())
-                .map(|seed| cached(bench, &deep, &cache(seed)))
+                .map(|seed| cached(bench, &all_bounces, &cache(seed)))
                 .collect::<Result<_>>()?,
         });
     }
@@ -214,7 +216,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     })
 }
 
-/// Losses in one room.
+/// Plot of the losses in one room.
 fn drawn(name: &str, label: &str, x: fn(&Mark) -> f64, kinds: &[Kind], cache: &[Mark]) -> Plot {
     let loss = |errors: &Errors| errors.loss;
     let held_out = "held-out l1 loss, radiance";
@@ -251,7 +253,7 @@ fn variances(scenes: &[LitRoom]) -> Table {
     table
 }
 
-/// Loss at the last mark in rays that all of a scene's courses passed.
+/// An error at the last mark that all of a room's courses passed.
 fn at_equal_rays(scene: &LitRoom, quantity: fn(&Errors) -> Option<f64>) -> Vec<Option<Spread>> {
     let mark = common_mark(&scene.kinds);
     let loss = |kind: &Kind| mark.and_then(|mark| kind.at_mark(mark, quantity));
@@ -301,7 +303,7 @@ fn seen(scene: &LitRoom) -> Vec<String> {
     if let [Some(mis), Some(light), Some(bsdf)] = at_equal_rays(scene, |e| e.loss)[..] {
         let single = if light.mean < bsdf.mean { light } else { bsdf };
         let ratio = brief(single.mean / mis.mean);
-        let verdict = if mis.differs(&single) && mis.mean * AS_GOOD < single.mean {
+        let conclusion = if mis.differs(&single) && mis.mean * AS_GOOD < single.mean {
             "beyond the noise, as the paper says"
         } else if mis.differs(&single) && mis.mean > single.mean * AS_GOOD {
             "beyond the noise, against what the paper says"
@@ -310,7 +312,7 @@ fn seen(scene: &LitRoom) -> Vec<String> {
         };
         seen.push(format!(
             "{}, loss at equal rays: {} with MIS, {} with light sampling, {} with BSDF sampling; the better of the two alone \
-             has {ratio} times that of MIS, {verdict}.",
+             has {ratio} times that of MIS, {conclusion}.",
             scene.name,
             mis.words(),
             light.words(),

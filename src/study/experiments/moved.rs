@@ -1,4 +1,4 @@
-//! A room of another size, or in a larger world, and how exactly rays meet it there.
+//! A room scaled, or with a distant outlier, and the accuracy of hit points there.
 
 use crate::math::stats::quantile;
 use crate::room::Room;
@@ -8,10 +8,10 @@ use crate::scene::visibility::NOTHING;
 use crate::transport::material::Material;
 use glam::{DVec3, Vec2, Vec3};
 
-/// Fraction of the rays whose error is below what is reported.
-const MOST: f64 = 0.99;
+/// Quantile of the reported error over rays.
+const QUANTILE: f64 = 0.99;
 
-/// Changes a room by a value; the changed room and the size of it in which errors are counted.
+/// Changes a room by a parameter. Returns the room, and the size that errors are relative to.
 pub type Change = fn(&Room, f64) -> (Room, f64);
 
 /// Longest side of a room's bounding box.
@@ -20,7 +20,7 @@ fn size(room: &Room) -> f64 {
     (high - low).max_element()
 }
 
-/// A room `factor` times as large.
+/// The room scaled by `factor`.
 pub fn scaled(room: &Room, factor: f64) -> (Room, f64) {
     let mut room = room.clone();
     room.mesh.positions.iter_mut().for_each(|p| *p *= factor);
@@ -29,7 +29,7 @@ pub fn scaled(room: &Room, factor: f64) -> (Room, f64) {
     (room, size)
 }
 
-/// A room with a speck at so many of its sizes: what a scan's stray triangle does to coordinates of 32 bits.
+/// The room with a small triangle at `distance` times its size, like a stray triangle of a scan.
 pub fn with_outlier(room: &Room, distance: f64) -> (Room, f64) {
     let mut room = room.clone();
     let size = size(&room);
@@ -50,15 +50,15 @@ pub fn with_outlier(room: &Room, distance: f64) -> (Room, f64) {
     (room, size)
 }
 
-/// Whether the central ray of each pixel of each camera meets something, one pixel after the other.
+/// Whether the central ray of each pixel of each camera hits a surface.
 pub fn meets(scene: &Scene) -> Vec<bool> {
     let pixels = scene.ids().triangles.iter().flatten();
     pixels.map(|&triangle| triangle != NOTHING).collect()
 }
 
-/// How far the hit points of the central rays of pixels lie from where the ray of a camera in 64 bits meets the plane of
-/// the same triangle in 64 bits, in units of `size`: 99 % of them are nearer. Of pixels that met something in the room as
-/// it was; one that now meets nothing is one size off.
+/// Error of the hit points of the pixels' central rays in units of `size` (99 % quantile), compared in f64 with the
+/// intersection of ray and triangle plane. `met` are the pixels with a hit in the original room; one that hits
+/// nothing now has error 1.
 pub fn hit_error(room: &Room, scene: &Scene, met: &[bool], size: f64) -> f64 {
     let lens = scene.cameras.first().map(|camera| camera.intrinsics);
     let [width, height] = lens.map_or([0; 2], |lens| [lens.width, lens.height]);
@@ -89,7 +89,7 @@ pub fn hit_error(room: &Room, scene: &Scene, met: &[bool], size: f64) -> f64 {
             errors.push((pose.center + direction * t - found).length() / size);
         }
     }
-    quantile(&mut errors, MOST).unwrap_or(f64::NAN)
+    quantile(&mut errors, QUANTILE).unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]

@@ -1,45 +1,47 @@
-//! Single objects whose photographs are far more exact than what is asked of a fit.
+//! Single objects whose photographs are far more accurate than the required fit.
 
 use crate::capture::photograph::Photograph;
 use crate::error::{Error, Result};
 use crate::room::Room;
 use crate::room::cameras::View;
-use crate::room::photographs::{Rendering, linear, render};
+use crate::room::linear_photograph;
+use crate::room::photographs::{Rendering, render};
 use crate::room::shape::Modeller;
 use crate::room::truth::seen_pixels;
 use crate::scene::visibility::NOTHING;
+use crate::study::experiments::box_room;
 use crate::study::experiments::chair::chair;
+use crate::study::experiments::closed_form;
 use crate::study::experiments::subject::Subject;
 use crate::study::experiments::twin::Studied;
-use crate::study::experiments::{box_room, closed_form};
 use crate::transport::material::Material;
 use glam::{DAffine3, DVec3, Vec3};
 use std::cmp::Reverse;
 
-/// An object in front of cameras.
+/// An object to be photographed and fitted.
 pub struct Posed {
-    /// In words.
+    /// Display name.
     pub name: String,
     /// Its name in the scene.
     pub object: String,
-    /// What it is and how it was photographed, a sentence.
+    /// Sentence on the object and its photographs.
     pub how: String,
     /// The scene with its photographs.
     pub subject: Subject,
-    /// Whether light comes from other surfaces than lamps.
+    /// Whether it receives light from other surfaces than lamps.
     pub interreflects: bool,
-    /// The error in percent that the paper has of an object of its own.
+    /// Error in percent that the paper reports for a similar object.
     pub target: f64,
-    /// Median relative standard error in percent at which a solve is told to end: chosen below `target`.
+    /// Median relative standard error in percent at which a solve ends; below `target`.
     pub aim: f64,
-    /// Relative error that the photographs' own noise makes in the object's mean radiance.
+    /// Relative error of the object's mean radiance due to the photographs' noise.
     pub floor: f64,
 }
 
-/// A convex object of one colour under a black lamp, photographed in closed form.
+/// A convex object of one colour under a black lamp, with photographs in closed form.
 ///
 /// # Errors
-/// Never for the scene as it is.
+/// Never for this scene.
 pub fn convex(quick: bool) -> Result<Posed> {
     let size = if quick { [48, 36] } else { [128, 96] };
     let room = gem();
@@ -62,12 +64,12 @@ pub fn convex(quick: bool) -> Result<Posed> {
         interreflects: false,
         target: 3.7e-4,
         aim: 2.5e-4,
-        // One rounding bounds what rounding of many pixels does to their mean.
+        // The rounding of one value bounds that of a mean.
         floor: f64::from(f32::EPSILON) * 0.5,
     })
 }
 
-/// The convex object and its lamp, seen from close by.
+/// The convex object and its lamp, in close-up views.
 fn gem() -> Room {
     let mut modeller = Modeller::default();
     modeller.object("gem");
@@ -92,10 +94,10 @@ fn gem() -> Room {
     }
 }
 
-/// A chair that shadows itself in a room whose walls light it and each other, photographed by paths of all lengths.
+/// A chair that shadows itself, in a room with interreflection, with path-traced photographs of all bounces.
 ///
 /// # Errors
-/// Never for the scene as it is.
+/// Never for this scene.
 pub fn shadowed(quick: bool) -> Result<Posed> {
     let (size, samples) = if quick {
         ([32, 24], 32)
@@ -108,13 +110,13 @@ pub fn shadowed(quick: bool) -> Result<Posed> {
         let place = DAffine3::from_translation(DVec3::new(-0.3, 0.0, -0.25)) * turn;
         m.placed(place, chair);
     });
-    // The chair from nearby, besides the views of the room.
+    // Close-up views of the chair, besides those of the room.
     for eye in [[0.5, 0.8, 0.5], [-0.8, 1.0, 0.5], [0.5, 0.5, -0.7]] {
         let target = DVec3::new(-0.3, 0.45, -0.25);
         room.views.push(View::towards(eye.into(), target));
     }
     let rendering = Rendering {
-        seed: box_room::NOISE,
+        seed: box_room::PHOTOGRAPH_SEED,
         samples,
         size,
     };
@@ -139,7 +141,7 @@ pub fn shadowed(quick: bool) -> Result<Posed> {
     })
 }
 
-/// The object of a capture's twin that most pixels see, of those that are no lamps; all others are unknown too.
+/// The most visible object of a capture's twin that is no lamp. All other objects are unknown too.
 ///
 /// # Errors
 /// All objects are lamps.
@@ -154,7 +156,7 @@ pub fn of_twin(twin: &Studied) -> Result<Posed> {
         .ok_or_else(|| {
             Error::new(
                 &room.name,
-                "every object of it that is seen is a lamp",
+                "every visible object is a lamp",
                 "run the study on rooms of its own",
             )
         })?;
@@ -175,15 +177,15 @@ pub fn of_twin(twin: &Studied) -> Result<Posed> {
     })
 }
 
-/// A room photographed in two halves of their own noise, whose difference tells how exact the mean of an object's
-/// radiance is.
+/// Photographs a room in two independent halves. Returns their mean, and the relative error of an object's mean radiance due to
+/// their noise.
 fn photographed(room: &Room, rendering: &Rendering, object: &str) -> Result<(Subject, f64)> {
     let half = |seed| render(room, &Rendering { seed, ..*rendering });
     let halves = [half(rendering.seed)?, half(rendering.seed + 1)?];
     let mean = |(a, b): (&Photograph, &Photograph)| {
         let pixels = a.pixels.iter().zip(&b.pixels);
         let means = pixels.map(|(&a, &b)| (a + b) * 0.5).collect();
-        linear(rendering.size, means)
+        linear_photograph(rendering.size, means)
     };
     let photographs: Vec<Photograph> = halves[0].iter().zip(&halves[1]).map(mean).collect();
     let subject = Subject::of_photographs(room, photographs)?;
@@ -191,7 +193,7 @@ fn photographed(room: &Room, rendering: &Rendering, object: &str) -> Result<(Sub
     Ok((subject, floor))
 }
 
-/// Relative standard error of an object's mean radiance, channels pooled, from photographs in two independent halves.
+/// Relative standard error of an object's mean radiance over all channels, from two independent halves of the photographs.
 fn noise_of(subject: &Subject, object: &str, halves: &[Vec<Photograph>; 2]) -> f64 {
     let scene = &subject.problem.scene;
     let triangles = &scene.ids().triangles;
@@ -220,7 +222,7 @@ mod tests {
 
     #[test]
     fn the_closed_form_is_what_paths_render_on_the_mean() {
-        // From further away too, where pixels see outlines.
+        // Also from farther away, where pixels see outlines.
         let mut room = gem();
         let eye = DVec3::new(1.1, 0.9, 0.9);
         room.views
@@ -243,7 +245,7 @@ mod tests {
                 sums[0] += f64::from(a.x);
                 sums[1] += f64::from(b.x);
             }
-            // Where no outline is seen the noise is small.
+            // Without outlines there is little noise.
             let alike = (sums[1] - sums[0]).abs() <= 2e-3 * sums[0];
             assert!(alike || frame == room.views.len() - 1, "{frame}: {sums:?}");
         }

@@ -1,16 +1,17 @@
-//! Where single precision stops being enough.
+//! Study: limits of single precision.
 
 use crate::error::Result;
 use crate::export::plot::{Axis, Plot, Series};
 use crate::export::table::Table;
 use crate::inverse::settings::{Preset, Settings};
+use crate::study::experiments::box_room;
 use crate::study::experiments::course::{cache_settings, solved};
-use crate::study::experiments::findings::brief;
+use crate::study::experiments::findings::{Findings, Summary, brief};
 use crate::study::experiments::moved::{self, hit_error};
+use crate::study::experiments::study::{Bench, Study};
 use crate::study::experiments::subject::Subject;
 use crate::study::experiments::summed::Paths;
 use crate::study::experiments::twin::studied;
-use crate::study::experiments::{Bench, Findings, Study, Summary, box_room};
 use glam::Vec3;
 
 /// The study.
@@ -22,19 +23,20 @@ pub const STUDY: Study = Study {
     run,
 };
 
-/// Mean albedo and half side of the lamp.
+/// Mean albedo.
 const ALBEDO: f64 = 0.5;
+/// Half side of the lamp in metres.
 const LAMP: f64 = 0.25;
-/// A relative error above this is too large; of a fit, one above twice what another seed makes of it.
+/// Largest tolerable relative error. For a fit it is twice the difference between two seeds.
 const TOLERABLE: f64 = 1e-3;
 
-/// Errors along one axis.
+/// Errors over one parameter.
 struct Line {
     axis: &'static str,
     quantity: &'static str,
-    /// Errors up to this are none to speak of.
+    /// Largest tolerable error.
     tolerable: f64,
-    /// Value on the axis, and error.
+    /// Parameter value and error.
     points: Vec<(f64, f64)>,
 }
 
@@ -44,11 +46,11 @@ fn run(bench: &Bench) -> Result<Findings> {
         (low..=high).step_by(step).map(|k| 10f64.powi(k)).collect()
     };
     let words = format!("A box room of mean albedo {ALBEDO}");
-    let own = || {
+    let own_room = || {
         let room = box_room::box_room("box room", ALBEDO, LAMP);
         (room, box_room::rendering(true))
     };
-    let studied = studied(bench, &words, own)?;
+    let studied = studied(bench, &words, own_room)?;
     let subject = studied.photographed()?;
     let (words, room) = (studied.words, studied.room);
     let reflects: Vec<bool> = (room.materials.iter())
@@ -58,7 +60,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     let met = moved::meets(&subject.problem.scene);
     let noise = difference(&albedos(&subject, 2)?, &albedos(&subject, 1)?);
 
-    // The same room of other sizes, and with something ever farther away; the first of each is what fits are held against.
+    // The room scaled, and with an ever farther outlier; fits are compared with the first value of each.
     let mut lines = Vec::new();
     let sizes: Vec<f64> = std::iter::once(1.0).chain(powers(-6, 6)).collect();
     let far: Vec<f64> = std::iter::once(1.0).chain(powers(1, 6)).collect();
@@ -98,7 +100,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     }
 
     bench.begin("sums of paths")?;
-    // Sums of paths, and two lamps of very unequal radiance.
+    // Sums of paths, and two lamps of very different radiance.
     let count = if bench.quick { 10_000 } else { 1_000_000 };
     let paths = Paths::trace(&subject.problem, lamps(&subject, &reflects), count);
     for (quantity, sum) in [
@@ -124,13 +126,13 @@ fn run(bench: &Bench) -> Result<Findings> {
         quantity: "light of the dimmer one beside the other",
         tolerable: TOLERABLE,
         points: ratios
-            .map(|ratio| (ratio, paths.of_dim_lamp(ratio)))
+            .map(|ratio| (ratio, paths.dim_lamp_error(ratio)))
             .collect(),
     });
     Ok(findings(&words, noise, &lines))
 }
 
-/// The albedos of what reflects, channel by channel, as a quick fit finds them.
+/// The reflectors' albedos by channel, from a quick fit.
 fn fitted(bench: &Bench, subject: &Subject, reflects: &[bool], seed: u64) -> Result<Vec<f64>> {
     let settings = Settings {
         preset: Preset::Preview,
@@ -143,7 +145,7 @@ fn fitted(bench: &Bench, subject: &Subject, reflects: &[bool], seed: u64) -> Res
     Ok(albedos.map(f64::from).collect())
 }
 
-/// Mean relative difference, where there is something to be relative to.
+/// Mean relative difference over positive reference values.
 fn difference(found: &[f64], wanted: &[f64]) -> f64 {
     let both = found
         .iter()
@@ -153,7 +155,7 @@ fn difference(found: &[f64], wanted: &[f64]) -> f64 {
     differences.iter().sum::<f64>() / differences.len().max(1) as f64
 }
 
-/// Two objects that are taken for lamps: a reflector that is seen, the last one, and a lamp.
+/// Two objects to be treated as lamps: the last visible reflector, and the last lamp.
 fn lamps(subject: &Subject, reflects: &[bool]) -> [usize; 2] {
     let ids = subject.problem.scene.ids();
     let last = |reflector: bool| {
@@ -230,15 +232,15 @@ fn plot(lines: &[Line]) -> Plot {
     }
 }
 
-/// From where to where an error is tolerable.
+/// The range of parameter values with a tolerable error.
 fn reach(line: &Line) -> String {
-    let good = || {
+    let tolerable = || {
         line.points
             .iter()
             .filter(|p| p.1 <= line.tolerable)
             .map(|p| p.0)
     };
-    match (good().reduce(f64::min), good().reduce(f64::max)) {
+    match (tolerable().reduce(f64::min), tolerable().reduce(f64::max)) {
         (Some(low), Some(high)) => format!("{low:.0e} to {high:.0e}"),
         _ => "nowhere".to_owned(),
     }
@@ -284,7 +286,7 @@ mod tests {
 
     #[test]
     fn an_error_that_is_too_large_once_is_not_said_to_be_so_beyond() {
-        let said = |errors: [f64; 4]| {
+        let text = |errors: [f64; 4]| {
             let points = (0..4).map(|i| 10f64.powi(i)).zip(errors).collect();
             sentence(&Line {
                 axis: "size",
@@ -293,8 +295,8 @@ mod tests {
                 points,
             })
         };
-        assert!(said([0.0, 0.01, 0.0, 0.05]).starts_with("below 0.100 at all 4 values"));
-        assert!(said([0.0, 0.2, 0.0, 0.0]).ends_with("in all at 1 of 4 values tried"));
-        assert!(said([0.0, 0.0, 0.2, f64::NAN]).ends_with("at all values tried beyond"));
+        assert!(text([0.0, 0.01, 0.0, 0.05]).starts_with("below 0.100 at all 4 values"));
+        assert!(text([0.0, 0.2, 0.0, 0.0]).ends_with("in all at 1 of 4 values tried"));
+        assert!(text([0.0, 0.0, 0.2, f64::NAN]).ends_with("at all values tried beyond"));
     }
 }

@@ -1,4 +1,4 @@
-//! How often it is noticed that a capture is read wrongly, and how often a sound one is taken for that.
+//! Study: how often a wrong reading of a capture is detected, and how often a correct one is refused.
 
 use crate::calibrate::alignment::{Alignment, Decision};
 use crate::calibrate::photographs::leave_out;
@@ -11,7 +11,8 @@ use crate::export::table::{Cell, Table};
 use crate::room;
 use crate::room::generated::Family;
 use crate::scene::Scene;
-use crate::study::experiments::{Bench, Findings, Study, Summary};
+use crate::study::experiments::findings::{Findings, Summary};
+use crate::study::experiments::study::{Bench, Study};
 use crate::study::trade::rooms;
 
 /// The study.
@@ -23,43 +24,43 @@ pub const STUDY: Study = Study {
     run,
 };
 
-/// A factor that is found is right within this part.
+/// Relative tolerance of a factor that is found.
 const TOLERANCE: f64 = 0.03;
-/// Pixels of all photographs together.
+/// Pixel budget of all photographs together.
 const PIXELS: u64 = 4_000_000;
-/// Captures at most that every mistake is made in.
+/// Most captures that mistakes are tested in.
 const MAX_CAPTURES: usize = 6;
 
-/// A mistake that people make.
+/// A common mistake.
 #[derive(Debug, Clone, Copy)]
 pub struct Mistake {
-    /// What is wrong.
+    /// Description.
     pub name: &'static str,
-    /// How a sound capture gets it.
+    /// How to introduce it.
     pub made: Made,
 }
 
-/// How a mistake is made in a sound capture.
+/// How to introduce a mistake into a correct capture.
 #[derive(Debug, Clone, Copy)]
 pub enum Made {
-    /// By reading it so.
+    /// By reading its files in this way.
     Reading(Reading),
-    /// By giving every pose the first photograph.
+    /// By using the first photograph for all poses.
     OnePhotograph,
 }
 
-/// How a capture fared.
+/// Outcome of checking a capture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// What was found.
+    /// The alignment check.
     pub alignment: Alignment,
-    /// Whether it was refused.
+    /// Whether the capture was refused.
     pub detected: bool,
-    /// Whether the reading that was offered undoes the mistake, or what no reading mends was refused for its true cause.
+    /// Whether the proposed reading undoes the mistake, or, if no reading can, the cause was identified.
     pub right_remedy: bool,
 }
 
-/// Mistakes of geometry that all photographs share.
+/// Geometric mistakes that affect all photographs alike.
 pub fn mistakes() -> Vec<Mistake> {
     let sound = Reading::default();
     let mistake = |name, reading| Mistake {
@@ -134,7 +135,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         ]);
     };
 
-    // Sound captures: the one that is asked for, or the built-in room and rooms of all families.
+    // Correct captures: the given one, or the built-in room and rooms of all families.
     let subject = bench.subject.map(|subject| (*subject.capture).clone());
     let mut captures = vec![in_memory(&subject.map_or_else(room::capture, Ok)?)?];
     let first = decide(&captures[0], None)?;
@@ -164,7 +165,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         }
     }
 
-    // Every mistake in the plain ones and in the first.
+    // Every mistake in the plain rooms and in the first capture.
     let (mut made, mut found, mut mended) = (0, 0, 0);
     for mistake in mistakes() {
         let (mut detected, mut right) = (0, 0);
@@ -209,12 +210,12 @@ fn run(bench: &Bench) -> Result<Findings> {
     })
 }
 
-/// A capture with its photographs in memory, where mistakes are made without reading files anew.
+/// The capture with its photographs in memory, so that files are read only once.
 fn in_memory(capture: &Capture) -> Result<Capture> {
     Ok(capture.at(&load_working(capture, PIXELS)?))
 }
 
-/// Whether a capture is taken to be sound, or `mistake` in it is found.
+/// Introduces `mistake`, if any, and checks the capture.
 ///
 /// # Errors
 /// The capture cannot be read.
@@ -247,7 +248,7 @@ pub fn decide(capture: &Capture, mistake: Option<&Mistake>) -> Result<Outcome> {
     })
 }
 
-/// Whether a reading is that of the files, but for small factors.
+/// Whether a reading is the default one up to the tolerance.
 fn undone(reading: &Reading) -> bool {
     let near = |factor: f64| factor.ln().abs() < TOLERANCE;
     let same = Reading {
@@ -256,7 +257,7 @@ fn undone(reading: &Reading) -> bool {
         lens_scale: 1.0,
         ..*reading
     };
-    // The same lens, however it is said.
+    // Focal length and lens scale have the same effect.
     let focal = reading.focal * reading.lens_scale;
     same.is_default() && near(reading.mesh_scale) && near(focal) && near(reading.lens_scale)
 }

@@ -1,10 +1,11 @@
-//! Better ways to draw pixels and paths.
+//! Study: sampling strategies for pixels and paths.
 
 use crate::error::Result;
 use crate::export::plot::{Axis, Plot, Series};
 use crate::export::table::Table;
 use crate::inverse::paper::descent::Descent;
 use crate::inverse::settings::Settings;
+use crate::study::experiments::box_room;
 use crate::study::experiments::course::{
     Gauge, Mark, descend, descend_by, estimate, paper_settings, rays_at,
 };
@@ -12,10 +13,10 @@ use crate::study::experiments::courses::{
     self, Kind, Quantity, common_mark, comparison, plot, table, words,
 };
 use crate::study::experiments::evenness::{Evenness, measure};
-use crate::study::experiments::findings::brief;
+use crate::study::experiments::findings::{Findings, Summary, brief};
 use crate::study::experiments::selection::Groups;
+use crate::study::experiments::study::{Bench, Limits, Study};
 use crate::study::experiments::twin::studied;
-use crate::study::experiments::{Bench, Findings, Limits, Study, Summary, box_room};
 use crate::transport::path::PathOptions;
 
 /// The study.
@@ -27,55 +28,62 @@ pub const STUDY: Study = Study {
     run,
 };
 
-/// Mean albedo and half side of the lamp.
+/// Mean albedo.
 const ALBEDO: f64 = 0.5;
+/// Half side of the lamp in metres.
 const LAMP: f64 = 0.25;
-/// Steps between two looks at the residual.
-const LOOK_EVERY: u64 = 500;
+/// Steps between updates of the residual.
+const UPDATE_INTERVAL: u64 = 500;
 const UNIFORM: &str = "uniform";
 
-/// How groups of pixels are drawn.
+/// How pixels are drawn.
 #[derive(Clone, Copy)]
-enum Way {
+enum Strategy {
     Uniform,
-    Objects { weighed: bool },
-    Residual { weighed: bool },
+    Objects { weighted: bool },
+    Residual { weighted: bool },
 }
 
-const WAYS: [(&str, Way); 5] = [
-    (UNIFORM, Way::Uniform),
-    ("by object", Way::Objects { weighed: false }),
-    ("by object, weighed back", Way::Objects { weighed: true }),
-    ("by residual", Way::Residual { weighed: false }),
-    ("by residual, weighed back", Way::Residual { weighed: true }),
+const STRATEGIES: [(&str, Strategy); 5] = [
+    (UNIFORM, Strategy::Uniform),
+    ("by object", Strategy::Objects { weighted: false }),
+    (
+        "by object, weighed back",
+        Strategy::Objects { weighted: true },
+    ),
+    ("by residual", Strategy::Residual { weighted: false }),
+    (
+        "by residual, weighed back",
+        Strategy::Residual { weighted: true },
+    ),
 ];
 
 fn run(bench: &Bench) -> Result<Findings> {
-    let limits = bench.limits(WAYS.len() * bench.seeds as usize);
+    let limits = bench.limits(STRATEGIES.len() * bench.seeds as usize);
     let words = format!("A box room of mean albedo {ALBEDO}");
-    let own = || {
+    let own_room = || {
         let room = box_room::box_room("box room", ALBEDO, LAMP);
         (room, box_room::rendering(bench.quick))
     };
-    let studied = studied(bench, &words, own)?;
+    let studied = studied(bench, &words, own_room)?;
     let subject = studied.photographed()?;
     let gauge = Gauge::new(&subject, paper_settings(1).max_bounces());
-    let names = WAYS.iter().map(|(name, _)| (*name).to_owned());
+    let names = STRATEGIES.iter().map(|(name, _)| (*name).to_owned());
     let course = |index: usize, seed| {
-        let way = WAYS[index].1;
-        descent(bench, &gauge, way, &paper_settings(seed), limits)
+        let strategy = STRATEGIES[index].1;
+        descent(bench, &gauge, strategy, &paper_settings(seed), limits)
     };
     let kinds = courses::run(bench, names, course, of_loss)?;
     bench.begin("paths")?;
     let truth = box_room::truth(&studied.room);
-    let (pixels, most) = if bench.quick { (16, 256) } else { (64, 4096) };
-    let evenness = measure(&subject.problem, &truth, pixels, most);
+    let (pixels, max) = if bench.quick { (16, 256) } else { (64, 4096) };
+    let evenness = measure(&subject.problem, &truth, pixels, max);
 
     Ok(Findings {
         how: format!(
             "{}. The paper's descent there, {} seeds, each for {}, batches of 8, nothing annealed, with \
              pixels drawn uniformly, from each object alike, and from blocks of 8 × 8 pixels by their residual (looked at \
-             every {LOOK_EVERY} steps, whose rays count); each with gradients as they come and weighed back to what uniform \
+             every {UPDATE_INTERVAL} steps, whose rays count); each with gradients as they come and weighed back to what uniform \
              draws fit. Held-out loss is over uniform pixels. {}Paths: standard deviation of a pixel's mean radiance over 16 \
              repetitions, root mean square over {pixels} pixels, at the true values.",
             studied.words,
@@ -111,20 +119,20 @@ fn drawn(kinds: &[Kind], label: &str, quantity: Quantity) -> Plot {
     plot(title, "rays", label, rays, quantity, kinds, &[])
 }
 
-/// One course.
+/// One course of the descent.
 fn descent(
     bench: &Bench,
     gauge: &Gauge,
-    way: Way,
+    strategy: Strategy,
     settings: &Settings,
     limits: Limits,
 ) -> Vec<Mark> {
     let problem = gauge.problem();
     let bounces = settings.max_bounces();
-    let mut groups = match way {
-        Way::Uniform => return descend(bench, gauge, settings, limits),
-        Way::Objects { weighed } => Groups::by_object(problem, settings, weighed),
-        Way::Residual { weighed } => Groups::by_block(problem, settings, weighed),
+    let mut groups = match strategy {
+        Strategy::Uniform => return descend(bench, gauge, settings, limits),
+        Strategy::Objects { weighted } => Groups::by_object(problem, settings, weighted),
+        Strategy::Residual { weighted } => Groups::by_block(problem, settings, weighted),
     };
     let options = PathOptions {
         max_bounces: bounces,
@@ -133,9 +141,9 @@ fn descent(
     let mut steps = 0;
     let mut step = |descent: &mut Descent| {
         let mut rays = 0;
-        if matches!(way, Way::Residual { .. }) && steps % LOOK_EVERY == 0 {
+        if matches!(strategy, Strategy::Residual { .. }) && steps % UPDATE_INTERVAL == 0 {
             let lit = estimate(descent).lit(&problem.scene);
-            rays = groups.look(problem, &lit, &options, settings.seed + steps);
+            rays = groups.update(problem, &lit, &options, settings.seed + steps);
         }
         steps += 1;
         let mut outcome =
@@ -156,10 +164,10 @@ fn of_paths(evenness: &[Evenness]) -> Table {
 }
 
 fn evenness_plot(evenness: &[Evenness]) -> Plot {
-    let series = |name: &str, of: fn(&Evenness) -> f64| Series {
+    let series = |name: &str, noise: fn(&Evenness) -> f64| Series {
         name: name.to_owned(),
         points: (evenness.iter())
-            .map(|at| [at.paths as f64, of(at)])
+            .map(|at| [at.paths as f64, noise(at)])
             .collect(),
         ..Series::default()
     };
@@ -219,13 +227,13 @@ fn seen(kinds: &[Kind], evenness: &[Evenness]) -> Vec<String> {
             let (Some(uniform), Some(other)) = (uniform, at(kind)) else {
                 continue;
             };
-            let verdict = match (other.differs(&uniform), other.mean < uniform.mean) {
+            let conclusion = match (other.differs(&uniform), other.mean < uniform.mean) {
                 (false, _) => "no difference beyond what seeds tell of the noise",
                 (true, true) => "better",
                 (true, false) => "worse",
             };
             seen.push(format!(
-                "Pixels {}, at {:.2} million rays: albedo off by {}, uniformly {}: {verdict}.",
+                "Pixels {}, at {:.2} million rays: albedo off by {}, uniformly {}: {conclusion}.",
                 kind.name,
                 rays_at(mark) as f64 * 1e-6,
                 other.words(),

@@ -1,4 +1,4 @@
-//! Other ways to draw the pixels of a batch than uniformly.
+//! Non-uniform selection of the pixels of a batch.
 
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
@@ -11,41 +11,41 @@ use crate::transport::path::{PathOptions, radiance};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-/// Sides of the blocks of pixels that fraction a residual.
+/// Side of the blocks of pixels that share a residual.
 const BLOCK: u32 = 8;
 /// Paths for each block's residual.
 const PATHS: u64 = 4;
-/// Fraction of the draws that stay uniform.
-const UNIFORM: f64 = 0.2;
+/// Fraction of uniform draws.
+const UNIFORM_FRACTION: f64 = 0.2;
 
-/// Pixels in groups, each group drawn with a chance of its own.
+/// Pixels in groups, each with its own probability.
 pub struct Groups {
-    /// Frame and pixel.
+    /// For each group, its pixels as (frame, pixel).
     pixels: Vec<Vec<(u32, u32)>>,
-    /// Running sums of the chances.
-    ends: Vec<f64>,
+    /// Cumulative probabilities of the groups.
+    cumulative: Vec<f64>,
     total: usize,
-    /// Whether gradients are weighed so that their mean is that of uniform draws.
-    weighed: bool,
+    /// Whether gradients are weighted to be unbiased for uniform draws.
+    weighted: bool,
 }
 
 impl Groups {
-    /// The pixels of each object, all objects with the same chance.
-    pub fn by_object(problem: &Problem, settings: &Settings, weighed: bool) -> Self {
+    /// Groups by object, with equal probabilities.
+    pub fn by_object(problem: &Problem, settings: &Settings, weighted: bool) -> Self {
         let scene = &problem.scene;
         let seen = &scene.ids().triangles;
-        Self::new(problem, settings, weighed, |frame, pixel| {
+        Self::new(problem, settings, weighted, |frame, pixel| {
             let triangle = seen[frame][pixel as usize];
             (triangle != NOTHING).then(|| scene.object_of[triangle as usize] as usize)
         })
     }
 
-    /// Blocks of pixels, at first all with the same chance.
-    pub fn by_block(problem: &Problem, settings: &Settings, weighed: bool) -> Self {
+    /// Groups by blocks of pixels, at first with equal probabilities.
+    pub fn by_block(problem: &Problem, settings: &Settings, weighted: bool) -> Self {
         let width = problem.photographs.first().map_or(1, |p| p.width);
         let height = problem.photographs.first().map_or(1, |p| p.height);
         let (across, down) = (width.div_ceil(BLOCK), height.div_ceil(BLOCK));
-        Self::new(problem, settings, weighed, |frame, pixel| {
+        Self::new(problem, settings, weighted, |frame, pixel| {
             let (x, y) = (pixel % width / BLOCK, pixel / width / BLOCK);
             Some(frame * (across * down) as usize + (y * across + x) as usize)
         })
@@ -54,7 +54,7 @@ impl Groups {
     fn new(
         problem: &Problem,
         settings: &Settings,
-        weighed: bool,
+        weighted: bool,
         group: impl Fn(usize, u32) -> Option<usize>,
     ) -> Self {
         let mut pixels: Vec<Vec<(u32, u32)>> = Vec::new();
@@ -78,19 +78,19 @@ impl Groups {
         let even = vec![1.0; pixels.len()];
         let mut groups = Self {
             pixels,
-            ends: Vec::new(),
+            cumulative: Vec::new(),
             total,
-            weighed,
+            weighted,
         };
         groups.set(&even);
         groups
     }
 
-    /// Gives the groups chances in proportion to `fractions`.
+    /// Sets the groups' probabilities in proportion to `fractions`.
     fn set(&mut self, fractions: &[f64]) {
         let sum: f64 = fractions.iter().sum();
         let mut end = 0.0;
-        self.ends = fractions
+        self.cumulative = fractions
             .iter()
             .map(|fraction| {
                 end += fraction / sum;
@@ -99,17 +99,18 @@ impl Groups {
             .collect();
     }
 
-    /// A pixel.
+    /// Draws a pixel.
     pub fn draw(&self, stream: &mut Stream) -> Option<Drawn> {
         let at = stream.uniform_f64();
         let group = self
-            .ends
+            .cumulative
             .partition_point(|&end| end <= at)
-            .min(self.ends.len().checked_sub(1)?);
-        let chance = self.ends[group] - group.checked_sub(1).map_or(0.0, |g| self.ends[g]);
+            .min(self.cumulative.len().checked_sub(1)?);
+        let chance =
+            self.cumulative[group] - group.checked_sub(1).map_or(0.0, |g| self.cumulative[g]);
         let pixels = &self.pixels[group];
         let (frame, pixel) = pixels[stream.below(pixels.len())];
-        let weight = if self.weighed {
+        let weight = if self.weighted {
             (pixels.len() as f64 / self.total as f64 / chance) as f32
         } else {
             1.0
@@ -121,9 +122,9 @@ impl Groups {
         })
     }
 
-    /// Gives each group a chance in proportion to its pixels times its residual now, found by a few paths, mixed with a
-    /// uniform share; the rays that it took.
-    pub fn look(&mut self, problem: &Problem, lit: &Lit, options: &PathOptions, key: u64) -> u64 {
+    /// Sets each group's probability in proportion to its number of pixels times its residual, estimated by a few
+    /// paths, mixed with a uniform fraction. Returns the rays cast.
+    pub fn update(&mut self, problem: &Problem, lit: &Lit, options: &PathOptions, key: u64) -> u64 {
         let found: Vec<(f64, u64)> = (self.pixels.par_iter().enumerate())
             .map(|(group, pixels)| {
                 let (mut difference, mut rays) = (Vec3::ZERO, 0);
@@ -148,7 +149,9 @@ impl Groups {
         let each: Vec<f64> = found.iter().zip(sizes()).map(|((r, _), n)| r * n).collect();
         let sum = each.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let fractions: Vec<f64> = (each.iter().zip(sizes()))
-            .map(|(r, n)| UNIFORM * n / self.total as f64 + (1.0 - UNIFORM) * r / sum)
+            .map(|(r, n)| {
+                UNIFORM_FRACTION * n / self.total as f64 + (1.0 - UNIFORM_FRACTION) * r / sum
+            })
             .collect();
         self.set(&fractions);
         found.iter().map(|(_, rays)| rays).sum()

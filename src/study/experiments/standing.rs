@@ -1,4 +1,4 @@
-//! Where something can stand in a scene: level, free to all sides, and seen by its cameras.
+//! Free places on the floor of a scene: level, unoccupied, and seen by cameras.
 
 use crate::math::frame::Frame;
 use crate::scene::Scene;
@@ -7,17 +7,17 @@ use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 
-/// Cosine between up and the normal of ground that something can stand on.
+/// Smallest cosine between up and the normal of level floor.
 const LEVEL: f32 = 0.98;
-/// The same for what tells where up is: cameras that look down or up tilt the mean of theirs.
+/// The same for triangles that determine the up direction; the cameras' mean up may be tilted.
 const NEARLY_LEVEL: f32 = 0.95;
-/// Ways across a picture at which its ground is looked at.
+/// Columns of a picture at which the floor is sampled.
 const ACROSS: u32 = 24;
 /// Directions in which a place must be free.
 const AROUND: usize = 16;
-/// Heights at which it must be, in fractions of the height.
+/// Heights at which it must be free, relative to the cylinder's.
 const HEIGHTS: [f32; 3] = [0.05, 0.5, 1.0];
-/// How far above and below a place the ground around it may lie, in fractions of the height.
+/// Largest step of the floor around a place, relative to the cylinder's height.
 const STEP: f32 = 0.03;
 
 /// An upright cylinder.
@@ -25,11 +25,11 @@ const STEP: f32 = 0.03;
 pub struct Cylinder {
     /// Radius of its base.
     pub radius: f32,
-    /// From its base to its top.
+    /// Height from base to top.
     pub height: f32,
 }
 
-/// Up, as what is nearly level tells it: the mean normal by area; the cameras' where there is no such thing.
+/// The up direction: mean normal of nearly level triangles, weighted by area; that of the cameras if there are none.
 pub fn up(scene: &Scene) -> Vec3 {
     let triangles = scene.normals.iter().zip(&scene.areas);
     let level = triangles.filter(|(normal, _)| normal.dot(scene.up) >= NEARLY_LEVEL);
@@ -39,8 +39,7 @@ pub fn up(scene: &Scene) -> Vec3 {
     sum.as_vec3().normalize_or(scene.up)
 }
 
-/// Up to `count` points of the ground, apart from each other, on which the cylinder can stand; those whose middle most
-/// cameras see come first.
+/// Up to `count` points on the floor where the cylinder can stand, without overlap; those seen by most cameras come first.
 pub fn places(scene: &Scene, up: Vec3, cylinder: Cylinder, count: usize) -> Vec<Vec3> {
     let mut free: Vec<(usize, Vec3)> = (ground(scene, up).into_par_iter())
         .filter(|&place| is_free(scene, up, cylinder, place))
@@ -50,7 +49,7 @@ pub fn places(scene: &Scene, up: Vec3, cylinder: Cylinder, count: usize) -> Vec<
         })
         .filter(|(cameras, _)| *cameras > 0)
         .collect();
-    // Stable, so that equals stay in the order of frames and pixels.
+    // The sort is stable: equal places stay in the order of frames and pixels.
     free.sort_by_key(|(cameras, _)| std::cmp::Reverse(*cameras));
     let mut chosen: Vec<Vec3> = Vec::new();
     for (_, place) in free {
@@ -62,14 +61,14 @@ pub fn places(scene: &Scene, up: Vec3, cylinder: Cylinder, count: usize) -> Vec<
     chosen
 }
 
-/// Level points that the cameras see.
+/// Points on level floor that the cameras see.
 fn ground(scene: &Scene, up: Vec3) -> Vec<Vec3> {
     let mut points = Vec::new();
     for camera in &scene.cameras {
         let lens = &camera.intrinsics;
-        let apart = lens.width.div_ceil(ACROSS).max(1) as usize;
-        let rows = (0..lens.height).step_by(apart);
-        for (x, y) in rows.flat_map(|y| (0..lens.width).step_by(apart).map(move |x| (x, y))) {
+        let step = lens.width.div_ceil(ACROSS).max(1) as usize;
+        let rows = (0..lens.height).step_by(step);
+        for (x, y) in rows.flat_map(|y| (0..lens.width).step_by(step).map(move |x| (x, y))) {
             let ray = camera.ray(Vec2::new(x as f32, y as f32) + 0.5);
             let level = |triangle: u32| {
                 let normal = scene.normals[triangle as usize];
@@ -82,8 +81,8 @@ fn ground(scene: &Scene, up: Vec3) -> Vec<Vec3> {
     points
 }
 
-/// Whether no camera is as near as its height, nothing reaches into the cylinder as far as rays around it tell, and level
-/// ground is below all of its rim.
+/// Whether a place is free: no camera within the cylinder's height, no occluder on rays through the cylinder, and
+/// level floor below its rim.
 fn is_free(scene: &Scene, up: Vec3, cylinder: Cylinder, place: Vec3) -> bool {
     let Cylinder { radius, height } = cylinder;
     let frame = Frame::around(up);
@@ -107,7 +106,7 @@ fn is_free(scene: &Scene, up: Vec3, cylinder: Cylinder, place: Vec3) -> bool {
         })
 }
 
-/// Cameras that see a point.
+/// Number of cameras that see a point.
 fn seen_by(scene: &Scene, point: Vec3) -> usize {
     let seen = scene.cameras.iter().filter(|camera| {
         camera.project(point).is_some() && !scene.occluded(&Ray::between(camera.center, point))
@@ -138,7 +137,7 @@ mod tests {
             assert!(place.x.abs() + 0.15 < 1.0 && place.z.abs() + 0.15 < 1.0);
             let apart = found[..index].iter().map(|other| other.distance(*place));
             assert!(apart.fold(f32::INFINITY, f32::min) > 0.3);
-            // Not beside the block and through its side.
+            // Neither beside the block nor through its side.
             let block = (place.x + 0.35).abs() < 0.4 && (place.z + 0.3).abs() < 0.35;
             assert!(!block || place.y - floor > 0.5, "{place}");
         }

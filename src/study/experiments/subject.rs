@@ -1,4 +1,4 @@
-//! What a study solves: a scene with photographs, and its truth where that is known.
+//! What a study solves: a scene with photographs, and its truth if known.
 
 use crate::calibrate::problem::Problem;
 use crate::capture::Capture;
@@ -13,21 +13,21 @@ use std::sync::Arc;
 /// A named problem with its truth.
 #[derive(Debug, Clone)]
 pub struct Subject {
-    /// The name shown to people.
+    /// Display name.
     pub name: String,
-    /// The files as they were read.
+    /// The capture.
     pub capture: Arc<Capture>,
     /// The scene and its photographs.
     pub problem: Problem,
-    /// The truth, or that there is none.
+    /// Measures estimates, by the truth if known.
     pub judge: Judge,
 }
 
 impl Subject {
-    /// A room, photographed.
+    /// A room, with rendered photographs.
     ///
     /// # Errors
-    /// The room's mesh holds nothing to see.
+    /// The room's mesh is empty.
     pub fn of_room(room: &Room, rendering: &Rendering) -> Result<Self> {
         Self::of_photographs(room, photographs::render(room, rendering)?)
     }
@@ -35,7 +35,7 @@ impl Subject {
     /// A room with photographs of it, one a view and all of one size.
     ///
     /// # Errors
-    /// The room's mesh holds nothing to see, or there is no photograph.
+    /// The room's mesh is empty, or there is no photograph.
     pub fn of_photographs(room: &Room, photographs: Vec<Photograph>) -> Result<Self> {
         let (capture, problem, reference) = rooms::with_photographs(room, photographs)?;
         Ok(Self {
@@ -46,7 +46,7 @@ impl Subject {
         })
     }
 
-    /// The truth, where it is known.
+    /// The truth, if known.
     pub fn truth(&self) -> Option<&Reference> {
         match &self.judge {
             Judge::Truth(reference) => Some(reference),

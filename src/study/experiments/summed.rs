@@ -1,4 +1,4 @@
-//! Paths evaluated in 32 bits, as the fit does it, and in 64.
+//! Paths evaluated in 32 bits, as in the fit, and in 64 bits.
 
 use crate::calibrate::problem::Problem;
 use crate::inverse::paths::derivative::{Gradient, differentiate};
@@ -16,19 +16,19 @@ const KEY: u64 = 0x7375_6d73;
 const ALBEDO: f32 = 0.55;
 /// Longest path in bounces.
 const BOUNCES: u32 = 64;
-/// Paths of which the lamps' shares are taken.
-const SHARED: usize = 10_000;
+/// Paths for comparing the light of two lamps.
+const LAMP_PATHS: usize = 10_000;
 
-/// Paths through the pixels of all photographs, one after the other. Two objects are their lamps, drawn alike.
+/// Paths through the pixels of all photographs in turn. Two objects are lamps, sampled with equal probability.
 pub struct Paths {
     vertices: Vec<Vertex>,
-    ends: Vec<usize>,
+    path_ends: Vec<usize>,
     surfaces: usize,
     lamps: [usize; 2],
 }
 
 impl Paths {
-    /// Traces so many paths, with these objects as lamps.
+    /// Traces `count` paths with two objects as lamps.
     pub fn trace(problem: &Problem, lamps: [usize; 2], count: usize) -> Self {
         let scene = &*problem.scene;
         let surfaces = scene.objects.len();
@@ -37,7 +37,7 @@ impl Paths {
         let lights = Emitters::new(scene, &weights);
         let believed = vec![ALBEDO; surfaces];
         let tracer = tracer(scene, &lights, &believed, LightSampling::Mis, BOUNCES);
-        let (mut vertices, mut ends) = (Vec::new(), Vec::new());
+        let (mut vertices, mut path_ends) = (Vec::new(), Vec::new());
         for path in 0..count {
             let frame = path % scene.cameras.len().max(1);
             let camera = &scene.cameras[frame];
@@ -46,34 +46,34 @@ impl Paths {
             let pixel = stream.below((width * height) as usize) as u32;
             let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
             tracer.pixel_path(camera, corner, &mut stream, &mut vertices);
-            ends.push(vertices.len());
+            path_ends.push(vertices.len());
         }
         Self {
             vertices,
-            ends,
+            path_ends,
             surfaces,
             lamps,
         }
     }
 
-    /// How many.
+    /// Number of paths.
     pub fn count(&self) -> usize {
-        self.ends.len()
+        self.path_ends.len()
     }
 
     /// The first `count` paths.
     fn first(&self, count: usize) -> impl Iterator<Item = &[Vertex]> {
-        let starts = std::iter::once(0).chain(self.ends.iter().copied());
-        let each = starts.zip(&self.ends).take(count);
-        each.map(|(start, &end)| &self.vertices[start..end])
+        let starts = std::iter::once(0).chain(self.path_ends.iter().copied());
+        let ranges = starts.zip(&self.path_ends).take(count);
+        ranges.map(|(start, &end)| &self.vertices[start..end])
     }
 
-    /// Sum over the first `count` paths, with lamps of radiance one, by adding up 32 bits.
+    /// Sum over the first `count` paths with lamps of radiance one, accumulated in 32 bits.
     pub fn in_f32(&self, count: usize) -> f64 {
         f64::from(self.radiances(count, [1.0, 1.0]).sum::<f32>())
     }
 
-    /// The same with a sum of 64 bits.
+    /// The same, accumulated in 64 bits.
     pub fn in_f64(&self, count: usize) -> f64 {
         self.radiances(count, [1.0, 1.0]).map(f64::from).sum()
     }
@@ -84,14 +84,15 @@ impl Paths {
         (sum(self, count) / exact - 1.0).abs()
     }
 
-    /// Relative error of the light that a lamp of radiance one adds to that of one `ratio` times as bright.
-    pub fn of_dim_lamp(&self, ratio: f64) -> f64 {
-        let sum = |lamps: [f32; 2]| -> f64 { self.radiances(SHARED, lamps).map(f64::from).sum() };
+    /// Relative error of the contribution of a lamp of radiance one beside a lamp of radiance `ratio`.
+    pub fn dim_lamp_error(&self, ratio: f64) -> f64 {
+        let sum =
+            |lamps: [f32; 2]| -> f64 { self.radiances(LAMP_PATHS, lamps).map(f64::from).sum() };
         let found = sum([1.0, ratio as f32]) - sum([0.0, ratio as f32]);
-        (found / self.exact(SHARED, [1.0, 0.0]) - 1.0).abs()
+        (found / self.exact(LAMP_PATHS, [1.0, 0.0]) - 1.0).abs()
     }
 
-    /// Radiance of each path in 32 bits.
+    /// Radiance of each path, in 32 bits.
     fn radiances(&self, count: usize, radiances: [f32; 2]) -> impl Iterator<Item = f32> {
         let mut unknowns = Unknowns {
             albedo: vec![Vec3::splat(ALBEDO); self.surfaces],
@@ -108,13 +109,13 @@ impl Paths {
         })
     }
 
-    /// Sum over paths in 64 bits throughout, from the same weights.
+    /// Sum over paths, in 64 bits throughout, from the same weights.
     fn exact(&self, count: usize, radiances: [f64; 2]) -> f64 {
         let emission = |surface: u32| {
             let lamp = self.lamps.iter().position(|&l| l == surface as usize);
             lamp.map_or(0.0, |lamp| radiances[lamp])
         };
-        let of = |path: &[Vertex]| {
+        let radiance = |path: &[Vertex]| {
             path.iter().rev().fold(0.0, |beyond, v| {
                 let lamp = if v.lamp == NO_LAMP {
                     0.0
@@ -125,6 +126,6 @@ impl Paths {
                     + f64::from(ALBEDO) * (beyond + lamp)
             })
         };
-        self.first(count).map(of).sum()
+        self.first(count).map(radiance).sum()
     }
 }

@@ -1,4 +1,4 @@
-//! How exactly the albedo of a single object can be known.
+//! Study: accuracy of a single object's albedo.
 
 use crate::error::Result;
 use crate::export::plot::{Axis, Draw, Plot, Series};
@@ -7,10 +7,10 @@ use crate::inverse::settings::{LightSampling, Preset, Settings};
 use crate::study::experiments::course::{
     CACHE_WITHOUT, Gauge, Mark, cache_settings, cached, descend, paper_settings,
 };
-use crate::study::experiments::findings::brief;
+use crate::study::experiments::findings::{Findings, Summary, brief};
 use crate::study::experiments::objects::{self, Posed};
+use crate::study::experiments::study::{Bench, Limits, Study};
 use crate::study::experiments::twin::{Sizes, twin};
-use crate::study::experiments::{Bench, Findings, Limits, Study, Summary};
 
 /// The study.
 pub const STUDY: Study = Study {
@@ -21,9 +21,9 @@ pub const STUDY: Study = Study {
     run,
 };
 
-/// Seeds of the paper's descent, which takes the time of all its solves.
+/// Seeds of the paper's descent, which always takes its full time.
 const PAPER_SEEDS: u64 = 2;
-/// Time of one solve of the descent, in fractions of one of the transport cache.
+/// Time of one solve of the descent, relative to one of the transport cache.
 const PAPER_FRACTION: f64 = 2.0;
 
 /// One object, solved with several seeds.
@@ -65,7 +65,7 @@ fn run(bench: &Bench) -> Result<Findings> {
             let posed = &all[last].posed;
             let solver = if by_cache { "transport cache" } else { "paper" };
             bench.begin(&format!("{}, {solver}, seed {seed}", posed.name))?;
-            let gauge = Gauge::new(&posed.subject, u32::MAX).watching(&posed.object);
+            let gauge = Gauge::new(&posed.subject, u32::MAX).watch_object(&posed.object);
             if by_cache {
                 let settings = settings(posed, seed, bench.quick, limits.seconds);
                 let end = cached(bench, &gauge, &settings)?;
@@ -126,7 +126,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     })
 }
 
-/// When solves end, a sentence.
+/// When the solves end, as a sentence.
 fn stopping(quick: bool, aims: &[String], limits: Limits) -> String {
     if quick {
         return "Solves end by themselves, and the preset is `preview` but for the object in closed form: this is the short \
@@ -169,8 +169,8 @@ fn root_mean_square(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
-fn mean(marks: &[Mark], of: impl Fn(&Mark) -> f64) -> f64 {
-    marks.iter().map(of).sum::<f64>() / marks.len().max(1) as f64
+fn mean(marks: &[Mark], value: impl Fn(&Mark) -> f64) -> f64 {
+    marks.iter().map(value).sum::<f64>() / marks.len().max(1) as f64
 }
 
 fn table(all: &[Solved]) -> Table {

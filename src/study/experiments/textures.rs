@@ -1,4 +1,4 @@
-//! How textures come out, coarse to fine.
+//! Study: textures, from coarse to fine.
 
 use crate::calibrate::problem::Problem;
 use crate::error::Result;
@@ -12,9 +12,10 @@ use crate::inverse::solver::{Control, Observer, Progress, Termination};
 use crate::math::picture::Picture;
 use crate::room::truth::albedo_picture;
 use crate::study::experiments::course::{cache_settings, paper_settings, solved};
-use crate::study::experiments::findings::{Grid, brief};
+use crate::study::experiments::findings::{Findings, Grid, Summary, brief};
 use crate::study::experiments::furnished::built_in;
-use crate::study::experiments::{Bench, Findings, Study, Subject, Summary};
+use crate::study::experiments::study::{Bench, Study};
+use crate::study::experiments::subject::Subject;
 use crate::transport::lit::Lit;
 use glam::Vec3;
 use std::sync::Arc;
@@ -28,16 +29,16 @@ pub const STUDY: Study = Study {
     run,
 };
 
-/// Bounces of the descent here: the photographs hold all light, and what two bounces cut off goes into albedos.
+/// Bounces of the descent here: the photographs have all bounces, and light cut off by two would bias the albedos.
 const BOUNCES: u64 = 8;
 /// The photograph whose albedo is shown.
 const SHOWN: usize = 0;
 
-/// Where textures stood.
+/// Measurements at one state of the textures.
 struct State {
     name: String,
     unknowns: usize,
-    /// Peak signal-to-noise ratio of the albedo pictures in dB, where the truth is known.
+    /// Peak signal-to-noise ratio of the albedo pictures in dB, if the truth is known.
     psnr: Option<f64>,
     loss: Option<f64>,
     seconds: f64,
@@ -45,11 +46,11 @@ struct State {
     picture: Picture,
 }
 
-/// Measures states.
+/// Measures states of the textures.
 struct Measure {
     /// The true albedo seen by each camera.
     truth: Option<Vec<Picture>>,
-    /// For each camera and pixel, whether it counts: no lamp, no edge of the mesh.
+    /// For each camera and pixel, whether it is compared: it sees a surface that is no lamp.
     counts: Vec<Vec<bool>>,
     probe: LossProbe,
 }
@@ -90,7 +91,7 @@ fn run(bench: &Bench) -> Result<Findings> {
         (bench.show)(plot(&states, measure.truth.is_some()));
     }
 
-    // The paper's descent, stage after stage.
+    // The paper's descent, stage by stage.
     bench.begin("the paper's descent")?;
     let settings = descent_settings(bench);
     let mut stages = Stages {
@@ -100,7 +101,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     let solution = solve(&subject.problem, &settings, None, &mut stages)?;
     bench.go_on()?;
     if solution.progress.stages.len() > stages.ended.len() {
-        stages.take(&solution.progress, &solution.estimate);
+        stages.collect(&solution.progress, &solution.estimate);
     }
     for (estimate, seconds, rays, name) in &stages.ended {
         states.push(measure.state(name, &subject.problem, estimate, *seconds, *rays));
@@ -129,7 +130,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     Ok(findings(how, states, measure.truth))
 }
 
-/// The paper's solver as the program runs it, but for the bounces; in the quick form nothing is annealed and steps are long.
+/// The paper's solver as in the program, except for the bounces; with `quick`, without annealing and with large steps.
 fn descent_settings(bench: &Bench) -> Settings {
     let settings = Settings {
         bounces: BOUNCES,
@@ -150,14 +151,14 @@ fn descent_settings(bench: &Bench) -> Settings {
     }
 }
 
-/// Keeps what the stages of a solve leave: estimate, seconds, rays and name.
+/// Collects the state after each stage of a solve: estimate, seconds, rays and name.
 struct Stages<'a, 'b> {
     bench: &'a Bench<'b>,
     ended: Vec<(Estimate, f64, u64, String)>,
 }
 
 impl Stages<'_, '_> {
-    fn take(&mut self, progress: &Progress, estimate: &Estimate) {
+    fn collect(&mut self, progress: &Progress, estimate: &Estimate) {
         let name = progress.stages.last().map_or("", |stage| &stage.name);
         let name = format!("paper, {name}");
         let (seconds, rays) = (progress.seconds, progress.rays);
@@ -168,7 +169,7 @@ impl Stages<'_, '_> {
 impl Observer for Stages<'_, '_> {
     fn observe(&mut self, progress: &Progress, estimate: &Estimate) -> Control {
         if progress.stages.len() > self.ended.len() {
-            self.take(progress, estimate);
+            self.collect(progress, estimate);
             let why = progress.stages.last().map_or("", |stage| &stage.why);
             (self.bench.say)(why);
         }
@@ -179,15 +180,15 @@ impl Observer for Stages<'_, '_> {
     }
 }
 
-/// Unknown albedos of an estimate: of objects, or of patches or cells that a pixel saw.
+/// Number of unknown albedos: objects, or visible patches or texels.
 fn unknowns(estimate: &Estimate) -> usize {
     let cells = |texels: &Arc<TexelEstimate>| {
-        // Texels of one patch hold the same colour.
+        // Texels of a patch have the same colour.
         let layout = &texels.colors.layout;
         let mut count = 0;
         for triangle in layout.first.windows(2) {
-            let own = triangle[0] as usize..triangle[1] as usize;
-            let mut colors: Vec<[u32; 3]> = (own.filter(|&t| texels.seen[t] > 0))
+            let range = triangle[0] as usize..triangle[1] as usize;
+            let mut colors: Vec<[u32; 3]> = (range.filter(|&t| texels.seen[t] > 0))
                 .map(|t| texels.colors.colors[t].to_array().map(f32::to_bits))
                 .collect();
             colors.sort_unstable();
@@ -315,7 +316,7 @@ fn findings(how: String, states: Vec<State>, truth: Option<Vec<Picture>>) -> Fin
     }
 }
 
-/// How right the albedo pictures are over rays; `known` says whether the truth is.
+/// Accuracy of the albedo pictures over rays, by PSNR if the truth is `known`, else by loss.
 fn plot(states: &[State], known: bool) -> Plot {
     let point = |state: &State| Some([state.rays as f64, state.psnr.or(state.loss)?]);
     let series = |name: &str, solver: &str| Series {
@@ -351,7 +352,7 @@ fn seen(states: &[State]) -> Vec<String> {
         .iter()
         .map(|s| format!("{} {}", s.name, score(s)))
         .collect();
-    // Higher is better for both.
+    // Larger is better for both.
     let value = |state: &State| {
         state
             .psnr
@@ -393,7 +394,7 @@ fn seen(states: &[State]) -> Vec<String> {
 mod tests {
     use super::*;
 
-    fn said(scores: [f64; 5]) -> String {
+    fn text(scores: [f64; 5]) -> String {
         let names = [
             "cache",
             "cache, textures",
@@ -417,12 +418,12 @@ mod tests {
 
     #[test]
     fn the_paper_s_gain_is_seen_where_patches_are_better_than_one_colour_of_both_solvers() {
-        let gains = said([24.0, 37.0, 23.5, 26.0, 30.0]);
+        let gains = text([24.0, 37.0, 23.5, 26.0, 30.0]);
         assert!(
             gains.contains("\"cut 1\": +6.5 dB from its own") && gains.contains("of it was seen")
         );
         assert!(gains.contains("+6.0 dB from the transport"));
-        let worse = said([24.0, 37.0, 20.0, 22.0, 23.0]);
+        let worse = text([24.0, 37.0, 20.0, 22.0, 23.0]);
         assert!(worse.contains("+3.0 dB from its own") && worse.contains("was not seen"));
     }
 }

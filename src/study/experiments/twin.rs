@@ -1,5 +1,5 @@
-//! The twin of a capture: a room with its mesh and its cameras whose colours and lamps are those that a solve of the
-//! capture found. What is true of it is known, so that studies can count errors there.
+//! The twin of a capture: a room with its mesh and cameras, and with the colours and lamps that a solve found. Its
+//! truth is known, so that studies can measure errors.
 
 use crate::capture::camera::Pose;
 use crate::capture::mesh::Mesh;
@@ -11,48 +11,50 @@ use crate::room::cameras::View;
 use crate::room::photographs::Rendering;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
+use crate::study::experiments::box_room;
 use crate::study::experiments::course::{cache_settings, solved};
-use crate::study::experiments::{Bench, Subject, box_room};
+use crate::study::experiments::study::Bench;
+use crate::study::experiments::subject::Subject;
 use crate::transport::material::Material;
 use glam::Vec3;
 
-/// No surface reflects more, as in studies' own rooms; light between whiter ones would hardly ever end.
-const WHITEST: f32 = 0.98;
-/// Fewest and most paths a pixel of its photographs.
-const PATHS: [u64; 2] = [16, 128];
+/// Largest albedo, as in the studies' own rooms; whiter ones would need very long paths.
+const MAX_ALBEDO: f32 = 0.98;
+/// Range of the samples per pixel of its photographs.
+const SAMPLES: [u64; 2] = [16, 128];
 
-/// The room that a study runs in, and how it is photographed.
+/// The room that a study uses, and the settings of its photographs.
 #[derive(Debug, Clone)]
 pub struct Studied {
     /// Geometry and truth.
     pub room: Room,
-    /// How it is photographed.
+    /// Settings of its photographs.
     pub rendering: Rendering,
-    /// What it is, a phrase that begins a sentence.
+    /// Description, as the beginning of a sentence.
     pub words: String,
 }
 
 impl Studied {
-    /// The room, photographed with all bounces.
+    /// The room, with photographs of all bounces.
     ///
     /// # Errors
-    /// The mesh holds nothing to see.
+    /// The mesh is empty.
     pub fn photographed(&self) -> Result<Subject> {
         Subject::of_room(&self.room, &self.rendering)
     }
 }
 
-/// How a twin is photographed.
+/// Size of a twin's photographs.
 #[derive(Debug, Clone, Copy)]
 pub struct Sizes {
     /// Pixels along the longer side.
     pub long_side: u32,
-    /// Paths of all photographs together, as far as each pixel gets no fewer than 16 and no more than 128.
+    /// Total number of paths; each pixel gets between 16 and 128.
     pub paths: u64,
 }
 
 impl Sizes {
-    /// As small as the photographs of studies' own box room.
+    /// As small as the photographs of the studies' box room.
     pub fn small(quick: bool) -> Self {
         let [width, _] = box_room::rendering(quick).size;
         Self {
@@ -62,7 +64,7 @@ impl Sizes {
     }
 }
 
-/// The room that a study of one room runs in: the twin of its capture, else a room of its own, which `words` describe.
+/// The room for a study of one room: the twin of its capture, or its own room with the description `words`.
 ///
 /// # Errors
 /// As [`twin`].
@@ -82,10 +84,10 @@ pub fn studied(
     }))
 }
 
-/// The twin of the capture that a study is run on; `None` where it runs on rooms of its own.
+/// The twin of a study's capture; `None` if it uses its own rooms.
 ///
 /// # Errors
-/// The capture cannot be solved, no lamp was found in it, or the study is to end.
+/// The capture cannot be solved, it has no lamp, or the study is stopped.
 pub fn twin(bench: &Bench, sizes: Sizes) -> Result<Option<Studied>> {
     let Some(subject) = bench.subject else {
         return Ok(None);
@@ -102,7 +104,7 @@ pub fn twin(bench: &Bench, sizes: Sizes) -> Result<Option<Studied>> {
     Ok(Some(Studied {
         words: format!(
             "The {}: its mesh, its views through ideal lenses of the first one's shape, and the colours and lamps that the transport cache found in \
-             it (one an object, none above {WHITEST}, light from outside left away), photographed with all bounces in {} photographs of {width} × \
+             it (one an object, none above {MAX_ALBEDO}, light from outside left away), photographed with all bounces in {} photographs of {width} × \
              {height} pixels with {} paths each, so that the truth is known",
             room.name,
             room.views.len(),
@@ -118,7 +120,7 @@ fn room_of(subject: &Subject, estimate: &Estimate) -> Result<Room> {
     let scene = &*subject.problem.scene;
     let materials: Vec<Material> = (estimate.objects.iter())
         .map(|object| {
-            let albedo = object.albedo.clamp(Vec3::ZERO, Vec3::splat(WHITEST));
+            let albedo = object.albedo.clamp(Vec3::ZERO, Vec3::splat(MAX_ALBEDO));
             Material::diffuse(albedo, object.emission)
         })
         .collect();
@@ -161,17 +163,17 @@ fn view(scene: &Scene, camera: &Camera) -> View {
     }
 }
 
-/// Photographs with the shape of the first camera's.
+/// Settings of photographs with the aspect ratio of the first camera.
 fn rendering(cameras: &[Camera], sizes: Sizes) -> Rendering {
     let size = (cameras.first()).map_or([1; 2], |camera| {
         let small = camera.shrunk(sizes.long_side).intrinsics;
         [small.width, small.height]
     });
     let pixels = cameras.len() as u64 * u64::from(size[0]) * u64::from(size[1]);
-    let [fewest, most] = PATHS;
+    let [min, max] = SAMPLES;
     Rendering {
-        seed: box_room::NOISE,
-        samples: (sizes.paths / pixels.max(1)).clamp(fewest, most) as u32,
+        seed: box_room::PHOTOGRAPH_SEED,
+        samples: (sizes.paths / pixels.max(1)).clamp(min, max) as u32,
         size,
     }
 }

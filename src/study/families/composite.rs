@@ -1,4 +1,4 @@
-//! A chair put into photographs of a generated room by its estimate, compared with the chair truly there.
+//! Composites of a chair in photographs of a generated room, compared with the chair truly in the room.
 
 use crate::capture::exposure::Exposure;
 use crate::compose::backdrop::Backdrop;
@@ -17,7 +17,7 @@ use crate::room::generated::Family;
 use crate::room::shape::Modeller;
 use crate::scene::Scene;
 use crate::study::experiments::{Cylinder, chair, places, up};
-use crate::study::families::Plan;
+use crate::study::families::plan::Plan;
 use crate::study::families::score::{Solved, solved};
 use crate::transport::denoise::Denoiser;
 use crate::transport::lit::Lit;
@@ -26,24 +26,25 @@ use crate::transport::path::PathOptions;
 use glam::{DAffine3, DQuat, DVec3, Vec2, Vec3};
 use std::sync::Arc;
 
-/// The chair: reflectance, height, and radius of a cylinder around it in metres.
+/// The chair's reflectance.
 const ALBEDO: Vec3 = Vec3::new(0.55, 0.33, 0.16);
+/// A cylinder around the chair, in metres.
 const CHAIR: Cylinder = Cylinder {
     radius: 0.31,
     height: 0.85,
 };
-/// How far above the floor it stands, in metres, as on one that is not quite flat.
+/// Gap between floor and chair in metres, for floors that are not quite flat.
 const LIFT: f32 = 2e-3;
-/// Photographs that it is put into.
+/// Number of photographs that it is inserted into.
 const FRAMES: usize = 2;
-/// Part of a photograph that it covers at least and at most.
+/// Range of the fraction of a photograph that it covers.
 const COVERED: [f64; 2] = [0.005, 0.3];
-/// Paths a pixel of the composite, in two halves, and of the truth.
+/// Samples per pixel of the composite, in two halves, and of the truth.
 const SAMPLES: [u32; 2] = [64, 256];
-/// A pixel beside the chair belongs to its shadow and bleed if the chair changes it by so much, at the photograph's exposure.
+/// Shadow and bleed are the pixels beside the chair that it changes by more than this, at the photograph's exposure.
 const CHANGED: f32 = 0.025;
 
-/// How the composites in one room compare with the truth; means over its photographs.
+/// Comparison of the composites in a room with the truth; means over its photographs.
 #[derive(Debug, Clone)]
 pub struct CompositeRow {
     /// The room's family.
@@ -52,25 +53,25 @@ pub struct CompositeRow {
     pub seed: u64,
     /// Seconds of the solve.
     pub seconds: f64,
-    /// PSNR in dB over the chair, as shown at the photograph's exposure: the composite's.
+    /// PSNR of the composite in dB over the chair, displayed at the photograph's exposure.
     pub chair: f64,
-    /// The naive composite's.
+    /// The same of the naive composite.
     pub naive: f64,
-    /// Brightness of the chair over the true one.
+    /// Ratio of the chair's brightness to the true one.
     pub brightness: f64,
-    /// PSNR in dB over the shadow and bleed: the composite's; `None` where the chair changes nothing beside itself.
+    /// PSNR of the composite in dB over shadow and bleed; `None` if the chair changes no pixel beside it.
     pub shadow: Option<f64>,
-    /// The untouched photograph's.
+    /// The same of the photograph without the chair.
     pub untouched: Option<f64>,
-    /// Least-squares slope of the composite's change there on the true one: 1 is right.
+    /// Least-squares slope of the composite's change there over the true change; 1 is right.
     pub slope: Option<f64>,
 }
 
-/// Draws a room, solves it, and puts a chair into the photographs that see most of where it stands; `None` where the floor has no
-/// free place in view for one.
+/// Generates and solves a room, and inserts a chair into the photographs that see most of it. `None` if the floor has
+/// no visible free place.
 ///
 /// # Errors
-/// The room cannot be drawn or solved.
+/// The room cannot be generated or solved.
 pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<CompositeRow>> {
     let solved = solved(family, seed, plan)?;
     let truth = Arc::new(solved.room.lit.clone());
@@ -82,16 +83,16 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
         &Placement::as_modelled("chair"),
         &truth.scene,
     )?)];
-    let frames = max_seen(&truth, &true_chair);
+    let frames = most_seen(&truth, &true_chair);
     let scores = (frames.iter())
         .map(|&frame| scores(&solved, frame, &truth, &true_chair, &chair))
         .collect::<Result<Vec<_>>>()?;
     let count = scores.len() as f64;
-    let mean = |of: fn(&Scores) -> f64| scores.iter().map(of).sum::<f64>() / count;
-    let told: Vec<Beside> = scores.iter().filter_map(|s| s.beside).collect();
-    let beside = |of: fn(&Beside) -> f64| {
-        let sum: f64 = told.iter().map(of).sum();
-        (!told.is_empty()).then(|| sum / told.len() as f64)
+    let mean = |score: fn(&Scores) -> f64| scores.iter().map(score).sum::<f64>() / count;
+    let changed: Vec<AroundScores> = scores.iter().filter_map(|s| s.around).collect();
+    let around = |score: fn(&AroundScores) -> f64| {
+        let sum: f64 = changed.iter().map(score).sum();
+        (!changed.is_empty()).then(|| sum / changed.len() as f64)
     };
     Ok((!scores.is_empty()).then(|| CompositeRow {
         family,
@@ -100,21 +101,21 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
         chair: mean(|s| s.chair),
         naive: mean(|s| s.naive),
         brightness: mean(|s| s.brightness),
-        shadow: beside(|b| b.shadow),
-        untouched: beside(|b| b.untouched),
-        slope: beside(|b| b.slope),
+        shadow: around(|b| b.shadow),
+        untouched: around(|b| b.untouched),
+        slope: around(|b| b.slope),
     }))
 }
 
 impl CompositeRow {
-    /// In a line.
+    /// As a line of text.
     pub fn words(&self) -> String {
-        let told = self.shadow.zip(self.untouched).zip(self.slope);
-        let beside = told.map_or("none".to_owned(), |((shadow, untouched), slope)| {
+        let scores = self.shadow.zip(self.untouched).zip(self.slope);
+        let around = scores.map_or("none".to_owned(), |((shadow, untouched), slope)| {
             format!("{shadow:.1} dB (untouched {untouched:.1}), slope {slope:.2}")
         });
         format!(
-            "{} room {}: chair {:.1} dB (naive {:.1}), brightness {:.2}; shadow {beside}; {:.0} s",
+            "{} room {}: chair {:.1} dB (naive {:.1}), brightness {:.2}; shadow {around}; {:.0} s",
             self.family.name(),
             self.seed,
             self.chair,
@@ -125,23 +126,23 @@ impl CompositeRow {
     }
 }
 
-/// What holds over rooms.
+/// Summary over rooms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decision {
-    /// Rooms.
+    /// Number of rooms.
     pub rooms: usize,
-    /// Those in which the chair is nearer to the truth than the naive one.
+    /// Rooms in which the chair has a higher PSNR than the naive one.
     pub better: usize,
-    /// Median gain in dB over the naive one.
+    /// Median gain in dB over the naive composite.
     pub gain: f64,
-    /// Those in which the chair's brightness is within 15 %.
+    /// Rooms in which the chair's brightness is within 15 %.
     pub bright: usize,
-    /// Those in which the slope lies between 0.7 and 1.3.
+    /// Rooms in which the slope is between 0.7 and 1.3.
     pub strong: usize,
 }
 
 impl Decision {
-    /// Over some rooms.
+    /// Summarizes rooms.
     pub fn of(rows: &[CompositeRow]) -> Self {
         let mut gains: Vec<f64> = rows.iter().map(|row| row.chair - row.naive).collect();
         let count =
@@ -155,7 +156,7 @@ impl Decision {
         }
     }
 
-    /// In a line.
+    /// As a line of text.
     pub fn words(&self) -> String {
         let Self {
             rooms,
@@ -223,8 +224,8 @@ fn standing(truth: &Lit) -> Result<Option<Arc<ObjectModel>>> {
     ObjectModel::from_corners("chair", corners, material).map(|model| Some(Arc::new(model)))
 }
 
-/// The photographs that see most of the chair, but not little else.
-fn max_seen(truth: &Arc<Lit>, chair: &[Arc<PlacedObject>]) -> Vec<usize> {
+/// The photographs that see most of the chair, without those that it nearly fills.
+fn most_seen(truth: &Arc<Lit>, chair: &[Arc<PlacedObject>]) -> Vec<usize> {
     let world = FurnishedScene::new(truth, chair);
     let seen = |frame: usize| {
         let camera = &truth.scene.cameras[frame];
@@ -243,25 +244,25 @@ fn max_seen(truth: &Arc<Lit>, chair: &[Arc<PlacedObject>]) -> Vec<usize> {
     frames.into_iter().map(|(_, frame)| frame).collect()
 }
 
-/// Scores of one photograph.
+/// Scores in one photograph.
 #[derive(Debug, Clone, Copy)]
 struct Scores {
     chair: f64,
     naive: f64,
     brightness: f64,
-    /// Where the chair changes anything beside itself.
-    beside: Option<Beside>,
+    /// Scores beside the chair, if it changes any pixel there.
+    around: Option<AroundScores>,
 }
 
 /// Scores over the shadow and bleed.
 #[derive(Debug, Clone, Copy)]
-struct Beside {
+struct AroundScores {
     shadow: f64,
     untouched: f64,
     slope: f64,
 }
 
-/// Compares the composite, the naive one and the untouched photograph of a frame with the truth.
+/// Compares the composite, the naive composite and the photograph of a frame with the truth.
 fn scores(
     solved: &Solved,
     frame: usize,
@@ -273,7 +274,7 @@ fn scores(
     let photograph = &problem.photographs[frame];
     let options = PathOptions::default();
 
-    // The truth, in the photograph's values: its exposure is the one that the empty room has in it.
+    // The truth in the photograph's values. Its exposure is fitted to the empty room.
     let backdrop =
         |scene: &Scene, exposure| Backdrop::new(frame, &scene.cameras[frame], photograph, exposure);
     let true_backdrop = backdrop(&truth.scene, Exposure::default())?;
@@ -286,22 +287,22 @@ fn scores(
     );
     with.pass(SAMPLES[1]);
     let layers = with.layers();
-    let shows = &photograph.pixels;
-    let told: Vec<bool> = (0..shows.len())
+    let pixels = &photograph.pixels;
+    let valid: Vec<bool> = (0..pixels.len())
         .map(|i| photograph.is_usable(i) && !photograph.is_saturated(i))
         .collect();
-    let fitted = (0..shows.len()).filter(|&i| told[i]);
-    let (top, bottom) = fitted.fold((0.0, 0.0), |(top, bottom), i| {
-        let dark = layers.without.pixels[i];
+    let fitted = (0..pixels.len()).filter(|&i| valid[i]);
+    let (numerator, denominator) = fitted.fold((0.0, 0.0), |(numerator, denominator), i| {
+        let without = layers.without.pixels[i];
         (
-            top + f64::from(dark.dot(shows[i])),
-            bottom + f64::from(dark.dot(dark)),
+            numerator + f64::from(without.dot(pixels[i])),
+            denominator + f64::from(without.length_squared()),
         )
     });
-    if bottom <= 0.0 {
+    if denominator <= 0.0 {
         return Err(Error::new("the photograph", "shows nothing", ""));
     }
-    let exposure = (top / bottom) as f32;
+    let exposure = (numerator / denominator) as f32;
     let shown = |v: Vec3| v.clamp(Vec3::ZERO, Vec3::ONE);
     let truth_at = |i: usize| shown(layers.with.pixels[i] * exposure);
     let change_at = |i: usize| truth_at(i) - shown(layers.without.pixels[i] * exposure);
@@ -328,44 +329,45 @@ fn scores(
     let naive = Pasted::new(&plain, &lit, &placed, &[light], Exposure::default());
     let naive = naive.over(&plain.photograph);
 
-    // The chair, and what it changes around itself.
-    let on: Vec<usize> = (0..shows.len())
+    // The chair, and the pixels beside it that it changes.
+    let covered: Vec<usize> = (0..pixels.len())
         .filter(|&i| layers.alpha[i] > 0.95)
         .collect();
-    let beside: Vec<usize> = (0..shows.len())
+    let around: Vec<usize> = (0..pixels.len())
         .filter(|&i| {
-            layers.alpha[i] == 0.0 && told[i] && change_at(i).abs().max_element() > CHANGED
+            layers.alpha[i] == 0.0 && valid[i] && change_at(i).abs().max_element() > CHANGED
         })
         .collect();
     let psnr =
-        |pixels: &[usize], picture: &dyn Fn(usize) -> Vec3, truth: &dyn Fn(usize) -> Vec3| {
-            let off = pixels.iter().map(|&i| {
+        |indices: &[usize], picture: &dyn Fn(usize) -> Vec3, truth: &dyn Fn(usize) -> Vec3| {
+            let squares = indices.iter().map(|&i| {
                 let display = |v: Vec3| shown(v).map(linear_to_srgb);
                 f64::from((display(picture(i)) - display(truth(i))).length_squared()) / 3.0
             });
             -10.0
-                * (off.sum::<f64>() / pixels.len().max(1) as f64)
+                * (squares.sum::<f64>() / indices.len().max(1) as f64)
                     .max(1e-9)
                     .log10()
         };
-    // Beside the chair the true change is put onto the photograph itself, whose noise is nobody's error.
-    let truly_changed = |i: usize| shows[i] + change_at(i);
-    let sum = |of: &dyn Fn(usize) -> f32, pixels: &[usize]| -> f64 {
-        pixels.iter().map(|&i| f64::from(of(i))).sum()
+    // Beside the chair, the true change is added to the photograph itself, so that its noise is no error.
+    let true_at = |i: usize| pixels[i] + change_at(i);
+    let sum = |value: &dyn Fn(usize) -> f32, indices: &[usize]| -> f64 {
+        indices.iter().map(|&i| f64::from(value(i))).sum()
     };
     let ours_at = |i: usize| ours.pixels[i];
     let slope = || {
-        let ours = |i: usize| (ours_at(i) - shows[i]).dot(change_at(i));
-        sum(&ours, &beside) / sum(&|i| change_at(i).length_squared(), &beside)
+        let ours = |i: usize| (ours_at(i) - pixels[i]).dot(change_at(i));
+        sum(&ours, &around) / sum(&|i| change_at(i).length_squared(), &around)
     };
-    let bright = |of: &dyn Fn(usize) -> Vec3| sum(&|i| shown(of(i)).element_sum(), &on);
+    let bright =
+        |picture: &dyn Fn(usize) -> Vec3| sum(&|i| shown(picture(i)).element_sum(), &covered);
     Ok(Scores {
-        chair: psnr(&on, &ours_at, &truth_at),
-        naive: psnr(&on, &|i| naive.pixels[i], &truth_at),
+        chair: psnr(&covered, &ours_at, &truth_at),
+        naive: psnr(&covered, &|i| naive.pixels[i], &truth_at),
         brightness: bright(&ours_at) / bright(&truth_at),
-        beside: (!beside.is_empty()).then(|| Beside {
-            shadow: psnr(&beside, &ours_at, &truly_changed),
-            untouched: psnr(&beside, &|i| shows[i], &truly_changed),
+        around: (!around.is_empty()).then(|| AroundScores {
+            shadow: psnr(&around, &ours_at, &true_at),
+            untouched: psnr(&around, &|i| pixels[i], &true_at),
             slope: slope(),
         }),
     })

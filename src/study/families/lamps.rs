@@ -1,27 +1,27 @@
-//! Lamps that were found, and objects that were taken for lamps.
+//! Counts lamps that were found, and objects that were mistaken for lamps.
 
 use crate::math::color::luminance_f64;
 use crate::study::evaluate::ObjectErrors;
 use crate::transport::environment::Environment;
 use glam::DVec3;
 
-/// Largest factor between the emission of a lamp that counts as found and the true one.
+/// Largest factor between the estimated and the true emission of a lamp that counts as found.
 const FACTOR: f64 = 2.0;
-/// Fraction of the brightest true emission that makes a lamp of what is none.
-const FALSE: f64 = 0.01;
+/// An object without emission is a false lamp above this fraction of the largest true emission.
+const FALSE_FRACTION: f64 = 0.01;
 
 /// Numbers of lamps.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Lamps {
-    /// Lamps that there are.
-    pub there: u64,
-    /// Of them, those whose brightness was found.
+    /// True lamps.
+    pub true_count: u64,
+    /// True lamps whose brightness was found.
     pub found: u64,
-    /// Objects that are none and were given light.
-    pub made_up: u64,
+    /// False lamps: objects without emission that were given one.
+    pub false_count: u64,
 }
 
-/// Counts lamps by luminance. Where there is no lamp, the mean radiance from outside takes the place of the brightest emission.
+/// Counts lamps by luminance. Without true lamps, false ones are measured against the mean radiance from outside.
 pub fn count(errors: &[(String, ObjectErrors)], outside: Option<&Environment>) -> Lamps {
     let light = |emission: [f64; 3]| luminance_f64(DVec3::from(emission));
     let lamps = errors.iter().filter(|(_, errors)| errors.emitter);
@@ -32,10 +32,10 @@ pub fn count(errors: &[(String, ObjectErrors)], outside: Option<&Environment>) -
     for (_, errors) in errors {
         let [estimated, known] = [errors.emission, errors.emission_true].map(light);
         if errors.emitter {
-            lamps.there += 1;
+            lamps.true_count += 1;
             lamps.found += u64::from(estimated <= FACTOR * known && known <= FACTOR * estimated);
         } else {
-            lamps.made_up += u64::from(estimated > FALSE * brightest);
+            lamps.false_count += u64::from(estimated > FALSE_FRACTION * brightest);
         }
     }
     lamps
@@ -72,13 +72,13 @@ mod tests {
             object(0.09, 0.0),
         ];
         let expected = Lamps {
-            there: 4,
+            true_count: 4,
             found: 2,
-            made_up: 1,
+            false_count: 1,
         };
         assert_eq!(count(&objects, None), expected);
         let sky = Environment::new(4, 2, vec![glam::Vec3::ONE; 8]);
         let dark = [object(0.02, 0.0), object(0.005, 0.0)];
-        assert_eq!(count(&dark, sky.as_ref()).made_up, 1);
+        assert_eq!(count(&dark, sky.as_ref()).false_count, 1);
     }
 }

@@ -1,10 +1,11 @@
-//! Solves of generated rooms, family by family, compared with what is true: what holds over rooms and not of one capture alone.
+//! Solves of generated rooms by family, compared with their truth: what holds over many rooms instead of one capture.
 //!
-//! Each room is a row of rooms.csv, written as soon as it is solved; rows that are there are not solved again. From all rows of one
-//! program, preset and size come rooms.json and rooms.png.
+//! Each room is a row of rooms.csv, which is written as soon as it is solved; existing rows are not solved again.
+//! rooms.json and rooms.png summarize all rows of one program version, preset and size.
 
 mod composite;
 mod lamps;
+mod plan;
 mod plot;
 mod row;
 mod score;
@@ -12,50 +13,37 @@ mod segments;
 mod summary;
 
 pub use composite::{CompositeRow, Decision, composite, table};
+pub use plan::Plan;
 pub use plot::plot;
 pub use row::{Row, Rows};
 pub use score::measure;
 pub use summary::{Quantiles, Summary, summarize};
 
 use crate::error::{Error, Result};
-use crate::inverse::settings::Preset;
 use crate::room::generated::Family;
 use std::path::Path;
 
-/// Which rooms are solved, and how.
-#[derive(Debug, Clone)]
-pub struct Plan {
-    /// The families, one after the other.
-    pub families: Vec<Family>,
-    /// The seeds of the rooms of each, which are those of the solves too.
-    pub seeds: Vec<u64>,
-    /// Width and height of the photographs in pixels.
-    pub size: [u32; 2],
-    /// The preset of every solve.
-    pub preset: Preset,
-}
-
-/// What is told while rooms are solved.
+/// Progress of [`run`].
 #[derive(Debug)]
-pub enum Heard<'a> {
-    /// A room is drawn and solved.
+pub enum RoomEvent<'a> {
+    /// A room is generated and solved.
     Begins(Family, u64),
-    /// It has been solved.
+    /// A room has been solved.
     Solved(&'a Row),
-    /// It could not be.
+    /// A room could not be solved.
     Failed(&'a Error),
 }
 
-/// Solves what rooms.csv in `folder` lacks, until `stopped`; then writes rooms.json and rooms.png of all its rows that belong to the
-/// plan's program, preset and size.
+/// Solves the rooms that rooms.csv in `folder` lacks, until `stopped`; then writes rooms.json and rooms.png over all
+/// rows that belong to the plan.
 ///
 /// # Errors
-/// A file cannot be read or written, or rooms.csv is no such table. Rooms that could not be solved are told of and left out.
+/// A file cannot be read or written, or rooms.csv is another table. Rooms that cannot be solved are reported and left out.
 pub fn run(
     folder: &Path,
     plan: &Plan,
     stopped: &dyn Fn() -> bool,
-    tell: &mut dyn FnMut(Heard),
+    report: &mut dyn FnMut(RoomEvent),
 ) -> Result<Summary> {
     let mut rows = Rows::open(folder)?;
     for &family in &plan.families {
@@ -63,13 +51,13 @@ pub fn run(
             if stopped() || rows.holds(plan, family, seed) {
                 continue;
             }
-            tell(Heard::Begins(family, seed));
+            report(RoomEvent::Begins(family, seed));
             match measure(family, seed, plan) {
                 Ok(row) => {
-                    tell(Heard::Solved(&row));
+                    report(RoomEvent::Solved(&row));
                     rows.append(row)?;
                 }
-                Err(error) => tell(Heard::Failed(&error)),
+                Err(error) => report(RoomEvent::Failed(&error)),
             }
         }
     }

@@ -1,13 +1,14 @@
-//! The rooms of each family as dots: albedo error, and how often the truth lies within two standard errors.
+//! Strip plot of the rooms of each family: albedo error, and coverage of two standard errors.
 
 use crate::export::strips::{Panel, Strips};
 use crate::room::generated::Family;
-use crate::study::families::{Row, Summary};
+use crate::study::families::row::Row;
+use crate::study::families::summary::Summary;
 
-/// How often a normal deviate lies within two standard deviations.
+/// Probability of a normal deviate within two standard deviations.
 const TWO_DEVIATIONS: f64 = 0.954_5;
 
-/// The picture of a summary and the rows that it is of.
+/// The plot of a summary and its rows.
 pub fn plot<'a>(summary: &Summary, rows: impl Iterator<Item = &'a Row>) -> Strips {
     let rows: Vec<&Row> = rows.collect();
     let families = Family::ALL.into_iter().map(Family::name);
@@ -15,11 +16,11 @@ pub fn plot<'a>(summary: &Summary, rows: impl Iterator<Item = &'a Row>) -> Strip
         .filter(|name| summary.families.contains_key(name))
         .collect();
     let dots = |value: fn(&Row) -> Option<f64>| -> Vec<Vec<f64>> {
-        let of = |name: &&str| {
+        let values = |name: &&str| {
             let rows = rows.iter().filter(|row| row.family.name() == *name);
             rows.filter_map(|row| value(row)).collect()
         };
-        families.iter().map(of).collect()
+        families.iter().map(values).collect()
     };
     Strips {
         title: format!(

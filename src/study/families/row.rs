@@ -1,10 +1,10 @@
-//! rooms.csv: a row a room and solve.
+//! rooms.csv: one row for each solved room.
 
 use crate::error::{Error, Result};
 use crate::export::atomic::write_bytes;
 use crate::export::table::{Cell, Table};
 use crate::room::generated::Family;
-use crate::study::families::Plan;
+use crate::study::families::plan::Plan;
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -30,12 +30,12 @@ const COLUMNS: [&str; 18] = [
     "rays",
 ];
 
-/// How a solve of a room compares with the truth.
+/// Comparison of a solved room with its truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// The program's version.
     pub relit: String,
-    /// The preset's word.
+    /// Name of the preset.
     pub preset: String,
     /// Width and height of the photographs in pixels.
     pub size: [u32; 2],
@@ -43,7 +43,7 @@ pub struct Row {
     pub family: Family,
     /// Its seed.
     pub seed: u64,
-    /// Seconds of solving, drawing and loading excluded.
+    /// Seconds of solving, without generating and loading.
     pub seconds: f64,
     /// Objects scored for their albedo.
     pub objects: u64,
@@ -53,24 +53,24 @@ pub struct Row {
     pub albedo_rel_median: Option<f64>,
     /// Peak signal-to-noise ratio in dB against the true albedo pictures.
     pub albedo_psnr: Option<f64>,
-    /// Lamps that there are, whether photographs see them or not.
+    /// True lamps, whether or not photographs see them.
     pub lamps_true: u64,
-    /// Of them, those whose emission was found within a factor of two.
+    /// True lamps whose emission was found within a factor of two.
     pub lamps_found: u64,
-    /// Objects that give no light and were given more than 1 % of the brightest emission.
+    /// Objects without emission that were given more than 1 % of the largest emission.
     pub lamps_false: u64,
-    /// Albedos, one an object and channel, that should lie within their standard errors as often as they say.
+    /// Number of albedos (object and channel) with a reported standard error.
     pub albedos: u64,
     /// Fraction of them within one standard error of the truth.
     pub coverage_1: Option<f64>,
-    /// Within two.
+    /// Fraction of them within two standard errors.
     pub coverage_2: Option<f64>,
     /// Rays of the solve.
     pub rays: u64,
 }
 
 impl Row {
-    /// Whether it was measured as a plan measures.
+    /// Whether the row has the plan's program version, preset and size.
     pub fn belongs_to(&self, plan: &Plan) -> bool {
         self.relit == env!("CARGO_PKG_VERSION")
             && self.preset == plan.preset.word()
@@ -100,11 +100,11 @@ impl Row {
         ]
     }
 
-    /// The row of a line; `None` where it is not whole.
+    /// Parses a line; `None` if it is incomplete.
     fn parse(line: &str) -> Option<Self> {
         let fields: Vec<&str> = line.split(',').collect();
         let fields: [&str; COLUMNS.len()] = fields.try_into().ok()?;
-        let maybe = |text: &str| match text {
+        let optional = |text: &str| match text {
             "" => Some(None),
             text => text.parse::<f64>().ok().map(Some),
         };
@@ -117,21 +117,21 @@ impl Row {
             seed: whole(5)?,
             seconds: fields[6].parse().ok()?,
             objects: whole(7)?,
-            albedo_mae: maybe(fields[8])?,
-            albedo_rel_median: maybe(fields[9])?,
-            albedo_psnr: maybe(fields[10])?,
+            albedo_mae: optional(fields[8])?,
+            albedo_rel_median: optional(fields[9])?,
+            albedo_psnr: optional(fields[10])?,
             lamps_true: whole(11)?,
             lamps_found: whole(12)?,
             lamps_false: whole(13)?,
             albedos: whole(14)?,
-            coverage_1: maybe(fields[15])?,
-            coverage_2: maybe(fields[16])?,
+            coverage_1: optional(fields[15])?,
+            coverage_2: optional(fields[16])?,
             rays: whole(17)?,
         })
     }
 }
 
-/// The rows of a folder's rooms.csv, which grows by a row at a time.
+/// The rows of a folder's rooms.csv, which grows row by row.
 #[derive(Debug)]
 pub struct Rows {
     path: PathBuf,
@@ -139,7 +139,7 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Reads rooms.csv, or begins it. A last line that was broken off is taken away.
+    /// Reads rooms.csv, or creates it. Removes an incomplete last line.
     ///
     /// # Errors
     /// The file cannot be read or written, or is another table.
@@ -182,18 +182,18 @@ impl Rows {
         Ok(Self { path, rows })
     }
 
-    /// Whether a room was solved as a plan asks for.
+    /// Whether a room has been solved according to a plan.
     pub fn holds(&self, plan: &Plan, family: Family, seed: u64) -> bool {
         self.of(plan)
             .any(|row| row.family == family && row.seed == seed)
     }
 
-    /// The rows that were measured as a plan measures.
+    /// The rows that belong to a plan.
     pub fn of<'a>(&'a self, plan: &'a Plan) -> impl Iterator<Item = &'a Row> {
         self.rows.iter().filter(|row| row.belongs_to(plan))
     }
 
-    /// Adds a row, in the file too.
+    /// Appends a row, also to the file.
     ///
     /// # Errors
     /// The file cannot be written.

@@ -1,4 +1,4 @@
-//! One room, solved and compared with its truth.
+//! Solves one room and compares it with its truth.
 
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
@@ -15,14 +15,17 @@ use crate::scene::Scene;
 use crate::scene::prepare::prepare;
 use crate::study::albedo_pictures;
 use crate::study::evaluate::{ObjectErrors, Reference};
-use crate::study::families::{Plan, Row, lamps, segments};
+use crate::study::families::lamps;
+use crate::study::families::plan::Plan;
+use crate::study::families::row::Row;
+use crate::study::families::segments;
 use std::sync::Arc;
 
 /// A room and its solution.
 pub struct Solved {
     /// The room.
     pub room: Generated,
-    /// What was solved: cut into segments where it is a scan.
+    /// The capture that was solved; cut into segments if it is a scan.
     pub capture: Capture,
     /// Scene and photographs.
     pub problem: Problem,
@@ -30,10 +33,10 @@ pub struct Solved {
     pub solution: Solution,
 }
 
-/// Draws a room and solves it as `relit solve` solves a capture.
+/// Generates a room and solves it like `relit solve`.
 ///
 /// # Errors
-/// The room cannot be drawn or solved.
+/// The room cannot be generated or solved.
 pub fn solved(family: Family, seed: u64, plan: &Plan) -> Result<Solved> {
     let settings = Settings {
         preset: plan.preset,
@@ -60,10 +63,10 @@ pub fn solved(family: Family, seed: u64, plan: &Plan) -> Result<Solved> {
     })
 }
 
-/// Solves a room and compares what was found with what is true.
+/// Solves a room and compares the estimate with the truth.
 ///
 /// # Errors
-/// The room cannot be drawn or solved.
+/// The room cannot be generated or solved.
 pub fn measure(family: Family, seed: u64, plan: &Plan) -> Result<Row> {
     let Solved {
         room,
@@ -94,9 +97,9 @@ pub fn measure(family: Family, seed: u64, plan: &Plan) -> Result<Row> {
         albedo_mae: errors.albedo_mae,
         albedo_rel_median: errors.albedo_rel_median,
         albedo_psnr: pictures.psnr(),
-        lamps_true: lamps.there,
+        lamps_true: lamps.true_count,
         lamps_found: lamps.found,
-        lamps_false: lamps.made_up,
+        lamps_false: lamps.false_count,
         albedos: coverage.albedos,
         coverage_1: coverage.fraction(0),
         coverage_2: coverage.fraction(1),
@@ -104,7 +107,7 @@ pub fn measure(family: Family, seed: u64, plan: &Plan) -> Result<Row> {
     })
 }
 
-/// Lets a solve end by itself.
+/// An observer that never stops a solve.
 struct Unwatched;
 
 impl Observer for Unwatched {
@@ -113,7 +116,7 @@ impl Observer for Unwatched {
     }
 }
 
-/// How many albedos lie within one and within two of their reported standard errors.
+/// Number of albedos within one and within two of their reported standard errors.
 #[derive(Debug, Default)]
 struct Coverage {
     albedos: u64,
@@ -121,7 +124,7 @@ struct Coverage {
 }
 
 impl Coverage {
-    /// Over the channels of all objects whose albedo is scored and reported as determined.
+    /// Counts the channels of all objects whose albedo is scored and reported as determined.
     fn of(scene: &Scene, estimate: &Estimate, errors: &[(String, ObjectErrors)]) -> Self {
         let mut coverage = Self::default();
         for (name, errors) in errors.iter().filter(|(_, errors)| errors.scored) {

@@ -1,13 +1,13 @@
-//! What is true of segments of a mesh, which have no names: what the pixels that see them truly see.
+//! The truth of unnamed mesh segments, from the true values of the pixels that see them.
 
 use crate::capture::truth::{ObjectTruth, Truth};
 use crate::room::generated::Generated;
 use crate::scene::Scene;
 use glam::{DVec3, Vec3};
 
-/// A segment is a lamp where at least so large a fraction of its pixels truly see one, and no lamp where at most so large a one
-/// does. In between nothing is said of it.
+/// A segment is a lamp if at least this fraction of its pixels sees one.
 const LAMP: f64 = 0.5;
+/// A segment is no lamp if at most this fraction of its pixels sees one. In between it has no truth.
 const NO_LAMP: f64 = 0.1;
 
 /// Sums over the pixels that see a segment.
@@ -19,8 +19,8 @@ struct Sum {
     emission: DVec3,
 }
 
-/// The truth about each segment of the mesh cut from a room without objects: the mean of the true albedo over the pixels of all
-/// photographs whose centres see it, lamps left out; the mean of the true emission where it is a lamp.
+/// The truth of each segment of a mesh without objects, over the pixels of all photographs whose centres see it: mean
+/// true albedo of the pixels that see no lamp, or mean true emission if it is a lamp.
 pub fn truth(room: &Generated, scene: &Scene) -> Truth {
     let mut sums = vec![Sum::default(); scene.objects.len()];
     for (frame, triangles) in scene.ids().triangles.iter().enumerate() {

@@ -1,10 +1,11 @@
-//! Figures over the rooms of each family: rooms.json, and a table.
+//! Statistics over the rooms of each family: rooms.json, and a table.
 
 use crate::error::{Error, Result};
 use crate::export::atomic::write_bytes;
 use crate::math::stats::quantile;
 use crate::room::generated::Family;
-use crate::study::families::{Plan, Row};
+use crate::study::families::plan::Plan;
+use crate::study::families::row::Row;
 use crate::study::machine::Machine;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -17,7 +18,7 @@ enum Worst {
     Smallest,
 }
 
-/// A number of a row, its name and its worst end.
+/// A figure of a row: name, value, and worst end.
 type Figure = (&'static str, fn(&Row) -> Option<f64>, Worst);
 
 const FIGURES: [Figure; 10] = [
@@ -38,39 +39,39 @@ const FIGURES: [Figure; 10] = [
 ];
 
 impl Row {
-    /// Fraction of the lamps that were found; `None` where there are none.
+    /// Fraction of the lamps that were found; `None` without lamps.
     fn found(&self) -> Option<f64> {
         (self.lamps_true > 0).then(|| self.lamps_found as f64 / self.lamps_true as f64)
     }
 }
 
-/// Quantiles of a figure over rooms that have it.
+/// Quantiles of a figure over the rooms that have it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Quantiles {
-    /// Rooms that have it.
+    /// Number of rooms.
     pub n: usize,
-    /// A tenth of the rooms is below.
+    /// 10 % quantile.
     pub q10: f64,
-    /// The median.
+    /// Median.
     pub q50: f64,
-    /// A tenth of the rooms is above.
+    /// 90 % quantile.
     pub q90: f64,
-    /// The largest of an error, a time or a number of false lamps, the smallest of all else.
+    /// The worst value: the largest error, time or number of false lamps; otherwise the smallest.
     pub worst: f64,
 }
 
-/// Figures of one family.
+/// Statistics of one family.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OfFamily {
-    /// Rooms.
+    /// Number of rooms.
     pub n: usize,
-    /// Lamps in all of them.
+    /// True lamps in all rooms.
     pub lamps_true: u64,
-    /// Of them, those that were found.
+    /// Lamps that were found.
     pub lamps_found: u64,
     /// Rooms with a false lamp.
     pub rooms_with_false_lamps: usize,
-    /// Albedos of all rooms together whose errors are reported.
+    /// Number of albedos with reported errors in all rooms.
     pub albedos: u64,
     /// Fractions of them within one and two standard errors.
     pub coverage: Option<[f64; 2]>,
@@ -78,7 +79,7 @@ pub struct OfFamily {
     pub figures: BTreeMap<&'static str, Quantiles>,
 }
 
-/// What rooms.json holds.
+/// Content of rooms.json.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// The program's version.
@@ -87,13 +88,13 @@ pub struct Summary {
     pub preset: String,
     /// Width and height of the photographs in pixels.
     pub size: [u32; 2],
-    /// What seconds were measured on last.
+    /// The machine of the last measurement.
     pub machine: Machine,
-    /// By name.
+    /// Statistics by family name.
     pub families: BTreeMap<&'static str, OfFamily>,
 }
 
-/// Figures over rows that were measured as a plan measures.
+/// Summarizes rows that belong to a plan.
 pub fn summarize<'a>(plan: &Plan, rows: impl Iterator<Item = &'a Row>) -> Summary {
     let mut families: BTreeMap<&'static str, Vec<&Row>> = BTreeMap::new();
     for row in rows {
@@ -165,7 +166,7 @@ impl Summary {
         write_bytes(&path, text.as_bytes())
     }
 
-    /// A table with a line a family, in the families' order.
+    /// A table with a line for each family.
     pub fn words(&self) -> String {
         let [width, height] = self.size;
         let mut text = format!(

@@ -1,14 +1,14 @@
-//! Curves of the same solves on several captures as one: the geometric mean of the error, and its spread.
+//! Combines curves of the same solves on several captures: geometric mean of the error, and its spread.
 
 use crate::math::stats::Moments;
-use crate::study::trade::{Curve, Point};
+use crate::study::trade::curve::{Curve, Point};
 
 /// Points of a mean curve, at times that grow by equal factors.
 const POINTS: usize = 48;
 
-/// The mean course of each solve over captures; `captures` holds the same solves in the same order for each. Where a
-/// solve has ended earlier it stays at its last error. The mean begins where all have an estimate; solves that gave
-/// none on some capture are left out.
+/// The mean curve of each solve over captures; `captures` holds the same solves in the same order for each. A solve
+/// that has ended keeps its last error. The mean begins when all have an estimate. Solves without an estimate on some
+/// capture are left out.
 pub fn combine(captures: &[Vec<Curve>]) -> Vec<Curve> {
     let Some(first) = captures.first() else {
         return Vec::new();
@@ -42,7 +42,7 @@ fn mean(curves: &[&Curve]) -> Vec<Point> {
     let count = if end > start { POINTS } else { 1 };
     (0..count)
         .map(|i| match i {
-            // Exact at the end, so that no solve's last point is missed by rounding.
+            // Exactly the end, so that rounding misses no solve's last point.
             _ if i + 1 == count => end,
             _ => start * (end / start).powf(i as f64 / (count - 1) as f64),
         })
@@ -50,7 +50,7 @@ fn mean(curves: &[&Curve]) -> Vec<Point> {
         .collect()
 }
 
-/// The mean of the curves' last points at or before a time; all have one there.
+/// Mean of the curves' last points at or before a time.
 fn at(curves: &[&Curve], seconds: f64) -> Point {
     let mut logs = Moments::default();
     let mut reported = Moments::default();
@@ -60,7 +60,7 @@ fn at(curves: &[&Curve], seconds: f64) -> Point {
         let Some(point) = curve.points.get(after.saturating_sub(1)) else {
             continue;
         };
-        // A perfect score has no logarithm; it counts as the least number.
+        // The logarithm of zero error is replaced by that of the smallest number.
         logs.push(point.error.max(f64::MIN_POSITIVE).ln());
         if let Some(claim) = point.reported {
             reported.push(claim);

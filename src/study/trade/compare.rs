@@ -1,17 +1,17 @@
-//! How much faster the transport cache is than the paper's descent, to the same error in the same run.
+//! Speedup of the transport cache over the paper's descent, to the same error in the same run.
 
 use crate::inverse::settings::Preset;
-use crate::study::trade::{Curve, Point};
+use crate::study::trade::curve::{Curve, Point};
 
-/// The albedo error to which times are compared.
+/// Albedo error for comparing times.
 const TARGET: f64 = 0.02;
 
-/// The first point whose error is at most `error`.
+/// The first point with at most this error.
 pub fn reaches(curve: &Curve, error: f64) -> Option<&Point> {
     curve.points.iter().find(|point| point.error <= error)
 }
 
-/// The curve that is first to reach an error, and when.
+/// The curve that reaches an error first, and its time in seconds.
 fn first_to_reach<'a>(
     curves: impl Iterator<Item = &'a Curve>,
     error: f64,
@@ -21,8 +21,8 @@ fn first_to_reach<'a>(
         .min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// The comparison with the paper's descent in words: the time of the presets to an albedo error of 0.02, and to the
-/// smallest error that the descent reached with any of the settings tried.
+/// Compares the presets with the paper's descent: times to an albedo error of 0.02, and to the smallest error that any descent
+/// reached.
 pub fn against_paper(curves: &[Curve]) -> Vec<String> {
     let is_paper = |curve: &&Curve| curve.settings.preset == Preset::Paper;
     let paper = || curves.iter().filter(is_paper);
@@ -41,7 +41,7 @@ pub fn against_paper(curves: &[Curve]) -> Vec<String> {
         let Some(ours) = reaches(curve, TARGET).map(|point| point.seconds) else {
             continue;
         };
-        let theirs = match first_to_reach(paper(), TARGET) {
+        let paper_time = match first_to_reach(paper(), TARGET) {
             Some((paper, seconds)) => format!(
                 "{} in {seconds:.2} s: {:.1} times faster",
                 paper.name,
@@ -53,25 +53,25 @@ pub fn against_paper(curves: &[Curve]) -> Vec<String> {
             ),
         };
         findings.push(format!(
-            "{} reaches an albedo error of {TARGET} in {ours:.2} s, {theirs}",
+            "{} reaches an albedo error of {TARGET} in {ours:.2} s, {paper_time}",
             curve.name
         ));
     }
 
-    // To the smallest error that the descent reaches at all.
-    let least = paper()
+    // To the smallest error of any descent.
+    let best = paper()
         .flat_map(|curve| curve.points.iter().map(move |point| (curve, point)))
         .min_by(|a, b| a.1.error.total_cmp(&b.1.error));
-    if let Some((paper, least)) = least
-        && let Some((ours, seconds)) = first_to_reach(presets(), least.error)
+    if let Some((paper, best)) = best
+        && let Some((ours, seconds)) = first_to_reach(presets(), best.error)
     {
         findings.push(format!(
             "the smallest error of {} is {:.4} after {:.2} s; {} reaches it in {seconds:.2} s: {:.1} times faster",
             paper.name,
-            least.error,
-            least.seconds,
+            best.error,
+            best.seconds,
             ours.name,
-            least.seconds / seconds
+            best.seconds / seconds
         ));
     }
     findings

@@ -3,15 +3,17 @@
 use crate::error::{Error, Result};
 use crate::export::atomic::write_bytes;
 use crate::export::table::{Cell, Table};
-use crate::study::trade::{Curve, Point, Trade, plot};
+use crate::study::trade::curve::{Curve, Point};
+use crate::study::trade::plot;
+use crate::study::trade::record::Trade;
 use std::path::Path;
 
-/// The file that holds everything.
+/// The file with all data.
 const JSON: &str = "trade.json";
-/// Longest trade.json that is read, in bytes.
+/// Largest trade.json that is read, in bytes.
 const MAX_BYTES: u64 = 1 << 28;
 
-/// Columns of trade.csv; the last three are the same in every row.
+/// Columns of trade.csv; the last three are constant.
 const COLUMNS: [&str; 13] = [
     "curve",
     "preset",
@@ -42,10 +44,10 @@ impl Trade {
         write_bytes(&path, text.as_bytes())
     }
 
-    /// Reads trade.json of a folder; `None` where there is no such file.
+    /// Reads trade.json from a folder; `None` if it does not exist.
     ///
     /// # Errors
-    /// The file cannot be read or is no trade of this version.
+    /// The file cannot be read or is no trade.json of this version.
     pub fn read(folder: &Path) -> Result<Option<Self>> {
         let path = folder.join(JSON);
         let length = match path.metadata() {
@@ -63,7 +65,7 @@ impl Trade {
         Ok(Some(trade))
     }
 
-    /// One row a point.
+    /// The table, one row for each point.
     pub fn table(&self) -> Table {
         let mut table = Table::new(&COLUMNS);
         for curve in &self.curves {

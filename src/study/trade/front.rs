@@ -1,9 +1,9 @@
 //! The Pareto front: points that no other point beats in both seconds and error.
 
-use crate::study::trade::Curve;
+use crate::study::trade::curve::Curve;
 
-/// Which of some (seconds, error) points no other point beats: none is as early and as exact, and better in one of the
-/// two. Of equal points the first stands for all.
+/// Marks the (seconds, error) points that no other point dominates: none is as early and as accurate, and better in
+/// one of the two. Of equal points only the first is marked.
 pub fn front(points: &[[f64; 2]]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by(|&a, &b| {

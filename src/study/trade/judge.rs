@@ -1,33 +1,34 @@
-//! What tells the error of an estimate: the truth where there is one, else pixels held out of the fit.
+//! Measures the error of an estimate: against the truth if known, else on held-out pixels.
 
 use crate::calibrate::problem::Problem;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::loss::LossProbe;
 use crate::inverse::settings::Settings;
 use crate::study::evaluate::Reference;
-use crate::study::trade::Measure;
+use crate::study::trade::curve::Measure;
 
-/// Held-out pixels that are rendered, and paths for each.
+/// Held-out pixels that are rendered.
 const PIXELS: usize = 1000;
+/// Samples for each of these pixels.
 const SAMPLES: u64 = 16;
 
-/// A judge of estimates.
+/// How the error of estimates is measured.
 #[derive(Debug, Clone)]
 pub enum Judge {
-    /// The truth.
+    /// Against the truth.
     Truth(Box<Reference>),
-    /// Held-out pixels, the same for all solves.
+    /// On held-out pixels, the same for all solves.
     HeldOut,
 }
 
-/// A judge of the estimates of one solve.
-pub(super) enum Bench<'a> {
+/// Measures the estimates of one solve.
+pub(super) enum SolveJudge<'a> {
     Truth(&'a Reference),
     HeldOut(LossProbe),
 }
 
 impl Judge {
-    /// What it measures.
+    /// The quantity that is measured.
     pub fn measure(&self) -> Measure {
         match self {
             Self::Truth(_) => Measure::Albedo,
@@ -35,7 +36,7 @@ impl Judge {
         }
     }
 
-    /// Smallest ratio of the times of two points, so that judging takes no longer than solving.
+    /// Smallest ratio between the times of two points, so that measuring takes no longer than solving.
     pub(super) fn spacing(&self) -> f64 {
         match self {
             Self::Truth(_) => 1.02,
@@ -43,21 +44,21 @@ impl Judge {
         }
     }
 
-    /// For the estimates of a solve with these parameters.
-    pub(super) fn bench(&self, problem: &Problem, settings: &Settings) -> Bench<'_> {
+    /// Prepares measuring the estimates of a solve with these parameters.
+    pub(super) fn for_solve(&self, problem: &Problem, settings: &Settings) -> SolveJudge<'_> {
         match self {
-            Self::Truth(reference) => Bench::Truth(reference),
+            Self::Truth(reference) => SolveJudge::Truth(reference),
             Self::HeldOut => {
                 let bounces = settings.max_bounces();
                 let probe = LossProbe::new(problem, settings, PIXELS, SAMPLES, bounces);
-                Bench::HeldOut(probe)
+                SolveJudge::HeldOut(probe)
             }
         }
     }
 }
 
-impl Bench<'_> {
-    /// The error; `None` where nothing can be compared.
+impl SolveJudge<'_> {
+    /// The error; `None` if nothing can be compared.
     pub fn error(&self, problem: &Problem, estimate: &Estimate) -> Option<f64> {
         match self {
             Self::Truth(reference) => reference.errors(&problem.scene, estimate).albedo_mae,

@@ -1,26 +1,26 @@
-//! Runs the solves one after the other and watches the error of each.
+//! Runs solves one after the other and measures the error of each over time.
 
 use crate::calibrate::problem::Problem;
 use crate::error::Result;
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::inverse::solve;
 use crate::inverse::solver::{Control, Observer, Progress, Solution, Termination};
-use crate::study::trade::judge::{Bench, Judge};
+use crate::study::trade::curve::{Curve, Point};
+use crate::study::trade::judge::{Judge, SolveJudge};
 use crate::study::trade::plan::Run;
-use crate::study::trade::{Curve, Point};
 use std::time::{Duration, Instant};
 
-/// What a measurement tells while it goes on.
+/// Progress of [`measure`].
 #[derive(Debug)]
-pub enum Heard<'a> {
+pub enum SolveEvent<'a> {
     /// A solve begins.
     Begins(&'a Run),
     /// A solve has ended.
     Ended(&'a Curve),
 }
 
-/// Measures `runs` one after the other in about `limit` of wall time, judging included, until `stopped`; of what is
-/// left each gets a fraction by its weight, and what one leaves over goes to those after it.
+/// Measures `runs` in turn in about `limit` of wall time, including measurements, until `stopped`. Each gets a fraction of the
+/// remaining time by its weight; unused time is left to later runs.
 ///
 /// # Errors
 /// A solver cannot start.
@@ -30,7 +30,7 @@ pub fn measure(
     runs: &[Run],
     limit: Duration,
     stopped: &dyn Fn() -> bool,
-    tell: &mut dyn FnMut(Heard),
+    report: &mut dyn FnMut(SolveEvent),
 ) -> Result<Vec<Curve>> {
     let end = Instant::now() + limit;
     let mut curves = Vec::with_capacity(runs.len());
@@ -42,15 +42,15 @@ pub fn measure(
         let weights: f64 = runs[index..].iter().map(|r| r.weight).sum();
         let left = end.saturating_duration_since(now);
         let fraction = left.mul_f64((run.weight / weights).clamp(0.0, 1.0));
-        tell(Heard::Begins(run));
+        report(SolveEvent::Begins(run));
         let (curve, _) = watch(problem, judge, run, now + fraction, stopped)?;
-        tell(Heard::Ended(&curve));
+        report(SolveEvent::Ended(&curve));
         curves.push(curve);
     }
     Ok(curves)
 }
 
-/// Runs one solve until it ends or `deadline` comes; its course and what it found.
+/// Runs one solve until it ends or `deadline` is reached. Returns its curve and solution.
 ///
 /// # Errors
 /// The solver cannot start.
@@ -63,19 +63,19 @@ pub fn watch(
 ) -> Result<(Curve, Solution)> {
     let mut watch = Watch {
         problem,
-        bench: judge.bench(problem, &run.settings),
+        judge: judge.for_solve(problem, &run.settings),
         spacing: judge.spacing(),
         deadline,
         stopped,
         late: false,
-        judged: Vec::new(),
+        measured: Vec::new(),
         rejected: 0,
         points: Vec::new(),
     };
     let solution = solve(problem, &run.settings, None, &mut watch)?;
 
-    // Where it ended.
-    watch.judge(&solution.progress, &solution.estimate);
+    // The last point.
+    watch.add_point(&solution.progress, &solution.estimate);
     let ended = match solution.termination {
         Termination::Cancelled if watch.late => Termination::Time,
         other => other,
@@ -91,29 +91,29 @@ pub fn watch(
     Ok((curve, solution))
 }
 
-/// Judges a running solve now and then.
+/// Observer that measures a running solve from time to time.
 struct Watch<'a> {
     problem: &'a Problem,
-    bench: Bench<'a>,
+    judge: SolveJudge<'a>,
     spacing: f64,
     deadline: Instant,
     stopped: &'a dyn Fn() -> bool,
-    /// Whether the deadline has come.
+    /// Whether the deadline has passed.
     late: bool,
-    /// What was judged last.
-    judged: Vec<ObjectEstimate>,
+    /// The estimate measured last.
+    measured: Vec<ObjectEstimate>,
     rejected: u64,
     points: Vec<Point>,
 }
 
 impl Watch<'_> {
-    /// Adds a point for an estimate that was not judged yet.
-    fn judge(&mut self, progress: &Progress, estimate: &Estimate) {
-        if progress.seconds_to_first_estimate.is_none() || estimate.objects == self.judged {
+    /// Adds a point for a new estimate.
+    fn add_point(&mut self, progress: &Progress, estimate: &Estimate) {
+        if progress.seconds_to_first_estimate.is_none() || estimate.objects == self.measured {
             return;
         }
-        self.judged.clone_from(&estimate.objects);
-        let error = self.bench.error(self.problem, estimate);
+        self.measured.clone_from(&estimate.objects);
+        let error = self.judge.error(self.problem, estimate);
         match error.filter(|error| error.is_finite()) {
             Some(error) => self.points.push(Point {
                 seconds: progress.seconds,
@@ -133,7 +133,7 @@ impl Observer for Watch<'_> {
     fn observe(&mut self, progress: &Progress, estimate: &Estimate) -> Control {
         let last = self.points.last().map_or(0.0, |point| point.seconds);
         if progress.seconds >= last * self.spacing {
-            self.judge(progress, estimate);
+            self.add_point(progress, estimate);
         }
         self.late = Instant::now() >= self.deadline;
         if self.late || (self.stopped)() {

@@ -1,4 +1,4 @@
-//! Which solves are measured: every preset, and around them one setting changed at a time.
+//! The solves to be measured: every preset, and variations of single settings.
 
 use crate::inverse::settings::{PARAMETERS, Preset, Settings};
 
@@ -7,25 +7,25 @@ use crate::inverse::settings::{PARAMETERS, Preset, Settings};
 pub struct Run {
     /// Name of the preset, followed by what differs from it.
     pub name: String,
-    /// Whether nothing differs from the preset.
+    /// Whether it is an unchanged preset.
     pub is_preset: bool,
     /// The parameters.
     pub settings: Settings,
-    /// Fraction of the time that it may take, against the weights of the others.
+    /// Weight of its time among all runs.
     pub weight: f64,
 }
 
-/// The presets with their fractions of the time: those that go further get more.
+/// The presets with the weights of their times.
 const PRESETS: [(Preset, f64); 4] = [
     (Preset::Preview, 3.0),
     (Preset::Balanced, 6.0),
     (Preset::Reference, 8.0),
     (Preset::Paper, 8.0),
 ];
-/// Fraction of the time of a solve with one setting changed.
+/// Weight of the time of a variation.
 const VARIED_WEIGHT: f64 = 2.0;
 
-/// The settings that are changed, with the values tried.
+/// Variations: preset, setting, and values.
 const VARIED: &[(Preset, &str, &[&str])] = &[
     (Preset::Preview, "paths", &["100000", "1600000"]),
     (Preset::Preview, "pixels", &["15000", "240000"]),
@@ -80,7 +80,7 @@ pub fn everything(base: &Settings) -> Vec<Run> {
     runs
 }
 
-/// The preset of a word and its variations alone, each with as much of the time: what the preset's own settings are chosen by.
+/// A preset and its variations, with equal times: for choosing the preset's settings.
 pub fn around(word: &str, base: &Settings) -> Vec<Run> {
     let mut runs = everything(base);
     runs.retain(|run| run.settings.preset.word() == word);

@@ -1,16 +1,17 @@
-//! The trade as a picture: error over seconds on logarithmic axes, the front marked, presets named on it.
+//! Plot of error over seconds on logarithmic axes, with the presets named and the Pareto front marked.
 
 use crate::export::plot::{Axis, Draw, Plot, Series};
-use crate::study::trade::{Curve, Point, Trade};
+use crate::study::trade::curve::{Curve, Point};
+use crate::study::trade::record::Trade;
 
-/// The picture of a trade.
+/// The plot of a trade.
 pub fn plot(trade: &Trade) -> Plot {
     let points = |points: &[Point]| -> Vec<[f64; 2]> {
         points.iter().map(|p| [p.seconds, p.error]).collect()
     };
     let presets = || trade.curves.iter().filter(|curve| curve.is_preset);
 
-    // Presets as curves, everything else as dots.
+    // Presets as curves, variations as dots.
     let mut series: Vec<Series> = presets()
         .map(|curve| Series {
             name: curve.name.clone(),

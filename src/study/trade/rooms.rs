@@ -1,4 +1,4 @@
-//! The trade over generated rooms: what presets are chosen on.
+//! Generated rooms for measuring trades; presets are chosen on them.
 
 use crate::calibrate::problem::Problem;
 use crate::capture::Capture;
@@ -16,30 +16,30 @@ use std::sync::Arc;
 /// Width and height of the photographs of generated rooms in pixels.
 pub const SIZE: [u32; 2] = [96, 72];
 
-/// Generated room `seed`, photographed, with a judge that knows its truth.
+/// Generated room `seed` with photographs, and a judge with its truth.
 ///
 /// # Errors
-/// Never for rooms as they are generated; the signature is the scene's.
+/// Never for generated rooms.
 pub fn problem(seed: u64, size: [u32; 2]) -> Result<(Problem, Judge)> {
     let (room, rendering) = generate(seed, size);
     let (problem, reference) = photographed(&room, &rendering)?;
     Ok((problem, Judge::Truth(Box::new(reference))))
 }
 
-/// Any room, photographed, with its truth.
+/// A room with rendered photographs, and its truth.
 ///
 /// # Errors
-/// The room's mesh holds nothing to see.
+/// The room's mesh is empty.
 pub fn photographed(room: &Room, rendering: &Rendering) -> Result<(Problem, Reference)> {
     let photographs = photographs::render(room, rendering)?;
     let (_, problem, reference) = with_photographs(room, photographs)?;
     Ok((problem, reference))
 }
 
-/// Any room with photographs of it, one a view and all of one size, as a capture, as a problem, and its truth.
+/// A room with given photographs, one a view and all of one size: as a capture, as a problem, and its truth.
 ///
 /// # Errors
-/// The room's mesh holds nothing to see, or there is no photograph.
+/// The room's mesh is empty, or there is no photograph.
 pub fn with_photographs(
     room: &Room,
     photographs: Vec<Photograph>,

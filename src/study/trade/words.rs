@@ -1,9 +1,10 @@
-//! A trade as text: a line a curve, and what follows.
+//! A trade as text: a line for each curve, and the conclusions.
 
-use crate::study::trade::{Curve, Trade};
+use crate::study::trade::curve::Curve;
+use crate::study::trade::record::Trade;
 
 impl Trade {
-    /// A table of where each solve began and ended, then the findings.
+    /// A table of the first and last point of each solve, then the conclusions.
     pub fn words(&self) -> String {
         let names = self.curves.iter().map(|curve| curve.name.chars().count());
         let width = names.max().unwrap_or(0).max(5);
