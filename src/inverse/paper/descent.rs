@@ -323,7 +323,7 @@ impl Descent {
                 lights: &traced.emitters,
                 measured: None,
                 surface_of: &scene.object_of,
-                believed_albedo: &self.believed,
+                expected_albedo: &self.believed,
                 texels: traced.grid.as_deref(),
                 lobes: &self.lobes,
                 patches: None,

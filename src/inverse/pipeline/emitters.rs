@@ -1,7 +1,7 @@
 //! Which objects give light: tests on traced paths, and how light samples are shared out.
 
 use crate::inverse::emitters::classify::classify;
-use crate::inverse::fit::errors::{Released, release};
+use crate::inverse::fit::errors::{ScoreTest, score_tests};
 use crate::inverse::fit::gauss_newton::Fit;
 use crate::inverse::paths::PathCache;
 use crate::inverse::pipeline::Pipeline;
@@ -23,7 +23,7 @@ const EXPLORATION: f64 = 0.05;
 
 impl Pipeline<'_, '_> {
     /// What the paths say of light from objects that are held dark.
-    pub(super) fn test_dark(&mut self, cache: &PathCache) -> Vec<Released> {
+    pub(super) fn test_dark(&mut self, cache: &PathCache) -> Vec<ScoreTest> {
         let objects = self.roles.len();
         let mut free = self.free();
         let active = free.len();
@@ -35,7 +35,7 @@ impl Pipeline<'_, '_> {
                 .map(|k| objects + k),
         );
         let equations = cache.normal_equations(&self.unknowns, &free, &self.robust, &self.prior);
-        let released = release(&equations, &free, active);
+        let released = score_tests(&equations, &free, active);
         for test in &released {
             self.errors.emission[test.index - objects] =
                 Vec3::from_array(test.stderr.map(|e| e as f32));
@@ -121,7 +121,7 @@ impl Pipeline<'_, '_> {
         let mut added = Vec::new();
         while added.len() < MAX_CHANGES {
             let tested = self.test_dark(cache);
-            let open = |test: &Released| {
+            let open = |test: &ScoreTest| {
                 let k = test.index - objects;
                 k < in_mesh && !self.emission_is_known(k)
             };

@@ -7,7 +7,7 @@ use crate::inverse::fit::prior::ALBEDO_MEAN;
 use crate::inverse::paths::clusters::{Cluster, cluster};
 use crate::inverse::paths::evaluate::Linearised;
 use crate::inverse::paths::memory::PILOT_CLUSTERS;
-use crate::inverse::paths::trace::{Tracer, longest_mean_path};
+use crate::inverse::paths::trace::{Tracer, max_mean_path_length};
 use crate::inverse::paths::{PathCache, memory};
 use crate::inverse::pipeline::Pipeline;
 use crate::inverse::roles::Role;
@@ -42,7 +42,11 @@ impl Pipeline<'_, '_> {
         let surfaces = self.roles.len();
         let mut fits = paths;
         let believed = self.believed();
-        if !memory::suffices(allowed, paths, longest_mean_path(self.brightest(&believed))) {
+        if !memory::suffices(
+            allowed,
+            paths,
+            max_mean_path_length(self.brightest(&believed)),
+        ) {
             // A few paths of the same kind tell how long they are.
             distribute_paths(&mut self.clusters, surfaces, 0);
             let step = self.clusters.len().div_ceil(PILOT_CLUSTERS).max(1);
@@ -135,7 +139,7 @@ impl Pipeline<'_, '_> {
     ) -> Result<(), Termination> {
         let believed = self.believed();
         let most = memory::allowed(self.monitor.settings.memory) / SLICE_FRACTION;
-        let longest = longest_mean_path(self.brightest(&believed));
+        let longest = max_mean_path_length(self.brightest(&believed));
         let mut next = 0;
         let mut slice = 16;
         while next < self.clusters.len() {
@@ -196,7 +200,7 @@ impl Pipeline<'_, '_> {
             lights,
             measured,
             surface_of: &self.problem.scene.object_of,
-            believed_albedo: believed,
+            expected_albedo: believed,
             texels: self.estimate.texels.as_deref(),
             lobes: &self.lobes,
             patches: Some(&self.patches),

@@ -5,7 +5,7 @@
 //! candidate. Those that a linear step promises most of are tried, each with paths of its own and with all else fitted anew; the
 //! one that leaves least of the photographs unexplained is taken, and so on until none makes a difference that is sure.
 
-use crate::inverse::fit::errors::{Released, release};
+use crate::inverse::fit::errors::{ScoreTest, score_tests};
 use crate::inverse::fit::gauss_newton::Fit;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::paths::PathCache;
@@ -124,10 +124,10 @@ impl Pipeline<'_, '_> {
         explored: &PathCache,
         candidates: &[usize],
         at_first: bool,
-    ) -> Vec<Released> {
+    ) -> Vec<ScoreTest> {
         let surfaces = self.roles.len();
         let max_tried = MAX_TRIED[usize::from(!at_first)];
-        let mut promising: Vec<Released> = Vec::new();
+        let mut promising: Vec<ScoreTest> = Vec::new();
         let all = self.free();
         let light = all.iter().copied().filter(|&i| i >= surfaces).collect();
         let tests = if at_first {
@@ -140,13 +140,13 @@ impl Pipeline<'_, '_> {
             free.extend(candidates.iter().map(|k| surfaces + k));
             let equations =
                 explored.normal_equations(&self.unknowns, &free, &self.robust, &self.prior);
-            let mut tests: Vec<Released> = (release(&equations, &free, active).into_iter())
+            let mut tests: Vec<ScoreTest> = (score_tests(&equations, &free, active).into_iter())
                 .filter(|test| test.significance() > SIGNIFICANT)
                 .collect();
             tests.sort_by(|a, b| b.gain().total_cmp(&a.gain()).then(a.index.cmp(&b.index)));
-            let most = tests.first().map_or(0.0, Released::gain);
+            let most = tests.first().map_or(0.0, ScoreTest::gain);
             tests.truncate(max_tried);
-            let is_new = |test: &Released| promising.iter().all(|p| p.index != test.index);
+            let is_new = |test: &ScoreTest| promising.iter().all(|p| p.index != test.index);
             tests.retain(|test| test.gain() > PROMISING * most && is_new(test));
             promising.extend(tests);
         }
@@ -156,7 +156,7 @@ impl Pipeline<'_, '_> {
     /// Tries each of some candidates from the present unknowns on: the one that leaves least, if it surely leaves less than `now`.
     fn best_of(
         &mut self,
-        promising: &[Released],
+        promising: &[ScoreTest],
         now: &Hypothesis,
         paths: u64,
     ) -> Result<Option<(usize, Hypothesis)>, Termination> {
