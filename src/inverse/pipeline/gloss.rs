@@ -1,7 +1,7 @@
 //! Rough specular lobes, tried on objects that look different from different sides.
 
 use crate::inverse::known::Pinned;
-use crate::inverse::lobe::{Found, Lobes, Task};
+use crate::inverse::lobe::{LobeFit, Lobes, Task};
 use crate::inverse::pipeline::Pipeline;
 use crate::inverse::roles::Role;
 use crate::inverse::solver::{Stage, Termination};
@@ -26,7 +26,7 @@ impl<'a> Pipeline<'a, '_> {
         let estimate = self.estimate.clone();
         let evidence = lobes.evidence(&estimate, &objects, &mut |cast| self.cast(cast))?;
         let called: Vec<usize> = (objects.iter().zip(&evidence))
-            .filter(|(_, e)| Lobes::calls(**e))
+            .filter(|(_, e)| Lobes::is_promising(**e))
             .map(|(&k, _)| k)
             .collect();
         if called.is_empty() {
@@ -56,7 +56,7 @@ impl<'a> Pipeline<'a, '_> {
             let emits = self.roles[k].emits();
             let found = lobes.find(&lit, k, emits, None, &mut |cast| self.cast(cast))?;
             match found {
-                Some(found) if found.is_called_for() => kept.push((k, found)),
+                Some(found) if found.is_significant() => kept.push((k, found)),
                 Some(found) => refused.push(self.words(k, &found, true)),
                 None => refused.push(self.problem.scene.objects[k].name.clone()),
             }
@@ -141,7 +141,7 @@ impl<'a> Pipeline<'a, '_> {
     }
 
     /// Takes over a lobe and the base under it; what the light field said of the object as a diffuse one counts no more.
-    fn take_lobe(&mut self, k: usize, found: &Found) {
+    fn take_lobe(&mut self, k: usize, found: &LobeFit) {
         self.lobes[k] = Some(found.lobe());
         self.unknowns.albedo[k] = found.albedo.as_vec3();
         self.errors.albedo[k] = found.albedo_error().min(Vec3::splat(0.5));
@@ -155,7 +155,7 @@ impl<'a> Pipeline<'a, '_> {
     }
 
     /// An object's lobe in words.
-    fn words(&self, k: usize, found: &Found, gains: bool) -> String {
+    fn words(&self, k: usize, found: &LobeFit, gains: bool) -> String {
         let [.., specular, roughness] = found.errors;
         let mut words = format!(
             "{}: roughness {:.3} ± {roughness:.3}, specular {:.3} ± {specular:.3}",
