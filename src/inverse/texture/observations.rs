@@ -1,9 +1,9 @@
-//! What is known of the cells: weighted means over a few cells each, and their normal equations.
+//! Measurements as weighted means over cells, in sparse rows and columns, with the products of the normal equations.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Measurements y ≈ Σ w x of colours x of cells, one row each; the weights of a row sum to one.
+/// Measurements y ≈ Σ w x of the colours x of cells, one row each; the weights of a row sum to one.
 #[derive(Debug, Clone, Default)]
 pub struct Observations {
     /// End of each row.
@@ -49,7 +49,7 @@ impl Observations {
         this
     }
 
-    /// One observation of each cell.
+    /// One measurement of each cell.
     pub fn of_each(cell_count: usize) -> Self {
         let rows: Vec<Vec<(u32, f32)>> = (0..cell_count as u32).map(|c| vec![(c, 1.0)]).collect();
         Self::new(&rows, cell_count)
@@ -85,13 +85,13 @@ impl Observations {
         range.map(|at| (self.column_rows[at] as usize, self.column_weights[at]))
     }
 
-    /// What a row measures of the given colours.
+    /// The value Σ w x of a row for the given colours.
     #[inline]
     pub fn of(&self, row: usize, colors: &[Vec3]) -> Vec3 {
         self.row(row).map(|(cell, w)| colors[cell] * w).sum()
     }
 
-    /// What all rows measure.
+    /// The values of all rows.
     pub fn all_of(&self, colors: &[Vec3]) -> Vec<Vec3> {
         (0..self.rows())
             .into_par_iter()
@@ -99,7 +99,7 @@ impl Observations {
             .collect()
     }
 
-    /// For each cell, Σ w · ω · value over its rows, with one weight ω (a channel) and one value a row.
+    /// For each cell, Σ w ω y over its rows, with the weights ω (per channel) and values y of rows.
     pub fn gathered(&self, row_weights: &[Vec3], values: &[Vec3]) -> Vec<Vec3> {
         (0..self.cells())
             .into_par_iter()
