@@ -1,4 +1,4 @@
-//! The one table of parameters: each is declared once and reaches the command line, the window, presets and files.
+//! The table of parameters. Each is declared once and available on the command line, in the window, in presets and in files.
 
 use crate::calibrate::held_out::HoldOut;
 use serde::{Deserialize, Serialize};
@@ -17,7 +17,7 @@ pub enum Value {
     Choice(String),
 }
 
-/// What a parameter can be.
+/// The type and range of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
     /// On or off.
@@ -53,7 +53,7 @@ pub struct Parameter {
     pub unit: &'static str,
     /// One sentence of help.
     pub help: &'static str,
-    /// Whether a change takes effect while a solver runs (else at the next reset).
+    /// Whether a change takes effect while a solver runs; otherwise at the next start.
     pub live: bool,
     get: fn(&Settings) -> Value,
     set: fn(&mut Settings, &Value) -> bool,
@@ -160,7 +160,7 @@ choice! {
 }
 
 choice! {
-    /// How light is found at a bounce.
+    /// Sampling strategy of direct light.
     LightSampling {
         /// Both, combined by the power heuristic.
         Mis = "mis",
@@ -254,7 +254,7 @@ parameters! {
         "Paper solver: stop after this many steps; 0 goes on until the time is up or the loss stands still";
 }
 
-/// Bounces that the paper's solver takes when none are set.
+/// Bounces of the paper's solver if none are set.
 const PAPER_BOUNCES: u32 = 2;
 
 impl From<&Settings> for HoldOut {
@@ -267,7 +267,7 @@ impl From<&Settings> for HoldOut {
 }
 
 impl Settings {
-    /// Longest path in bounces: what is set, else the paper solver's two, else all that roulette leaves.
+    /// Greatest number of bounces: the setting, or two for the paper solver, or no limit.
     pub fn max_bounces(&self) -> u32 {
         match (self.bounces, self.preset) {
             (0, Preset::Paper) => PAPER_BOUNCES,
@@ -286,7 +286,7 @@ impl Parameter {
     /// Sets the value if it is of the right kind and in range.
     ///
     /// # Errors
-    /// A sentence saying what would be allowed.
+    /// A sentence with the allowed values.
     pub fn set(&self, settings: &mut Settings, value: &Value) -> Result<(), String> {
         let allowed = match (self.kind, value) {
             (Kind::Whole { min, max }, Value::Whole(n)) => (min..=max).contains(n),
@@ -302,7 +302,7 @@ impl Parameter {
         }
     }
 
-    /// What values are allowed, in words.
+    /// The allowed values, in words.
     pub fn allowed(&self) -> String {
         match self.kind {
             Kind::Flag => "true or false".to_owned(),
@@ -312,10 +312,10 @@ impl Parameter {
         }
     }
 
-    /// Reads a value from text, as typed on the command line.
+    /// Parses a value from the command line.
     ///
     /// # Errors
-    /// A sentence saying what would be allowed.
+    /// A sentence with the allowed values.
     pub fn parse(&self, text: &str) -> Result<Value, String> {
         let value = match self.kind {
             Kind::Flag => text.parse().ok().map(Value::Flag),
@@ -331,7 +331,7 @@ impl Parameter {
 mod tests {
     use super::*;
 
-    /// A value that a parameter may have and by default has not.
+    /// An allowed value other than the default.
     fn other(parameter: &Parameter) -> Value {
         let default = parameter.get(&Settings::default());
         let values = match parameter.kind {

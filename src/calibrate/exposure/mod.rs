@@ -411,11 +411,11 @@ mod tests {
     /// Fits a power law between the light of `found` and of `truth` in one channel: the power and the largest deviation.
     fn power_between(found: &Response, truth: &Response, channel: usize) -> (f64, f64) {
         let lights: Vec<f64> = (0..80).map(|k| -4.0 + 0.05 * f64::from(k)).collect();
-        let told = |light: &f64| found.log_light(channel, truth.log_value(channel, *light))[0];
-        let [x, y] = [
+        let recovered = |light: &f64| found.log_light(channel, truth.log_value(channel, *light))[0];
+        let (x, y) = (
             lights.clone(),
-            lights.iter().map(told).collect::<Vec<f64>>(),
-        ];
+            lights.iter().map(recovered).collect::<Vec<f64>>(),
+        );
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
         let (mx, my) = (mean(&x), mean(&y));
         let both: f64 = x.iter().zip(&y).map(|(x, y)| (x - mx) * (y - my)).sum();
@@ -437,8 +437,8 @@ mod tests {
             assert!(off < 0.05, "{channel}: {off} from a power of {power}");
             // Exposures are of the same power.
             for (found, truth) in found.factors.iter().zip(&exposures) {
-                let told = f64::from(found[channel]).ln() - power * (truth[channel] - 0.1);
-                assert!(told.abs() < 0.06, "{channel}: {told}");
+                let error = f64::from(found[channel]).ln() - power * (truth[channel] - 0.1);
+                assert!(error.abs() < 0.06, "{channel}: {error}");
             }
         }
         // The identity deviates much more.

@@ -101,7 +101,7 @@ impl RobustWeights {
     }
 
     /// The factor of one object.
-    pub fn of(&self, object: u32) -> DVec3 {
+    pub fn factor(&self, object: u32) -> DVec3 {
         self.0[object as usize].factor
     }
 }
@@ -184,19 +184,22 @@ mod tests {
             .chain(clusters(2, noise(100, 1.0)))
             .collect();
         let robust = RobustWeights::from_residuals(&all, 4);
-        let ratio = robust.of(1) / robust.of(0);
+        let ratio = robust.factor(1) / robust.factor(0);
         // The typical variance counts for two clusters and the object's for 100, which keeps the ratio below 100.
         assert!(
             ratio.min_element() > 8.0 && ratio.max_element() < 100.0,
             "{ratio}"
         );
-        let ratio = robust.of(0) / robust.of(2);
+        let ratio = robust.factor(0) / robust.factor(2);
         // The same for the noisy object: 100 to the power of 100/102; the typical variance is a little above the first object's.
         assert!(
             ratio.min_element() > 90.0 && ratio.max_element() < 95.0,
             "{ratio}"
         );
-        assert_eq!(robust.of(3), robust.of(3).min(DVec3::ONE).max(DVec3::ONE));
+        assert_eq!(
+            robust.factor(3),
+            robust.factor(3).min(DVec3::ONE).max(DVec3::ONE)
+        );
     }
 
     #[test]
@@ -210,9 +213,9 @@ mod tests {
         }
         let [quiet, disturbed] = [&quiet, &edges].map(|c| RobustWeights::from_residuals(c, 2));
         // One of 40 clusters counts for ten deviations; unbounded, the factor would fall to a 50,000th.
-        assert!((disturbed.of(1) / quiet.of(1)).min_element() > 0.15);
+        assert!((disturbed.factor(1) / quiet.factor(1)).min_element() > 0.15);
         let influence = |cluster: &Linearised| disturbed.weight(cluster) * cluster.residuals[0];
-        let usual = disturbed.of(1) * 0.1;
+        let usual = disturbed.factor(1) * 0.1;
         let ratio = (influence(&edges[400]) / usual).x;
         // Ten deviations, which the cluster itself doubles, instead of 500.
         assert!((10.0..30.0).contains(&ratio), "{ratio}");
@@ -230,7 +233,7 @@ mod tests {
                 *residual += cluster.own * 0.8;
             }
         }
-        let [right, wrong] = [right, wrong].map(|c| RobustWeights::from_residuals(&c, 2).of(1));
+        let [right, wrong] = [right, wrong].map(|c| RobustWeights::from_residuals(&c, 2).factor(1));
         let gained = wrong / right - DVec3::ONE;
         assert!(gained.abs().max_element() < 0.03, "{gained}");
     }
@@ -262,7 +265,7 @@ mod tests {
             .collect();
         let robust = RobustWeights::from_residuals(&all, 2);
         // The factor of an object without residuals is limited to 100.
-        assert!((robust.of(1) - DVec3::splat(100.0)).abs().max_element() < 1e-9);
+        assert!((robust.factor(1) - DVec3::splat(100.0)).abs().max_element() < 1e-9);
         let bound_met: Vec<Linearised> = clusters(0, noise(10, 0.0)).collect();
         assert_eq!(
             RobustWeights::from_residuals(&bound_met, 1),

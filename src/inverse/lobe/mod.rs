@@ -78,7 +78,7 @@ pub struct LobeFit {
 }
 
 impl Gain {
-    /// Whether it exceeds [`SIGNIFICANT`] standard errors.
+    /// Whether it is more than four standard errors above zero.
     pub fn is_significant(&self) -> bool {
         self.mean > SIGNIFICANT * self.noise
     }

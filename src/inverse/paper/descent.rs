@@ -226,7 +226,7 @@ impl Descent {
         bounces: u32,
         draw: Draw,
     ) -> StepOutcome {
-        let pace = Pace::of(self, settings);
+        let pace = Pace::new(self, settings);
         let step = self.steps;
         // The squared loss of two independent sets has no bias for any number of paths.
         let loss = match self.patches {

@@ -34,7 +34,7 @@ pub struct Pace {
 
 impl Pace {
     /// The pace of the next step of a descent.
-    pub fn of(descent: &Descent, settings: &Settings) -> Self {
+    pub fn new(descent: &Descent, settings: &Settings) -> Self {
         let level = descent.level;
         let (batch, samples) = match &descent.patches {
             None => {

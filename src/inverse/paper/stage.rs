@@ -134,7 +134,7 @@ impl Run<'_, '_> {
     /// Number of paths until the next measurement.
     fn until_measured(&self) -> u64 {
         let seen = self.covered.iter().filter(|&&pixels| pixels > 0).count() as u64;
-        let pace = Pace::of(&self.state.descent, &self.monitor.settings);
+        let pace = Pace::new(&self.state.descent, &self.monitor.settings);
         let paths = MEETINGS * seen * (pace.samples[0] + pace.samples[1]);
         paths.max(MEASURE_EVERY * self.losses.paths()).max(1)
     }

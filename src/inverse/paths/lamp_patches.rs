@@ -55,7 +55,7 @@ impl LampPatches {
     }
 
     /// The patch of a triangle, or [`NO_PATCH`].
-    pub fn of(&self, triangle: u32) -> u32 {
+    pub fn patch(&self, triangle: u32) -> u32 {
         let patch = self.patch_of.get(triangle as usize);
         patch.copied().unwrap_or(NO_PATCH)
     }

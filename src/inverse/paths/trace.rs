@@ -432,7 +432,7 @@ impl Tracer<'_> {
     }
 
     fn patch(&self, triangle: u32) -> u32 {
-        self.patches.map_or(NO_PATCH, |p| p.of(triangle))
+        self.patches.map_or(NO_PATCH, |p| p.patch(triangle))
     }
 
     fn lobe(&self, object: u32) -> Option<Lobe> {

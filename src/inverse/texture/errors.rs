@@ -55,7 +55,7 @@ pub fn standard_errors(
         .into_par_iter()
         .map(|cell| {
             let (mut sum, mut n) = (squares[cell], 1.0);
-            for (_, other) in links.of(cell) {
+            for (_, other) in links.neighbours(cell) {
                 sum += squares[other];
                 n += 1.0;
             }
@@ -73,9 +73,15 @@ fn perturbation(system: &System, seed: u64, object: usize, draw: u64) -> Vec<Vec
     let measured: Vec<Vec3> = (system.row_weights.par_iter().enumerate())
         .map(|(row, weight)| normal(0, row) / weight.max(Vec3::splat(f32::MIN_POSITIVE)).powf(0.5))
         .collect();
-    let mut right = system.observations.gathered(system.row_weights, &measured);
+    let mut right = system
+        .observations
+        .transpose_times(system.row_weights, &measured);
     for cell in 0..right.len() {
-        for (at, other) in system.links.of(cell).filter(|&(_, other)| other > cell) {
+        for (at, other) in system
+            .links
+            .neighbours(cell)
+            .filter(|&(_, other)| other > cell)
+        {
             let noise = normal(1, at) * system.penalties[at].sqrt();
             right[cell] += noise;
             right[other] -= noise;

@@ -64,7 +64,7 @@ pub struct Texture {
 impl Measurements {
     /// From pixels, and the radiance `white` of each cell with an albedo of one.
     pub fn new(pixels: &[&SeenPixel], observations: Observations, white: &[Vec3]) -> Self {
-        let irradiance: Vec<Vec3> = (observations.all_of(white).iter().zip(pixels))
+        let irradiance: Vec<Vec3> = (observations.values(white).iter().zip(pixels))
             .map(|(r, pixel)| *r * pixel.base)
             .collect();
         // Channels with almost no irradiance have no weight.
@@ -214,7 +214,7 @@ impl Measurements {
     fn is_active(&self, row: usize, colors: &[Vec3], values: &[Vec3]) -> bool {
         !self.bounds[row]
             || !is_met(
-                self.observations.of(row, colors),
+                self.observations.value(row, colors),
                 values[row],
                 self.weights[row],
             )
@@ -226,7 +226,7 @@ impl Measurements {
         let (mut sum, mut count) = (0.0, 0u64);
         for (row, value) in values.iter().enumerate() {
             if let Some(colors) = colors.get(self.folds[row]) {
-                let residual = *value - self.observations.of(row, colors);
+                let residual = *value - self.observations.value(row, colors);
                 let square = f64::from((residual * residual).dot(self.weights[row]));
                 if self.is_active(row, colors, values) {
                     sum += square.min(clip);
@@ -243,7 +243,7 @@ impl Measurements {
         for (row, value) in values.iter().enumerate() {
             let colors = colors.get(self.folds[row]);
             if let Some(colors) = colors.filter(|c| self.is_active(row, c, values)) {
-                let residual = (*value - self.observations.of(row, colors)).as_dvec3();
+                let residual = (*value - self.observations.value(row, colors)).as_dvec3();
                 sum += residual * residual * self.weights[row].as_dvec3();
                 count += 1;
             }
@@ -255,7 +255,7 @@ impl Measurements {
     fn clip(&self, values: &[Vec3], flat: &[Vec3]) -> f64 {
         let mut squares: Vec<f64> = (0..values.len())
             .map(|row| {
-                let residual = values[row] - self.observations.of(row, flat);
+                let residual = values[row] - self.observations.value(row, flat);
                 f64::from((residual * residual).dot(self.weights[row]))
             })
             .collect();
@@ -336,7 +336,7 @@ mod tests {
         let pixels: Vec<SeenPixel> = (0..100).map(pixel).collect();
         let seen: Vec<&SeenPixel> = pixels.iter().collect();
         let light: Vec<Vec3> = (0..100).map(white).collect();
-        let found = Measurements::new(&seen, Observations::of_each(100), &light);
+        let found = Measurements::new(&seen, Observations::one_per_cell(100), &light);
         assert!(
             (found.constant - truth).length() < 0.01,
             "{}",

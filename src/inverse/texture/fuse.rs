@@ -49,7 +49,7 @@ pub fn fuse(problem: &Problem, strength: f32, start: &[Vec3]) -> Vec<Vec3> {
     } = *problem;
     let data = observations.diagonal(row_weights);
     let tether = TETHER * mean_channel(&data).max(f32::MIN_POSITIVE);
-    let mut right = observations.gathered(row_weights, values);
+    let mut right = observations.transpose_times(row_weights, values);
     for (r, s) in right.iter_mut().zip(start) {
         *r += *s * tether;
     }
@@ -78,7 +78,7 @@ pub fn penalties(links: &Links, levels: &[f32], strength: f32, colors: &[Vec3]) 
         .into_par_iter()
         .map(|cell| {
             links
-                .of(cell)
+                .neighbours(cell)
                 .map(|(at, other)| {
                     let difference = (colors[cell] - colors[other]).length();
                     let level = 0.5 * (levels[cell] + levels[other]);
@@ -152,14 +152,14 @@ impl System<'_> {
     }
 
     fn apply(&self, x: &[Vec3]) -> Vec<Vec3> {
-        let measured = self.observations.all_of(x);
+        let measured = self.observations.values(x);
         (0..x.len())
             .into_par_iter()
             .map(|cell| {
                 let data: Vec3 = (self.observations.column(cell))
                     .map(|(row, w)| measured[row] * self.row_weights[row] * w)
                     .sum();
-                let smooth: Vec3 = (self.links.of(cell))
+                let smooth: Vec3 = (self.links.neighbours(cell))
                     .map(|(at, other)| (x[cell] - x[other]) * self.penalties[at])
                     .sum();
                 data + smooth + x[cell] * self.tether

@@ -139,7 +139,7 @@ impl Irradiance {
             .map(|(a, b)| (*a + *b) * 0.5)
             .collect();
         let levels = levels(&both, links);
-        let each = Observations::of_each(count);
+        let each = Observations::one_per_cell(count);
         let weights: Vec<Vec3> = levels.iter().map(|l| Vec3::splat(1.0 / (l * l))).collect();
         let problem = |values| Problem {
             observations: &each,
@@ -195,7 +195,7 @@ fn local_mean(values: &[Vec3], links: &Links) -> Vec<Vec3> {
             .map(|cell| {
                 let mut sum = level[cell];
                 let mut weight = 1.0;
-                for (at, other) in links.of(cell) {
+                for (at, other) in links.neighbours(cell) {
                     sum += level[other] * links.borders[at];
                     weight += links.borders[at];
                 }

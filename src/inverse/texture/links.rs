@@ -59,7 +59,7 @@ impl Links {
 
     /// A cell's links: index of the link and the neighbour.
     #[inline]
-    pub fn of(&self, cell: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
+    pub fn neighbours(&self, cell: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
         let row = self.row(cell);
         row.map(|at| (at, self.to[at] as usize))
     }

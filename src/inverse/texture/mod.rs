@@ -123,7 +123,7 @@ impl Refined {
             .filter_map(|a| {
                 let trial = a.trial?;
                 Some(format!(
-                    "{} ({} cells, squared error of untouched pixels {:.0} % less)",
+                    "{} ({} cells, squared error of pixels outside the fit {:.0} % less)",
                     name(a.object),
                     a.cells,
                     100.0 * (1.0 - trial.after / trial.before)

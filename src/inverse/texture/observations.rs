@@ -50,7 +50,7 @@ impl Observations {
     }
 
     /// One measurement of each cell.
-    pub fn of_each(cell_count: usize) -> Self {
+    pub fn one_per_cell(cell_count: usize) -> Self {
         let rows: Vec<Vec<(u32, f32)>> = (0..cell_count as u32).map(|c| vec![(c, 1.0)]).collect();
         Self::new(&rows, cell_count)
     }
@@ -87,20 +87,20 @@ impl Observations {
 
     /// The value Σ w x of a row for the given colours.
     #[inline]
-    pub fn of(&self, row: usize, colors: &[Vec3]) -> Vec3 {
+    pub fn value(&self, row: usize, colors: &[Vec3]) -> Vec3 {
         self.row(row).map(|(cell, w)| colors[cell] * w).sum()
     }
 
     /// The values of all rows.
-    pub fn all_of(&self, colors: &[Vec3]) -> Vec<Vec3> {
+    pub fn values(&self, colors: &[Vec3]) -> Vec<Vec3> {
         (0..self.rows())
             .into_par_iter()
-            .map(|row| self.of(row, colors))
+            .map(|row| self.value(row, colors))
             .collect()
     }
 
     /// For each cell, Σ w ω y over its rows, with the weights ω (per channel) and values y of rows.
-    pub fn gathered(&self, row_weights: &[Vec3], values: &[Vec3]) -> Vec<Vec3> {
+    pub fn transpose_times(&self, row_weights: &[Vec3], values: &[Vec3]) -> Vec<Vec3> {
         (0..self.cells())
             .into_par_iter()
             .map(|cell| {

@@ -93,11 +93,11 @@ pub fn compare(
         comparison.compare(&pixels)
     };
     let mut compared = part(true);
-    let first = Trial::of(&compared, glossy);
+    let first = Trial::new(&compared, glossy);
     if !is_decisive(&first) && !is_hopeless(&first, count) {
         compared.extend(part(false));
     }
-    Trial::of(&compared, glossy)
+    Trial::new(&compared, glossy)
 }
 
 /// Whether the first pixels decide for the texture.
@@ -189,7 +189,7 @@ impl Trial {
         self.gain > SIGNIFICANT * self.noise
     }
 
-    fn of(pixels: &[Compared], glossy: bool) -> Self {
+    fn new(pixels: &[Compared], glossy: bool) -> Self {
         let mut sizes: Vec<f64> = (pixels.iter())
             .map(|p| (p.flat - p.textured).abs())
             .collect();
