@@ -3,6 +3,7 @@
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
 use crate::math::rng::{Stream, splitmix64};
+use crate::math::stats::upper_median;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::visibility::NOTHING;
@@ -135,16 +136,10 @@ impl GBuffer {
             footprints.extend(frame.footprints);
             rays += frame.rays;
         }
-        let middle = footprints.len() / 2;
-        let footprint = if footprints.is_empty() {
-            0.0
-        } else {
-            *footprints.select_nth_unstable_by(middle, f32::total_cmp).1
-        };
         Self {
             pixels,
             seen,
-            footprint,
+            footprint: upper_median(&mut footprints).unwrap_or(0.0),
             rays,
         }
     }

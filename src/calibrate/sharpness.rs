@@ -9,7 +9,7 @@ use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
 use crate::capture::photograph::Photograph;
 use crate::math::color::luminance;
-use crate::math::stats::quantile;
+use crate::math::stats::{quantile, upper_median};
 use crate::scene::Scene;
 use crate::scene::geometry::Ray;
 use glam::{Vec2, Vec3};
@@ -99,7 +99,8 @@ impl Sharpness {
         for steps in &mut steps {
             sizes.append(&mut steps.sizes);
         }
-        let min_step = MIN_STEP.max(ABOVE_MEDIAN * upper_median(&mut sizes));
+        let median = upper_median(&mut sizes).unwrap_or(0.0);
+        let min_step = MIN_STEP.max(ABOVE_MEDIAN * median);
         Self {
             contrast: fit_contrasts(&ratios(&steps, min_step), frames),
         }
@@ -129,15 +130,6 @@ impl Sharpness {
     pub fn weight(&self, frame: usize) -> f32 {
         let contrast = self.contrast.get(frame).copied().flatten();
         contrast.unwrap_or(1.0).min(1.0).powi(2) as f32
-    }
-}
-
-/// The upper median; 0 without values.
-fn upper_median(values: &mut [f32]) -> f32 {
-    let index = values.len() / 2;
-    match values.is_empty() {
-        true => 0.0,
-        false => *values.select_nth_unstable_by(index, f32::total_cmp).1,
     }
 }
 

@@ -5,6 +5,7 @@
 
 use crate::calibrate::gbuffer::{GBuffer, GBufferPixel};
 use crate::calibrate::problem::Problem;
+use crate::math::stats::upper_median;
 use glam::{BVec3, DVec3, Vec3};
 use std::collections::BTreeMap;
 
@@ -179,11 +180,7 @@ fn typical_level(problem: &Problem, gbuffer: &GBuffer) -> Vec3 {
             .map(|p| problem.photographs[p.frame as usize].pixels[p.pixel as usize][c])
             .filter(|&v| v > 0.0)
             .collect();
-        if values.is_empty() {
-            return 1.0;
-        }
-        let middle = values.len() / 2;
-        *values.select_nth_unstable_by(middle, f32::total_cmp).1
+        upper_median(&mut values).unwrap_or(1.0)
     };
     Vec3::new(channel(0), channel(1), channel(2))
 }

@@ -107,16 +107,13 @@ impl PathCache {
 /// changes it by many times the dark side's radiance. The mean square accounts for that.
 fn level(cached: &CachedCluster, unknowns: &Unknowns) -> Vec3 {
     let (mut emitted_squared, mut reflected) = (DVec3::ZERO, DVec3::ZERO);
-    let mut start = 0;
-    for &end in &cached.ends {
-        let vertices = &cached.vertices[start..end as usize];
+    for vertices in cached.paths() {
         let first = vertices.first().filter(|v| v.surface != SPECULAR);
         let emitted = first.map_or(Vec3::ZERO, |vertex| {
             unknowns.emission[vertex.surface as usize] * vertex.emission_weight
         });
         emitted_squared += (emitted * emitted).as_dvec3();
         reflected += (radiance(vertices, unknowns) - emitted).as_dvec3();
-        start = end as usize;
     }
     let paths = cached.ends.len().max(1) as f64;
     let reflected = reflected / paths;
@@ -129,11 +126,9 @@ fn level(cached: &CachedCluster, unknowns: &Unknowns) -> Vec3 {
 fn means(cached: &CachedCluster, mut f: impl FnMut(&[Vertex], usize) -> Vec3) -> [DVec3; 2] {
     let paths = cached.cluster.paths as usize;
     let mut sums = [DVec3::ZERO; 2];
-    let mut start = 0;
-    for (path, &end) in cached.ends.iter().enumerate() {
+    for (path, vertices) in cached.paths().enumerate() {
         let set = path / paths % 2;
-        sums[set] += f(&cached.vertices[start..end as usize], set).as_dvec3();
-        start = end as usize;
+        sums[set] += f(vertices, set).as_dvec3();
     }
     sums.map(|sum| sum * f64::from(scale(cached)))
 }

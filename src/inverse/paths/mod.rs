@@ -73,6 +73,18 @@ pub struct CachedCluster {
     pub ends: Vec<u32>,
 }
 
+impl CachedCluster {
+    /// The vertices of each path, in order.
+    pub fn paths(&self) -> impl Iterator<Item = &[Vertex]> {
+        let mut start = 0;
+        self.ends.iter().map(move |&end| {
+            let path = &self.vertices[start..end as usize];
+            start = end as usize;
+            path
+        })
+    }
+}
+
 /// Two independent sets of paths through the same pixels.
 #[derive(Debug, Clone, Default)]
 pub struct PathCache {
@@ -96,13 +108,10 @@ impl PathCache {
         let (mut ending, mut all) = (0u64, 0u64);
         for cached in &self.clusters {
             all += cached.ends.len() as u64;
-            let mut start = 0;
-            for &end in &cached.ends {
-                let last = cached.vertices[start..end as usize].last();
-                let ends_there = last.is_some_and(|v| v.surface >= first && v.surface != SPECULAR);
-                ending += u64::from(ends_there);
-                start = end as usize;
-            }
+            let last = cached.paths().filter_map(|path| path.last());
+            ending += last
+                .filter(|v| v.surface >= first && v.surface != SPECULAR)
+                .count() as u64;
         }
         ending as f64 / all.max(1) as f64
     }

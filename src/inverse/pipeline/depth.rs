@@ -2,7 +2,6 @@
 
 use crate::inverse::loss::LateLight;
 use crate::inverse::pipeline::{MAX_DEPTH, Pipeline};
-use crate::inverse::solver::Stage;
 
 /// A common fixed depth, in bounces.
 const COMMON_DEPTH: u32 = 10;
@@ -22,16 +21,7 @@ impl Pipeline<'_, '_> {
         if let Some(late) = &late {
             self.monitor.cast(late.cast);
         }
-        let stage = Stage {
-            name: "depth".to_owned(),
-            seconds: self.monitor.seconds() - started,
-            iterations: self.monitor.progress.iterations,
-            train_loss: None,
-            held_out_loss: None,
-            kept: true,
-            why: describe(limit, late.as_ref()),
-        };
-        self.monitor.stage(stage);
+        self.record_unmeasured("depth", started, true, describe(limit, late.as_ref()));
     }
 }
 

@@ -2,7 +2,6 @@
 
 use crate::calibrate::exposure::Exposures;
 use crate::inverse::pipeline::Pipeline;
-use crate::inverse::solver::Stage;
 use glam::{DVec2, Vec3};
 
 impl Pipeline<'_, '_> {
@@ -43,15 +42,6 @@ impl Pipeline<'_, '_> {
                 exposures.response_gain * 100.0
             ));
         }
-        let stage = Stage {
-            name: "exposures".to_owned(),
-            seconds: self.monitor.seconds() - started,
-            iterations: 0,
-            train_loss: None,
-            held_out_loss: None,
-            kept: exposures.needed(),
-            why,
-        };
-        self.monitor.stage(stage);
+        self.record_unmeasured("exposures", started, exposures.needed(), why);
     }
 }

@@ -4,7 +4,7 @@ use crate::inverse::known::Pinned;
 use crate::inverse::lobe::{Gain, LobeFit, Lobes, Task};
 use crate::inverse::pipeline::Pipeline;
 use crate::inverse::roles::Role;
-use crate::inverse::solver::{Stage, Termination};
+use crate::inverse::solver::Termination;
 use crate::transport::arrival::Cast;
 use glam::Vec3;
 
@@ -31,19 +31,12 @@ impl<'a> Pipeline<'a, '_> {
             .collect();
         if promising.is_empty() {
             let max = evidence.iter().flatten().fold(0.0f64, |a, b| a.max(*b));
-            self.monitor.stage(Stage {
-                name: "lobes".to_owned(),
-                seconds: self.monitor.seconds() - started,
-                iterations: self.monitor.progress.iterations,
-                train_loss: None,
-                held_out_loss: None,
-                kept: false,
-                why: format!(
-                    "none of {} objects looks glossy: differences between photographs of the same spots give at most {max:.1} \
-                     standard errors of evidence for a lobe",
-                    objects.len()
-                ),
-            });
+            let why = format!(
+                "none of {} objects looks glossy: differences between photographs of the same spots give at most {max:.1} \
+                 standard errors of evidence for a lobe",
+                objects.len()
+            );
+            self.record_unmeasured("lobes", started, false, why);
             return Ok(());
         }
 

@@ -77,6 +77,19 @@ impl Pipeline<'_, '_> {
         Ok(losses)
     }
 
+    /// Records a stage that leaves the estimate as it is, without losses.
+    pub(super) fn record_unmeasured(&mut self, name: &str, started: f64, kept: bool, why: String) {
+        self.monitor.stage(Stage {
+            name: name.to_owned(),
+            seconds: self.monitor.seconds() - started,
+            iterations: self.monitor.progress.iterations,
+            train_loss: None,
+            held_out_loss: None,
+            kept,
+            why,
+        });
+    }
+
     /// Ends a stage: updates the checkpoint, and offers it to the observer.
     pub(super) fn end_stage(&mut self, stages: u32) -> Result<(), Termination> {
         self.keep_checkpoint(stages);
