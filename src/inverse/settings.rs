@@ -207,37 +207,37 @@ parameters! {
     preset: Preset = Preset::Balanced, Kind::Choice(Preset::WORDS), "", false,
         "Which solver runs, and how far it goes";
     seed: u64 = 1, Kind::Whole { min: 0, max: u64::MAX }, "", false,
-        "Key of all random numbers: the same seed gives the same result";
+        "Seed of all random numbers: the same seed gives the same result";
     time: f64 = 0.0, Kind::Real { min: 0.0, max: 1e9, logarithmic: true }, "s", true,
         "Wall time after which the solve stops; 0 sets no limit";
     target_error: f64 = 0.0, Kind::Real { min: 0.0, max: 100.0, logarithmic: true }, "%", true,
-        "Go on until the median relative standard error of the albedos seen is below this; 0 leaves it to the preset";
+        "Continue until the median relative standard error of the seen albedos is below this; 0 uses the preset's target";
     bounces: u64 = 0, Kind::Whole { min: 0, max: 1000 }, "", false,
-        "Longest path in bounces; 0 chooses (2 for the paper solver, by the albedo found for the others)";
+        "Greatest number of bounces; 0 means 2 for the paper solver, and Russian roulette alone for the others";
     held_out: f64 = HoldOut::DEFAULT.held_out, Kind::Real { min: 0.0, max: 0.9, logarithmic: false }, "of the pixels", false,
-        "Fraction of the pixels kept out of the fit, to test it";
+        "Fraction of the pixels held out of the fit, to test it";
     hold_out: u64 = HoldOut::DEFAULT.hold_out, Kind::Whole { min: 0, max: 1_000_000 }, "frames", false,
-        "Keep every K-th frame out of the fit instead of single pixels; 0 keeps single pixels";
+        "Hold every K-th frame out of the fit instead of single pixels; 0 holds out single pixels";
     outside_light: bool = true, Kind::Flag, "", false,
         "Try light from outside the mesh, where rays leave it";
     exposures: bool = true, Kind::Flag, "", false,
-        "Estimate the exposure and white balance of each photograph, and how the lens dims the corners, where the photographs disagree about surfaces that they share";
+        "Estimate the exposure and white balance of each photograph, vignetting and camera response, if photographs disagree on shared surfaces";
     leave_out: bool = true, Kind::Flag, "", false,
-        "Leave out photographs that do not show what all others show of the surfaces that they share, as from a wrong pose (not in the paper's descent)";
+        "Leave out photographs that contradict the others on shared surfaces, for example because of a wrong pose (not in the paper solver)";
     lobes: bool = true, Kind::Flag, "", false,
-        "Try a rough specular lobe on objects that look different from different sides";
+        "Try a rough specular lobe on objects that look different in different views";
     textures: bool = true, Kind::Flag, "", false,
         "Try albedo that varies over an object, where its pixels show more than one colour";
     pixels: u64 = 0, Kind::Whole { min: 0, max: 1_000_000_000 }, "", false,
-        "Pixels in the fit of the transport cache, about; 0 leaves it to the preset";
+        "Approximate number of pixels in the fit of the transport cache; 0 uses the preset's number";
     paths: u64 = 0, Kind::Whole { min: 0, max: 1_000_000_000_000 }, "a round", false,
-        "Paths of the transport cache in each round, its first stage in proportion; 0 leaves it to the preset";
+        "Paths of the transport cache in each round; the first stage scales in proportion; 0 uses the preset's number";
     memory: f64 = 0.0, Kind::Real { min: 0.0, max: 1e6, logarithmic: true }, "GiB", false,
-        "Memory that stored paths may take; 0 takes a quarter of the machine's";
+        "Memory limit of stored paths; 0 uses a quarter of the machine's memory";
     learning_rate: f64 = 5e-3, Kind::Real { min: 1e-6, max: 10.0, logarithmic: true }, "", true,
         "Paper solver: initial step size of ADAM";
     batch: u64 = 8, Kind::Whole { min: 1, max: 1_000_000 }, "pixels", true,
-        "Paper solver: pixels drawn for each step at first";
+        "Paper solver: initial number of pixels per step";
     samples: u64 = 1, Kind::Whole { min: 1, max: 65536 }, "a pixel", true,
         "Paper solver: paths for each pixel's colour, and as many for its derivative";
     loss: Loss = Loss::L1, Kind::Choice(Loss::WORDS), "", true,
@@ -245,13 +245,13 @@ parameters! {
     emission_weight: f64 = 1e-3, Kind::Real { min: 0.0, max: 1.0, logarithmic: true }, "", true,
         "Paper solver: weight of the L1 regulariser on all emission";
     light_sampling: LightSampling = LightSampling::Mis, Kind::Choice(LightSampling::WORDS), "", true,
-        "How light is found at a bounce";
+        "Sampling of direct light";
     decay: f64 = 0.0, Kind::Real { min: 0.0, max: 1.0, logarithmic: false }, "a 1000 steps", true,
-        "Paper solver: share by which the learning rate falls every thousand steps";
+        "Paper solver: fraction by which the learning rate falls every thousand steps";
     anneal: bool = true, Kind::Flag, "", true,
         "Paper solver: halve the learning rate and double the samples, at first the batch too, whenever the loss stands still";
     steps: u64 = 0, Kind::Whole { min: 0, max: 1_000_000_000 }, "", true,
-        "Paper solver: stop after this many steps; 0 goes on until the time is up or the loss stands still";
+        "Paper solver: stop after this many steps; 0 continues until the time limit or convergence";
 }
 
 /// Bounces of the paper's solver if none are set.

@@ -29,7 +29,7 @@ const LONG_SIDE: u32 = 128;
 const MAX_FRAMES: usize = 24;
 /// Photographs on which readings similar to the given one are scored.
 const NEAR_FRAMES: usize = 12;
-/// Rounds of the search over readings: the best so many readings of the previous round, on so many photographs.
+/// Rounds of the search over readings: the number of readings kept from the previous round, and of photographs.
 const ROUNDS: [(usize, usize); 2] = [(usize::MAX, 4), (24, 12)];
 /// Readings of the last round whose factor is refined, and refined readings that are scored on all photographs. With few
 /// edges, a factor that is off by half a step is not among the first two.

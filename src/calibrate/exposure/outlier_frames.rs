@@ -216,7 +216,7 @@ mod tests {
         }
     }
 
-    /// A walk on which each photograph shares cells with the next alone: those beside the wrong one differ from nothing else.
+    /// A walk on which each photograph shares cells with the next one alone: neighbours of the wrong one differ from it only.
     #[test]
     fn neighbours_of_a_wrong_photograph_stay() {
         let observations = seen(40 * 11, 12, &[5], |cell, frame| {
