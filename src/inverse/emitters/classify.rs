@@ -251,9 +251,8 @@ fn least_squares(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse::paths::CachedCluster;
-    use crate::inverse::paths::Vertex;
     use crate::inverse::paths::clusters::Cluster;
+    use crate::inverse::paths::{CachedCluster, Vertex};
 
     /// A cluster whose paths have the incident radiance `light`, with some noise, and whose photograph shows `measured`.
     fn cluster(object: u32, index: usize, light: f32, measured: f32) -> CachedCluster {
@@ -264,14 +263,8 @@ mod tests {
         };
         CachedCluster {
             cluster: Cluster {
-                frame: 0,
-                object,
-                pixels: vec![0],
-                paths: 1,
-                measured: Vec3::splat(measured),
-                censored: BVec3::FALSE,
                 weight: Vec3::splat(1.0 / (measured * measured + 0.25)),
-                dark: Vec3::ONE,
+                ..Cluster::unit(object, 1, Vec3::splat(measured))
             },
             vertices: vec![path(0), path(1)],
             ends: vec![1, 2],

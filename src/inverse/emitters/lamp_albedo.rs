@@ -80,22 +80,16 @@ mod tests {
     use super::*;
     use crate::inverse::fit::linear::descend;
     use crate::inverse::roles;
-    use glam::BVec3;
-
     /// A lamp (0) of emission 10 that reflects `albedo` × 1 below and `albedo` × 3 above, seen from below. A floor (1) is lit by
     /// its lower side and a ceiling (2) by its upper side; both are photographed, with noise that cancels.
     fn room(albedo: f64, seen: bool) -> Vec<Linearised> {
         let below = 10.0 + albedo;
         let cluster = |object: u32, measured: f64, model: f64, rows: &[(usize, f64)]| Linearised {
-            object,
-            weight: DVec3::ONE,
-            pixels: 1.0,
-            residuals: [DVec3::splat(measured - model); 2],
-            censored: BVec3::FALSE,
             own: DVec3::splat(rows[0].1),
             rows: (rows.iter())
                 .map(|&(row, d)| (row, DVec3::splat(d), DVec3::splat(d)))
                 .collect(),
+            ..Linearised::unit(object, DVec3::splat(measured - model))
         };
         // Rows: albedos of lamp, floor, ceiling, and the lamp's emission; about emission 10, albedos 0 and 0.5.
         let lamp = cluster(0, below, 10.0, &[(3, 1.0), (0, 1.0)]);

@@ -68,18 +68,14 @@ impl Accumulated {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse::fit::equations::Coupling;
-    use crate::inverse::fit::equations::NormalEquations;
+    use crate::inverse::fit::equations::{Coupling, NormalEquations};
     use crate::inverse::fit::prior::Prior;
     use crate::inverse::fit::robust_weights::RobustWeights;
-    use crate::inverse::paths::CachedCluster;
-    use crate::inverse::paths::NO_LAMP;
-    use crate::inverse::paths::PathCache;
-    use crate::inverse::paths::Vertex;
     use crate::inverse::paths::clusters::Cluster;
+    use crate::inverse::paths::{CachedCluster, NO_LAMP, PathCache, Vertex};
     use crate::inverse::unknowns::Unknowns;
     use crate::math::rng::Stream;
-    use glam::{BVec3, Vec3};
+    use glam::Vec3;
 
     const SURFACES: usize = 3;
     const PIXELS: usize = 2;
@@ -112,14 +108,9 @@ mod tests {
             }
         }
         let cluster = Cluster {
-            frame: 0,
-            object: 0,
-            pixels: (0..PIXELS as u32).collect(),
             paths: count,
-            measured: Vec3::new(0.5, 0.6, 0.7),
-            censored: BVec3::FALSE,
             weight: Vec3::new(1.0, 2.0, 3.0),
-            dark: Vec3::ONE,
+            ..Cluster::unit(0, PIXELS as u32, Vec3::new(0.5, 0.6, 0.7))
         };
         PathCache {
             clusters: vec![CachedCluster {

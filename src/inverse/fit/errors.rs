@@ -371,7 +371,6 @@ fn eliminate_sparse(
 mod tests {
     use super::*;
     use crate::inverse::fit::prior::Prior;
-    use glam::BVec3;
 
     /// The mean of n values of deviation one. With residuals over 1 − 1/n, the variance is the textbook's Σ r² / (n (n − 1))
     /// times n / (n − 1); the plain scores give Σ r² / n².
@@ -380,13 +379,9 @@ mod tests {
         for count in [4, 40] {
             let clusters: Vec<Linearised> = (0..count)
                 .map(|i| Linearised {
-                    object: 0,
-                    weight: DVec3::ONE,
-                    pixels: 1.0,
-                    residuals: [DVec3::splat([1.0, -1.0][i % 2]); 2],
-                    censored: BVec3::FALSE,
                     own: DVec3::ONE,
                     rows: vec![(0, DVec3::ONE, DVec3::ONE)],
+                    ..Linearised::unit(0, DVec3::splat([1.0, -1.0][i % 2]))
                 })
                 .collect();
             let prior = Prior::new(1, 1, Vec3::ONE);

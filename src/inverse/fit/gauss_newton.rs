@@ -235,13 +235,12 @@ fn dense_step(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse::paths::CachedCluster;
-    use crate::inverse::paths::Vertex;
     use crate::inverse::paths::clusters::Cluster;
+    use crate::inverse::paths::{CachedCluster, Vertex};
     use crate::inverse::roles;
     use crate::inverse::roles::Role;
     use crate::math::rng::Stream;
-    use glam::{BVec3, Vec3};
+    use glam::Vec3;
 
     /// Noise-free photographs of a lamp and a wall. One set of paths overestimates the light and the other underestimates it, so
     /// that the product of their residuals is negative.
@@ -253,17 +252,11 @@ mod tests {
             known: Vec3::splat([1.0 + off, 1.0 - off][set]),
             ..Vertex::on(u32::from(lamp))
         };
-        let measured = if lamp { 17.3 } else { 0.37 };
+        let measured: f32 = if lamp { 17.3 } else { 0.37 };
         CachedCluster {
             cluster: Cluster {
-                frame: 0,
-                object: u32::from(lamp),
-                pixels: vec![0],
-                paths: 1,
-                measured: Vec3::splat(measured),
-                censored: BVec3::FALSE,
                 weight: Vec3::splat(measured.powi(-2)),
-                dark: Vec3::ONE,
+                ..Cluster::unit(u32::from(lamp), 1, Vec3::splat(measured))
             },
             vertices: vec![vertex(0), vertex(1)],
             ends: vec![1, 2],

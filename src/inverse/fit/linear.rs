@@ -71,7 +71,7 @@ pub fn descend(
 mod tests {
     use super::*;
     use crate::math::rng::Stream;
-    use glam::{BVec3, Vec3};
+    use glam::Vec3;
 
     /// 1000 clusters depend on one albedo through derivatives with a relative noise of one. One step goes half the way; the fit
     /// finds the albedo. The tolerance is four of its standard errors.
@@ -84,13 +84,10 @@ mod tests {
             .map(|_| {
                 let [a, b] = [(); 2].map(|()| DVec3::ONE + noise());
                 Linearised {
-                    object: 0,
-                    weight: DVec3::ONE,
-                    pixels: 1.0,
                     residuals: [a, b].map(|j| DVec3::splat(truth) - j * begun),
-                    censored: BVec3::FALSE,
                     own: (a + b) * 0.5,
                     rows: vec![(0, a, b)],
+                    ..Linearised::unit(0, DVec3::ZERO)
                 }
             })
             .collect();

@@ -79,8 +79,6 @@ mod tests {
     use super::*;
     use crate::inverse::estimate::ObjectEstimate;
     use crate::math::rng::Stream;
-    use glam::BVec3;
-
     /// Estimated error of clusters with an albedo of 0.5 and an irradiance of one, with an error that 50 neighbours share and
     /// independent noise.
     fn found(shared_error: f64, noise: f64) -> f64 {
@@ -97,26 +95,11 @@ mod tests {
                     shared = shared_error * normal();
                 }
                 let residual = DVec3::splat(0.5 * (shared + noise * normal()));
-                let cluster = Cluster {
-                    frame: 0,
-                    object: 0,
-                    pixels: vec![i],
-                    paths: 1,
-                    measured: Vec3::splat(0.5),
-                    censored: BVec3::FALSE,
-                    weight: Vec3::ONE,
-                    dark: Vec3::ONE,
-                };
                 let line = Linearised {
-                    object: 0,
-                    weight: DVec3::ONE,
-                    pixels: 1.0,
-                    residuals: [residual; 2],
-                    censored: BVec3::FALSE,
                     own: DVec3::ONE,
-                    rows: Vec::new(),
+                    ..Linearised::unit(0, residual)
                 };
-                (cluster, line)
+                (Cluster::unit(0, 1, Vec3::splat(0.5)), line)
             })
             .unzip::<_, _, Vec<_>, Vec<_>>();
         let mut unknowns = Unknowns::new(1);

@@ -50,19 +50,10 @@ pub fn distribute_paths(clusters: &mut [Cluster], objects: usize, total: u64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{BVec3, DVec3, Vec3};
+    use glam::{DVec3, Vec3};
 
     fn pixels(object: u32, count: u32) -> Cluster {
-        Cluster {
-            frame: 0,
-            object,
-            pixels: (0..count).collect(),
-            paths: 1,
-            measured: Vec3::ZERO,
-            censored: BVec3::FALSE,
-            weight: Vec3::ONE,
-            dark: Vec3::ONE,
-        }
+        Cluster::unit(object, count, Vec3::ZERO)
     }
 
     #[test]
@@ -91,13 +82,8 @@ mod tests {
 
     fn residuals(object: u32, a: f64, b: f64) -> Linearised {
         Linearised {
-            object,
-            weight: DVec3::ONE,
-            pixels: 1.0,
             residuals: [DVec3::splat(a), DVec3::splat(b)],
-            censored: BVec3::FALSE,
-            own: DVec3::ZERO,
-            rows: Vec::new(),
+            ..Linearised::unit(object, DVec3::ZERO)
         }
     }
 

@@ -155,21 +155,12 @@ fn weighted_median(mut values: Vec<(f64, f64)>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::BVec3;
 
     fn clusters(
         object: u32,
         residuals: impl Iterator<Item = f64>,
     ) -> impl Iterator<Item = Linearised> {
-        residuals.map(move |r| Linearised {
-            object,
-            weight: DVec3::ONE,
-            pixels: 1.0,
-            residuals: [DVec3::splat(r); 2],
-            censored: BVec3::FALSE,
-            own: DVec3::ZERO,
-            rows: Vec::new(),
-        })
+        residuals.map(move |r| Linearised::unit(object, DVec3::splat(r)))
     }
 
     /// Residuals of about the given deviation, of alternating sign.

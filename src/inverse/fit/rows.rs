@@ -246,16 +246,12 @@ fn dot(entries: &[Entry], v: &[DVec3]) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse::fit::equations::Coupling;
-    use crate::inverse::fit::equations::Matrices;
-    use crate::inverse::fit::equations::NormalEquations;
+    use crate::inverse::fit::equations::{Coupling, Matrices, NormalEquations};
     use crate::inverse::fit::errors::{score_tests, standard_errors};
     use crate::inverse::fit::gauss_newton::propose;
     use crate::inverse::fit::prior::Prior;
     use crate::inverse::unknowns::Unknowns;
     use crate::math::rng::Stream;
-    use glam::BVec3;
-
     const SURFACES: usize = 40;
     /// All albedos and the first ten emissions.
     const FREE: usize = SURFACES + 10;
@@ -280,13 +276,10 @@ mod tests {
                 let pull = if object.is_multiple_of(3) { -1.5 } else { 0.4 };
                 let residual = rows[0].1 * pull + color(0.3);
                 Linearised {
-                    object: object as u32,
                     weight: DVec3::ONE + color(1.0),
-                    pixels: 1.0,
                     residuals: [residual, residual + color(0.05)],
-                    censored: BVec3::FALSE,
-                    own: DVec3::ZERO,
                     rows,
+                    ..Linearised::unit(object as u32, DVec3::ZERO)
                 }
             })
             .collect()

@@ -204,20 +204,31 @@ pub fn brightness(clusters: &[Cluster], surfaces: usize) -> Vec<f32> {
 }
 
 #[cfg(test)]
+impl Cluster {
+    /// A cluster for tests: unit weight, one path per pixel and set.
+    pub fn unit(object: u32, pixels: u32, measured: Vec3) -> Self {
+        Self {
+            frame: 0,
+            object,
+            pixels: (0..pixels).collect(),
+            paths: 1,
+            measured,
+            censored: BVec3::FALSE,
+            weight: Vec3::ONE,
+            dark: Vec3::ONE,
+        }
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn a_predicted_level_weighs_dark_and_bright_spots_of_a_texture_alike() {
         let cluster = |measured: f32| Cluster {
-            frame: 0,
-            object: 0,
-            pixels: vec![0; 10],
-            paths: 1,
-            measured: Vec3::splat(measured),
-            censored: BVec3::FALSE,
-            weight: Vec3::ONE,
             dark: Vec3::splat(0.1),
+            ..Cluster::unit(0, 10, Vec3::splat(measured))
         };
         let mut spots = [cluster(0.2), cluster(1.8)];
         let mean = |spots: &[Cluster]| {

@@ -205,11 +205,26 @@ impl Scratch {
 }
 
 #[cfg(test)]
+impl Linearised {
+    /// A cluster for tests: one pixel, unit weight, equal residuals of both sets, no derivatives.
+    pub fn unit(object: u32, residual: DVec3) -> Self {
+        Self {
+            object,
+            weight: DVec3::ONE,
+            pixels: 1.0,
+            residuals: [residual; 2],
+            censored: BVec3::FALSE,
+            own: DVec3::ZERO,
+            rows: Vec::new(),
+        }
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse::paths::NO_LAMP;
-    use crate::inverse::paths::NO_TEXEL;
     use crate::inverse::paths::clusters::Cluster;
+    use crate::inverse::paths::{NO_LAMP, NO_TEXEL};
 
     /// One path over a textured surface (0) and a plain one (1) that reaches a lamp (2), and one path over the plain one alone.
     fn cached() -> CachedCluster {
@@ -220,16 +235,7 @@ mod tests {
             ..Vertex::on(surface)
         };
         CachedCluster {
-            cluster: Cluster {
-                frame: 0,
-                object: 0,
-                pixels: vec![0],
-                paths: 1,
-                measured: Vec3::ONE,
-                censored: BVec3::FALSE,
-                weight: Vec3::ONE,
-                dark: Vec3::ONE,
-            },
+            cluster: Cluster::unit(0, 1, Vec3::ONE),
             vertices: vec![
                 vertex(0, 1, NO_LAMP),
                 vertex(1, NO_TEXEL, 2),

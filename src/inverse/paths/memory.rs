@@ -41,24 +41,14 @@ mod tests {
     use super::*;
     use crate::inverse::paths::CachedCluster;
     use crate::inverse::paths::clusters::Cluster;
-    use glam::{BVec3, Vec3};
+    use glam::Vec3;
 
     #[test]
     fn as_many_paths_fit_as_are_as_long_as_those_of_the_pilot() {
-        let cluster = Cluster {
-            frame: 0,
-            object: 0,
-            pixels: vec![0, 1],
-            paths: 1,
-            measured: Vec3::ONE,
-            censored: BVec3::FALSE,
-            weight: Vec3::ONE,
-            dark: Vec3::ONE,
-        };
         // Four paths of three vertices.
         let pilot = PathCache {
             clusters: vec![CachedCluster {
-                cluster,
+                cluster: Cluster::unit(0, 2, Vec3::ONE),
                 vertices: vec![Vertex::on(0); 12],
                 ends: vec![3, 6, 9, 12],
             }],

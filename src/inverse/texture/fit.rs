@@ -285,21 +285,26 @@ fn weighted_mean(values: &[Vec3], weights: &[Vec3]) -> Vec3 {
 mod tests {
     use super::*;
 
-    #[test]
-    fn pixels_that_no_light_reaches_have_no_say_and_leave_all_finite() {
-        let pixel = |index: u32| SeenPixel {
+    fn pixel(index: u32, measured: Vec3, saturated: bool) -> SeenPixel {
+        SeenPixel {
             frame: 0,
             pixel: index,
             held_out: false,
-            measured: Vec3::splat(0.3),
-            saturated: false,
+            measured,
+            saturated,
             fold: index as usize % FOLDS,
             weight: 1.0,
             base: 1.0,
             gloss: Vec3::ZERO,
             hits: Vec::new(),
-        };
-        let pixels: Vec<SeenPixel> = (0..20).map(pixel).collect();
+        }
+    }
+
+    #[test]
+    fn pixels_that_no_light_reaches_have_no_say_and_leave_all_finite() {
+        let pixels: Vec<SeenPixel> = (0..20)
+            .map(|index| pixel(index, Vec3::splat(0.3), false))
+            .collect();
         let seen: Vec<&SeenPixel> = pixels.iter().collect();
         let rows = |cell: fn(u32) -> u32| -> Vec<Vec<(u32, f32)>> {
             (0..20).map(|i| vec![(cell(i), 1.0)]).collect()
@@ -320,20 +325,11 @@ mod tests {
     fn a_channel_without_light_does_not_spoil_the_colour() {
         let truth = Vec3::new(0.2, 0.5, 0.3);
         let white = |cell: usize| Vec3::new(1.0, 0.8, if cell < 90 { 0.4 } else { 1e-8 });
-        let pixel = |index: u32| SeenPixel {
-            frame: 0,
-            pixel: index,
-            held_out: false,
-            // Plus some light that the paths missed.
-            measured: truth * white(index as usize) + 1e-3,
-            saturated: index >= 95,
-            fold: index as usize % FOLDS,
-            weight: 1.0,
-            base: 1.0,
-            gloss: Vec3::ZERO,
-            hits: Vec::new(),
-        };
-        let pixels: Vec<SeenPixel> = (0..100).map(pixel).collect();
+        // Plus some light that the paths missed.
+        let measured = |index: u32| truth * white(index as usize) + 1e-3;
+        let pixels: Vec<SeenPixel> = (0..100)
+            .map(|index| pixel(index, measured(index), index >= 95))
+            .collect();
         let seen: Vec<&SeenPixel> = pixels.iter().collect();
         let light: Vec<Vec3> = (0..100).map(white).collect();
         let found = Measurements::new(&seen, Observations::one_per_cell(100), &light);
@@ -355,18 +351,7 @@ mod tests {
     fn saturated_pixels_are_lower_bounds() {
         let part = |cell: u32, count: u32, measured: f32, saturated: bool| {
             (0..count).map(move |i| {
-                let pixel = SeenPixel {
-                    frame: cell,
-                    pixel: 2 * i + u32::from(saturated),
-                    held_out: false,
-                    measured: Vec3::splat(measured),
-                    saturated,
-                    fold: i as usize % FOLDS,
-                    weight: 1.0,
-                    base: 1.0,
-                    gloss: Vec3::ZERO,
-                    hits: Vec::new(),
-                };
+                let pixel = pixel(i, Vec3::splat(measured), saturated);
                 (pixel, vec![(cell, 1.0)])
             })
         };
