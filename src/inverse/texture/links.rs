@@ -1,6 +1,7 @@
 //! The graph of neighbouring cells, found by stepping over their edges.
 
 use crate::inverse::texture::cells::{Cell, Cells};
+use crate::inverse::texture::observations::row_range;
 use crate::scene::Scene;
 use crate::scene::geometry::{Hit, Ray};
 use glam::Vec3;
@@ -67,8 +68,7 @@ impl Links {
     /// Indices of a cell's links.
     #[inline]
     pub fn row(&self, cell: usize) -> std::ops::Range<usize> {
-        let start = if cell == 0 { 0 } else { self.ends[cell - 1] };
-        start as usize..self.ends[cell] as usize
+        row_range(&self.ends, cell)
     }
 }
 

@@ -2,6 +2,14 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
+use std::ops::Range;
+
+/// The indices of a row in compressed sparse rows, given the end of each row.
+#[inline]
+pub fn row_range(ends: &[u32], row: usize) -> Range<usize> {
+    let start = if row == 0 { 0 } else { ends[row - 1] };
+    start as usize..ends[row] as usize
+}
 
 /// Measurements y ≈ Σ w x of the colours x of cells, one row each; the weights of a row sum to one.
 #[derive(Debug, Clone, Default)]
@@ -68,21 +76,14 @@ impl Observations {
     /// The cells and weights of a row.
     #[inline]
     pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, f32)> + '_ {
-        let start = if row == 0 { 0 } else { self.ends[row - 1] } as usize;
-        let range = start..self.ends[row] as usize;
-        range.map(|at| (self.cells[at] as usize, self.weights[at]))
+        row_range(&self.ends, row).map(|at| (self.cells[at] as usize, self.weights[at]))
     }
 
     /// The rows and weights of a cell.
     #[inline]
     pub fn column(&self, cell: usize) -> impl Iterator<Item = (usize, f32)> + '_ {
-        let start = if cell == 0 {
-            0
-        } else {
-            self.column_ends[cell - 1]
-        } as usize;
-        let range = start..self.column_ends[cell] as usize;
-        range.map(|at| (self.column_rows[at] as usize, self.column_weights[at]))
+        row_range(&self.column_ends, cell)
+            .map(|at| (self.column_rows[at] as usize, self.column_weights[at]))
     }
 
     /// The value Σ w x of a row for the given colours.
