@@ -138,7 +138,7 @@ fn independent_samples_give_the_gradient_and_shared_samples_a_biased_one() {
         sky: None,
         outside: None,
         surface_of: &scene.object_of,
-        believed_albedo: &believed,
+        expected_albedo: &believed,
         lobes: &[],
         patches: None,
         sampling: LightSampling::Mis,

@@ -17,8 +17,8 @@ use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 impl Place {
-    /// The program, running unheard.
-    fn bound_met(&self, arguments: &[&str]) -> Command {
+    /// The command with its output discarded.
+    fn quiet(&self, arguments: &[&str]) -> Command {
         let mut command = self.command(arguments);
         command.stdout(Stdio::null()).stderr(Stdio::null());
         command
@@ -26,7 +26,7 @@ impl Place {
 
     /// Runs to the end; what it said.
     fn said(&self, arguments: &[&str]) -> (Option<i32>, String) {
-        let Output { status, stderr, .. } = (self.bound_met(arguments))
+        let Output { status, stderr, .. } = (self.quiet(arguments))
             .stderr(Stdio::piped())
             .output()
             .expect("relit starts");
@@ -186,7 +186,7 @@ fn a_kill_at_any_moment_leaves_only_whole_files_and_work_goes_on() {
             place.done(&first);
         }
         let before = if resuming { iterations(&out) } else { None };
-        let mut relit = place.bound_met(arguments).spawn().expect("relit starts");
+        let mut relit = place.quiet(arguments).spawn().expect("relit starts");
         std::thread::sleep(length.mul_f64(1.1 * stream.uniform_f64()));
         relit.kill().expect("kills");
         let ended = relit.wait().expect("ends").success();
@@ -224,10 +224,10 @@ fn a_kill_at_any_moment_leaves_only_whole_files_and_work_goes_on() {
 fn two_programs_in_one_folder_leave_whole_results() {
     let place = Place::new();
     place.done(&[&ENDLESS[..12], &["--steps", "3"]].concat());
-    let mut endless = place.bound_met(&ENDLESS).spawn().expect("relit starts");
+    let mut endless = place.quiet(&ENDLESS).spawn().expect("relit starts");
     let out = place.path("out");
     for _ in 0..3 {
-        let mut pair = [&WHOLE, &WHOLE].map(|w| place.bound_met(w).spawn().expect("relit starts"));
+        let mut pair = [&WHOLE, &WHOLE].map(|w| place.quiet(w).spawn().expect("relit starts"));
         for relit in &mut pair {
             assert!(relit.wait().expect("ends").success());
         }
@@ -397,7 +397,7 @@ fn a_folder_that_vanishes_while_solving_is_made_again() {
         "--views",
         "none",
     ];
-    let mut relit = place.bound_met(&arguments).spawn().expect("relit starts");
+    let mut relit = place.quiet(&arguments).spawn().expect("relit starts");
     let out = place.path("out");
     // Removing fails where the folder is not there yet or a file comes in meanwhile.
     let mut vanished = 0;

@@ -148,7 +148,7 @@ fn parts_begin_at_the_albedo_of_the_whole() {
 
     let count = parts.albedo.len() - objects;
     let covered: Vec<u64> = (0..count as u64).map(|patch| patch % 2).collect();
-    parts.keep_still(&covered);
+    parts.fix_uncovered(&covered);
     let before = parts.clone();
     for _ in 0..20 {
         parts.step(&problem, &settings(), 2);

@@ -4,7 +4,7 @@
 #[path = "common/beside.rs"]
 mod beside;
 
-use relit::calibrate::alignment::{Astray, Decision, Why};
+use relit::calibrate::alignment::{Decision, Evidence, MispairedPhotograph};
 use relit::capture::Capture;
 use relit::capture::read::{ReadOptions, read};
 use relit::inverse::estimate::{Estimate, ObjectEstimate};
@@ -51,7 +51,7 @@ fn sound_rooms_are_taken_for_sound() {
             capture.name
         );
         assert!(outcome.alignment.agreement > 5.0, "{}", capture.name);
-        assert_eq!(outcome.alignment.astray, [], "{}", capture.name);
+        assert_eq!(outcome.alignment.mispaired, [], "{}", capture.name);
     }
 }
 
@@ -64,7 +64,7 @@ fn mistakes_in_a_box_with_five_photographs_are_found() {
     let capture = read(&folder, &ReadOptions::default()).expect("a capture");
     let sound = decide(&capture, None).expect("a capture");
     assert_eq!(sound.alignment.decision, Decision::Sound);
-    assert_eq!(sound.alignment.astray, []);
+    assert_eq!(sound.alignment.mispaired, []);
     for name in ["mesh with z up, poses with y up", "photographs mirrored"] {
         let all = mistakes();
         let mistake = all.iter().find(|m| m.name == name).expect("a mistake");
@@ -75,8 +75,11 @@ fn mistakes_in_a_box_with_five_photographs_are_found() {
     for (frame, other) in [(0, 1), (1, 3), (2, 0), (3, 4), (4, 0)] {
         let wrong = with_pose_of(&capture, frame, other);
         let outcome = decide(&wrong, None).expect("a capture");
-        let why = Why::Fractions(other);
-        assert_eq!(outcome.alignment.astray, [Astray { frame, why }]);
+        let evidence = Evidence::SharesPoseWith(other);
+        assert_eq!(
+            outcome.alignment.mispaired,
+            [MispairedPhotograph { frame, evidence }]
+        );
     }
 }
 
@@ -101,15 +104,15 @@ fn a_photograph_with_the_pose_of_another_one_is_left_out_and_named() {
     let mut exchanged = sound.clone();
     (exchanged.frames[2].pose, exchanged.frames[9].pose) =
         (sound.frames[9].pose, sound.frames[2].pose);
-    let astray = decide(&exchanged, None)
+    let mispaired = decide(&exchanged, None)
         .expect("a capture")
         .alignment
-        .astray;
-    let shows = |frame, other| Astray {
+        .mispaired;
+    let shows = |frame, other| MispairedPhotograph {
         frame,
-        why: Why::Shows(other),
+        evidence: Evidence::ShowsViewOf(other),
     };
-    assert_eq!(astray, [shows(2, 9), shows(9, 2)]);
+    assert_eq!(mispaired, [shows(2, 9), shows(9, 2)]);
 
     let opened = open(&with_pose_of(&sound, 3, 7), true);
     let used = |frame: usize| {

@@ -1,8 +1,8 @@
-//! Lamps that photographs of a scan show saturated: their other pixels are mixtures.
+//! Marks pixels of overexposed lamps in scans as censored: their values become lower bounds.
 //!
-//! Where most of what a photograph shows of an object is saturated, the rest is darker because the pixel, the lens or the mesh's
-//! outline mixes the object with what is beside it. Fitted as if it were measured, it would hold a lamp's light at the
-//! level of saturation, and make up for the rest by surfaces that are too white.
+//! Where most pixels of an object are saturated, its darker pixels are mixtures of the object with its surroundings: through
+//! the pixel filter, the lens, or an inexact outline of the mesh. A fit to their values would hold the lamp's emission at the
+//! saturation level and compensate with too high an albedo of the surfaces.
 
 use crate::calibrate::gbuffer::{GBuffer, GBufferPixel};
 use crate::calibrate::problem::Problem;
@@ -10,40 +10,37 @@ use crate::capture::photograph::Photograph;
 use glam::{BVec3, Vec3};
 use std::sync::Arc;
 
-/// The problem with lower bounds for such pixels, channel by channel; `None` where there are none.
+/// The problem with such pixels turned into lower bounds (`Photograph::limits`), per channel; `None` if there are none.
 ///
-/// Also bounds are the pixels at the edges of such an object in photographs that do not show it saturated.
+/// Pixels at the edges of such an object become lower bounds in every photograph, also where it is not saturated.
 pub fn bounded(problem: &Problem, gbuffer: &GBuffer) -> Option<Problem> {
     let (frames, objects) = (problem.photographs.len(), gbuffer.seen.len());
     let counts = Counts::new(problem, gbuffer);
     let overexposed = |frame: usize, object: usize| counts.mostly_saturated(frame, object);
-    let ever: Vec<BVec3> = (0..objects)
-        .map(|object| {
-            (0..frames).fold(BVec3::FALSE, |ever, frame| {
-                ever | overexposed(frame, object)
-            })
-        })
+    let overexposed_anywhere: Vec<BVec3> = (0..objects)
+        .map(|object| (0..frames).fold(BVec3::FALSE, |any, frame| any | overexposed(frame, object)))
         .collect();
-    if !ever.iter().any(|ever| ever.any()) {
+    if !overexposed_anywhere.iter().any(|channels| channels.any()) {
         return None;
     }
     let mut limits: Vec<Vec<Vec3>> = vec![Vec::new(); frames];
     for pixel in &gbuffer.pixels {
-        let Some(&ever) = ever.get(pixel.object as usize).filter(|ever| ever.any()) else {
+        let anywhere = overexposed_anywhere.get(pixel.object as usize);
+        let Some(&anywhere) = anywhere.filter(|channels| channels.any()) else {
             continue;
         };
         let (frame, index) = (pixel.frame as usize, pixel.pixel as usize);
-        let bound = match pixel.inside {
+        let censored = match pixel.inside {
             true => overexposed(frame, pixel.object as usize),
-            false => ever,
+            false => anywhere,
         };
         let photograph = &problem.photographs[frame];
         let limits = &mut limits[frame];
         if limits.is_empty() {
             limits.extend((0..photograph.pixels.len()).map(|i| photograph.limit(i)));
         }
-        let shown = photograph.pixels[index].min(limits[index]);
-        limits[index] = Vec3::select(bound, shown, limits[index]);
+        let value = photograph.pixels[index].min(limits[index]);
+        limits[index] = Vec3::select(censored, value, limits[index]);
     }
     let photographs = problem.photographs.iter().zip(limits);
     Some(Problem {
@@ -60,10 +57,10 @@ pub fn bounded(problem: &Problem, gbuffer: &GBuffer) -> Option<Problem> {
     })
 }
 
-/// Pixels by photograph and object: all of them, and those that each channel is saturated in.
+/// Counts of pixels by photograph and object.
 struct Counts {
     objects: usize,
-    /// Pixels away from edges, and all pixels where there are no such.
+    /// For pure pixels and for all pixels: their number, and how many are saturated in R, G and B.
     counts: Vec<[[u32; 4]; 2]>,
 }
 
@@ -75,18 +72,18 @@ impl Counts {
         for pixel in gbuffer.pixels.iter().filter(fitted) {
             let photograph = &problem.photographs[pixel.frame as usize];
             let saturated = photograph.saturated(pixel.pixel as usize);
-            let of = &mut counts[pixel.frame as usize * objects + pixel.object as usize];
+            let entry = &mut counts[pixel.frame as usize * objects + pixel.object as usize];
             for kind in [pixel.pure.then_some(0), Some(1)].into_iter().flatten() {
-                of[kind][0] += 1;
+                entry[kind][0] += 1;
                 for channel in 0..3 {
-                    of[kind][1 + channel] += u32::from(saturated.test(channel));
+                    entry[kind][1 + channel] += u32::from(saturated.test(channel));
                 }
             }
         }
         Self { objects, counts }
     }
 
-    /// In which channels most of an object's pixels in a photograph are saturated.
+    /// Channels in which most of an object's pixels in a photograph are saturated: its pure pixels, or all if none is pure.
     fn mostly_saturated(&self, frame: usize, object: usize) -> BVec3 {
         let [pure, all] = self.counts[frame * self.objects + object];
         let [pixels, r, g, b] = if pure[0] > 0 { pure } else { all };

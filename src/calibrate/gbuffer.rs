@@ -1,8 +1,9 @@
-//! What each pixel sees: the objects behind a few rays through it.
+//! The g-buffer: which surface points each pixel sees, from a few rays through it.
 
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
 use crate::math::rng::{Stream, splitmix64};
+use crate::math::stats::upper_median;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::visibility::NOTHING;
@@ -11,11 +12,11 @@ use rayon::prelude::*;
 
 /// Rays through a pixel besides the one through its centre: one in each quarter.
 const QUARTERS: usize = 4;
-/// All pixels are looked at of objects that fewer pixels than this see.
+/// Objects that fewer pixels than this see are not subsampled.
 const RARE: u64 = 2_000;
-/// Corners that lie within this fraction of the scene's diameter of a plane lie on it.
+/// Largest distance of a corner from a plane that it lies on, as a fraction of the scene's diameter.
 const COPLANAR: f32 = 1e-6;
-/// First of the sample keys of g-buffer rays, far from those of paths.
+/// Sample key of g-buffer rays, disjoint from those of paths.
 const KEY: u64 = 1 << 62;
 
 /// One usable pixel of a photograph.
@@ -23,21 +24,21 @@ const KEY: u64 = 1 << 62;
 pub struct GBufferPixel {
     /// Frame index.
     pub frame: u32,
-    /// Row by row from the top left.
+    /// Pixel index, row by row from the top left.
     pub pixel: u32,
-    /// Object behind the centre; `u32::MAX` where the ray leaves the mesh.
+    /// Object that the pixel's centre sees; `u32::MAX` where the ray misses the mesh.
     pub object: u32,
-    /// Whether all its rays meet one side of one smooth surface of one object.
+    /// Whether all its rays hit the same side of one smooth surface of one object.
     pub pure: bool,
-    /// Whether it is pure and the eight pixels around see the same object too, so that no edge can be within it.
+    /// Whether it is pure and its eight neighbours see the same object, so that no edge crosses it.
     pub inside: bool,
-    /// Whether it is kept out of the fit.
+    /// Whether it is held out of the fit.
     pub held_out: bool,
-    /// Points behind the quarters, with the normal of the side that is seen; unset where a ray leaves the mesh.
+    /// Hit points of the rays through the quarters; `None` where a ray misses the mesh.
     pub points: [Option<SurfacePoint>; QUARTERS],
 }
 
-/// A surface point behind a part of a pixel.
+/// A surface point that a camera ray hits.
 #[derive(Debug, Clone, Copy)]
 pub struct SurfacePoint {
     /// Position.
@@ -48,22 +49,21 @@ pub struct SurfacePoint {
     pub object: u32,
 }
 
-/// The usable pixels that were looked at, and how often each object was seen.
+/// The sampled usable pixels of all photographs.
 #[derive(Debug, Clone)]
 pub struct GBuffer {
     /// In order of frame and pixel.
     pub pixels: Vec<GBufferPixel>,
-    /// For each object, usable pixels whose centre sees it.
+    /// For each object, the number of usable pixels of all photographs whose centre sees it.
     pub seen: Vec<u64>,
-    /// Median size of a pixel's footprint on the surfaces, in metres; zero where no pixel sees the mesh.
+    /// Median width of a pixel's footprint on the surfaces, in metres; zero if no pixel sees the mesh.
     pub footprint: f32,
     /// Rays cast.
     pub rays: u64,
 }
 
 impl GBuffer {
-    /// For each of the photographs, whether no pixel of it is in the fit: those that are held out as a whole, and those that
-    /// show nothing of use.
+    /// For each photograph, whether none of its pixels is in the fit: it is held out whole or has no usable pixel.
     pub fn unfitted(&self, photographs: usize) -> Vec<bool> {
         let mut unfitted = vec![true; photographs];
         for pixel in self.pixels.iter().filter(|p| !p.held_out) {
@@ -72,7 +72,7 @@ impl GBuffer {
         unfitted
     }
 
-    /// Casts the rays of all pixels, or of a keyed fraction of about `max_pixels` and of the objects that few pixels see.
+    /// Casts the rays of about `max_pixels` pixels, chosen by hash, and of all pixels of objects that few pixels see.
     pub fn new(problem: &Problem, hold_out: HoldOut, seed: u64, max_pixels: usize) -> Self {
         let scene = &*problem.scene;
         let centers = scene.ids();
@@ -136,22 +136,16 @@ impl GBuffer {
             footprints.extend(frame.footprints);
             rays += frame.rays;
         }
-        let middle = footprints.len() / 2;
-        let footprint = if footprints.is_empty() {
-            0.0
-        } else {
-            *footprints.select_nth_unstable_by(middle, f32::total_cmp).1
-        };
         Self {
             pixels,
             seen,
-            footprint,
+            footprint: upper_median(&mut footprints).unwrap_or(0.0),
             rays,
         }
     }
 }
 
-/// What was found in one frame.
+/// The sampled pixels of one frame.
 #[derive(Default)]
 struct FramePixels {
     pixels: Vec<GBufferPixel>,
@@ -159,21 +153,21 @@ struct FramePixels {
     rays: u64,
 }
 
-/// Whether a pixel belongs to the keyed share that is looked at.
+/// Whether a pixel belongs to the hashed fraction of sampled pixels.
 fn drawn(fraction: f64, frame: u64, pixel: u64) -> bool {
     fraction >= 1.0
         || ((splitmix64(splitmix64(frame ^ KEY) ^ pixel) >> 11) as f64)
             < fraction * (1u64 << 53) as f64
 }
 
-/// A frame, with the triangle that the centre of each of its pixels sees.
+/// A camera and the triangle that the centre of each of its pixels sees.
 struct FrameView<'a> {
     scene: &'a Scene,
     camera: &'a Camera,
     triangles: &'a [u32],
 }
 
-/// What was found through one pixel.
+/// What the rays through one pixel hit.
 struct SampledPixel {
     object: u32,
     pure: bool,
@@ -185,8 +179,8 @@ struct SampledPixel {
 }
 
 impl FrameView<'_> {
-    /// Looks through a pixel, at points drawn from `stream`. Where all neighbours see the plane that it sees, the points
-    /// lie on that plane and need no rays.
+    /// Samples a pixel with stratified offsets from `stream`. Where the pixel and its neighbours see one plane, the points are
+    /// computed on that plane without casting rays.
     fn sample(&self, pixel: usize, mut stream: Stream) -> SampledPixel {
         let width = self.camera.intrinsics.width as usize;
         let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
@@ -194,9 +188,9 @@ impl FrameView<'_> {
         let center = (triangle != NOTHING)
             .then(|| self.on_plane(triangle, corner + 0.5))
             .flatten();
-        // The pixels around, where they see the same object.
-        let around = (self.around(pixel, width)).filter(|seen| self.is_one_object(triangle, *seen));
-        let flat = center.is_some() && around.is_some_and(|seen| self.is_flat(triangle, seen));
+        let one_object = (self.neighbours(pixel, width))
+            .filter(|triangles| self.is_one_object(triangle, *triangles));
+        let flat = center.is_some() && one_object.is_some_and(|t| self.is_flat(triangle, t));
         let points: [Option<SurfacePoint>; QUARTERS] = std::array::from_fn(|quarter| {
             let [dx, dy] = stream.uniform2();
             let offset = Vec2::new((quarter % 2) as f32 + dx, (quarter / 2) as f32 + dy) * 0.5;
@@ -227,14 +221,14 @@ impl FrameView<'_> {
         SampledPixel {
             object: center.map_or(u32::MAX, |c| c.object),
             pure,
-            inside: pure && around.is_some(),
+            inside: pure && one_object.is_some(),
             points,
             footprint,
             rays: if flat { 0 } else { QUARTERS as u64 },
         }
     }
 
-    /// The point of a triangle's surface, with the side that the camera sees.
+    /// A point on a triangle, with the normal of the side that faces the camera.
     fn seen_from(&self, triangle: u32, point: Vec3) -> SurfacePoint {
         let normal = self.scene.normals[triangle as usize];
         let front = normal.dot(self.camera.center - point) >= 0.0;
@@ -245,7 +239,7 @@ impl FrameView<'_> {
         }
     }
 
-    /// Where the ray through a place of the picture meets a triangle's plane; `None` where it runs along it.
+    /// Where the ray through an image position meets a triangle's plane; `None` if the plane is parallel or behind the camera.
     fn on_plane(&self, triangle: u32, at: Vec2) -> Option<SurfacePoint> {
         let ray = self.camera.ray(at);
         let t = self.scene.plane_distance(triangle, &ray);
@@ -253,8 +247,8 @@ impl FrameView<'_> {
         (t > 0.0 && point.is_finite()).then(|| self.seen_from(triangle, point))
     }
 
-    /// The triangles that a pixel and the eight around it see, a row after the other; `None` on the picture's border.
-    fn around(&self, pixel: usize, width: usize) -> Option<[&[u32]; 3]> {
+    /// The triangles that a pixel and its eight neighbours see, in three rows; `None` on the image border.
+    fn neighbours(&self, pixel: usize, width: usize) -> Option<[&[u32]; 3]> {
         let height = self.triangles.len() / width;
         let (x, y) = (pixel % width, pixel / width);
         let surrounded = x > 0 && y > 0 && x + 1 < width && y + 1 < height;
@@ -263,14 +257,14 @@ impl FrameView<'_> {
         })
     }
 
-    /// Whether all of some triangles belong to the object of one.
-    fn is_one_object(&self, own: u32, seen: [&[u32]; 3]) -> bool {
+    /// Whether all `triangles` belong to the object of `own`.
+    fn is_one_object(&self, own: u32, triangles: [&[u32]; 3]) -> bool {
         let object = |triangle: u32| self.scene.object_of.get(triangle as usize);
-        (seen.into_iter().flatten()).all(|&other| other == own || object(other) == object(own))
+        (triangles.into_iter().flatten()).all(|&other| other == own || object(other) == object(own))
     }
 
-    /// Whether all of some triangles of an object lie on the plane of one.
-    fn is_flat(&self, own: u32, seen: [&[u32]; 3]) -> bool {
+    /// Whether all `triangles` lie in the plane of `own`.
+    fn is_flat(&self, own: u32, triangles: [&[u32]; 3]) -> bool {
         let scene = self.scene;
         let [on_plane, _, _] = scene.corners(own);
         let normal = scene.normals[own as usize];
@@ -279,6 +273,6 @@ impl FrameView<'_> {
             let corners = scene.corners(other);
             (corners.iter()).all(|c| (*c - on_plane).dot(normal).abs() <= tolerance)
         };
-        (seen.into_iter().flatten()).all(|&other| other == own || coplanar(other))
+        (triangles.into_iter().flatten()).all(|&other| other == own || coplanar(other))
     }
 }

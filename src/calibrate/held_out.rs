@@ -1,16 +1,16 @@
-//! Which pixels are kept out of every fit, to test it.
+//! Which pixels are held out of every fit, to test it.
 
 use crate::error::{Error, Result};
 use crate::math::rng::splitmix64;
 use serde::{Deserialize, Serialize};
 
-/// What is kept out of every fit, as the solve's settings say it.
+/// Settings of the held-out pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct HoldOut {
-    /// Fraction of the pixels.
+    /// Fraction of the pixels that is held out, if `hold_out` is 0.
     pub held_out: f64,
-    /// Every so many frames, instead of single pixels; 0 keeps single pixels.
+    /// If K > 0, every K-th frame is held out whole instead of single pixels.
     pub hold_out: u64,
 }
 
@@ -21,15 +21,15 @@ impl Default for HoldOut {
 }
 
 impl HoldOut {
-    /// What is held out where nothing else is asked for.
+    /// 5 % of single pixels.
     pub const DEFAULT: Self = Self {
         held_out: 0.05,
         hold_out: 0,
     };
 
-    /// Whether a pixel is held out: a keyed fraction of all pixels, or every K-th frame whole (frames 0, K, 2K, …).
+    /// Whether a pixel is held out: by a hash of frame and pixel, or every K-th frame (frames 0, K, 2K, …).
     ///
-    /// The choice does not depend on the seed, so that solves with different seeds are tested on the same pixels.
+    /// The choice does not depend on the seed of a solve: solves with different seeds are tested on the same pixels.
     pub fn contains(self, frame: u32, pixel: u32) -> bool {
         if self.hold_out > 0 {
             return u64::from(frame).is_multiple_of(self.hold_out);
@@ -38,10 +38,10 @@ impl HoldOut {
         ((hash >> 11) as f64) < self.held_out * (1u64 << 53) as f64
     }
 
-    /// Refuses to hold out all of `frames` photographs.
+    /// Checks that some of `frames` photographs are left to fit.
     ///
     /// # Errors
-    /// No photograph is left to fit.
+    /// All photographs would be held out.
     pub fn check(self, frames: usize) -> Result<()> {
         if self.hold_out == 0 || frames == 0 || frames > 1 && self.hold_out > 1 {
             return Ok(());
@@ -54,7 +54,7 @@ impl HoldOut {
                     format!("all {frames} photographs would be held out, which leaves none to fit")
                 }
             },
-            "hold out every second at most, of two or more, or none with 0",
+            "with two photographs or more, hold out every second one or fewer; 0 holds out none",
         ))
     }
 }

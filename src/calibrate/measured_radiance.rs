@@ -1,7 +1,7 @@
-//! The radiance that leaves surfaces, as the photographs measured it: a light field on the mesh.
+//! Outgoing radiance of surfaces as measured by the photographs: a light field on the mesh.
 //!
-//! Diffuse surfaces look the same from everywhere, so a photograph of a surface point is a measurement of the light
-//! that it sends to all others. Paths may end there and need not be traced on to a lamp.
+//! A diffuse surface has the same radiance in all directions, so a photograph of a surface point measures what the point
+//! sends to every other point. Paths can end there instead of at an emitter.
 
 use crate::calibrate::gbuffer::{GBuffer, SurfacePoint};
 use crate::calibrate::problem::Problem;
@@ -13,23 +13,23 @@ const LEVELS: usize = 3;
 /// Width of the finest cells in pixel footprints.
 const CELL_FOOTPRINTS: f32 = 1.5;
 
-/// Mean measured radiance in cells of space, apart for each object and each side of a surface.
+/// Mean measured radiance in a grid of cells, separate for each object and each orientation of the surface.
 #[derive(Debug, Clone)]
 pub struct MeasuredRadiance {
     cell: f32,
     levels: Vec<Table>,
-    /// Mean photographed radiance of each object over pixels that see nothing else, saturated ones at what they show; `None`
-    /// where there are none.
+    /// Mean photographed radiance of each object over its pure pixels, with saturated ones at their clipped value; `None`
+    /// without such pixels.
     pub object_means: Vec<Option<Vec3>>,
 }
 
-/// What landed in one cell.
+/// The samples in one cell.
 #[derive(Debug, Clone, Copy, Default)]
 struct Cell {
     key: u64,
     sum: DVec3,
-    /// Samples of pixels that see one smooth surface and are not saturated.
-    telling: u32,
+    /// Samples of pure, unsaturated pixels, which `sum` adds up.
+    valid: u32,
     /// All samples.
     total: u32,
 }
@@ -77,7 +77,7 @@ impl Table {
 }
 
 impl MeasuredRadiance {
-    /// Gathers the pixels that are in the fit.
+    /// Accumulates the pixels that are not held out.
     pub fn new(problem: &Problem, gbuffer: &GBuffer) -> Self {
         let mut measured = Self {
             cell: gbuffer.footprint * CELL_FOOTPRINTS,
@@ -88,15 +88,15 @@ impl MeasuredRadiance {
         for pixel in gbuffer.pixels.iter().filter(|p| !p.held_out) {
             let photograph = &problem.photographs[pixel.frame as usize];
             let radiance = photograph.pixels[pixel.pixel as usize].as_dvec3();
-            // Where pixels are saturated they measured nothing: paths go on to what they see.
-            let tells = pixel.pure && !photograph.is_saturated(pixel.pixel as usize);
+            // A saturated pixel is no measurement: paths continue at such surfaces.
+            let is_valid = pixel.pure && !photograph.is_saturated(pixel.pixel as usize);
             for point in pixel.points.iter().flatten() {
                 for level in 0..LEVELS {
                     let key = measured.key(level, point);
                     let cell = measured.levels[level].entry(key);
                     cell.total += 1;
-                    if tells {
-                        cell.telling += 1;
+                    if is_valid {
+                        cell.valid += 1;
                         cell.sum += radiance;
                     }
                 }
@@ -115,7 +115,7 @@ impl MeasuredRadiance {
         measured
     }
 
-    /// Radiance leaving a surface point to the side of `normal`; `None` where no photograph tells.
+    /// Radiance leaving a surface point on the side of its normal; `None` where no photograph measured it.
     #[inline]
     pub fn at(&self, point: &SurfacePoint) -> Option<Vec3> {
         if self.cell <= 0.0 {
@@ -124,9 +124,9 @@ impl MeasuredRadiance {
         for (level, table) in self.levels.iter().enumerate() {
             let key = self.key(level, point);
             let cell = &table.cells[table.slot(key)];
-            // Cells at the edges of objects hold mostly mixed pixels, which say nothing of either.
-            if cell.telling > 0 && 2 * cell.telling >= cell.total {
-                return Some((cell.sum / f64::from(cell.telling)).as_vec3());
+            // Cells at the edges of objects hold mostly mixed pixels, which measure neither object.
+            if cell.valid > 0 && 2 * cell.valid >= cell.total {
+                return Some((cell.sum / f64::from(cell.valid)).as_vec3());
             }
             if cell.total > 0 {
                 return None;
@@ -135,18 +135,17 @@ impl MeasuredRadiance {
         None
     }
 
-    /// Key of the cell that a point lies in.
     #[inline]
     fn key(&self, level: usize, point: &SurfacePoint) -> u64 {
         cell_key(self.cell * (1u32 << level) as f32, point)
     }
 }
 
-/// Key of the cell of a given width that a surface point lies in: its place, object, and which way its surface looks;
-/// never zero.
+/// Hash key of the cell of width `size` that a surface point lies in: from its position, object, and dominant signed axis of
+/// the normal; never zero.
 #[inline]
 pub fn cell_key(size: f32, at: &SurfacePoint) -> u64 {
-    let place = (at.point / size).floor();
+    let position = (at.point / size).floor();
     let a = at.normal.abs();
     let axis = if a.x >= a.y && a.x >= a.z {
         0
@@ -157,7 +156,7 @@ pub fn cell_key(size: f32, at: &SurfacePoint) -> u64 {
     };
     let facing = 2 * axis as u64 + u64::from(at.normal[axis] < 0.0);
     let mut h = splitmix64(u64::from(at.object) << 3 | facing);
-    for c in place.to_array() {
+    for c in position.to_array() {
         h = splitmix64(h ^ (c as i64 as u64));
     }
     h.max(1)

@@ -1,5 +1,5 @@
-//! From photographs to observations, once, before anything is solved: which pixels see what, how each photograph was
-//! exposed, and whether the photographs agree with the mesh and with each other.
+//! Turns photographs into observations before the solve: the g-buffer of each photograph, its exposure, and whether the
+//! photographs agree with the mesh and with each other.
 
 pub mod alignment;
 pub mod censored;

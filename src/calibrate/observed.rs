@@ -1,4 +1,4 @@
-//! All that photographs tell before a solve, in the order in which one finding needs the other.
+//! All steps from photographs to observations, in order of their dependencies.
 
 use crate::calibrate::censored;
 use crate::calibrate::exposure::{Exposures, Observations, OutlierFrames};
@@ -6,14 +6,14 @@ use crate::calibrate::gbuffer::GBuffer;
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
 
-/// What is asked of the photographs.
+/// Settings of [`Observed::new`].
 #[derive(Debug, Clone, Copy)]
 pub struct Questions {
-    /// What no fit may see.
+    /// Pixels kept out of every fit.
     pub hold_out: HoldOut,
-    /// Key of the rays inside pixels.
+    /// Seed of the rays inside pixels.
     pub seed: u64,
-    /// Pixels of the g-buffer, about.
+    /// Approximate number of pixels in the g-buffer.
     pub pixels: usize,
     /// Whether frames that contradict the others are left out.
     pub leave_out: bool,
@@ -21,22 +21,22 @@ pub struct Questions {
     pub exposures: bool,
 }
 
-/// What the photographs tell.
+/// The observations that a solve fits.
 pub struct Observed {
-    /// The scene, with photographs of one exposure, without outlier frames, and with what is saturated as lower bounds.
+    /// The scene, with photographs at one exposure, outlier frames unusable, and saturated values as lower bounds.
     pub problem: Problem,
     /// What each pixel sees.
     pub gbuffer: GBuffer,
-    /// How photographs differ in exposure, whether or not that was taken out; `None` where too few surfaces are shared.
+    /// Estimated exposures, whether or not they were corrected; `None` if too few surfaces are shared between photographs.
     pub exposures: Option<Exposures>,
-    /// Sentences on frames that were left out.
+    /// One sentence per frame that was left out.
     pub warnings: Vec<String>,
-    /// Rays cast for all of this.
+    /// Rays cast in total.
     pub rays: u64,
 }
 
 impl Observed {
-    /// Looks at the photographs of a problem.
+    /// Prepares the photographs of a problem.
     pub fn new(problem: &Problem, asked: Questions) -> Self {
         let gbuffer_of =
             |problem: &Problem| GBuffer::new(problem, asked.hold_out, asked.seed, asked.pixels);
@@ -45,7 +45,7 @@ impl Observed {
         let mut rays = gbuffer.rays;
         let mut warnings = Vec::new();
 
-        // Frames that show something else than all others, as from a wrong pose.
+        // Outlier frames: they contradict the others, for example because of a wrong pose.
         let mut observations =
             (asked.leave_out || asked.exposures).then(|| Observations::new(&problem, &gbuffer));
         let outliers = (observations.as_mut())
@@ -64,10 +64,10 @@ impl Observed {
             .filter(|_| asked.exposures)
             .and_then(|observations| Exposures::new(&problem, observations));
         if let Some(needed) = exposures.as_ref().filter(|e| e.needed()) {
-            problem = needed.undone(&problem);
+            problem = needed.corrected(&problem);
         }
 
-        // Pixels beside saturated ones. Of a mesh that is no scan the mixtures at outlines are known.
+        // Censored pixels around saturated lamps. A mesh that is not a scan has exact outlines: its mixed pixels are modelled.
         if problem.scene.scanned
             && let Some(bounded) = censored::bounded(&problem, &gbuffer)
         {

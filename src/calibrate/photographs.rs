@@ -1,6 +1,6 @@
-//! Photographs that cannot be of the room, and pixels that cannot be of a photograph: found, left out and named.
+//! Finds unusable photographs (black, white, duplicated, mispaired) and hot pixels, masks them, and warns.
 
-use crate::calibrate::alignment::{Astray, Why};
+use crate::calibrate::alignment::{Evidence, MispairedPhotograph};
 use crate::capture::Capture;
 use crate::capture::photograph::{Encoding, Photograph, PhotographSource};
 use crate::capture::working::Working;
@@ -9,18 +9,18 @@ use crate::math::color::luminance;
 use crate::math::stats::quantile;
 use std::sync::Arc;
 
-/// An 8-bit photograph is black whose brightest hundredth is so much darker than that of the median one: ten stops, which is
-/// more than eight bits hold.
+/// An integer-encoded photograph is black if its 99th percentile of luminance is below this times the median photograph's: ten
+/// stops, more than eight bits hold.
 const BLACK: f64 = 1.0 / 1024.0;
-/// A photograph is white of which at least this part is saturated in every channel.
+/// A photograph is white if at least this fraction is saturated in every channel.
 const WHITE: f64 = 0.99;
-/// A pixel is hot that is so many times as bright as the brightest around it, inside one object that surrounds it. Path
-/// tracing noise of 64 samples a pixel reaches that where one path carries 64,000 times the mean.
+/// A pixel is hot if it is this many times as bright as its brightest neighbour and all of them see one object. Path tracing
+/// noise with 64 samples per pixel reaches that only if one path carries 64,000 times the mean.
 const HOT: f32 = 1000.0;
-/// At least this many photographs are left: of two that contradict each other, neither is outvoted.
+/// At least this many photographs must remain: two that contradict each other cannot be told apart.
 const MIN_LEFT: usize = 3;
 
-/// Marks what cannot be as unusable, and says so among the warnings.
+/// Masks black, white and duplicated photographs, and adds a warning for each.
 ///
 /// # Errors
 /// No photograph is left.
@@ -28,20 +28,16 @@ pub fn leave_out(capture: &Capture, working: &mut Working) -> Result<()> {
     let photographs = &working.photographs;
     let mut reasons: Vec<Option<String>> = vec![None; photographs.len()];
     let brightest: Vec<Option<f64>> = photographs.iter().map(|p| brightest(p)).collect();
-    let usual = quantile(
-        &mut brightest.iter().flatten().copied().collect::<Vec<f64>>(),
-        0.5,
-    )
-    .unwrap_or(0.0);
+    let mut known: Vec<f64> = brightest.iter().flatten().copied().collect();
+    let median = quantile(&mut known, 0.5).unwrap_or(0.0);
     for (frame, photograph) in photographs.iter().enumerate() {
-        reasons[frame] = nothing_shown(photograph, brightest[frame], usual).map(str::to_owned);
+        reasons[frame] = blank(photograph, brightest[frame], median).map(str::to_owned);
     }
     for (frame, same) in same_pictures(photographs).into_iter().enumerate() {
         let Some(same) = same.filter(|_| reasons[frame].is_none()) else {
             continue;
         };
-        let one_pose = capture.frames[frame].pose == capture.frames[same].pose;
-        if !one_pose {
+        if capture.frames[frame].pose != capture.frames[same].pose {
             reasons[frame] = Some(format!(
                 "is the same picture as {}, which has another pose",
                 name(capture, same)
@@ -56,10 +52,10 @@ pub fn leave_out(capture: &Capture, working: &mut Working) -> Result<()> {
         return Err(Error::new(
             &capture.name,
             format!(
-                "no photograph is of use; the first {}",
+                "no photograph is usable; the first one {}",
                 first.unwrap_or_default()
             ),
-            "check that the images are the ones that were taken",
+            "check the image files",
         ));
     }
     for (frame, reason) in reasons.into_iter().enumerate() {
@@ -70,19 +66,23 @@ pub fn leave_out(capture: &Capture, working: &mut Working) -> Result<()> {
     Ok(())
 }
 
-/// Marks photographs that show something else than their poses see as unusable, and says so among the warnings. Where too few
-/// would be left, they stay, and only that is said.
-pub fn leave_out_astray(capture: &Capture, working: &mut Working, astray: &[Astray]) {
+/// Masks photographs that are paired with a wrong pose, and adds a warning for each. If too few photographs would be left, only
+/// the warnings are added.
+pub fn leave_out_mispaired(
+    capture: &Capture,
+    working: &mut Working,
+    mispaired: &[MispairedPhotograph],
+) {
     let is_used = |p: &Arc<Photograph>| (0..p.pixels.len()).any(|pixel| p.is_usable(pixel));
     let used = working.photographs.iter().filter(|p| is_used(p)).count();
-    let left = used.saturating_sub(astray.len());
-    for &Astray { frame, why } in astray {
-        let reason = match why {
-            Why::Shows(other) => format!(
+    let left = used.saturating_sub(mispaired.len());
+    for &MispairedPhotograph { frame, evidence } in mispaired {
+        let reason = match evidence {
+            Evidence::ShowsViewOf(other) => format!(
                 "shows what the pose of {} sees, and not what its own does",
                 name(capture, other)
             ),
-            Why::Fractions(other) => format!(
+            Evidence::SharesPoseWith(other) => format!(
                 "has the pose of {}, but is another picture and does not fit the mesh from there",
                 name(capture, other)
             ),
@@ -97,7 +97,7 @@ pub fn leave_out_astray(capture: &Capture, working: &mut Working, astray: &[Astr
     }
 }
 
-/// Marks a photograph as unusable and says why.
+/// Masks a photograph and adds a warning with the reason.
 fn take_out(capture: &Capture, working: &mut Working, frame: usize, reason: &str) {
     let photograph = &mut working.photographs[frame];
     let usable = vec![false; photograph.pixels.len()];
@@ -110,8 +110,8 @@ fn take_out(capture: &Capture, working: &mut Working, frame: usize, reason: &str
     working.warnings.push(warning);
 }
 
-/// Marks pixels as unusable that are far brighter than all around them and lie inside one object, as `object_at` tells
-/// for each pixel; and how many there were.
+/// A linear photograph with its hot pixels masked, and their number; `None` if there are none. Hot pixels are far brighter than
+/// their eight neighbours and see the same object as these; `object_at` gives the object of a pixel.
 pub fn without_hot_pixels(
     photograph: &Arc<Photograph>,
     object_at: impl Fn(usize) -> Option<u32>,
@@ -133,12 +133,12 @@ pub fn without_hot_pixels(
                 .into_iter()
                 .flat_map(|row| [row - 1, row, row + 1])
                 .filter(|&p| p != pixel);
-            let most = around
+            let max = around
                 .clone()
                 .map(|p| photograph.pixels[p].max_element())
                 .fold(0.0, f32::max);
             let object = object_at(pixel);
-            if value > HOT * most
+            if value > HOT * max
                 && object.is_some()
                 && around.clone().all(|p| object_at(p) == object)
             {
@@ -163,7 +163,7 @@ pub fn without_hot_pixels(
     Some((Arc::new(without), hot.len()))
 }
 
-/// The photograph's file, or its number.
+/// The photograph's file, or its frame number.
 pub fn name(capture: &Capture, frame: usize) -> String {
     match &capture.frames[frame].photograph {
         PhotographSource::File(path, _) => path.display().to_string(),
@@ -171,7 +171,7 @@ pub fn name(capture: &Capture, frame: usize) -> String {
     }
 }
 
-/// The luminance that a hundredth of the usable pixels exceed; `None` where none is usable.
+/// 99th percentile of the luminance of usable pixels; `None` if no pixel is usable.
 fn brightest(photograph: &Photograph) -> Option<f64> {
     let mut levels: Vec<f64> = (0..photograph.pixels.len())
         .filter(|&pixel| photograph.is_usable(pixel))
@@ -180,19 +180,16 @@ fn brightest(photograph: &Photograph) -> Option<f64> {
     quantile(&mut levels, 0.99)
 }
 
-/// Why a photograph shows nothing, if it does.
-fn nothing_shown(
-    photograph: &Photograph,
-    brightest: Option<f64>,
-    usual: f64,
-) -> Option<&'static str> {
+/// Why a photograph shows nothing: it is masked, black or white. `None` if it shows something. `median` is the median of
+/// [`brightest`] over all photographs.
+fn blank(photograph: &Photograph, brightest: Option<f64>, median: f64) -> Option<&'static str> {
     let usable = || (0..photograph.pixels.len()).filter(|&pixel| photograph.is_usable(pixel));
     let Some(brightest) = brightest else {
         return Some("has no usable pixel");
     };
     let black = match photograph.encoding {
         Encoding::Linear => 0.0,
-        Encoding::Srgb8 | Encoding::Srgb16 => usual * BLACK,
+        Encoding::Srgb8 | Encoding::Srgb16 => median * BLACK,
     };
     if brightest <= black {
         return Some("is black");
@@ -204,8 +201,7 @@ fn nothing_shown(
     None
 }
 
-/// For each photograph another one with the same pixels, the first of them, or the second for the first. Photographs of one colour
-/// are no pictures that could be told apart.
+/// For each photograph, the first other one with identical pixels. Photographs of one single colour have none.
 fn same_pictures(photographs: &[Arc<Photograph>]) -> Vec<Option<usize>> {
     let hashes: Vec<blake3::Hash> = photographs
         .iter()
@@ -222,8 +218,8 @@ fn same_pictures(photographs: &[Arc<Photograph>]) -> Vec<Option<usize>> {
     (0..hashes.len())
         .map(|frame| {
             let first = photographs[frame].pixels.first();
-            let plain = photographs[frame].pixels.iter().all(|p| Some(p) == first);
-            (0..hashes.len()).find(|&k| k != frame && hashes[k] == hashes[frame] && !plain)
+            let uniform = photographs[frame].pixels.iter().all(|p| Some(p) == first);
+            (0..hashes.len()).find(|&k| k != frame && hashes[k] == hashes[frame] && !uniform)
         })
         .collect()
 }
@@ -255,7 +251,7 @@ mod tests {
     fn black_and_white_photographs_show_nothing() {
         let why = |pixels: Vec<Vec3>| {
             let photograph = photograph(pixels, Encoding::Srgb8);
-            nothing_shown(&photograph, brightest(&photograph), 0.5)
+            blank(&photograph, brightest(&photograph), 0.5)
         };
         assert_eq!(why(ramp()), None);
         assert_eq!(why(vec![Vec3::splat(1e-4); 25]), Some("is black"));

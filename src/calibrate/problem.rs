@@ -1,14 +1,14 @@
-//! What a solve starts from.
+//! The input of a solve.
 
 use crate::capture::photograph::Photograph;
 use crate::scene::Scene;
 use std::sync::Arc;
 
-/// A scene and what its photographs measured.
+/// A scene and its photographs.
 #[derive(Debug, Clone)]
 pub struct Problem {
     /// Geometry and cameras. Camera sizes equal those of `photographs`.
     pub scene: Arc<Scene>,
-    /// One photograph a camera, at the working resolution.
+    /// One photograph per camera, at the working resolution.
     pub photographs: Vec<Arc<Photograph>>,
 }

@@ -1,4 +1,4 @@
-//! What photographs show of each face of a mesh, all brought to one exposure, and meshes cut into segments that follow it.
+//! Mean photographed colour of each face of a mesh, at one common exposure, and the segmentation of meshes by it.
 
 use crate::calibrate::exposure::{Exposures, Observations};
 use crate::calibrate::gbuffer::GBuffer;
@@ -13,36 +13,36 @@ use crate::scene::prepare::prepare;
 use glam::DVec3;
 use std::sync::Arc;
 
-/// Pixels that are looked at for the exposures.
+/// Pixels of the g-buffer that the exposures are estimated from.
 const GBUFFER_PIXELS: usize = 100_000;
-/// Seed of the rays inside pixels: the segments of a capture do not depend on the seed of a solve.
+/// Seed of the rays inside pixels. It is fixed: the segments of a capture do not depend on the seed of a solve.
 const SEED: u64 = 1;
 
-/// For each face what the pixels show whose centres see it; those that are held out say nothing.
+/// For each face, the mean over the pixels whose centre sees it, without held-out pixels.
 pub fn shown(problem: &Problem, hold_out: HoldOut) -> Vec<ShownFace> {
     let gbuffer = GBuffer::new(problem, hold_out, SEED, GBUFFER_PIXELS);
     let exposures = Exposures::new(problem, &Observations::new(problem, &gbuffer));
-    let undone = (exposures.filter(Exposures::needed)).map(|found| found.undone(problem));
-    let alike = undone.as_ref().unwrap_or(problem);
+    let corrected = (exposures.filter(Exposures::needed)).map(|found| found.corrected(problem));
+    let corrected = corrected.as_ref().unwrap_or(problem);
 
     let scene = &problem.scene;
     let mut sums = vec![Sum::default(); scene.triangles.len()];
-    let photographs = problem.photographs.iter().zip(&alike.photographs);
-    for (frame, ((taken, alike), triangles)) in photographs.zip(&scene.ids().triangles).enumerate()
-    {
-        let full = taken.saturation * BELOW_SATURATION;
+    let photographs = problem.photographs.iter().zip(&corrected.photographs);
+    let photographs = photographs.zip(&scene.ids().triangles).enumerate();
+    for (frame, ((original, corrected), triangles)) in photographs {
+        let saturation = original.saturation * BELOW_SATURATION;
         for (pixel, &triangle) in triangles.iter().enumerate() {
             let Some(sum) = sums.get_mut(triangle as usize) else {
                 continue;
             };
-            if !taken.is_usable(pixel) || hold_out.contains(frame as u32, pixel as u32) {
+            if !original.is_usable(pixel) || hold_out.contains(frame as u32, pixel as u32) {
                 continue;
             }
-            let is_full = taken.pixels[pixel].cmpge(full).all();
-            // What lies beside is a mixture with clipped light.
-            if is_full || !taken.is_saturated(pixel) {
-                sum.radiance += alike.pixels[pixel].as_dvec3();
-                sum.saturated += u32::from(is_full);
+            let is_white = original.pixels[pixel].cmpge(saturation).all();
+            // Pixels that are saturated in some channels only are mixtures with clipped light.
+            if is_white || !original.is_saturated(pixel) {
+                sum.radiance += corrected.pixels[pixel].as_dvec3();
+                sum.saturated += u32::from(is_white);
                 sum.pixels += 1;
             }
         }
@@ -50,7 +50,7 @@ pub fn shown(problem: &Problem, hold_out: HoldOut) -> Vec<ShownFace> {
     sums.iter().map(Sum::mean).collect()
 }
 
-/// Cuts the mesh of a capture into segments, by what its photographs show of it too.
+/// Cuts the mesh of a capture into segments by its normals and its photographed colours.
 ///
 /// # Errors
 /// The mesh has no triangle with an area, or no photograph sees the mesh.

@@ -1,85 +1,88 @@
-//! How sharp each photograph is beside the others that show the same edges.
+//! Sharpness of each photograph relative to the others that show the same edges.
 //!
-//! Two photographs that see the same two neighbouring points of a surface from about as far should show the same step of
-//! brightness between them; one that is blurred, by motion or focus, shows a smaller one. Steps well above noise are
-//! compared for each pair of photographs, once at the pixels of either, so that interpolation in the other cancels; one
-//! sharpness a photograph explains all pairs in least squares.
+//! Two photographs that see two neighbouring surface points from about the same distance should show the same step of
+//! brightness between them. A photograph that is blurred by motion or focus shows a smaller one. Steps well above noise are
+//! compared for each pair of photographs, in both directions, so that the loss by interpolation cancels. One contrast per
+//! photograph is then fitted to all pairs by least squares.
 
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
 use crate::capture::photograph::Photograph;
 use crate::math::color::luminance;
-use crate::math::stats::quantile;
+use crate::math::stats::{quantile, upper_median};
 use crate::scene::Scene;
 use crate::scene::geometry::Ray;
 use glam::{Vec2, Vec3};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Pairs of neighbouring pixels that are looked at in each photograph, about.
+/// Approximate number of pairs of neighbouring pixels that are sampled in each photograph.
 const PAIRS: usize = 6_000;
-/// Photographs that each is compared with at most.
+/// Greatest number of photographs that each one is compared with.
 const OTHERS: usize = 24;
-/// A step counts from this on, as a logarithm, ...
+/// Least step that counts, in log luminance.
 const MIN_STEP: f32 = 0.1;
-/// ... and from so many times the usual one on, which is mostly noise.
-const ABOVE_USUAL: f32 = 4.0;
-/// A step counts as no larger than this.
+/// Least step that counts, as a multiple of the median step, which is mostly noise.
+const ABOVE_MEDIAN: f32 = 4.0;
+/// Steps are clamped to this, in log luminance.
 const MAX_STEP: f32 = 1.0;
-/// Steps that two photographs must share, seen from either.
+/// Least number of steps that two photographs must share in each direction.
 const MIN_STEPS: usize = 40;
-/// Photographs that must be compared, for the usual sharpness to say something.
+/// Least number of compared photographs for which the median contrast is meaningful.
 const MIN_PHOTOGRAPHS: usize = 4;
-/// Distances in the other photograph's pixels at which two points are as fine there.
-const AS_FINE: [f32; 2] = [0.75, 1.33];
-/// Depths along a ray that differ by a smaller share are of the same surface.
+/// Range of the distance of the two points in the other photograph, in its pixels.
+const SIMILAR_RESOLUTION: [f32; 2] = [0.75, 1.33];
+/// Relative difference of depths along a ray up to which they belong to the same surface.
 const SAME_DEPTH: f32 = 0.02;
 /// Pixels darker than this fraction of a photograph's median hold mostly noise.
 const ABOVE_NOISE: f64 = 0.1;
-/// Edges with less of the usual contrast are worth a word.
+/// Photographs with a relative contrast below this are reported as blurred.
 const BLURRED: f64 = 0.85;
-/// Relative weight that keeps what is open at the usual sharpness.
-const OPEN: f64 = 1e-6;
+/// Regularization of the undetermined directions of the least-squares fit.
+const RIDGE: f64 = 1e-6;
 
-/// How sharp photographs are: the contrast of edges beside the usual one, 1; `None` where too little is shared to tell.
+/// Sharpness of photographs.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Sharpness {
-    /// One a photograph.
+    /// For each photograph, the contrast of its edges relative to the median photograph; `None` if it shares too few edges.
     pub contrast: Vec<Option<f64>>,
 }
 
-/// The logarithmic steps of two photographs between the same points.
+/// The steps of log luminance between the same two points in two photographs.
 #[derive(Debug, Clone, Copy)]
 struct Step {
+    /// Frame of the other photograph.
     other: u32,
+    /// Step in the photograph whose pixels the points are.
     own: f32,
+    /// Step in the other photograph.
     others: f32,
 }
 
-/// What a photograph shares with the others.
+/// The steps that a photograph shares with the others.
 #[derive(Debug, Default)]
 struct Steps {
-    /// The larger of both photographs' steps, for each that is shared.
+    /// [`Step::size`] of each shared step.
     sizes: Vec<f32>,
-    /// Those that could be more than noise.
+    /// The steps of at least [`MIN_STEP`].
     large: Vec<Step>,
 }
 
-/// A photograph's pixels as logarithms of luminance; not a number where one says nothing.
+/// Log luminance of a photograph's pixels; NaN where a pixel is masked, held out, saturated or too dark.
 struct Levels<'a> {
     photograph: &'a Photograph,
     logarithms: Vec<f32>,
 }
 
 impl Step {
-    /// The larger of both.
+    /// The larger magnitude of both steps.
     fn size(&self) -> f32 {
         self.own.abs().max(self.others.abs())
     }
 }
 
 impl Sharpness {
-    /// Compares the photographs that are not `left_out`, by pixels that are not held out.
+    /// Compares the photographs that are not `left_out` on pixels that are not held out.
     pub fn new(problem: &Problem, hold_out: HoldOut, left_out: &[bool]) -> Self {
         let levels: Vec<Levels> = (problem.photographs.par_iter().enumerate())
             .map(|(frame, photograph)| Levels::new(photograph, frame, hold_out))
@@ -93,33 +96,28 @@ impl Sharpness {
             })
             .collect();
         let mut sizes: Vec<f32> = Vec::with_capacity(steps.iter().map(|s| s.sizes.len()).sum());
-        for of_frame in &mut steps {
-            sizes.append(&mut of_frame.sizes);
+        for steps in &mut steps {
+            sizes.append(&mut steps.sizes);
         }
-        let least = MIN_STEP.max(ABOVE_USUAL * middle(&mut sizes));
+        let median = upper_median(&mut sizes).unwrap_or(0.0);
+        let min_step = MIN_STEP.max(ABOVE_MEDIAN * median);
         Self {
-            contrast: explained(&ratios(&steps, least), frames),
+            contrast: fit_contrasts(&ratios(&steps, min_step), frames),
         }
     }
 
-    /// Which photographs are blurred, in one sentence; `None` where none is.
+    /// One sentence that names the blurred photographs; `None` if there are none.
     pub fn remark(&self) -> Option<String> {
-        let blurred = |(frame, contrast): (usize, &Option<f64>)| {
-            Some((frame, contrast.filter(|c| *c < BLURRED)?))
-        };
-        let mut all: Vec<(usize, f64)> = self
-            .contrast
-            .iter()
-            .enumerate()
-            .filter_map(blurred)
+        let mut blurred: Vec<(usize, f64)> = (self.contrast.iter().enumerate())
+            .filter_map(|(frame, contrast)| Some((frame, contrast.filter(|c| *c < BLURRED)?)))
             .collect();
-        all.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let each: Vec<String> = (all.iter())
+        blurred.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let each: Vec<String> = (blurred.iter())
             .map(|(frame, contrast)| format!("{frame} ({:.0} %)", 100.0 * contrast))
             .collect();
         (!each.is_empty()).then(|| {
             format!(
-                "frames that show edges with less than {:.0} % of the usual contrast are blurred and say less of textures: {} \
+                "frames whose edges have less than {:.0} % of the median contrast are blurred and weigh less in textures: {} \
                  (counted from 0)",
                 100.0 * BLURRED,
                 each.join(", ")
@@ -127,54 +125,42 @@ impl Sharpness {
         })
     }
 
-    /// How much a photograph's pixels say of what is fine: the squared contrast of a blurred one, as a signal beside the same noise;
-    /// 1 of others, since noise adds contrast too, and where it is not told.
+    /// Weight of a photograph's pixels for fine detail: its squared contrast, the power of the signal relative to the same noise,
+    /// at most 1. Contrasts above 1 come from noise; unknown contrasts count as 1.
     pub fn weight(&self, frame: usize) -> f32 {
         let contrast = self.contrast.get(frame).copied().flatten();
         contrast.unwrap_or(1.0).min(1.0).powi(2) as f32
     }
 }
 
-/// One in the middle of some numbers by size; 0 where there are none.
-fn middle(values: &mut [f32]) -> f32 {
-    let place = values.len() / 2;
-    match values.is_empty() {
-        true => 0.0,
-        false => *values.select_nth_unstable_by(place, f32::total_cmp).1,
-    }
-}
-
-/// For ordered pairs of photographs, the logarithm of the ratio of the energies of steps, and how many there are.
-fn ratios(steps: &[Steps], least: f32) -> Vec<Vec<(usize, f64, usize)>> {
-    let of = |steps: &Steps| {
+/// For each photograph, a list of (other photograph, log ratio of the summed squares of own and other steps, number of steps),
+/// over steps of at least `min_step`.
+fn ratios(steps: &[Steps], min_step: f32) -> Vec<Vec<(usize, f64, usize)>> {
+    let ratios_of = |steps: &Steps| {
         let mut large: Vec<&Step> = (steps.large.iter())
-            .filter(|step| step.size() >= least)
+            .filter(|step| step.size() >= min_step)
             .collect();
         large.sort_by_key(|step| step.other);
         let energy = |step: f32| f64::from(step.clamp(-MAX_STEP, MAX_STEP)).powi(2);
         (large.chunk_by(|a, b| a.other == b.other))
-            .map(|of_pair| {
-                let own: f64 = of_pair.iter().map(|s| energy(s.own)).sum();
-                let others: f64 = of_pair.iter().map(|s| energy(s.others)).sum();
-                (
-                    of_pair[0].other as usize,
-                    (own / others).ln(),
-                    of_pair.len(),
-                )
+            .map(|pair| {
+                let own: f64 = pair.iter().map(|s| energy(s.own)).sum();
+                let others: f64 = pair.iter().map(|s| energy(s.others)).sum();
+                (pair[0].other as usize, (own / others).ln(), pair.len())
             })
             .filter(|(_, ratio, _)| ratio.is_finite())
             .collect()
     };
-    steps.iter().map(of).collect()
+    steps.iter().map(ratios_of).collect()
 }
 
-/// The contrasts that explain the ratios best, their median 1.
-fn explained(ratios: &[Vec<(usize, f64, usize)>], frames: usize) -> Vec<Option<f64>> {
-    let mut matrix = DMatrix::<f64>::identity(frames, frames) * OPEN;
+/// The least-squares contrasts of photographs, scaled to a median of 1, from their [`ratios`].
+fn fit_contrasts(ratios: &[Vec<(usize, f64, usize)>], frames: usize) -> Vec<Option<f64>> {
+    let mut matrix = DMatrix::<f64>::identity(frames, frames) * RIDGE;
     let mut right = DVector::<f64>::zeros(frames);
     let mut pairs = vec![0; frames];
-    for (frame, of_frame) in ratios.iter().enumerate() {
-        for &(other, ratio, count) in of_frame.iter().filter(|pair| pair.0 > frame) {
+    for (frame, own) in ratios.iter().enumerate() {
+        for &(other, ratio, count) in own.iter().filter(|pair| pair.0 > frame) {
             let back = ratios[other].iter().find(|pair| pair.0 == frame);
             let Some(&(_, back, count_back)) = back else {
                 continue;
@@ -183,7 +169,7 @@ fn explained(ratios: &[Vec<(usize, f64, usize)>], frames: usize) -> Vec<Option<f
             if count < MIN_STEPS {
                 continue;
             }
-            // Half the difference of energies is that of contrasts; half again the mean of both ways to look.
+            // Energies are squared contrasts, which gives one half; the mean of both directions gives the other half.
             let (difference, weight) = (0.25 * (ratio - back), count as f64);
             for (a, b, sign) in [(frame, other, 1.0), (other, frame, -1.0)] {
                 matrix[(a, a)] += weight;
@@ -193,81 +179,83 @@ fn explained(ratios: &[Vec<(usize, f64, usize)>], frames: usize) -> Vec<Option<f
             }
         }
     }
-    let none = vec![None; frames];
+    let unknown = vec![None; frames];
     let Some(factor) = matrix.cholesky() else {
-        return none;
+        return unknown;
     };
-    let found = factor.solve(&right);
-    let told = |frame: &usize| pairs[*frame] > 0;
-    let mut known: Vec<f64> = (0..frames).filter(told).map(|frame| found[frame]).collect();
+    let logarithms = factor.solve(&right);
+    let is_known = |frame: &usize| pairs[*frame] > 0;
+    let mut known: Vec<f64> = (0..frames)
+        .filter(is_known)
+        .map(|frame| logarithms[frame])
+        .collect();
     if known.len() < MIN_PHOTOGRAPHS {
-        return none;
+        return unknown;
     }
-    let Some(middle) = quantile(&mut known, 0.5) else {
-        return none;
+    let Some(median) = quantile(&mut known, 0.5) else {
+        return unknown;
     };
     (0..frames)
-        .map(|frame| told(&frame).then(|| (found[frame] - middle).exp()))
+        .map(|frame| is_known(&frame).then(|| (logarithms[frame] - median).exp()))
         .collect()
 }
 
-/// The steps between neighbouring pixels of a photograph, and between the same points in others.
+/// The steps between neighbouring pixels of a photograph, each with the step between the same points in other photographs.
 fn steps(problem: &Problem, levels: &[Levels], left_out: &[bool], frame: usize) -> Steps {
     let scene = &*problem.scene;
     let own = &levels[frame];
     let (width, height) = (own.photograph.width, own.photograph.height);
-    let apart = (f64::from(width) * f64::from(height) * 2.0 / PAIRS as f64).sqrt();
-    let apart = (apart.ceil() as usize).max(1);
-    let others = others(scene, left_out, frame);
-    let places = (0..height.saturating_sub(1)).step_by(apart);
-    let places = places.flat_map(|y| {
+    let spacing = (f64::from(width) * f64::from(height) * 2.0 / PAIRS as f64).sqrt();
+    let spacing = (spacing.ceil() as usize).max(1);
+    let others = similar_views(scene, left_out, frame);
+    let rows = (0..height.saturating_sub(1)).step_by(spacing);
+    let pixels = rows.flat_map(|y| {
         (0..width.saturating_sub(1))
-            .step_by(apart)
+            .step_by(spacing)
             .map(move |x| [x, y])
     });
-    let mut found = Steps::default();
-    for [x, y] in places {
+    let mut steps = Steps::default();
+    for [x, y] in pixels {
         for [u, v] in [[x + 1, y], [x, y + 1]] {
             let step = own.at([u, v]) - own.at([x, y]);
-            let seen = [
+            let hits = [
                 point(scene, frame, [x, y], width),
                 point(scene, frame, [u, v], width),
             ];
-            let [Some((object, a)), Some((beside, b))] = seen else {
+            let [Some((object, a)), Some((neighbour, b))] = hits else {
                 continue;
             };
-            if object != beside || step.is_nan() {
+            if object != neighbour || step.is_nan() {
                 continue;
             }
             for &other in &others {
-                let there = step_in(scene, &levels[other], other, object, [a, b]);
-                let Some(others) = there else {
+                let Some(others) = step_in(scene, &levels[other], other, object, [a, b]) else {
                     continue;
                 };
-                let both = Step {
+                let shared = Step {
                     other: other as u32,
                     own: step,
                     others,
                 };
-                found.sizes.push(both.size());
-                if both.size() >= MIN_STEP {
-                    found.large.push(both);
+                steps.sizes.push(shared.size());
+                if shared.size() >= MIN_STEP {
+                    steps.large.push(shared);
                 }
             }
         }
     }
-    found
+    steps
 }
 
-/// The photographs that look most alike from where another was taken: those that look the same way from nearby.
-fn others(scene: &Scene, left_out: &[bool], frame: usize) -> Vec<usize> {
+/// The frames with the most similar views: nearby cameras with a similar direction.
+fn similar_views(scene: &Scene, left_out: &[bool], frame: usize) -> Vec<usize> {
     let camera = &scene.cameras[frame];
     let mut all: Vec<(f32, usize)> = (scene.cameras.iter().enumerate())
         .filter(|&(other, _)| other != frame && !left_out[other])
-        .map(|(other, there)| {
-            let apart =
-                there.center.distance(camera.center) / scene.diameter.max(f32::MIN_POSITIVE);
-            (apart - there.forward().dot(camera.forward()), other)
+        .map(|(other, view)| {
+            let distance =
+                view.center.distance(camera.center) / scene.diameter.max(f32::MIN_POSITIVE);
+            (distance - view.forward().dot(camera.forward()), other)
         })
         .collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -277,7 +265,7 @@ fn others(scene: &Scene, left_out: &[bool], frame: usize) -> Vec<usize> {
         .collect()
 }
 
-/// The object and the point that a pixel's middle sees.
+/// The object and the surface point that a pixel's centre sees.
 fn point(scene: &Scene, frame: usize, [x, y]: [u32; 2], width: u32) -> Option<(u32, Vec3)> {
     let triangle = scene.ids().triangles[frame][(y * width + x) as usize];
     let ray = scene.cameras[frame].ray(Vec2::new(x as f32, y as f32) + 0.5);
@@ -287,7 +275,7 @@ fn point(scene: &Scene, frame: usize, [x, y]: [u32; 2], width: u32) -> Option<(u
     is_ahead.then(|| (object, ray.origin + ray.direction * distance))
 }
 
-/// The step between two points of an object in another photograph, where it sees both about as finely.
+/// The step between two points of an object in another photograph; `None` unless it sees both, at a similar resolution.
 fn step_in(
     scene: &Scene,
     levels: &Levels,
@@ -298,8 +286,8 @@ fn step_in(
     let camera = &scene.cameras[frame];
     let [a, b] = points.map(|point| camera.project(point));
     let (a, b) = (a?, b?);
-    let [least, most] = AS_FINE;
-    if !(least..=most).contains(&a.distance(b)) {
+    let [min, max] = SIMILAR_RESOLUTION;
+    if !(min..=max).contains(&a.distance(b)) {
         return None;
     }
     for (at, point) in [(a, points[0]), (b, points[1])] {
@@ -310,34 +298,35 @@ fn step_in(
         }
         let to_point = point - camera.center;
         let distance = to_point.length();
-        let seen = scene.plane_distance(triangle, &Ray::new(camera.center, to_point / distance));
-        let is_same = (seen - distance).abs() <= SAME_DEPTH * distance;
+        let visible = scene.plane_distance(triangle, &Ray::new(camera.center, to_point / distance));
+        let is_same = (visible - distance).abs() <= SAME_DEPTH * distance;
         if !is_same {
             return None;
         }
     }
-    let step = levels.between(b) - levels.between(a);
+    let step = levels.interpolated(b) - levels.interpolated(a);
     (!step.is_nan()).then_some(step)
 }
 
 impl<'a> Levels<'a> {
     fn new(photograph: &'a Photograph, frame: usize, hold_out: HoldOut) -> Self {
-        let mut all: Vec<f64> = (photograph.pixels.iter().enumerate())
+        let mut luminances: Vec<f64> = (photograph.pixels.iter().enumerate())
             .filter(|(index, _)| photograph.is_usable(*index))
             .map(|(_, &pixel)| f64::from(luminance(pixel)))
             .collect();
-        let least = (quantile(&mut all, 0.5).unwrap_or(0.0) * ABOVE_NOISE) as f32;
-        let says = |(index, &pixel): (usize, &Vec3)| {
+        let dark = (quantile(&mut luminances, 0.5).unwrap_or(0.0) * ABOVE_NOISE) as f32;
+        let logarithm = |(index, &pixel): (usize, &Vec3)| {
             let level = luminance(pixel);
-            let told =
+            let fitted =
                 photograph.is_usable(index) && !hold_out.contains(frame as u32, index as u32);
-            match told && level > least && !photograph.is_saturated(index) {
+            match fitted && level > dark && !photograph.is_saturated(index) {
                 true => level.ln(),
                 false => f32::NAN,
             }
         };
+        let pixels = photograph.pixels.iter().enumerate();
         Self {
-            logarithms: photograph.pixels.iter().enumerate().map(says).collect(),
+            logarithms: pixels.map(logarithm).collect(),
             photograph,
         }
     }
@@ -346,8 +335,8 @@ impl<'a> Levels<'a> {
         self.logarithms[(y * self.photograph.width + x) as usize]
     }
 
-    /// Between the middles of four pixels; not a number outside or where one of them says nothing.
-    fn between(&self, at: Vec2) -> f32 {
+    /// Bilinear interpolation; NaN outside the image or where one of the four pixels is NaN.
+    fn interpolated(&self, at: Vec2) -> f32 {
         let corner = at - 0.5;
         let (x, y) = (corner.x.floor(), corner.y.floor());
         let (width, height) = (self.photograph.width, self.photograph.height);

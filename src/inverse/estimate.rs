@@ -1,4 +1,4 @@
-//! What comes out: emission, materials, outside light, exposures, each with a confidence.
+//! The result of a solve: emission, materials, outside light and exposures, with standard errors.
 
 use crate::capture::exposure::{Exposure, Vignetting};
 use crate::capture::response::Response;
@@ -13,29 +13,29 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Pixels that must see an object for its albedo to count in an error over objects.
+/// Least number of pixels of an object whose albedo counts in an error over objects.
 pub const ENOUGH_PIXELS: u64 = 50;
-/// Albedos are taken for at least this large when an error is relative to them.
-const SMALLEST_ALBEDO: f32 = 1e-3;
+/// Errors are relative to an albedo of at least this.
+const MIN_ALBEDO: f32 = 1e-3;
 
-/// Everything that a solver has found out about a scene.
+/// The estimate of a scene.
 #[derive(Debug, Clone, Default)]
 pub struct Estimate {
-    /// One entry an object, in the scene's order.
+    /// One entry per object, in the scene's order.
     pub objects: Vec<ObjectEstimate>,
-    /// Spatial detail, where a stage added it.
+    /// Textures; `None` if none was kept.
     pub texels: Option<Arc<TexelEstimate>>,
-    /// Light from outside the mesh, where a stage added it.
+    /// Light from outside the mesh; `None` if it was not kept.
     pub outside: Option<Outside>,
-    /// Each frame's linear exposure and white balance, their median 1 in each channel, where they were estimated.
+    /// Linear exposure and white balance of each frame, with a median of 1 in each channel; `None` if they do not differ.
     pub exposures: Option<Vec<Vec3>>,
-    /// How the lens dims the corners of all frames, where that was found.
+    /// Vignetting of all frames, if it was found.
     pub vignetting: Option<Vignetting>,
-    /// How the camera's values follow the light, where that was found not to be the files' own curve.
+    /// Response of the camera, if it was found to differ from the files' own curve.
     pub response: Option<Response>,
 }
 
-/// What is known of one object; also its entry in `estimate.json` and `report.json`, where what is no number is `null`.
+/// The estimate of one object; also its entry in `estimate.json` and `report.json`, where non-finite numbers are `null`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ObjectEstimate {
     /// Diffuse reflectance, linear RGB in [0, 1].
@@ -62,19 +62,19 @@ pub struct ObjectEstimate {
         deserialize_with = "nullable::or_infinity"
     )]
     pub emission_stderr: Vec3,
-    /// GGX roughness α, where a lobe was kept.
+    /// GGX roughness α; `None` without a lobe.
     #[serde(serialize_with = "nullable::number")]
     pub roughness: Option<f32>,
-    /// Specular reflectance at normal incidence, where a lobe was kept.
+    /// Specular reflectance at normal incidence; `None` without a lobe.
     #[serde(serialize_with = "nullable::number")]
     pub specular: Option<f32>,
-    /// Pixels of all photographs whose centre sees the object.
+    /// Number of pixels of all photographs whose centre sees the object.
     pub seen_pixels: u64,
     /// Whether the photographs determine albedo and emission.
     pub identifiable: bool,
     /// Whether the photographs determine the albedo.
     pub albedo_identifiable: bool,
-    /// Why not, in a sentence; empty where all is determined.
+    /// A remark, such as why something is not determined; may be empty.
     pub note: String,
 }
 
@@ -96,12 +96,12 @@ impl Default for ObjectEstimate {
 }
 
 impl ObjectEstimate {
-    /// GGX roughness α and specular reflectance at normal incidence, where there is a lobe.
+    /// GGX roughness α and specular reflectance at normal incidence; `None` without a lobe.
     pub fn lobe(&self) -> Option<(f32, f32)> {
         self.roughness.zip(self.specular)
     }
 
-    /// The first field that holds what no surface has.
+    /// The first field with a physically impossible value.
     pub fn impossible(&self) -> Option<&'static str> {
         let reflects =
             |fraction: Vec3| fraction.cmpge(Vec3::ZERO).all() && fraction.cmple(Vec3::ONE).all();
@@ -124,21 +124,22 @@ impl ObjectEstimate {
     }
 }
 
-/// Albedo texels with their confidence.
+/// Albedo texels with their standard errors.
 #[derive(Debug, Clone)]
 pub struct TexelEstimate {
-    /// Albedo a texel; used for the objects in `textured`.
+    /// Albedo of each texel; used for the objects in `textured`.
     pub colors: Arc<TexelColors>,
     /// Standard error of each texel's albedo.
     pub stderr: Vec<Vec3>,
-    /// Pixels that saw each texel; zero where the value is the neighbours'.
+    /// Number of pixels that see each texel; zero for interpolated texels.
     pub seen: Vec<u32>,
     /// For each object, whether its albedo is read from the texels.
     pub textured: Vec<bool>,
 }
 
 impl TexelEstimate {
-    /// The same with the texels of each textured object multiplied, a factor a channel; albedos end at one.
+    /// The estimate with the texels of each textured object multiplied by a factor per channel; albedos are clamped to one.
+    /// `object_of` is the object of each triangle.
     pub fn scaled(&self, factor: impl Fn(usize) -> Vec3, object_of: &[u32]) -> Self {
         let layout = &self.colors.layout;
         let mut scaled = self.clone();
@@ -164,25 +165,25 @@ impl TexelEstimate {
 /// Light arriving from outside the mesh.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outside {
-    /// Equirectangular map of incoming radiance by direction of travel reversed; row 0 is straight up (world +y
-    /// before `up` is applied), columns run around. Around a box the directions are those from its middle.
+    /// Columns of the equirectangular map. Directions point from the scene to the light; for a box, from its centre. Row 0 is
+    /// straight up (world +y before `up` is applied).
     pub width: u32,
-    /// Rows.
+    /// Rows of the map.
     pub height: u32,
-    /// Radiance, row by row.
+    /// Incoming radiance, row by row.
     pub pixels: Vec<Vec3>,
-    /// How far away the light comes from.
+    /// Distance of the light: infinite, or a box.
     pub surroundings: Surroundings,
 }
 
-/// Size over RGB of an error of an albedo, relative to that albedo.
+/// Norm over RGB of an albedo's error, relative to the norm of the albedo.
 pub fn relative_to_albedo(error: Vec3, albedo: Vec3) -> f64 {
-    f64::from(error.length() / albedo.length().max(SMALLEST_ALBEDO))
+    f64::from(error.length() / albedo.length().max(MIN_ALBEDO))
 }
 
 impl Estimate {
-    /// The error that the estimate claims of itself: median over objects of the relative standard error of albedo over
-    /// RGB, of those whose albedo is determined and that [`ENOUGH_PIXELS`] see; `None` where there are none.
+    /// The reported error: the median relative standard error of albedo, over objects whose albedo is determined and that at least
+    /// [`ENOUGH_PIXELS`] pixels see; `None` if there are none.
     pub fn relative_error(&self) -> Option<f64> {
         let mut relative: Vec<f64> = (self.objects.iter())
             .filter(|object| object.albedo_identifiable && object.seen_pixels >= ENOUGH_PIXELS)
@@ -191,8 +192,7 @@ impl Estimate {
         quantile(&mut relative, 0.5)
     }
 
-    /// What turns radiance into a frame's values: what was estimated of exposure, white balance, vignetting and
-    /// response.
+    /// The estimated map from radiance to a frame's values: exposure, white balance, vignetting and response.
     pub fn exposure(&self, frame: usize) -> Exposure {
         let factor = self.exposures.as_ref().and_then(|e| e.get(frame));
         Exposure {
@@ -202,7 +202,7 @@ impl Estimate {
         }
     }
 
-    /// The scene in the light and the materials of this estimate.
+    /// The scene with the light and the materials of this estimate.
     pub fn lit(&self, scene: &Arc<Scene>) -> Lit {
         let mut materials = self.materials();
         materials.resize(
@@ -217,7 +217,7 @@ impl Estimate {
         Lit::new(scene.clone(), materials, outside.map(Arc::new))
     }
 
-    /// One material an object, for rendering.
+    /// The material of each object, for rendering.
     pub fn materials(&self) -> Vec<Material> {
         self.objects
             .iter()

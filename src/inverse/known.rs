@@ -1,9 +1,9 @@
-//! What is known of a scene beforehand: values that are held while the rest is solved.
+//! Known values of a scene, which are held fixed while the rest is solved.
 
 use glam::Vec3;
 use std::collections::BTreeMap;
 
-/// What is known of one object.
+/// The known values of one object.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Pinned {
     /// Diffuse reflectance, linear RGB in [0, 1].
@@ -13,7 +13,7 @@ pub struct Pinned {
 }
 
 impl Pinned {
-    /// What is held, in a few words; empty where nothing is.
+    /// Which values are held, in words; empty if none is.
     pub fn words(&self) -> &'static str {
         match (self.albedo.is_some(), self.emission.is_some()) {
             (true, true) => "albedo and emission held at known values",
@@ -24,17 +24,17 @@ impl Pinned {
     }
 }
 
-/// What is known of all objects, by their index.
+/// The known values of all objects, by object index.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Known(BTreeMap<usize, Pinned>);
 
 impl Known {
-    /// What is known of an object.
-    pub fn of(&self, object: usize) -> Pinned {
+    /// The known values of an object.
+    pub fn object(&self, object: usize) -> Pinned {
         self.0.get(&object).copied().unwrap_or_default()
     }
 
-    /// Replaces what is known of an object. Values that no surface has are brought into range.
+    /// Replaces the known values of an object. Impossible values are clamped.
     pub fn set(&mut self, object: usize, pinned: Pinned) {
         let pinned = Pinned {
             albedo: pinned.albedo.map(|a| a.clamp(Vec3::ZERO, Vec3::ONE)),
@@ -47,12 +47,12 @@ impl Known {
         }
     }
 
-    /// All objects of which something is known, ascending.
+    /// All objects with known values, in ascending order.
     pub fn objects(&self) -> impl Iterator<Item = (usize, Pinned)> + '_ {
         self.0.iter().map(|(&object, &pinned)| (object, pinned))
     }
 
-    /// Whether nothing is known.
+    /// Whether no value is known.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

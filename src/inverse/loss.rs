@@ -1,5 +1,5 @@
-//! The loss that is shown: mean absolute difference between photographs and re-renders on fixed sets of pixels. Where a
-//! photograph is saturated only a darker re-render differs.
+//! The reported loss: mean absolute difference between photographs and re-renders on fixed sets of pixels. Saturated values are
+//! lower bounds.
 
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
@@ -14,10 +14,10 @@ use crate::transport::path::{PathOptions, radiance};
 use glam::{DVec3, Vec2};
 use rayon::prelude::*;
 
-/// First of the sample keys of loss paths, far from those of the fit.
+/// First of the sample keys of loss paths, disjoint from those of the fit.
 const KEY: u64 = 1 << 61;
 
-/// Two fixed sets of pixels, in the fit and held out.
+/// Two fixed sets of pixels: in the fit, and held out.
 #[derive(Debug, Clone)]
 pub struct LossProbe {
     train: Vec<(u32, u32)>,
@@ -30,28 +30,28 @@ pub struct LossProbe {
 /// Losses of one estimate.
 #[derive(Debug, Clone, Copy)]
 pub struct Losses {
-    /// On pixels in the fit; `None` where there are none.
+    /// On pixels in the fit; `None` if there are none.
     pub train: Option<f64>,
-    /// On held-out pixels; `None` where there are none.
+    /// On held-out pixels; `None` if there are none.
     pub held_out: Option<f64>,
-    /// What measuring them took; dropped samples count as black.
+    /// Rays cast and paths rejected; rejected samples count as black.
     pub cast: Cast,
 }
 
-/// The light that reaches the photographs after a number of bounces.
+/// The part of the photographed light that comes after a number of bounces.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rest {
-    /// Its fraction of all light, in the channel in which that is most.
+pub struct LateLight {
+    /// Its fraction of all light, in the channel with the largest fraction.
     pub fraction: f64,
-    /// Standard error of the fraction, by how pixels differ.
+    /// Standard error of the fraction over pixels.
     pub stderr: f64,
-    /// What measuring it took.
+    /// Rays cast and paths rejected.
     pub cast: Cast,
 }
 
 impl LossProbe {
-    /// Draws up to `pixels` usable pixels that see the mesh for each set, spread evenly over all photographs, to be rendered with
-    /// `samples` paths each of at most `max_bounces` bounces.
+    /// Chooses up to `pixels` usable pixels that see the mesh for each set, spread evenly over all photographs. Each is rendered with
+    /// `samples` paths of at most `max_bounces` bounces.
     pub fn new(
         problem: &Problem,
         settings: &Settings,
@@ -61,9 +61,9 @@ impl LossProbe {
     ) -> Self {
         let mut sets = [Vec::new(), Vec::new()];
         let total: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
-        // Look at some forty times as many pixels as are wanted: enough to find the held-out ones.
+        // About forty times as many pixels are visited, which is enough to find the held-out ones.
         let stride = (total / (pixels * 40).max(1)).max(1);
-        let sees_mesh = &problem.scene.ids().triangles;
+        let triangles = &problem.scene.ids().triangles;
         let mut next = 0;
         let mut before = 0;
         for (frame, photograph) in problem.photographs.iter().enumerate() {
@@ -71,7 +71,7 @@ impl LossProbe {
             while next < end {
                 let pixel = next - before;
                 let usable = photograph.is_usable(pixel);
-                if usable && sees_mesh[frame].get(pixel) != Some(&NOTHING) {
+                if usable && triangles[frame].get(pixel) != Some(&NOTHING) {
                     let held = HoldOut::from(settings).contains(frame as u32, pixel as u32);
                     sets[usize::from(held)].push((frame as u32, pixel as u32));
                 }
@@ -94,12 +94,12 @@ impl LossProbe {
         }
     }
 
-    /// Paths that measuring takes.
+    /// Number of paths of a measurement.
     pub fn paths(&self) -> u64 {
         (self.train.len() + self.held_out.len()) as u64 * self.samples
     }
 
-    /// The same pixels and paths, of at most so many bounces.
+    /// The same pixels and paths, with at most `max_bounces` bounces.
     #[must_use]
     pub fn deepened(&self, max_bounces: u32) -> Self {
         Self {
@@ -121,27 +121,31 @@ impl LossProbe {
         }
     }
 
-    /// Mean absolute difference on the held-out pixels alone, `None` where there are none, and what it took.
+    /// Mean absolute difference on the held-out pixels alone (`None` if there are none), and the rays cast.
     pub fn held_out(&self, problem: &Problem, estimate: &Estimate) -> (Option<f64>, Cast) {
         let (each, cast) = self.held_out_each(problem, estimate);
         (mean(&each), cast)
     }
 
-    /// Mean absolute difference over the channels of each held-out pixel, the same ones in the same order for any estimate, and what it
-    /// took.
+    /// Mean absolute difference over the channels of each held-out pixel, in the same order for any estimate, and the rays cast.
     pub fn held_out_each(&self, problem: &Problem, estimate: &Estimate) -> (Vec<f64>, Cast) {
         let lit = estimate.lit(&problem.scene);
         self.differences(problem, &lit, &self.held_out)
     }
 
-    /// How much of the light in the photographs comes after `bounces` bounces, by an estimate: the same paths as long as the probe's,
-    /// cut off there. `None` where no pixel is in the fit, or all is black.
-    pub fn beyond(&self, problem: &Problem, estimate: &Estimate, bounces: u32) -> Option<Rest> {
+    /// The part of the photographed light that comes after `bounces` bounces, according to an estimate: the difference between the
+    /// probe's paths and the same paths cut off there. `None` if no pixel is in the fit, or everything is black.
+    pub fn beyond(
+        &self,
+        problem: &Problem,
+        estimate: &Estimate,
+        bounces: u32,
+    ) -> Option<LateLight> {
         let lit = estimate.lit(&problem.scene);
         let each: Vec<([DVec3; 2], Cast)> = (self.train.par_iter())
             .map(|&pixel| {
                 let [whole, cut] = [self.max_bounces, bounces]
-                    .map(|most| self.rendered(problem, &lit, pixel, most));
+                    .map(|max_bounces| self.rendered(problem, &lit, pixel, max_bounces));
                 let mut cast = whole.1;
                 cast += cut.1;
                 ([whole.0, whole.0 - cut.0], cast)
@@ -149,21 +153,21 @@ impl LossProbe {
             .collect();
         let cast = each.iter().map(|e| e.1).sum();
         let count = each.len() as f64;
-        let mean = |of: usize| each.iter().map(|e| e.0[of]).sum::<DVec3>() / count;
+        let mean = |i: usize| each.iter().map(|e| e.0[i]).sum::<DVec3>() / count;
         let [all, late] = [mean(0), mean(1)];
         let fractions = late / all;
         let channel = (0..3)
             .filter(|&c| fractions[c].is_finite())
             .max_by(|&a, &b| fractions[a].total_cmp(&fractions[b]))?;
-        // A ratio of means, to first order.
+        // Standard error of a ratio of means, to first order.
         let fraction = fractions[channel];
-        let mut off = Moments::default();
+        let mut deviations = Moments::default();
         for ([all, late], _) in &each {
-            off.push(late[channel] - fraction * all[channel]);
+            deviations.push(late[channel] - fraction * all[channel]);
         }
-        Some(Rest {
+        Some(LateLight {
             fraction,
-            stderr: off.standard_error() / all[channel],
+            stderr: deviations.standard_error() / all[channel],
             cast,
         })
     }
@@ -172,20 +176,21 @@ impl LossProbe {
         let each: Vec<(f64, Cast)> = pixels
             .par_iter()
             .map(|&(frame, pixel)| {
-                let (shown, cast) = self.rendered(problem, lit, (frame, pixel), self.max_bounces);
+                let (rendered, cast) =
+                    self.rendered(problem, lit, (frame, pixel), self.max_bounces);
                 let photograph = &problem.photographs[frame as usize];
                 let measured = photograph.pixels[pixel as usize].as_dvec3();
-                let missing = measured - shown;
+                let residual = measured - rendered;
                 let censored = photograph.saturated(pixel as usize);
-                let wrong = DVec3::select(censored, missing.max(DVec3::ZERO), missing.abs());
-                (wrong.element_sum() / 3.0, cast)
+                let error = DVec3::select(censored, residual.max(DVec3::ZERO), residual.abs());
+                (error.element_sum() / 3.0, cast)
             })
             .collect();
         let cast = each.iter().map(|e| e.1).sum();
         (each.into_iter().map(|e| e.0).collect(), cast)
     }
 
-    /// What a pixel of a frame shows by paths of at most so many bounces.
+    /// Radiance of a pixel (frame, index) by paths of at most `max_bounces` bounces.
     fn rendered(
         &self,
         problem: &Problem,
@@ -220,7 +225,7 @@ impl LossProbe {
     }
 }
 
-/// Their mean; `None` for none.
+/// The mean; `None` without values.
 fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }

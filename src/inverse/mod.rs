@@ -1,8 +1,8 @@
-//! From photographs to an estimate: the solvers, what they estimate, and how sure they are.
+//! The solvers: from photographs to an estimate with standard errors.
 //!
-//! [`solve`] picks the solver: [`pipeline`] (the transport cache, of all presets but one) or [`paper`]. Neither imports
-//! the other. [`paths`] holds stored paths and their derivatives, [`fit`] the least squares over them, [`emitters`] what is a
-//! lamp; [`lobe`] and [`texture`] find what one albedo an object does not explain.
+//! [`solve`] selects the solver: [`pipeline`] (the transport cache; all presets but one) or [`paper`]. Neither imports the
+//! other. [`paths`] holds stored paths and their derivatives, [`fit`] their least-squares fit, [`emitters`] the classification
+//! of objects as lamps; [`lobe`] and [`texture`] add detail to the one albedo per object.
 
 pub mod emitters;
 pub mod estimate;
@@ -28,7 +28,7 @@ use monitor::Monitor;
 use settings::{Preset, Settings};
 use solver::{Checkpoint, Observer, Solution};
 
-/// Runs the solver that the settings' preset names.
+/// Runs the solver of the settings' preset.
 ///
 /// # Errors
 /// The checkpoint belongs to another capture or preset, or all photographs are to be held out.

@@ -1,4 +1,4 @@
-//! The solver's clock and its line to the observer.
+//! The solver's clock and its reports to the observer.
 
 use crate::inverse::estimate::Estimate;
 use crate::inverse::known::Known;
@@ -9,28 +9,28 @@ use crate::inverse::solver::{
 use crate::transport::arrival::Cast;
 use std::time::{Duration, Instant};
 
-/// Counts time without pauses, reports to the observer, and says when to stop.
+/// Measures solving time without pauses, reports to the observer, and decides when to stop.
 pub struct Monitor<'a> {
     observer: &'a mut dyn Observer,
-    /// What the observer hears.
+    /// The progress that is reported.
     pub progress: Progress,
-    /// The parameters in force; live ones may change at any report.
+    /// The present settings; live ones may change at any report.
     pub settings: Settings,
-    /// What is held.
+    /// Values that are held fixed.
     pub known: Known,
     started: Instant,
     /// Time spent in the observer.
     away: Duration,
-    /// Seconds of the runs before this one.
+    /// Seconds of earlier runs.
     earlier: f64,
     last_report: Option<Instant>,
 }
 
-/// Reports further apart than this are due.
+/// Interval between reports.
 const REPORT_EVERY: Duration = Duration::from_millis(30);
 
 impl<'a> Monitor<'a> {
-    /// Starts the clock at the seconds that `progress` already has.
+    /// Starts the clock at the seconds in `progress`.
     pub fn new(settings: &Settings, observer: &'a mut dyn Observer, progress: Progress) -> Self {
         Self {
             known: observer.known(),
@@ -55,10 +55,10 @@ impl<'a> Monitor<'a> {
             .is_none_or(|at| at.elapsed() >= REPORT_EVERY)
     }
 
-    /// Tells the observer, if a report is due, and obeys; the error says why to stop.
+    /// Reports to the observer if a report is due.
     ///
     /// # Errors
-    /// Why the solve is to end.
+    /// The reason to end the solve.
     pub fn tick(
         &mut self,
         estimate: &Estimate,
@@ -70,10 +70,11 @@ impl<'a> Monitor<'a> {
         Ok(())
     }
 
-    /// Tells the observer now; `checkpoint` is called only if the observer wants to keep one.
+    /// Reports to the observer, and applies its answer and the limits of time and error. `checkpoint` is called only if the observer
+    /// keeps one.
     ///
     /// # Errors
-    /// Why the solve is to end.
+    /// The reason to end the solve.
     pub fn report(
         &mut self,
         estimate: &Estimate,
@@ -94,20 +95,21 @@ impl<'a> Monitor<'a> {
         if self.settings.time > 0.0 && self.seconds() >= self.settings.time {
             return Err(Termination::Time);
         }
-        if self.settings.target_error > 0.0 && self.claims(estimate) <= self.settings.target_error {
+        let target = self.settings.target_error;
+        if target > 0.0 && self.reported_error(estimate) <= target {
             return Err(Termination::Target);
         }
         Ok(())
     }
 
-    /// The error that an estimate claims of itself in percent; infinite before the first that can be shown.
-    fn claims(&self, estimate: &Estimate) -> f64 {
+    /// An estimate's reported error in percent; infinite before the first estimate.
+    fn reported_error(&self, estimate: &Estimate) -> f64 {
         let first = self.progress.seconds_to_first_estimate;
         let error = first.and_then(|_| estimate.relative_error());
         error.map_or(f64::INFINITY, |error| error * 100.0)
     }
 
-    /// Names what is being done now.
+    /// Sets the name of the present phase.
     pub fn phase(&mut self, name: &str) {
         name.clone_into(&mut self.progress.phase);
         self.progress.fraction = None;
@@ -124,7 +126,7 @@ impl<'a> Monitor<'a> {
         self.progress.losses.push(point);
     }
 
-    /// Adds a point to the course of the fit: the relative residual, with so many unknowns free, and what the estimate claims.
+    /// Adds a point to the curve of the fit: the relative residual, the number of free unknowns, and the reported error.
     pub fn fitted(&mut self, residual: f64, unknowns: usize, estimate: &Estimate) {
         let point = FitPoint {
             seconds: self.seconds(),
@@ -141,13 +143,13 @@ impl<'a> Monitor<'a> {
         self.progress.stages.push(stage);
     }
 
-    /// Counts rays, and paths dropped because their weights were not finite.
+    /// Counts rays cast, and paths rejected because their weights were not finite.
     pub fn cast(&mut self, cast: Cast) {
         self.progress.rays += cast.rays;
         self.rejected("path weight not finite", cast.rejected);
     }
 
-    /// Counts dropped samples.
+    /// Counts rejected samples by cause.
     pub fn rejected(&mut self, cause: &str, count: u64) {
         if count > 0 {
             *self.progress.rejected.entry(cause.to_owned()).or_default() += count;
@@ -161,7 +163,7 @@ mod tests {
     use crate::inverse::estimate::{ENOUGH_PIXELS, ObjectEstimate};
     use glam::Vec3;
 
-    /// Answers with what it is told to, after a pause.
+    /// Gives a fixed answer after a pause.
     struct Puppet {
         answer: Control,
         pause: Duration,

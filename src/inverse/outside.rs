@@ -1,7 +1,6 @@
-//! Light from outside the mesh, as the photographs measured it: pixels that look past the mesh, by direction.
+//! Light from outside the mesh as measured by the photographs: the radiance of pixels that see past the mesh, by direction.
 //!
-//! What lies there is far away, as a sky, and looks the same from everywhere in the room; or it is what a scan lacks, and
-//! lies on a box around the mesh.
+//! Its source is either infinitely far, like a sky, or on a box around the mesh, like the parts that a scan lacks.
 
 use crate::calibrate::gbuffer::GBuffer;
 use crate::calibrate::problem::Problem;
@@ -10,20 +9,21 @@ use crate::transport::surroundings::Surroundings;
 use glam::{DVec3, Vec2, Vec3};
 use std::f64::consts::PI;
 
-/// Width of a cell of the map in widths of a pixel.
+/// Width of a cell of the map, in pixels of the first camera.
 const CELL_PIXELS: f64 = 2.0;
-/// Columns of the map at least and at most.
+/// Least and greatest number of columns of the map.
 const COLUMNS: [usize; 2] = [32, 512];
-/// A direction that no pixel looks in takes the mean of a block of cells up to 2^(LEVELS − 1) cells wide around it.
+/// Unseen directions take the mean of a block of up to 2^(LEVELS − 1) cells a side.
 const LEVELS: usize = 3;
 
-/// Mean measured radiance by direction; black where no photograph looks.
+/// Mean measured radiance by direction; black in unmeasured directions.
 #[derive(Debug, Clone)]
 pub struct MeasuredOutside {
     width: usize,
     height: usize,
+    /// Whether each cell is measured.
     known: Vec<bool>,
-    /// Where all that is known is a lower bound.
+    /// Whether each cell has only saturated pixels, so that its radiance is a lower bound.
     censored: Vec<bool>,
     map: Environment,
     /// Unit up vector.
@@ -31,9 +31,8 @@ pub struct MeasuredOutside {
 }
 
 impl MeasuredOutside {
-    /// Gathers the pixels in the fit that see nothing of the mesh; `None` where there are none.
+    /// Accumulates the pixels in the fit that see nothing of the mesh; `None` if there are none.
     pub fn new(problem: &Problem, gbuffer: &GBuffer, surroundings: Surroundings) -> Option<Self> {
-        // Cells a little wider than the pixels.
         let scene = &problem.scene;
         let camera = scene.cameras.first()?;
         let columns = 2.0 * PI * camera.intrinsics.fx / CELL_PIXELS;
@@ -41,23 +40,23 @@ impl MeasuredOutside {
         let height = height.next_multiple_of(1 << (LEVELS - 1));
         let width = 2 * height;
 
-        // Add up what the pixels show, in the finest cells; saturated ones, which are lower bounds, apart.
+        // Sum radiance in the finest cells, separately for unsaturated and saturated pixels.
         let mut sums = vec![[(DVec3::ZERO, 0u32); 2]; width * height];
         let past_the_mesh = (gbuffer.pixels.iter()).filter(|p| {
             !p.held_out && p.object == u32::MAX && p.points.iter().all(Option::is_none)
         });
         for pixel in past_the_mesh {
             let photograph = &problem.photographs[pixel.frame as usize];
-            let place = [
+            let [x, y] = [
                 pixel.pixel % photograph.width,
                 pixel.pixel / photograph.width,
             ];
-            let at = Vec2::from(place.map(|x| x as f32 + 0.5));
-            let ray = scene.cameras[pixel.frame as usize].ray(at);
+            let center = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+            let ray = scene.cameras[pixel.frame as usize].ray(center);
             let direction = ray.direction.normalize_or_zero();
             let map_direction = surroundings.map_direction(ray.origin, direction);
-            let bound = usize::from(photograph.is_saturated(pixel.pixel as usize));
-            let sum = &mut sums[pixel_of(width, height, map_direction)][bound];
+            let saturated = usize::from(photograph.is_saturated(pixel.pixel as usize));
+            let sum = &mut sums[pixel_of(width, height, map_direction)][saturated];
             sum.0 += photograph.pixels[pixel.pixel as usize].as_dvec3();
             sum.1 += 1;
         }
@@ -65,7 +64,7 @@ impl MeasuredOutside {
             return None;
         }
 
-        // Fill gaps from coarser blocks; in each a bound counts only where nothing is measured.
+        // Fill gaps from coarser blocks. Saturated pixels count only in blocks without unsaturated ones.
         let mut known = vec![false; width * height];
         let mut censored = vec![false; width * height];
         let mut pixels = vec![Vec3::ZERO; width * height];
@@ -73,15 +72,15 @@ impl MeasuredOutside {
             let block = 1 << level;
             for (row, column) in blocks(width, height, block) {
                 let cells = || cells(width, row, column, block);
-                let of_kind = |kind: usize| {
+                let block_sum = |kind: usize| {
                     cells().fold((DVec3::ZERO, 0), |all, cell| {
                         let (sum, count) = sums[cell][kind];
                         (all.0 + sum, all.1 + count)
                     })
                 };
-                let [measured, bound] = [of_kind(0), of_kind(1)];
+                let [measured, saturated] = [block_sum(0), block_sum(1)];
                 let is_bound = measured.1 == 0;
-                let (sum, count) = if is_bound { bound } else { measured };
+                let (sum, count) = if is_bound { saturated } else { measured };
                 if count == 0 {
                     continue;
                 }
@@ -104,13 +103,13 @@ impl MeasuredOutside {
         })
     }
 
-    /// Radiance that a ray finds, or a bound that it exceeds; `None` where no photograph tells.
+    /// Radiance along a ray, or its lower bound; `None` in unmeasured directions.
     #[inline]
     pub fn at(&self, origin: Vec3, direction: Vec3) -> Option<Vec3> {
         self.known[self.cell(origin, direction)].then(|| self.map.radiance(origin, direction))
     }
 
-    /// Whether no photograph tells more of what a ray finds than that it is at least so bright: all are saturated there.
+    /// Whether the radiance along a ray is a lower bound, since all photographs are saturated there.
     #[inline]
     pub fn is_bound(&self, origin: Vec3, direction: Vec3) -> bool {
         self.censored[self.cell(origin, direction)]
@@ -121,23 +120,23 @@ impl MeasuredOutside {
         pixel_of(self.width, self.height, map_direction)
     }
 
-    /// The map, for drawing directions from.
+    /// The map, for sampling directions.
     pub fn map(&self) -> &Environment {
         &self.map
     }
 
-    /// What to expect from a direction of the map that no photograph looks in: the mean of what was seen at its height above the
-    /// horizon, within a band as high as `band` radians, or of all that was seen.
+    /// Expected radiance of an unmeasured direction: the mean over measured directions within ± `band` / 2 radians of its elevation,
+    /// or over all measured directions.
     pub fn expected(&self, direction: Vec3, band: f64) -> Vec3 {
-        let height_of = |d: Vec3| f64::from(d.dot(self.up).clamp(-1.0, 1.0)).asin();
-        let height = height_of(direction);
+        let elevation_of = |d: Vec3| f64::from(d.dot(self.up).clamp(-1.0, 1.0)).asin();
+        let elevation = elevation_of(direction);
         let (mut near, mut all) = ((DVec3::ZERO, 0.0), (DVec3::ZERO, 0.0));
         for cell in (0..self.known.len()).filter(|&cell| self.known[cell]) {
             let seen = direction_of(self.width, self.height, cell);
             let solid_angle = f64::from(1.0 - seen.y * seen.y).max(0.0).sqrt();
             let radiance = self.map.map_radiance(seen).as_dvec3() * solid_angle;
             all = (all.0 + radiance, all.1 + solid_angle);
-            if (height_of(seen) - height).abs() < 0.5 * band {
+            if (elevation_of(seen) - elevation).abs() < 0.5 * band {
                 near = (near.0 + radiance, near.1 + solid_angle);
             }
         }
@@ -145,7 +144,7 @@ impl MeasuredOutside {
         (sum / f64::max(weight, f64::MIN_POSITIVE)).as_vec3()
     }
 
-    /// The mean of the bounds where there is nothing else; black where there are none.
+    /// Mean of the lower bounds; black if there are none.
     pub fn mean_bound(&self) -> Vec3 {
         let cells = || (0..self.known.len()).filter(|&cell| self.censored[cell]);
         let sum: DVec3 = cells()
@@ -162,7 +161,7 @@ impl MeasuredOutside {
         [self.width, self.height]
     }
 
-    /// The whole map: what was measured, `excess` more where that is a bound, and `elsewhere` by direction where nothing was.
+    /// The completed map: measured radiance, plus `excess` where it is a lower bound, and `elsewhere` in unmeasured directions.
     pub fn filled(&self, excess: Vec3, elsewhere: impl Fn(Vec3) -> Vec3) -> Vec<Vec3> {
         (0..self.width * self.height)
             .map(|cell| {
@@ -215,7 +214,7 @@ mod tests {
         assert!((at(5) - Vec3::ONE).length() < 1e-5);
         // Both cells span the same solid angle.
         assert!((at(0) - Vec3::splat(2.5)).length() < 1e-4);
-        // Heights are along the capture's own up axis: seen from there both cells are level with neither.
+        // Elevations are relative to the capture's up axis.
         let sideways = MeasuredOutside {
             up: direction_of(width, height, above),
             ..measured

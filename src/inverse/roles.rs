@@ -1,19 +1,19 @@
-//! Which objects give light: every object is a reflector unless the photographs contradict that plainly.
+//! The role of each object: a reflector, unless the photographs clearly contradict that.
 
 use serde::{Deserialize, Serialize};
 
-/// What an object is taken for.
+/// The role of an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Role {
-    /// Its light is what it reflects.
+    /// It reflects light only.
     Reflector,
-    /// It gives light; its albedo is hidden by that and held at zero, so that its emission is its exitant radiance.
+    /// It emits light. Its albedo cannot be separated from that and is held at zero: its emission is its exitant radiance.
     Emitter,
-    /// No photograph sees it. Its light is an unknown, found by what it does to others.
+    /// No photograph sees it. Its emission is fitted through its effect on other objects.
     Unseen,
-    /// No photograph sees it, and nothing speaks for light from it.
+    /// No photograph sees it, and it emits nothing.
     Dark,
-    /// It both gives light and reflects.
+    /// It emits and reflects.
     Glowing,
 }
 
@@ -29,7 +29,7 @@ impl Role {
     }
 }
 
-/// Where each of the parameters of so many surfaces stands among the free ones; `usize::MAX` for those that are held.
+/// The row of each parameter among the free ones; `usize::MAX` for fixed parameters.
 pub fn places(free: &[usize], surfaces: usize) -> Vec<usize> {
     let mut places = vec![usize::MAX; 2 * surfaces];
     for (row, &parameter) in free.iter().enumerate() {
@@ -38,8 +38,8 @@ pub fn places(free: &[usize], surfaces: usize) -> Vec<usize> {
     places
 }
 
-/// The parameters that are fitted under some roles: indices into albedos, of the surfaces of which `has_albedo` says so, then into
-/// emissions.
+/// The free parameters: the albedos of surfaces with `has_albedo`, then the emissions of surfaces whose role emits. They are
+/// indices into albedos, then emissions.
 pub fn free(roles: &[Role], has_albedo: impl Fn(usize) -> bool) -> Vec<usize> {
     let albedo = (0..roles.len()).filter(|&k| has_albedo(k));
     let emission = (0..roles.len())

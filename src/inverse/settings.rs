@@ -1,4 +1,4 @@
-//! The one table of parameters: each is declared once and reaches the command line, the window, presets and files.
+//! The table of parameters. Each is declared once and available on the command line, in the window, in presets and in files.
 
 use crate::calibrate::held_out::HoldOut;
 use serde::{Deserialize, Serialize};
@@ -17,7 +17,7 @@ pub enum Value {
     Choice(String),
 }
 
-/// What a parameter can be.
+/// The type and range of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
     /// On or off.
@@ -53,7 +53,7 @@ pub struct Parameter {
     pub unit: &'static str,
     /// One sentence of help.
     pub help: &'static str,
-    /// Whether a change takes effect while a solver runs (else at the next reset).
+    /// Whether a change takes effect while a solver runs; otherwise at the next start.
     pub live: bool,
     get: fn(&Settings) -> Value,
     set: fn(&mut Settings, &Value) -> bool,
@@ -160,7 +160,7 @@ choice! {
 }
 
 choice! {
-    /// How light is found at a bounce.
+    /// Sampling strategy of direct light.
     LightSampling {
         /// Both, combined by the power heuristic.
         Mis = "mis",
@@ -207,37 +207,37 @@ parameters! {
     preset: Preset = Preset::Balanced, Kind::Choice(Preset::WORDS), "", false,
         "Which solver runs, and how far it goes";
     seed: u64 = 1, Kind::Whole { min: 0, max: u64::MAX }, "", false,
-        "Key of all random numbers: the same seed gives the same result";
+        "Seed of all random numbers: the same seed gives the same result";
     time: f64 = 0.0, Kind::Real { min: 0.0, max: 1e9, logarithmic: true }, "s", true,
         "Wall time after which the solve stops; 0 sets no limit";
     target_error: f64 = 0.0, Kind::Real { min: 0.0, max: 100.0, logarithmic: true }, "%", true,
-        "Go on until the median relative standard error of the albedos seen is below this; 0 leaves it to the preset";
+        "Continue until the median relative standard error of the seen albedos is below this; 0 uses the preset's target";
     bounces: u64 = 0, Kind::Whole { min: 0, max: 1000 }, "", false,
-        "Longest path in bounces; 0 chooses (2 for the paper solver, by the albedo found for the others)";
+        "Greatest number of bounces; 0 means 2 for the paper solver, and Russian roulette alone for the others";
     held_out: f64 = HoldOut::DEFAULT.held_out, Kind::Real { min: 0.0, max: 0.9, logarithmic: false }, "of the pixels", false,
-        "Fraction of the pixels kept out of the fit, to test it";
+        "Fraction of the pixels held out of the fit, to test it";
     hold_out: u64 = HoldOut::DEFAULT.hold_out, Kind::Whole { min: 0, max: 1_000_000 }, "frames", false,
-        "Keep every K-th frame out of the fit instead of single pixels; 0 keeps single pixels";
+        "Hold every K-th frame out of the fit instead of single pixels; 0 holds out single pixels";
     outside_light: bool = true, Kind::Flag, "", false,
         "Try light from outside the mesh, where rays leave it";
     exposures: bool = true, Kind::Flag, "", false,
-        "Estimate the exposure and white balance of each photograph, and how the lens dims the corners, where the photographs disagree about surfaces that they share";
+        "Estimate the exposure and white balance of each photograph, vignetting and camera response, if photographs disagree on shared surfaces";
     leave_out: bool = true, Kind::Flag, "", false,
-        "Leave out photographs that do not show what all others show of the surfaces that they share, as from a wrong pose (not in the paper's descent)";
+        "Leave out photographs that contradict the others on shared surfaces, for example because of a wrong pose (not in the paper solver)";
     lobes: bool = true, Kind::Flag, "", false,
-        "Try a rough specular lobe on objects that look different from different sides";
+        "Try a rough specular lobe on objects that look different in different views";
     textures: bool = true, Kind::Flag, "", false,
         "Try albedo that varies over an object, where its pixels show more than one colour";
     pixels: u64 = 0, Kind::Whole { min: 0, max: 1_000_000_000 }, "", false,
-        "Pixels in the fit of the transport cache, about; 0 leaves it to the preset";
+        "Approximate number of pixels in the fit of the transport cache; 0 uses the preset's number";
     paths: u64 = 0, Kind::Whole { min: 0, max: 1_000_000_000_000 }, "a round", false,
-        "Paths of the transport cache in each round, its first stage in proportion; 0 leaves it to the preset";
+        "Paths of the transport cache in each round; the first stage scales in proportion; 0 uses the preset's number";
     memory: f64 = 0.0, Kind::Real { min: 0.0, max: 1e6, logarithmic: true }, "GiB", false,
-        "Memory that stored paths may take; 0 takes a quarter of the machine's";
+        "Memory limit of stored paths; 0 uses a quarter of the machine's memory";
     learning_rate: f64 = 5e-3, Kind::Real { min: 1e-6, max: 10.0, logarithmic: true }, "", true,
         "Paper solver: initial step size of ADAM";
     batch: u64 = 8, Kind::Whole { min: 1, max: 1_000_000 }, "pixels", true,
-        "Paper solver: pixels drawn for each step at first";
+        "Paper solver: initial number of pixels per step";
     samples: u64 = 1, Kind::Whole { min: 1, max: 65536 }, "a pixel", true,
         "Paper solver: paths for each pixel's colour, and as many for its derivative";
     loss: Loss = Loss::L1, Kind::Choice(Loss::WORDS), "", true,
@@ -245,16 +245,16 @@ parameters! {
     emission_weight: f64 = 1e-3, Kind::Real { min: 0.0, max: 1.0, logarithmic: true }, "", true,
         "Paper solver: weight of the L1 regulariser on all emission";
     light_sampling: LightSampling = LightSampling::Mis, Kind::Choice(LightSampling::WORDS), "", true,
-        "How light is found at a bounce";
+        "Sampling of direct light";
     decay: f64 = 0.0, Kind::Real { min: 0.0, max: 1.0, logarithmic: false }, "a 1000 steps", true,
-        "Paper solver: share by which the learning rate falls every thousand steps";
+        "Paper solver: fraction by which the learning rate falls every thousand steps";
     anneal: bool = true, Kind::Flag, "", true,
         "Paper solver: halve the learning rate and double the samples, at first the batch too, whenever the loss stands still";
     steps: u64 = 0, Kind::Whole { min: 0, max: 1_000_000_000 }, "", true,
-        "Paper solver: stop after this many steps; 0 goes on until the time is up or the loss stands still";
+        "Paper solver: stop after this many steps; 0 continues until the time limit or convergence";
 }
 
-/// Bounces that the paper's solver takes when none are set.
+/// Bounces of the paper's solver if none are set.
 const PAPER_BOUNCES: u32 = 2;
 
 impl From<&Settings> for HoldOut {
@@ -267,7 +267,7 @@ impl From<&Settings> for HoldOut {
 }
 
 impl Settings {
-    /// Longest path in bounces: what is set, else the paper solver's two, else all that roulette leaves.
+    /// Greatest number of bounces: the setting, or two for the paper solver, or no limit.
     pub fn max_bounces(&self) -> u32 {
         match (self.bounces, self.preset) {
             (0, Preset::Paper) => PAPER_BOUNCES,
@@ -286,7 +286,7 @@ impl Parameter {
     /// Sets the value if it is of the right kind and in range.
     ///
     /// # Errors
-    /// A sentence saying what would be allowed.
+    /// A sentence with the allowed values.
     pub fn set(&self, settings: &mut Settings, value: &Value) -> Result<(), String> {
         let allowed = match (self.kind, value) {
             (Kind::Whole { min, max }, Value::Whole(n)) => (min..=max).contains(n),
@@ -302,7 +302,7 @@ impl Parameter {
         }
     }
 
-    /// What values are allowed, in words.
+    /// The allowed values, in words.
     pub fn allowed(&self) -> String {
         match self.kind {
             Kind::Flag => "true or false".to_owned(),
@@ -312,10 +312,10 @@ impl Parameter {
         }
     }
 
-    /// Reads a value from text, as typed on the command line.
+    /// Parses a value from the command line.
     ///
     /// # Errors
-    /// A sentence saying what would be allowed.
+    /// A sentence with the allowed values.
     pub fn parse(&self, text: &str) -> Result<Value, String> {
         let value = match self.kind {
             Kind::Flag => text.parse().ok().map(Value::Flag),
@@ -331,7 +331,7 @@ impl Parameter {
 mod tests {
     use super::*;
 
-    /// A value that a parameter may have and by default has not.
+    /// An allowed value other than the default.
     fn other(parameter: &Parameter) -> Value {
         let default = parameter.get(&Settings::default());
         let values = match parameter.kind {

@@ -1,4 +1,4 @@
-//! What a solver is given, what it reports while it runs, and how it ends.
+//! The interface of solvers: progress, observer, checkpoints and solution.
 
 use crate::error::{Error, Result};
 use crate::inverse::estimate::Estimate;
@@ -8,12 +8,12 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// How far a solve has come. Handed out between iterations.
+/// The progress of a solve, reported between iterations.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Progress {
-    /// What is being done now, e.g. "tracing paths".
+    /// Name of the present phase, e.g. "tracing paths".
     pub phase: String,
-    /// Work done in the current phase, 0 to 1, where that is known.
+    /// Completed fraction of the present phase, if it is known.
     pub fraction: Option<f32>,
     /// Iterations (optimiser steps) so far.
     pub iterations: u64,
@@ -21,18 +21,18 @@ pub struct Progress {
     pub rays: u64,
     /// Seconds of solving so far, pauses excluded.
     pub seconds: f64,
-    /// Seconds until the first estimate that can be shown.
+    /// Seconds until the first estimate.
     pub seconds_to_first_estimate: Option<f64>,
     /// Loss curve, in time order.
     pub losses: Vec<LossPoint>,
-    /// The course of the fit, a point an iteration; the paper's descent has none.
+    /// The residual of the fit after each iteration; empty for the paper's descent.
     #[serde(default)]
     pub fits: Vec<FitPoint>,
-    /// Finished stages of the ladder.
+    /// Finished stages of the pipeline.
     pub stages: Vec<Stage>,
-    /// Samples dropped, by cause.
+    /// Number of rejected samples, by cause.
     pub rejected: BTreeMap<String, u64>,
-    /// What a person should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
@@ -43,91 +43,90 @@ pub struct LossPoint {
     pub seconds: f64,
     /// Iterations.
     pub iteration: u64,
-    /// Over pixels in the fit; `None` where it was not measured.
+    /// Over pixels in the fit; `None` if it was not measured.
     pub train: Option<f64>,
-    /// Over held-out pixels; `None` where it was not measured.
+    /// Over held-out pixels; `None` if it was not measured.
     pub held_out: Option<f64>,
 }
 
-/// The fit after one iteration. Stored paths give it without a ray.
+/// The fit after one iteration, evaluated on stored paths.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FitPoint {
     /// Seconds of solving.
     pub seconds: f64,
     /// Iterations.
     pub iteration: u64,
-    /// Root of the mean squared residual of the pixels in the fit, relative to their level.
+    /// Root mean square of the residuals of pixels in the fit, relative to their level.
     pub residual: f64,
-    /// The error that the estimate claims: median relative standard error of albedo; `None` before there is one.
+    /// The reported error: median relative standard error of albedo; `None` before the first estimate.
     pub stderr: Option<f64>,
-    /// Free parameters.
+    /// Number of free parameters.
     pub unknowns: u64,
 }
 
-/// One rung of the model ladder, tried and kept or not.
+/// A finished stage of the pipeline.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Stage {
-    /// What was added, e.g. "objects".
+    /// Its name, e.g. "objects".
     pub name: String,
-    /// What it cost.
+    /// Its duration.
     pub seconds: f64,
-    /// Iterations spent.
+    /// Number of iterations.
     pub iterations: u64,
     /// Loss in the fit at its end.
     pub train_loss: Option<f64>,
     /// Loss on held-out pixels at its end.
     pub held_out_loss: Option<f64>,
-    /// Whether it stayed in the model.
+    /// Whether its result is kept.
     pub kept: bool,
-    /// Why, in a sentence.
+    /// The reason, in a sentence.
     pub why: String,
 }
 
-/// What the observer wants next.
+/// The observer's answer to a report.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Control {
-    /// Go on.
+    /// Continue.
     Continue,
-    /// Go on with other values of the live parameters.
+    /// Continue with other values of the live parameters.
     Change(Box<Settings>),
-    /// End now with what there is.
+    /// Stop with the present estimate.
     Stop,
 }
 
-/// Listens to a running solver: at least every 50 ms, between iterations, on the solver's thread.
+/// Receives reports of a running solver: at least every 50 ms, between iterations, on the solver's thread.
 ///
-/// The observer may take its time (a pause is an observer that does not return); the solver's clock excludes it.
+/// The solver's clock excludes the time in the observer, so an observer pauses the solve by not returning.
 pub trait Observer {
-    /// Hears how far the solve has come and may steer it.
+    /// Receives the progress and the present estimate.
     fn observe(&mut self, progress: &Progress, estimate: &Estimate) -> Control;
 
-    /// What is known beforehand and is to be held; asked for once, at the start.
+    /// Known values to hold fixed; requested once, at the start.
     fn known(&self) -> Known {
         Known::default()
     }
 
-    /// Is offered a checkpoint of where the solve stands, just before it hears of it by [`Observer::observe`]; one that
-    /// wants to keep it calls `make`. Solvers that can be taken up again offer it wherever they call `observe`.
+    /// Offers a checkpoint just before each [`Observer::observe`]. An observer that keeps it calls `make`.
     fn offer(&mut self, make: &dyn Fn() -> Checkpoint) {
         let _ = make;
     }
 }
 
-/// Why a solve ended; the word in `report.json`.
+/// Why a solve ended, as in `report.json`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Termination {
-    /// The estimate stands still within its reported error.
+    /// The estimate has converged within its reported error.
     Converged,
-    /// The reported error is as small as was asked for.
+    /// The reported error is below the target.
     Target,
-    /// The time is up.
+    /// The time limit was reached.
     Time,
-    /// The step limit is reached.
+    /// The step limit was reached.
     Steps,
     /// The observer stopped it.
     Cancelled,
-    /// The iteration left the finite numbers; the last finite estimate is returned.
+    /// The gradient was not finite; the last finite estimate is returned.
     Diverged,
 }
 
@@ -145,17 +144,17 @@ impl Termination {
     }
 }
 
-/// Where a solve can be taken up again.
+/// A state from which a solve can be resumed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Checkpoint {
-    /// How far it had come: clock, counters and loss curve go on from here.
+    /// The progress: clock, counters and loss curve continue from here.
     pub progress: Progress,
-    /// The solver's own state, as JSON; opaque to everyone but the solver that wrote it.
+    /// The solver's state as JSON, readable by the same solver only.
     pub state: serde_json::Value,
 }
 
 impl Checkpoint {
-    /// Writes a solver's state down. A state that cannot be written becomes `null`, which no solver takes up.
+    /// Serialises a solver's state. A state that cannot be serialised becomes `null`, which no solver accepts.
     pub fn new(progress: &Progress, state: &impl Serialize) -> Self {
         Self {
             progress: progress.clone(),
@@ -163,7 +162,7 @@ impl Checkpoint {
         }
     }
 
-    /// The state, if it is one that `fits` accepts.
+    /// The state, if `fits` accepts it.
     ///
     /// # Errors
     /// It belongs to another capture or another solver.
@@ -179,15 +178,15 @@ impl Checkpoint {
     }
 }
 
-/// How a solve ended.
+/// The result of a solve.
 #[derive(Debug, Clone)]
 pub struct Solution {
-    /// What was found.
+    /// The estimate.
     pub estimate: Estimate,
-    /// The last progress.
+    /// The final progress.
     pub progress: Progress,
     /// Why it ended.
     pub termination: Termination,
-    /// Where to go on from, unless there is nothing left to do.
+    /// Where to resume; `None` if nothing is left to do.
     pub checkpoint: Option<Checkpoint>,
 }

@@ -1,9 +1,9 @@
-//! The vector of unknowns: per surface an albedo and an emission, the three channels apart.
+//! The unknowns of a solve: RGB albedo and RGB emission of each surface.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-/// Values of all unknowns. A surface is a set of triangles that fraction theirs: an object, or a single triangle.
+/// Values of all unknowns. A surface is a set of triangles with common unknowns: an object, or an outside direction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Unknowns {
     /// Diffuse reflectance of each surface, in [0, 1].
@@ -13,7 +13,7 @@ pub struct Unknowns {
 }
 
 impl Unknowns {
-    /// Grey and dark.
+    /// Albedos of 0.5, and no emission.
     pub fn new(surfaces: usize) -> Self {
         Self {
             albedo: vec![Vec3::splat(0.5); surfaces],
@@ -34,7 +34,7 @@ impl Unknowns {
         }
     }
 
-    /// The same, to be changed.
+    /// Mutable access to the value of a parameter.
     pub fn value_mut(&mut self, parameter: usize) -> &mut Vec3 {
         match parameter.checked_sub(self.surfaces()) {
             None => &mut self.albedo[parameter],

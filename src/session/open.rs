@@ -1,7 +1,7 @@
 //! Opens a capture for solving and display.
 
 use crate::calibrate::alignment::{Alignment, Decision};
-use crate::calibrate::photographs::{leave_out, leave_out_astray, name, without_hot_pixels};
+use crate::calibrate::photographs::{leave_out, leave_out_mispaired, name, without_hot_pixels};
 use crate::calibrate::segments::cut_up;
 use crate::capture::Capture;
 use crate::capture::photograph::{Photograph, PhotographSource};
@@ -58,7 +58,7 @@ impl OpenCapture {
             .then(|| alignment(&capture, &working))
             .transpose()?;
         if let Some(alignment) = &alignment {
-            leave_out_astray(&capture, &mut working, &alignment.astray);
+            leave_out_mispaired(&capture, &mut working, &alignment.mispaired);
         }
         if let Some(cut) = capture.segmentation.clone() {
             cut_up(&mut capture, &cut, &working, options.hold_out)?;

@@ -41,7 +41,7 @@ fn cache() -> (PathCache, Vec<Cluster>, Vec<usize>) {
         sky: None,
         outside: None,
         surface_of: &problem.scene.object_of,
-        believed_albedo: &[0.6; SURFACES],
+        expected_albedo: &[0.6; SURFACES],
         lobes: &[],
         patches: None,
         sampling: LightSampling::Mis,

@@ -36,7 +36,7 @@ fn count_up(
     let mut progress = resume.map(|c| c.progress.clone()).unwrap_or_default();
     let mut estimate = common::truth();
     let known = observer.known();
-    estimate.objects[1].roughness = known.of(1).albedo.map(|albedo| albedo.x);
+    estimate.objects[1].roughness = known.object(1).albedo.map(|albedo| albedo.x);
     loop {
         progress.iterations += 1;
         progress.rays += 1000;

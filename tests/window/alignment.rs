@@ -24,7 +24,7 @@ fn waiting(before: Reading, found: Reading) -> (Harness<'static, Window>, Record
                 reading: found,
                 agreement: 14.0,
             },
-            astray: Vec::new(),
+            mispaired: Vec::new(),
         });
         snapshot.phase = Phase::Paused;
         snapshot.progress = Arc::default();

@@ -1,23 +1,23 @@
-//! Other ways to read a capture, each of which is a mistake that people make.
+//! Candidate readings of a capture, one for each common mistake in its files.
 
 use crate::capture::orientation::Orientation;
 use crate::capture::reading::{Axes, Reading};
 
-/// Units that meshes and poses are written in, in metres, and powers of ten besides.
+/// Factors between common length units and metres, and powers of ten.
 const UNITS: [f64; 9] = [0.001, 0.01, 0.0254, 0.1, 0.3048, 10.0, 39.37, 100.0, 1000.0];
-/// Photographs over the size that their lens is given for.
+/// Size of the photographs relative to the size that their intrinsics are given for.
 const SIZES: [f64; 6] = [0.125, 0.25, 0.5, 2.0, 4.0, 8.0];
-/// Factors of scale and focal length are tried in steps of 5 %, twice as fine as edges blur by being a pixel off, ...
+/// Step between factors of scale and focal length: half the factor by which edges move out of their tolerance of a pixel.
 const STEP: f64 = 1.05;
-/// ... up to a factor of 2.5; focal lengths a tenth or ten times as long too.
+/// Steps in both directions, up to a factor of 2.5.
 const STEPS: i32 = 19;
 
-/// Readings so near to that of the files that photographs fit both somewhat: scale and focal length 5 and 10 % off.
+/// Readings that partly fit together with the given one: scale or focal length off by 5 and 10 %.
 pub fn near() -> Vec<Reading> {
     [-2, -1, 1, 2].into_iter().flat_map(factor).collect()
 }
 
-/// Readings that turn, mirror or exchange something: what looks alike from several sides fits some of them too.
+/// Readings that turn, mirror or permute something. Symmetric rooms partly fit several of them.
 pub fn exchanged() -> Vec<Reading> {
     let given = Reading::default();
     let turned = [1, 2, 3].map(Orientation::turned);
@@ -42,7 +42,7 @@ pub fn exchanged() -> Vec<Reading> {
     readings
 }
 
-/// All other readings.
+/// All candidate readings other than the given one.
 pub fn all() -> Vec<Reading> {
     let given = Reading::default();
     let mut readings: Vec<Reading> = (1..=STEPS).flat_map(|n| [n, -n]).flat_map(factor).collect();
@@ -60,7 +60,7 @@ pub fn all() -> Vec<Reading> {
     readings
 }
 
-/// Scale and focal length off by some steps.
+/// The readings with the mesh's scale, or the focal length, off by `steps` steps.
 fn factor(steps: i32) -> [Reading; 2] {
     let factor = STEP.powi(steps);
     let given = Reading::default();
@@ -76,7 +76,7 @@ fn factor(steps: i32) -> [Reading; 2] {
     ]
 }
 
-/// Readings between a reading and its neighbours, to find its factor more exactly; none where it has no factor.
+/// Readings between `reading` and its neighbouring factors; none if it changes neither scale nor focal length alone.
 pub fn finer(reading: &Reading) -> Vec<Reading> {
     let steps = (-4..=4).filter(|&n| n != 0);
     let factors = steps.map(|n| STEP.powf(f64::from(n) / 5.0));

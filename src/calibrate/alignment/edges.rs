@@ -1,18 +1,18 @@
-//! Where a view of the mesh should show edges: between neighbouring pixels that see different surfaces.
+//! Edges of the mesh in a camera's image: pairs of neighbouring pixels that see different surfaces.
 
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use glam::{Vec2, Vec3};
 
-/// A neighbour that lies off a pixel's plane by more than this many pixel footprints is another surface.
+/// Distance of a neighbour from a pixel's plane, in pixel footprints, that makes a depth edge.
 const JUMP_FOOTPRINTS: f32 = 6.0;
-/// A crease turns the mean normals of two 3 × 3 blocks of pixels by more than arccos(1 − 0.2) = 37°: what a mesh fused from
-/// noisy depth does not do on flat walls.
+/// One minus the cosine between the mean normals of adjacent 3 × 3 blocks that makes a crease: 37°. Flat walls of a mesh
+/// fused from noisy depth stay below.
 const CREASE: f32 = 0.2;
-/// Of the nine unit normals of a block, the length of the sum from which their mean is a direction.
+/// Least length of the sum of a block's nine unit normals for which their mean counts.
 const COHERENT: f32 = 5.0;
 
-/// Which neighbour an edge is towards.
+/// The neighbour on the other side of an edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Towards {
     /// The pixel to the right.
@@ -32,21 +32,21 @@ pub struct Edge {
     pub towards: Towards,
 }
 
-/// Edges by what makes them.
+/// Edges by kind.
 #[derive(Debug, Clone, Default)]
 pub struct Edges {
-    /// Jumps of depth, creases, borders of objects, and outlines of the mesh.
+    /// Depth discontinuities, creases, borders between objects, and outlines of the mesh.
     pub kinds: [Vec<Edge>; 4],
 }
 
-const JUMP: usize = 0;
+const DEPTH: usize = 0;
 const FOLD: usize = 1;
 const BORDER: usize = 2;
 const OUTLINE: usize = 3;
 
-/// What the centre of a pixel sees.
+/// The surface point that a pixel's centre sees.
 #[derive(Clone, Copy)]
-struct Seen {
+struct PixelHit {
     point: Vec3,
     /// Unit normal of the side that is seen.
     normal: Vec3,
@@ -54,23 +54,23 @@ struct Seen {
     distance: f32,
 }
 
-/// The edges that a camera should see.
+/// The edges of the mesh in a camera's image.
 pub fn edges(scene: &Scene, camera: &Camera) -> Edges {
     let lens = &camera.intrinsics;
     let (width, height) = (lens.width as i32, lens.height as i32);
     let at = |x: i32, y: i32| (y * width + x) as usize;
-    let seen: Vec<Option<Seen>> = (0..width * height)
-        .map(|pixel| look(scene, camera, pixel % width, pixel / width))
+    let hits: Vec<Option<PixelHit>> = (0..width * height)
+        .map(|pixel| pixel_hit(scene, camera, pixel % width, pixel / width))
         .collect();
     let normal = |x: i32, y: i32| {
         let inside = x >= 0 && y >= 0 && x < width && y < height;
         inside
-            .then(|| seen[at(x, y)])
+            .then(|| hits[at(x, y)])
             .flatten()
-            .map_or(Vec3::ZERO, |s| s.normal)
+            .map_or(Vec3::ZERO, |hit| hit.normal)
     };
 
-    // How much the surface turns across each edge.
+    // One minus the cosine between the mean normals on both sides of each pair of pixels.
     let turn = |x: i32, y: i32, towards: Towards| {
         let (mut before, mut after) = (Vec3::ZERO, Vec3::ZERO);
         for along in -1..=1 {
@@ -107,7 +107,7 @@ pub fn edges(scene: &Scene, camera: &Camera) -> Edges {
                 if x + dx >= width || y + dy >= height {
                     continue;
                 }
-                let kind = match (seen[at(x, y)], seen[at(x + dx, y + dy)]) {
+                let kind = match (hits[at(x, y)], hits[at(x + dx, y + dy)]) {
                     (None, None) => continue,
                     (None, Some(_)) | (Some(_), None) => OUTLINE,
                     (Some(a), Some(b)) => {
@@ -119,7 +119,7 @@ pub fn edges(scene: &Scene, camera: &Camera) -> Edges {
                             .filter(|&(x, y)| x >= 0 && y >= 0)
                             .all(|(x, y)| turned >= turns[at(x, y)]);
                         if off > JUMP_FOOTPRINTS * footprint * a.distance.min(b.distance) {
-                            JUMP
+                            DEPTH
                         } else if turned > CREASE && sharpest {
                             FOLD
                         } else if a.object != b.object {
@@ -136,13 +136,12 @@ pub fn edges(scene: &Scene, camera: &Camera) -> Edges {
     edges
 }
 
-/// What the centre of a pixel sees.
-fn look(scene: &Scene, camera: &Camera, x: i32, y: i32) -> Option<Seen> {
+fn pixel_hit(scene: &Scene, camera: &Camera, x: i32, y: i32) -> Option<PixelHit> {
     let ray = camera.ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5));
     let hit = scene.intersect(&ray)?;
     let normal = scene.normals[hit.triangle as usize];
     let point = scene.point(&hit);
-    Some(Seen {
+    Some(PixelHit {
         point,
         normal: if normal.dot(ray.direction) > 0.0 {
             -normal

@@ -1,13 +1,14 @@
-//! Whether photographs show the mesh from their poses, and how else the files would have to be read for that.
+//! Checks that photographs show the mesh from their poses. If they do not, searches for another reading of the files (axes,
+//! unit, focal length, orientation, order) with which they do.
 //!
-//! Where a mesh has an edge, photographs change more than beside it. For each photograph the mean rank of its changes at the
-//! mesh's edges is compared with the same at displaced edges ([`score`]). The sum over photographs is near zero, within one or
-//! two, where poses have nothing to do with photographs, and 6 to 40 where they belong together. It needs no other photograph,
-//! so that it also tells when all of them are wrong. `relit study readings` measures how often it is right.
+//! Image gradients are larger at the projected edges of the mesh than beside them. Each photograph is scored by the mean rank of
+//! its gradients at the mesh's edges, relative to displaced edges ([`score`]). The scores of all photographs sum up to within
+//! ±2 for unrelated poses, and to 6 to 40 for correct ones. Each photograph is compared with the mesh alone, so the check also
+//! works if all poses are wrong. `relit study readings` measures how often the decision is right.
 
-mod astray;
 mod candidates;
 mod edges;
+mod mispaired;
 mod score;
 
 use crate::capture::orientation::Orientation;
@@ -16,49 +17,49 @@ use crate::capture::reading::{Axes, Reading};
 use crate::error::Error;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
-pub use astray::{Astray, Why};
 use edges::edges;
+pub use mispaired::{Evidence, MispairedPhotograph};
 use rayon::prelude::*;
 use score::{Contrast, levels};
 use std::sync::Arc;
 
 /// Long side in pixels at which photographs are compared: edges a pixel wide, and noise averaged.
 const LONG_SIDE: u32 = 128;
-/// Photographs that are compared at most, evenly spaced; ...
+/// Greatest number of photographs that are scored, evenly spaced.
 const MAX_FRAMES: usize = 24;
-/// ... with readings near to that of the files so many, ...
+/// Photographs on which readings similar to the given one are scored.
 const NEAR_FRAMES: usize = 12;
-/// ... and all other readings in rounds: so many of the best of a round before on so many photographs.
+/// Rounds of the search over readings: the number of readings kept from the previous round, and of photographs.
 const ROUNDS: [(usize, usize); 2] = [(usize::MAX, 4), (24, 12)];
-/// Of the best readings of the last round so many are looked for a better factor, and then so many are compared on all
-/// photographs: where edges are few, a factor that is off by half a step is not among the first two.
+/// Readings of the last round whose factor is refined, and refined readings that are scored on all photographs. With few
+/// edges, a factor that is off by half a step is not among the first two.
 const FINALISTS: usize = 6;
-/// An agreement that chance gives once in three million times: five standard deviations.
+/// Five standard deviations: chance gives such an agreement once in three million times.
 const AGREES: f64 = 5.0;
-/// Less than this is what chance gives: two standard deviations.
+/// Two standard deviations: agreements below are consistent with chance.
 const CHANCE: f64 = 2.0;
-/// Another reading must agree better by so many standard deviations of the difference of two agreements.
-const PLAINLY: f64 = 3.0;
+/// Least advantage of another reading, in standard deviations of the difference of two agreements.
+const CLEAR_ADVANTAGE: f64 = 3.0;
 
 /// How well photographs agree with the mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Alignment {
-    /// In standard deviations of what chance gives.
+    /// Agreement of edges over all scored photographs, in standard deviations of unrelated poses.
     pub agreement: f64,
-    /// What follows from it.
+    /// The decision that follows from it.
     pub decision: Decision,
-    /// Single photographs that do not show the mesh from their poses, where the others do.
-    pub astray: Vec<Astray>,
+    /// Single photographs with a wrong pose; searched for only if the decision is [`Decision::Sound`].
+    pub mispaired: Vec<MispairedPhotograph>,
 }
 
-/// What follows from an agreement.
+/// Whether the capture is read correctly.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Decision {
     /// Photographs show the mesh from their poses.
     Sound,
-    /// Neither this reading nor another is plainly right: there may be too few edges to tell.
+    /// Neither this reading nor another is clearly right; there may be too few edges.
     Doubtful,
-    /// Read as `reading` says, on top of how it is read now, the photographs agree with the mesh by `agreement`.
+    /// With `reading` applied on top of the present reading, the photographs agree with the mesh by `agreement`.
     Wrong {
         /// The other reading.
         reading: Reading,
@@ -68,35 +69,35 @@ pub enum Decision {
 }
 
 impl Alignment {
-    /// Compares photographs, one a camera, with the scene.
+    /// Compares the photographs, one per camera, with the mesh.
     pub fn new(scene: &Scene, photographs: &[Arc<Photograph>]) -> Self {
         let views = Views::new(scene, photographs);
         let given = Reading::default();
         let scores = views.scores(&given, MAX_FRAMES);
         let agreement = total(&scores);
-        let decision = match agreement >= AGREES && !views.may_be_another() {
+        let decision = match agreement >= AGREES && !views.another_may_be_better() {
             true => Decision::Sound,
             false => match views.best() {
-                Some((reading, found)) if plainly_better(&found, &scores) => Decision::Wrong {
+                Some((reading, better)) if clearly_better(&better, &scores) => Decision::Wrong {
                     reading,
-                    agreement: total(&found),
+                    agreement: total(&better),
                 },
                 _ if agreement >= CHANCE => Decision::Sound,
                 _ => Decision::Doubtful,
             },
         };
-        let astray = match decision {
-            Decision::Sound => astray::astray(&views, &scores),
+        let mispaired = match decision {
+            Decision::Sound => mispaired::mispaired(&views, &scores),
             Decision::Doubtful | Decision::Wrong { .. } => Vec::new(),
         };
         Self {
             agreement,
             decision,
-            astray,
+            mispaired,
         }
     }
 
-    /// The error of a capture that is plainly read wrongly; `before` is how it is read now.
+    /// The error of a capture that is read wrongly; `before` is its present reading. `None` unless [`Decision::Wrong`].
     pub fn error(&self, name: &str, before: &Reading) -> Option<Error> {
         let Decision::Wrong { reading, agreement } = &self.decision else {
             return None;
@@ -116,7 +117,7 @@ impl Alignment {
         ))
     }
 
-    /// What is to be said of a capture that may be read wrongly.
+    /// The warning of a capture that may be read wrongly; `None` unless [`Decision::Doubtful`].
     pub fn warning(&self) -> Option<String> {
         (self.decision == Decision::Doubtful).then(|| {
             format!(
@@ -128,7 +129,7 @@ impl Alignment {
     }
 }
 
-/// What a reading takes for granted, after "they do".
+/// The conditions of a reading, to follow "they do".
 fn condition(reading: &Reading) -> String {
     let mut conditions = Vec::new();
     if reading.axes == Axes::OpenCv {
@@ -168,22 +169,22 @@ fn condition(reading: &Reading) -> String {
     conditions.join(" and ")
 }
 
-/// The agreement of photographs' scores, each of deviation one by chance.
+/// The sum of independent scores of standard deviation one, scaled to standard deviation one.
 fn total(scores: &[f64]) -> f64 {
     scores.iter().sum::<f64>() / (scores.len().max(1) as f64).sqrt()
 }
 
-/// Whether scores agree, and by plainly more than others of the same photographs.
-fn plainly_better(scores: &[f64], others: &[f64]) -> bool {
+/// Whether `scores` agree with the mesh, and clearly more than `others` of the same photographs.
+fn clearly_better(scores: &[f64], others: &[f64]) -> bool {
     let [better, worse] = [scores, others].map(total);
-    better >= AGREES && (better - worse) / f64::sqrt(2.0) >= PLAINLY
+    better >= AGREES && (better - worse) / f64::sqrt(2.0) >= CLEAR_ADVANTAGE
 }
 
-/// The photographs that are compared.
+/// The photographs and the mesh that they are scored against.
 struct Views<'a> {
     scene: &'a Scene,
     photographs: &'a [Arc<Photograph>],
-    /// Of each photograph that is compared as it lies in its file.
+    /// Gradients of each scored photograph in the orientation of its file.
     contrasts: Vec<Option<Contrast>>,
 }
 
@@ -207,26 +208,26 @@ impl<'a> Views<'a> {
         views
     }
 
-    /// Frames that are compared, evenly spaced.
-    fn chosen(&self, most: usize) -> Vec<usize> {
+    /// At most `max` evenly spaced frames.
+    fn chosen(&self, max: usize) -> Vec<usize> {
         let count = self.photographs.len();
-        let most = most.min(count);
-        (0..most).map(|i| i * count / most).collect()
+        let max = max.min(count);
+        (0..max).map(|i| i * count / max).collect()
     }
 
     fn contrast(&self, frame: usize, orientation: Orientation, camera: &Camera) -> Contrast {
         let photograph = &self.photographs[frame];
         let lens = &camera.intrinsics;
         let [width, height] = orientation.size([lens.width, lens.height]);
-        // Reduced as it lies in the file, then turned to the camera.
+        // Downscaled in the file's orientation, then turned to the camera's.
         let levels = levels(photograph, width, height);
         let levels = orientation.apply(&levels, [width, height]);
         Contrast::new(&levels, lens.width, lens.height)
     }
 
-    /// The score of each compared photograph where the capture is read in another way.
-    fn scores(&self, reading: &Reading, most: usize) -> Vec<f64> {
-        (self.chosen(most).into_par_iter())
+    /// The scores of at most `max` photographs with another reading of the capture.
+    fn scores(&self, reading: &Reading, max: usize) -> Vec<f64> {
+        (self.chosen(max).into_par_iter())
             .map(|frame| self.score(frame, reading))
             .collect()
     }
@@ -235,29 +236,29 @@ impl<'a> Views<'a> {
         let camera = self.camera(frame, reading).shrunk(LONG_SIDE);
         let edges = edges(self.scene, &camera);
         let count = self.photographs.len() as i64;
-        let shown = (frame as i64 + i64::from(reading.shift)).rem_euclid(count) as usize;
-        match &self.contrasts[shown] {
+        let photograph = (frame as i64 + i64::from(reading.shift)).rem_euclid(count) as usize;
+        match &self.contrasts[photograph] {
             Some(contrast) if reading.orientation == Orientation::default() => {
                 contrast.score(&edges)
             }
-            _ => (self.contrast(shown, reading.orientation, &camera)).score(&edges),
+            _ => (self.contrast(photograph, reading.orientation, &camera)).score(&edges),
         }
     }
 
-    /// Whether some other reading could be better than that of the files, although that one agrees.
-    fn may_be_another(&self) -> bool {
+    /// Whether another reading may be better than the given one although the given one agrees.
+    fn another_may_be_better(&self) -> bool {
         let given = Reading::default();
-        let near_scores = self.scores(&given, NEAR_FRAMES);
-        let nearer = (candidates::near().iter())
-            .any(|near| plainly_better(&self.scores(near, NEAR_FRAMES), &near_scores));
+        let scores = self.scores(&given, NEAR_FRAMES);
+        let near_is_better = (candidates::near().iter())
+            .any(|near| clearly_better(&self.scores(near, NEAR_FRAMES), &scores));
         let few = ROUNDS[0].1;
         let agreement = total(&self.scores(&given, few));
-        nearer
+        near_is_better
             || (candidates::exchanged().iter())
                 .any(|other| total(&self.scores(other, few)) > agreement)
     }
 
-    /// A camera as another reading has it, relative to the mesh as it is.
+    /// A frame's camera with another reading, relative to the unchanged mesh.
     fn camera(&self, frame: usize, reading: &Reading) -> Camera {
         let mut camera = self.scene.cameras[frame].clone();
         let mut rotation = camera.rotation;
@@ -265,15 +266,15 @@ impl<'a> Views<'a> {
             rotation.y_axis *= -1.0;
             rotation.z_axis *= -1.0;
         }
-        let back = reading.mesh_rotation().transpose();
-        camera.rotation = back.as_mat3() * rotation;
+        let inverse = reading.mesh_rotation().transpose();
+        camera.rotation = inverse.as_mat3() * rotation;
         let center = camera.center.as_dvec3() + self.scene.origin;
-        camera.center = (back * center / reading.mesh_scale - self.scene.origin).as_vec3();
+        camera.center = (inverse * center / reading.mesh_scale - self.scene.origin).as_vec3();
         camera.intrinsics = camera.intrinsics.read_as(reading);
         camera
     }
 
-    /// The reading that agrees best, with its scores; on the way the less promising are left behind.
+    /// The reading that agrees best, and its scores; candidates are eliminated in rounds on more and more photographs.
     fn best(&self) -> Option<(Reading, Vec<f64>)> {
         let ranked = |readings: Vec<Reading>, frames: usize| -> Vec<Reading> {
             let mut scored: Vec<(f64, Reading)> = (readings.into_iter())
@@ -282,15 +283,15 @@ impl<'a> Views<'a> {
             scored.sort_by(|a, b| b.0.total_cmp(&a.0));
             scored.into_iter().map(|(_, reading)| reading).collect()
         };
-        let mut left = candidates::all();
-        for (most, frames) in ROUNDS {
-            left.truncate(most);
-            left = ranked(left, frames);
+        let mut readings = candidates::all();
+        for (max, frames) in ROUNDS {
+            readings.truncate(max);
+            readings = ranked(readings, frames);
         }
-        left.truncate(FINALISTS);
-        let finer: Vec<Reading> = (left.iter()).flat_map(candidates::finer).collect();
-        left.extend(finer);
-        let mut finalists = ranked(left, ROUNDS[1].1);
+        readings.truncate(FINALISTS);
+        let finer: Vec<Reading> = (readings.iter()).flat_map(candidates::finer).collect();
+        readings.extend(finer);
+        let mut finalists = ranked(readings, ROUNDS[1].1);
         finalists.truncate(FINALISTS);
         (finalists.into_iter())
             .map(|reading| (reading, self.scores(&reading, MAX_FRAMES)))

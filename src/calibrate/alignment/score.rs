@@ -1,4 +1,4 @@
-//! How much better a photograph's own edges fit the mesh's where they should be than where they should not.
+//! Scores how well the gradients of a photograph coincide with the projected edges of the mesh.
 
 use crate::calibrate::alignment::edges::{Edge, Edges, Towards};
 use crate::capture::photograph::Photograph;
@@ -6,28 +6,28 @@ use crate::math::color::luminance;
 use crate::math::stats::Moments;
 use glam::Vec3;
 
-/// Edges are compared with the photograph at displacements up to this many pixels, ...
+/// Largest displacement of the edges, in pixels.
 const REACH: i32 = 8;
-/// ... of which those from this distance on tell what chance gives.
+/// Displacements of at least this many pixels sample the distribution of chance.
 const FAR: f32 = 5.0;
-/// Fewer edges of a kind say nothing.
+/// Least number of edges of a kind.
 const MIN_EDGES: usize = 30;
-/// A kind of edge says at most this much, in standard deviations, so that no one decides alone.
+/// Limit of the score of one kind of edges, in standard deviations, so that no kind decides alone.
 const MAX_SCORE: f64 = 8.0;
-/// Radiance below this is darkness.
+/// Radiance is clamped to at least this before the logarithm.
 const DARK: f32 = 1e-8;
 
-/// How much a photograph changes from pixel to pixel, as a rank within it: whatever its exposure, contrast and noise.
+/// Gradient magnitudes of a photograph as ranks, which are invariant to exposure and contrast.
 #[derive(Debug, Clone)]
 pub struct Contrast {
     width: i32,
     height: i32,
-    /// Rank from 0 to 1 of the change towards the right and down; no number where there is no neighbour.
+    /// Rank in [0, 1) of the difference to the pixel on the right and below; NaN without that neighbour.
     ranks: [Vec<f32>; 2],
 }
 
 impl Contrast {
-    /// Of pixels of logarithmic luminance, row by row.
+    /// From logarithmic luminance, row by row.
     pub fn new(levels: &[f32], width: u32, height: u32) -> Self {
         let (columns, rows) = (width as usize, height as usize);
         let mut changes = Vec::with_capacity(2 * levels.len());
@@ -41,8 +41,8 @@ impl Contrast {
         }
         changes.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut ranks = [vec![f32::NAN; levels.len()], vec![f32::NAN; levels.len()]];
-        for (place, &(_, towards, pixel)) in changes.iter().enumerate() {
-            ranks[towards][pixel] = place as f32 / changes.len() as f32;
+        for (rank, &(_, towards, pixel)) in changes.iter().enumerate() {
+            ranks[towards][pixel] = rank as f32 / changes.len() as f32;
         }
         Self {
             width: width as i32,
@@ -51,7 +51,7 @@ impl Contrast {
         }
     }
 
-    /// Mean rank of a photograph's changes at edges displaced by (dx, dy); `None` where they leave the picture.
+    /// Mean rank of the gradients at edges displaced by (dx, dy) pixels; `None` if too few of them are inside the image.
     fn at(&self, edges: &[Edge], dx: i32, dy: i32) -> Option<f64> {
         let (mut sum, mut count) = (0.0, 0u32);
         for edge in edges {
@@ -72,8 +72,8 @@ impl Contrast {
         (count as usize >= MIN_EDGES / 2).then(|| sum / f64::from(count))
     }
 
-    /// How well the photograph's changes fit edges of the mesh, in standard deviations of what displaced edges give: near zero
-    /// by chance, a few where they fit. Zero where there are too few edges.
+    /// How well the photograph's gradients fit edges of the mesh, in standard deviations over displaced edges: near zero for
+    /// unrelated edges, several for correct ones. Zero if there are too few edges.
     pub fn score(&self, edges: &Edges) -> f64 {
         let (mut sum, mut weights) = (0.0, 0.0);
         for kind in edges.kinds.iter().filter(|kind| kind.len() >= MIN_EDGES) {
@@ -90,13 +90,13 @@ impl Contrast {
         }
     }
 
-    /// The same for edges of one kind.
+    /// The score of one kind of edges.
     fn score_of(&self, edges: &[Edge]) -> Option<f64> {
         let side = 2 * REACH + 1;
         let profile: Vec<Option<f64>> = (0..side * side)
             .map(|i| self.at(edges, i % side - REACH, i / side - REACH))
             .collect();
-        // The best of nine neighbouring displacements, since poses are off by a pixel.
+        // The maximum over 3 × 3 displacements, since poses are off by up to a pixel.
         let best = |dx: i32, dy: i32| -> Option<f64> {
             let around = (-1..=1).flat_map(|y| (-1..=1).map(move |x| (dx + x, dy + y)));
             let values =
@@ -116,11 +116,11 @@ impl Contrast {
     }
 }
 
-/// Logarithmic luminance of a photograph reduced to another size, each pixel the mean of those that it covers.
+/// Logarithmic luminance of a photograph downscaled with a box filter.
 pub fn levels(photograph: &Photograph, width: u32, height: u32) -> Vec<f32> {
-    let span = |index: u32, count: u32, of: u32| {
-        let from = (u64::from(index) * u64::from(of) / u64::from(count)) as u32;
-        let to = (u64::from(index + 1) * u64::from(of) / u64::from(count)) as u32;
+    let span = |index: u32, count: u32, source: u32| {
+        let from = (u64::from(index) * u64::from(source) / u64::from(count)) as u32;
+        let to = (u64::from(index + 1) * u64::from(source) / u64::from(count)) as u32;
         from..to.max(from + 1)
     };
     let pixel = |x: u32, y: u32| {

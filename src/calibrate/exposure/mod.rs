@@ -1,145 +1,150 @@
-//! Exposure and white balance of each photograph, and vignetting and response of all of them, where the photographs disagree
-//! about surfaces that they share.
+//! Estimates the exposure and white balance of each photograph, and the vignetting and response that all share, from surfaces
+//! that several photographs see.
 //!
-//! What a pixel shows is its surface's radiance times its photograph's exposure, one factor a channel, times what the lens lets
-//! through at its distance from the axis, bent by the camera's response. On surface cells that several photographs see, the
-//! logarithms are fitted by least absolute differences of values, so that highlights, mis-registration and people decide
-//! nothing. One common factor stays open; by convention the exposures' median is 1 in each channel, and the lens dims nothing on
-//! its axis. A power of all light stays open too unless the exposures are known: see [`Response`].
+//! A pixel's value is the response of radiance × exposure (one factor per channel) × vignetting. The logarithms are fitted on
+//! surface cells by least absolute deviations, which are robust to highlights, misregistration and people. A common factor is
+//! undetermined: by convention the median exposure is 1 in each channel, and vignetting is 1 on the optical axis. A power of all
+//! radiances is undetermined too unless the exposures are known: see [`Response`].
 
+mod correct;
 mod fit;
 mod normal;
 mod observations;
 mod outlier_frames;
-mod undo;
 
 use crate::calibrate::problem::Problem;
 use crate::capture::exposure::Vignetting;
 use crate::capture::response::Response;
 use crate::math::stats::Moments;
 use crate::scene::camera::Camera;
-use fit::{Parts, compare, disagreements, fit};
+use fit::{ModelParts, disagreements, fit, fit_held_out};
 use glam::{DVec3, Vec3};
 pub use observations::Observations;
 use observations::{Observation, shared};
 pub use outlier_frames::OutlierFrames;
 
-/// Fraction of the disagreement on cells left out of the fit that exposures must explain, next to vignetting and response where
-/// those are found.
+/// Least fraction of the disagreement between photographs, on cells held out of the fit, that exposures must explain.
 const MIN_GAIN: f64 = 0.05;
-/// Fraction of what they leave that vignetting, and then the response, must explain, and by how many standard errors.
-const MIN_OF_CAMERA: f64 = 0.01;
+/// Least fraction of the remaining disagreement that vignetting, and then the response, must explain.
+const MIN_CAMERA_GAIN: f64 = 0.01;
+/// Least gain of vignetting and response in standard errors over cells.
 const SIGNIFICANT: f64 = 4.0;
-/// Photographs whose focal lengths, in widths of their pictures, differ by more were not taken through one lens.
+/// Largest relative difference of focal lengths, in image widths, of photographs through one lens.
 const ONE_LENS: f64 = 0.05;
 
-/// What was found out about exposures.
+/// The estimated exposures, vignetting and response. Each part is used only if it explains enough of the disagreement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Exposures {
-    /// For each photograph and channel, its pixels over the radiance on the lens's axis; all one where they do not differ.
+    /// For each photograph and channel, light on the sensor over radiance on the optical axis; all one unless `differ`.
     pub factors: Vec<Vec3>,
-    /// Whether they explain enough of the disagreement.
+    /// Whether exposures explain enough of the disagreement.
     pub differ: bool,
-    /// How all photographs dim towards their corners, where that explains enough of the rest.
+    /// Vignetting of all photographs.
     pub vignetting: Option<Vignetting>,
-    /// How the values of all photographs follow the light, where that explains enough of what is left then.
+    /// Response of all photographs.
     pub response: Option<Response>,
-    /// Fraction of the disagreement, on surfaces left out of the fit, that exposures explain.
+    /// Fraction of the disagreement, on cells held out of the fit, that exposures explain.
     pub gain: f64,
-    /// Fraction of what exposures leave of it that vignetting explains.
+    /// Fraction of the disagreement after exposures that vignetting explains.
     pub vignetting_gain: f64,
-    /// Fraction of what both leave that the response explains.
+    /// Fraction of the disagreement after both that the response explains.
     pub response_gain: f64,
 }
 
 impl Exposures {
-    /// Compares the photographs on the surfaces that they share, held-out pixels left out; `None` where too few are
-    /// shared to tell. A photograph that is held out whole is given the exposure at which it fits what the others found, so
-    /// that it can test more than that.
+    /// Fits the photographs on the cells that they share, without held-out pixels; `None` if too few cells are shared. A
+    /// photograph that is held out whole gets the exposure that fits it best to the others' cells, so that it can still test
+    /// the rest of the estimate.
     pub fn new(problem: &Problem, observations: &Observations) -> Option<Self> {
         let one_lens = one_lens(&problem.scene.cameras);
-        let files_bend = (problem.photographs.iter()).all(|p| p.saturation.is_finite());
-        let camera = Shared {
+        let all_saturate = (problem.photographs.iter()).all(|p| p.saturation.is_finite());
+        let camera = CameraAssumptions {
             one_lens,
-            may_bend: one_lens && files_bend,
+            has_response: one_lens && all_saturate,
         };
-        Self::of(observations, problem.photographs.len(), camera)
+        Self::estimate(observations, problem.photographs.len(), camera)
     }
 
-    fn of(observations: &Observations, photographs: usize, camera: Shared) -> Option<Self> {
+    fn estimate(
+        observations: &Observations,
+        photographs: usize,
+        camera: CameraAssumptions,
+    ) -> Option<Self> {
         let shared = shared(&observations.fitted);
-        // What is found on one half of the cells is tried on the other.
+        // Models fitted to one half of the cells are tested on the other half.
         let (fitted, tested): (Vec<Observation>, Vec<Observation>) =
             shared.iter().partition(|s| s.cell.is_multiple_of(2));
         if tested.is_empty() {
             return None;
         }
-        let with = |exposures, vignetting, response| {
-            let parts = Parts {
+        let test = |exposures, vignetting, response| {
+            let parts = ModelParts {
                 exposures,
                 vignetting,
                 response,
             };
-            let found = fit(&fitted, photographs, parts);
-            (disagreements(&tested, &found), found)
+            let model = fit(&fitted, photographs, parts);
+            (disagreements(&tested, &model), model)
         };
         let is_needed = |before: &[f64], after: &[f64]| {
-            explained(before, after) > MIN_OF_CAMERA && is_significant(before, after)
+            explained(before, after) > MIN_CAMERA_GAIN && is_significant(before, after)
         };
-        let [(exposed, _), (both, found)] =
-            [false, true].map(|vignetting| with(true, vignetting, false));
-        let vignetting_gain = explained(&exposed, &both);
-        let dims = camera.one_lens && found.power.min_element() > 0.0 && is_needed(&exposed, &both);
-        let exposed = if dims { both } else { exposed };
-        let alone = with(false, dims, false).0;
+        let [(without, _), (with, model)] =
+            [false, true].map(|vignetting| test(true, vignetting, false));
+        let vignetting_gain = explained(&without, &with);
+        let vignetting =
+            camera.one_lens && model.power.min_element() > 0.0 && is_needed(&without, &with);
+        let exposed = if vignetting { with } else { without };
+        let unexposed = test(false, vignetting, false).0;
 
-        // A response beside the exposures, or in their place: known exposures and a power look like others.
-        let mut parts = Parts {
+        // The response is tested together with exposures or instead of them: a power of known exposures looks like other
+        // exposures.
+        let mut parts = ModelParts {
             exposures: false,
-            vignetting: dims,
+            vignetting,
             response: false,
         };
-        let mut gain = explained(&alone, &exposed);
+        let mut gain = explained(&unexposed, &exposed);
         let mut response_gain = 0.0;
-        if camera.may_bend {
-            let [bent, both] = [false, true].map(|exposures| with(exposures, dims, true).0);
-            let beside = explained(&bent, &both) > MIN_GAIN;
-            let [before, after] = match beside {
+        if camera.has_response {
+            let [response_only, both] =
+                [false, true].map(|exposures| test(exposures, vignetting, true).0);
+            let [before, after] = match explained(&response_only, &both) > MIN_GAIN {
                 true => [&exposed, &both],
-                false => [&alone, &bent],
+                false => [&unexposed, &response_only],
             };
             response_gain = explained(before, after);
             parts.response = is_needed(before, after);
             if parts.response {
-                gain = explained(&bent, &both);
+                gain = explained(&response_only, &both);
             }
         }
         parts.exposures = gain > MIN_GAIN;
 
-        let mut found = fit(&shared, photographs, parts);
+        let mut model = fit(&shared, photographs, parts);
         if parts.exposures {
-            compare(observations, &mut found);
+            fit_held_out(observations, &mut model);
         }
         let factor = |logarithm: &DVec3| logarithm.map(f64::exp).as_vec3();
         Some(Self {
-            factors: found.exposures.iter().map(factor).collect(),
+            factors: model.exposures.iter().map(factor).collect(),
             differ: parts.exposures,
-            vignetting: dims.then(|| Vignetting {
-                power: found.power.as_vec3(),
+            vignetting: vignetting.then(|| Vignetting {
+                power: model.power.as_vec3(),
             }),
-            response: found.response,
+            response: model.response,
             gain,
             vignetting_gain,
             response_gain,
         })
     }
 
-    /// Whether there is anything to undo.
+    /// Whether there is anything to correct.
     pub fn needed(&self) -> bool {
         self.differ || self.vignetting.is_some() || self.response.is_some()
     }
 
-    /// The largest and the least factor, of the mean over channels.
+    /// The smallest and the largest factor, averaged over channels.
     pub fn range(&self) -> (f32, f32) {
         let means = self.factors.iter().map(|f| f.element_sum() / 3.0);
         means.fold((f32::INFINITY, 0.0), |(low, high), m| {
@@ -148,28 +153,28 @@ impl Exposures {
     }
 }
 
-/// What all photographs may have in common.
+/// What photographs may share.
 #[derive(Debug, Clone, Copy)]
-struct Shared {
-    /// They may have been taken through one lens.
+struct CameraAssumptions {
+    /// One lens, and with it vignetting.
     one_lens: bool,
-    /// All of them saturate, so that a camera may have bent them alike.
-    may_bend: bool,
+    /// One camera response: all photographs saturate, so they are not linear renderings.
+    has_response: bool,
 }
 
-/// Whether all photographs may have been taken through one lens.
+/// Whether the focal lengths allow that all photographs were taken through one lens.
 fn one_lens(cameras: &[Camera]) -> bool {
     let lengths = cameras.iter().map(|camera| {
         let k = &camera.intrinsics;
         (k.fx / f64::from(k.width)).abs()
     });
-    let (least, most) = lengths.fold((f64::INFINITY, 0.0f64), |(least, most), l| {
-        (least.min(l), most.max(l))
+    let (min, max) = lengths.fold((f64::INFINITY, 0.0f64), |(min, max), l| {
+        (min.min(l), max.max(l))
     });
-    most <= least * (1.0 + ONE_LENS)
+    max <= min * (1.0 + ONE_LENS)
 }
 
-/// The fraction of a disagreement that goes where another takes its place.
+/// Relative decrease of the summed disagreement.
 fn explained(before: &[f64], after: &[f64]) -> f64 {
     let [before, after] = [before, after].map(|d| d.iter().sum::<f64>());
     if before > 0.0 {
@@ -179,7 +184,7 @@ fn explained(before: &[f64], after: &[f64]) -> f64 {
     }
 }
 
-/// Whether cells disagree less by more than chance.
+/// Whether the mean decrease per cell is larger than chance.
 fn is_significant(before: &[f64], after: &[f64]) -> bool {
     let mut gains = Moments::default();
     for (before, after) in before.iter().zip(after) {
@@ -193,14 +198,14 @@ mod tests {
     use super::*;
     use crate::math::rng::Stream;
 
-    const EXPOSURES: Parts = Parts {
+    const EXPOSURES: ModelParts = ModelParts {
         exposures: true,
         vignetting: false,
         response: false,
     };
-    const LENS: Shared = Shared {
+    const LENS: CameraAssumptions = CameraAssumptions {
         one_lens: true,
-        may_bend: false,
+        has_response: false,
     };
 
     fn observation(frame: usize, cell: usize, level: f64) -> Observation {
@@ -209,11 +214,11 @@ mod tests {
             cell: cell as u64,
             level: DVec3::splat(level),
             off_axis: 0.0,
-            full: DVec3::ZERO,
+            saturation: DVec3::ZERO,
         }
     }
 
-    /// Cells of random levels seen by random photographs of given exposures, anywhere in them, with some noise and some outliers.
+    /// Observations of cells of random levels by random photographs of given log exposures, with noise and 10 % outliers.
     fn seen(exposures: &[DVec3], noise: f64) -> Vec<Observation> {
         let mut stream = Stream::new(71, 0, 0, 0);
         (0..400)
@@ -229,7 +234,7 @@ mod tests {
                             cell,
                             level: level + *exposure + DVec3::splat(error),
                             off_axis: -0.3 * f64::from(stream.uniform()),
-                            full: DVec3::ZERO,
+                            saturation: DVec3::ZERO,
                         });
                     }
                 }
@@ -259,8 +264,8 @@ mod tests {
         assert!((found[0] - found[1] - DVec3::splat(0.6)).length() < 0.01);
     }
 
-    /// A walk of two hundred photographs, each of which shares cells with the next alone: exposures that rise and fall along
-    /// it by a factor of twenty are found, outliers among the cells notwithstanding.
+    /// A walk of 200 photographs, each of which shares cells with the next one alone. Exposures vary along it by a factor of
+    /// twenty, and 5 % of the observations are outliers.
     #[test]
     fn exposures_that_drift_along_a_walk_are_found() {
         let frames = 200;
@@ -281,8 +286,8 @@ mod tests {
         }
     }
 
-    /// Whatever is held out, the exposures of the others are the same bits: here it shares cells with them, and with one of
-    /// them cells that no other sees.
+    /// The exposures of fitted photographs are the same bits with and without a held-out one. It shares cells with all of them,
+    /// and with one of them cells that no other sees.
     #[test]
     fn a_photograph_held_out_is_compared_with_the_others_and_they_are_not_with_it() {
         let exposures = [0.4, -0.4, 1.3].map(DVec3::splat);
@@ -305,7 +310,7 @@ mod tests {
             held_out: Vec::new(),
         };
         let [with, without] =
-            [with, without].map(|s| Exposures::of(&s, 4, LENS).expect("cells are shared"));
+            [with, without].map(|s| Exposures::estimate(&s, 4, LENS).expect("cells are shared"));
         let of_fitted = |e: &Exposures| [e.factors[0], e.factors[1], e.factors[3]];
         assert_eq!(of_fitted(&with), of_fitted(&without));
         assert_eq!((with.gain, with.differ), (without.gain, without.differ));
@@ -316,7 +321,7 @@ mod tests {
         assert_eq!(without.factors[2], Vec3::ONE);
     }
 
-    /// The observations of a lens that dims, those of the last photograph kept out of the fit.
+    /// Observations with vignetting; the last photograph is held out.
     fn dimmed(exposures: &[DVec3], power: DVec3) -> Observations {
         let mut all = seen(exposures, 0.1);
         for observation in &mut all {
@@ -332,28 +337,29 @@ mod tests {
         let exposures = [0.5, 0.0, -0.4, 0.9].map(DVec3::splat);
         let power = DVec3::new(1.0, 2.0, 4.0);
         let observations = dimmed(&exposures, power);
-        let found = Exposures::of(&observations, 4, LENS).expect("cells are shared");
+        let found = Exposures::estimate(&observations, 4, LENS).expect("cells are shared");
         assert!(found.differ);
         let vignetting = found.vignetting.expect("a lens that dims");
         let off = vignetting.power.as_dvec3() - power;
         assert!(off.abs().max_element() < 0.1, "{off}");
-        // The one held out too, whose observations are dimmed alike.
+        // The held-out photograph has the same vignetting.
         for (found, truth) in found.factors.iter().zip(&exposures) {
             let off = found.as_dvec3().map(f64::ln) - *truth;
             assert!(off.abs().max_element() < 0.03, "{off}");
         }
-        const DIFFERENT: Shared = Shared {
+        const DIFFERENT: CameraAssumptions = CameraAssumptions {
             one_lens: false,
-            may_bend: false,
+            has_response: false,
         };
-        let other_lenses = Exposures::of(&observations, 4, DIFFERENT).expect("cells are shared");
+        let other_lenses =
+            Exposures::estimate(&observations, 4, DIFFERENT).expect("cells are shared");
         assert_eq!(other_lenses.vignetting, None);
     }
 
     #[test]
     fn a_lens_that_dims_needs_no_exposures() {
         let observations = dimmed(&[DVec3::ZERO; 4], DVec3::splat(4.0));
-        let found = Exposures::of(&observations, 4, LENS).expect("cells are shared");
+        let found = Exposures::estimate(&observations, 4, LENS).expect("cells are shared");
         assert!(found.vignetting.is_some() && !found.differ && found.needed());
         assert_eq!(found.factors, [Vec3::ONE; 4]);
     }
@@ -361,16 +367,16 @@ mod tests {
     #[test]
     fn a_lens_that_brightens_its_corners_is_not_believed() {
         let observations = dimmed(&[DVec3::ZERO; 4], DVec3::splat(-2.0));
-        let found = Exposures::of(&observations, 4, LENS).expect("cells are shared");
+        let found = Exposures::estimate(&observations, 4, LENS).expect("cells are shared");
         assert_eq!(found.vignetting, None);
     }
 
-    const CAMERA: Shared = Shared {
+    const CAMERA: CameraAssumptions = CameraAssumptions {
         one_lens: true,
-        may_bend: true,
+        has_response: true,
     };
 
-    /// A camera of raised contrast with a shoulder, less of it in one channel.
+    /// A response of raised contrast with a shoulder, different in each channel.
     fn contrasty() -> Response {
         Response {
             terms: [
@@ -381,34 +387,35 @@ mod tests {
         }
     }
 
-    /// What the observations show through a response, of photographs that were divided by the exposures known of them.
+    /// Applies a response to observations. The photographs were divided by `known` log exposures.
     fn bent(
         mut observations: Vec<Observation>,
         response: &Response,
         known: impl Fn(usize) -> f64,
     ) -> Observations {
         for observation in &mut observations {
-            observation.full = DVec3::splat(3.4 - known(observation.frame));
-            let light = observation.level - observation.full;
+            observation.saturation = DVec3::splat(3.4 - known(observation.frame));
+            let light = observation.level - observation.saturation;
             let value = std::array::from_fn(|c| response.log_value(c, light[c]));
-            observation.level = DVec3::from_array(value) + observation.full;
+            observation.level = DVec3::from_array(value) + observation.saturation;
         }
-        observations
-            .retain(|observation| (observation.level - observation.full).max_element() < -0.03);
+        observations.retain(|observation| {
+            (observation.level - observation.saturation).max_element() < -0.03
+        });
         Observations {
             fitted: observations,
             held_out: Vec::new(),
         }
     }
 
-    /// The power by which what is found as light grows with the true light, in one channel, and how far it is from that.
+    /// Fits a power law between the light of `found` and of `truth` in one channel: the power and the largest deviation.
     fn power_between(found: &Response, truth: &Response, channel: usize) -> (f64, f64) {
         let lights: Vec<f64> = (0..80).map(|k| -4.0 + 0.05 * f64::from(k)).collect();
-        let told = |light: &f64| found.log_light(channel, truth.log_value(channel, *light))[0];
-        let [x, y] = [
+        let recovered = |light: &f64| found.log_light(channel, truth.log_value(channel, *light))[0];
+        let (x, y) = (
             lights.clone(),
-            lights.iter().map(told).collect::<Vec<f64>>(),
-        ];
+            lights.iter().map(recovered).collect::<Vec<f64>>(),
+        );
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
         let (mx, my) = (mean(&x), mean(&y));
         let both: f64 = x.iter().zip(&y).map(|(x, y)| (x - mx) * (y - my)).sum();
@@ -422,7 +429,7 @@ mod tests {
         let exposures = [0.7, 0.2, 0.0, -0.5, -0.9, 0.4].map(DVec3::splat);
         let truth = contrasty();
         let observations = bent(seen(&exposures, 0.1), &truth, |_| 0.0);
-        let found = Exposures::of(&observations, 6, CAMERA).expect("cells are shared");
+        let found = Exposures::estimate(&observations, 6, CAMERA).expect("cells are shared");
         assert!(found.differ && found.vignetting.is_none());
         let response = found.response.expect("a response");
         for channel in 0..3 {
@@ -430,18 +437,18 @@ mod tests {
             assert!(off < 0.05, "{channel}: {off} from a power of {power}");
             // Exposures are of the same power.
             for (found, truth) in found.factors.iter().zip(&exposures) {
-                let told = f64::from(found[channel]).ln() - power * (truth[channel] - 0.1);
-                assert!(told.abs() < 0.06, "{channel}: {told}");
+                let error = f64::from(found[channel]).ln() - power * (truth[channel] - 0.1);
+                assert!(error.abs() < 0.06, "{channel}: {error}");
             }
         }
-        // With the files' own curve the light is bent by much more.
+        // The identity deviates much more.
         let none = Response {
             terms: [Vec3::ZERO; 3],
         };
         assert!(power_between(&none, &truth, 0).1 > 0.15);
     }
 
-    /// Where exposures are known, as of photographs with an EXIF record, the power is found as well, and no exposures.
+    /// If exposures are known, as from EXIF, the power is determined too, and no exposures are fitted.
     #[test]
     fn known_exposures_tell_the_power_of_a_camera() {
         let known = |frame: usize| [0.9, 0.0, -0.8, 0.4][frame];
@@ -449,7 +456,7 @@ mod tests {
             terms: [Vec3::new(-0.25, -0.2, 0.2), Vec3::ZERO, Vec3::ZERO],
         };
         let observations = bent(seen(&[DVec3::ZERO; 4], 0.1), &truth, known);
-        let found = Exposures::of(&observations, 4, CAMERA).expect("cells are shared");
+        let found = Exposures::estimate(&observations, 4, CAMERA).expect("cells are shared");
         assert!(!found.differ && found.needed(), "{}", found.gain);
         let response = found.response.expect("a response");
         for channel in 0..3 {
@@ -465,11 +472,11 @@ mod tests {
             terms: [Vec3::ZERO; 3],
         };
         let observations = bent(seen(&exposures, 0.2), &straight, |_| 0.0);
-        let found = Exposures::of(&observations, 4, CAMERA).expect("cells are shared");
+        let found = Exposures::estimate(&observations, 4, CAMERA).expect("cells are shared");
         assert!(found.differ && found.response.is_none());
-        // Nor one whose files are linear, or where no two photographs were taken with one camera.
+        // Without a shared response, as of linear files, none is fitted.
         let observations = bent(seen(&exposures, 0.1), &contrasty(), |_| 0.0);
-        let found = Exposures::of(&observations, 4, LENS).expect("cells are shared");
+        let found = Exposures::estimate(&observations, 4, LENS).expect("cells are shared");
         assert_eq!(found.response, None);
     }
 
@@ -479,9 +486,9 @@ mod tests {
             fitted: seen(&[DVec3::ZERO; 5], 0.2),
             held_out: Vec::new(),
         };
-        let found = Exposures::of(&observations, 5, LENS).expect("cells are shared");
+        let found = Exposures::estimate(&observations, 5, LENS).expect("cells are shared");
         assert!(found.gain.abs() < 0.02, "{}", found.gain);
         assert!(!found.needed());
-        assert_eq!(Exposures::of(&Observations::default(), 5, LENS), None);
+        assert_eq!(Exposures::estimate(&Observations::default(), 5, LENS), None);
     }
 }

@@ -1,38 +1,39 @@
-//! The normal equations of what photographs do to the surfaces that they share.
+//! Normal equations of the camera model's unknowns, with the levels of the cells eliminated.
 
-use crate::calibrate::exposure::fit::{Logarithms, Parts};
+use crate::calibrate::exposure::fit::{CameraModel, ModelParts};
 use crate::calibrate::exposure::observations::Observation;
 use crate::capture::response::{Response, TERMS};
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Relative weight that keeps what is open near zero.
-const OPEN: f64 = 1e-9;
-/// Halvings of the interval in which the greatest possible fraction of a response lies.
-const HALVINGS: usize = 12;
+/// Relative regularization that keeps undetermined unknowns near zero.
+const RIDGE: f64 = 1e-9;
+/// Bisection steps for the largest valid fraction of a response.
+const BISECTIONS: usize = 12;
 
-/// Where the unknowns stand: the row of each photograph that has one, then vignetting's power, then the response's terms.
-pub(super) struct Shape {
-    /// The photographs that have rows, in order.
-    pub told: Vec<usize>,
-    place: Vec<Option<usize>>,
+/// The order of the unknowns: exposures of the fitted photographs, vignetting's power, the response's terms.
+pub(super) struct Layout {
+    /// The photographs whose exposure is fitted, in order of their rows.
+    pub frames: Vec<usize>,
+    /// Row of each photograph's exposure.
+    row_of: Vec<Option<usize>>,
     vignetting: bool,
-    /// Whether the response has terms, and whether the power is one of them.
+    /// `None` without a response; otherwise whether its power term is fitted.
     response: Option<bool>,
 }
 
-impl Shape {
-    /// Rows for the photographs in `told` and what else may differ from one. Exposures that are not known leave the response's
-    /// power open.
-    pub fn new(told: Vec<usize>, frames: usize, parts: Parts) -> Self {
-        let mut place = vec![None; frames];
-        for (row, &frame) in told.iter().enumerate() {
-            place[frame] = Some(row);
+impl Layout {
+    /// Rows for the exposures of the photographs `fitted` and for the other parts. If exposures are fitted, the power of the
+    /// response is undetermined and gets no row.
+    pub fn new(fitted: Vec<usize>, frames: usize, parts: ModelParts) -> Self {
+        let mut row_of = vec![None; frames];
+        for (row, &frame) in fitted.iter().enumerate() {
+            row_of[frame] = Some(row);
         }
         Self {
-            told,
-            place,
+            frames: fitted,
+            row_of,
             vignetting: parts.vignetting,
             response: parts.response.then_some(!parts.exposures),
         }
@@ -43,52 +44,52 @@ impl Shape {
             None => 0,
             Some(power) => TERMS - usize::from(!power),
         };
-        self.told.len() + usize::from(self.vignetting) + terms
+        self.frames.len() + usize::from(self.vignetting) + terms
     }
 }
 
-/// What a camera's response may do to each observation.
-pub(super) struct Shapes<'a> {
+/// Observations with the basis of the camera's response evaluated at their values.
+pub(super) struct ResponseBasis<'a> {
     observations: &'a [Observation],
-    /// The response's shapes at the value of each observation; empty where there is no response.
-    of_observations: Vec<[DVec3; TERMS]>,
-    /// How much of each of them a power would explain.
+    /// The basis functions ([`Response::basis`]) at the value of each observation; empty without a response.
+    values: Vec<[DVec3; TERMS]>,
+    /// Slope of each basis function over the power term, by linear regression over all observations.
     powers: [DVec3; TERMS],
 }
 
-impl<'a> Shapes<'a> {
-    /// Those of the observations.
-    pub fn new(observations: &'a [Observation], parts: Parts) -> Self {
-        let of_observations: Vec<[DVec3; TERMS]> = match parts.response {
-            true => observations.par_iter().map(shapes).collect(),
+impl<'a> ResponseBasis<'a> {
+    /// Evaluates the basis if `parts` has a response.
+    pub fn new(observations: &'a [Observation], parts: ModelParts) -> Self {
+        let values: Vec<[DVec3; TERMS]> = match parts.response {
+            true => observations.par_iter().map(basis).collect(),
             false => Vec::new(),
         };
         Self {
             observations,
-            powers: powers(&of_observations),
-            of_observations,
+            powers: powers(&values),
+            values,
         }
     }
 
-    /// The least-squares unknowns of all channels; `None` where one has none.
-    pub fn solve(&self, weights: &[DVec3], shape: &Shape) -> Option<ExposureUnknowns> {
+    /// The weighted least-squares unknowns of all channels; `None` if a channel's matrix is singular.
+    pub fn solve(&self, weights: &[DVec3], layout: &Layout) -> Option<CameraUnknowns> {
         let [Some(r), Some(g), Some(b)] = [0, 1, 2].map(|channel| {
-            let Normal { matrix, right } = self.normal(weights, shape, channel);
+            let NormalEquations { matrix, right } = self.normal(weights, layout, channel);
             matrix.cholesky().map(|factor| factor.solve(&right))
         }) else {
             return None;
         };
         let row = |row: usize| DVec3::new(r[row], g[row], b[row]);
-        let exposures = shape.told.len();
-        let first = exposures + usize::from(shape.vignetting);
-        Some(ExposureUnknowns {
+        let exposures = layout.frames.len();
+        let first = exposures + usize::from(layout.vignetting);
+        Some(CameraUnknowns {
             exposures: (0..exposures).map(row).collect(),
-            power: if shape.vignetting {
+            power: if layout.vignetting {
                 row(exposures)
             } else {
                 DVec3::ZERO
             },
-            terms: match shape.response {
+            terms: match layout.response {
                 None => [DVec3::ZERO; TERMS],
                 Some(true) => std::array::from_fn(|term| row(first + term)),
                 Some(false) => {
@@ -100,39 +101,40 @@ impl<'a> Shapes<'a> {
         })
     }
 
-    /// How what stands for a observation's value grows with each unknown.
+    /// The non-zero entries of an observation's row of the design matrix: unknown and derivative.
     fn columns(
         &self,
-        shape: &Shape,
+        layout: &Layout,
         index: usize,
         channel: usize,
     ) -> impl Iterator<Item = (usize, f64)> + use<> {
         let observation = &self.observations[index];
-        let power = shape.told.len();
-        let first = power + usize::from(shape.vignetting);
-        let skipped = usize::from(shape.response == Some(false));
-        let powers = self.powers.map(|of_channel| of_channel[channel]);
-        let bends = shape.response.map(|_| {
-            let shapes = self.of_observations[index].map(|of_channel| of_channel[channel]);
+        let power = layout.frames.len();
+        let first = power + usize::from(layout.vignetting);
+        let skipped = usize::from(layout.response == Some(false));
+        let powers = self.powers.map(|rgb| rgb[channel]);
+        let response = layout.response.map(|_| {
+            let basis = self.values[index].map(|rgb| rgb[channel]);
             (skipped..TERMS).map(move |term| {
-                let without = if skipped > 0 {
-                    powers[term] * shapes[0]
+                // The power term is projected out of the other terms if it is not fitted.
+                let projected = if skipped > 0 {
+                    powers[term] * basis[0]
                 } else {
                     0.0
                 };
-                (first + term - skipped, without - shapes[term])
+                (first + term - skipped, projected - basis[term])
             })
         });
-        let exposure = shape.place[observation.frame].map(|row| (row, 1.0));
-        let dimmed = shape.vignetting.then_some((power, observation.off_axis));
+        let exposure = layout.row_of[observation.frame].map(|row| (row, 1.0));
+        let vignetting = layout.vignetting.then_some((power, observation.off_axis));
         (exposure.into_iter())
-            .chain(dimmed)
-            .chain(bends.into_iter().flatten())
+            .chain(vignetting)
+            .chain(response.into_iter().flatten())
     }
 
-    /// The weighted normal equations of one channel, without the cells' levels.
-    fn normal(&self, weights: &[DVec3], shape: &Shape, channel: usize) -> Normal {
-        let rows = shape.rows();
+    /// The weighted normal equations of one channel, with the cells' levels eliminated by the Schur complement.
+    fn normal(&self, weights: &[DVec3], layout: &Layout, channel: usize) -> NormalEquations {
+        let rows = layout.rows();
         let mut matrix = DMatrix::zeros(rows, rows);
         let mut right = DVector::zeros(rows);
         let mut with_level: Vec<(usize, f64)> = Vec::new();
@@ -144,14 +146,14 @@ impl<'a> Shapes<'a> {
                 let (weight, target) = (weights[index][channel], observation.level[channel]);
                 total += weight;
                 level += weight * target;
-                for (row, grown) in self.columns(shape, index, channel) {
-                    right[row] += weight * grown * target;
-                    for (column, other) in self.columns(shape, index, channel) {
-                        matrix[(row, column)] += weight * grown * other;
+                for (row, derivative) in self.columns(layout, index, channel) {
+                    right[row] += weight * derivative * target;
+                    for (column, other) in self.columns(layout, index, channel) {
+                        matrix[(row, column)] += weight * derivative * other;
                     }
                     match with_level.iter_mut().find(|(known, _)| *known == row) {
-                        Some((_, sum)) => *sum += weight * grown,
-                        None => with_level.push((row, weight * grown)),
+                        Some((_, sum)) => *sum += weight * derivative,
+                        None => with_level.push((row, weight * derivative)),
                     }
                 }
             }
@@ -163,86 +165,89 @@ impl<'a> Shapes<'a> {
             }
             first += cell.len();
         }
-        // What all photographs share, and each group of them that shares nothing with the others, is open; so is vignetting where
-        // all see a cell at one angle from the axis.
+        // Undetermined are: the common exposure of each connected group of photographs, and vignetting if each cell is always
+        // seen at one angle from the axis.
         let scale = (0..rows).map(|row| matrix[(row, row)]).sum::<f64>() / rows.max(1) as f64;
         for row in 0..rows {
-            matrix[(row, row)] += OPEN * (matrix[(row, row)] + scale);
+            matrix[(row, row)] += RIDGE * (matrix[(row, row)] + scale);
         }
-        Normal { matrix, right }
+        NormalEquations { matrix, right }
     }
 }
 
-/// What a step finds.
-pub(super) struct ExposureUnknowns {
-    /// Of the photographs that have rows.
+/// The solution of one step.
+pub(super) struct CameraUnknowns {
+    /// Log exposures of [`Layout::frames`].
     pub exposures: Vec<DVec3>,
+    /// Vignetting's power.
     pub power: DVec3,
+    /// The response's coefficients.
     pub terms: [DVec3; TERMS],
 }
 
-struct Normal {
+struct NormalEquations {
     matrix: DMatrix<f64>,
     right: DVector<f64>,
 }
 
-/// For each observation the weighted mean of the radiance that its cell's observations show.
+/// For each observation, the weighted mean log radiance of its cell.
 pub(super) fn levels(
     observations: &[Observation],
     weights: &[DVec3],
-    found: &Logarithms,
+    model: &CameraModel,
 ) -> Vec<DVec3> {
     let mut levels = Vec::with_capacity(observations.len());
     for cell in observations.chunk_by(|a, b| a.cell == b.cell) {
         let own = cell.iter().zip(&weights[levels.len()..]);
         let (sum, total) = own.fold((DVec3::ZERO, DVec3::ZERO), |(sum, total), (s, w)| {
-            (sum + *w * found.radiance(s), total + *w)
+            (sum + *w * model.radiance(s), total + *w)
         });
         levels.extend(std::iter::repeat_n(sum / total, cell.len()));
     }
     levels
 }
 
-fn shapes(observation: &Observation) -> [DVec3; TERMS] {
-    let of_channels = (observation.level - observation.full)
+/// The response's basis functions at an observation's value.
+fn basis(observation: &Observation) -> [DVec3; TERMS] {
+    let rgb = (observation.level - observation.saturation)
         .to_array()
         .map(Response::basis);
-    std::array::from_fn(|term| DVec3::from_array(of_channels.map(|shape| shape[term][0])))
+    std::array::from_fn(|term| DVec3::from_array(rgb.map(|basis| basis[term][0])))
 }
 
-/// The slope of each shape over the logarithm of the value, over all observations.
-fn powers(of_observations: &[[DVec3; TERMS]]) -> [DVec3; TERMS] {
-    let mean = |of: &dyn Fn(&[DVec3; TERMS]) -> DVec3| {
-        of_observations.iter().map(of).sum::<DVec3>() / of_observations.len().max(1) as f64
+/// The slope of each basis function over the first one, the logarithm of the value, by linear regression.
+fn powers(values: &[[DVec3; TERMS]]) -> [DVec3; TERMS] {
+    let mean = |f: &dyn Fn(&[DVec3; TERMS]) -> DVec3| {
+        values.iter().map(f).sum::<DVec3>() / values.len().max(1) as f64
     };
-    let value = mean(&|shapes| shapes[0]);
-    let variance = mean(&|shapes| (shapes[0] - value) * (shapes[0] - value));
+    let value = mean(&|basis| basis[0]);
+    let variance = mean(&|basis| (basis[0] - value) * (basis[0] - value));
     std::array::from_fn(|term| {
-        let slope = mean(&|shapes| shapes[term] * (shapes[0] - value)) / variance;
+        let slope = mean(&|basis| basis[term] * (basis[0] - value)) / variance;
         DVec3::select(slope.is_finite_mask(), slope, DVec3::ZERO)
     })
 }
 
-impl ExposureUnknowns {
-    /// The response of the terms, as far towards it as one is possible.
+impl CameraUnknowns {
+    /// The response with these terms, scaled down as far as needed to make it valid.
     pub fn response(&self) -> Response {
-        let fraction = |fraction: f64| Response {
+        let scaled = |fraction: f64| Response {
             terms: self.terms.map(|term| (term * fraction).as_vec3()),
         };
-        let whole = fraction(1.0);
+        let whole = scaled(1.0);
         if whole.is_possible() {
             return whole;
         }
-        // Slopes are linear in the terms, so that what is possible has one end.
-        let [mut least, mut most] = [0.0, 1.0];
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (least + most);
-            if fraction(middle).is_possible() {
-                least = middle;
+        // Slopes are linear in the terms, so the valid fractions form an interval from 0.
+        let [mut low, mut high] = [0.0, 1.0];
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (low + high);
+            if scaled(middle).is_possible() {
+                low = middle;
             } else {
-                most = middle;
+                high = middle;
             }
         }
-        fraction(least)
+        scaled(low)
     }
 }

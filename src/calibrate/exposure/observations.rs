@@ -1,4 +1,4 @@
-//! What the photographs show of the surfaces that they share.
+//! Observations of surface cells by photographs, from which exposures are estimated.
 
 use crate::calibrate::gbuffer::{GBuffer, GBufferPixel};
 use crate::calibrate::measured_radiance::cell_key;
@@ -13,24 +13,25 @@ const CELL_FOOTPRINTS: f32 = 4.0;
 /// Pixels darker than this fraction of the photographs' median level hold mostly noise.
 const ABOVE_NOISE: f64 = 0.1;
 
-/// The mean logarithm of what one photograph shows of one surface cell.
+/// The log mean value of one surface cell in one photograph.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Observation {
     pub frame: usize,
-    /// The cell's key, which is a hash.
+    /// The cell's hash key.
     pub cell: u64,
+    /// Logarithm of the mean value.
     pub level: DVec3,
-    /// Where in the photograph, as [`Vignetting::off_axis`].
+    /// Mean [`Vignetting::off_axis`] of the pixels.
     pub off_axis: f64,
-    /// The logarithm of the value at which its photograph saturates.
-    pub full: DVec3,
+    /// Logarithm of the photograph's saturation value.
+    pub saturation: DVec3,
 }
 
-/// What the photographs show of the cells, in order of cells.
+/// The observations of all cells, sorted by cell.
 #[derive(Debug, Default)]
 pub struct Observations {
     pub(super) fitted: Vec<Observation>,
-    /// Of photographs that are kept out of every fit: these are compared with the others, and the others not with them.
+    /// Observations by photographs that are held out whole. They are compared with the fitted ones and never fitted.
     pub(super) held_out: Vec<Observation>,
 }
 
@@ -43,7 +44,7 @@ struct Sums {
 }
 
 impl Observations {
-    /// Compares pixels of one surface, neither saturated nor dark, held-out ones of whole photographs alone.
+    /// Collects pure pixels that are neither saturated nor dark. Held-out pixels count only in photographs held out whole.
     pub fn new(problem: &Problem, gbuffer: &GBuffer) -> Self {
         let size = gbuffer.footprint * CELL_FOOTPRINTS;
         if size <= 0.0 {
@@ -63,13 +64,12 @@ impl Observations {
             .filter(|p| !p.held_out)
             .map(|p| value(p).max_element())
             .collect();
-        let least =
-            (quantile(&mut levels, 0.5).unwrap_or(0.0) * ABOVE_NOISE).max(f64::MIN_POSITIVE);
+        let dark = (quantile(&mut levels, 0.5).unwrap_or(0.0) * ABOVE_NOISE).max(f64::MIN_POSITIVE);
 
         let mut sums: BTreeMap<(u64, u32), Sums> = BTreeMap::new();
         for pixel in gbuffer.pixels.iter().filter(usable) {
             let value = value(pixel);
-            if value.min_element() < least {
+            if value.min_element() < dark {
                 continue;
             }
             if let Some(point) = pixel.points.iter().flatten().next() {
@@ -89,15 +89,15 @@ impl Observations {
             cell,
             level: (sum.value / sum.count).map(f64::ln),
             off_axis: sum.off_axis / sum.count,
-            full: (problem.photographs[frame as usize].saturation.as_dvec3()).map(f64::ln),
+            saturation: (problem.photographs[frame as usize].saturation.as_dvec3()).map(f64::ln),
         };
         let (held_out, fitted) =
             (sums.into_iter().map(observation)).partition(|s| held_out[s.frame]);
         Self { fitted, held_out }
     }
 
-    /// Forgets what a photograph shows.
-    pub(super) fn forget(&mut self, frame: usize) {
+    /// Removes the observations of a photograph.
+    pub(super) fn remove(&mut self, frame: usize) {
         self.fitted.retain(|observation| observation.frame != frame);
         self.held_out
             .retain(|observation| observation.frame != frame);

@@ -1,6 +1,6 @@
-//! Photographs that do not show what all others show: taken from elsewhere than their pose says, or of another room.
+//! Finds outlier frames: photographs that contradict the others, because of a wrong pose or of another room.
 
-use crate::calibrate::exposure::fit::{Logarithms, MIN_CELLS, Parts, compare, fit};
+use crate::calibrate::exposure::fit::{CameraModel, MIN_CELLS, ModelParts, fit, fit_held_out};
 use crate::calibrate::exposure::observations::{Observation, Observations, shared};
 use crate::calibrate::problem::Problem;
 use crate::capture::photograph::Photograph;
@@ -9,61 +9,63 @@ use glam::DVec3;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Photographs that must be compared, for the usual difference to say something.
+/// Least number of compared photographs for which the median difference is meaningful.
 const MIN_PHOTOGRAPHS: usize = 4;
-/// A photograph is an outlier frame whose difference is so many times that of most, ...
-const PLAINLY: f64 = 4.0;
-/// ... and a factor of e to this at least: noise, gloss and a blurred picture make less.
+/// Least difference of an outlier frame, as a multiple of the median difference.
+const TIMES_MEDIAN: f64 = 4.0;
+/// Least difference of an outlier frame, in log radiance. Noise, gloss and blur cause less.
 const MIN_DIFFERENCE: f64 = 0.3;
 
 /// How well photographs agree about the surfaces that they share.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutlierFrames {
-    /// Half of the photographs differ by at most so much, as the logarithm of a factor, from what the others show of half of the
-    /// surfaces that they share, each at the exposure that suits it best.
+    /// Median over photographs of their difference: the median absolute difference in log radiance, over shared cells, from the
+    /// median of the other photographs, at the fitted exposures.
     pub usual: f64,
-    /// Photographs that differ plainly more than that, and by how much, in order.
+    /// Frame index and difference of each outlier.
     pub outliers: BTreeMap<usize, f64>,
 }
 
 impl OutlierFrames {
-    /// Compares the photographs, and takes what outlier frames show out of what is compared; `None` where too few share enough to
-    /// tell. The poorest is taken out first, since its neighbours may only differ from it; photographs that are held out are
-    /// compared with the others, and the others not with them.
+    /// Finds outlier frames and removes their observations; `None` if too few photographs share enough cells. The worst frame is
+    /// removed first and the others compared again, since its neighbours may differ from it alone. Held-out photographs are
+    /// compared with the fitted ones only.
     pub fn new(observations: &mut Observations, photographs: usize) -> Option<Self> {
         let mut outliers = BTreeMap::new();
         let cells = shared(&observations.fitted);
-        let mut found = exposures(&cells, photographs);
-        let mut now = differences(&cells, &found);
-        let most = now.len().div_ceil(2).saturating_sub(1);
-        let mut usual = middle(&now)?;
+        let mut fitted = exposures(&cells, photographs);
+        let mut current = differences(&cells, &fitted);
+        let max_outliers = current.len().div_ceil(2).saturating_sub(1);
+        let mut usual = median(&current)?;
         loop {
-            let worst = now.iter().max_by(|a, b| a.1.total_cmp(b.1));
+            let worst = current.iter().max_by(|a, b| a.1.total_cmp(b.1));
             let Some((&frame, &difference)) =
-                worst.filter(|(_, d)| is_outlier(**d, usual) && outliers.len() < most)
+                worst.filter(|(_, d)| is_outlier(**d, usual) && outliers.len() < max_outliers)
             else {
                 break;
             };
             outliers.insert(frame, difference);
-            observations.forget(frame);
-            // What outlier frames do to the exposures of others is little, as these are robust.
-            now = differences(&shared(&observations.fitted), &found);
-            usual = middle(&now).unwrap_or(usual);
+            observations.remove(frame);
+            // The exposures are fitted robustly, so they need not be fitted again after each outlier.
+            current = differences(&shared(&observations.fitted), &fitted);
+            usual = median(&current).unwrap_or(usual);
         }
         if !outliers.is_empty() {
-            found = exposures(&shared(&observations.fitted), photographs);
+            fitted = exposures(&shared(&observations.fitted), photographs);
         }
-        for (frame, left) in compare(observations, &mut found) {
-            let mut sizes: Vec<f64> = left.iter().map(|d| d.abs().element_sum() / 3.0).collect();
+        for (frame, residuals) in fit_held_out(observations, &mut fitted) {
+            let mut sizes: Vec<f64> = (residuals.iter())
+                .map(|d| d.abs().element_sum() / 3.0)
+                .collect();
             if let Some(difference) = quantile(&mut sizes, 0.5).filter(|&d| is_outlier(d, usual)) {
                 outliers.insert(frame, difference);
-                observations.forget(frame);
+                observations.remove(frame);
             }
         }
         Some(Self { usual, outliers })
     }
 
-    /// The problem with none of the outlier frames' pixels in it.
+    /// The problem with all pixels of the outlier frames masked.
     pub fn without_outliers(&self, problem: &Problem) -> Problem {
         let mut problem = problem.clone();
         for &frame in self.outliers.keys() {
@@ -76,7 +78,7 @@ impl OutlierFrames {
         problem
     }
 
-    /// Which photographs are outliers and why, in a sentence for each.
+    /// One sentence per outlier frame.
     pub fn remarks(&self) -> Vec<String> {
         let fraction = |difference: f64| (difference.exp() - 1.0) * 100.0;
         let remark = |(frame, difference): (&usize, &f64)| {
@@ -91,14 +93,13 @@ impl OutlierFrames {
     }
 }
 
-/// Whether a difference is plainly more than the usual one.
 fn is_outlier(difference: f64, usual: f64) -> bool {
-    difference > (usual * PLAINLY).max(MIN_DIFFERENCE)
+    difference > (usual * TIMES_MEDIAN).max(MIN_DIFFERENCE)
 }
 
-/// The exposures that suit the photographs best.
-fn exposures(shared: &[Observation], photographs: usize) -> Logarithms {
-    let parts = Parts {
+/// Fits exposures alone.
+fn exposures(shared: &[Observation], photographs: usize) -> CameraModel {
+    let parts = ModelParts {
         exposures: true,
         vignetting: false,
         response: false,
@@ -106,12 +107,12 @@ fn exposures(shared: &[Observation], photographs: usize) -> Logarithms {
     fit(shared, photographs, parts)
 }
 
-/// Of each photograph that shares enough, the median difference from what the others show of the same cells.
-fn differences(shared: &[Observation], found: &Logarithms) -> BTreeMap<usize, f64> {
+/// For each photograph that shares enough cells, its median absolute difference in log radiance from the other photographs.
+fn differences(shared: &[Observation], fitted: &CameraModel) -> BTreeMap<usize, f64> {
     let mut all: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
     for cell in shared.chunk_by(|a, b| a.cell == b.cell) {
         let levels: Vec<DVec3> = (cell.iter())
-            .map(|observation| observation.level - found.exposures[observation.frame])
+            .map(|observation| observation.level - fitted.exposures[observation.frame])
             .collect();
         for (observation, difference) in cell.iter().zip(from_others(&levels)) {
             all.entry(observation.frame).or_default().push(difference);
@@ -123,22 +124,22 @@ fn differences(shared: &[Observation], found: &Logarithms) -> BTreeMap<usize, f6
         .collect()
 }
 
-/// The median over photographs; `None` where they are too few.
-fn middle(differences: &BTreeMap<usize, f64>) -> Option<f64> {
+/// The median over photographs; `None` if there are too few.
+fn median(differences: &BTreeMap<usize, f64>) -> Option<f64> {
     let mut all: Vec<f64> = differences.values().copied().collect();
     let enough = all.len() >= MIN_PHOTOGRAPHS;
     enough.then(|| quantile(&mut all, 0.5))?
 }
 
-/// How far each of a cell's levels is from the median of the others, mean over the channels.
+/// For each of a cell's levels, the absolute difference from the median of the others, averaged over the channels.
 fn from_others(levels: &[DVec3]) -> Vec<f64> {
     let mut sum = vec![0.0; levels.len()];
     for channel in 0..3 {
         let mut order: Vec<usize> = (0..levels.len()).collect();
         order.sort_by(|&a, &b| levels[a][channel].total_cmp(&levels[b][channel]));
-        for (place, &own) in order.iter().enumerate() {
-            // The middle of the order without `place`.
-            let rest = |i: usize| levels[order[i + usize::from(i >= place)]][channel];
+        for (rank, &own) in order.iter().enumerate() {
+            // The sorted levels without this one.
+            let rest = |i: usize| levels[order[i + usize::from(i >= rank)]][channel];
             let count = levels.len() - 1;
             let median = 0.5 * (rest((count - 1) / 2) + rest(count / 2));
             sum[own] += (levels[own][channel] - median).abs() / 3.0;
@@ -158,8 +159,8 @@ mod tests {
         move || f64::from(stream.uniform()) * 2.0 - 1.0
     }
 
-    /// Cells of random levels, each seen by the photographs that `sees` takes for it, of random exposures, with a tenth of
-    /// noise; what those in `wrong` show has nothing to do with it.
+    /// Observations of cells of random levels by photographs of random exposures, with noise of 0.1; `sees` selects the
+    /// photographs of each cell. Frames in `wrong` show unrelated levels.
     fn seen(
         cells: usize,
         frames: usize,
@@ -172,16 +173,16 @@ mod tests {
         for cell in 0..cells {
             let level = draw();
             for (frame, exposure) in exposures.iter().enumerate().filter(|f| sees(cell, f.0)) {
-                let shown = match wrong.contains(&frame) {
+                let radiance = match wrong.contains(&frame) {
                     true => draw(),
                     false => level + 0.1 * draw(),
                 };
                 observations.push(Observation {
                     frame,
                     cell: cell as u64,
-                    level: DVec3::splat(shown + exposure),
+                    level: DVec3::splat(radiance + exposure),
                     off_axis: 0.0,
-                    full: DVec3::ZERO,
+                    saturation: DVec3::ZERO,
                 });
             }
         }
@@ -215,7 +216,7 @@ mod tests {
         }
     }
 
-    /// A walk on which each photograph shares cells with the next alone: those beside the wrong one differ from nothing else.
+    /// A walk on which each photograph shares cells with the next one alone: neighbours of the wrong one differ from it only.
     #[test]
     fn neighbours_of_a_wrong_photograph_stay() {
         let observations = seen(40 * 11, 12, &[5], |cell, frame| {

@@ -1,4 +1,4 @@
-//! Whether an object gives light or reflects it, judged by how well either explains the photographs of it.
+//! Classifies each object as emitter or reflector: by which of the two explains its photographs better.
 
 use crate::inverse::paths::PathCache;
 use crate::inverse::roles::Role;
@@ -6,20 +6,20 @@ use crate::inverse::unknowns::Unknowns;
 use crate::math::stats::quantile;
 use glam::{BVec3, DVec3, Vec3};
 
-/// An advantage of so many typical squared errors decides.
-const DECISIVE: f64 = 10.0;
-/// How many standard deviations besides: of the noise of the paths, and of the advantage from cluster to cluster.
-const SURE: [f64; 2] = [5.0, 2.0];
-/// No single cluster counts for more than so many typical squared errors, however far its paths strayed.
-const MOST: f64 = 400.0;
-/// The noise of a cluster's paths counts in full up to so many times the usual one; beyond it the cluster counts for less.
-const STRAYED: f64 = 4.0;
-/// Turns of finding which lower bounds are exceeded.
-const MAX_TURNS: usize = 8;
-/// An emitter must leave at most this fraction of the squared error that a reflector leaves.
+/// Least advantage of an emitter, in typical squared errors of a cluster.
+const MIN_ADVANTAGE: f64 = 10.0;
+/// Additional advantage in standard deviations: of path noise, and of the advantage over clusters.
+const SIGNIFICANT: [f64; 2] = [5.0, 2.0];
+/// Limit of a single cluster's advantage, in typical squared errors, against outlier paths.
+const MAX_ADVANTAGE: f64 = 400.0;
+/// Clusters with more than this many times the median path noise are down-weighted to it.
+const MAX_NOISE: f64 = 4.0;
+/// Greatest number of iterations over which lower bounds are active.
+const MAX_ITERATIONS: usize = 8;
+/// Greatest squared error of an emitter, as a fraction of that of a reflector.
 const EXPLAINED: f64 = 0.25;
-/// What was taken for an emitter stays one down to this fraction of the advantage that it took to become one.
-const STAYING: f64 = 0.2;
+/// Hysteresis: an emitter stays one down to this fraction of the advantage needed to become one.
+const HYSTERESIS: f64 = 0.2;
 
 /// An object whose role should change.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,43 +32,38 @@ pub struct Change {
     pub value: Vec3,
 }
 
-/// A cluster seen as what its own object adds to it: `target` = albedo × `irradiance`, or emission × `shown`.
-struct Part {
+/// A cluster's radiance due to its own object, from both sets of paths: `target` = albedo × `irradiance`, or emission ×
+/// `coverage`.
+struct OwnRadiance {
     weight: DVec3,
     /// Channels in which the target is a lower bound.
     censored: BVec3,
     target: [DVec3; 2],
     irradiance: [DVec3; 2],
-    shown: [DVec3; 2],
+    coverage: [DVec3; 2],
 }
 
-/// Judges all seen reflectors and emitters, given a fit under their present roles.
+/// Classifies all seen reflectors and emitters, given a fit under their present roles; returns the roles to change.
 pub fn classify(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<Change> {
-    let mut parts = parts(cache, unknowns, roles);
-    let classifications: Vec<Option<Classification>> =
-        parts.iter().map(|p| Classification::new(p)).collect();
+    let mut clusters = own_radiance(cache, unknowns, roles);
+    let models: Vec<Option<RoleModels>> = clusters.iter().map(|c| RoleModels::new(c)).collect();
 
-    // The typical error of a cluster, under whichever role explains it better; bounds that are kept have none.
-    let measured = |part: &Part| !part.censored.any();
-    let mut errors: Vec<f64> = (classifications.iter().zip(&parts))
-        .filter_map(|(classification, parts)| {
-            Some(classification.as_ref()?.errors.iter().zip(parts))
-        })
+    // The typical error of an uncensored cluster under the better role.
+    let mut errors: Vec<f64> = (models.iter().zip(&clusters))
+        .filter_map(|(models, clusters)| Some(models.as_ref()?.errors.iter().zip(clusters)))
         .flatten()
-        .filter(|(_, part)| measured(part))
+        .filter(|(_, cluster)| !cluster.censored.any())
         .map(|(error, _)| *error)
         .collect();
     let typical = quantile(&mut errors, 0.5).unwrap_or(0.0);
-    (parts.iter_mut().zip(classifications).enumerate())
-        .filter_map(|(object, (parts, classification))| {
-            classification?.steady(parts, typical);
-            let classification = Classification::new(parts)?;
-            let fraction = classification.fraction_of_decision(typical);
+    (clusters.iter_mut().zip(models).enumerate())
+        .filter_map(|(object, (clusters, models))| {
+            models?.limit_noise(clusters, typical);
+            let models = RoleModels::new(clusters)?;
+            let advantage = models.relative_advantage(typical);
             match roles[object] {
-                Role::Reflector if fraction > 1.0 => Some((Role::Emitter, classification.emission)),
-                Role::Emitter if fraction < STAYING => {
-                    Some((Role::Reflector, classification.albedo))
-                }
+                Role::Reflector if advantage > 1.0 => Some((Role::Emitter, models.emission)),
+                Role::Emitter if advantage < HYSTERESIS => Some((Role::Reflector, models.albedo)),
                 _ => None,
             }
             .map(|(role, value)| Change {
@@ -80,48 +75,51 @@ pub fn classify(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<C
         .collect()
 }
 
-/// The clusters of each surface, split into what the surface itself adds and the rest.
-fn parts(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<Vec<Part>> {
+/// For each surface, its clusters' [`OwnRadiance`].
+fn own_radiance(cache: &PathCache, unknowns: &Unknowns, roles: &[Role]) -> Vec<Vec<OwnRadiance>> {
     let surfaces = unknowns.surfaces();
-    let judged = |k: usize| matches!(roles[k], Role::Reflector | Role::Emitter);
-    let place: Vec<usize> = (0..2 * surfaces)
-        .map(|i| if judged(i % surfaces) { i } else { usize::MAX })
+    let is_classified = |k: usize| matches!(roles[k], Role::Reflector | Role::Emitter);
+    let row_of: Vec<usize> = (0..2 * surfaces)
+        .map(|i| match is_classified(i % surfaces) {
+            true => i,
+            false => usize::MAX,
+        })
         .collect();
-    let mut parts: Vec<Vec<Part>> = (0..surfaces).map(|_| Vec::new()).collect();
-    for cluster in cache.linearise(unknowns, &place, &[]) {
+    let mut own: Vec<Vec<OwnRadiance>> = (0..surfaces).map(|_| Vec::new()).collect();
+    for cluster in cache.linearise(unknowns, &row_of, &[]) {
         let k = cluster.object as usize;
-        if !judged(k) {
+        if !is_classified(k) {
             continue;
         }
         let derivative = |parameter: usize| {
             let row = cluster.rows.iter().find(|r| r.0 == parameter);
             row.map_or([DVec3::ZERO; 2], |&(_, a, b)| [a, b])
         };
-        let (irradiance, shown) = (derivative(k), derivative(surfaces + k));
+        let (irradiance, coverage) = (derivative(k), derivative(surfaces + k));
         let (albedo, emission) = (
             unknowns.albedo[k].as_dvec3(),
             unknowns.emission[k].as_dvec3(),
         );
-        parts[k].push(Part {
+        own[k].push(OwnRadiance {
             weight: cluster.weight,
             censored: cluster.censored,
             target: std::array::from_fn(|set| {
-                cluster.residuals[set] + albedo * irradiance[set] + emission * shown[set]
+                cluster.residuals[set] + albedo * irradiance[set] + emission * coverage[set]
             }),
             irradiance,
-            shown,
+            coverage,
         });
     }
-    parts
+    own
 }
 
-/// What an object would be as a reflector and as an emitter, and which explains its clusters better.
-struct Classification {
+/// Least-squares models of an object as a reflector and as an emitter, with their errors.
+struct RoleModels {
     albedo: DVec3,
     emission: DVec3,
-    /// Squared error as a reflector less that as an emitter, for each cluster.
+    /// For each cluster, squared error as a reflector minus squared error as an emitter.
     advantage: Vec<f64>,
-    /// Variance of the above from the noise of the paths.
+    /// Variance of the advantage by path noise, for each cluster.
     noise: Vec<f64>,
     /// Squared error under the better role, for each cluster.
     errors: Vec<f64>,
@@ -129,31 +127,29 @@ struct Classification {
     sums: [f64; 2],
 }
 
-impl Classification {
-    /// `None` where there is nothing to see.
-    fn new(parts: &[Part]) -> Option<Self> {
-        if parts.is_empty() {
+impl RoleModels {
+    /// `None` without clusters.
+    fn new(clusters: &[OwnRadiance]) -> Option<Self> {
+        if clusters.is_empty() {
             return None;
         }
-        let albedo = least_squares(parts, |p| p.irradiance).clamp(DVec3::ZERO, DVec3::ONE);
-        let emission = least_squares(parts, |p| p.shown).max(DVec3::ZERO);
-        let errors = |left: &dyn Fn(&Part, usize) -> DVec3| -> Vec<[DVec3; 2]> {
-            let wrong = |p: &Part| {
-                let [a, b] = [left(p, 0), left(p, 1)];
-                // What exceeds a lower bound is right.
-                let bound_met = p.censored & (a + b).cmple(DVec3::ZERO);
+        let albedo = least_squares(clusters, |c| c.irradiance).clamp(DVec3::ZERO, DVec3::ONE);
+        let emission = least_squares(clusters, |c| c.coverage).max(DVec3::ZERO);
+        let residuals = |residual: &dyn Fn(&OwnRadiance, usize) -> DVec3| -> Vec<[DVec3; 2]> {
+            let censored = |c: &OwnRadiance| {
+                let [a, b] = [residual(c, 0), residual(c, 1)];
+                // A model above a lower bound has no residual.
+                let bound_met = c.censored & (a + b).cmple(DVec3::ZERO);
                 [a, b].map(|r| DVec3::select(bound_met, DVec3::ZERO, r))
             };
-            parts.iter().map(wrong).collect()
+            clusters.iter().map(censored).collect()
         };
-        let reflecting = errors(&|p, set| p.target[set] - albedo * p.irradiance[set]);
-        let emitting = errors(&|p, set| p.target[set] - emission * p.shown[set]);
+        let reflecting = residuals(&|c, set| c.target[set] - albedo * c.irradiance[set]);
+        let emitting = residuals(&|c, set| c.target[set] - emission * c.coverage[set]);
         let square = |weight: DVec3, [a, b]: [DVec3; 2]| (weight * a * b).element_sum();
-        let sums = [&reflecting, &emitting].map(|all| {
-            parts
-                .iter()
-                .zip(all)
-                .map(|(p, &r)| square(p.weight, r))
+        let sums = [&reflecting, &emitting].map(|residuals| {
+            (clusters.iter().zip(residuals))
+                .map(|(c, &r)| square(c.weight, r))
                 .sum()
         });
         let better = if sums[0] < sums[1] {
@@ -164,94 +160,101 @@ impl Classification {
         Some(Self {
             albedo,
             emission,
-            advantage: (parts.iter().zip(reflecting.iter().zip(&emitting)))
-                .map(|(p, (&r, &e))| square(p.weight, r) - square(p.weight, e))
+            advantage: (clusters.iter().zip(reflecting.iter().zip(&emitting)))
+                .map(|(c, (&r, &e))| square(c.weight, r) - square(c.weight, e))
                 .collect(),
-            noise: (parts.iter().zip(&reflecting))
-                .map(|(p, &[a, b])| {
-                    // The product of two residuals of mean r and path variance s² varies by 2 r² s² + s⁴.
-                    let (both, paths) = ((a + b) * 0.5, (a - b) * (a - b) * 0.5);
-                    (p.weight * p.weight * paths * (both * both * 2.0 + paths)).element_sum()
+            noise: (clusters.iter().zip(&reflecting))
+                .map(|(c, &[a, b])| {
+                    // The product of two residuals of mean r and path variance s² has the variance 2 r² s² + s⁴.
+                    let (mean, variance) = ((a + b) * 0.5, (a - b) * (a - b) * 0.5);
+                    let product = variance * (mean * mean * 2.0 + variance);
+                    (c.weight * c.weight * product).element_sum()
                 })
                 .collect(),
-            errors: (parts.iter().zip(better))
-                .map(|(p, &[a, b])| (p.weight * (a + b) * (a + b) * 0.25).element_sum())
+            errors: (clusters.iter().zip(better))
+                .map(|(c, &[a, b])| (c.weight * (a + b) * (a + b) * 0.25).element_sum())
                 .collect(),
             sums,
         })
     }
 
-    /// Takes weight from the clusters of which a few paths strayed far, so that they say no more than they know.
-    fn steady(&self, parts: &mut [Part], typical: f64) {
+    /// Reduces the weight of clusters with high path noise to the limit of [`MAX_NOISE`].
+    fn limit_noise(&self, clusters: &mut [OwnRadiance], typical: f64) {
         let usual = quantile(&mut self.noise.clone(), 0.5).unwrap_or(0.0) + typical * typical;
-        for (part, noise) in parts.iter_mut().zip(&self.noise) {
-            let most = usual * STRAYED;
-            if *noise > most {
-                part.weight *= (most / noise).sqrt();
+        let max = usual * MAX_NOISE;
+        for (cluster, noise) in clusters.iter_mut().zip(&self.noise) {
+            if *noise > max {
+                cluster.weight *= (max / noise).sqrt();
             }
         }
     }
 
-    /// The advantage of being an emitter as a fraction of what it takes to be sure of it.
-    fn fraction_of_decision(&self, typical: f64) -> f64 {
+    /// The advantage of an emitter over a reflector, as a fraction of the advantage needed to decide for it.
+    fn relative_advantage(&self, typical: f64) -> f64 {
         let [reflecting, emitting] = self.sums;
         if self.emission.max_element() <= 0.0 || emitting > EXPLAINED * reflecting {
             return 0.0;
         }
         let count = self.advantage.len() as f64;
-        let most = MOST * typical;
-        let bounded: Vec<f64> = self
-            .advantage
-            .iter()
-            .map(|a| a.clamp(-most, most))
+        let max = MAX_ADVANTAGE * typical;
+        let bounded: Vec<f64> = (self.advantage.iter())
+            .map(|a| a.clamp(-max, max))
             .collect();
         let sum: f64 = bounded.iter().sum();
         let spread: f64 = bounded.iter().map(|a| (a - sum / count).powi(2)).sum();
-        let noise: f64 = self.noise.iter().map(|n| n.min(most * most)).sum();
+        let noise: f64 = self.noise.iter().map(|n| n.min(max * max)).sum();
         let own = emitting.max(0.0) / count;
-        let decisive =
-            DECISIVE * typical.max(own) + SURE[0] * noise.sqrt() + SURE[1] * spread.sqrt();
-        match (sum > 0.0, decisive > 0.0) {
-            (true, true) => sum / decisive,
+        let needed = MIN_ADVANTAGE * typical.max(own)
+            + SIGNIFICANT[0] * noise.sqrt()
+            + SIGNIFICANT[1] * spread.sqrt();
+        match (sum > 0.0, needed > 0.0) {
+            (true, true) => sum / needed,
             (true, false) => f64::INFINITY,
             (false, _) => 0.0,
         }
     }
 }
 
-/// Weighted least squares of the targets on one regressor, unbiased by the noise of the paths. Targets that are lower bounds
-/// count while what is found stays below them.
-fn least_squares(parts: &[Part], regressor: impl Fn(&Part) -> [DVec3; 2]) -> DVec3 {
-    let mut found = DVec3::ZERO;
-    for turn in 0..MAX_TURNS {
-        let (mut top, mut bottom) = (DVec3::ZERO, DVec3::ZERO);
-        for part in parts {
-            let [a, b] = regressor(part);
-            let exceeded = (part.target[0] + part.target[1]).cmple(found * (a + b));
-            // What was measured begins.
-            let bound_met = part.censored & if turn == 0 { BVec3::TRUE } else { exceeded };
-            let weight = DVec3::select(bound_met, DVec3::ZERO, part.weight);
-            top += weight * (a * part.target[1] + b * part.target[0]) * 0.5;
-            bottom += weight * a * b;
+/// Weighted least squares of the targets on one regressor, unbiased by path noise. Censored targets count only while the
+/// solution is below them; the first iteration uses uncensored ones alone.
+fn least_squares(
+    clusters: &[OwnRadiance],
+    regressor: impl Fn(&OwnRadiance) -> [DVec3; 2],
+) -> DVec3 {
+    let mut solution = DVec3::ZERO;
+    for iteration in 0..MAX_ITERATIONS {
+        let (mut numerator, mut denominator) = (DVec3::ZERO, DVec3::ZERO);
+        for cluster in clusters {
+            let [a, b] = regressor(cluster);
+            let exceeded = (cluster.target[0] + cluster.target[1]).cmple(solution * (a + b));
+            let bound_met = cluster.censored
+                & if iteration == 0 {
+                    BVec3::TRUE
+                } else {
+                    exceeded
+                };
+            let weight = DVec3::select(bound_met, DVec3::ZERO, cluster.weight);
+            numerator += weight * (a * cluster.target[1] + b * cluster.target[0]) * 0.5;
+            denominator += weight * a * b;
         }
-        // Where all bounds are exceeded there is nothing left to change.
-        let next = DVec3::select(bottom.cmpgt(DVec3::ZERO), top / bottom, found);
-        if turn > 0 && next == found {
+        // The solution stays where all bounds are met.
+        let is_determined = denominator.cmpgt(DVec3::ZERO);
+        let next = DVec3::select(is_determined, numerator / denominator, solution);
+        if iteration > 0 && next == solution {
             break;
         }
-        found = next;
+        solution = next;
     }
-    found
+    solution
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse::paths::CachedCluster;
-    use crate::inverse::paths::Vertex;
     use crate::inverse::paths::clusters::Cluster;
+    use crate::inverse::paths::{CachedCluster, Vertex};
 
-    /// A cluster of an object whose paths gather `light` with some noise and whose photograph shows `measured`.
+    /// A cluster whose paths have the incident radiance `light`, with some noise, and whose photograph shows `measured`.
     fn cluster(object: u32, index: usize, light: f32, measured: f32) -> CachedCluster {
         let path = |set: usize| Vertex {
             emission_weight: 1.0,
@@ -260,14 +263,8 @@ mod tests {
         };
         CachedCluster {
             cluster: Cluster {
-                frame: 0,
-                object,
-                pixels: vec![0],
-                paths: 1,
-                measured: Vec3::splat(measured),
-                censored: BVec3::FALSE,
                 weight: Vec3::splat(1.0 / (measured * measured + 0.25)),
-                dark: Vec3::ONE,
+                ..Cluster::unit(object, 1, Vec3::splat(measured))
             },
             vertices: vec![path(0), path(1)],
             ends: vec![1, 2],
@@ -307,8 +304,8 @@ mod tests {
         assert!((changes[0].value - Vec3::splat(8.0)).length() < 1e-5);
     }
 
-    /// One path of a thousand strays to a light so near that its cluster seems to receive a hundred times what it does: what
-    /// the other clusters say still holds, for the lamp as for the wall.
+    /// One outlier path makes its cluster seem to receive a hundred times its irradiance. The other clusters still decide, for
+    /// the lamp and for the wall.
     #[test]
     fn a_path_that_strays_decides_nothing() {
         let mut strayed = room();
@@ -352,7 +349,7 @@ mod tests {
         assert_eq!(classify(&cache, &unknowns, &[Role::Reflector]), []);
     }
 
-    /// Neither role explains stripes; that one fits a little better by chance decides nothing.
+    /// Neither role explains stripes; a small advantage by chance decides nothing.
     #[test]
     fn a_textured_wall_stays_a_reflector() {
         let cache = cache((0..40).map(|index| {
@@ -386,7 +383,7 @@ mod tests {
         assert_eq!(changes.len(), 1, "{changes:?}");
         assert_eq!((changes[0].object, changes[0].role), (1, Role::Emitter));
         assert!((changes[0].value - Vec3::ONE).length() < 1e-5);
-        // Brighter than its photographs, as its light asks for, it stays one.
+        // An emitter brighter than its lower bounds stays one.
         unknowns.albedo[1] = Vec3::ZERO;
         unknowns.emission[1] = Vec3::splat(8.0);
         let settled = classify(&cache, &unknowns, &[Role::Reflector, Role::Emitter]);

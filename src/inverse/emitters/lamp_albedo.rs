@@ -1,10 +1,9 @@
-//! What lamps reflect of the room's light, behind their own: an unknown that is fitted to be left out again.
+//! Albedos of lamps, as nuisance parameters: they are fitted together with the other unknowns and then set to zero.
 //!
-//! Where a lamp is seen, its own light and what it reflects are one. Its unknowns are therefore taken to be all that
-//! leaves it, as its pixels show it in the mean, and its albedo at that. What the albedo then changes is from where on
-//! the lamp, and so to where in the room, how much light goes: a shade that is bright on its side towards a white
-//! ceiling sends more there than its lower side tells. No photograph need determine it; the other unknowns, and their
-//! standard errors, then hold what it may be.
+//! In pixels of a lamp, emitted and reflected light cannot be separated. The unknowns are therefore the lamp's mean exitant
+//! radiance, as its pixels show it, and its albedo at fixed exitance. The albedo then only changes how the exitance is
+//! distributed over the lamp, and so over the room: a shade below a white ceiling is brighter on its upper side than its lower
+//! side shows. The photographs need not determine the albedo; its uncertainty enters the other unknowns' standard errors.
 
 use crate::inverse::fit::prior::Prior;
 use crate::inverse::paths::evaluate::Linearised;
@@ -12,15 +11,15 @@ use crate::inverse::roles::Role;
 use crate::inverse::unknowns::Unknowns;
 use glam::{DVec3, Vec3};
 
-/// The same beliefs with nothing expected of the albedos of lamps.
+/// The prior without terms for the albedos of lamps.
 pub fn beliefs(prior: &Prior, roles: &[Role]) -> Prior {
     let mut prior = prior.clone();
     lamps(roles).for_each(|k| prior.forget_albedo(k));
     prior
 }
 
-/// Turns the derivatives by a lamp's albedo from those at a fixed emission into those at a fixed mean of all that leaves
-/// it where it is seen. `places` tells the row of each parameter.
+/// Changes the derivatives with respect to lamps' albedos from fixed emission to fixed mean exitant radiance in their pixels.
+/// `places` maps parameters to rows.
 pub fn hold_exitance(clusters: &mut [Linearised], roles: &[Role], places: &[usize]) {
     for lamp in lamps(roles) {
         let rows = [lamp, roles.len() + lamp].map(|parameter| places[parameter]);
@@ -31,7 +30,7 @@ pub fn hold_exitance(clusters: &mut [Linearised], roles: &[Role], places: &[usiz
     }
 }
 
-/// Sets the albedos of lamps to zero, so that their emission is all that leaves them.
+/// Sets the albedos of lamps to zero, so that their emission is their whole exitant radiance.
 pub fn leave_out(unknowns: &mut Unknowns, roles: &[Role]) {
     lamps(roles).for_each(|k| unknowns.albedo[k] = Vec3::ZERO);
 }
@@ -40,27 +39,28 @@ fn lamps(roles: &[Role]) -> impl Iterator<Item = usize> + '_ {
     (0..roles.len()).filter(|&k| roles[k] == Role::Emitter)
 }
 
-/// Mean derivatives of a cluster by two parameters.
+/// A cluster's derivatives with respect to two parameters, mean of both sets.
 fn derivatives(cluster: &Linearised, rows: [usize; 2]) -> [DVec3; 2] {
     rows.map(|row| {
-        let found = cluster.rows.iter().find(|r| r.0 == row);
-        found.map_or(DVec3::ZERO, |&(_, a, b)| (a + b) * 0.5)
+        let derivative = cluster.rows.iter().find(|r| r.0 == row);
+        derivative.map_or(DVec3::ZERO, |&(_, a, b)| (a + b) * 0.5)
     })
 }
 
-/// Radiance that a lamp of albedo one would reflect where it is seen: the regression of what its clusters would reflect on
-/// the fraction of the lamp in them.
+/// Mean radiance that a lamp would reflect in its pixels with an albedo of one: the regression of its clusters' derivatives with
+/// respect to albedo on those with respect to emission.
 fn reflected(clusters: &[Linearised], lamp: usize, rows: [usize; 2]) -> DVec3 {
     let own = clusters.iter().filter(|c| c.object as usize == lamp);
-    let (top, bottom) = own.fold((DVec3::ZERO, DVec3::ZERO), |(top, bottom), cluster| {
+    let (numerator, denominator) = own.fold((DVec3::ZERO, DVec3::ZERO), |(n, d), cluster| {
         let [albedo, emission] = derivatives(cluster, rows);
         let weighted = cluster.weight * emission;
-        (top + weighted * albedo, bottom + weighted * emission)
+        (n + weighted * albedo, d + weighted * emission)
     });
-    DVec3::select(bottom.cmpgt(DVec3::ZERO), top / bottom, DVec3::ZERO)
+    let is_determined = denominator.cmpgt(DVec3::ZERO);
+    DVec3::select(is_determined, numerator / denominator, DVec3::ZERO)
 }
 
-/// Takes from the derivative by a lamp's albedo what its emission gives way by.
+/// Subtracts `reflected` times the derivative with respect to emission from the derivative with respect to albedo.
 fn shift(cluster: &mut Linearised, [albedo, emission]: [usize; 2], reflected: DVec3) {
     let Some(&(_, a, b)) = cluster.rows.iter().find(|r| r.0 == emission) else {
         return;
@@ -80,22 +80,16 @@ mod tests {
     use super::*;
     use crate::inverse::fit::linear::descend;
     use crate::inverse::roles;
-    use glam::BVec3;
-
-    /// A lamp (0) of emission 10 that reflects `albedo` of the light on it, 1 below and 3 above, seen from below; a floor (1)
-    /// under it and a ceiling (2) over it, each photographed, with noise that cancels, and lit by its side of the lamp.
+    /// A lamp (0) of emission 10 that reflects `albedo` × 1 below and `albedo` × 3 above, seen from below. A floor (1) is lit by
+    /// its lower side and a ceiling (2) by its upper side; both are photographed, with noise that cancels.
     fn room(albedo: f64, seen: bool) -> Vec<Linearised> {
         let below = 10.0 + albedo;
         let cluster = |object: u32, measured: f64, model: f64, rows: &[(usize, f64)]| Linearised {
-            object,
-            weight: DVec3::ONE,
-            pixels: 1.0,
-            residuals: [DVec3::splat(measured - model); 2],
-            censored: BVec3::FALSE,
             own: DVec3::splat(rows[0].1),
             rows: (rows.iter())
                 .map(|&(row, d)| (row, DVec3::splat(d), DVec3::splat(d)))
                 .collect(),
+            ..Linearised::unit(object, DVec3::splat(measured - model))
         };
         // Rows: albedos of lamp, floor, ceiling, and the lamp's emission; about emission 10, albedos 0 and 0.5.
         let lamp = cluster(0, below, 10.0, &[(3, 1.0), (0, 1.0)]);
@@ -110,7 +104,7 @@ mod tests {
             cluster.residuals = cluster.residuals.map(|r| r + noise);
         }
         if seen {
-            // The upper side is seen too.
+            // A pixel of the upper side.
             all.push(cluster(0, 10.0 + 3.0 * albedo, 10.0, &[(3, 1.0), (0, 3.0)]));
         }
         all
@@ -145,8 +139,8 @@ mod tests {
         (plain, found)
     }
 
-    /// The ceiling has more light than the lamp's lower side tells, by an albedo that no photograph shows: it is then taken
-    /// for one half, which errs by less than none at all; what leaves the lamp is what is seen of it either way.
+    /// The ceiling receives more light than the lamp's lower side shows, by an albedo that no photograph determines. A marginal
+    /// albedo of one half errs by less than zero. The exitance is that of the lamp's pixels either way.
     #[test]
     fn a_lamp_that_reflects_is_no_brighter_and_lights_the_ceiling_more() {
         for albedo in [0.3, 0.7, 0.9] {

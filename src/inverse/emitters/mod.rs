@@ -1,4 +1,4 @@
-//! Which objects give light, and what lamps reflect behind their own light.
+//! Classifies objects as emitters or reflectors, and accounts for the light that lamps reflect.
 
 pub mod classify;
 pub mod lamp_albedo;

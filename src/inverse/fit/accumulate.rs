@@ -1,4 +1,4 @@
-//! Rounds of paths added up without keeping them: linearised about one point, averaged cluster by cluster.
+//! Sums linearised clusters over rounds of paths, so that the paths need not be kept.
 
 use crate::inverse::paths::evaluate::Linearised;
 use glam::DVec3;
@@ -11,7 +11,7 @@ pub struct Accumulated {
 }
 
 impl Accumulated {
-    /// Adds a round, linearised about the same unknowns, with the same clusters, as those before.
+    /// Adds a round with the same clusters, linearised about the same unknowns, as the previous rounds.
     pub fn add(&mut self, round: Vec<Linearised>) {
         self.rounds += 1;
         if self.clusters.is_empty() {
@@ -26,19 +26,19 @@ impl Accumulated {
                 sum.residuals[set] += new.residuals[set];
             }
             sum.own += new.own;
-            for (place, a, b) in new.rows {
-                match sum.rows.binary_search_by_key(&place, |r| r.0) {
+            for (parameter, a, b) in new.rows {
+                match sum.rows.binary_search_by_key(&parameter, |r| r.0) {
                     Ok(at) => {
                         sum.rows[at].1 += a;
                         sum.rows[at].2 += b;
                     }
-                    Err(at) => sum.rows.insert(at, (place, a, b)),
+                    Err(at) => sum.rows.insert(at, (parameter, a, b)),
                 }
             }
         }
     }
 
-    /// Rounds so far.
+    /// Number of rounds added.
     pub fn rounds(&self) -> u32 {
         self.rounds
     }
@@ -58,7 +58,7 @@ impl Accumulated {
                 rows: c
                     .rows
                     .iter()
-                    .map(|&(place, a, b)| (place, a * scale, b * scale))
+                    .map(|&(parameter, a, b)| (parameter, a * scale, b * scale))
                     .collect(),
             })
             .collect()
@@ -68,18 +68,14 @@ impl Accumulated {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse::fit::equations::Coupling;
-    use crate::inverse::fit::equations::NormalEquations;
+    use crate::inverse::fit::equations::{Coupling, NormalEquations};
     use crate::inverse::fit::prior::Prior;
     use crate::inverse::fit::robust_weights::RobustWeights;
-    use crate::inverse::paths::CachedCluster;
-    use crate::inverse::paths::NO_LAMP;
-    use crate::inverse::paths::PathCache;
-    use crate::inverse::paths::Vertex;
     use crate::inverse::paths::clusters::Cluster;
+    use crate::inverse::paths::{CachedCluster, NO_LAMP, PathCache, Vertex};
     use crate::inverse::unknowns::Unknowns;
     use crate::math::rng::Stream;
-    use glam::{BVec3, Vec3};
+    use glam::Vec3;
 
     const SURFACES: usize = 3;
     const PIXELS: usize = 2;
@@ -112,14 +108,9 @@ mod tests {
             }
         }
         let cluster = Cluster {
-            frame: 0,
-            object: 0,
-            pixels: (0..PIXELS as u32).collect(),
             paths: count,
-            measured: Vec3::new(0.5, 0.6, 0.7),
-            censored: BVec3::FALSE,
             weight: Vec3::new(1.0, 2.0, 3.0),
-            dark: Vec3::ONE,
+            ..Cluster::unit(0, PIXELS as u32, Vec3::new(0.5, 0.6, 0.7))
         };
         PathCache {
             clusters: vec![CachedCluster {
@@ -146,13 +137,13 @@ mod tests {
         };
         // All but one parameter are free.
         let free: Vec<usize> = (0..2 * SURFACES).filter(|&p| p != 4).collect();
-        let mut place = vec![usize::MAX; 2 * SURFACES];
-        free.iter().enumerate().for_each(|(row, &p)| place[p] = row);
+        let mut row_of = vec![usize::MAX; 2 * SURFACES];
+        (free.iter().enumerate()).for_each(|(row, &p)| row_of[p] = row);
 
         let mut sums = Accumulated::default();
         for r in 0..ROUNDS {
             let cache = cache(|pixel, set| round(r, pixel, set));
-            sums.add(cache.linearise(&unknowns, &place, &[]));
+            sums.add(cache.linearise(&unknowns, &row_of, &[]));
         }
         assert_eq!(sums.rounds(), ROUNDS as u32);
         let even = RobustWeights::even(SURFACES);

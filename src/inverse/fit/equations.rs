@@ -1,7 +1,7 @@
 //! The normal equations of the fit.
 //!
-//! With one set of paths for both, noise in the derivative correlates with noise in the residual and an ℓ2 fit is
-//! biased towards darkness. Products are therefore taken across the two independent sets A and B.
+//! If derivatives and residuals come from the same paths, their noise is correlated and a least-squares fit is biased towards
+//! darkness. Products are therefore taken across the two independent sets A and B.
 
 use crate::inverse::fit::prior::Prior;
 use crate::inverse::fit::robust_weights::RobustWeights;
@@ -14,45 +14,45 @@ use glam::DVec3;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-/// Up to so many parameters, matrices over pairs of them are kept.
+/// Greatest number of parameters for which dense matrices are stored.
 const MAX_DENSE: usize = 256;
 
-/// Sums over the clusters of the fit for one set of unknowns.
+/// Sums over the clusters of the fit at one value of the unknowns. Vectors have one entry per free parameter.
 #[derive(Debug, Clone)]
 pub struct NormalEquations {
-    /// ½ Σ w (J_A r_B + J_B r_A) of each free parameter, the unbiased direction of descent.
+    /// ½ Σ w (J_A r_B + J_B r_A), the unbiased direction of descent.
     pub descent: Vec<DVec3>,
     /// Diagonal of the Hessian Σ w J̄ J̄ᵀ with J̄ = (J_A + J_B)/2.
     pub diagonal: Vec<DVec3>,
-    /// Diagonal of the derivative of minus `descent`, Σ w J_A J_B: without the square of the paths' noise in J̄.
+    /// Σ w J_A J_B, the diagonal of the derivative of −`descent`. Unlike `diagonal` it lacks the squared path noise of J̄.
     pub across: Vec<DVec3>,
     /// Diagonal of the scatter Σ g gᵀ of the clusters' contributions g to `descent`.
     pub scatter: Vec<DVec3>,
-    /// Σ w r_A r_B, an unbiased measure of the squared error.
+    /// Σ w r_A r_B, an unbiased estimate of the squared error.
     pub objective: DVec3,
-    /// Clusters in the sums that say anything.
+    /// Number of clusters with a residual in any channel.
     pub clusters: usize,
-    /// Pixels of those clusters.
+    /// Number of pixels in those clusters.
     pub pixels: f64,
-    /// What is believed besides.
+    /// The prior of the unknowns.
     pub prior: Prior,
-    /// How parameters depend on each other.
+    /// The off-diagonal terms.
     pub coupling: Coupling,
 }
 
-/// Hessian and scatter.
+/// Hessian and scatter of all pairs of parameters.
 #[derive(Debug, Clone)]
 pub enum Coupling {
-    /// As matrices.
+    /// As dense matrices.
     Dense(Matrices),
-    /// As the clusters' rows.
+    /// As the clusters' sparse rows.
     Sparse(Rows),
 }
 
-/// Hessian and scatter as matrices, lower triangles.
+/// Hessian and scatter as dense matrices; only the lower triangles are set.
 #[derive(Debug, Clone)]
 pub struct Matrices {
-    /// Per channel: Σ w J̄ J̄ᵀ; never indefinite.
+    /// Per channel: Σ w J̄ J̄ᵀ, positive semidefinite.
     pub hessian: [DMatrix<f64>; 3],
     /// Per channel: Σ g gᵀ, for standard errors.
     pub scatter: [DMatrix<f64>; 3],
@@ -88,7 +88,7 @@ impl NormalEquations {
         Self::with_coupling(linearised, n, robust, prior, coupling)
     }
 
-    /// The same with the couplings given.
+    /// The same with given off-diagonal terms.
     pub fn with_coupling(
         linearised: &[Linearised],
         n: usize,
@@ -96,15 +96,15 @@ impl NormalEquations {
         prior: &Prior,
         coupling: Coupling,
     ) -> Self {
-        let telling = || linearised.iter().filter(|c| !c.bound_met().all());
+        let active = || linearised.iter().filter(|c| !c.bound_met().all());
         let mut sums = Self {
             descent: vec![DVec3::ZERO; n],
             diagonal: vec![DVec3::ZERO; n],
             across: vec![DVec3::ZERO; n],
             scatter: vec![DVec3::ZERO; n],
             objective: DVec3::ZERO,
-            clusters: telling().count(),
-            pixels: telling().map(|c| c.pixels).sum(),
+            clusters: active().count(),
+            pixels: active().map(|c| c.pixels).sum(),
             prior: prior.clone(),
             coupling,
         };
@@ -122,8 +122,7 @@ impl NormalEquations {
         sums
     }
 
-    /// Root of the mean squared residual of a pixel over the level that it is weighed by, over pixels and channels; free of the
-    /// paths' noise, which differs between the two sets.
+    /// Root mean square of the residuals relative to the pixels' levels, over pixels and channels, without path noise.
     pub fn relative_residual(&self) -> f64 {
         let mean = self.objective.element_sum() / (3.0 * self.pixels.max(1.0));
         mean.max(0.0).sqrt()
@@ -131,38 +130,38 @@ impl NormalEquations {
 }
 
 impl Matrices {
-    /// Of linearised clusters with `n` free parameters.
+    /// From linearised clusters with `n` free parameters.
     pub fn new(linearised: &[Linearised], n: usize, robust: &RobustWeights) -> Self {
         let all = vec![DVec3::ONE; linearised.len()];
-        Self::with_residuals_kept(linearised, n, robust, &all)
+        Self::with_scores_over(linearised, n, robust, &all)
     }
 
-    /// The same with each cluster's score over the fraction of its residual that it keeps, in the scatter alone.
-    pub fn with_residuals_kept(
+    /// The same with each cluster's score divided by its entry of `divisors` in the scatter.
+    pub fn with_scores_over(
         linearised: &[Linearised],
         n: usize,
         robust: &RobustWeights,
-        kept: &[DVec3],
+        divisors: &[DVec3],
     ) -> Self {
-        let terms: Vec<Vec<Term>> = (linearised.par_iter().zip(kept))
-            .map(|(cluster, kept)| Term::of(cluster, robust.weight(cluster), *kept))
+        let terms: Vec<Vec<Term>> = (linearised.par_iter().zip(divisors))
+            .map(|(cluster, divisor)| Term::all(cluster, robust.weight(cluster), *divisor))
             .collect();
-        // For each row, the clusters that meet it and the place of its term there.
-        let mut where_met: Vec<Vec<(u32, u32)>> = vec![Vec::new(); n];
+        // For each parameter, the clusters with a term of it and the index of that term.
+        let mut terms_of: Vec<Vec<(u32, u32)>> = vec![Vec::new(); n];
         for (cluster, terms) in terms.iter().enumerate() {
-            for (place, term) in terms.iter().enumerate() {
-                where_met[term.place].push((cluster as u32, place as u32));
+            for (index, term) in terms.iter().enumerate() {
+                terms_of[term.parameter].push((cluster as u32, index as u32));
             }
         }
-        // Each row of the lower triangles by itself, its clusters in order.
-        let rows: Vec<Vec<[DVec3; 2]>> = (where_met.par_iter().enumerate())
-            .map(|(i, met)| {
+        // Each row of the lower triangles is summed in the order of the clusters.
+        let rows: Vec<Vec<[DVec3; 2]>> = (terms_of.par_iter().enumerate())
+            .map(|(i, own_terms)| {
                 let mut row = vec![[DVec3::ZERO; 2]; i + 1];
-                for &(cluster, place) in met {
-                    let here = &terms[cluster as usize];
-                    let own = here[place as usize];
-                    for other in here.iter().filter(|other| other.place <= i) {
-                        let [h, s] = &mut row[other.place];
+                for &(cluster, index) in own_terms {
+                    let terms = &terms[cluster as usize];
+                    let own = terms[index as usize];
+                    for other in terms.iter().filter(|other| other.parameter <= i) {
+                        let [h, s] = &mut row[other.parameter];
                         *h += own.weighted * other.derivative;
                         *s += own.score * other.score;
                     }
@@ -172,7 +171,7 @@ impl Matrices {
             .collect();
         let matrix = |which: usize, channel: usize| {
             DMatrix::from_fn(n, n, |i, j| match rows[i].get(j) {
-                Some(both) => both[which][channel],
+                Some(entry) => entry[which][channel],
                 None => 0.0,
             })
         };
@@ -183,28 +182,28 @@ impl Matrices {
     }
 }
 
-/// What one parameter adds to the matrices in one cluster.
+/// A cluster's factors of one parameter in the matrices.
 #[derive(Debug, Clone, Copy)]
 struct Term {
-    place: usize,
-    /// Sum of the derivatives of both sets.
+    parameter: usize,
+    /// J_A + J_B.
     derivative: DVec3,
-    /// A quarter of the same times the cluster's weight, so that products are those of means.
+    /// w (J_A + J_B) / 4, so that its product with `derivative` is w J̄ J̄.
     weighted: DVec3,
-    /// Contribution to the descent, over the fraction of the residual that is kept.
+    /// Contribution to the descent, over the divisor.
     score: DVec3,
 }
 
 impl Term {
-    fn of(cluster: &Linearised, weight: DVec3, kept: DVec3) -> Vec<Self> {
+    fn all(cluster: &Linearised, weight: DVec3, divisor: DVec3) -> Vec<Self> {
         let scores = cluster.scores(weight);
         let terms = cluster.rows.iter().zip(scores);
         terms
-            .map(|(&(place, a, b), score)| Self {
-                place,
+            .map(|(&(parameter, a, b), score)| Self {
+                parameter,
                 derivative: a + b,
                 weighted: weight * (a + b) * 0.25,
-                score: score / kept,
+                score: score / divisor,
             })
             .collect()
     }

@@ -1,4 +1,4 @@
-//! How sure a fit is: standard errors of what was fitted, and tests of what was left out.
+//! Standard errors of fitted parameters, and score tests of parameters held fixed.
 
 use crate::inverse::fit::equations::{Coupling, Matrices, NormalEquations};
 use crate::inverse::fit::gauss_newton::noise;
@@ -11,46 +11,45 @@ use glam::{DVec3, Vec3};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Draws that standard errors are taken from where matrices would be too large: they are then within some 10 % of what
-/// matrices would give.
+/// Bootstrap draws for standard errors without dense matrices: standard errors are then accurate to 10 %.
 const DRAWS: u64 = 48;
 /// Relative residual of a draw's solution.
 const DRAW_TOLERANCE: f64 = 1e-2;
 /// Key of the draws.
 const KEY: u64 = 0x6d75_6c74;
-/// Parameters that are tested exactly where matrices would be too large.
+/// Number of parameters that are tested exactly without dense matrices.
 const MAX_EXACT: usize = 24;
-/// Fraction of a curvature that is taken not to be noise at least.
+/// Least fraction of a curvature that is taken to be signal.
 const MIN_SIGNAL: f64 = 0.05;
-/// Fraction of a cluster's residual that it is taken to keep at least when the fit follows it.
+/// Least value of one minus a cluster's leverage.
 const MIN_KEPT: f64 = 0.1;
-/// Fraction of its curvature that a parameter must keep when the others follow it, to be told apart from them.
+/// Least fraction of its curvature that a parameter keeps when the active ones are eliminated. Below, it is degenerate.
 const MIN_OWN: f64 = 1e-9;
 
 /// Standard errors of all parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StandardErrors {
-    /// Of each object's albedo; the prior's deviation where nothing is known.
+    /// Of each object's albedo; the prior's standard deviation if it was not fitted.
     pub albedo: Vec<Vec3>,
-    /// Of each object's emission; infinite where nothing is known.
+    /// Of each object's emission; infinite if it was not fitted.
     pub emission: Vec<Vec3>,
 }
 
-/// A parameter that was held fixed, and what the photographs say of setting it free.
+/// Score test of a parameter that is held fixed: the step it would take if it were set free.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Released {
+pub struct ScoreTest {
     /// Index into albedos, then emissions.
     pub index: usize,
-    /// The step it would take, per channel.
+    /// The step, per channel.
     pub step: [f64; 3],
-    /// Standard error of that step, per channel.
+    /// Standard error of the step, per channel.
     pub stderr: [f64; 3],
-    /// Half the second derivative of the squared error along it when the active ones follow, per channel.
+    /// Half the second derivative of the squared error with the active parameters eliminated, per channel.
     pub curvature: [f64; 3],
 }
 
-impl Released {
-    /// χ² of three degrees of freedom over the channels that would rise.
+impl ScoreTest {
+    /// χ² with three degrees of freedom, over the channels that would increase.
     pub fn significance(&self) -> f64 {
         (0..3)
             .filter(|&c| self.step[c] > 0.0 && self.stderr[c] > 0.0)
@@ -58,7 +57,7 @@ impl Released {
             .sum()
     }
 
-    /// By how much the squared error falls over the channels that would rise.
+    /// Decrease of the squared error, over the channels that would increase.
     pub fn gain(&self) -> f64 {
         (0..3)
             .filter(|&c| self.step[c] > 0.0)
@@ -67,20 +66,21 @@ impl Released {
     }
 }
 
-/// Standard errors of the parameters in `free`: the sandwich (H + P)⁻¹ (S + vP) (H + P)⁻¹ with S the scatter of the
-/// clusters' scores, so that noise of photographs and of paths both count, whatever their distribution (Huber 1967).
+/// Standard errors of the parameters in `free`: the sandwich estimator (H + P)⁻¹ (S + vP) (H + P)⁻¹ with the prior's precision P
+/// and the scatter S of the clusters' scores. It includes the noise of photographs and of paths for any distribution (Huber
+/// 1967).
 ///
-/// H holds the square of the derivatives' own noise, which the descent does not: what few paths meet would seem better known
-/// than it is. Errors grow by the fraction of that noise in the parameter's curvature.
+/// H contains the squared noise of the derivatives, which the descent does not. It would make parameters that few paths meet
+/// seem too certain, so errors are multiplied by the ratio of both curvatures.
 pub fn standard_errors(
     equations: &NormalEquations,
     free: &[usize],
     objects: usize,
 ) -> StandardErrors {
-    let beliefs = Beliefs::new(equations, free);
+    let prior = PriorTerms::new(equations, free);
     let variances = match &equations.coupling {
-        Coupling::Dense(matrices) => sandwich(matrices, &beliefs),
-        Coupling::Sparse(rows) => multipliers(rows, &beliefs),
+        Coupling::Dense(matrices) => sandwich(matrices, &prior),
+        Coupling::Sparse(rows) => bootstrap(rows, &prior),
     };
     let mut errors = StandardErrors {
         albedo: vec![Vec3::splat(ALBEDO_DEVIATION); objects],
@@ -88,8 +88,8 @@ pub fn standard_errors(
     };
     let curvatures = equations.diagonal.iter().zip(&equations.across);
     for ((&index, variance), (diagonal, across)) in free.iter().zip(variances).zip(curvatures) {
-        let noisy = (*diagonal / signal(*diagonal, *across)).max(DVec3::ONE);
-        let error = (variance.max(DVec3::ZERO).powf(0.5) * noisy).as_vec3();
+        let inflation = (*diagonal / signal(*diagonal, *across)).max(DVec3::ONE);
+        let error = (variance.max(DVec3::ZERO).powf(0.5) * inflation).as_vec3();
         let target = match index.checked_sub(objects) {
             None => &mut errors.albedo[index],
             Some(emitter) => &mut errors.emission[emitter],
@@ -100,35 +100,34 @@ pub fn standard_errors(
     errors
 }
 
-/// The same equations with the scatter that the clusters' scores have before the fit follows them: each over what it keeps
-/// of its residual, one less its leverage (MacKinnon and White 1985, HC3). Few clusters know a lamp or a small object, and
-/// the fit goes through them as if they had no noise. Matrices only: where unknowns are so many that rows take their place, the
-/// scatter stays what is left, and errors of what few clusters see are too small.
+/// The equations with leave-one-out scores in the scatter: each cluster's score over one minus its leverage (HC3, MacKinnon and
+/// White 1985). Few clusters determine a lamp or a small object, and the fit passes through them as if they had no noise. Only
+/// dense matrices are corrected; with sparse rows, errors of parameters that few clusters determine are too small.
 pub fn jackknifed(
     mut equations: NormalEquations,
     clusters: &[Linearised],
     robust: &RobustWeights,
     free: &[usize],
 ) -> NormalEquations {
-    let beliefs = Beliefs::new(&equations, free);
+    let prior = PriorTerms::new(&equations, free);
     if let Coupling::Dense(matrices) = &mut equations.coupling {
-        let inverses = [0, 1, 2].map(|c| inverse(&matrices.hessian[c], &beliefs.added, c));
+        let inverses = [0, 1, 2].map(|c| inverse(&matrices.hessian[c], &prior.added, c));
         let kept: Vec<DVec3> = (clusters.par_iter())
             .map(|cluster| {
                 let weight = robust.weight(cluster);
                 DVec3::from_array(std::array::from_fn(|c| {
-                    let leverage = (inverses[c].as_ref()).map_or(0.0, |m| along(m, cluster, c));
+                    let leverage = (inverses[c].as_ref()).map_or(0.0, |m| quadratic(m, cluster, c));
                     (1.0 - weight[c] * leverage).max(MIN_KEPT)
                 }))
             })
             .collect();
-        *matrices = Matrices::with_residuals_kept(clusters, free.len(), robust, &kept);
+        *matrices = Matrices::with_scores_over(clusters, free.len(), robust, &kept);
     }
     equations
 }
 
 /// J̄ᵀ M J̄ of a cluster's derivatives in one channel.
-fn along(matrix: &DMatrix<f64>, cluster: &Linearised, channel: usize) -> f64 {
+fn quadratic(matrix: &DMatrix<f64>, cluster: &Linearised, channel: usize) -> f64 {
     let slope = |&(row, a, b): &(usize, DVec3, DVec3)| (row, 0.5 * (a[channel] + b[channel]));
     let mut sum = 0.0;
     for (i, left) in cluster.rows.iter().map(slope) {
@@ -144,22 +143,23 @@ fn along(matrix: &DMatrix<f64>, cluster: &Linearised, channel: usize) -> f64 {
     sum
 }
 
-/// The part of a parameter's curvature that is no noise of its derivatives, given its curvature and that across the two sets.
+/// A parameter's curvature without the noise of its derivatives, from [`NormalEquations::diagonal`] and
+/// [`NormalEquations::across`].
 pub fn signal(diagonal: DVec3, across: DVec3) -> DVec3 {
     across.max(diagonal * MIN_SIGNAL)
 }
 
-/// What is believed of the free parameters, in the units of the normal equations.
-struct Beliefs {
-    /// Precision of each.
+/// The prior of the free parameters, in the units of the normal equations.
+struct PriorTerms {
+    /// Precision of each parameter.
     precision: Vec<DVec3>,
-    /// What keeps the diagonal positive where no path touches.
+    /// Terms added to the diagonal: the precision, and one for parameters that no path meets.
     added: Vec<DVec3>,
-    /// Variance of one cluster.
+    /// Noise variance of one cluster.
     variance: DVec3,
 }
 
-impl Beliefs {
+impl PriorTerms {
     fn new(equations: &NormalEquations, free: &[usize]) -> Self {
         let variance = noise(equations);
         let precision: Vec<DVec3> = (free.iter())
@@ -176,7 +176,8 @@ impl Beliefs {
     }
 }
 
-/// Inverse of one channel's Hessian over the first parameters with `added` on its diagonal, damped where it must be.
+/// Inverse of one channel's Hessian plus `added` on the diagonal, over the first `added.len()` parameters; damped as far as
+/// needed to be positive definite, `None` if that fails.
 fn inverse(hessian: &DMatrix<f64>, added: &[DVec3], channel: usize) -> Option<DMatrix<f64>> {
     let n = added.len();
     let mut damping = 0.0;
@@ -197,17 +198,17 @@ fn inverse(hessian: &DMatrix<f64>, added: &[DVec3], channel: usize) -> Option<DM
     None
 }
 
-/// Variances by matrices; negative where a channel has no inverse.
-fn sandwich(matrices: &Matrices, beliefs: &Beliefs) -> Vec<DVec3> {
-    let n = beliefs.added.len();
+/// Variances from dense matrices; −1 in channels without an inverse.
+fn sandwich(matrices: &Matrices, prior: &PriorTerms) -> Vec<DVec3> {
+    let n = prior.added.len();
     let mut variances = vec![DVec3::NEG_ONE; n];
     for channel in 0..3 {
-        let Some(bread) = inverse(&matrices.hessian[channel], &beliefs.added, channel) else {
+        let Some(bread) = inverse(&matrices.hessian[channel], &prior.added, channel) else {
             continue;
         };
         let scatter = &matrices.scatter[channel];
         let meat = DMatrix::from_fn(n, n, |a, b| {
-            let own = beliefs.variance[channel] * beliefs.precision[a][channel];
+            let own = prior.variance[channel] * prior.precision[a][channel];
             scatter[(a.max(b), a.min(b))] + if a == b { own } else { 0.0 }
         });
         let covariance = &bread * meat * &bread;
@@ -218,11 +219,11 @@ fn sandwich(matrices: &Matrices, beliefs: &Beliefs) -> Vec<DVec3> {
     variances
 }
 
-/// The same variances from random draws: with signs ε of the clusters, (H + P)⁻¹ Σ ε g scatters as the estimate does
-/// (the multiplier bootstrap, Wu 1986).
-fn multipliers(rows: &Rows, beliefs: &Beliefs) -> Vec<DVec3> {
-    let n = beliefs.added.len();
-    let (free, none) = (vec![DVec3::ONE; n], vec![DVec3::ZERO; n]);
+/// The same variances by the multiplier bootstrap (Wu 1986): with random signs ε of the clusters, (H + P)⁻¹ Σ ε g has the
+/// covariance of the estimate.
+fn bootstrap(rows: &Rows, prior: &PriorTerms) -> Vec<DVec3> {
+    let n = prior.added.len();
+    let (free, zero) = (vec![DVec3::ONE; n], vec![DVec3::ZERO; n]);
     let draws: Vec<Vec<DVec3>> = (0..DRAWS)
         .into_par_iter()
         .map(|draw| {
@@ -232,9 +233,9 @@ fn multipliers(rows: &Rows, beliefs: &Beliefs) -> Vec<DVec3> {
             };
             let mut right = rows.scores_times(|cluster| sign(0, cluster));
             for (i, b) in right.iter_mut().enumerate() {
-                *b += (beliefs.variance * beliefs.precision[i]).powf(0.5) * sign(1, i);
+                *b += (prior.variance * prior.precision[i]).powf(0.5) * sign(1, i);
             }
-            rows.solve(&beliefs.added, &free, &right, &none, DRAW_TOLERANCE)
+            rows.solve(&prior.added, &free, &right, &zero, DRAW_TOLERANCE)
         })
         .collect();
     (0..n)
@@ -242,55 +243,60 @@ fn multipliers(rows: &Rows, beliefs: &Beliefs) -> Vec<DVec3> {
         .collect()
 }
 
-/// For each parameter of `free` after the first `active` ones: the step it would take if it alone were set free besides
-/// the active ones, with its standard error (a score test, Rao 1948).
-pub fn release(equations: &NormalEquations, free: &[usize], active: usize) -> Vec<Released> {
-    let beliefs = Beliefs::new(equations, &free[..active]);
-    let mut released: Vec<Released> = (free[active..].iter())
-        .map(|&index| Released {
+/// Score tests (Rao 1948) of the parameters in `free` after the first `active` ones: for each, the step that it would take if it
+/// were set free together with the active ones, and the standard error of the step.
+pub fn score_tests(equations: &NormalEquations, free: &[usize], active: usize) -> Vec<ScoreTest> {
+    let prior = PriorTerms::new(equations, &free[..active]);
+    let mut results: Vec<ScoreTest> = (free[active..].iter())
+        .map(|&index| ScoreTest {
             index,
             step: [0.0; 3],
             stderr: [f64::INFINITY; 3],
             curvature: [0.0; 3],
         })
         .collect();
-    let tests = match &equations.coupling {
-        Coupling::Dense(matrices) => by_matrices(equations, matrices, &beliefs, active),
-        Coupling::Sparse(rows) => by_rows(equations, rows, &beliefs, active),
+    let eliminated = match &equations.coupling {
+        Coupling::Dense(matrices) => eliminate_dense(equations, matrices, &prior, active),
+        Coupling::Sparse(rows) => eliminate_sparse(equations, rows, &prior, active),
     };
-    for ((result, tested), row) in released.iter_mut().zip(tests).zip(active..) {
+    for ((result, own), row) in results.iter_mut().zip(eliminated).zip(active..) {
         let (diagonal, score) = (equations.diagonal[row], equations.descent[row]);
         for channel in 0..3 {
-            let curvature = tested.curvature[channel];
+            let curvature = own.curvature[channel];
             if curvature > MIN_OWN * diagonal[channel] && curvature > 0.0 {
                 result.curvature[channel] = curvature;
                 result.step[channel] = score[channel] / curvature;
-                result.stderr[channel] = tested.variance[channel].max(0.0).sqrt() / curvature;
+                result.stderr[channel] = own.variance[channel].max(0.0).sqrt() / curvature;
             }
         }
     }
-    released
+    results
 }
 
-/// What is left of a parameter when the active ones follow it.
-struct Tested {
-    /// Its curvature.
+/// A tested parameter with the active ones eliminated.
+#[derive(Clone)]
+struct Eliminated {
+    /// Its curvature (Schur complement).
     curvature: DVec3,
-    /// The variance of its score.
+    /// Variance of its score.
     variance: DVec3,
 }
 
-fn by_matrices(
+fn eliminate_dense(
     equations: &NormalEquations,
     matrices: &Matrices,
-    beliefs: &Beliefs,
+    prior: &PriorTerms,
     active: usize,
-) -> Vec<Tested> {
+) -> Vec<Eliminated> {
     let n = equations.diagonal.len();
-    let mut tests: Vec<Tested> = (active..n).map(|_| Tested::none()).collect();
+    let zero = Eliminated {
+        curvature: DVec3::ZERO,
+        variance: DVec3::ZERO,
+    };
+    let mut tests = vec![zero; n - active];
     for channel in 0..3 {
         let (hessian, scatter) = (&matrices.hessian[channel], &matrices.scatter[channel]);
-        let Some(inverse) = inverse(hessian, &beliefs.added, channel) else {
+        let Some(inverse) = inverse(hessian, &prior.added, channel) else {
             continue;
         };
         let active_scatter = DMatrix::from_fn(active, active, |a, b| scatter[(a.max(b), a.min(b))]);
@@ -306,16 +312,16 @@ fn by_matrices(
     tests
 }
 
-/// As [`by_matrices`], exactly for the parameters whose scores stand out most; the others as if nothing followed them.
-fn by_rows(
+/// As [`eliminate_dense`] for the parameters with the most significant scores; for the others nothing is eliminated.
+fn eliminate_sparse(
     equations: &NormalEquations,
     rows: &Rows,
-    beliefs: &Beliefs,
+    prior: &PriorTerms,
     active: usize,
-) -> Vec<Tested> {
+) -> Vec<Eliminated> {
     let n = equations.diagonal.len();
-    let mut tests: Vec<Tested> = (active..n)
-        .map(|row| Tested {
+    let mut tests: Vec<Eliminated> = (active..n)
+        .map(|row| Eliminated {
             curvature: equations.diagonal[row],
             variance: equations.scatter[row],
         })
@@ -328,32 +334,29 @@ fn by_rows(
         let known = scatter.cmpgt(DVec3::ZERO);
         DVec3::select(known, score * score / scatter, DVec3::ZERO).element_sum()
     };
-    let mut standing_out: Vec<(f64, usize)> = (active..n).map(|r| (significance(r), r)).collect();
-    standing_out.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    let mut ranked: Vec<(f64, usize)> = (active..n).map(|r| (significance(r), r)).collect();
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
 
-    let is_active = |row: usize| {
-        if row < active {
-            DVec3::ONE
-        } else {
-            DVec3::ZERO
-        }
-    };
-    let free: Vec<DVec3> = (0..n).map(is_active).collect();
-    let none = vec![DVec3::ZERO; n];
-    let mut added = beliefs.added.clone();
+    let mut free = vec![DVec3::ZERO; n];
+    free[..active].fill(DVec3::ONE);
+    let zero = vec![DVec3::ZERO; n];
+    let mut added = prior.added.clone();
     added.resize(n, DVec3::ONE);
-    let exact: Vec<(usize, Tested)> = (standing_out.par_iter().take(MAX_EXACT))
+    let exact: Vec<(usize, Eliminated)> = (ranked.par_iter().take(MAX_EXACT))
         .map(|&(_, row)| {
             let mut unit = vec![DVec3::ZERO; n];
             unit[row] = DVec3::ONE;
             let coupling = rows.hessian_times(&unit);
-            let mut follow = rows.solve(&added, &free, &coupling, &none, DRAW_TOLERANCE);
-            let followed = (0..active).map(|a| coupling[a] * follow[a]).sum::<DVec3>();
-            follow.iter_mut().for_each(|u| *u = -*u);
-            follow[row] = DVec3::ONE;
-            let test = Tested {
-                curvature: equations.diagonal[row] - followed,
-                variance: rows.scatter_along(&follow),
+            // The direction along which the active parameters are optimal.
+            let mut direction = rows.solve(&added, &free, &coupling, &zero, DRAW_TOLERANCE);
+            let explained = (0..active)
+                .map(|a| coupling[a] * direction[a])
+                .sum::<DVec3>();
+            direction.iter_mut().for_each(|u| *u = -*u);
+            direction[row] = DVec3::ONE;
+            let test = Eliminated {
+                curvature: equations.diagonal[row] - explained,
+                variance: rows.scatter_along(&direction),
             };
             (row - active, test)
         })
@@ -364,35 +367,21 @@ fn by_rows(
     tests
 }
 
-impl Tested {
-    fn none() -> Self {
-        Self {
-            curvature: DVec3::ZERO,
-            variance: DVec3::ZERO,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::inverse::fit::prior::Prior;
-    use glam::BVec3;
 
-    /// The mean of `count` values of deviation one: with its residuals over what each keeps, one less 1/n, its variance is
-    /// the textbook's Σ r² / (n (n - 1)) times n / (n - 1), and not the Σ r² / n² that the scores alone would say.
+    /// The mean of n values of deviation one. With residuals over 1 − 1/n, the variance is the textbook's Σ r² / (n (n − 1))
+    /// times n / (n − 1); the plain scores give Σ r² / n².
     #[test]
     fn few_clusters_know_less_than_their_own_scatter_says() {
         for count in [4, 40] {
             let clusters: Vec<Linearised> = (0..count)
                 .map(|i| Linearised {
-                    object: 0,
-                    weight: DVec3::ONE,
-                    pixels: 1.0,
-                    residuals: [DVec3::splat([1.0, -1.0][i % 2]); 2],
-                    censored: BVec3::FALSE,
                     own: DVec3::ONE,
                     rows: vec![(0, DVec3::ONE, DVec3::ONE)],
+                    ..Linearised::unit(0, DVec3::splat([1.0, -1.0][i % 2]))
                 })
                 .collect();
             let prior = Prior::new(1, 1, Vec3::ONE);

@@ -1,7 +1,9 @@
-//! The fit to clusters that were linearised once: what a sum over rounds of paths is fitted by.
+//! The fit to clusters that are linearised once, as sums over rounds of paths are.
 
 use crate::inverse::fit::equations::NormalEquations;
-use crate::inverse::fit::gauss_newton::{MIN_DAMPING, STEP_TOLERANCE, is_stalled, propose, pull};
+use crate::inverse::fit::gauss_newton::{
+    MIN_DAMPING, STEP_TOLERANCE, is_stalled, propose, relative_gradient,
+};
 use crate::inverse::fit::prior::Prior;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::paths::evaluate::Linearised;
@@ -9,27 +11,26 @@ use crate::inverse::unknowns::Unknowns;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Steps at most.
+/// Greatest number of steps.
 const MAX_STEPS: u32 = 12;
 
-/// Where the direction of descent vanishes.
+/// The solution of a linearised fit.
 #[derive(Debug)]
 pub struct Descended {
     /// The unknowns.
     pub unknowns: Unknowns,
-    /// The weights there.
+    /// The robust weights at the solution.
     pub robust: RobustWeights,
-    /// The normal equations there.
+    /// The normal equations at the solution.
     pub equations: NormalEquations,
-    /// The clusters, their residuals those that are left.
+    /// The clusters with their residuals at the solution.
     pub clusters: Vec<Linearised>,
 }
 
-/// Fits the parameters in `free` (indices into albedos, then emissions) to clusters that were linearised about `about`, beginning
-/// at `start`.
+/// Fits the parameters in `free` (indices into albedos, then emissions) to clusters linearised about `about`, starting at `start`.
 ///
-/// One step would not do: the Hessian, which must not be indefinite, holds the square of the derivatives' noise besides
-/// their product across sets, so that what few paths meet would stay near where it began. Weights are found anew at each.
+/// One step does not suffice: the Hessian is kept semidefinite and so contains the squared noise of the derivatives, which
+/// shortens the steps of parameters that few paths meet. Robust weights are updated at each step.
 pub fn descend(
     mut clusters: Vec<Linearised>,
     about: &Unknowns,
@@ -48,8 +49,8 @@ pub fn descend(
         let robust = RobustWeights::from_residuals(&clusters, about.surfaces());
         let equations = NormalEquations::new(&clusters, free.len(), &robust, prior);
         let (next, length) = propose(&equations, free, &unknowns, MIN_DAMPING);
-        let pull = pull(&equations, free, &unknowns);
-        if length.left < STEP_TOLERANCE || is_stalled(before, pull) || steps == MAX_STEPS {
+        let gradient = relative_gradient(&equations, free, &unknowns);
+        if length.remaining < STEP_TOLERANCE || is_stalled(before, gradient) || steps == MAX_STEPS {
             return Descended {
                 unknowns,
                 robust,
@@ -57,11 +58,11 @@ pub fn descend(
                 clusters,
             };
         }
-        let moved: Vec<DVec3> = (free.iter())
+        let step: Vec<DVec3> = (free.iter())
             .map(|&i| (next.value(i) - unknowns.value(i)).as_dvec3())
             .collect();
-        clusters.par_iter_mut().for_each(|c| c.step(&moved));
-        (unknowns, before) = (next, pull);
+        clusters.par_iter_mut().for_each(|c| c.step(&step));
+        (unknowns, before) = (next, gradient);
         steps += 1;
     }
 }
@@ -70,10 +71,10 @@ pub fn descend(
 mod tests {
     use super::*;
     use crate::math::rng::Stream;
-    use glam::{BVec3, Vec3};
+    use glam::Vec3;
 
-    /// A thousand clusters that know one albedo through derivatives whose noise is as large as they are: it is found, where
-    /// one step would go half the way. The tolerance is four standard errors of its own.
+    /// 1000 clusters depend on one albedo through derivatives with a relative noise of one. One step goes half the way; the fit
+    /// finds the albedo. The tolerance is four of its standard errors.
     #[test]
     fn noise_of_derivatives_does_not_keep_an_albedo_where_it_began() {
         let (begun, truth) = (0.2, 0.6);
@@ -83,13 +84,10 @@ mod tests {
             .map(|_| {
                 let [a, b] = [(); 2].map(|()| DVec3::ONE + noise());
                 Linearised {
-                    object: 0,
-                    weight: DVec3::ONE,
-                    pixels: 1.0,
                     residuals: [a, b].map(|j| DVec3::splat(truth) - j * begun),
-                    censored: BVec3::FALSE,
                     own: (a + b) * 0.5,
                     rows: vec![(0, a, b)],
+                    ..Linearised::unit(0, DVec3::ZERO)
                 }
             })
             .collect();

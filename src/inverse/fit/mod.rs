@@ -1,4 +1,4 @@
-//! The bounded, robust least-squares fit of all unknowns to stored paths, and the standard errors of what it finds.
+//! The bounded, robust least-squares fit of all unknowns to the transport cache, with standard errors.
 
 pub mod accumulate;
 pub mod equations;

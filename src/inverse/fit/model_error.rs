@@ -1,9 +1,8 @@
-//! How far off the model is: neighbours tell.
+//! Estimates the model error from the correlation of neighbouring residuals.
 //!
-//! The scatter of clusters about the fit holds the noise of photographs and paths, which differs from one cluster to the next.
-//! Light that is missing or wrong does not: it makes neighbouring clusters of a surface too bright or too dark together, and an
-//! object that is smaller than the mistake is off as a whole, which its own scatter cannot show. The mean product of neighbours'
-//! residuals is free of the noise, and estimates the variance of that mistake.
+//! The noise of photographs and paths is independent between clusters. Errors of the model, such as missing light, are shared by
+//! neighbouring clusters, and shift the estimate of a whole object that is smaller than they are, which its own scatter does
+//! not show. The mean product of neighbours' residuals is free of noise and estimates the variance of the model error.
 
 use crate::inverse::estimate::Estimate;
 use crate::inverse::paths::clusters::Cluster;
@@ -13,19 +12,19 @@ use crate::inverse::unknowns::Unknowns;
 use crate::math::stats::quantile;
 use glam::{DVec3, Vec3};
 
-/// A cluster off by more than this part of what its object reflects counts as if it were off by that: no single one decides.
+/// Residuals are clamped to this fraction of the reflected radiance.
 const MAX_RELATIVE: f64 = 0.5;
-/// Mistakes that whole objects share are larger than what neighbours show of them, by this factor. It was the only one tried: with
-/// it 78 to 100 % of true albedos are within two reported errors in each family of `relit trade --rooms 3 --family all --preset
-/// preview`, where 95 % would be right.
+/// Factor between the errors of whole objects and those that neighbours show. Only this value was tried: with it 78 to 100 % of
+/// true albedos lie within two reported errors in each family of `relit trade --rooms 3 --family all --preset preview`; 95 %
+/// would be right.
 const SHARED: f64 = 2.0;
 
-/// Pairs of neighbours from which on an object says something.
+/// Least number of pairs of neighbours on an object.
 const MIN_PAIRS: u64 = 8;
 
-/// Variance of what the model lacks, relative to what surfaces reflect: for each object the mean product of relative residuals of
-/// clusters that follow each other on it in one photograph, and of the objects the median, since textures that were not looked for
-/// yet look like wrong light; those in `textured` are left out. `clusters` are those that were linearised, in the same order.
+/// Variance of the model error relative to reflected radiance: the median over objects of the mean product of relative residuals
+/// of consecutive clusters in one photograph. It is a median since unmodelled textures look like model errors; objects in
+/// `textured` are left out. `clusters` and `linearised` have the same order.
 pub fn variance(
     clusters: &[Cluster],
     linearised: &[Linearised],
@@ -41,11 +40,8 @@ pub fn variance(
         if line.bound_met().any() || reflected.min_element() <= 0.0 {
             continue;
         }
-        let most = DVec3::splat(MAX_RELATIVE);
-        let relative = (line.residual() / reflected)
-            .clamp(-most, most)
-            .element_sum()
-            / 3.0;
+        let max = DVec3::splat(MAX_RELATIVE);
+        let relative = (line.residual() / reflected).clamp(-max, max).element_sum() / 3.0;
         if let Some((frame, before)) = last[k]
             && frame == cluster.frame
         {
@@ -61,8 +57,7 @@ pub fn variance(
     quantile(&mut variances, 0.5).unwrap_or(0.0).max(0.0)
 }
 
-/// Adds the model's error to the standard errors of an estimate: to those of albedos, and of the light of lamps that only their
-/// effect tells.
+/// Adds the model error to the standard errors of albedos, and of the emission of unseen lamps.
 pub fn add_to(estimate: &mut Estimate, roles: &[Role], variance: f64) {
     let relative = (SHARED * variance.sqrt()) as f32;
     let total = |error: Vec3, value: Vec3| {
@@ -84,11 +79,9 @@ mod tests {
     use super::*;
     use crate::inverse::estimate::ObjectEstimate;
     use crate::math::rng::Stream;
-    use glam::BVec3;
-
-    /// Clusters of one object that reflects 0.5 of a light of one, off by a mistake that many neighbours share and by noise that
-    /// each has of its own.
-    fn found(mistake: f64, noise: f64) -> f64 {
+    /// Estimated error of clusters with an albedo of 0.5 and an irradiance of one, with an error that 50 neighbours share and
+    /// independent noise.
+    fn found(shared_error: f64, noise: f64) -> f64 {
         let mut stream = Stream::new(83, 0, 0, 0);
         let mut normal = || {
             (0..12)
@@ -99,29 +92,14 @@ mod tests {
         let (clusters, lines) = (0..20_000)
             .map(|i| {
                 if i % 50 == 0 {
-                    shared = mistake * normal();
+                    shared = shared_error * normal();
                 }
                 let residual = DVec3::splat(0.5 * (shared + noise * normal()));
-                let cluster = Cluster {
-                    frame: 0,
-                    object: 0,
-                    pixels: vec![i],
-                    paths: 1,
-                    measured: Vec3::splat(0.5),
-                    censored: BVec3::FALSE,
-                    weight: Vec3::ONE,
-                    dark: Vec3::ONE,
-                };
                 let line = Linearised {
-                    object: 0,
-                    weight: DVec3::ONE,
-                    pixels: 1.0,
-                    residuals: [residual; 2],
-                    censored: BVec3::FALSE,
                     own: DVec3::ONE,
-                    rows: Vec::new(),
+                    ..Linearised::unit(0, residual)
                 };
-                (cluster, line)
+                (Cluster::unit(0, 1, Vec3::splat(0.5)), line)
             })
             .unzip::<_, _, Vec<_>, Vec<_>>();
         let mut unknowns = Unknowns::new(1);
@@ -132,7 +110,7 @@ mod tests {
     #[test]
     fn a_mistake_that_neighbours_share_is_told_from_noise() {
         assert!(found(0.0, 0.2) < 0.02, "{}", found(0.0, 0.2));
-        // 400 independent mistakes: 5 % of their deviation, two standard errors.
+        // 400 independent errors: the tolerance is 10 % of their deviation, two standard errors.
         for noise in [0.0, 0.1] {
             let sd = found(0.08, noise);
             assert!((sd - 0.08).abs() < 0.008, "{noise}: {sd}");

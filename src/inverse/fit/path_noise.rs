@@ -1,13 +1,13 @@
-//! How much of what a fit leaves is the noise of its own paths, which more paths would take away, and how much is
-//! the photographs' noise and what the model lacks, which they would not.
+//! The fraction of a fit's residuals that is path noise, which more paths would reduce, in contrast to photograph noise and
+//! model error; and the distribution of paths over clusters.
 
 use crate::inverse::paths::clusters::Cluster;
 use crate::inverse::paths::evaluate::Linearised;
 
-/// Residuals of a few clusters say little: an even mixture of both kinds of noise counts for so many clusters.
+/// Number of clusters that the prior, an even mixture of both kinds of noise, counts for.
 const PRIOR_CLUSTERS: f64 = 2.0;
 
-/// For each object the fraction of its squared residuals that the paths' noise explains, from 0 to 1.
+/// For each object, the fraction of its squared residuals that path noise explains, from 0 to 1.
 pub fn fractions(clusters: &[Linearised], objects: usize) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0, 0.0); objects];
     for cluster in clusters.iter().filter(|c| !c.bound_met().all()) {
@@ -31,8 +31,8 @@ pub fn fractions(clusters: &[Linearised], objects: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Shares a number of paths out over clusters: to objects in proportion to the square root of their pixels, so that
-/// small ones become known well without starving large ones; at least one path a pixel and set.
+/// Distributes `total` paths over clusters: to objects in proportion to the square root of their pixels, which favours small
+/// objects; at least one path per pixel and set.
 pub fn distribute_paths(clusters: &mut [Cluster], objects: usize, total: u64) {
     let mut pixels = vec![0u64; objects];
     for cluster in clusters.iter() {
@@ -50,19 +50,10 @@ pub fn distribute_paths(clusters: &mut [Cluster], objects: usize, total: u64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{BVec3, DVec3, Vec3};
+    use glam::{DVec3, Vec3};
 
     fn pixels(object: u32, count: u32) -> Cluster {
-        Cluster {
-            frame: 0,
-            object,
-            pixels: (0..count).collect(),
-            paths: 1,
-            measured: Vec3::ZERO,
-            censored: BVec3::FALSE,
-            weight: Vec3::ONE,
-            dark: Vec3::ONE,
-        }
+        Cluster::unit(object, count, Vec3::ZERO)
     }
 
     #[test]
@@ -91,13 +82,8 @@ mod tests {
 
     fn residuals(object: u32, a: f64, b: f64) -> Linearised {
         Linearised {
-            object,
-            weight: DVec3::ONE,
-            pixels: 1.0,
             residuals: [DVec3::splat(a), DVec3::splat(b)],
-            censored: BVec3::FALSE,
-            own: DVec3::ZERO,
-            rows: Vec::new(),
+            ..Linearised::unit(object, DVec3::ZERO)
         }
     }
 

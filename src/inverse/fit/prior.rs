@@ -1,40 +1,36 @@
-//! What is believed of an unknown before any photograph speaks: little, but enough to keep what no photograph
-//! determines within reason.
+//! Priors of the unknowns: wide normal distributions that keep undetermined unknowns at plausible values.
 
 use crate::inverse::known::Known;
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Standard deviation of an albedo of which nothing is known, about [`ALBEDO_MEAN`].
+/// Standard deviation of an unknown albedo about [`ALBEDO_MEAN`].
 pub const ALBEDO_DEVIATION: f32 = 0.5;
-/// Standard deviation of the albedo of what no photograph sees: that of an even distribution from 0 to 1 is 0.29, and few
-/// surfaces are black or lose no light.
+/// Standard deviation of the albedo of unseen objects. A uniform distribution from 0 to 1 has 0.29, and extreme albedos are rare.
 pub const UNSEEN_DEVIATION: f32 = 0.25;
-/// Where an albedo stays of which nothing is known.
+/// Mean of an unknown albedo.
 pub const ALBEDO_MEAN: f32 = 0.5;
-/// Standard deviation of light from a direction outside that no photograph looks in, in mean radiances of what the
-/// photographs show.
+/// Standard deviation of outside radiance in an unseen direction, in mean radiances of the photographs.
 const OUTSIDE_DEVIATION: f32 = 4.0;
 
-/// Standard deviation of each channel of light from outside about the colour that is expected of it, once its brightness is found,
-/// relative to that brightness.
+/// Standard deviation of each channel of outside radiance about its expected colour, relative to its fitted brightness.
 const OUTSIDE_TINT: f32 = 0.3;
 
-/// Standard deviation of a value that is known, relative to its size: so little that nothing moves it.
+/// Relative standard deviation of a known value: small enough that nothing moves it.
 const KNOWN: f64 = 1e-12;
 
 /// Normal distributions of albedos.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ExpectedAlbedo {
-    /// One for each surface.
+    /// Mean of each surface's albedo.
     pub mean: Vec<Vec3>,
-    /// Standard deviations.
+    /// Standard deviation of each surface's albedo.
     pub deviation: Vec<Vec3>,
 }
 
 impl ExpectedAlbedo {
-    /// Before anything was found: of surfaces that so many pixels see, and of others (`seen` may be shorter).
+    /// The prior before any fit. `seen` is the number of pixels that see each surface; it may be shorter than `surfaces`.
     pub fn unknown(surfaces: usize, seen: &[u64]) -> Self {
         let deviation = |k: usize| match seen.get(k) {
             Some(0) => UNSEEN_DEVIATION,
@@ -47,23 +43,23 @@ impl ExpectedAlbedo {
     }
 }
 
-/// Normal distributions of the unknowns; nothing is believed of a lamp.
+/// Normal distributions of the unknowns; emissions of objects have none.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
     surfaces: usize,
     albedo: ExpectedAlbedo,
-    /// First of the surfaces that stand for directions outside.
+    /// Index of the first surface that stands for an outside direction.
     outside: usize,
-    /// Mean and standard deviation of each of those.
+    /// Mean and standard deviation of the radiance of each outside direction.
     directions: Vec<(Vec3, Vec3)>,
-    /// What light from a direction of which nothing was found yet is expected to deviate by.
+    /// Standard deviation of the radiance of an outside direction before a fit.
     deviation: Vec3,
-    /// Parameters that are known, with their values.
+    /// Known parameters and their values.
     known: BTreeMap<usize, Vec3>,
 }
 
 impl Prior {
-    /// For `surfaces` surfaces of which those from `outside` on stand for directions outside; `photographed` is the mean
+    /// For `surfaces` surfaces, of which those from index `outside` stand for outside directions; `photographed` is the mean
     /// radiance of all photographs.
     pub fn new(surfaces: usize, outside: usize, photographed: Vec3) -> Self {
         Self {
@@ -76,7 +72,7 @@ impl Prior {
         }
     }
 
-    /// The same with values that are known.
+    /// The prior with known values of some parameters.
     pub fn with_known(mut self, known: &Known) -> Self {
         for (k, pinned) in known.objects().filter(|(k, _)| *k < self.outside) {
             let albedo = pinned.albedo.map(|albedo| (k, albedo));
@@ -88,24 +84,24 @@ impl Prior {
         self
     }
 
-    /// The same with what to expect of each surface's albedo.
+    /// The prior with the given distributions of albedos.
     pub fn with_albedo(mut self, albedo: ExpectedAlbedo) -> Self {
         self.albedo = albedo;
         self
     }
 
-    /// Forgets what was expected of a surface's albedo.
+    /// Resets a surface's albedo to the unknown distribution.
     pub fn forget_albedo(&mut self, surface: usize) {
         self.albedo.mean[surface] = Vec3::splat(ALBEDO_MEAN);
         self.albedo.deviation[surface] = Vec3::splat(ALBEDO_DEVIATION);
     }
 
-    /// What is expected of the albedos.
+    /// The distributions of albedos.
     pub fn albedo(&self) -> &ExpectedAlbedo {
         &self.albedo
     }
 
-    /// The same with what to expect of each of those surfaces, from what was seen outside.
+    /// The prior with the given means of the outside directions, by surface.
     pub fn with_sky(mut self, expected: impl Fn(u32) -> Vec3) -> Self {
         for (surface, (mean, _)) in (self.outside as u32..).zip(&mut self.directions) {
             *mean = expected(surface);
@@ -117,21 +113,22 @@ impl Prior {
         self
     }
 
-    /// The same with means and standard deviations for each of those surfaces.
+    /// The prior with means and standard deviations of the outside directions.
     pub fn with_directions(mut self, directions: Vec<(Vec3, Vec3)>) -> Self {
         self.directions = directions;
         self
     }
 
-    /// Mean and standard deviation of light from each direction outside.
+    /// Mean and standard deviation of the radiance of each outside direction.
     pub fn directions(&self) -> &[(Vec3, Vec3)] {
         &self.directions
     }
 
-    /// The same, each of those surfaces expected to send what was found of it, in a colour that is expected of it.
+    /// The prior with each outside direction held near its expected colour, at its fitted brightness.
     ///
-    /// What a direction does to the room may tell little more than how bright it is; its channels, each fitted by itself, would come
-    /// out in any colour that the noise likes. `color` is given the surface and the mean that was expected of it before.
+    /// The effect of a direction on the room may determine little more than its brightness, and channels fitted independently
+    /// would give colours from noise. `found` gives the fitted radiance and its standard error by surface; `color` gives the
+    /// expected colour, from the surface and its previous mean.
     pub fn with_outside_found(
         mut self,
         found: impl Fn(usize) -> (Vec3, Vec3),
@@ -147,11 +144,11 @@ impl Prior {
         self
     }
 
-    /// Mean of a parameter (albedos first, then emissions), and its precision in the units of the normal equations: the
-    /// noise variance of one cluster over the prior's variance. Zero where nothing is believed.
+    /// Mean and precision of a parameter (albedos first, then emissions). The precision is in the units of the normal equations:
+    /// the noise variance of one cluster over the prior's variance. Both are zero for parameters without a prior.
     pub fn of(&self, parameter: usize, noise: DVec3) -> (DVec3, DVec3) {
         if let Some(value) = self.known.get(&parameter) {
-            // One in the unit of the parameter, for those that are zero.
+            // The scale of the parameter, for known values of zero.
             let unit = match parameter < self.surfaces {
                 true => Vec3::ONE,
                 false => self.deviation,
@@ -175,7 +172,7 @@ impl Prior {
     }
 }
 
-/// The multiple of a colour that is nearest to a radiance, in the radiance's standard errors.
+/// The multiple of a colour that fits a radiance best, weighted by the radiance's standard errors.
 fn brightness(color: Vec3, radiance: Vec3, error: Vec3) -> f32 {
     let weight = (error * error).recip();
     let known = weight.is_finite_mask() & color.cmpgt(Vec3::ZERO);

@@ -1,49 +1,47 @@
-//! How far the photographs of each object are to be trusted: the weights of the fit, from its own residuals.
+//! Robust weights of the fit, per object and channel, from the residuals of the previous fit.
 //!
-//! Least squares are best where every term weighs by the inverse of its variance. That variance differs from object to
-//! object: a lamp is seen with no noise from paths at all, a textured surface is badly described by one albedo. It is
-//! read off the residuals and the fit repeated (feasible generalised least squares, Aitken 1935, Zellner 1962). What a
-//! change of the object's own albedo or emission would take away is left out of them: else an object whose albedo is
-//! wrong would be distrusted for it, and the distrust would keep it wrong.
+//! Least squares are optimal if every term weighs by its inverse variance. The variance differs between objects: lamps have no
+//! path noise, and textured surfaces are badly described by one albedo. It is estimated from the residuals and the fit repeated
+//! (feasible generalised least squares, Aitken 1935, Zellner 1962). Residuals are taken after the best step of the object's own
+//! albedo or emission; otherwise a wrong albedo would lower the object's weight and so stay wrong.
 //!
-//! Single clusters that lie far out, at the edge of a lamp or where somebody walked by, are bounded in what they do to
-//! the fit (Huber 1964), and in what they say of the others.
+//! Outlier clusters, at the edge of a lamp or where somebody walked by, have a bounded influence (Huber 1964) on the fit and on
+//! the variances.
 
 use crate::inverse::paths::evaluate::Linearised;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Clusters that the typical variance counts for beside an object's own, in the logarithm.
+/// Number of clusters that the typical log variance counts for in the mean with an object's own.
 const PRIOR_CLUSTERS: f64 = 2.0;
-/// Error of a pixel, relative to the level that it is weighed by, below which nothing is trusted to be: cameras and meshes
-/// are no better.
+/// Least relative error of a pixel: cameras and meshes are no better.
 const FLOOR: f64 = 1e-3;
-/// Fraction of the typical variance below which no object's is trusted to be: what is nearly black in a channel would lead the
-/// fit by its silence.
+/// Least variance of an object as a fraction of the typical one. Objects that are nearly black in a channel have almost no
+/// residuals and would dominate the fit.
 const MIN_OF_TYPICAL: f64 = 1e-2;
 /// Median of χ² with one degree of freedom.
 const MEDIAN_CHI2: f64 = 0.454_936;
-/// Deviations beyond which a cluster's pull no longer grows. Noise of photographs and of paths at the edges of lamps is
-/// skewed, and a closer bound would make a bias of its rare large values.
-const FAR_OUT: f64 = 10.0;
+/// Standard deviations beyond which a cluster's influence is constant. Noise of photographs and paths at the edges of lamps is
+/// skewed, and a lower bound would bias the fit.
+const MAX_DEVIATIONS: f64 = 10.0;
 
 /// Factors on the weights of the clusters, per channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobustWeights(Vec<ObjectWeights>);
 
-/// What the residuals of an object's clusters say.
+/// Statistics of the residuals of an object's clusters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ObjectWeights {
-    /// Typical variance over the object's.
+    /// Typical variance over the object's variance.
     factor: DVec3,
-    /// The object's variance, weighted; infinite where nothing is known.
+    /// The object's weighted variance; infinite if it is unknown.
     variance: DVec3,
-    /// What the object's own parameter would have to change by to describe its clusters best.
+    /// The step of the object's own albedo or emission that fits its clusters best.
     step: DVec3,
 }
 
 impl RobustWeights {
-    /// The same for all.
+    /// Factors of one.
     pub fn even(objects: usize) -> Self {
         Self(vec![
             ObjectWeights {
@@ -55,15 +53,15 @@ impl RobustWeights {
         ])
     }
 
-    /// From the residuals that a fit has left.
+    /// From the residuals of a fit.
     pub fn from_residuals(clusters: &[Linearised], objects: usize) -> Self {
         let steps = own_steps(clusters, objects);
-        // Bounds that the model keeps tell nothing of how well it describes the rest.
+        // Lower bounds that hold have no residual.
         let (clusters, squares): (Vec<&Linearised>, Vec<DVec3>) = (clusters.iter())
             .filter(|cluster| !cluster.bound_met().any())
             .map(|cluster| (cluster, square(cluster, steps[cluster.object as usize])))
             .unzip();
-        // The typical variance is a median, which no badly described object can raise.
+        // A median, robust to badly described objects.
         let typical = typical_variance(squares.iter().copied());
         let mut of_object: Vec<Vec<DVec3>> = vec![Vec::new(); objects];
         let mut floors = vec![0.0; objects];
@@ -73,16 +71,15 @@ impl RobustWeights {
         }
         let robust = |((squares, floor), step): ((Vec<DVec3>, f64), DVec3)| {
             let count = squares.len() as f64;
-            // Variances lie orders of magnitude apart, so it is their logarithm that is drawn to the typical one's.
+            // Variances differ by orders of magnitude, so logarithms are averaged with the typical one's.
             let fraction = count / (count + PRIOR_CLUSTERS);
-            let expected = |own: DVec3| own.powf(fraction) * typical.powf(1.0 - fraction);
-            // What lies far out counts no more than the farthest of the others.
-            let usual = expected(typical_variance(squares.iter().copied()));
-            let most = usual * (FAR_OUT * FAR_OUT);
-            let sum: DVec3 = squares.iter().map(|s| s.min(most)).sum();
-            let [own, least] = [sum, DVec3::splat(floor)].map(|s| s / f64::max(count, 1.0));
-            let variance = expected(own).max(least).max(typical * MIN_OF_TYPICAL);
-            // With no residuals at all there is nothing to tell objects apart by.
+            let shrunk = |own: DVec3| own.powf(fraction) * typical.powf(1.0 - fraction);
+            let usual = shrunk(typical_variance(squares.iter().copied()));
+            let max = usual * (MAX_DEVIATIONS * MAX_DEVIATIONS);
+            let sum: DVec3 = squares.iter().map(|s| s.min(max)).sum();
+            let [own, min] = [sum, DVec3::splat(floor)].map(|s| s / f64::max(count, 1.0));
+            let variance = shrunk(own).max(min).max(typical * MIN_OF_TYPICAL);
+            // Without any residuals all factors are one.
             let known = typical.cmpgt(DVec3::ZERO);
             ObjectWeights {
                 factor: DVec3::select(known, typical / variance, DVec3::ONE),
@@ -94,22 +91,22 @@ impl RobustWeights {
         Self(all.map(robust).collect())
     }
 
-    /// The weight of a cluster in the fit.
+    /// The weight of a cluster in the fit, with the bound of outliers.
     pub fn weight(&self, cluster: &Linearised) -> DVec3 {
         let robust = &self.0[cluster.object as usize];
-        let most = robust.variance * (FAR_OUT * FAR_OUT);
+        let max = robust.variance * (MAX_DEVIATIONS * MAX_DEVIATIONS);
         let square = square(cluster, robust.step);
-        let bounded = DVec3::select(square.cmpgt(most), (most / square).powf(0.5), DVec3::ONE);
+        let bounded = DVec3::select(square.cmpgt(max), (max / square).powf(0.5), DVec3::ONE);
         cluster.weight_now() * robust.factor * bounded
     }
 
     /// The factor of one object.
-    pub fn of(&self, object: u32) -> DVec3 {
+    pub fn factor(&self, object: u32) -> DVec3 {
         self.0[object as usize].factor
     }
 }
 
-/// The variance whose median of squares is that of the given ones; zero for none.
+/// The variance of a normal distribution with the same median of squares; zero without values.
 fn typical_variance(squares: impl Iterator<Item = DVec3> + Clone) -> DVec3 {
     DVec3::from_array(std::array::from_fn(|channel| {
         let mut values: Vec<f64> = squares.clone().map(|s| s[channel]).collect();
@@ -119,12 +116,12 @@ fn typical_variance(squares: impl Iterator<Item = DVec3> + Clone) -> DVec3 {
 
 /// Weighted square of a cluster's residual after a step of its object's own parameter.
 fn square(cluster: &Linearised, step: DVec3) -> DVec3 {
-    let left = cluster.residual() - cluster.own * step;
-    cluster.weight * left * left
+    let residual = cluster.residual() - cluster.own * step;
+    cluster.weight * residual * residual
 }
 
-/// For each object and channel, the step of its own parameter after which the absolute values of its clusters' residuals are least:
-/// a weighted median, which a few clusters far out do not move.
+/// For each object and channel, the step of its own parameter that minimises the absolute residuals of its clusters: a weighted
+/// median, robust to outliers.
 fn own_steps(clusters: &[Linearised], objects: usize) -> Vec<DVec3> {
     let mut of_object: Vec<Vec<&Linearised>> = vec![Vec::new(); objects];
     for cluster in clusters {
@@ -143,7 +140,7 @@ fn own_steps(clusters: &[Linearised], objects: usize) -> Vec<DVec3> {
     of_object.into_par_iter().map(step).collect()
 }
 
-/// The value below which half of the weight lies; zero where there is none.
+/// The value below which half of the weight lies; zero without weight.
 fn weighted_median(mut values: Vec<(f64, f64)>) -> f64 {
     values.sort_by(|a, b| a.0.total_cmp(&b.0));
     let half = values.iter().map(|(_, weight)| weight).sum::<f64>() / 2.0;
@@ -158,24 +155,15 @@ fn weighted_median(mut values: Vec<(f64, f64)>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::BVec3;
 
     fn clusters(
         object: u32,
         residuals: impl Iterator<Item = f64>,
     ) -> impl Iterator<Item = Linearised> {
-        residuals.map(move |r| Linearised {
-            object,
-            weight: DVec3::ONE,
-            pixels: 1.0,
-            residuals: [DVec3::splat(r); 2],
-            censored: BVec3::FALSE,
-            own: DVec3::ZERO,
-            rows: Vec::new(),
-        })
+        residuals.map(move |r| Linearised::unit(object, DVec3::splat(r)))
     }
 
-    /// Residuals of a given deviation, by turns.
+    /// Residuals of about the given deviation, of alternating sign.
     fn noise(count: usize, deviation: f64) -> impl Iterator<Item = f64> {
         (0..count).map(move |i| deviation * [1.0, -1.0, 0.6, -1.2][i % 4])
     }
@@ -187,19 +175,22 @@ mod tests {
             .chain(clusters(2, noise(100, 1.0)))
             .collect();
         let robust = RobustWeights::from_residuals(&all, 4);
-        let ratio = robust.of(1) / robust.of(0);
-        // The typical variance counts for two clusters beside the quiet object's hundred and keeps the ratio below 100.
+        let ratio = robust.factor(1) / robust.factor(0);
+        // The typical variance counts for two clusters and the object's for 100, which keeps the ratio below 100.
         assert!(
             ratio.min_element() > 8.0 && ratio.max_element() < 100.0,
             "{ratio}"
         );
-        let ratio = robust.of(0) / robust.of(2);
-        // The same at the noisy one: 100 to the power of 100 over 102; the typical variance lies a little over the first.
+        let ratio = robust.factor(0) / robust.factor(2);
+        // The same for the noisy object: 100 to the power of 100/102; the typical variance is a little above the first object's.
         assert!(
             ratio.min_element() > 90.0 && ratio.max_element() < 95.0,
             "{ratio}"
         );
-        assert_eq!(robust.of(3), robust.of(3).min(DVec3::ONE).max(DVec3::ONE));
+        assert_eq!(
+            robust.factor(3),
+            robust.factor(3).min(DVec3::ONE).max(DVec3::ONE)
+        );
     }
 
     #[test]
@@ -212,14 +203,13 @@ mod tests {
             cluster.residuals = [DVec3::splat(50.0); 2];
         }
         let [quiet, disturbed] = [&quiet, &edges].map(|c| RobustWeights::from_residuals(c, 2));
-        // It counts for ten deviations, of forty clusters; in full it would cost all but a 50,000th.
-        assert!((disturbed.of(1) / quiet.of(1)).min_element() > 0.15);
-        let pull = |cluster: &Linearised| disturbed.weight(cluster) * cluster.residuals[0];
-        let usual = disturbed.of(1) * 0.1;
-        let ratio = (pull(&edges[400]) / usual).x;
-        // Ten deviations, which the cluster itself doubles, and not the 500 that it lies off.
+        // One of 40 clusters counts for ten deviations; unbounded, the factor would fall to a 50,000th.
+        assert!((disturbed.factor(1) / quiet.factor(1)).min_element() > 0.15);
+        let influence = |cluster: &Linearised| disturbed.weight(cluster) * cluster.residuals[0];
+        let usual = disturbed.factor(1) * 0.1;
+        let ratio = (influence(&edges[400]) / usual).x;
+        // Ten deviations, which the cluster itself doubles, instead of 500.
         assert!((10.0..30.0).contains(&ratio), "{ratio}");
-        // Where nothing is known all weigh what they weigh.
         assert_eq!(RobustWeights::even(2).weight(&edges[400]), DVec3::ONE);
     }
 
@@ -234,13 +224,12 @@ mod tests {
                 *residual += cluster.own * 0.8;
             }
         }
-        let [right, wrong] = [right, wrong].map(|c| RobustWeights::from_residuals(&c, 2).of(1));
+        let [right, wrong] = [right, wrong].map(|c| RobustWeights::from_residuals(&c, 2).factor(1));
         let gained = wrong / right - DVec3::ONE;
         assert!(gained.abs().max_element() < 0.03, "{gained}");
     }
 
-    /// Two of a hundred clusters see what one albedo cannot tell, a hundred deviations brighter: what they do to the object's albedo
-    /// stays small.
+    /// 2 % of the clusters are 100 deviations brighter; their effect on the object's albedo stays small.
     #[test]
     fn clusters_far_out_do_not_move_the_bound_that_holds_them() {
         let mut all: Vec<Linearised> = clusters(0, noise(400, 0.1)).collect();
@@ -255,7 +244,7 @@ mod tests {
             let weight = robust.weight(cluster).x;
             (top + weight * cluster.residuals[0].x, bottom + weight)
         });
-        // Two deviations of a tenth each by two in a hundred at ten deviations; unbounded it is 0.2.
+        // 2 % of the clusters at a bound of ten deviations of 0.1; unbounded it is 0.2.
         let moved = top / bottom;
         assert!((0.0..0.04).contains(&moved), "{moved}");
     }
@@ -266,8 +255,8 @@ mod tests {
             .chain(clusters(1, noise(1_000_000, 0.0).take(90)))
             .collect();
         let robust = RobustWeights::from_residuals(&all, 2);
-        // What is silent leads by a hundred at most.
-        assert!((robust.of(1) - DVec3::splat(100.0)).abs().max_element() < 1e-9);
+        // The factor of an object without residuals is limited to 100.
+        assert!((robust.factor(1) - DVec3::splat(100.0)).abs().max_element() < 1e-9);
         let bound_met: Vec<Linearised> = clusters(0, noise(10, 0.0)).collect();
         assert_eq!(
             RobustWeights::from_residuals(&bound_met, 1),

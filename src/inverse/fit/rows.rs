@@ -1,33 +1,33 @@
-//! Normal equations kept as the clusters' rows, for more unknowns than matrices over pairs of them can be kept of: a
-//! cluster's paths meet few of the surfaces. Solved by conjugate gradients, the three channels side by side.
+//! Normal equations as the clusters' sparse rows, for too many unknowns for dense matrices: the paths of a cluster meet few of
+//! the surfaces. Solved by conjugate gradients, for the three channels in parallel.
 
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::paths::evaluate::Linearised;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Parts that a sum over clusters is cut into, always the same for the same bits on any number of threads.
+/// Number of partial sums over clusters; fixed, for the same bits on any number of threads.
 const PARTS: usize = 8;
-/// Steps of conjugate gradients at most.
-const STEPS: usize = 200;
-/// Residual, relative to where it began, at which a step of the fit is found.
+/// Greatest number of conjugate gradient iterations.
+const MAX_ITERATIONS: usize = 200;
+/// Relative residual at which conjugate gradients stop.
 const TOLERANCE: f64 = 1e-5;
-/// Changes of the set of parameters that are at their bounds, at most.
-const CHANGES: usize = 24;
+/// Greatest number of changes of the active set of bounds.
+const MAX_ACTIVE_SETS: usize = 24;
 
-/// What a cluster holds of one parameter that its paths meet; half the size of f64, since reading it is what costs.
+/// A non-zero entry of a cluster's row; in f32, since memory bandwidth is the bottleneck.
 #[derive(Debug, Clone, Copy)]
 struct Entry {
-    place: u32,
+    parameter: u32,
     value: Vec3,
 }
 
-/// The clusters of the fit.
+/// The rows of all clusters.
 #[derive(Debug, Clone)]
 pub struct Rows {
     /// √w J̄ with J̄ the mean derivative of both sets.
     slopes: Vec<Entry>,
-    /// What the cluster adds to the descent direction.
+    /// Contributions to the descent direction.
     scores: Vec<Entry>,
     /// End of each cluster in both.
     ends: Vec<usize>,
@@ -35,20 +35,20 @@ pub struct Rows {
     pub diagonal: Vec<DVec3>,
 }
 
-/// Bounds of each parameter: zero and this.
+/// A quadratic problem with bounds: each parameter lies between zero and `upper`.
 pub struct Bounded<'a> {
-    /// Where the parameters stand.
+    /// Present values of the parameters.
     pub x: &'a [DVec3],
-    /// Minus the gradient there.
+    /// Minus the gradient at `x`.
     pub descent: &'a [DVec3],
-    /// Added to the diagonal.
+    /// Terms added to the diagonal of the Hessian.
     pub added: &'a [DVec3],
-    /// Largest values, per parameter.
+    /// Upper bound of each parameter.
     pub upper: &'a [f64],
 }
 
 impl Rows {
-    /// Of linearised clusters with `n` free parameters.
+    /// From linearised clusters with `n` free parameters.
     pub fn new(linearised: &[Linearised], n: usize, robust: &RobustWeights) -> Self {
         let mut this = Self {
             slopes: Vec::new(),
@@ -59,12 +59,11 @@ impl Rows {
         for cluster in linearised {
             let weight = robust.weight(cluster);
             let root = weight.powf(0.5);
-            for (&(place, a, b), score) in cluster.rows.iter().zip(cluster.scores(weight)) {
+            for (&(parameter, a, b), score) in cluster.rows.iter().zip(cluster.scores(weight)) {
                 let slope = root * (a + b) * 0.5;
-                this.diagonal[place] += slope * slope;
-                let place = place as u32;
+                this.diagonal[parameter] += slope * slope;
                 let entry = |value: DVec3| Entry {
-                    place,
+                    parameter: parameter as u32,
                     value: value.as_vec3(),
                 };
                 this.slopes.push(entry(slope));
@@ -75,7 +74,7 @@ impl Rows {
         this
     }
 
-    /// Σ f e over the entries e of all clusters, with f a factor of each cluster, from its entries.
+    /// Σ f e over the entries e of all clusters, with a factor f of each cluster, from its index and entries.
     fn sum(
         &self,
         entries: &[Entry],
@@ -95,7 +94,7 @@ impl Rows {
                     let own = &entries[start..self.ends[cluster]];
                     let factor = factor(cluster, own);
                     for entry in own {
-                        sum[entry.place as usize] += entry.value.as_dvec3() * factor;
+                        sum[entry.parameter as usize] += entry.value.as_dvec3() * factor;
                     }
                 }
                 sum
@@ -112,10 +111,10 @@ impl Rows {
 
     /// H v with H = Σ w J̄ J̄ᵀ.
     pub fn hessian_times(&self, v: &[DVec3]) -> Vec<DVec3> {
-        self.sum(&self.slopes, |_, own| along(own, v))
+        self.sum(&self.slopes, |_, own| dot(own, v))
     }
 
-    /// Σ f g with g a cluster's contribution to the descent direction and f a factor of that cluster.
+    /// Σ f g with a cluster's contribution g to the descent direction and its factor f.
     pub fn scores_times(&self, factor: impl Fn(usize) -> DVec3 + Sync) -> Vec<DVec3> {
         self.sum(&self.scores, |cluster, _| factor(cluster))
     }
@@ -125,14 +124,15 @@ impl Rows {
         let mut start = 0;
         let mut sum = DVec3::ZERO;
         for &end in &self.ends {
-            let along = along(&self.scores[start..end], v);
-            sum += along * along;
+            let score = dot(&self.scores[start..end], v);
+            sum += score * score;
             start = end;
         }
         sum
     }
 
-    /// Solves (H + D) x = b for the entries where `free` is one, beginning at `start`; the others stay zero.
+    /// Solves (H + D) x = b by preconditioned conjugate gradients from `start`, with D = `added` and b = `right`, over the entries
+    /// where `free` is one; the others are zero.
     pub fn solve(
         &self,
         added: &[DVec3],
@@ -162,7 +162,7 @@ impl Rows {
         let mut z = scaled(&residual);
         let mut direction = z.clone();
         let mut rz = dot(&residual, &z);
-        for _ in 0..STEPS {
+        for _ in 0..MAX_ITERATIONS {
             if !rz.cmpgt(goal).any() {
                 break;
             }
@@ -186,8 +186,8 @@ impl Rows {
         x
     }
 
-    /// Minimises ½ dᵀ(H + D) d − gᵀ d with x + d within the bounds, by changing many parameters at a time between free
-    /// and bound (block principal pivoting, Júdice and Pires 1994).
+    /// Minimises ½ dᵀ(H + D) d − gᵀ d with x + d within the bounds by block principal pivoting (Júdice and Pires 1994), which
+    /// changes many parameters at a time between free and held at a bound.
     pub fn bounded_step(&self, problem: &Bounded) -> Vec<DVec3> {
         let Bounded {
             x,
@@ -199,8 +199,8 @@ impl Rows {
         let mut free = vec![DVec3::ONE; n];
         let mut held = vec![DVec3::ZERO; n];
         let mut step = held.clone();
-        for _ in 0..CHANGES {
-            // Solve for what is free, with the others at their bounds.
+        for _ in 0..MAX_ACTIVE_SETS {
+            // Solve for the free parameters, with the others at their bounds.
             let from_held = self.hessian_times(&held);
             let right: Vec<DVec3> = (0..n).map(|i| descent[i] - from_held[i]).collect();
             step = self.solve(added, &free, &right, &step, TOLERANCE);
@@ -209,7 +209,7 @@ impl Rows {
             }
             let product = self.hessian_times(&step);
 
-            // Hold what left its bounds and let go of what pushes inwards from them.
+            // Hold parameters that left their bounds, and free those whose gradient points inwards.
             let mut changed = false;
             for i in 0..n {
                 let target = x[i] + step[i];
@@ -236,33 +236,28 @@ impl Rows {
     }
 }
 
-/// Σ e v over some entries.
-fn along(entries: &[Entry], v: &[DVec3]) -> DVec3 {
+/// Dot product of a sparse row with a vector.
+fn dot(entries: &[Entry], v: &[DVec3]) -> DVec3 {
     (entries.iter())
-        .map(|e| e.value.as_dvec3() * v[e.place as usize])
+        .map(|e| e.value.as_dvec3() * v[e.parameter as usize])
         .sum()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse::fit::equations::Coupling;
-    use crate::inverse::fit::equations::Matrices;
-    use crate::inverse::fit::equations::NormalEquations;
-    use crate::inverse::fit::errors::release;
-    use crate::inverse::fit::errors::standard_errors;
+    use crate::inverse::fit::equations::{Coupling, Matrices, NormalEquations};
+    use crate::inverse::fit::errors::{score_tests, standard_errors};
     use crate::inverse::fit::gauss_newton::propose;
     use crate::inverse::fit::prior::Prior;
     use crate::inverse::unknowns::Unknowns;
     use crate::math::rng::Stream;
-    use glam::BVec3;
-
     const SURFACES: usize = 40;
     /// All albedos and the first ten emissions.
     const FREE: usize = SURFACES + 10;
 
-    /// Clusters of which each meets its own object, a lamp and a few others; the unknowns that explain them exactly lie
-    /// partly beyond the bounds.
+    /// Clusters that each depend on their own object and a few other parameters. The unbounded solution lies partly outside
+    /// the bounds.
     fn clusters() -> Vec<Linearised> {
         let mut stream = Stream::new(61, 0, 0, 0);
         (0..600)
@@ -273,21 +268,18 @@ mod tests {
                 };
                 let mut rows = vec![(object, color(1.0), color(1.0))];
                 for other in 1..6 {
-                    let place = (object * 7 + other * 11 + index) % FREE;
-                    if rows.iter().all(|r| r.0 != place) {
-                        rows.push((place, color(0.3), color(0.3)));
+                    let parameter = (object * 7 + other * 11 + index) % FREE;
+                    if rows.iter().all(|r| r.0 != parameter) {
+                        rows.push((parameter, color(0.3), color(0.3)));
                     }
                 }
                 let pull = if object.is_multiple_of(3) { -1.5 } else { 0.4 };
                 let residual = rows[0].1 * pull + color(0.3);
                 Linearised {
-                    object: object as u32,
                     weight: DVec3::ONE + color(1.0),
-                    pixels: 1.0,
                     residuals: [residual, residual + color(0.05)],
-                    censored: BVec3::FALSE,
-                    own: DVec3::ZERO,
                     rows,
+                    ..Linearised::unit(object as u32, DVec3::ZERO)
                 }
             })
             .collect()
@@ -336,7 +328,7 @@ mod tests {
     #[test]
     fn what_is_released_is_tested_alike() {
         let free: Vec<usize> = (0..FREE).collect();
-        let [dense, sparse] = both().map(|e| release(&e, &free, SURFACES));
+        let [dense, sparse] = both().map(|e| score_tests(&e, &free, SURFACES));
         for (a, b) in dense.iter().zip(&sparse) {
             for c in 0..3 {
                 assert!((a.step[c] / b.step[c] - 1.0).abs() < 0.05, "{a:?} {b:?}");

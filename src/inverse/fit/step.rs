@@ -1,10 +1,10 @@
-//! One bounded Gauss–Newton step of one channel.
+//! One bounded Gauss–Newton step of one channel, with dense matrices.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// One channel's linearised problem with bounds.
 pub struct Step<'a> {
-    /// Symmetric and positive; only the lower triangle is read.
+    /// Symmetric and positive definite; only the lower triangle is read.
     pub hessian: &'a DMatrix<f64>,
     /// Minus the gradient.
     pub descent: &'a DVector<f64>,
@@ -23,7 +23,7 @@ impl Step<'_> {
         let mut fixed: Vec<Option<f64>> = vec![None; n];
         let mut step = DVector::zeros(n);
         for _ in 0..2 * n + 2 {
-            // Solve for what is free, with the others at their bounds.
+            // Solve for the free parameters, with the others at their bounds.
             let free: Vec<usize> = (0..n).filter(|&i| fixed[i].is_none()).collect();
             for i in 0..n {
                 step[i] = fixed[i].map_or(0.0, |bound| bound - x[i]);
@@ -48,7 +48,7 @@ impl Step<'_> {
                 }
             }
 
-            // Hold whatever left its bounds; when nothing did, let go of the bound that pushes back hardest.
+            // Hold parameters that left their bounds. If there are none, free the one with the largest inward gradient.
             let mut violated = false;
             for &i in &free {
                 let target = x[i] + step[i];
@@ -96,7 +96,7 @@ impl Step<'_> {
 mod tests {
     use super::*;
 
-    /// Minimises the same problem by tiny projected gradient steps.
+    /// Solves the same problem by projected coordinate descent.
     fn by_projected_gradient(step: &Step, x: &[f64]) -> Vec<f64> {
         let mut d = vec![0.0; x.len()];
         for _ in 0..200_000 {

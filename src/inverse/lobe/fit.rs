@@ -1,47 +1,47 @@
-//! Least squares over an object's observations: as a diffuse surface, or with a lobe of given roughness.
+//! Least-squares fit of an object's observations by a diffuse surface, or by a lobe of given roughness over a diffuse base.
 //!
-//! With u = albedo (1 − specular), a observation under a lobe shows u·base + specular·(lobe − grazing) + grazing, linear in u
-//! and specular (variable projection, Golub and Pereyra 1973: roughness is searched outside). Products are taken across
-//! two independent sets of paths, so that their noise biases nothing. What all observations of a spot share may be texture:
-//! it counts less the more spots differ (generalised least squares of random effects, Fuller and Battese 1973).
+//! With u = albedo (1 − specular), an observation has the radiance u·base + specular·(lobe − grazing) + grazing, linear in u
+//! and specular; roughness is searched outside (variable projection, Golub and Pereyra 1973). Products are taken across two
+//! independent sets of paths, so that path noise causes no bias. The mean over the observations of a spot may be texture: it is
+//! a random effect, down-weighted by the variance between spots (Fuller and Battese 1973).
 
-use crate::inverse::lobe::gather::Parts;
+use crate::inverse::lobe::gather::Components;
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 
-/// What one observation shows, and what it would show of each part in two independent sets; all relative to its spot's level.
+/// One observation of the fit. All radiances are relative to the level of its spot.
 #[derive(Debug, Clone, Copy)]
 pub struct Row {
-    /// Index of its spot; rows of a spot lie side by side.
+    /// Index of its spot; rows of a spot are adjacent.
     pub spot: usize,
-    /// Pixels.
+    /// Number of pixels.
     pub weight: f64,
-    /// Radiance of the photograph.
-    pub shown: DVec3,
-    /// A radiance of one.
+    /// Radiance in the photograph.
+    pub measured: DVec3,
+    /// An absolute radiance of one.
     pub one: DVec3,
-    /// The parts.
-    pub sets: [Parts; 2],
+    /// Radiance of each component per unit, from two independent sets of paths.
+    pub sets: [Components; 2],
 }
 
-/// What explains the rows.
+/// A model of the rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Model {
-    /// A diffuse surface: albedo of each channel, and emission of each where it may give light.
+    /// A diffuse surface. Parameters: RGB albedo, and RGB emission if it may emit.
     Diffuse {
-        /// Whether it may give light.
+        /// Whether it may emit light.
         emits: bool,
     },
-    /// A lobe over a diffuse base: albedo (1 − specular) of each channel, and specular.
+    /// A lobe over a diffuse base. Parameters: RGB albedo × (1 − specular), and specular.
     Lobe,
 }
 
-/// Variances of what a model leaves, of one pixel.
+/// Variances of a model's residuals for one pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Variances {
     /// Between observations of a spot.
     pub within: f64,
-    /// Between spots, beyond that.
+    /// Between spots, in addition.
     pub between: f64,
 }
 
@@ -55,12 +55,12 @@ impl Model {
         }
     }
 
-    /// The derivative of one channel of a row with respect to the parameters that it depends on.
+    /// The derivatives of one channel of a row: parameter and derivative.
     fn slopes(self, row: &Row, set: usize, channel: usize) -> [(usize, f64); 2] {
-        let parts = &row.sets[set];
+        let components = &row.sets[set];
         match self {
             Self::Diffuse { emits } => [
-                (channel, parts.diffuse[channel]),
+                (channel, components.diffuse[channel]),
                 if emits {
                     (3 + channel, row.one[channel])
                 } else {
@@ -68,13 +68,13 @@ impl Model {
                 },
             ],
             Self::Lobe => [
-                (channel, parts.base[channel]),
-                (3, parts.lobe[channel] - parts.grazing[channel]),
+                (channel, components.base[channel]),
+                (3, components.lobe[channel] - components.grazing[channel]),
             ],
         }
     }
 
-    /// What one channel of a row shows with all parameters at zero.
+    /// Radiance of one channel of a row with all parameters at zero.
     fn offset(self, row: &Row, set: usize, channel: usize) -> f64 {
         match self {
             Self::Diffuse { .. } => 0.0,
@@ -82,18 +82,18 @@ impl Model {
         }
     }
 
-    /// Photograph less model, in both sets.
+    /// Photograph minus model, for both sets.
     pub fn residuals(self, row: &Row, parameters: &[f64]) -> [DVec3; 2] {
         [0, 1].map(|set| {
             DVec3::from_array(std::array::from_fn(|c| {
                 let slopes = self.slopes(row, set, c);
                 let model: f64 = slopes.iter().map(|&(i, s)| s * parameters[i]).sum();
-                row.shown[c] - self.offset(row, set, c) - model
+                row.measured[c] - self.offset(row, set, c) - model
             }))
         })
     }
 
-    /// Σ w r_A r_B.
+    /// Squared error Σ w r_A r_B.
     pub fn error(self, rows: &[Row], parameters: &[f64]) -> f64 {
         (rows.iter())
             .map(|row| {
@@ -103,14 +103,14 @@ impl Model {
             .sum()
     }
 
-    /// The parameters of least error within their bounds; `None` where the rows do not tell.
+    /// The least-squares parameters within their bounds; `None` if the rows do not determine them.
     pub fn fit(self, rows: &[Row]) -> Option<Vec<f64>> {
         let n = self.len();
         let (mut normal, mut right) = (DMatrix::zeros(n, n), DVector::zeros(n));
         for row in rows {
             for c in 0..3 {
                 let slopes = [0, 1].map(|set| self.slopes(row, set, c));
-                let target = [0, 1].map(|set| row.shown[c] - self.offset(row, set, c));
+                let target = [0, 1].map(|set| row.measured[c] - self.offset(row, set, c));
                 for (set, other) in [(0, 1), (1, 0)] {
                     for (i, s) in slopes[set] {
                         right[i] += 0.5 * row.weight * s * target[other];
@@ -124,7 +124,7 @@ impl Model {
         self.bounded(&normal, &right)
     }
 
-    /// Solves for all parameters, holding at its bound what leaves it.
+    /// Solves the normal equations; parameters that leave their bounds are held there.
     fn bounded(self, normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<Vec<f64>> {
         let n = self.len();
         let mut held: Vec<Option<f64>> = vec![None; n];
@@ -141,52 +141,50 @@ impl Model {
             } else {
                 matrix.lu().solve(&vector)?
             };
-            let mut found = held.iter().map(|h| h.unwrap_or(0.0)).collect::<Vec<f64>>();
-            free.iter()
-                .zip(solution.iter())
-                .for_each(|(&i, x)| found[i] = *x);
-            if found.iter().any(|x| !x.is_finite()) {
+            let mut parameters: Vec<f64> = held.iter().map(|h| h.unwrap_or(0.0)).collect();
+            (free.iter().zip(solution.iter())).for_each(|(&i, x)| parameters[i] = *x);
+            if parameters.iter().any(|x| !x.is_finite()) {
                 return None;
             }
-            let bound = |i: usize| match self {
+            let upper = |i: usize| match self {
                 Self::Diffuse { .. } if i >= 3 => f64::INFINITY,
                 Self::Lobe if i == 3 => MAX_SPECULAR,
                 _ => 1.0,
             };
-            let mut left = false;
+            let mut violated = false;
             for &i in &free {
-                if !(0.0..=bound(i)).contains(&found[i]) {
-                    held[i] = Some(found[i].clamp(0.0, bound(i)));
-                    left = true;
+                if !(0.0..=upper(i)).contains(&parameters[i]) {
+                    held[i] = Some(parameters[i].clamp(0.0, upper(i)));
+                    violated = true;
                 }
             }
-            if left {
+            if violated {
                 continue;
             }
             if self == Self::Lobe {
-                // No base reflects more than all that the lobe leaves.
-                let room = 1.0 - found[3];
-                found[..3].iter_mut().for_each(|u| *u = u.min(room));
+                // The base's albedo is at most one.
+                let max = 1.0 - parameters[3];
+                parameters[..3].iter_mut().for_each(|u| *u = u.min(max));
             }
-            return Some(found);
+            return Some(parameters);
         }
     }
 
-    /// Variances of what is left of rows that are as they were measured.
+    /// Variances of the residuals of rows that are not [`decorrelated`].
     pub fn variances(self, rows: &[Row], parameters: &[f64]) -> Variances {
         let (mut within, mut freedom) = (0.0, 0usize);
         let mut means = Vec::new();
         for spot in rows.chunk_by(|a, b| a.spot == b.spot) {
             let weight: f64 = spot.iter().map(|r| r.weight).sum();
-            let left: Vec<[DVec3; 2]> =
+            let residuals: Vec<[DVec3; 2]> =
                 spot.iter().map(|r| self.residuals(r, parameters)).collect();
             let mean = [0, 1].map(|set| {
-                let sum: DVec3 = (spot.iter().zip(&left))
-                    .map(|(r, l)| l[set] * r.weight)
+                let sum: DVec3 = (spot.iter().zip(&residuals))
+                    .map(|(row, residual)| residual[set] * row.weight)
                     .sum();
                 sum / weight
             });
-            for (row, [a, b]) in spot.iter().zip(&left) {
+            for (row, [a, b]) in spot.iter().zip(&residuals) {
                 within += row.weight * (*a - mean[0]).dot(*b - mean[1]) / 3.0;
             }
             freedom += spot.len() - 1;
@@ -208,33 +206,33 @@ impl Model {
     }
 }
 
-/// Specular reflectance at most.
+/// Greatest specular reflectance at normal incidence.
 const MAX_SPECULAR: f64 = 0.98;
-/// Photographs and meshes are no better than this, squared and relative.
+/// Least relative variance: photographs and meshes are no better.
 const MIN_VARIANCE: f64 = 1e-6;
 
-/// The rows with a fraction of each spot's mean taken off, so that what is left of them scatters alike and independently: all of it
-/// where spots have any albedo each.
-pub fn freed(rows: &[Row], fraction: impl Fn(f64) -> f64) -> Vec<Row> {
+/// The rows minus a fraction of their spot's mean, which makes their errors independent and of equal variance. `fraction` is
+/// given the weight of the spot; a fraction of one gives each spot a free albedo.
+pub fn decorrelated(rows: &[Row], fraction: impl Fn(f64) -> f64) -> Vec<Row> {
     let mut all = Vec::with_capacity(rows.len());
     for spot in rows.chunk_by(|a, b| a.spot == b.spot) {
         let weight: f64 = spot.iter().map(|r| r.weight).sum();
         let fraction = fraction(weight);
-        let mean = |of: &dyn Fn(&Row) -> DVec3| {
-            spot.iter().map(|r| of(r) * r.weight).sum::<DVec3>() * (fraction / weight)
+        let mean = |value: &dyn Fn(&Row) -> DVec3| {
+            spot.iter().map(|r| value(r) * r.weight).sum::<DVec3>() * (fraction / weight)
         };
-        let (shown, one) = (mean(&|r| r.shown), mean(&|r| r.one));
-        let parts = [0, 1].map(|set| {
-            let mut sum = Parts::default();
+        let (measured, one) = (mean(&|r| r.measured), mean(&|r| r.one));
+        let components = [0, 1].map(|set| {
+            let mut sum = Components::default();
             for row in spot {
                 sum += row.sets[set] * row.weight;
             }
             sum * (fraction / weight)
         });
         all.extend(spot.iter().map(|row| Row {
-            shown: row.shown - shown,
+            measured: row.measured - measured,
             one: row.one - one,
-            sets: [0, 1].map(|set| row.sets[set] - parts[set]),
+            sets: [0, 1].map(|set| row.sets[set] - components[set]),
             ..*row
         }));
     }
@@ -242,9 +240,9 @@ pub fn freed(rows: &[Row], fraction: impl Fn(f64) -> f64) -> Vec<Row> {
 }
 
 impl Variances {
-    /// [`freed`] by what these variances call for.
-    pub fn free(&self, rows: &[Row]) -> Vec<Row> {
-        freed(rows, |weight| {
+    /// Rows [`decorrelated`] for these variances.
+    pub fn decorrelate(&self, rows: &[Row]) -> Vec<Row> {
+        decorrelated(rows, |weight| {
             1.0 - (1.0 + weight * self.between / self.within).sqrt().recip()
         })
     }
@@ -255,7 +253,7 @@ mod tests {
     use super::*;
     use crate::math::rng::Stream;
 
-    /// Two observations of each of 200 spots, each of its own colour, with noise in the photographs and in both sets.
+    /// Two observations of each of 200 spots of random albedo, with noise in the photographs and in both sets.
     fn rows(albedo: f64, specular: f64, texture: f64) -> Vec<Row> {
         let mut stream = Stream::new(17, 0, 0, 0);
         let mut uniform = || f64::from(stream.uniform());
@@ -263,26 +261,26 @@ mod tests {
         for spot in 0..200 {
             let own = albedo * (1.0 + texture * (2.0 * uniform() - 1.0));
             for _ in 0..2 {
-                let parts = Parts {
+                let truth = Components {
                     diffuse: DVec3::splat(1.0),
                     base: DVec3::splat(0.9 + 0.1 * uniform()),
                     lobe: DVec3::splat(0.5 + uniform()),
                     grazing: DVec3::splat(0.05 * uniform()),
                 };
-                let shown = parts.base * own * (1.0 - specular)
-                    + parts.lobe * specular
-                    + parts.grazing * (1.0 - specular);
+                let radiance = truth.base * own * (1.0 - specular)
+                    + truth.lobe * specular
+                    + truth.grazing * (1.0 - specular);
                 let mut noisy = |v: DVec3, size: f64| v * (1.0 + size * (2.0 * uniform() - 1.0));
-                let shown = noisy(shown, 0.02);
-                let sets = [0, 1].map(|_| Parts {
-                    lobe: noisy(parts.lobe, 0.5),
-                    base: noisy(parts.base, 0.2),
-                    ..parts
+                let measured = noisy(radiance, 0.02);
+                let sets = [0, 1].map(|_| Components {
+                    lobe: noisy(truth.lobe, 0.5),
+                    base: noisy(truth.base, 0.2),
+                    ..truth
                 });
                 rows.push(Row {
                     spot,
                     weight: 4.0,
-                    shown,
+                    measured,
                     one: DVec3::ONE,
                     sets,
                 });
@@ -307,15 +305,16 @@ mod tests {
         let first = Model::Lobe.fit(&rows).expect("rows tell");
         let variances = Model::Lobe.variances(&rows, &first);
         assert!(variances.between > 4.0 * variances.within, "{variances:?}");
-        let freed = variances.free(&rows);
-        let found = Model::Lobe.fit(&freed).expect("rows tell");
+        let found = Model::Lobe
+            .fit(&variances.decorrelate(&rows))
+            .expect("rows tell");
         assert!((found[3] - 0.2).abs() < 0.03, "{found:?}");
     }
 
     #[test]
     fn parameters_stay_within_their_bounds() {
         let mut rows = rows(0.5, 0.0, 0.0);
-        rows.iter_mut().for_each(|r| r.shown *= 3.0);
+        rows.iter_mut().for_each(|r| r.measured *= 3.0);
         let found = Model::Lobe.fit(&rows).expect("rows tell");
         assert!(found.iter().all(|x| (0.0..=1.0).contains(x)), "{found:?}");
         assert!(found[0] + found[3] <= 1.0 + 1e-12, "{found:?}");

@@ -1,4 +1,5 @@
-//! The light that arrives at what pixels see, kept by direction: any lobe's share in it follows with no ray.
+//! Samples the incident radiance at observed surface points, stored by direction, so that any lobe can be evaluated without
+//! further rays.
 
 use crate::inverse::lobe::observations::SpotObservation;
 use crate::math::frame::Frame;
@@ -13,41 +14,42 @@ use crate::transport::path::PathOptions;
 use glam::{DVec3, Vec2};
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 
-/// First of the sample keys of these paths, far from those of other stages.
+/// First of the sample keys of these paths, disjoint from those of other stages.
 const KEY: u64 = 9 << 59;
 
-/// How light is gathered.
+/// Settings of the sampling of incident radiance.
 #[derive(Debug, Clone, Copy)]
 pub struct Gathering<'a> {
-    /// Scene, lights and materials as known so far.
+    /// The scene with its present estimate.
     pub lit: &'a Lit,
-    /// The object whose pixels are looked at.
+    /// The object whose pixels are sampled.
     pub object: u32,
-    /// Points in each of two sets.
+    /// Points per observation in each of two sets.
     pub points: u32,
-    /// GGX roughnesses that directions are drawn by, besides evenly.
+    /// GGX roughnesses whose lobes directions are sampled from, in addition to cosine sampling.
     pub roughnesses: &'a [f64],
-    /// How paths go on.
+    /// Options of the continued paths.
     pub options: PathOptions,
-    /// Key of the random streams.
+    /// Seed of the random streams.
     pub seed: u64,
-    /// Gatherings of other passes are independent.
+    /// Different passes are independent.
     pub pass: u64,
 }
 
-/// Light that arrives at random points of a observation: one independent set of paths.
+/// Incident radiance at random points of an observation, from one set of paths.
 #[derive(Debug, Clone, Default)]
 pub struct Gathered {
+    /// Outgoing direction in the local frame, and an incident sample.
     arrivals: Vec<(glam::Vec3, Arrival)>,
     points: u32,
 }
 
-/// What a observation shows per unit of each part of a material, per channel.
+/// Radiance of an observation per unit of each component of a material, per channel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Parts {
+pub struct Components {
     /// A diffuse surface of unit albedo.
     pub diffuse: DVec3,
-    /// The base under a lobe, of unit albedo, before the factor (1 − specular).
+    /// The base below a lobe, of unit albedo, without the factor (1 − specular).
     pub base: DVec3,
     /// The lobe without its Fresnel term.
     pub lobe: DVec3,
@@ -55,7 +57,7 @@ pub struct Parts {
     pub grazing: DVec3,
 }
 
-impl Parts {
+impl Components {
     fn map(self, other: Self, f: impl Fn(DVec3, DVec3) -> DVec3) -> Self {
         Self {
             diffuse: f(self.diffuse, other.diffuse),
@@ -66,34 +68,34 @@ impl Parts {
     }
 }
 
-impl Add for Parts {
+impl Add for Components {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         self.map(other, |a, b| a + b)
     }
 }
 
-impl AddAssign for Parts {
+impl AddAssign for Components {
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
-impl Sub for Parts {
+impl Sub for Components {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
         self.map(other, |a, b| a - b)
     }
 }
 
-impl Mul<f64> for Parts {
+impl Mul<f64> for Components {
     type Output = Self;
     fn mul(self, factor: f64) -> Self {
         self.map(self, |a, _| a * factor)
     }
 }
 
-impl Div<DVec3> for Parts {
+impl Div<DVec3> for Components {
     type Output = Self;
     fn div(self, level: DVec3) -> Self {
         self.map(self, |a, _| a / level)
@@ -101,7 +103,7 @@ impl Div<DVec3> for Parts {
 }
 
 impl Gathering<'_> {
-    /// Gathers the light that arrives at one observation, in two independent sets.
+    /// Samples the incident radiance of one observation, in two independent sets.
     pub fn observation(
         &self,
         camera: &Camera,
@@ -126,17 +128,17 @@ impl Gathering<'_> {
         point: u32,
         gathered: &mut Gathered,
     ) -> Cast {
-        // Points spread over the pixels.
+        // Points are stratified over the pixels.
         let index = KEY + (self.pass << 40) + 2 * u64::from(point) + set;
         let first = u64::from(observation.pixels[0]);
         let mut stream = Stream::new(self.seed, u64::from(observation.frame), first, index);
         let count = observation.pixels.len() as u32;
-        let place = if self.points < count {
+        let index_in_pixels = if self.points < count {
             point * count / self.points + stream.below(1 + (count / self.points) as usize) as u32
         } else {
             point
         };
-        let pixel = observation.pixels[(place % count) as usize];
+        let pixel = observation.pixels[(index_in_pixels % count) as usize];
         let width = camera.intrinsics.width;
         let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
         let ray = camera.ray(corner + Vec2::from_array(stream.uniform2()));
@@ -152,7 +154,7 @@ impl Gathering<'_> {
             return cast;
         }
 
-        // Light on the side that the camera sees.
+        // Incident light on the side that the camera sees.
         let surface = self.lit.surface(&hit);
         let to_camera = -ray.direction.normalize_or_zero();
         let side = if surface.normal.dot(to_camera) < 0.0 {
@@ -183,14 +185,14 @@ impl Gathering<'_> {
 }
 
 impl Gathered {
-    /// What the observation would show of each part, for a lobe of GGX roughness α; zero where no point was seen.
-    pub fn parts(&self, alpha: f64) -> Parts {
-        let mut sum = Parts::default();
+    /// The observation's components for a lobe of GGX roughness α; zero if no point hit the object.
+    pub fn components(&self, alpha: f64) -> Components {
+        let mut sum = Components::default();
         for (wo, arrival) in &self.arrivals {
             let light = arrival.light.as_dvec3();
             let lobe = Microfacet::new(alpha, *wo, arrival.wi);
             let value = lobe.eval();
-            sum += Parts {
+            sum += Components {
                 diffuse: light * f64::from(warp::cosine_hemisphere_pdf(arrival.wi.z)),
                 base: light * coupling(*wo, arrival.wi),
                 lobe: light * value,
@@ -200,7 +202,7 @@ impl Gathered {
         sum * (1.0 / f64::from(self.points.max(1)))
     }
 
-    /// Whether any point was seen.
+    /// Whether no point hit the object.
     pub fn is_empty(&self) -> bool {
         self.points == 0
     }

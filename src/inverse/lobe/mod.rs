@@ -1,9 +1,9 @@
-//! Rough specular lobes: one an object, only where its photographs show it.
+//! Fits one rough specular lobe per object, where its photographs show one.
 //!
-//! What an object reflects of the light around it is gathered once, kept by direction ([`gather`]), and then explained as
-//! a diffuse surface or under a lobe of any roughness with no further ray ([`fit`]). An object is tried where photographs
-//! of the same spots differ as a lobe would make them ([`screen`]), and its lobe kept where pixels left out of its fit
-//! get better by more than their noise, in what they show and in how they differ by view ([`trial`]).
+//! The incident radiance at an object is sampled once and stored by direction ([`gather`]). A diffuse surface, or a lobe of any
+//! roughness, is then fitted without further rays ([`fit`]). An object is tried if photographs of the same spots differ as a
+//! lobe predicts ([`screen`]). Its lobe is kept if it improves cross-validated pixels significantly, both in their radiance and
+//! in their differences between views ([`trial`]).
 
 mod fit;
 mod gather;
@@ -23,72 +23,74 @@ use gather::Gathering;
 use glam::{DVec3, Vec3};
 use observations::Spot;
 pub use trial::Gain;
-use trial::{Evidence, find};
+use trial::{LitObservations, find};
 
-/// Evidence of so many standard errors calls for a trial.
-const CALLING: f64 = 5.0;
-/// A gain of so many standard errors is no accident.
+/// Evidence of this many standard errors leads to a trial.
+const MIN_EVIDENCE: f64 = 5.0;
+/// A gain of this many standard errors is significant.
 const SIGNIFICANT: f64 = 4.0;
-/// Points of a observation in screening, in each of two sets.
+/// Points per observation in screening, in each of two sets.
 const SCREENED_POINTS: u32 = 2;
-/// Bounces up to which light is followed in screening.
+/// Greatest number of bounces in screening.
 const SCREENED_BOUNCES: u32 = 2;
-/// Observations of an object in the fit, at most.
-const MAX_SIGHTS: usize = 1200;
-/// Directions at a point in a first fit are drawn by these roughnesses.
+/// Greatest number of observations of an object in the fit.
+const MAX_OBSERVATIONS: usize = 1200;
+/// GGX roughnesses that directions are sampled from in the first fit.
 const FIRST_DRAWN: [f64; 2] = [0.08, 0.3];
-/// Points of a observation in each of two sets, at least and at most: in the first fit, in the second, and where a lobe is found anew.
+/// Least and greatest number of points per observation and set in the first fit, ...
 const FIRST_POINTS: (u64, u64) = (8, 48);
+/// ... in the second fit, whose directions are sampled from the roughness of the first, ...
 const SECOND_POINTS: (u64, u64) = (12, 96);
-const POINTS_ANEW: (u64, u64) = (12, 384);
+/// ... and if a known lobe is fitted again.
+const REFIT_POINTS: (u64, u64) = (12, 384);
 
-/// A last fit looks no further than so many times the roughness that directions were drawn by.
+/// Greatest ratio between the roughness of the last fit and the sampled one.
 const NEAR: f64 = 2.0;
 
-/// What lobes are looked for in.
+/// The inputs of the search for lobes.
 #[derive(Debug, Clone, Copy)]
 pub struct Task<'a> {
     /// Scene and photographs.
     pub problem: &'a Problem,
-    /// Key of the random streams.
+    /// Seed of the random streams.
     pub seed: u64,
-    /// Directions to follow for an object in each of its fits, about.
+    /// Approximate number of paths for each fit of an object.
     pub paths: u64,
-    /// Longest path in bounces.
+    /// Greatest number of bounces.
     pub max_bounces: u32,
 }
 
 /// The best lobe of an object.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Found {
+pub struct LobeFit {
     /// GGX roughness α.
     pub roughness: f64,
     /// Specular reflectance at normal incidence.
     pub specular: f64,
     /// Albedo of the base.
     pub albedo: DVec3,
-    /// Standard errors of albedo, specular and roughness.
+    /// Standard errors of RGB albedo, specular and roughness.
     pub errors: [f64; 5],
-    /// Gain over a diffuse surface on pixels left out of the fit.
+    /// Cross-validated gain over a diffuse surface.
     pub gain: Gain,
-    /// The same in differences between photographs of the same spots alone.
+    /// The same for differences between photographs of the same spots.
     pub by_view: Gain,
 }
 
 impl Gain {
-    /// Whether it is no accident.
+    /// Whether it is more than four standard errors above zero.
     pub fn is_significant(&self) -> bool {
         self.mean > SIGNIFICANT * self.noise
     }
 }
 
-impl Found {
-    /// Whether pixels left out of the fit ask for it.
-    pub fn is_called_for(&self) -> bool {
+impl LobeFit {
+    /// Whether both gains are significant.
+    pub fn is_significant(&self) -> bool {
         self.gain.is_significant() && self.by_view.is_significant()
     }
 
-    /// As a material's.
+    /// The lobe of a material.
     pub fn lobe(&self) -> Lobe {
         Lobe {
             roughness: self.roughness as f32,
@@ -103,18 +105,18 @@ impl Found {
     }
 }
 
-/// Hears of rays cast and paths dropped; may end the stage.
-pub type Tell<'t> = dyn FnMut(Cast) -> Result<(), Termination> + 't;
+/// Receives the numbers of rays cast and paths rejected; its error ends the stage.
+pub type Report<'t> = dyn FnMut(Cast) -> Result<(), Termination> + 't;
 
-/// The spots of all objects, and what lobes are looked for with.
+/// The search for lobes over the spots of all objects.
 pub struct Lobes<'a> {
-    /// What lobes are looked for in, and with how many paths.
+    /// Its inputs.
     pub task: Task<'a>,
     spots: Vec<Vec<Spot>>,
 }
 
 impl<'a> Lobes<'a> {
-    /// Gathers the spots that pixels see.
+    /// Groups the pixels into spots.
     pub fn new(task: Task<'a>, gbuffer: &GBuffer) -> Self {
         Self {
             spots: observations::spots(task.problem, gbuffer),
@@ -137,71 +139,71 @@ impl<'a> Lobes<'a> {
         }
     }
 
-    /// For each of the given objects, how many standard errors photographs of the same spots speak for a lobe; `None`
-    /// where too few spots are seen by several photographs.
+    /// For each of the given objects, the evidence for a lobe in standard errors, from differences between photographs of the
+    /// same spots; `None` if too few spots are seen by several photographs.
     ///
     /// # Errors
-    /// Why the solve is to end, where `tell` says so.
+    /// The error of `report`.
     pub fn evidence(
         &self,
         estimate: &Estimate,
         objects: &[usize],
-        tell: &mut Tell,
+        report: &mut Report,
     ) -> Result<Vec<Option<f64>>, Termination> {
         let lit = estimate.lit(&self.task.problem.scene);
         let mut all = Vec::with_capacity(objects.len());
         for &object in objects {
             let mut gathering = self.gathering(&lit, object, &screen::DRAWN);
             gathering.options.max_bounces = SCREENED_BOUNCES.min(self.task.max_bounces);
-            // What gives light hides its albedo: that of most things will do.
+            // Emitters have albedo zero; a small one is assumed.
             let albedo = estimate.objects[object].albedo.max(Vec3::splat(0.05));
             let scene = &self.task.problem.scene;
             let (evidence, cast) =
                 screen::evidence(&gathering, scene, &self.spots[object], albedo.as_dvec3());
-            tell(cast)?;
+            report(cast)?;
             all.push(evidence);
         }
         Ok(all)
     }
 
-    /// Points of each of an object's observations that its paths suffice for, where directions are drawn in so many ways besides
-    /// evenly.
-    fn points(&self, object: usize, ways: usize, (least, most): (u64, u64)) -> u32 {
-        let chosen = observations::choose(&self.spots[object], 1, MAX_SIGHTS);
+    /// Points per observation and set that the paths suffice for, if directions are sampled from `lobes` lobes and by cosine.
+    fn points(&self, object: usize, lobes: usize, (min, max): (u64, u64)) -> u32 {
+        let chosen = observations::choose(&self.spots[object], 1, MAX_OBSERVATIONS);
         let observations: usize = chosen.iter().map(|spot| spot.len()).sum();
-        let points = self.task.paths / (2 * (1 + ways) * observations.max(1)) as u64;
-        points.clamp(least, most) as u32
+        let points = self.task.paths / (2 * (1 + lobes) * observations.max(1)) as u64;
+        points.clamp(min, max) as u32
     }
 
-    /// Whether evidence calls for a trial.
-    pub fn calls(evidence: Option<f64>) -> bool {
-        evidence.is_some_and(|t| t > CALLING)
+    /// Whether the evidence suffices for a trial.
+    pub fn is_promising(evidence: Option<f64>) -> bool {
+        evidence.is_some_and(|t| t > MIN_EVIDENCE)
     }
 
-    /// Finds an object's lobe, from nothing or from what was found before; `None` where nothing tells. What is found from
-    /// before is by paths of its `turn`, independent of those of other turns.
+    /// Fits an object's lobe, from scratch or near a known one; `None` if the observations do not determine it. `known` holds the
+    /// lobe and the number of the refit, whose paths are independent of other refits.
     ///
     /// # Errors
-    /// Why the solve is to end, where `tell` says so.
+    /// The error of `report`.
     pub fn find(
         &self,
         lit: &Lit,
         object: usize,
         emits: bool,
         known: Option<(Lobe, u64)>,
-        tell: &mut Tell,
-    ) -> Result<Option<Found>, Termination> {
+        report: &mut Report,
+    ) -> Result<Option<LobeFit>, Termination> {
         let scene = &self.task.problem.scene;
         let spots = &self.spots[object];
         let (roughness, pass, points) = match known {
-            Some((lobe, turn)) => (f64::from(lobe.roughness), 3 + turn, POINTS_ANEW),
+            Some((lobe, refit)) => (f64::from(lobe.roughness), 3 + refit, REFIT_POINTS),
             None => {
                 let mut gathering = self.gathering(lit, object, &FIRST_DRAWN);
                 gathering.points = self.points(object, FIRST_DRAWN.len(), FIRST_POINTS);
                 gathering.pass = 1;
-                let (evidence, cast) = Evidence::new(&gathering, scene, spots, MAX_SIGHTS);
-                tell(cast)?;
-                match find(&evidence, emits, [0.0, 1.0]) {
+                let (observations, cast) =
+                    LitObservations::new(&gathering, scene, spots, MAX_OBSERVATIONS);
+                report(cast)?;
+                match find(&observations, emits, [0.0, 1.0]) {
                     Some(first) => (first.roughness, 2, SECOND_POINTS),
                     None => return Ok(None),
                 }
@@ -211,9 +213,9 @@ impl<'a> Lobes<'a> {
         let mut gathering = self.gathering(lit, object, &drawn);
         gathering.points = self.points(object, drawn.len(), points);
         gathering.pass = pass;
-        let (evidence, cast) = Evidence::new(&gathering, scene, spots, MAX_SIGHTS);
-        tell(cast)?;
+        let (observations, cast) = LitObservations::new(&gathering, scene, spots, MAX_OBSERVATIONS);
+        report(cast)?;
         let near = [roughness / NEAR, roughness * NEAR];
-        Ok(find(&evidence, emits, near))
+        Ok(find(&observations, emits, near))
     }
 }

@@ -1,7 +1,7 @@
-//! Spots of a surface, and what each photograph that sees one shows of it.
+//! Spots of a surface, and their observations by each photograph.
 //!
-//! A diffuse spot looks the same from everywhere whatever its colour, so what differs between photographs of one spot
-//! speaks of gloss and never of texture.
+//! A diffuse spot has the same radiance in all views, whatever its texture. Differences between photographs of one spot
+//! therefore indicate gloss.
 
 use crate::calibrate::gbuffer::GBuffer;
 use crate::calibrate::measured_radiance::cell_key;
@@ -17,23 +17,23 @@ const SPOT_FOOTPRINTS: f32 = 3.0;
 pub struct SpotObservation {
     /// Frame index.
     pub frame: u32,
-    /// Row by row from the top left.
+    /// Pixel indices, row by row from the top left.
     pub pixels: Vec<u32>,
     /// Their mean radiance.
     pub measured: DVec3,
-    /// Whether they are kept out of every fit.
+    /// Whether they are held out of every fit.
     pub held_out: bool,
 }
 
 /// A spot's observations; those in the fit come first.
 pub type Spot = Vec<SpotObservation>;
 
-/// Photographs in the fit that see a spot.
+/// Number of photographs in the fit that see a spot.
 pub fn views(spot: &[SpotObservation]) -> usize {
     spot.iter().filter(|s| !s.held_out).count()
 }
 
-/// The spots of each object, in an order that has nothing to do with where they lie.
+/// The spots of each object, in the order of their hash keys, which is random in space.
 pub fn spots(problem: &Problem, gbuffer: &GBuffer) -> Vec<Vec<Spot>> {
     let mut of_object = vec![Vec::new(); problem.scene.objects.len()];
     let size = gbuffer.footprint * SPOT_FOOTPRINTS;
@@ -69,17 +69,18 @@ pub fn spots(problem: &Problem, gbuffer: &GBuffer) -> Vec<Vec<Spot>> {
     of_object
 }
 
-/// Spots with up to about `most` observations in the fit, those that several photographs see first.
-pub fn choose(spots: &[Spot], min_views: usize, most: usize) -> Vec<&Spot> {
+/// Spots with about `max` observations in the fit in total, those that several photographs see first; none with fewer than
+/// `min_views` views.
+pub fn choose(spots: &[Spot], min_views: usize, max: usize) -> Vec<&Spot> {
     let several = spots.iter().filter(|s| views(s) >= 2.max(min_views));
     let single = (spots.iter()).filter(|s| views(s) == 1 && min_views <= 1);
     let mut count = 0;
     several
         .chain(single)
         .take_while(|spot| {
-            let room = count < most;
+            let has_room = count < max;
             count += views(spot);
-            room
+            has_room
         })
         .collect()
 }

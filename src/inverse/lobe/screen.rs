@@ -1,6 +1,6 @@
-//! Which objects are worth a trial: those that look different from different sides, and as a lobe would make them.
+//! Selects the objects that are worth a trial of a lobe: their photographs differ between views as a lobe predicts.
 
-use crate::inverse::lobe::gather::{Gathered, Gathering, Parts};
+use crate::inverse::lobe::gather::{Components, Gathered, Gathering};
 use crate::inverse::lobe::observations::{Spot, SpotObservation, choose};
 use crate::math::stats::quantile;
 use crate::scene::Scene;
@@ -8,40 +8,43 @@ use crate::transport::arrival::Cast;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Observations that are looked at.
-const MAX_SIGHTS: usize = 600;
-/// Observations that an object needs.
-const MIN_SIGHTS: usize = 12;
-/// GGX roughnesses that are looked for, and the specular reflectance.
+/// Greatest number of observations of an object.
+const MAX_OBSERVATIONS: usize = 600;
+/// Least number of observations of an object.
+const MIN_OBSERVATIONS: usize = 12;
+/// GGX roughnesses that are tested.
 const ROUGHNESSES: [f64; 3] = [0.1, 0.25, 0.6];
+/// Specular reflectance that is tested.
 const SPECULAR: f64 = 0.1;
-/// One observation's expected difference counts up to so many times what two of three stay below.
+/// Expected differences are clamped to this multiple of their 68th percentile.
 const CLIP: f64 = 5.0;
 
-/// Directions at a point in screening are drawn by these roughnesses.
+/// GGX roughnesses that directions are sampled from.
 pub const DRAWN: [f64; 2] = [0.15, 0.5];
 
-/// What a lobe would change in a observation, what a diffuse surface shows of its light, and what the photograph shows.
+/// An observation's differences from the mean of its spot, relative to the spot's measured radiance.
 struct Difference {
     weight: f64,
+    /// Change of radiance by a lobe.
     expected: DVec3,
+    /// Radiance of a diffuse surface of unit albedo.
     diffuse: DVec3,
-    shown: DVec3,
+    measured: DVec3,
 }
 
-/// How many standard errors the strength of a lobe is above zero, at the roughness that speaks for it most, judged by
-/// differences between photographs of the same spots; `None` where too few spots are seen by several photographs.
+/// The fitted strength of a lobe in standard errors, at the most significant roughness, from differences between photographs of
+/// the same spots; `None` if too few spots are seen by several photographs.
 ///
-/// Light is gathered roughly: its noise hides a lobe but makes none, being independent of the photographs'.
+/// Few paths suffice: their noise is independent of the photographs', so it can hide a lobe but not feign one.
 pub fn evidence(
     gathering: &Gathering,
     scene: &Scene,
     spots: &[Spot],
     albedo: DVec3,
 ) -> (Option<f64>, Cast) {
-    let chosen = choose(spots, 2, MAX_SIGHTS);
+    let chosen = choose(spots, 2, MAX_OBSERVATIONS);
     let observations: usize = chosen.iter().map(|s| s.len()).sum();
-    if observations < MIN_SIGHTS {
+    if observations < MIN_OBSERVATIONS {
         return (None, Cast::default());
     }
     let gathered: Vec<(Vec<(&SpotObservation, Gathered)>, Cast)> = (chosen.par_iter())
@@ -62,72 +65,68 @@ pub fn evidence(
     let cast = gathered.iter().map(|(_, cast)| *cast).sum();
     let strongest = (ROUGHNESSES.iter())
         .filter_map(|&alpha| {
-            let of_spot = |(own, _): &(Vec<(&SpotObservation, Gathered)>, Cast)| {
-                differences(own, alpha, albedo)
-            };
-            let all: Vec<Vec<Difference>> = gathered.par_iter().map(of_spot).collect();
-            strength(
-                &all.into_iter().flatten().collect::<Vec<_>>(),
-                gathered.len(),
-            )
+            let all: Vec<Vec<Difference>> = (gathered.par_iter())
+                .map(|(own, _)| differences(own, alpha, albedo))
+                .collect();
+            let all: Vec<Difference> = all.into_iter().flatten().collect();
+            strength(&all, gathered.len())
         })
-        .fold(None, |most: Option<f64>, t| {
-            Some(most.map_or(t, |m| m.max(t)))
-        });
+        .reduce(f64::max);
     (strongest, cast)
 }
 
-/// Of each observation of a spot: what sets it apart from the spot's mean, relative to the spot's level.
+/// The differences of a spot's observations; none for fewer than two.
 fn differences(own: &[(&SpotObservation, Gathered)], alpha: f64, albedo: DVec3) -> Vec<Difference> {
     let mut all: Vec<Difference> = (own.iter())
         .map(|(observation, light)| {
-            let parts = light.parts(alpha);
+            let components = light.components(alpha);
             Difference {
                 weight: observation.pixels.len() as f64,
-                expected: lobed(&parts, albedo) - albedo * parts.diffuse,
-                diffuse: parts.diffuse,
-                shown: observation.measured,
+                expected: with_lobe(&components, albedo) - albedo * components.diffuse,
+                diffuse: components.diffuse,
+                measured: observation.measured,
             }
         })
         .collect();
     let weight: f64 = all.iter().map(|d| d.weight).sum();
-    let mean = |of: &dyn Fn(&Difference) -> DVec3| {
-        all.iter().map(|d| of(d) * d.weight).sum::<DVec3>() / weight
+    let mean = |value: &dyn Fn(&Difference) -> DVec3| {
+        all.iter().map(|d| value(d) * d.weight).sum::<DVec3>() / weight
     };
-    let (expected, diffuse, shown) = (
+    let (expected, diffuse, measured) = (
         mean(&|d| d.expected),
         mean(&|d| d.diffuse),
-        mean(&|d| d.shown),
+        mean(&|d| d.measured),
     );
-    if shown.min_element() <= 0.0 || all.len() < 2 {
+    if measured.min_element() <= 0.0 || all.len() < 2 {
         return Vec::new();
     }
     for d in &mut all {
-        d.expected = (d.expected - expected) / shown;
-        d.diffuse = (d.diffuse - diffuse) / shown;
-        d.shown = (d.shown - shown) / shown;
+        d.expected = (d.expected - expected) / measured;
+        d.diffuse = (d.diffuse - diffuse) / measured;
+        d.measured = (d.measured - measured) / measured;
     }
     all
 }
 
-fn lobed(parts: &Parts, albedo: DVec3) -> DVec3 {
-    (albedo * parts.base + parts.grazing) * (1.0 - SPECULAR) + parts.lobe * SPECULAR
+/// Radiance of a surface with the tested specular reflectance.
+fn with_lobe(components: &Components, albedo: DVec3) -> DVec3 {
+    (albedo * components.base + components.grazing) * (1.0 - SPECULAR) + components.lobe * SPECULAR
 }
 
-/// The least-squares strength of the expected differences in those shown, in standard errors, beside what uneven light
-/// within the spots explains.
+/// The regression coefficient of the measured differences on the expected ones, in standard errors, with the differences of
+/// irradiance within the spots as a second regressor.
 fn strength(all: &[Difference], spots: usize) -> Option<f64> {
     let mut sizes: Vec<f64> = (all.iter())
         .map(|d| d.expected.abs().max_element())
         .collect();
-    let most = DVec3::splat(CLIP * quantile(&mut sizes, 0.68)?);
+    let max = DVec3::splat(CLIP * quantile(&mut sizes, 0.68)?);
     // Normal equations of two regressors.
     let (mut xx, mut xd, mut dd, mut xy, mut dy, mut yy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     for difference in all {
         let (x, d, y) = (
-            difference.expected.clamp(-most, most),
+            difference.expected.clamp(-max, max),
             difference.diffuse,
-            difference.shown,
+            difference.measured,
         );
         let w = difference.weight;
         xx += w * x.dot(x);
@@ -143,7 +142,7 @@ fn strength(all: &[Difference], spots: usize) -> Option<f64> {
         (xx, xy)
     };
     let explained = if dd > 0.0 { dy * dy / dd } else { 0.0 };
-    // The channels of a observation hardly differ: they count once.
+    // The channels of an observation are strongly correlated, so they count once.
     let freedom = all.len().checked_sub(spots + 2).filter(|&n| n > 0)? as f64;
     let slope = score / own;
     let noise = (yy - explained - slope * score).max(0.0) / freedom;
@@ -156,7 +155,7 @@ mod tests {
     use super::*;
     use crate::math::rng::Stream;
 
-    /// Differences that hold so much of what a lobe would make, under noise of 5 %.
+    /// Differences with a lobe of the given strength, and noise of 5 %.
     fn made(strength: f64, seed: u64) -> Vec<Difference> {
         let mut stream = Stream::new(seed, 0, 0, 0);
         (0..300)
@@ -170,13 +169,13 @@ mod tests {
                     weight: 1.0,
                     expected,
                     diffuse: DVec3::splat(0.01 * centered()),
-                    shown: expected * strength + DVec3::splat(0.05 * centered()),
+                    measured: expected * strength + DVec3::splat(0.05 * centered()),
                 }
             })
             .collect()
     }
 
-    /// Standard scores: 40 of them stay below 4 but for one chance in 800.
+    /// Of 40 standard scores, one exceeds 4 with a probability of 1/400.
     #[test]
     fn noise_speaks_for_no_lobe_and_a_lobe_for_itself() {
         for seed in 0..40 {

@@ -1,8 +1,8 @@
-//! The lobe that explains an object best, and whether pixels that were left out of its fit ask for it.
+//! Fits the best lobe of an object and cross-validates it against a diffuse surface.
 
-use crate::inverse::lobe::Found;
-use crate::inverse::lobe::fit::{Model, Row, Variances, freed};
-use crate::inverse::lobe::gather::{Gathered, Gathering, Parts};
+use crate::inverse::lobe::LobeFit;
+use crate::inverse::lobe::fit::{Model, Row, Variances, decorrelated};
+use crate::inverse::lobe::gather::{Components, Gathered, Gathering};
 use crate::inverse::lobe::observations::{Spot, SpotObservation, choose};
 use crate::math::stats::{Moments, quantile};
 use crate::scene::Scene;
@@ -11,49 +11,49 @@ use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Roughnesses that are tried, evenly spaced in their logarithm, and the least of them.
-const TRIED: usize = 15;
+/// Number of candidate roughnesses, evenly spaced in their logarithm.
+const CANDIDATES: usize = 15;
 const MIN_ROUGHNESS: f64 = 0.03;
-/// Standard deviations of an error that count as part of it.
-const SURE: f64 = 2.0;
-/// Halvings of the step between roughnesses tried.
+/// Standard deviations that are added to a candidate's error.
+const SAFETY: f64 = 2.0;
+/// Halvings of the step of the line search between candidates.
 const HALVINGS: u32 = 5;
-/// Parts that spots are cut into, each tried on a fit to the others.
+/// Folds of the cross-validation over spots.
 const FOLDS: usize = 4;
-/// Below this fraction of the median level errors weigh no more.
+/// Fraction of the median level below which weights stop growing.
 const DARK: f64 = 0.5;
-/// One spot's gain counts up to so many times what two of three stay below.
+/// The gain of a spot is clamped to this multiple of the 68th percentile.
 const CLIP: f64 = 5.0;
-/// Relative step of differences by roughness.
+/// Relative step of finite differences in roughness.
 const STEP: f64 = 0.02;
 
-/// Gains on what was left out of the fit, in squared errors relative to the level.
+/// Decrease of the squared relative error on data outside the fit.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Gain {
-    /// Mean over spots, single ones held back from deciding alone.
+    /// Mean over spots, with clamped outliers.
     pub mean: f64,
     /// Standard error of the mean.
     pub noise: f64,
 }
 
-/// Light gathered at an object's observations.
-pub struct Evidence<'a> {
-    /// Observations with the index of their spot, and the light of each.
+/// An object's observations with their incident radiance.
+pub struct LitObservations<'a> {
+    /// Index of the spot, observation, and incident radiance from two sets of paths.
     observations: Vec<(usize, &'a SpotObservation, [Gathered; 2])>,
     /// Level of each observation's spot.
     levels: Vec<DVec3>,
 }
 
-impl<'a> Evidence<'a> {
-    /// Gathers light at up to about `most` observations in the fit, and those held out of the same spots.
+impl<'a> LitObservations<'a> {
+    /// Samples incident radiance at about `max` observations in the fit, and at the held-out ones of the same spots.
     pub fn new(
         gathering: &Gathering,
         scene: &Scene,
         spots: &'a [Spot],
-        most: usize,
+        max: usize,
     ) -> (Self, Cast) {
         let chosen: Vec<(usize, &SpotObservation)> =
-            (choose(spots, 1, most).into_iter().enumerate())
+            (choose(spots, 1, max).into_iter().enumerate())
                 .flat_map(|(index, spot)| spot.iter().map(move |observation| (index, observation)))
                 .collect();
         let gathered: Vec<([Gathered; 2], Cast)> = (chosen.par_iter())
@@ -78,27 +78,29 @@ impl<'a> Evidence<'a> {
         )
     }
 
-    /// The rows in the fit, and those held out, for a lobe of GGX roughness α.
+    /// The rows in the fit, and the held-out ones, for a lobe of GGX roughness α.
     fn rows(&self, alpha: f64) -> [Vec<Row>; 2] {
         let rows: Vec<(bool, Row)> = (self.observations.par_iter().zip(&self.levels))
             .map(|((spot, observation, light), &level)| {
                 let row = Row {
                     spot: *spot,
                     weight: observation.pixels.len() as f64,
-                    shown: observation.measured / level,
+                    measured: observation.measured / level,
                     one: level.recip(),
-                    sets: [0, 1].map(|set| light[set].parts(alpha) / level),
+                    sets: [0, 1].map(|set| light[set].components(alpha) / level),
                 };
                 (observation.held_out, row)
             })
             .collect();
-        let of = |held: bool| (rows.iter().filter(|r| r.0 == held)).map(|r| r.1).collect();
-        [of(false), of(true)]
+        [false, true].map(|held_out| {
+            let chosen = rows.iter().filter(|r| r.0 == held_out);
+            chosen.map(|r| r.1).collect()
+        })
     }
 }
 
-/// Of each observation, the mean radiance of its spot's observations in the fit, raised where it is dark; the median of all spots where
-/// all its observations are left out of it.
+/// The level of each observation's spot: the root of the squared mean radiance of its observations in the fit plus a squared dark
+/// level; the median of all spots stands for the mean if none is in the fit.
 fn levels(observations: &[(usize, &SpotObservation, [Gathered; 2])]) -> Vec<DVec3> {
     let spots: Vec<(usize, Option<DVec3>)> = (observations.chunk_by(|a, b| a.0 == b.0))
         .map(|spot| {
@@ -121,25 +123,25 @@ fn levels(observations: &[(usize, &SpotObservation, [Gathered; 2])]) -> Vec<DVec
         .collect()
 }
 
-/// The rows of one roughness as the fit takes them.
-struct Tried {
+/// The rows of one candidate roughness.
+struct Candidate {
     alpha: f64,
     rows: Vec<Row>,
     held_out: Vec<Row>,
 }
 
-/// Finds the best lobe of roughness between the given bounds; `emits` says that without one the object is taken to give
-/// light. `None` where nothing tells.
-pub fn find(evidence: &Evidence, emits: bool, [from, to]: [f64; 2]) -> Option<Found> {
+/// Finds the best lobe with a roughness between the given bounds, and its gain over a diffuse surface, which may emit light if
+/// `emits`. `None` if the observations do not determine the models.
+pub fn find(observations: &LitObservations, emits: bool, [from, to]: [f64; 2]) -> Option<LobeFit> {
     let diffuse = Model::Diffuse { emits };
     let from = from.clamp(MIN_ROUGHNESS, 1.0);
     let to = to.clamp(from, 1.0);
-    let ratio = (to / from).powf(1.0 / (TRIED - 1) as f64);
-    let tried: Vec<Tried> = (0..TRIED)
+    let ratio = (to / from).powf(1.0 / (CANDIDATES - 1) as f64);
+    let candidates: Vec<Candidate> = (0..CANDIDATES)
         .map(|i| {
             let alpha = (from * ratio.powi(i as i32)).min(to);
-            let [rows, held_out] = evidence.rows(alpha);
-            Tried {
+            let [rows, held_out] = observations.rows(alpha);
+            Candidate {
                 alpha,
                 rows,
                 held_out,
@@ -147,70 +149,73 @@ pub fn find(evidence: &Evidence, emits: bool, [from, to]: [f64; 2]) -> Option<Fo
         })
         .collect();
 
-    // How much spots differ, first as a diffuse surface sees it, then as the best lobe does.
-    let flat = diffuse.fit(&tried[0].rows)?;
-    let before = diffuse.variances(&tried[0].rows, &flat);
-    let (first, parameters, _) = best(&tried, &before, |_| true)?;
-    let variances = Model::Lobe.variances(&tried[first].rows, &parameters);
-    let (place, _, _) = best(&tried, &variances, |_| true)?;
+    // The variances, first by a diffuse surface, then by the best lobe.
+    let flat = diffuse.fit(&candidates[0].rows)?;
+    let diffuse_variances = diffuse.variances(&candidates[0].rows, &flat);
+    let (first, parameters, _) = best(&candidates, &diffuse_variances, |_| true)?;
+    let variances = Model::Lobe.variances(&candidates[first].rows, &parameters);
+    let (index, _, _) = best(&candidates, &variances, |_| true)?;
 
-    // Between the roughnesses tried.
+    // Line search between the candidates.
     let error_at = |alpha: f64| -> Option<(f64, Vec<f64>)> {
-        let [rows, _] = evidence.rows(alpha);
-        let freed = variances.free(&rows);
-        let parameters = Model::Lobe.fit(&freed)?;
-        Some((Model::Lobe.error(&freed, &parameters), parameters))
+        let [rows, _] = observations.rows(alpha);
+        let rows = variances.decorrelate(&rows);
+        let parameters = Model::Lobe.fit(&rows)?;
+        Some((Model::Lobe.error(&rows, &parameters), parameters))
     };
-    let mut alpha = tried[place].alpha;
-    let mut least = error_at(alpha)?;
+    let mut alpha = candidates[index].alpha;
+    let mut lowest = error_at(alpha)?;
     let mut step = ratio.sqrt();
     for _ in 0..HALVINGS {
         for next in [alpha * step, alpha / step] {
             let next = next.clamp(from, to);
-            if let Some(error) = error_at(next).filter(|e| e.0 < least.0) {
-                (least, alpha) = (error, next);
+            if let Some(error) = error_at(next).filter(|e| e.0 < lowest.0) {
+                (lowest, alpha) = (error, next);
                 break;
             }
         }
         step = step.sqrt();
     }
-    let parameters = least.1;
-    let errors = standard_errors(evidence, &variances, alpha, &parameters);
+    let parameters = lowest.1;
+    let errors = standard_errors(observations, &variances, alpha, &parameters);
 
-    // What was left out of the fit.
+    // Cross-validation.
     let mut gains = Vec::new();
     let mut by_view = Vec::new();
     for fold in 0..FOLDS {
         let inside = |row: &Row| row.spot % FOLDS != fold;
-        let Some((place, lobe, _)) = best(&tried, &variances, inside) else {
+        let Some((index, lobe, _)) = best(&candidates, &variances, inside) else {
             continue;
         };
-        let of = |rows: &[Row], fitted: bool| -> Vec<Row> {
+        let candidate = &candidates[index];
+        let select = |rows: &[Row], fitted: bool| -> Vec<Row> {
             (rows.iter().filter(|r| inside(r) == fitted))
                 .copied()
                 .collect()
         };
-        let Some(flat) = diffuse.fit(&before.free(&of(&tried[place].rows, true))) else {
+        let fitted = diffuse_variances.decorrelate(&select(&candidate.rows, true));
+        let Some(flat) = diffuse.fit(&fitted) else {
             continue;
         };
-        let left_out = of(&tried[place].rows, false);
+        let left_out = select(&candidate.rows, false);
         let compare = |rows: &[Row], into: &mut Vec<f64>| {
             for spot in rows.chunk_by(|a, b| a.spot == b.spot) {
                 into.push(diffuse.error(spot, &flat) - Model::Lobe.error(spot, &lobe));
             }
         };
-        compare(&before.free(&left_out), &mut gains);
-        compare(&before.free(&of(&tried[place].held_out, false)), &mut gains);
+        compare(&diffuse_variances.decorrelate(&left_out), &mut gains);
+        let held_out = select(&candidate.held_out, false);
+        compare(&diffuse_variances.decorrelate(&held_out), &mut gains);
         let several: Vec<Row> = (left_out.chunk_by(|a, b| a.spot == b.spot))
             .filter(|spot| spot.len() > 1)
             .flatten()
             .copied()
             .collect();
-        compare(&freed(&several, |_| 1.0), &mut by_view);
+        compare(&decorrelated(&several, |_| 1.0), &mut by_view);
     }
     let specular = parameters[3];
     let albedo = DVec3::new(parameters[0], parameters[1], parameters[2]) / (1.0 - specular);
-    Some(Found {
+    Some(LobeFit {
         roughness: alpha,
         specular,
         albedo,
@@ -220,64 +225,70 @@ pub fn find(evidence: &Evidence, emits: bool, [from, to]: [f64; 2]) -> Option<Fo
     })
 }
 
-/// The roughness tried that surely leaves the least error in the rows that `inside` takes, with its parameters and that
-/// error, raised by what it scatters: roughnesses far from those that directions were drawn by are known badly.
+/// The candidate with the least error on the rows selected by `inside`: its index, parameters and error. [`SAFETY`] standard
+/// deviations are added to errors, since roughnesses far from the sampled ones are noisy.
 fn best(
-    tried: &[Tried],
+    candidates: &[Candidate],
     variances: &Variances,
     inside: impl Fn(&Row) -> bool + Sync,
 ) -> Option<(usize, Vec<f64>, f64)> {
-    let fits: Vec<Option<(usize, Vec<f64>, f64)>> = (tried.par_iter().enumerate())
-        .map(|(place, tried)| {
-            let rows: Vec<Row> = tried.rows.iter().filter(|r| inside(r)).copied().collect();
-            let freed = variances.free(&rows);
-            let parameters = Model::Lobe.fit(&freed)?;
-            let errors: Vec<f64> = (freed.chunk_by(|a, b| a.spot == b.spot))
+    let fits: Vec<Option<(usize, Vec<f64>, f64)>> = (candidates.par_iter().enumerate())
+        .map(|(index, candidate)| {
+            let rows = candidate.rows.iter().filter(|r| inside(r));
+            let rows = variances.decorrelate(&rows.copied().collect::<Vec<_>>());
+            let parameters = Model::Lobe.fit(&rows)?;
+            let errors: Vec<f64> = (rows.chunk_by(|a, b| a.spot == b.spot))
                 .map(|spot| Model::Lobe.error(spot, &parameters))
                 .collect();
             let scatter: f64 = errors.iter().map(|e| e * e).sum();
-            let error = errors.iter().sum::<f64>() + SURE * scatter.sqrt();
-            Some((place, parameters, error))
+            let error = errors.iter().sum::<f64>() + SAFETY * scatter.sqrt();
+            Some((index, parameters, error))
         })
         .collect();
     (fits.into_iter().flatten()).min_by(|a, b| a.2.total_cmp(&b.2))
 }
 
-fn gain(mut gains: Vec<f64>) -> Gain {
+/// Mean and standard error of spots' gains, with clamped outliers.
+fn gain(gains: Vec<f64>) -> Gain {
     let mut sizes: Vec<f64> = gains.iter().map(|g| g.abs()).collect();
     let clip = CLIP * quantile(&mut sizes, 0.68).unwrap_or(0.0);
     let mut moments = Moments::default();
-    (gains.drain(..)).for_each(|g| moments.push(g.clamp(-clip, clip)));
+    (gains.iter()).for_each(|g| moments.push(g.clamp(-clip, clip)));
     Gain {
         mean: moments.mean,
         noise: moments.standard_error(),
     }
 }
 
-/// Standard errors of albedo, specular and roughness: the sandwich over spots (Huber 1967).
+/// Standard errors of RGB albedo, specular and roughness: the sandwich estimator over spots (Huber 1967).
 fn standard_errors(
-    evidence: &Evidence,
+    observations: &LitObservations,
     variances: &Variances,
     alpha: f64,
     parameters: &[f64],
 ) -> [f64; 5] {
-    let at = |alpha: f64| variances.free(&evidence.rows(alpha)[0]);
+    let at = |alpha: f64| variances.decorrelate(&observations.rows(alpha)[0]);
     let (rows, less, more) = (
         at(alpha),
         at(alpha * (1.0 - STEP)),
         at(alpha * (1.0 + STEP)),
     );
     let specular = parameters[3];
-    // Slopes with respect to albedo, specular and roughness.
+    // Derivatives with respect to albedo, specular and roughness.
     let slopes = |i: usize, set: usize, c: usize| -> [(usize, f64); 3] {
-        let parts = &rows[i].sets[set];
+        let Components {
+            base,
+            lobe,
+            grazing,
+            ..
+        } = rows[i].sets[set];
         let albedo = parameters[c] / (1.0 - specular);
-        let wide = |p: &Parts| p.lobe[c] * specular + p.grazing[c] * (1.0 - specular);
-        let of_alpha = (wide(&more[i].sets[set]) - wide(&less[i].sets[set])) / (2.0 * STEP * alpha);
+        let reflected = |p: &Components| p.lobe[c] * specular + p.grazing[c] * (1.0 - specular);
+        let difference = reflected(&more[i].sets[set]) - reflected(&less[i].sets[set]);
         [
-            (c, parts.base[c] * (1.0 - specular)),
-            (3, parts.lobe[c] - parts.grazing[c] - albedo * parts.base[c]),
-            (4, of_alpha),
+            (c, base[c] * (1.0 - specular)),
+            (3, lobe[c] - grazing[c] - albedo * base[c]),
+            (4, difference / (2.0 * STEP * alpha)),
         ]
     };
     let (mut normal, mut scatter) = (DMatrix::<f64>::zeros(5, 5), DMatrix::<f64>::zeros(5, 5));

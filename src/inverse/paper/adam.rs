@@ -1,4 +1,4 @@
-//! ADAM (Kingma and Ba 2015), sparse: each parameter has a clock of its own, which stands still while no path meets it.
+//! Sparse ADAM (Kingma and Ba 2015): each parameter has its own step count, which increases only when a path meets it.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -7,10 +7,10 @@ const BETA1: f32 = 0.9;
 const BETA2: f32 = 0.999;
 const EPSILON: f32 = 1e-8;
 
-/// First and second moments of each parameter's gradient, three channels each, and how often it was stepped.
+/// First and second moments of each parameter's RGB gradient, and its number of steps.
 ///
-/// Moments decay when their own parameter is stepped, and their bias is corrected by their own count. With one clock for
-/// all, what a batch meets rarely would take steps by moments that have decayed, corrected as if they had not.
+/// A parameter's moments decay, and are bias-corrected, by its own step count. With a common count, moments of parameters that
+/// batches rarely meet would decay between their steps without a matching correction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Adam {
     first: Vec<Vec3>,
@@ -28,13 +28,13 @@ impl Adam {
         }
     }
 
-    /// Number of parameters; `None` where the entries of a broken file differ in number.
+    /// Number of parameters; `None` if the lengths differ, as in a corrupt file.
     pub fn parameters(&self) -> Option<usize> {
         let count = self.first.len();
         (self.second.len() == count && self.steps.len() == count).then_some(count)
     }
 
-    /// The change of one parameter for its gradient.
+    /// The change of one parameter, given its gradient.
     pub fn step(&mut self, index: usize, gradient: Vec3, learning_rate: f32) -> Vec3 {
         self.steps[index] = self.steps[index].saturating_add(1);
         let steps = self.steps[index].min(1 << 30) as i32;
@@ -73,7 +73,7 @@ mod tests {
         );
     }
 
-    /// A parameter that is met once in a thousand steps of another takes the steps that it would take alone.
+    /// A parameter that is stepped once in a thousand steps of another one behaves as if it were alone.
     #[test]
     fn what_is_met_rarely_is_stepped_as_if_it_were_alone() {
         let (mut shared, mut alone) = (Adam::new(2), Adam::new(1));

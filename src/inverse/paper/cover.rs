@@ -1,4 +1,4 @@
-//! Which pixels each patch covers, how far off they are, and which patches are to be cut.
+//! The pixels that each patch covers and their errors, which select the patches to cut.
 
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
@@ -12,26 +12,27 @@ use crate::transport::arrival::Cast;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-/// Pixels that are looked at, at most: each n-th of all.
+/// Greatest number of pixels; above it every n-th pixel is used.
 const MAX_PIXELS: usize = 400_000;
-/// Pixels that a patch must cover to be cut: four for each of its parts.
+/// Least number of pixels of a patch that is cut: four for each of its parts.
 const MIN_COVERED: u64 = 16;
-/// The worst patches are cut, until they cover this fraction of the pixels of all that may be.
+/// Fraction of the pixels of all patches that may be cut, which the cut patches cover.
 const CUT: f64 = 0.5;
-/// Paths of each of two independent colours of a pixel.
+/// Paths for each of two independent colours of a pixel.
 const SAMPLES: u64 = 2;
-/// First of the sample keys of these paths, far from those of the descent.
+/// First of the sample keys of these paths, disjoint from those of the descent.
 const KEY: u64 = 1 << 63;
 
-/// The pixels in the fit and what their centres see.
+/// The pixels in the fit and the hits of their centres.
 pub struct Cover {
+    /// Frame, pixel and hit.
     pixels: Vec<(u32, u32, Hit)>,
-    /// Each stands for so many.
+    /// Number of pixels that each one stands for.
     stride: u64,
 }
 
 impl Cover {
-    /// Looks through the pixels.
+    /// Casts a ray through the centre of each pixel.
     pub fn new(problem: &Problem, settings: &Settings) -> Self {
         let scene = &problem.scene;
         let total: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
@@ -64,7 +65,7 @@ impl Cover {
         }
     }
 
-    /// How many pixels each patch covers.
+    /// The number of pixels that each patch covers.
     pub fn counts(&self, patches: &Patches) -> Vec<u64> {
         let mut counts = vec![0; patches.len()];
         for (_, _, hit) in &self.pixels {
@@ -73,7 +74,7 @@ impl Cover {
         counts
     }
 
-    /// Which patches are to be cut by the mean ℓ2 error of the pixels that they cover, and what looking took.
+    /// Selects the patches to cut by the mean squared error of the pixels that they cover. Also returns the rays cast.
     pub fn to_cut(
         &self,
         problem: &Problem,
@@ -94,8 +95,8 @@ impl Cover {
         (worst(&sums, patches.depth()), cast)
     }
 
-    /// The squared residual of each pixel over the channels: that of two independent colours multiplied, which is free of
-    /// their noise in the mean.
+    /// The squared residual of each pixel, summed over the channels: the product of the residuals of two independent colours, whose
+    /// expectation is free of path noise.
     fn errors(
         &self,
         problem: &Problem,
@@ -131,8 +132,8 @@ impl Cover {
     }
 }
 
-/// The patches of greatest mean error that cover a fraction of the pixels of all that may be cut, given each patch's sum of
-/// errors with its pixels, and its depth.
+/// The patches of greatest mean error that together cover the fraction [`CUT`] of the pixels of all that may be cut. `sums` holds
+/// the sum of errors and the number of pixels of each patch.
 fn worst(sums: &[(f64, u64)], depth: &[u8]) -> Vec<bool> {
     let may_be_cut = |&p: &usize| sums[p].1 >= MIN_COVERED && depth[p] < MAX_DEPTH;
     let mut order: Vec<usize> = (0..sums.len()).filter(may_be_cut).collect();

@@ -20,67 +20,66 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Batches that trace this many paths or more are spread over threads.
+/// Batches of at least this many paths are traced in parallel.
 const PARALLEL: u64 = 128;
-/// From this level on paths end by chance; before it colours of one or two paths would become too noisy for it.
-const BELIEVED_FROM: u32 = 2;
-/// No surface is believed to reflect less, so that paths go on from what is dark now.
-const MIN_BELIEVED: f32 = 0.8;
+/// Level from which Russian roulette is used; before it colours from one or two paths would become too noisy.
+const ROULETTE_FROM: u32 = 2;
+/// Least expected albedo for Russian roulette, so that paths continue at surfaces that are dark now.
+const MIN_EXPECTED_ALBEDO: f32 = 0.8;
 
-/// What shines less than this fraction of the brightest is no lamp once triangles have albedos: the noise of the steps leaves
-/// a little emission everywhere. `evaluate` tells lamps by the same share.
+/// Objects with less than this fraction of the greatest emission are no lamps once triangles have albedos: the noise of the
+/// steps leaves a little emission everywhere. `evaluate` uses the same fraction.
 const DIM: f32 = 0.01;
 
-/// Everything that a step changes.
+/// The state of the descent.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Descent {
-    /// Albedo of each object, then of each patch; an object's own is not used once it has patches.
+    /// Albedo of each object, then of each patch; albedos of objects are unused once there are patches.
     pub albedo: Vec<Vec3>,
     /// Emission of each object.
     pub emission: Vec<Vec3>,
-    /// What has an albedo of its own below objects; `None` while objects have one each.
+    /// The parts of triangles with their own albedo; `None` while each object has one albedo.
     pub patches: Option<Patches>,
-    /// How far the steps have fallen and the batches have grown, see [`Pace`].
+    /// Number of reductions of the step, see [`Pace`].
     pub level: u32,
-    /// The largest channel of each object's albedo when the level began: by chance on it paths end. Not by the present
-    /// albedo, or zero would be a fixed point.
+    /// The largest channel of each object's albedo at the start of the level, for Russian roulette. The present albedo would make
+    /// zero a fixed point.
     believed: Vec<f32>,
     adam: Adam,
     steps: u64,
-    /// For each object its rough specular lobe, where it has one that is known; empty where none has.
+    /// The known rough specular lobe of each object; empty without lobes.
     #[serde(skip)]
     lobes: Vec<Option<Lobe>>,
-    /// Albedos that keep their value: of patches that no pixel sees, which would wander by the noise of what little light
-    /// they send elsewhere. Empty where all are free.
+    /// Whether each albedo is fixed: those of patches that no pixel sees would follow noise. Empty if all are free.
     #[serde(skip)]
-    still: Vec<bool>,
+    fixed: Vec<bool>,
     #[serde(skip)]
-    traced: Option<Traced>,
+    caches: Option<Caches>,
 }
 
-/// What tracing needs of the state.
+/// Data for tracing, derived from the state.
 #[derive(Debug, Clone)]
-struct Traced {
+struct Caches {
     emitters: Emitters,
-    /// The grid of the patches.
+    /// The texels of the patches.
     grid: Option<Arc<TexelEstimate>>,
 }
 
-/// What one step did.
+/// The outcome of one step.
 #[derive(Debug, Clone, Copy)]
 pub struct StepOutcome {
-    /// Rays cast, and paths dropped because a weight was not finite.
+    /// Number of rays cast, and of paths rejected because a weight was not finite.
     pub cast: Cast,
-    /// Pixels drawn.
+    /// Number of pixels in the batch.
     pub pixels: u64,
-    /// Paths traced.
+    /// Number of paths traced.
     pub paths: u64,
     /// Whether the gradient was finite.
     pub finite: bool,
 }
 
 impl Descent {
-    /// One albedo and one emission an object, all zero.
+    /// The start: albedo and emission of each object are zero.
     pub fn new(problem: &Problem) -> Self {
         let objects = problem.scene.objects.len();
         Self {
@@ -92,23 +91,23 @@ impl Descent {
             adam: Adam::new(2 * objects),
             steps: 0,
             lobes: Vec::new(),
-            still: Vec::new(),
-            traced: None,
+            fixed: Vec::new(),
+            caches: None,
         }
     }
 
-    /// The same with lobes that are known, one entry an object: what has one reflects by it, and gives no light.
+    /// Sets known lobes, one entry per object. Objects with a lobe emit no light.
     pub fn with_lobes(mut self, lobes: Vec<Option<Lobe>>) -> Self {
         self.lobes = lobes;
         self
     }
 
-    /// The lobe of an object, where it is known to have one.
+    /// The known lobe of an object.
     pub fn lobe(&self, object: usize) -> Option<Lobe> {
         self.lobes.get(object).copied().flatten()
     }
 
-    /// Whether the state is one of this scene's.
+    /// Whether the state's sizes fit the scene.
     pub fn fits(&self, scene: &Scene) -> bool {
         let (objects, triangles) = (scene.objects.len(), scene.triangles.len());
         let patches = self.patches.as_ref();
@@ -119,8 +118,8 @@ impl Descent {
             && patches.is_none_or(|patches| patches.fit(triangles))
     }
 
-    /// The same with an albedo for each triangle and lamps in place, or with the patches cut that `which` says; parts begin at
-    /// the albedo of the whole. The steps begin anew.
+    /// The next refinement: an albedo for each triangle, or the patches in `which` cut into four. Parts start with the albedo of
+    /// the whole, dim objects lose their emission, and ADAM and the level start again.
     pub fn refined(&self, scene: &Scene, which: &[bool]) -> Self {
         let objects = self.emission.len();
         let mut emission = self.emission.clone();
@@ -128,7 +127,7 @@ impl Descent {
             None => {
                 let brightest = emission
                     .iter()
-                    .fold(0.0f32, |most, e| most.max(e.max_element()));
+                    .fold(0.0f32, |max, e| max.max(e.max_element()));
                 let is_dim = |e: &&mut Vec3| e.max_element() < DIM * brightest;
                 emission
                     .iter_mut()
@@ -139,8 +138,8 @@ impl Descent {
             }
             Some(patches) => {
                 let (patches, parents) = patches.cut(which);
-                let above = |parent: u32| parent + objects as u32;
-                (patches, parents.into_iter().map(above).collect())
+                let index = |parent: u32| parent + objects as u32;
+                (patches, parents.into_iter().map(index).collect())
             }
         };
         let mut albedo = self.albedo[..objects].to_vec();
@@ -154,27 +153,27 @@ impl Descent {
             believed: self.believed.clone(),
             steps: self.steps,
             lobes: self.lobes.clone(),
-            still: Vec::new(),
-            traced: None,
+            fixed: Vec::new(),
+            caches: None,
         }
     }
 
-    /// Goes on with shorter steps and more work in each.
+    /// Goes to the next level, with shorter steps and larger batches.
     pub fn slow_down(&mut self) {
         self.level += 1;
-        if self.patches.is_none() && self.level >= BELIEVED_FROM {
-            let believed = |albedo: &Vec3| albedo.max_element().max(MIN_BELIEVED);
-            self.believed = self.albedo.iter().map(believed).collect();
+        if self.patches.is_none() && self.level >= ROULETTE_FROM {
+            let expected = |albedo: &Vec3| albedo.max_element().max(MIN_EXPECTED_ALBEDO);
+            self.believed = self.albedo.iter().map(expected).collect();
         }
     }
 
-    /// Lets patches keep their albedo that cover none of the pixels counted.
-    pub fn keep_still(&mut self, covered: &[u64]) {
-        self.still = vec![false; self.emission.len()];
-        self.still.extend(covered.iter().map(|&pixels| pixels == 0));
+    /// Fixes the albedos of patches that cover no pixels, given the number of pixels of each patch.
+    pub fn fix_uncovered(&mut self, covered: &[u64]) {
+        self.fixed = vec![false; self.emission.len()];
+        self.fixed.extend(covered.iter().map(|&pixels| pixels == 0));
     }
 
-    /// Gives what is known its values.
+    /// Sets known parameters to their values.
     pub fn hold(&mut self, scene: &Scene, known: &Known) {
         for (k, pinned) in known.objects() {
             if k >= self.emission.len() {
@@ -191,35 +190,35 @@ impl Descent {
                 }
             }
             if let Some(emission) = pinned.emission {
-                self.shine(scene, k, emission);
+                self.set_object_emission(scene, k, emission);
             }
         }
     }
 
-    /// Gives all objects their emission.
+    /// Sets the emission of all objects.
     pub fn set_emission(&mut self, emission: Vec<Vec3>) {
         self.emission = emission;
-        self.traced = None;
+        self.caches = None;
     }
 
-    /// Gives an object an emission.
-    fn shine(&mut self, scene: &Scene, object: usize, emission: Vec3) {
+    /// Sets the emission of an object, and its weight for light sampling.
+    fn set_object_emission(&mut self, scene: &Scene, object: usize, emission: Vec3) {
         if self.emission[object] != emission {
             self.emission[object] = emission;
-            if let Some(traced) = &mut self.traced {
+            if let Some(caches) = &mut self.caches {
                 let area = scene.objects[object].area;
-                (traced.emitters).set_weight(object, area * f64::from(luminance(emission)));
+                (caches.emitters).set_weight(object, area * f64::from(luminance(emission)));
             }
         }
     }
 
-    /// One step: a batch of pixels, its gradient, ADAM, and the bounds. A gradient that is not finite changes nothing.
+    /// One step: the gradient of a batch of pixels, ADAM, and the bounds. A gradient that is not finite changes nothing.
     pub fn step(&mut self, problem: &Problem, settings: &Settings, bounces: u32) -> StepOutcome {
         let uniform = |stream: &mut Stream| draw(problem, settings, stream);
         self.step_on(problem, settings, bounces, &uniform)
     }
 
-    /// A step on pixels that are drawn in another way than uniformly.
+    /// A step on pixels drawn by `draw`.
     pub fn step_on(
         &mut self,
         problem: &Problem,
@@ -227,9 +226,9 @@ impl Descent {
         bounces: u32,
         draw: Draw,
     ) -> StepOutcome {
-        let pace = Pace::of(self, settings);
+        let pace = Pace::new(self, settings);
         let step = self.steps;
-        // The squared loss of two independent sets has no bias however few the paths are.
+        // The squared loss of two independent sets has no bias for any number of paths.
         let loss = match self.patches {
             None => settings.loss,
             Some(_) => Loss::L2,
@@ -247,7 +246,7 @@ impl Descent {
             }
         });
 
-        // Gradient of the batch's mean, with the parameters that it met.
+        // Gradient of the batch's mean, and the parameters that its paths met.
         let (albedos, objects) = (self.albedo.len(), self.emission.len());
         let mut gradient = vec![Vec3::ZERO; albedos + objects];
         let mut is_met = vec![false; albedos + objects];
@@ -265,30 +264,31 @@ impl Descent {
             return outcome;
         }
 
-        // Step what was met. The penalty also acts on emission that no path met. Once there are patches, what gives no light
-        // stays dark.
+        // Step the parameters that were met. The penalty also acts on emission that no path met. Once there are patches, objects
+        // without emission stay dark.
         let rate = pace.rate(settings, self.steps) as f32;
         self.steps += 1;
-        let still = |index: usize| self.still.get(index) == Some(&true);
-        let moves: Vec<usize> = (0..albedos).filter(|&i| is_met[i] && !still(i)).collect();
-        for index in moves {
+        for index in 0..albedos {
+            if !is_met[index] || self.fixed.get(index) == Some(&true) {
+                continue;
+            }
             let change = self.adam.step(index, gradient[index], rate);
             self.albedo[index] = (self.albedo[index] + change).clamp(Vec3::ZERO, Vec3::ONE);
         }
         let penalty = Vec3::splat(settings.emission_weight as f32);
         for k in 0..objects {
-            let shines = self.emission[k] != Vec3::ZERO;
-            if shines || is_met[albedos + k] && self.patches.is_none() {
+            let emits = self.emission[k] != Vec3::ZERO;
+            if emits || is_met[albedos + k] && self.patches.is_none() {
                 let index = albedos + k;
                 let change = self.adam.step(index, gradient[index] + penalty, rate);
                 let emission = (self.emission[k] + change).max(Vec3::ZERO);
-                self.shine(&problem.scene, k, emission);
+                self.set_object_emission(&problem.scene, k, emission);
             }
         }
         outcome
     }
 
-    /// Lets paths be traced by the present values.
+    /// Runs `work` with a renderer of the present values.
     pub fn render<T>(
         &mut self,
         problem: &Problem,
@@ -297,8 +297,8 @@ impl Descent {
         work: impl FnOnce(&Rendering) -> T,
     ) -> T {
         let (scene, objects) = (&*problem.scene, self.emission.len());
-        let traced = self.traced.get_or_insert_with(|| {
-            // Emitters are drawn in proportion to area × luminance of their present emission.
+        let caches = self.caches.get_or_insert_with(|| {
+            // Emitters are sampled in proportion to area × luminance of their present emission.
             let weights: Vec<f64> = (scene.objects.iter().zip(&self.emission))
                 .map(|(object, emission)| object.area * f64::from(luminance(*emission)))
                 .collect();
@@ -311,7 +311,7 @@ impl Descent {
                 seen: Vec::new(),
                 textured: vec![true; objects],
             });
-            Traced {
+            Caches {
                 emitters: Emitters::new(scene, &weights),
                 grid: grid.map(Arc::new),
             }
@@ -320,11 +320,11 @@ impl Descent {
             problem,
             tracer: Tracer {
                 scene,
-                lights: &traced.emitters,
+                lights: &caches.emitters,
                 measured: None,
                 surface_of: &scene.object_of,
-                believed_albedo: &self.believed,
-                texels: traced.grid.as_deref(),
+                expected_albedo: &self.believed,
+                texels: caches.grid.as_deref(),
                 lobes: &self.lobes,
                 patches: None,
                 sky: None,

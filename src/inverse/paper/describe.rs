@@ -1,4 +1,4 @@
-//! Where a descent stands, as an estimate.
+//! Converts the state of a descent to an estimate.
 
 use crate::calibrate::gbuffer::GBuffer;
 use crate::calibrate::problem::Problem;
@@ -9,8 +9,8 @@ use crate::transport::material::TexelColors;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
-/// For each object why the photographs tell nothing of it; empty where they do.
-pub fn untold(problem: &Problem, gbuffer: &GBuffer) -> Vec<&'static str> {
+/// For each object, why the photographs do not determine it; empty if they do.
+pub fn undetermined(problem: &Problem, gbuffer: &GBuffer) -> Vec<&'static str> {
     let mut lit = false;
     let mut measured = vec![false; problem.scene.objects.len()];
     for pixel in gbuffer.pixels.iter().filter(|p| !p.held_out) {
@@ -31,8 +31,8 @@ pub fn untold(problem: &Problem, gbuffer: &GBuffer) -> Vec<&'static str> {
         .collect()
 }
 
-/// The estimate of the present parameters, given for each patch how many pixels it covers. The paper's descent knows no
-/// errors: they are reported as the width of the range, and nothing is claimed to be unidentifiable but what `notes` say.
+/// The estimate of the present parameters; `covered` is the number of pixels of each patch. The paper's descent has no standard
+/// errors: the width of the range is reported instead. Objects with a note in `notes` are reported as not identifiable.
 pub fn describe(
     problem: &Problem,
     gbuffer: &GBuffer,

@@ -1,8 +1,8 @@
-//! The stochastic gradient descent of the paper (Azinović et al. 2019): ADAM on small batches of pixels, first per
-//! object, then per triangle with the lights in place, then on triangles that are cut where their pixels are worst.
+//! The stochastic gradient descent of the paper (Azinović et al. 2019): ADAM on small batches of pixels. First each object has
+//! an albedo, then each triangle, with fixed lamps, then parts of triangles, which are cut where their pixels are worst.
 //!
-//! A stage leaves the best that it found by held-out pixels, which is what it began with where nothing was better.
-//! Triangles are cut again until that gains nothing.
+//! A stage keeps the state with the least loss on held-out pixels, including its start. Triangles are cut until that gains
+//! nothing.
 
 pub mod adam;
 mod cover;
@@ -25,53 +25,55 @@ use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Solution, Termination};
 use cover::Cover;
 use descent::Descent;
-use describe::{describe, untold};
+use describe::{describe, undetermined};
 use glam::Vec3;
 use schedule::Schedule;
 use serde::{Deserialize, Serialize};
 use stage::{Best, LEVELS};
 use std::time::{Duration, Instant};
 
-/// Pixels of each set that the loss is measured on, at most and as one in so many of all, and paths for each.
+/// Greatest number of pixels in each set of the loss.
 const LOSS_PIXELS: usize = 1000;
+/// All pixels over the pixels in each set of the loss.
 const LOSS_FRACTION: usize = 32;
+/// Paths per pixel of the loss.
 const LOSS_SAMPLES: u64 = 32;
-/// Pictures of patches are made anew after so long; they hold a colour a texel.
+/// Interval between estimates once there are patches: each allocates a colour per texel.
 const DESCRIBE_EVERY: Duration = Duration::from_millis(200);
 
-/// What a checkpoint holds: everything that decides how the descent goes on.
+/// The state in a checkpoint.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct State {
     descent: Descent,
     schedule: Schedule,
-    /// The best of this stage so far.
+    /// The best values of this stage so far.
     best: Option<Best>,
-    /// How often triangles were cut.
+    /// Number of stages that cut triangles.
     cuts: u32,
-    /// Stages on end that gained nothing.
+    /// Number of consecutive stages without a gain.
     fruitless: u32,
     /// Seconds and iterations at the start of the present stage.
     stage_started: (f64, u64),
 }
 
-/// A descent under way.
+/// A running descent.
 struct Run<'a, 'o> {
     problem: &'a Problem,
     monitor: Monitor<'o>,
     gbuffer: GBuffer,
-    /// For each object why the photographs tell nothing of it; empty where they do.
+    /// For each object, why the photographs do not determine it; empty if they do.
     notes: Vec<&'static str>,
     losses: LossProbe,
     bounces: u32,
     cover: Cover,
-    /// Pixels that each patch covers.
+    /// Number of pixels that each patch covers; empty without patches.
     covered: Vec<u64>,
     state: State,
     estimate: Estimate,
     described: Instant,
 }
 
-/// Runs the paper's optimiser until time, steps or a standstill end it.
+/// Runs the paper's optimiser until it converges, or a limit of time or steps ends it.
 ///
 /// # Errors
 /// The checkpoint belongs to another capture.
@@ -99,11 +101,11 @@ pub fn solve(
             descent.fits(scene) && descent.level <= LEVELS && is_its_own
         })?,
     };
-    let notes = untold(problem, &gbuffer);
+    let notes = undetermined(problem, &gbuffer);
     state.descent.hold(&problem.scene, &monitor.known);
     let cover = Cover::new(problem, settings);
-    let covered = (state.descent.patches.as_ref()).map(|patches| cover.counts(patches));
-    let covered = covered.unwrap_or_default();
+    let covered =
+        (state.descent.patches.as_ref()).map_or_else(Vec::new, |patches| cover.counts(patches));
     let pixels: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
     let loss_pixels = (pixels / LOSS_FRACTION).clamp(1, LOSS_PIXELS);
     let mut run = Run {
@@ -119,9 +121,7 @@ pub fn solve(
         state,
         described: Instant::now(),
     };
-    let counted = std::mem::take(&mut run.covered);
-    run.state.descent.keep_still(&counted);
-    run.covered = counted;
+    run.state.descent.fix_uncovered(&run.covered);
     let termination = match run.descend() {
         Ok(termination) | Err(termination) => termination,
     };
@@ -137,7 +137,7 @@ pub fn solve(
 }
 
 impl Run<'_, '_> {
-    /// The estimate of the present state.
+    /// Updates the estimate from the present state.
     fn describe(&mut self) {
         self.described = Instant::now();
         let (descent, covered) = (&self.state.descent, &self.covered);
@@ -156,7 +156,7 @@ impl Run<'_, '_> {
         }
     }
 
-    /// Tells the observer where the descent stands.
+    /// Reports the present estimate to the observer.
     fn report(&mut self) -> Result<(), Termination> {
         if self.covered.is_empty() || self.described.elapsed() >= DESCRIBE_EVERY {
             self.describe();

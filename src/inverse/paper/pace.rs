@@ -1,40 +1,40 @@
-//! How long steps are and how much work goes into each, and how both change as the descent goes on.
+//! The step size, the batch size and the number of paths, as functions of the level of the descent.
 //!
-//! The paper gives initial values: steps of 5·10⁻³ and batches of 8 pixels. At each level the step is half of what it was.
-//! Of an error what the steps' own noise makes remains: it falls with the root of the step and with that of the colours'
-//! noise. An ℓ1 loss takes the median of a noisy colour for its mean, so that the paths for an object's colour double too;
-//! noise of the derivative, which is independent, does not bias. Patches descend on the squared loss, which has no such bias.
+//! The paper gives initial values: a step of 5·10⁻³ and batches of 8 pixels. The step is halved at each level. The error that
+//! remains is that of the steps' noise, which falls with the square root of the step and with the noise of the colours. An ℓ1
+//! loss fits the median of a noisy colour instead of its mean, so the paths for a colour are doubled too; noise of the
+//! derivative is independent and causes no bias. Patches use the squared loss, which has no such bias.
 //!
-//! | | step | pixels a batch | paths for a colour | for a derivative |
+//! | | step | pixels per batch | paths for a colour | for a derivative |
 //! | --- | --- | --- | --- | --- |
 //! | objects | 5·10⁻³ / 2^level | 8, 16, then 32 | 2^level | 2^level, 8 at most |
-//! | patches | 5·10⁻³ / 2^level | 8 times patches / objects, 8192 at most | 4 | 2 |
+//! | patches | 5·10⁻³ / 2^level | 8 × patches / objects, 8192 at most | 4 | 2 |
 
 use crate::inverse::paper::descent::Descent;
 use crate::inverse::settings::Settings;
 
-/// Doublings of an objects' batch at most.
+/// Greatest number of doublings of the batch, for objects.
 const BATCH_DOUBLINGS: u32 = 2;
-/// Doublings of the paths for a derivative at most.
+/// Greatest number of doublings of the paths for a derivative.
 const DERIVATIVE_DOUBLINGS: u32 = 3;
-/// Pixels of a batch at most, unless the settings say more.
+/// Greatest number of pixels in a batch, unless the settings ask for more.
 const MAX_BATCH: u64 = 8192;
-/// Paths for a pixel's colour and for its derivative once there are patches, in those of the settings.
+/// Paths for a pixel's colour and for its derivative once there are patches, relative to the settings.
 const PATCH_SAMPLES: [u64; 2] = [4, 2];
 
-/// The work of a step.
+/// The amount of work in a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pace {
-    /// Pixels drawn.
+    /// Pixels in the batch.
     pub batch: u64,
-    /// Paths for a pixel's colour, and others for its derivative.
+    /// Paths for a pixel's colour, and independent ones for its derivative.
     pub samples: [u64; 2],
     level: u32,
 }
 
 impl Pace {
-    /// Of the next step of a descent.
-    pub fn of(descent: &Descent, settings: &Settings) -> Self {
+    /// The pace of the next step of a descent.
+    pub fn new(descent: &Descent, settings: &Settings) -> Self {
         let level = descent.level;
         let (batch, samples) = match &descent.patches {
             None => {
@@ -42,12 +42,12 @@ impl Pace {
                 let batch = settings.batch << level.min(BATCH_DOUBLINGS);
                 (batch, [settings.samples << level, derivative])
             }
-            // A step meets each patch about as often as a step at first met each object.
+            // A step meets each patch about as often as the first steps met each object.
             Some(patches) => {
                 let objects = descent.emission.len().max(1);
-                let more = (patches.len() / objects).max(1) as u64;
-                let batch = (settings.batch * more).min(MAX_BATCH.max(settings.batch));
-                let samples = PATCH_SAMPLES.map(|more| settings.samples * more);
+                let ratio = (patches.len() / objects).max(1) as u64;
+                let batch = (settings.batch * ratio).min(MAX_BATCH.max(settings.batch));
+                let samples = PATCH_SAMPLES.map(|factor| settings.samples * factor);
                 (batch, samples)
             }
         };
@@ -58,12 +58,12 @@ impl Pace {
         }
     }
 
-    /// Paths of a step.
+    /// Number of paths in a step.
     pub fn paths(&self) -> u64 {
         self.batch * (self.samples[0] + self.samples[1])
     }
 
-    /// Length of a step, after so many.
+    /// The learning rate after `steps` steps.
     pub fn rate(&self, settings: &Settings, steps: u64) -> f64 {
         let decay = (1.0 - settings.decay).powf(steps as f64 / 1000.0);
         settings.learning_rate * decay * 0.5f64.powi(self.level as i32)

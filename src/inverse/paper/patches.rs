@@ -1,27 +1,27 @@
-//! Patches: triangles, and triangles cut into four again and again, each with an albedo of its own.
+//! Patches: triangles and recursively subdivided parts of triangles, with one albedo each.
 
 use crate::scene::geometry::Hit;
 use crate::scene::texels::TexelLayout;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
-/// Cuts of one triangle at most: each of its edges into 256.
+/// Greatest depth of subdivision: each edge into 256 parts.
 pub const MAX_DEPTH: u8 = 8;
 
-/// Which patch each point of the mesh lies in.
+/// The patches of the mesh.
 ///
-/// A triangle's patches lie on a grid of texels as fine as the finest of them; a coarser patch holds several texels.
+/// A triangle has a grid of texels as fine as its finest patch; a coarser patch consists of several texels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Stored", into = "Stored")]
 pub struct Patches {
     layout: TexelLayout,
     /// The patch of each texel.
     patch_of: Vec<u32>,
-    /// How often each patch's triangle was cut for it.
+    /// Depth of subdivision of each patch.
     depth: Vec<u8>,
 }
 
-/// What a checkpoint holds.
+/// The form in a checkpoint.
 #[derive(Clone, Serialize, Deserialize)]
 struct Stored {
     levels: Vec<u8>,
@@ -51,7 +51,7 @@ impl From<Patches> for Stored {
 }
 
 impl Patches {
-    /// One patch a triangle.
+    /// One patch per triangle.
     pub fn triangles(count: usize) -> Self {
         Self {
             layout: TexelLayout::new(vec![0; count]),
@@ -65,7 +65,7 @@ impl Patches {
         self.depth.len()
     }
 
-    /// The grid that they lie on.
+    /// The grid of texels.
     pub fn layout(&self) -> &TexelLayout {
         &self.layout
     }
@@ -76,24 +76,24 @@ impl Patches {
         self.patch_of[texel as usize] as usize
     }
 
-    /// The patches of a triangle, those that hold several texels several times.
+    /// The patches of a triangle, one entry per texel.
     pub fn of_triangle(&self, triangle: usize) -> impl Iterator<Item = usize> + '_ {
         (self.layout.first[triangle]..self.layout.first[triangle + 1])
             .map(|texel| self.of_texel(texel))
     }
 
-    /// A value a patch, as one a texel.
+    /// Copies one value per patch to its texels.
     pub fn spread<T: Copy>(&self, values: &[T]) -> Vec<T> {
-        let of = |&patch: &u32| values[patch as usize];
-        self.patch_of.iter().map(of).collect()
+        let value = |&patch: &u32| values[patch as usize];
+        self.patch_of.iter().map(value).collect()
     }
 
-    /// How often each patch's triangle was cut for it.
+    /// Depth of subdivision of each patch.
     pub fn depth(&self) -> &[u8] {
         &self.depth
     }
 
-    /// Whether they are patches of so many triangles.
+    /// Whether the sizes fit this number of triangles.
     pub fn fit(&self, triangles: usize) -> bool {
         self.layout.levels.len() == triangles
             && self.patch_of.len() == self.layout.len()
@@ -111,8 +111,8 @@ impl Patches {
         triangle_of
     }
 
-    /// Cuts patches into four through the middles of their edges, those that may be cut again. Returns the new patches,
-    /// and for each the one that it was or was cut from.
+    /// Subdivides the patches in `which` into four at the midpoints of their edges, unless they have [`MAX_DEPTH`]. Returns the new
+    /// patches, and the old patch of each.
     pub fn cut(&self, which: &[bool]) -> (Self, Vec<u32>) {
         let is_cut = |patch: usize| which[patch] && self.depth[patch] < MAX_DEPTH;
         let mut levels = self.layout.levels.clone();
@@ -124,7 +124,7 @@ impl Patches {
         }
         let layout = TexelLayout::new(levels);
 
-        // Each new texel lies in a patch, and where that is cut in one of its four parts.
+        // Each new texel belongs to an old patch, or to one of its four parts if that is cut.
         let grids: Vec<TexelLayout> = (0..=MAX_DEPTH)
             .map(|level| TexelLayout::new(vec![level]))
             .collect();
@@ -168,7 +168,7 @@ impl Patches {
 mod tests {
     use super::*;
 
-    /// The fraction of its triangle that each patch covers.
+    /// The fraction of its triangle's area that each patch covers.
     fn fractions(patches: &Patches) -> Vec<f64> {
         let mut fractions = vec![0.0; patches.len()];
         let first = &patches.layout.first;
@@ -186,7 +186,7 @@ mod tests {
         let (once, parents) = whole.cut(&[false, true, false]);
         assert_eq!(parents, [0, 1, 1, 1, 1, 2]);
         assert_eq!(fractions(&once), [1.0, 0.25, 0.25, 0.25, 0.25, 1.0]);
-        // The second quarter again, beside its coarser neighbours.
+        // One quarter again, next to its coarser neighbours.
         let which: Vec<bool> = (0..6).map(|patch| patch == 2).collect();
         let (twice, parents) = once.cut(&which);
         assert_eq!(twice.len(), 9);
@@ -195,7 +195,7 @@ mod tests {
             assert_eq!(fraction, 0.25f64.powi(i32::from(twice.depth[patch])));
         }
         assert_eq!(parents.iter().filter(|&&parent| parent == 2).count(), 4);
-        // Every point still lies in what it lay in.
+        // Every point lies in a part of its old patch.
         for (b1, b2) in [(0.1, 0.1), (0.6, 0.3), (0.3, 0.6), (0.3, 0.3), (0.05, 0.9)] {
             let hit = Hit {
                 t: 1.0,

@@ -1,4 +1,4 @@
-//! The gradient of one pixel: colour and derivative from independent paths.
+//! The gradient of one pixel's loss, with colour and derivative from independent paths.
 
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
@@ -12,7 +12,7 @@ use crate::math::rng::Stream;
 use crate::transport::arrival::Cast;
 use glam::{Vec2, Vec3, Vec3A};
 
-/// Draws of a pixel before giving up on finding one that may be used.
+/// Attempts to draw a usable pixel.
 const TRIES: u32 = 64;
 
 /// A pixel of a batch.
@@ -20,16 +20,16 @@ const TRIES: u32 = 64;
 pub struct Drawn {
     /// Frame index.
     pub frame: u32,
-    /// Row by row from the top left.
+    /// Pixel index, row by row from the top left.
     pub pixel: u32,
-    /// Factor on its gradient: its chance if drawn uniformly over its chance, or 1 to fit what is drawn more often more.
+    /// Factor on its gradient: the uniform probability over its own for an unbiased batch, or 1 to weight by the distribution.
     pub weight: f32,
 }
 
-/// Draws the pixels of a batch; `None` leaves one out.
+/// Draws a pixel of a batch; `None` leaves it out.
 pub type Draw<'a> = &'a (dyn Fn(&mut Stream) -> Option<Drawn> + Sync);
 
-/// A pixel uniform over all photographs; `None` where none may be used.
+/// Draws a usable pixel that is not held out, uniformly over all photographs; `None` if no attempt finds one.
 pub fn draw(problem: &Problem, settings: &Settings, stream: &mut Stream) -> Option<Drawn> {
     let total: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
     if total == 0 {
@@ -56,13 +56,13 @@ pub fn draw(problem: &Problem, settings: &Settings, stream: &mut Stream) -> Opti
     None
 }
 
-/// What a pixel's paths are traced and evaluated with.
+/// Traces and evaluates the paths of pixels.
 pub struct Rendering<'a> {
     /// Scene and photographs.
     pub problem: &'a Problem,
     /// Traces paths whose surfaces are objects.
     pub tracer: Tracer<'a>,
-    /// What has an albedo of its own below objects.
+    /// The parts of triangles with their own albedo.
     pub patches: Option<&'a Patches>,
     /// Albedo of each object, then of each patch.
     pub albedo: &'a [Vec3],
@@ -70,37 +70,38 @@ pub struct Rendering<'a> {
     pub emission: &'a [Vec3],
 }
 
-/// Gradient of the data term of one pixel, and what it took.
+/// Gradient of the data term of one pixel.
 #[derive(Default)]
 pub struct PixelGradient {
-    /// Parameter (albedos first, then emissions) and derivative; one parameter may have several.
+    /// Parameter (albedos first, then emissions) and derivative; a parameter may have several entries.
     pub entries: Vec<(u32, Vec3)>,
-    /// Rays cast, and paths dropped.
+    /// Number of rays cast and paths rejected.
     pub cast: Cast,
 }
 
-/// A path under names of its own: each vertex's albedo and emission are entries of `unknowns`.
+/// A path with local indices: the surfaces of its vertices are indices into `unknowns`, which holds only what the path meets.
 pub struct Path {
     vertices: Vec<Vertex>,
-    /// Albedo and emission parameter of each entry.
-    names: Vec<[u32; 2]>,
+    /// Global albedo and emission index of each local index.
+    global: Vec<[u32; 2]>,
     unknowns: Unknowns,
-    gathered: Vec<Vec3A>,
+    /// Scratch memory of [`differentiate`].
+    incident: Vec<Vec3A>,
 }
 
 impl Default for Path {
     fn default() -> Self {
         Self {
             vertices: Vec::new(),
-            names: Vec::new(),
+            global: Vec::new(),
             unknowns: Unknowns::new(0),
-            gathered: Vec::new(),
+            incident: Vec::new(),
         }
     }
 }
 
 impl Rendering<'_> {
-    /// Differentiates the loss of a pixel: colour from `samples[0]` paths, derivative from `samples[1]` others.
+    /// The gradient of a pixel's loss: colour from `samples[0]` paths, derivative from `samples[1]` independent ones.
     pub fn gradient(
         &self,
         loss: Loss,
@@ -113,9 +114,9 @@ impl Rendering<'_> {
         let colour = self.colour(drawn, samples[0], &mut stream, &mut path, &mut result.cast);
         let photograph = &self.problem.photographs[drawn.frame as usize];
         let residual = colour - photograph.pixels[drawn.pixel as usize];
-        // What exceeds a saturated value is right.
-        let right = photograph.saturated(drawn.pixel as usize) & residual.cmpgt(Vec3::ZERO);
-        let residual = Vec3::select(right, Vec3::ZERO, residual);
+        // A saturated value is a lower bound.
+        let bound_met = photograph.saturated(drawn.pixel as usize) & residual.cmpgt(Vec3::ZERO);
+        let residual = Vec3::select(bound_met, Vec3::ZERO, residual);
         let sign = |r: f32| f32::from(r != 0.0) * r.signum();
         let slope = match loss {
             Loss::L1 => Vec3::from_array(residual.to_array().map(sign)),
@@ -126,20 +127,20 @@ impl Rendering<'_> {
         let emissions = self.albedo.len() as u32;
         for _ in 0..samples[1] {
             self.trace(drawn, &mut stream, &mut path, &mut result.cast);
-            let count = path.names.len();
+            let count = path.global.len();
             let mut gradient = Gradient::new(2 * count);
             differentiate(
                 &path.vertices,
                 &path.unknowns,
                 &[],
-                &mut path.gathered,
+                &mut path.incident,
                 &mut gradient,
             );
             for &touched in &gradient.touched {
                 let touched = touched as usize;
                 let parameter = match touched.checked_sub(count) {
-                    None => path.names[touched][0],
-                    Some(of) => emissions + path.names[of][1],
+                    None => path.global[touched][0],
+                    Some(local) => emissions + path.global[local][1],
                 };
                 let derivative = Vec3::from(gradient.values[touched]);
                 result.entries.push((parameter, derivative * slope));
@@ -148,7 +149,7 @@ impl Rendering<'_> {
         result
     }
 
-    /// Mean radiance of so many paths through a pixel.
+    /// Mean radiance of `samples` paths through a pixel.
     pub fn colour(
         &self,
         drawn: Drawn,
@@ -165,16 +166,16 @@ impl Rendering<'_> {
         sum / samples as f32
     }
 
-    /// Traces a path and names what it met.
+    /// Traces a path and replaces its surfaces by local indices.
     fn trace(&self, drawn: Drawn, stream: &mut Stream, path: &mut Path, cast: &mut Cast) {
         let width = self.problem.photographs[drawn.frame as usize].width;
         let corner = Vec2::new((drawn.pixel % width) as f32, (drawn.pixel / width) as f32);
         let camera = &self.problem.scene.cameras[drawn.frame as usize];
         path.vertices.clear();
-        let traced = (self.tracer).pixel_path(camera, corner, stream, &mut path.vertices);
-        cast.rays += traced.0;
-        cast.rejected += u64::from(!traced.1);
-        path.names.clear();
+        let (rays, accepted) = (self.tracer).pixel_path(camera, corner, stream, &mut path.vertices);
+        cast.rays += rays;
+        cast.rejected += u64::from(!accepted);
+        path.global.clear();
         path.unknowns.albedo.clear();
         path.unknowns.emission.clear();
         let objects = self.emission.len() as u32;
@@ -187,22 +188,24 @@ impl Rendering<'_> {
                     }
                     _ => vertex.surface,
                 };
-                path.vertices[index].surface = self.named(path, [albedo, vertex.surface]);
+                path.vertices[index].surface = self.local(path, [albedo, vertex.surface]);
             }
             if vertex.lamp != NO_LAMP {
-                path.vertices[index].lamp = self.named(path, [vertex.lamp, vertex.lamp]);
+                path.vertices[index].lamp = self.local(path, [vertex.lamp, vertex.lamp]);
             }
         }
     }
 
-    /// The entry of an albedo and an emission.
-    fn named(&self, path: &mut Path, name: [u32; 2]) -> u32 {
-        let known = path.names.iter().position(|known| *known == name);
+    /// The local index of an albedo and an emission.
+    fn local(&self, path: &mut Path, [albedo, emission]: [u32; 2]) -> u32 {
+        let known = (path.global.iter()).position(|known| *known == [albedo, emission]);
         known.unwrap_or_else(|| {
-            path.names.push(name);
-            path.unknowns.albedo.push(self.albedo[name[0] as usize]);
-            path.unknowns.emission.push(self.emission[name[1] as usize]);
-            path.names.len() - 1
+            path.global.push([albedo, emission]);
+            path.unknowns.albedo.push(self.albedo[albedo as usize]);
+            path.unknowns
+                .emission
+                .push(self.emission[emission as usize]);
+            path.global.len() - 1
         }) as u32
     }
 }

@@ -1,15 +1,16 @@
-//! When the descent measures its loss, and when the loss stands still. Both count work, not seconds, so that a solve
-//! takes the same course on any machine.
+//! When the descent measures its loss, and when the loss has converged. Intervals are numbers of paths instead of seconds, so
+//! that a solve takes the same course on any machine.
 
 use serde::{Deserialize, Serialize};
 
-/// The loss stands still when the mean of the last measurements is no better than that of as many before, by this fraction.
-const STANDSTILL: f64 = 0.01;
+/// Least relative decrease between the means of two consecutive windows of measurements.
+const MIN_DECREASE: f64 = 0.01;
 
-/// Losses since the last change of the learning rate, and the work until the next.
+/// The losses since the last change of the learning rate.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Schedule {
     losses: Vec<f64>,
+    /// Number of paths until the next measurement.
     until_measured: u64,
 }
 
@@ -19,12 +20,12 @@ impl Schedule {
         self.until_measured == 0
     }
 
-    /// Takes note of paths traced.
+    /// Counts traced paths.
     pub fn traced(&mut self, paths: u64) {
         self.until_measured = self.until_measured.saturating_sub(paths);
     }
 
-    /// Takes note of a loss, the next to be measured after so many paths; whether the mean of `window` of them stands still.
+    /// Adds a loss; the next one is due after `next` paths. Returns whether the mean of the last `window` losses has converged.
     pub fn measured(&mut self, loss: Option<f64>, next: u64, window: usize) -> bool {
         self.until_measured = next;
         self.losses.extend(loss);
@@ -33,10 +34,10 @@ impl Schedule {
         }
         let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
         let (before, last) = self.losses[self.losses.len() - 2 * window..].split_at(window);
-        mean(last) > mean(before) * (1.0 - STANDSTILL)
+        mean(last) > mean(before) * (1.0 - MIN_DECREASE)
     }
 
-    /// Forgets the losses of an earlier learning rate.
+    /// Removes the losses of an earlier learning rate.
     pub fn start_over(&mut self) {
         self.losses.clear();
     }

@@ -1,4 +1,4 @@
-//! The stages of a descent: what each begins with, when it ends, and what it leaves.
+//! The stages of a descent: per object, per triangle, and on parts of triangles.
 
 use crate::inverse::paper::descent::Descent;
 use crate::inverse::paper::pace::Pace;
@@ -9,56 +9,60 @@ use crate::inverse::solver::{Stage, Termination};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-/// Levels of the pace after the first: of one albedo an object, and of patches.
+/// Last level of the pace for objects.
 pub const LEVELS: u32 = 6;
+/// Last level of the pace for patches.
 const PATCH_LEVELS: u32 = 3;
-/// Paths between two measurements, in those that a measurement takes.
+/// Paths between two measurements, relative to the paths of a measurement.
 const MEASURE_EVERY: u64 = 6;
-/// Between two measurements a patch in sight is met this often in the mean.
+/// Mean number of batch pixels that see a patch between two measurements.
 const MEETINGS: u64 = 8;
-/// Measurements whose mean is compared with that of as many before.
+/// Measurements in a window of the schedule, for objects.
 const WINDOW: usize = 4;
+/// Measurements in a window of the schedule, for patches.
 const PATCH_WINDOW: usize = 2;
 
-/// Pixels that a patch covers at most: a texture that a square of sixteen pixels a side hides is found by cutting it twice.
+/// Greatest number of pixels of a patch. Textures within 16 × 16 pixels are found by cutting twice.
 const MAX_COVERED: u64 = 256;
-/// Stages on end that gain nothing before the descent ends: a texture may show only once triangles were cut twice.
+/// Consecutive stages without a gain that end the descent: a texture may show only after cutting twice.
 const FRUITLESS: u32 = 2;
 
-/// Values and their loss.
+/// The values with the least loss.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Best {
     albedo: Vec<Vec3>,
     emission: Vec<Vec3>,
-    /// On pixels in the fit and held out.
+    /// Loss on pixels in the fit.
     train: Option<f64>,
+    /// Loss on held-out pixels.
     held_out: Option<f64>,
-    /// The loss that stages are judged by, when this stage began: held-out, or in the fit where nothing is held out.
+    /// [`Best::judged`] at the start of the stage.
     at_first: Option<f64>,
 }
 
 impl Best {
-    /// Whether they are values of such a state.
+    /// Whether the sizes fit a state.
     pub fn fits(&self, descent: &Descent) -> bool {
         self.albedo.len() == descent.albedo.len() && self.emission.len() == descent.emission.len()
     }
 
+    /// The loss that states are compared by: on held-out pixels, or in the fit if no pixel is held out.
     fn judged(&self) -> Option<f64> {
         self.held_out.or(self.train)
     }
 }
 
-/// Whether a loss is below another; one that is no number is above all.
+/// Whether a loss is below another; NaN is above all numbers.
 fn is_below(loss: Option<f64>, other: Option<f64>) -> bool {
     match (loss, other) {
         (Some(loss), Some(other)) => loss < other || other.is_nan() && !loss.is_nan(),
-        // Nothing was measured: what is newer has descended further.
+        // Without a measurement the newer state is preferred.
         _ => true,
     }
 }
 
 impl Run<'_, '_> {
-    /// Descends per object, per triangle, and on ever smaller patches.
+    /// Runs all stages.
     pub fn descend(&mut self) -> Result<Termination, Termination> {
         loop {
             self.monitor.phase(&match self.covered.len() {
@@ -69,11 +73,11 @@ impl Run<'_, '_> {
                 },
             });
             let ended = self.stage();
-            // What was broken off can be taken up where it was.
-            let open = ended.is_err().then(|| self.state.clone());
+            // The state of an interrupted stage is kept for the checkpoint.
+            let interrupted = ended.is_err().then(|| self.state.clone());
             self.finish_stage();
-            if let Some(open) = open {
-                self.state = open;
+            if let Some(state) = interrupted {
+                self.state = state;
             }
             ended?;
             let goes_on = self.state.fruitless < FRUITLESS && self.monitor.settings.textures;
@@ -85,10 +89,10 @@ impl Run<'_, '_> {
         }
     }
 
-    /// Descends until the loss stands still at the last level.
+    /// Descends until the loss has converged at the last level.
     fn stage(&mut self) -> Result<(), Termination> {
         loop {
-            // Step until the observer is due, measuring now and then.
+            // Step until a report is due, measuring the loss by the schedule.
             let settings = self.monitor.settings.clone();
             while !self.monitor.due() {
                 let iterations = self.monitor.progress.iterations;
@@ -127,15 +131,15 @@ impl Run<'_, '_> {
         }
     }
 
-    /// Paths until the next measurement.
+    /// Number of paths until the next measurement.
     fn until_measured(&self) -> u64 {
-        let in_sight = self.covered.iter().filter(|&&pixels| pixels > 0).count() as u64;
-        let pace = Pace::of(&self.state.descent, &self.monitor.settings);
-        let meetings = MEETINGS * in_sight * (pace.samples[0] + pace.samples[1]);
-        meetings.max(MEASURE_EVERY * self.losses.paths()).max(1)
+        let seen = self.covered.iter().filter(|&&pixels| pixels > 0).count() as u64;
+        let pace = Pace::new(&self.state.descent, &self.monitor.settings);
+        let paths = MEETINGS * seen * (pace.samples[0] + pace.samples[1]);
+        paths.max(MEASURE_EVERY * self.losses.paths()).max(1)
     }
 
-    /// Adds a point to the loss curve and keeps the state if it is the best of the stage; returns the loss in the fit.
+    /// Adds a point to the loss curve, and keeps the state if it is the best of the stage; returns the loss in the fit.
     fn measure(&mut self) -> Option<f64> {
         self.describe();
         let loss = self.losses.measure(self.problem, &self.estimate);
@@ -156,8 +160,8 @@ impl Run<'_, '_> {
         loss.train
     }
 
-    /// Leaves the best state of the stage and records it. One that an earlier run had broken off takes the place of its
-    /// first part.
+    /// Sets the best state of the stage and records the stage. It replaces the record of an earlier, interrupted part of the same
+    /// stage.
     fn finish_stage(&mut self) {
         self.measure();
         let Some(best) = self.state.best.take() else {
@@ -216,7 +220,7 @@ impl Run<'_, '_> {
         self.describe();
     }
 
-    /// Goes on to the next stage: every triangle its own albedo, then the worst cut into four. `false` where there is none.
+    /// Starts the next stage: an albedo for each triangle, then the worst patches cut into four. `false` if there is none.
     fn refine(&mut self) -> bool {
         let scene = &self.problem.scene;
         let mut which = Vec::new();
@@ -227,14 +231,14 @@ impl Run<'_, '_> {
         } else {
             let settings = &self.monitor.settings;
             let descent = &mut self.state.descent;
-            let (found, cast) = self
+            let (worst, cast) = self
                 .cover
                 .to_cut(self.problem, settings, self.bounces, descent);
             self.monitor.cast(cast);
-            if !found.contains(&true) {
+            if !worst.contains(&true) {
                 return false;
             }
-            which = found;
+            which = worst;
         }
         let cuts = match self.state.descent.patches {
             None => 0,
@@ -248,13 +252,13 @@ impl Run<'_, '_> {
             fruitless: self.state.fruitless,
             stage_started: (self.monitor.seconds(), self.monitor.progress.iterations),
         };
-        self.cover_anew();
+        self.update_cover();
         self.cut_to_size();
         true
     }
 
-    /// Cuts what covers very many pixels, as triangles of a wall may, so that errors are compared of parts of a size at
-    /// which textures show.
+    /// Cuts patches with more than [`MAX_COVERED`] pixels, such as the triangles of a wall, so that errors of parts are compared at
+    /// the scale of textures.
     fn cut_to_size(&mut self) {
         loop {
             let Some(patches) = &self.state.descent.patches else {
@@ -268,15 +272,15 @@ impl Run<'_, '_> {
                 return;
             }
             self.state.descent = self.state.descent.refined(&self.problem.scene, &which);
-            self.cover_anew();
+            self.update_cover();
         }
     }
 
-    /// Counts the pixels that each patch covers.
-    fn cover_anew(&mut self) {
+    /// Counts the pixels of each patch, and fixes the albedos of those without any.
+    fn update_cover(&mut self) {
         let patches = self.state.descent.patches.as_ref();
         let counts = patches.map(|patches| self.cover.counts(patches));
         self.covered = counts.unwrap_or_default();
-        self.state.descent.keep_still(&self.covered);
+        self.state.descent.fix_uncovered(&self.covered);
     }
 }

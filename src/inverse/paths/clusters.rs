@@ -1,20 +1,21 @@
-//! Which pixels are fitted, gathered in clusters: neighbouring pixels of one object in one photograph.
+//! Selects the pixels of the fit and groups them in clusters: neighbouring pixels of one object in one photograph.
 //!
-//! Light varies little within a cluster, so its mean holds nearly all that its pixels know of the unknowns, while the
-//! noise of photographs and of paths averages out before products are taken.
+//! Radiance varies little within a cluster, so its mean carries nearly all the information of its pixels, and the noise of
+//! photographs and paths averages out before products are taken.
 
 use crate::calibrate::gbuffer::{GBuffer, GBufferPixel};
 use crate::calibrate::problem::Problem;
+use crate::math::stats::upper_median;
 use glam::{BVec3, DVec3, Vec3};
 use std::collections::BTreeMap;
 
-/// Pixels of a cluster aimed at.
+/// Target number of pixels in a cluster.
 const CLUSTER_PIXELS: f64 = 48.0;
 /// Objects with fewer pixels than this away from their edges are fitted at their edges too.
 const ENOUGH: u64 = 48;
-/// Objects seen by fewer pixels than this keep all of theirs, at edges each by itself.
+/// Objects seen by fewer pixels than this are not thinned; their pixels at edges form clusters of one pixel.
 const SMALL: u64 = 400;
-/// Below this fraction of a typical photograph's level, pixels weigh no more for being darker.
+/// Fraction of the median photographed radiance below which weights stop growing.
 const DARK: f32 = 0.5;
 
 /// Neighbouring pixels of one object in one photograph.
@@ -22,35 +23,35 @@ const DARK: f32 = 0.5;
 pub struct Cluster {
     /// Frame index.
     pub frame: u32,
-    /// Object behind the pixels' centres.
+    /// Object that the pixels' centres see.
     pub object: u32,
-    /// The pixels, row by row from the top left.
+    /// Pixel indices, row by row from the top left.
     pub pixels: Vec<u32>,
-    /// Paths a pixel in each of the two sets.
+    /// Paths per pixel in each of the two sets.
     pub paths: u32,
     /// Mean radiance of the pixels in the photograph.
     pub measured: Vec3,
     /// Channels in which a pixel is saturated, so that `measured` is a lower bound.
     pub censored: BVec3,
-    /// Weight of the squared difference of the means, per channel: pixels / level².
+    /// Weight of the squared residual of the mean, per channel: pixels / (level² + dark²).
     pub weight: Vec3,
-    /// Level below which pixels weigh no more for being darker.
+    /// Level below which the weight stops growing.
     pub dark: Vec3,
 }
 
 impl Cluster {
-    /// Weighs it by a level per channel.
+    /// Sets the weight from a level per channel.
     ///
-    /// The photograph's own level gives more weight to what is dark by its noise or its texture, so that one albedo for
-    /// a textured object comes out below the mean. A prediction from independent paths does not.
+    /// The photographed level would favour pixels that are dark by noise or texture, and bias the albedo of a textured object
+    /// below its mean. A level predicted from independent paths has no such bias.
     pub fn weigh(&mut self, level: Vec3) {
         self.weight = (level * level + self.dark * self.dark).recip() * self.pixels.len() as f32;
     }
 }
 
-/// Gathers the pixels that are in the fit. `max_pixels` bounds how many are used; small objects keep all of theirs.
+/// Groups the pixels that are in the fit, about `max_pixels` of them; small objects keep all of theirs.
 pub fn cluster(problem: &Problem, gbuffer: &GBuffer, max_pixels: usize) -> Vec<Cluster> {
-    // Usable pixels: away from all edges, or nearer to them on objects that have few.
+    // Pixels at edges are used only on objects with few other pixels.
     let seen = |object: u32| gbuffer.seen.get(object as usize).copied().unwrap_or(0);
     let mut usable: Vec<&GBufferPixel> = gbuffer
         .pixels
@@ -61,30 +62,30 @@ pub fn cluster(problem: &Problem, gbuffer: &GBuffer, max_pixels: usize) -> Vec<C
         let photograph = &problem.photographs[frame as usize];
         photograph.saturated(pixel as usize)
     };
-    let nearest = nearest_to_edges(&usable, gbuffer.seen.len(), |p| {
+    let allowed = allowed_edges(&usable, gbuffer.seen.len(), |p| {
         saturated(p.frame, p.pixel).any()
     });
-    usable.retain(|p| Edge::of(p) <= nearest[p.object as usize].0);
+    usable.retain(|p| Edge::of(p) <= allowed[p.object as usize].0);
     let thinning = (usable.len() as f64 / max_pixels.max(1) as f64).max(1.0);
     let tile = (CLUSTER_PIXELS * thinning).sqrt().round().max(1.0) as u32;
 
-    // Tiles of each photograph, apart for each object, and for what is saturated.
+    // Image tiles, separate for each object and for saturated pixels.
     let mut tiles: BTreeMap<(u32, u32, u32, u32, bool), Vec<u32>> = BTreeMap::new();
     for pixel in usable {
         let width = problem.photographs[pixel.frame as usize].width;
-        let bound = saturated(pixel.frame, pixel.pixel).any();
-        let tile = match nearest[pixel.object as usize] {
-            (Edge::Near | Edge::On, pixels) if !bound => tile_at_edges(pixels).min(tile),
+        let is_saturated = saturated(pixel.frame, pixel.pixel).any();
+        let tile = match allowed[pixel.object as usize] {
+            (Edge::Near | Edge::On, pixels) if !is_saturated => tile_at_edges(pixels).min(tile),
             _ => tile,
         };
-        let place = (pixel.pixel / width / tile, pixel.pixel % width / tile);
+        let (y, x) = (pixel.pixel / width / tile, pixel.pixel % width / tile);
         tiles
-            .entry((pixel.frame, place.0, place.1, pixel.object, bound))
+            .entry((pixel.frame, y, x, pixel.object, is_saturated))
             .or_default()
             .push(pixel.pixel);
     }
 
-    // Thin out large objects, evenly over each tile.
+    // Thin large objects, evenly over each tile.
     let dark = typical_level(problem, gbuffer) * DARK;
     tiles
         .into_iter()
@@ -98,8 +99,9 @@ pub fn cluster(problem: &Problem, gbuffer: &GBuffer, max_pixels: usize) -> Vec<C
                 .map(|&p| photograph.pixels[p as usize].as_dvec3())
                 .sum();
             let measured = (sum / pixels.len() as f64).as_vec3();
-            let bounds = pixels.iter().map(|&p| saturated(frame, p));
-            let censored = bounds.fold(BVec3::FALSE, |all, bound| all | bound);
+            let censored = (pixels.iter())
+                .map(|&p| saturated(frame, p))
+                .fold(BVec3::FALSE, |any, saturated| any | saturated);
             let mut cluster = Cluster {
                 frame,
                 object,
@@ -116,14 +118,14 @@ pub fn cluster(problem: &Problem, gbuffer: &GBuffer, max_pixels: usize) -> Vec<C
         .collect()
 }
 
-/// How near to an edge of what it sees a pixel lies.
+/// Where a pixel lies relative to edges of its object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Edge {
-    /// None of the pixels around is on one.
+    /// It and its neighbours see one object.
     Far,
-    /// It sees one surface, as far as its rays tell: a sliver may have slipped between them.
+    /// All its rays hit one surface, but a sliver of another may lie between them.
     Near,
-    /// It sees more than one.
+    /// Its rays hit several surfaces.
     On,
 }
 
@@ -137,36 +139,38 @@ impl Edge {
     }
 }
 
-/// How near to its edges each object is fitted, and by how many pixels: as far as there are enough. A sliver of a lamp in
-/// a pixel of the ceiling outshines it, and its fraction of the pixel is known no better than the photograph's noise and the
-/// camera's place. Lower bounds do not count.
-fn nearest_to_edges(
+/// For each object, the kind of pixels closest to edges that the fit needs to use, and the number of usable pixels then.
+/// Saturated pixels are not counted.
+///
+/// Pixels at edges are avoided because a sliver of a lamp outshines the rest of a pixel, and its coverage is only as well known
+/// as the camera's pose.
+fn allowed_edges(
     pixels: &[&GBufferPixel],
     objects: usize,
-    is_bound: impl Fn(&GBufferPixel) -> bool,
+    is_saturated: impl Fn(&GBufferPixel) -> bool,
 ) -> Vec<(Edge, u64)> {
     let mut counts = vec![[0u64; 3]; objects];
-    for pixel in pixels.iter().filter(|p| !is_bound(p)) {
-        let [far, off, all] = &mut counts[pixel.object as usize];
+    for pixel in pixels.iter().filter(|p| !is_saturated(p)) {
+        let [far, pure, all] = &mut counts[pixel.object as usize];
         *far += u64::from(Edge::of(pixel) == Edge::Far);
-        *off += u64::from(Edge::of(pixel) != Edge::On);
+        *pure += u64::from(Edge::of(pixel) != Edge::On);
         *all += 1;
     }
-    let nearest = |[far, off, all]: [u64; 3]| match (far >= ENOUGH, off >= ENOUGH) {
+    let allowed = |[far, pure, all]: [u64; 3]| match (far >= ENOUGH, pure >= ENOUGH) {
         (true, _) => (Edge::Far, far),
-        (false, true) => (Edge::Near, off),
+        (false, true) => (Edge::Near, pure),
         (false, false) => (Edge::On, all),
     };
-    counts.into_iter().map(nearest).collect()
+    counts.into_iter().map(allowed).collect()
 }
 
-/// Side of the tiles of an object that is fitted at its edges: near a lamp each pixel holds light of its own, or a fraction of
-/// the lamp of its own, and is known as well as those allow. Gathered with others it would weigh like them.
+/// Side of the tiles, in pixels, of an object that is fitted at its edges. Pixels at edges differ in coverage and in accuracy, so
+/// few of them share a cluster and its weight.
 fn tile_at_edges(pixels: u64) -> u32 {
     (pixels as f64 / SMALL as f64).sqrt().floor().max(1.0) as u32
 }
 
-/// Median over photographed pixels that are in the fit, per channel; one where all are black.
+/// Median of the positive values of pixels in the fit, per channel; one if there are none.
 fn typical_level(problem: &Problem, gbuffer: &GBuffer) -> Vec3 {
     let channel = |c: usize| {
         let mut values: Vec<f32> = gbuffer
@@ -176,22 +180,18 @@ fn typical_level(problem: &Problem, gbuffer: &GBuffer) -> Vec3 {
             .map(|p| problem.photographs[p.frame as usize].pixels[p.pixel as usize][c])
             .filter(|&v| v > 0.0)
             .collect();
-        if values.is_empty() {
-            return 1.0;
-        }
-        let middle = values.len() / 2;
-        *values.select_nth_unstable_by(middle, f32::total_cmp).1
+        upper_median(&mut values).unwrap_or(1.0)
     };
     Vec3::new(channel(0), channel(1), channel(2))
 }
 
-/// Mean radiance of the clusters.
+/// Mean of the clusters' measured radiance.
 pub fn mean_radiance(clusters: &[Cluster]) -> Vec3 {
     let sum: DVec3 = clusters.iter().map(|c| c.measured.as_dvec3()).sum();
     (sum / clusters.len().max(1) as f64).as_vec3()
 }
 
-/// Mean of each surface's brightest channel over its clusters.
+/// For each surface, the mean over its pixels of the brightest channel of their cluster.
 pub fn brightness(clusters: &[Cluster], surfaces: usize) -> Vec<f32> {
     let mut sums = vec![(0.0, 0.0); surfaces];
     for cluster in clusters {
@@ -204,20 +204,31 @@ pub fn brightness(clusters: &[Cluster], surfaces: usize) -> Vec<f32> {
 }
 
 #[cfg(test)]
+impl Cluster {
+    /// A cluster for tests: unit weight, one path per pixel and set.
+    pub fn unit(object: u32, pixels: u32, measured: Vec3) -> Self {
+        Self {
+            frame: 0,
+            object,
+            pixels: (0..pixels).collect(),
+            paths: 1,
+            measured,
+            censored: BVec3::FALSE,
+            weight: Vec3::ONE,
+            dark: Vec3::ONE,
+        }
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn a_predicted_level_weighs_dark_and_bright_spots_of_a_texture_alike() {
         let cluster = |measured: f32| Cluster {
-            frame: 0,
-            object: 0,
-            pixels: vec![0; 10],
-            paths: 1,
-            measured: Vec3::splat(measured),
-            censored: BVec3::FALSE,
-            weight: Vec3::ONE,
             dark: Vec3::splat(0.1),
+            ..Cluster::unit(0, 10, Vec3::splat(measured))
         };
         let mut spots = [cluster(0.2), cluster(1.8)];
         let mean = |spots: &[Cluster]| {
@@ -258,14 +269,14 @@ mod tests {
             .chain(of(2, [10, 20, 5]))
             .collect();
         let pixels: Vec<&GBufferPixel> = pixels.iter().collect();
-        let nearest = nearest_to_edges(&pixels, 4, |_| false);
-        let edges: Vec<Edge> = nearest.iter().map(|n| n.0).collect();
+        let allowed = allowed_edges(&pixels, 4, |_| false);
+        let edges: Vec<Edge> = allowed.iter().map(|n| n.0).collect();
         assert_eq!(edges, [Edge::Far, Edge::Near, Edge::On, Edge::On]);
-        let counts: Vec<u64> = nearest.iter().map(|n| n.1).collect();
+        let counts: Vec<u64> = allowed.iter().map(|n| n.1).collect();
         assert_eq!(counts, [ENOUGH, ENOUGH, 35, 0]);
-        // Lower bounds alone are none.
-        let bounds = nearest_to_edges(&pixels[..ENOUGH as usize], 1, |_| true);
-        assert_eq!(bounds, [(Edge::On, 0)]);
+        // Saturated pixels do not count.
+        let saturated = allowed_edges(&pixels[..ENOUGH as usize], 1, |_| true);
+        assert_eq!(saturated, [(Edge::On, 0)]);
         assert_eq!([1, SMALL, 4 * SMALL].map(tile_at_edges), [1, 1, 2]);
     }
 }

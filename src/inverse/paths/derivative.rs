@@ -1,11 +1,11 @@
-//! Radiance of a stored path and its derivative with respect to every albedo and emission on it.
+//! Radiance of a stored path, and its derivatives with respect to all albedos and emissions on it.
 
 use crate::inverse::paths::{NO_LAMP, NO_PATCH, SPECULAR, Vertex};
 use crate::inverse::unknowns::Unknowns;
 use glam::{Vec3, Vec3A};
 
-/// Derivative of a radiance: dense over parameters (albedos first, then emissions), with the list of
-/// those that were touched.
+/// Derivatives of a radiance: dense over the parameters (albedos of all surfaces, then emissions), with a list of the non-zero
+/// ones.
 pub struct Gradient {
     /// Derivative with respect to each parameter.
     pub values: Vec<Vec3A>,
@@ -16,7 +16,7 @@ pub struct Gradient {
 }
 
 impl Gradient {
-    /// All zero.
+    /// The zero gradient.
     pub fn new(parameters: usize) -> Self {
         Self {
             values: vec![Vec3A::ZERO; parameters],
@@ -34,7 +34,7 @@ impl Gradient {
         self.values[index] += value;
     }
 
-    /// Sets everything touched back to zero.
+    /// Resets the touched parameters to zero.
     pub fn clear(&mut self) {
         for &index in &self.touched {
             self.values[index as usize] = Vec3A::ZERO;
@@ -52,7 +52,7 @@ pub fn radiance(vertices: &[Vertex], unknowns: &Unknowns) -> Vec3 {
     })
 }
 
-/// Radiance of one path where texels have their own albedos.
+/// Radiance of one path with the albedo of each vertex's texel, and of its surface where it has none.
 #[inline]
 pub fn textured_radiance(vertices: &[Vertex], unknowns: &Unknowns, texels: &[Vec3]) -> Vec3 {
     radiance_with(vertices, unknowns, |vertex| {
@@ -67,64 +67,64 @@ fn radiance_with(
     unknowns: &Unknowns,
     albedo: impl Fn(&Vertex) -> Vec3,
 ) -> Vec3 {
-    let leaving = |beyond: Vec3A, vertex: &Vertex| {
-        let gathered = gathered_at(vertex, beyond, unknowns);
-        leaving(vertex, gathered, unknowns, &albedo)
+    let outgoing = |next: Vec3A, vertex: &Vertex| {
+        let incident = incident_at(vertex, next, unknowns);
+        outgoing(vertex, incident, unknowns, &albedo)
     };
-    vertices.iter().rev().fold(Vec3A::ZERO, leaving).into()
+    vertices.iter().rev().fold(Vec3A::ZERO, outgoing).into()
 }
 
-/// Radiance that leaves a vertex of what it gathered, and of its own.
+/// Radiance that leaves a vertex towards the previous one: emission plus albedo times the incident estimate.
 #[inline]
-fn leaving(
+fn outgoing(
     vertex: &Vertex,
-    gathered: Vec3A,
+    incident: Vec3A,
     unknowns: &Unknowns,
     albedo: impl Fn(&Vertex) -> Vec3,
 ) -> Vec3A {
     if vertex.surface == SPECULAR {
-        return gathered;
+        return incident;
     }
     let emission = Vec3A::from(unknowns.emission[vertex.surface as usize]);
-    emission * vertex.emission_weight + Vec3A::from(albedo(vertex)) * gathered
+    emission * vertex.emission_weight + Vec3A::from(albedo(vertex)) * incident
 }
 
-/// Radiance gathered at a vertex, where `beyond` leaves the next one towards it.
+/// Weighted incident radiance at a vertex: `next`, which leaves the following vertex, known radiance, and the light sample.
 #[inline]
-fn gathered_at(vertex: &Vertex, beyond: Vec3A, unknowns: &Unknowns) -> Vec3A {
-    let mut gathered = beyond + Vec3A::from(vertex.known);
+fn incident_at(vertex: &Vertex, next: Vec3A, unknowns: &Unknowns) -> Vec3A {
+    let mut incident = next + Vec3A::from(vertex.known);
     if vertex.lamp != NO_LAMP {
-        gathered += Vec3A::from(unknowns.emission[vertex.lamp as usize]) * vertex.lamp_weight;
+        incident += Vec3A::from(unknowns.emission[vertex.lamp as usize]) * vertex.lamp_weight;
     }
-    gathered
+    incident
 }
 
-/// Radiance of one path, its derivative added to `gradient`.
+/// Radiance of one path; adds its derivatives to `gradient`. `incident` is scratch memory.
 ///
-/// With G_i the radiance gathered at vertex i, L_i = w_i E_i + ρ_i G_i is what leaves it towards the camera; the
-/// derivative with respect to ρ_i is G_i, with respect to an emission its weight, each times the albedos before it. A
-/// vertex on a lobe has no ρ_i: there L_i = G_i. A patch of a lamp, whose albedo is held at zero, is known to send
-/// `reflected` for an albedo of one.
+/// With G_i the incident radiance at vertex i, L_i = w_i E_i + ρ_i G_i leaves it towards the camera. The derivative with
+/// respect to ρ_i is G_i, and with respect to an emission its weight, each times the albedos of the preceding vertices. A
+/// vertex on a lobe has no ρ_i: L_i = G_i. Lamps have albedo zero; for an albedo of one a patch of a lamp would send
+/// `reflected` (radiance, one per patch), which gives the derivative with respect to the lamp's albedo.
 #[inline]
 pub fn differentiate(
     vertices: &[Vertex],
     unknowns: &Unknowns,
     reflected: &[Vec3],
-    gathered: &mut Vec<Vec3A>,
+    incident: &mut Vec<Vec3A>,
     gradient: &mut Gradient,
 ) -> Vec3 {
     let surfaces = unknowns.surfaces();
-    gathered.resize(vertices.len().max(gathered.len()), Vec3A::ZERO);
-    let mut beyond = Vec3A::ZERO;
-    for (vertex, gathered) in vertices.iter().zip(&mut *gathered).rev() {
-        *gathered = gathered_at(vertex, beyond, unknowns);
-        beyond = leaving(vertex, *gathered, unknowns, |v| {
+    incident.resize(vertices.len().max(incident.len()), Vec3A::ZERO);
+    let mut radiance = Vec3A::ZERO;
+    for (vertex, incident) in vertices.iter().zip(&mut *incident).rev() {
+        *incident = incident_at(vertex, radiance, unknowns);
+        radiance = outgoing(vertex, *incident, unknowns, |v| {
             unknowns.albedo[v.surface as usize]
         });
     }
     let patch = |patch: u32| Vec3A::from(reflected[patch as usize]);
     let mut throughput = Vec3A::ONE;
-    for (vertex, g) in vertices.iter().zip(&*gathered) {
+    for (vertex, g) in vertices.iter().zip(&*incident) {
         if vertex.surface != SPECULAR {
             let surface = vertex.surface as usize;
             if vertex.emission_weight != 0.0 {
@@ -145,7 +145,7 @@ pub fn differentiate(
             }
         }
     }
-    beyond.into()
+    radiance.into()
 }
 
 #[cfg(test)]
@@ -160,7 +160,7 @@ mod tests {
         Vec3::from_array(std::array::from_fn(|_| 0.1 + 0.8 * stream.uniform()))
     }
 
-    /// A path over few surfaces, so that they repeat, with lamps, emission seen and known radiance.
+    /// A path over few surfaces, so that they repeat, with light samples, hit emission and known radiance.
     fn random_path(stream: &mut Stream) -> Vec<Vertex> {
         (0..1 + stream.below(7))
             .map(|_| Vertex {
@@ -197,7 +197,7 @@ mod tests {
         }
     }
 
-    /// The sum over all ways of the path to find light, term by term in f64.
+    /// The sum over all light that the path finds, term by term in f64.
     fn radiance(vertices: &[Vertex], albedo: &[DVec3], emission: &[DVec3]) -> DVec3 {
         let mut sum = DVec3::ZERO;
         for (i, vertex) in vertices.iter().enumerate() {
@@ -209,8 +209,8 @@ mod tests {
             };
             let before: DVec3 = vertices[..i].iter().map(factor).product();
             let after = before * factor(vertex);
-            let shown = emission.get(vertex.surface as usize).copied();
-            sum += before * shown.unwrap_or_default() * f64::from(vertex.emission_weight);
+            let own = emission.get(vertex.surface as usize).copied();
+            sum += before * own.unwrap_or_default() * f64::from(vertex.emission_weight);
             sum += after * vertex.known.as_dvec3();
             if vertex.lamp != NO_LAMP {
                 sum += after * emission[vertex.lamp as usize] * f64::from(vertex.lamp_weight);
@@ -291,8 +291,7 @@ mod tests {
         assert!(gradient.touched.is_empty());
     }
 
-    /// A patch sends what it reflects for the lamp's albedo besides its emission: where light samples reach it, and where
-    /// the path ends at it.
+    /// A patch sends its reflected light in addition to its emission, both to light samples and to paths that end at it.
     #[test]
     fn a_lamp_s_albedo_changes_what_its_patches_send() {
         let path = [

@@ -1,4 +1,4 @@
-//! Radiance and derivatives of cached paths for given unknowns.
+//! Evaluates the cached paths of all clusters for given unknowns: residuals, derivatives, and levels.
 
 use crate::inverse::paths::derivative::{Gradient, differentiate, radiance, textured_radiance};
 use crate::inverse::paths::{CachedCluster, PathCache, SPECULAR, Vertex};
@@ -6,28 +6,28 @@ use crate::inverse::unknowns::Unknowns;
 use glam::{BVec3, DVec3, Vec3, Vec3A};
 use rayon::prelude::*;
 
-/// One cluster's residual and derivative from both sets.
+/// A cluster's residuals and derivatives from two independent sets of paths.
 #[derive(Debug, Clone)]
 pub struct Linearised {
-    /// Object behind its pixels.
+    /// Object that its pixels see.
     pub object: u32,
     /// Weight of the squared residual, per channel.
     pub weight: DVec3,
-    /// Its pixels: what the squared residual would weigh if it were as large as the level that it is weighed by.
+    /// Number of pixels, which is the weight of a squared relative residual.
     pub pixels: f64,
     /// Photograph minus model, from set A and from set B.
     pub residuals: [DVec3; 2],
-    /// Channels in which the photograph is saturated, so that only a model that is darker is wrong.
+    /// Channels in which the photograph is saturated: a brighter model has no residual there.
     pub censored: BVec3,
-    /// Derivative with respect to the object's own emission if that is all its light, else to its own albedo; mean of
+    /// Derivative with respect to the object's emission if it is a pure emitter, else with respect to its albedo; mean of
     /// both sets.
     pub own: DVec3,
-    /// Place among the free parameters, derivative of A, derivative of B.
+    /// Index of a free parameter, derivative from set A, derivative from set B.
     pub rows: Vec<(usize, DVec3, DVec3)>,
 }
 
 impl Linearised {
-    /// Takes a step along the derivatives, a component a row: the residuals become those after it.
+    /// Subtracts the linear effect of a step of the free parameters from the residuals.
     pub fn step(&mut self, steps: &[DVec3]) {
         let [a, b] = &mut self.residuals;
         for &(row, of_a, of_b) in &self.rows {
@@ -41,17 +41,17 @@ impl Linearised {
         (self.residuals[0] + self.residuals[1]) * 0.5
     }
 
-    /// Channels that say nothing now: the photograph is saturated there, and the model at least as bright.
+    /// Channels in which the photograph is saturated and the model at least as bright, so that the lower bound holds.
     pub fn bound_met(&self) -> BVec3 {
         self.censored & self.residual().cmple(DVec3::ZERO)
     }
 
-    /// The weight of the squared residual, none in silent channels.
+    /// The weight of the squared residual, zero where [`Self::bound_met`].
     pub fn weight_now(&self) -> DVec3 {
         DVec3::select(self.bound_met(), DVec3::ZERO, self.weight)
     }
 
-    /// What each row adds to the direction of descent, for a weight per channel: ½ w (J_A r_B + J_B r_A).
+    /// Each row's term of the unbiased right-hand side, for a weight per channel: ½ w (J_A r_B + J_B r_A).
     pub fn scores(&self, weight: DVec3) -> impl Iterator<Item = DVec3> + '_ {
         let [ra, rb] = self.residuals;
         (self.rows.iter()).map(move |&(_, ja, jb)| weight * (ja * rb + jb * ra) * 0.5)
@@ -59,12 +59,12 @@ impl Linearised {
 }
 
 impl PathCache {
-    /// Linearises every cluster about some unknowns; `place` maps parameters to rows. `reflected` is what the patches of
-    /// lamps would send if they were white, if paths note any.
+    /// Linearises every cluster about `unknowns`. `row_of` maps parameters to rows, `usize::MAX` for fixed ones. `reflected` is
+    /// the radiance that each patch of a lamp would reflect with an albedo of one; empty if the paths have no patches.
     pub fn linearise(
         &self,
         unknowns: &Unknowns,
-        place: &[usize],
+        row_of: &[usize],
         reflected: &[Vec3],
     ) -> Vec<Linearised> {
         let parameters = 2 * unknowns.surfaces();
@@ -72,17 +72,17 @@ impl PathCache {
             .par_iter()
             .map_init(
                 || Scratch::new(parameters),
-                |scratch, cluster| linearise(cluster, unknowns, place, reflected, scratch),
+                |scratch, cluster| linearise(cluster, unknowns, row_of, reflected, scratch),
             )
             .collect()
     }
 
-    /// Every cluster's residuals for some unknowns, without derivatives.
+    /// Every cluster's residuals at `unknowns`, without derivatives.
     pub fn residuals(&self, unknowns: &Unknowns) -> Vec<Linearised> {
         self.linearise(unknowns, &vec![usize::MAX; 2 * unknowns.surfaces()], &[])
     }
 
-    /// By how much textures change the radiance of each cluster: the mean of the difference path by path.
+    /// Change of each cluster's mean radiance by textures with the albedos `texels`, summed path by path.
     pub fn texture_offsets(&self, unknowns: &Unknowns, texels: &[Vec3]) -> Vec<DVec3> {
         let clusters = self.clusters.par_iter();
         let offset = |cached: &CachedCluster| {
@@ -94,76 +94,69 @@ impl PathCache {
         clusters.map(offset).collect()
     }
 
-    /// The level of each cluster that its weight goes by, as its paths predict it.
+    /// Each cluster's level for [`Cluster::weigh`](crate::inverse::paths::clusters::Cluster::weigh), predicted by its paths.
     pub fn levels(&self, unknowns: &Unknowns) -> Vec<Vec3> {
         let clusters = self.clusters.par_iter();
         clusters.map(|cached| level(cached, unknowns)).collect()
     }
 }
 
-/// Root of the mean square of what the pixels of a cluster see by these paths, where light that is seen itself differs from
-/// path to path and what is reflected by its mean.
+/// Square root of the mean square of directly seen emission plus the squared mean of all other radiance.
 ///
-/// A pixel on the edge of a lamp has a moderate mean, but is as uncertain as its contrast: a sliver of the lamp more or
-/// less, by noise or by the camera's position, changes it by many times the dark side's radiance.
+/// A pixel on the edge of a lamp has a moderate mean but is as uncertain as its contrast: a small error of the camera's position
+/// changes it by many times the dark side's radiance. The mean square accounts for that.
 fn level(cached: &CachedCluster, unknowns: &Unknowns) -> Vec3 {
-    let (mut seen_squared, mut reflected) = (DVec3::ZERO, DVec3::ZERO);
-    let mut start = 0;
-    for &end in &cached.ends {
-        let vertices = &cached.vertices[start..end as usize];
+    let (mut emitted_squared, mut reflected) = (DVec3::ZERO, DVec3::ZERO);
+    for vertices in cached.paths() {
         let first = vertices.first().filter(|v| v.surface != SPECULAR);
-        let seen = first.map_or(Vec3::ZERO, |vertex| {
+        let emitted = first.map_or(Vec3::ZERO, |vertex| {
             unknowns.emission[vertex.surface as usize] * vertex.emission_weight
         });
-        seen_squared += (seen * seen).as_dvec3();
-        reflected += (radiance(vertices, unknowns) - seen).as_dvec3();
-        start = end as usize;
+        emitted_squared += (emitted * emitted).as_dvec3();
+        reflected += (radiance(vertices, unknowns) - emitted).as_dvec3();
     }
     let paths = cached.ends.len().max(1) as f64;
     let reflected = reflected / paths;
-    (seen_squared / paths + reflected * reflected)
+    (emitted_squared / paths + reflected * reflected)
         .powf(0.5)
         .as_vec3()
 }
 
-/// Mean over the paths of each set of what one path gives, told the set.
-fn means(cached: &CachedCluster, mut of: impl FnMut(&[Vertex], usize) -> Vec3) -> [DVec3; 2] {
+/// Mean of `f(path, set)` over the paths of each set.
+fn means(cached: &CachedCluster, mut f: impl FnMut(&[Vertex], usize) -> Vec3) -> [DVec3; 2] {
     let paths = cached.cluster.paths as usize;
     let mut sums = [DVec3::ZERO; 2];
-    let mut start = 0;
-    for (path, &end) in cached.ends.iter().enumerate() {
+    for (path, vertices) in cached.paths().enumerate() {
         let set = path / paths % 2;
-        sums[set] += of(&cached.vertices[start..end as usize], set).as_dvec3();
-        start = end as usize;
+        sums[set] += f(vertices, set).as_dvec3();
     }
     sums.map(|sum| sum * f64::from(scale(cached)))
 }
 
-/// One over the paths of each set.
+/// One over the number of paths in each set.
 fn scale(cached: &CachedCluster) -> f32 {
     let paths = cached.cluster.paths as usize * cached.cluster.pixels.len();
     1.0 / paths.max(1) as f32
 }
 
-/// Evaluates all paths of a cluster.
 fn linearise(
     cached: &CachedCluster,
     unknowns: &Unknowns,
-    place: &[usize],
+    row_of: &[usize],
     reflected: &[Vec3],
     scratch: &mut Scratch,
 ) -> Linearised {
     let Scratch {
-        gathered,
+        incident,
         gradients,
     } = scratch;
     gradients.iter_mut().for_each(Gradient::clear);
     let means = means(cached, |vertices, set| {
-        differentiate(vertices, unknowns, reflected, gathered, &mut gradients[set])
+        differentiate(vertices, unknowns, reflected, incident, &mut gradients[set])
     });
     let residuals = means.map(|mean| cached.cluster.measured.as_dvec3() - mean);
 
-    // The parameters that either set touches and that are free.
+    // The free parameters that either set touches.
     let [a, b] = &*gradients;
     let scale = scale(cached);
     let mut rows = Vec::new();
@@ -172,21 +165,19 @@ fn linearise(
         .iter()
         .chain(b.touched.iter().filter(|&&t| !a.marked[t as usize]))
     {
-        let place = place[t as usize];
-        if place != usize::MAX {
+        let row = row_of[t as usize];
+        if row != usize::MAX {
             let scaled = |g: &Gradient| Vec3::from(g.values[t as usize] * scale).as_dvec3();
-            rows.push((place, scaled(a), scaled(b)));
+            rows.push((row, scaled(a), scaled(b)));
         }
     }
     let object = cached.cluster.object as usize;
-    let gives_light_alone =
+    let is_pure_emitter =
         unknowns.albedo[object] == Vec3::ZERO && unknowns.emission[object] != Vec3::ZERO;
-    let own = object
-        + if gives_light_alone {
-            unknowns.surfaces()
-        } else {
-            0
-        };
+    let own = match is_pure_emitter {
+        true => object + unknowns.surfaces(),
+        false => object,
+    };
     Linearised {
         own: Vec3::from((a.values[own] + b.values[own]) * (0.5 * scale)).as_dvec3(),
         object: cached.cluster.object,
@@ -198,17 +189,33 @@ fn linearise(
     }
 }
 
-/// Memory reused from cluster to cluster.
+/// Memory reused between clusters.
 struct Scratch {
     gradients: [Gradient; 2],
-    gathered: Vec<Vec3A>,
+    incident: Vec<Vec3A>,
 }
 
 impl Scratch {
     fn new(parameters: usize) -> Self {
         Self {
             gradients: [Gradient::new(parameters), Gradient::new(parameters)],
-            gathered: Vec::new(),
+            incident: Vec::new(),
+        }
+    }
+}
+
+#[cfg(test)]
+impl Linearised {
+    /// A cluster for tests: one pixel, unit weight, equal residuals of both sets, no derivatives.
+    pub fn unit(object: u32, residual: DVec3) -> Self {
+        Self {
+            object,
+            weight: DVec3::ONE,
+            pixels: 1.0,
+            residuals: [residual; 2],
+            censored: BVec3::FALSE,
+            own: DVec3::ZERO,
+            rows: Vec::new(),
         }
     }
 }
@@ -216,11 +223,10 @@ impl Scratch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse::paths::NO_LAMP;
-    use crate::inverse::paths::NO_TEXEL;
     use crate::inverse::paths::clusters::Cluster;
+    use crate::inverse::paths::{NO_LAMP, NO_TEXEL};
 
-    /// A path over a textured surface (0) and then a plain one (1) that meets a lamp (2), a path over the plain one alone.
+    /// One path over a textured surface (0) and a plain one (1) that reaches a lamp (2), and one path over the plain one alone.
     fn cached() -> CachedCluster {
         let vertex = |surface: u32, texel: u32, lamp: u32| Vertex {
             lamp,
@@ -229,16 +235,7 @@ mod tests {
             ..Vertex::on(surface)
         };
         CachedCluster {
-            cluster: Cluster {
-                frame: 0,
-                object: 0,
-                pixels: vec![0],
-                paths: 1,
-                measured: Vec3::ONE,
-                censored: BVec3::FALSE,
-                weight: Vec3::ONE,
-                dark: Vec3::ONE,
-            },
+            cluster: Cluster::unit(0, 1, Vec3::ONE),
             vertices: vec![
                 vertex(0, 1, NO_LAMP),
                 vertex(1, NO_TEXEL, 2),
@@ -270,7 +267,7 @@ mod tests {
         assert!((offset - expected).length() < 1e-6, "{offset}");
     }
 
-    /// Green is saturated: what is darker there is wrong, what is brighter is not.
+    /// Green is saturated: a darker model has a residual there, a brighter one has none.
     #[test]
     fn a_lower_bound_is_silent_where_the_model_exceeds_it() {
         let mut bound = cached();

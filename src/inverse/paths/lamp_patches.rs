@@ -1,8 +1,8 @@
-//! What lamps reflect, triangle by triangle: how bright each patch of a lamp would be if it were white and gave no light.
+//! Reflected radiance of lamps per triangle ("patch"), for an albedo of one.
 //!
-//! A lamp's albedo changes by little what leaves it, but by how much differs over the lamp. Paths that meet a lamp and go
-//! on from there would tell, with a noise that drowns it for every surface but the lamp itself. Traced once from the
-//! patches, it is known wherever a light sample or a path reaches one.
+//! A lamp's albedo adds little to its radiance, by an amount that varies over the lamp. Following paths beyond lamps would
+//! estimate it with too much noise. It is instead traced once from each patch and looked up wherever a light sample or a path
+//! reaches one.
 
 use crate::inverse::paths::NO_PATCH;
 use crate::inverse::roles::Role;
@@ -16,9 +16,9 @@ use crate::transport::path::{PathOptions, white_radiance};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Paths of a patch at least, where there are enough for all, and at most.
+/// Least and greatest number of paths per patch; the least one if the total allows it.
 const PATHS: [f64; 2] = [4.0, 1024.0];
-/// Key of their random streams.
+/// Key of the random streams.
 const KEY: u64 = 0x7061_7463;
 
 /// The triangles of all lamps.
@@ -26,14 +26,14 @@ const KEY: u64 = 0x7061_7463;
 pub struct LampPatches {
     /// Triangle of each patch.
     triangles: Vec<u32>,
-    /// For each triangle of the scene its patch, or [`NO_PATCH`]; empty where there are no lamps.
+    /// Patch of each triangle of the scene, or [`NO_PATCH`]; empty without lamps.
     patch_of: Vec<u32>,
-    /// Mean radiance (irradiance / π) that each patch would reflect from its front if it were white, once it is lit.
+    /// Mean radiance that each patch would reflect from its front with an albedo of one (irradiance / π); set by `light`.
     pub reflected: Vec<Vec3>,
 }
 
 impl LampPatches {
-    /// Of the objects that are lamps.
+    /// The triangles of objects with the role [`Role::Emitter`].
     pub fn new(scene: &Scene, roles: &[Role]) -> Self {
         let lamps = scene.objects.iter().zip(roles);
         let triangles: Vec<u32> = lamps
@@ -55,13 +55,13 @@ impl LampPatches {
     }
 
     /// The patch of a triangle, or [`NO_PATCH`].
-    pub fn of(&self, triangle: u32) -> u32 {
+    pub fn patch(&self, triangle: u32) -> u32 {
         let patch = self.patch_of.get(triangle as usize);
         patch.copied().unwrap_or(NO_PATCH)
     }
 
-    /// Finds what they reflect by about `paths` paths from them, in proportion to area, through a scene as it is believed to
-    /// be lit; those of another `round` are independent.
+    /// Estimates `reflected` with about `paths` paths, distributed in proportion to area, through the scene with its present
+    /// estimate. Paths of different rounds are independent.
     pub fn light(
         &mut self,
         lit: &Lit,
@@ -72,12 +72,12 @@ impl LampPatches {
         let scene = &*lit.scene;
         let area: f64 = self.triangles.iter().map(|&t| area_of(scene, t)).sum();
         let even = paths as f64 / self.triangles.len() as f64;
-        let least = even.clamp(1.0, PATHS[0]);
+        let min = even.clamp(1.0, PATHS[0]);
         let traced: Vec<(Vec3, Cast)> = (self.triangles.par_iter())
             .map(|&triangle| {
                 let fraction = paths as f64 * area_of(scene, triangle) / area;
-                // Lamps without any area have no share; the least is then the most.
-                let count = fraction.max(least).min(PATHS[1]) as u64;
+                // `max` ignores the NaN of lamps without any area.
+                let count = fraction.max(min).min(PATHS[1]) as u64;
                 let (mut sum, mut cast) = (DVec3::ZERO, Cast::default());
                 for path in 0..count {
                     let mut stream = Stream::new(seed, KEY + round, u64::from(triangle), path);

@@ -1,16 +1,16 @@
-//! How many paths may be stored.
+//! Memory limit of the transport cache.
 
 use crate::inverse::paths::{PathCache, Vertex};
 use sysinfo::{MemoryRefreshKind, System};
 
-/// Clusters whose paths tell how long paths are.
+/// Clusters traced first to measure the memory per path.
 pub const PILOT_CLUSTERS: usize = 64;
-/// Fraction of the machine's memory that stored paths may take.
+/// One over the fraction of the machine's memory that stored paths may take.
 const FRACTION: u64 = 4;
-/// Memory where the machine's is not known, in bytes.
+/// Assumed memory of the machine if it is unknown, in bytes.
 const UNKNOWN: u64 = 8 << 30;
 
-/// Bytes that stored paths may take: so many GiB, or a quarter of the machine's memory for zero.
+/// Bytes that stored paths may take: the given number of GiB, or for zero a quarter of the machine's memory.
 pub fn allowed(gibibytes: f64) -> u64 {
     if gibibytes > 0.0 {
         return (gibibytes * (1u64 << 30) as f64) as u64;
@@ -24,12 +24,12 @@ pub fn allowed(gibibytes: f64) -> u64 {
     known.filter(|&bytes| bytes > 0).unwrap_or(UNKNOWN) / FRACTION
 }
 
-/// Whether so many paths of at most so many vertices each, in the mean, fit beyond doubt.
+/// Whether this number of paths, with at most `vertices` vertices in the mean, certainly fits.
 pub fn suffices(allowed: u64, paths: u64, vertices: f32) -> bool {
     paths as f64 * f64::from(vertices) * size_of::<Vertex>() as f64 <= allowed as f64
 }
 
-/// How many paths fit, if they are like those of a pilot.
+/// How many paths fit, at the mean size of a pilot's paths.
 pub fn paths_that_fit(allowed: u64, pilot: &PathCache) -> u64 {
     let paths: usize = pilot.clusters.iter().map(|c| c.ends.len()).sum();
     let bytes = pilot.bytes().max(1);
@@ -41,24 +41,14 @@ mod tests {
     use super::*;
     use crate::inverse::paths::CachedCluster;
     use crate::inverse::paths::clusters::Cluster;
-    use glam::{BVec3, Vec3};
+    use glam::Vec3;
 
     #[test]
     fn as_many_paths_fit_as_are_as_long_as_those_of_the_pilot() {
-        let cluster = Cluster {
-            frame: 0,
-            object: 0,
-            pixels: vec![0, 1],
-            paths: 1,
-            measured: Vec3::ONE,
-            censored: BVec3::FALSE,
-            weight: Vec3::ONE,
-            dark: Vec3::ONE,
-        };
         // Four paths of three vertices.
         let pilot = PathCache {
             clusters: vec![CachedCluster {
-                cluster,
+                cluster: Cluster::unit(0, 2, Vec3::ONE),
                 vertices: vec![Vertex::on(0); 12],
                 ends: vec![3, 6, 9, 12],
             }],

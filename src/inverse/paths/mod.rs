@@ -1,8 +1,8 @@
 //! The transport cache: paths traced once, stored with everything that does not depend on the unknowns.
 //!
-//! For diffuse surfaces and cosine sampling a path's contribution is a product of albedos times one emission (or one
-//! measured radiance) times a weight. Any values of the unknowns are then evaluated, and differentiated, with no ray.
-//! Rough specular lobes are held while such paths are used; [`crate::inverse::lobe`] finds them.
+//! For diffuse surfaces and cosine sampling, a path's contribution is a product of albedos, one emission (or measured
+//! radiance), and a weight. It is evaluated and differentiated for any values of the unknowns without casting rays.
+//! Rough specular lobes are held fixed in stored paths; [`crate::inverse::lobe`] fits them.
 
 pub mod clusters;
 pub mod derivative;
@@ -16,16 +16,16 @@ use crate::transport::arrival::Cast;
 use clusters::Cluster;
 use glam::Vec3;
 
-/// No lamp was reached from this vertex.
+/// The light sample at this vertex reached no lamp.
 pub const NO_LAMP: u32 = u32::MAX;
 
 /// No patch of a lamp was reached.
 pub const NO_PATCH: u32 = u32::MAX;
 
-/// The vertex's surface has one colour.
+/// The vertex's surface has no texture.
 pub const NO_TEXEL: u32 = u32::MAX;
 
-/// In place of a surface: the path was scattered by a lobe, which holds no unknown.
+/// In place of a surface: the path was scattered by a lobe, which has no unknown.
 pub const SPECULAR: u32 = u32::MAX;
 
 /// One vertex of a stored path.
@@ -33,22 +33,22 @@ pub const SPECULAR: u32 = u32::MAX;
 pub struct Vertex {
     /// The surface (set of triangles sharing unknowns) that the vertex lies on, or [`SPECULAR`].
     pub surface: u32,
-    /// The surface whose emission a light sample from here reached, or [`NO_LAMP`].
+    /// The surface that the light sample (NEE) reached, or [`NO_LAMP`].
     pub lamp: u32,
-    /// Weight of that emission, after this vertex's albedo.
+    /// Weight of that surface's emission, without albedos.
     pub lamp_weight: f32,
-    /// The patch of a lamp that the light sample reached, or that the vertex lies on and the path ends at; or [`NO_PATCH`].
+    /// The lamp patch that the light sample reached, or that the path ends at; or [`NO_PATCH`].
     pub patch: u32,
-    /// Weight of this surface's own emission, before its albedo.
+    /// Weight of the emission of the vertex's own surface, without albedos.
     pub emission_weight: f32,
     /// The texel of its surface's texture, or [`NO_TEXEL`].
     pub texel: u32,
-    /// Known radiance that arrives here and is scattered by this vertex's albedo, weights included.
+    /// Weighted known radiance that arrives here, to be multiplied by the vertex's albedo.
     pub known: Vec3,
 }
 
 impl Vertex {
-    /// On a surface, with no light from anywhere and no texture.
+    /// A vertex on a surface, without light and texture.
     pub fn on(surface: u32) -> Self {
         Self {
             surface,
@@ -65,25 +65,37 @@ impl Vertex {
 /// The paths of one cluster of pixels: for each pixel those of set A, then those of set B.
 #[derive(Debug, Clone)]
 pub struct CachedCluster {
-    /// The pixels and what the photographs say of them.
+    /// The pixels and their measurement.
     pub cluster: Cluster,
-    /// Vertices of all paths, one path after the other, from the camera outwards.
+    /// Vertices of all paths, one path after the other, starting at the camera.
     pub vertices: Vec<Vertex>,
-    /// End of each path in `vertices`.
+    /// End index of each path in `vertices`.
     pub ends: Vec<u32>,
+}
+
+impl CachedCluster {
+    /// The vertices of each path, in order.
+    pub fn paths(&self) -> impl Iterator<Item = &[Vertex]> {
+        let mut start = 0;
+        self.ends.iter().map(move |&end| {
+            let path = &self.vertices[start..end as usize];
+            start = end as usize;
+            path
+        })
+    }
 }
 
 /// Two independent sets of paths through the same pixels.
 #[derive(Debug, Clone, Default)]
 pub struct PathCache {
-    /// In the order in which they were given.
+    /// In the order of the traced clusters.
     pub clusters: Vec<CachedCluster>,
-    /// Rays that were cast, and paths dropped because a weight was not finite.
+    /// Number of rays cast, and of paths rejected because a weight was not finite.
     pub cast: Cast,
 }
 
 impl PathCache {
-    /// Bytes in use.
+    /// Bytes that the stored paths take.
     pub fn bytes(&self) -> usize {
         self.clusters
             .iter()
@@ -91,20 +103,15 @@ impl PathCache {
             .sum()
     }
 
-    /// Fraction of the paths whose last vertex lies on a surface from `first` on.
+    /// Fraction of the paths whose last vertex lies on a surface of index `first` or above.
     pub fn fraction_ending_on(&self, first: u32) -> f64 {
         let (mut ending, mut all) = (0u64, 0u64);
         for cached in &self.clusters {
             all += cached.ends.len() as u64;
-            let mut start = 0;
-            for &end in &cached.ends {
-                let path = &cached.vertices[start..end as usize];
-                ending += u64::from(
-                    path.last()
-                        .is_some_and(|v| v.surface >= first && v.surface != SPECULAR),
-                );
-                start = end as usize;
-            }
+            let last = cached.paths().filter_map(|path| path.last());
+            ending += last
+                .filter(|v| v.surface >= first && v.surface != SPECULAR)
+                .count() as u64;
         }
         ending as f64 / all.max(1) as f64
     }

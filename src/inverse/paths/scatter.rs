@@ -1,71 +1,74 @@
-//! How a stored path scatters where a rough lobe lies over the diffuse base.
+//! Scattering of stored paths at surfaces with a rough specular lobe over a diffuse base.
 //!
-//! A path takes either the base, whose albedo is unknown, or the lobe, which is held while albedos are fitted: so each
-//! vertex still holds one unknown factor or none, and the rest of its weight is known.
+//! A path chooses either the base, whose albedo is unknown, or the lobe, which is held fixed. So each vertex has at most one
+//! unknown factor, and the rest of its weight is known.
 
 use crate::math::frame::Frame;
 use crate::math::warp;
 use crate::transport::material::Lobe;
 use glam::Vec3;
 
-/// Chance of the lobe at least, and of the base.
-const MIN_CHANCE: f64 = 0.1;
+/// Least probability of choosing the lobe, and of choosing the base.
+const MIN_PROBABILITY: f64 = 0.1;
 
-/// The part that a path takes at a vertex with a lobe.
+/// The component (lobe or base) that a path chose at a vertex with a lobe.
 pub struct Scattering {
     lobe: Lobe,
     frame: Frame,
     wo: Vec3,
-    /// Whether the path takes the lobe.
+    /// Whether the path chose the lobe.
     pub specular: bool,
-    /// Chance of the part taken.
-    chance: f64,
+    /// Probability of the chosen component.
+    probability: f64,
 }
 
-/// A direction, the weight f cosθ / density of the part taken (the base for unit albedo) over the part's chance, and the
-/// density.
+/// A sampled direction.
 pub struct Scattered {
-    /// Unit direction in the world.
+    /// Unit direction in world space.
     pub wi: Vec3,
-    /// Weight.
+    /// f cosθ / (pdf × probability) of the chosen component, the base with unit albedo.
     pub weight: f32,
-    /// Density per solid angle.
+    /// Pdf of the chosen component with respect to solid angle.
     pub pdf: f32,
 }
 
 impl Scattering {
-    /// At a surface seen along `wo` (unit, away from it) whose side has the unit normal; `albedo` is what is believed of
-    /// the base, and `choice` uniform.
+    /// Chooses a component for the unit outgoing direction `wo` and the unit normal of that side. `albedo` is the present
+    /// estimate of the base's albedo, and `choice` is uniform in [0, 1).
     pub fn new(lobe: Lobe, normal: Vec3, wo: Vec3, albedo: f32, choice: f32) -> Self {
         let frame = Frame::around(normal);
         let wo = frame.to_local(wo.normalize_or_zero());
         let fraction = lobe.fraction(wo);
         let base = (1.0 - fraction) * f64::from(albedo);
-        let chance = fraction / (fraction + base).max(f64::MIN_POSITIVE);
-        let chance = chance.clamp(MIN_CHANCE, 1.0 - MIN_CHANCE);
-        let specular = f64::from(choice) < chance;
+        let lobe_probability = fraction / (fraction + base).max(f64::MIN_POSITIVE);
+        let lobe_probability = lobe_probability.clamp(MIN_PROBABILITY, 1.0 - MIN_PROBABILITY);
+        let specular = f64::from(choice) < lobe_probability;
         Self {
             lobe,
             frame,
             wo,
             specular,
-            chance: if specular { chance } else { 1.0 - chance },
+            probability: if specular {
+                lobe_probability
+            } else {
+                1.0 - lobe_probability
+            },
         }
     }
 
-    /// What is believed to be left of the light after this vertex, its unknown albedo included.
-    pub fn believed(&self, albedo: f32) -> f32 {
+    /// Expected throughput of this vertex, with `albedo` for the unknown albedo of the base.
+    pub fn expected_throughput(&self, albedo: f32) -> f32 {
         let fraction = self.lobe.fraction(self.wo);
-        let left = if self.specular {
+        let reflected = if self.specular {
             fraction
         } else {
             (1.0 - fraction) * f64::from(albedo)
         };
-        (left / self.chance) as f32
+        (reflected / self.probability) as f32
     }
 
-    /// f cosθ of the part taken over its chance, and the density of [`Scattering::sample`], for a unit direction in the
-    /// world.
+    /// For a unit direction in world space: f cosθ of the chosen component over its probability, and the pdf of
+    /// [`Scattering::sample`] with respect to solid angle.
     pub fn value(&self, wi: Vec3) -> (f32, f32) {
         self.local_value(self.frame.to_local(wi))
     }
@@ -81,10 +84,10 @@ impl Scattering {
             let value = self.lobe.base(self.wo, wi).x;
             (value, warp::cosine_hemisphere_pdf(wi.z))
         };
-        ((value / self.chance) as f32, pdf)
+        ((value / self.probability) as f32, pdf)
     }
 
-    /// Draws a direction of the part taken; `None` where it carries nothing.
+    /// Samples a direction from the chosen component; `None` if its weight is zero.
     pub fn sample(&self, u: [f32; 2]) -> Option<Scattered> {
         let local = if self.specular {
             self.lobe.sample(self.wo, u)

@@ -1,4 +1,4 @@
-//! Tracing the paths of a cache.
+//! Traces the paths of a transport cache.
 
 use crate::calibrate::gbuffer::SurfacePoint;
 use crate::calibrate::measured_radiance::MeasuredRadiance;
@@ -27,56 +27,54 @@ use std::f32::consts::FRAC_1_PI;
 
 /// Bounces before Russian roulette may end a path.
 const RR_DEPTH: u32 = 2;
-/// Paths are never ended with a higher chance than this at one vertex.
+/// Least survival probability of Russian roulette.
 const RR_MIN_SURVIVAL: f32 = 0.1;
-/// Paths are never continued with a higher chance than this. Their variance is finite while the square of the albedo is
-/// below it.
+/// Greatest survival probability of Russian roulette. The variance is finite while the squared albedo is below it.
 const RR_MAX_SURVIVAL: f32 = 0.999;
 
-/// At most so many vertices has a path in the mean where no surface is believed to reflect more than `albedo`.
-pub fn longest_mean_path(albedo: f32) -> f32 {
-    // The camera's vertex, one outside, and a geometric number of bounces once the roulette may end it.
+/// Upper bound of the mean number of vertices per path if no surface's expected albedo exceeds `albedo`.
+pub fn max_mean_path_length(albedo: f32) -> f32 {
+    // The first vertex, one outside, and a geometric number of bounces under Russian roulette.
     let survival = albedo.clamp(RR_MIN_SURVIVAL, RR_MAX_SURVIVAL);
     2.0 + RR_DEPTH as f32 + 1.0 / (1.0 - survival)
 }
 
-/// Everything that a path needs and that stays the same while a cache is traced.
+/// The inputs that are constant while a cache is traced.
 pub struct Tracer<'a> {
     /// Geometry.
     pub scene: &'a Scene,
-    /// Where light samples go.
+    /// Emitters that light samples (NEE) are drawn from.
     pub lights: &'a Emitters,
-    /// Radiance known from photographs, where paths may end; `None` traces them to the lamps.
+    /// Radiance measured by photographs, at which paths end; `None` traces all paths to emitters.
     pub measured: Option<&'a MeasuredRadiance>,
-    /// The surface that each triangle belongs to: triangles of one surface share their unknowns.
+    /// The surface of each triangle: triangles of one surface share their unknowns.
     pub surface_of: &'a [u32],
-    /// For each surface, the largest channel of its albedo as believed now; only steers where paths end.
-    pub believed_albedo: &'a [f32],
-    /// Textures whose texels are noted at the vertices.
+    /// For each surface, the largest channel of its present albedo estimate; used for sampling decisions only.
+    pub expected_albedo: &'a [f32],
+    /// Textures whose texel indices are stored at the vertices.
     pub texels: Option<&'a TexelEstimate>,
-    /// For each object its rough specular lobe, where it has one; empty where none has. What has a lobe gives no light.
+    /// The rough specular lobe of each object that has one; empty without lobes. Objects with a lobe emit no light.
     pub lobes: &'a [Option<Lobe>],
-    /// Patches of lamps, at which paths end unless the camera sees them: what they reflect is known. `None` follows all
-    /// paths on.
+    /// Patches of lamps with known reflected light. Paths end at them except at the first vertex; `None` continues all paths.
     pub patches: Option<&'a LampPatches>,
-    /// Light from outside where photographs measured it; draws light samples too.
+    /// Outside light in directions that photographs measured; light samples are drawn from it too.
     pub sky: Option<&'a MeasuredOutside>,
-    /// Surfaces that stand for light from elsewhere outside, by direction; `None` lets escaping rays find nothing.
+    /// Surfaces that stand for unmeasured outside light, by direction; `None` makes it zero.
     pub outside: Option<OutsideGrid>,
-    /// How light is found at a vertex.
+    /// Sampling strategy for direct light.
     pub sampling: LightSampling,
-    /// Longest path in bounces.
+    /// Greatest number of bounces.
     pub max_bounces: u32,
-    /// Key of the random streams.
+    /// Seed of the random streams.
     pub seed: u64,
-    /// Caches of other stages are independent.
+    /// Caches of different stages are independent.
     pub stage: u64,
-    /// Rounds of one stage continue each other's sequences of numbers, so that together they are more even than apart.
+    /// Rounds of one stage continue the same low-discrepancy sequences.
     pub round: u32,
 }
 
-/// Directions out of the mesh, cut into the pixels of a map; each is a surface with an emission. One more stands for what
-/// directions in which all photographs are saturated exceed their bounds by.
+/// Outside directions as the pixels of a map; each is a surface with an emission. One more surface stands for the excess above
+/// the lower bound in directions in which all photographs are saturated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OutsideGrid {
     /// Index of the first pixel's surface.
@@ -85,22 +83,22 @@ pub struct OutsideGrid {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// How far away the light comes from.
+    /// Distance of the outside light, for parallax.
     pub surroundings: Surroundings,
 }
 
 impl OutsideGrid {
-    /// Surfaces in all.
+    /// Number of surfaces.
     pub fn surfaces(&self) -> usize {
         self.width * self.height + 1
     }
 
-    /// The surface that stands for light above the bounds.
+    /// The surface of the excess above lower bounds.
     pub fn excess(&self) -> u32 {
         self.first + (self.width * self.height) as u32
     }
 
-    /// The unit direction in the middle of a surface.
+    /// The unit direction of the centre of a surface's pixel.
     pub fn direction(&self, surface: u32) -> Vec3 {
         direction_of(self.width, self.height, (surface - self.first) as usize)
     }
@@ -110,7 +108,7 @@ impl OutsideGrid {
         self.first + pixel_of(self.width, self.height, map_direction) as u32
     }
 
-    /// The vertex at which a path ends that leaves along a ray.
+    /// The last vertex of a path that leaves the scene along a ray.
     fn vertex(&self, ray: &Ray, weight: f32) -> Vertex {
         let map_direction = self.surroundings.map_direction(ray.origin, ray.direction);
         Vertex {
@@ -121,7 +119,7 @@ impl OutsideGrid {
 }
 
 impl Tracer<'_> {
-    /// Traces the paths of every cluster, two independent sets of them.
+    /// Traces two independent sets of paths for every cluster. `widths` are the image widths of the frames.
     pub fn trace(&self, clusters: &[Cluster], widths: &[u32]) -> PathCache {
         let traced: Vec<(CachedCluster, Cast)> = clusters
             .par_iter()
@@ -140,22 +138,23 @@ impl Tracer<'_> {
         let mut cast = Cast::default();
         let (paths, count) = (u64::from(cluster.paths), cluster.pixels.len() as u64);
         let first = cluster.pixels.first().copied().map_or(0, u64::from);
-        for (place, &pixel) in cluster.pixels.iter().enumerate() {
+        for (position, &pixel) in cluster.pixels.iter().enumerate() {
             let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
             for path in 0..2 * paths {
-                // The paths of a set, over all its pixels and rounds, share one sequence.
+                // All paths of a set, over its pixels and rounds, share one low-discrepancy sequence.
                 let set = path / paths;
-                let index = (u64::from(self.round) * count + place as u64) * paths + path % paths;
+                let index =
+                    (u64::from(self.round) * count + position as u64) * paths + path % paths;
                 let key = [u64::from(cluster.frame), first, 2 * self.stage + set];
                 let mut numbers = SequencePoint::new(self.seed, key, index);
                 let camera = &self.scene.cameras[cluster.frame as usize];
-                let traced = self.pixel_path(camera, corner, &mut numbers, &mut vertices);
-                cast.rays += traced.0;
-                cast.rejected += u64::from(!traced.1);
+                let (rays, accepted) = self.pixel_path(camera, corner, &mut numbers, &mut vertices);
+                cast.rays += rays;
+                cast.rejected += u64::from(!accepted);
                 ends.push(vertices.len() as u32);
             }
         }
-        // Memory is counted by what is used.
+        // `PathCache::bytes` counts lengths, not capacities.
         vertices.shrink_to_fit();
         (
             CachedCluster {
@@ -167,8 +166,8 @@ impl Tracer<'_> {
         )
     }
 
-    /// Appends the vertices of one path through a pixel whose upper left corner is given; returns the number of rays,
-    /// and whether all weights are finite (else nothing was appended).
+    /// Appends the vertices of one path through the pixel whose upper left corner is given. Returns the number of rays, and
+    /// whether all weights are finite; otherwise nothing is appended.
     pub fn pixel_path(
         &self,
         camera: &Camera,
@@ -201,25 +200,26 @@ impl Tracer<'_> {
             return rays;
         };
         let mut wo = -camera_ray.direction;
-        // Weight of everything from here on: the inverse of the chances of having come so far.
+        // Product of the known weights so far: lobes and survival probabilities.
         let mut scale = 1.0f32;
+        // MIS weight of emission at the present vertex.
         let mut emission_weight = 1.0;
-        let mut believed = 1.0f32;
+        // Expected throughput, with the estimated albedos.
+        let mut expected = 1.0f32;
         let mut bounce = 0;
         loop {
-            // Describe the vertex.
             let surface = self.surface(&hit, wo);
-            let albedo = self.believed_albedo[surface.id as usize];
-            let lobed = self.lobe(surface.seen.object).map(|lobe| {
+            let albedo = self.expected_albedo[surface.id as usize];
+            let scattering = self.lobe(surface.point.object).map(|lobe| {
                 let [choice, ..] = numbers.four();
-                Scattering::new(lobe, surface.seen.normal, wo, albedo, choice)
+                Scattering::new(lobe, surface.point.normal, wo, albedo, choice)
             });
-            let mut vertex = Vertex::on(match &lobed {
+            let mut vertex = Vertex::on(match &scattering {
                 Some(scattering) if scattering.specular => SPECULAR,
                 _ => surface.id,
             });
             vertex.texel = self.texel(&hit);
-            if surface.front && lobed.is_none() {
+            if surface.front && scattering.is_none() {
                 vertex.emission_weight = emission_weight * scale;
             }
             if surface.front && bounce > 0 {
@@ -230,36 +230,34 @@ impl Tracer<'_> {
                 return rays;
             }
 
-            // Sample light directly.
+            // Next-event estimation.
             let [choice, u, v, pick] = numbers.four();
             if self.sampling != LightSampling::Bsdf {
                 let choice = numbers.refine(choice);
                 rays += if pick < self.sky_fraction() {
-                    self.sky_sample(&surface, &lobed, scale, choice, [u, v], &mut vertex)
+                    self.sky_sample(&surface, &scattering, scale, choice, [u, v], &mut vertex)
                 } else {
-                    self.light_sample(&surface, &lobed, scale, choice, [u, v], &mut vertex)
+                    self.light_sample(&surface, &scattering, scale, choice, [u, v], &mut vertex)
                 };
             }
 
-            // Decide whether to go on, by what is believed of the albedo and never by the unknowns themselves.
+            // Russian roulette by the expected albedo, which is constant while the unknowns are fitted.
             let [u, v, end, _] = numbers.four();
-            let left = (lobed.as_ref()).map_or(albedo, |scattering| scattering.believed(albedo));
-            let believed_here = believed * left;
-            let mut survival = 1.0;
+            let throughput =
+                (scattering.as_ref()).map_or(albedo, |s| s.expected_throughput(albedo));
+            expected *= throughput;
             if bounce >= RR_DEPTH {
-                survival = believed_here.clamp(RR_MIN_SURVIVAL, RR_MAX_SURVIVAL);
+                let survival = expected.clamp(RR_MIN_SURVIVAL, RR_MAX_SURVIVAL);
                 if end >= survival {
                     vertices.push(vertex);
                     return rays;
                 }
-                believed = believed_here / survival;
-            } else {
-                believed = believed_here;
+                expected /= survival;
+                scale /= survival;
             }
-            scale /= survival;
 
-            // Scatter with density cosθ/π, so that the weight is the albedo alone; under a lobe by the part taken.
-            let Some(scattered) = surface.scatter(&lobed, [u, v]) else {
+            // Scatter with pdf cosθ/π, so that the weight is the albedo alone, or from the chosen component of a lobed surface.
+            let Some(scattered) = surface.scatter(&scattering, [u, v]) else {
                 vertices.push(vertex);
                 return rays;
             };
@@ -268,11 +266,10 @@ impl Tracer<'_> {
             let origin = surface.leave(wi);
             rays += 1;
             let ray = Ray::new(origin, wi);
-            let next = self.scene.intersect(&ray);
-            let Some(next) = next else {
+            let Some(next) = self.scene.intersect(&ray) else {
                 if let Some((sky, radiance)) = self.sky.and_then(|s| Some((s, s.at(origin, wi)?))) {
                     let sky_pdf = sky.map().pdf(origin, wi) * self.sky_fraction();
-                    let weight = self.met_weight(bsdf_pdf, sky_pdf);
+                    let weight = self.hit_weight(bsdf_pdf, sky_pdf);
                     vertex.known += radiance * (weight * scale);
                     vertices.push(vertex);
                     let excess = self.outside.filter(|_| sky.is_bound(origin, wi));
@@ -282,24 +279,25 @@ impl Tracer<'_> {
                     }));
                 } else {
                     vertices.push(vertex);
-                    // Where nothing is known no light samples go, so what is met has the whole weight.
+                    // No light samples are drawn from unmeasured outside light, so a hit has the whole MIS weight.
                     vertices.extend(self.outside.map(|grid| grid.vertex(&ray, scale)));
                 }
                 return rays;
             };
 
-            // Weigh what is found against light sampling.
-            let met = self.surface(&next, -wi);
-            let light_pdf = if met.front {
-                let cosine = met.seen.normal.dot(-wi);
-                self.light_pdf(met.seen.object) * next.t * next.t / cosine.max(f32::MIN_POSITIVE)
+            // MIS weight of the hit's emission against light sampling.
+            let next_surface = self.surface(&next, -wi);
+            let light_pdf = if next_surface.front {
+                let cosine = next_surface.point.normal.dot(-wi);
+                self.light_pdf(next_surface.point.object) * next.t * next.t
+                    / cosine.max(f32::MIN_POSITIVE)
             } else {
                 0.0
             };
-            emission_weight = self.met_weight(bsdf_pdf, light_pdf);
+            emission_weight = self.hit_weight(bsdf_pdf, light_pdf);
 
-            // End at a surface whose radiance a photograph measured.
-            if let Some(radiance) = self.measured.and_then(|m| m.at(&met.seen)) {
+            // End at a surface with measured radiance.
+            if let Some(radiance) = self.measured.and_then(|m| m.at(&next_surface.point)) {
                 vertex.known += radiance * (emission_weight * scale);
                 vertices.push(vertex);
                 return rays;
@@ -311,11 +309,11 @@ impl Tracer<'_> {
         }
     }
 
-    /// Adds a light sample to a vertex; returns the number of rays.
+    /// Adds a light sample on an emitter to a vertex; returns the number of rays.
     fn light_sample(
         &self,
         surface: &Surface,
-        lobed: &Option<Scattering>,
+        scattering: &Option<Scattering>,
         scale: f32,
         choice: f64,
         u: [f32; 2],
@@ -325,10 +323,10 @@ impl Tracer<'_> {
             return 0;
         };
         let light_normal = self.scene.normals[sample.triangle as usize];
-        let to_light = sample.point - surface.seen.point;
+        let to_light = sample.point - surface.point.point;
         let distance2 = to_light.length_squared();
         let wi = to_light.normalize_or_zero();
-        let (cos_surface, cos_light) = (surface.seen.normal.dot(wi), -light_normal.dot(wi));
+        let (cos_surface, cos_light) = (surface.point.normal.dot(wi), -light_normal.dot(wi));
         if cos_surface <= 0.0 || cos_light <= 0.0 {
             return 0;
         }
@@ -343,13 +341,13 @@ impl Tracer<'_> {
             return 1;
         }
         let light_pdf = self.light_pdf(object) * distance2 / cos_light;
-        let weight = self.drawn_weight(light_pdf, surface.value(lobed, wi)) * scale;
-        let seen = SurfacePoint {
+        let weight = self.sample_weight(light_pdf, surface.value(scattering, wi)) * scale;
+        let light_point = SurfacePoint {
             point: sample.point,
             normal: light_normal,
             object,
         };
-        match self.measured.and_then(|m| m.at(&seen)) {
+        match self.measured.and_then(|m| m.at(&light_point)) {
             Some(radiance) => vertex.known += radiance * weight,
             None => {
                 vertex.lamp = self.surface_of[sample.triangle as usize];
@@ -360,31 +358,31 @@ impl Tracer<'_> {
         1
     }
 
-    /// Adds a light sample of the measured light from outside to a vertex; returns the number of rays.
+    /// Adds a light sample of the measured outside light to a vertex; returns the number of rays.
     fn sky_sample(
         &self,
         surface: &Surface,
-        lobed: &Option<Scattering>,
+        scattering: &Option<Scattering>,
         scale: f32,
         choice: f64,
         u: [f32; 2],
         vertex: &mut Vertex,
     ) -> u64 {
-        let point = surface.seen.point;
+        let point = surface.point.point;
         let Some((sky, (wi, pdf))) =
             (self.sky).and_then(|s| Some((s, s.map().sample(point, choice, u)?)))
         else {
             return 0;
         };
-        let cosine = surface.seen.normal.dot(wi);
-        if cosine <= 0.0 {
+        if surface.point.normal.dot(wi) <= 0.0 {
             return 0;
         }
         let from = surface.leave(wi);
         if self.scene.occluded(&Ray::new(from, wi)) {
             return 1;
         }
-        let weight = self.drawn_weight(pdf * self.sky_fraction(), surface.value(lobed, wi)) * scale;
+        let sky_pdf = pdf * self.sky_fraction();
+        let weight = self.sample_weight(sky_pdf, surface.value(scattering, wi)) * scale;
         vertex.known += sky.map().radiance(point, wi) * weight;
         if let Some(grid) = self.outside.filter(|_| sky.is_bound(point, wi)) {
             (vertex.lamp, vertex.lamp_weight) = (grid.excess(), weight);
@@ -392,7 +390,7 @@ impl Tracer<'_> {
         1
     }
 
-    /// Fraction of the light samples that go outside.
+    /// Fraction of the light samples that are drawn from the measured outside light.
     fn sky_fraction(&self) -> f32 {
         match (self.sky.is_some(), self.lights.is_dark()) {
             (false, _) => 0.0,
@@ -401,14 +399,13 @@ impl Tracer<'_> {
         }
     }
 
-    /// Density per square metre with which light samples land on an object of the mesh.
+    /// Pdf of light samples on an object of the mesh, with respect to area in m².
     fn light_pdf(&self, object: u32) -> f32 {
         self.lights.pdf(object) * (1.0 - self.sky_fraction())
     }
 
-    /// Weight of a light sample: `value` (the BSDF over its albedo, times the cosine) over its density, shared with
-    /// BSDF sampling; both densities per solid angle.
-    fn drawn_weight(&self, light_pdf: f32, (value, bsdf_pdf): (f32, f32)) -> f32 {
+    /// Weight of a light sample: `value` (f cosθ / albedo) over its pdf, times its MIS weight; pdfs with respect to solid angle.
+    fn sample_weight(&self, light_pdf: f32, (value, bsdf_pdf): (f32, f32)) -> f32 {
         let fraction = match self.sampling {
             LightSampling::Mis => power_heuristic(light_pdf, bsdf_pdf),
             LightSampling::Emitter | LightSampling::Bsdf => 1.0,
@@ -416,12 +413,12 @@ impl Tracer<'_> {
         value / light_pdf * fraction
     }
 
-    /// Weight of light met by BSDF sampling against light sampling, given both densities per solid angle.
-    fn met_weight(&self, bsdf_pdf: f32, light_pdf: f32) -> f32 {
+    /// MIS weight of light hit by BSDF sampling; pdfs with respect to solid angle.
+    fn hit_weight(&self, bsdf_pdf: f32, light_pdf: f32) -> f32 {
         match self.sampling {
             LightSampling::Mis => power_heuristic(bsdf_pdf, light_pdf),
             LightSampling::Bsdf => 1.0,
-            // What light sampling cannot draw is left to BSDF sampling.
+            // Light that light sampling cannot draw is left to BSDF sampling.
             LightSampling::Emitter => f32::from(light_pdf <= 0.0),
         }
     }
@@ -435,7 +432,7 @@ impl Tracer<'_> {
     }
 
     fn patch(&self, triangle: u32) -> u32 {
-        self.patches.map_or(NO_PATCH, |p| p.of(triangle))
+        self.patches.map_or(NO_PATCH, |p| p.patch(triangle))
     }
 
     fn lobe(&self, object: u32) -> Option<Lobe> {
@@ -446,7 +443,7 @@ impl Tracer<'_> {
         let normal = self.scene.normals[hit.triangle as usize];
         let front = normal.dot(wo) > 0.0;
         Surface {
-            seen: SurfacePoint {
+            point: SurfacePoint {
                 point: self.scene.point(hit),
                 normal: if front { normal } else { -normal },
                 object: self.scene.object_of[hit.triangle as usize],
@@ -458,40 +455,43 @@ impl Tracer<'_> {
     }
 }
 
-/// A surface point as a path sees it.
+/// A surface point on a path.
 struct Surface {
-    seen: SurfacePoint,
+    /// With the normal of the side that the path arrives at.
+    point: SurfacePoint,
     corners: [Vec3; 3],
     /// Index of its unknowns.
     id: u32,
+    /// Whether the path arrives at the front.
     front: bool,
 }
 
 impl Surface {
-    /// Where a ray begins that leaves it in a direction.
+    /// Origin of a ray that leaves the surface in a direction.
     fn leave(&self, wi: Vec3) -> Vec3 {
-        offset_origin(self.seen.point, self.seen.normal, &self.corners, wi)
+        offset_origin(self.point.point, self.point.normal, &self.corners, wi)
     }
-    /// The BSDF over its albedo, times the cosine, and the density with which it is sampled, for a unit direction above
-    /// the horizon: both cosθ/π, or those of the part that is taken under a lobe.
-    fn value(&self, lobed: &Option<Scattering>, wi: Vec3) -> (f32, f32) {
-        match lobed {
+
+    /// For a unit direction above the horizon: f cosθ / albedo, and the pdf of sampling it. Both are cosθ/π, or those of the
+    /// chosen component of a surface with a lobe.
+    fn value(&self, scattering: &Option<Scattering>, wi: Vec3) -> (f32, f32) {
+        match scattering {
             Some(scattering) => scattering.value(wi),
             None => {
-                let cosine_pdf = self.seen.normal.dot(wi) * FRAC_1_PI;
+                let cosine_pdf = self.point.normal.dot(wi) * FRAC_1_PI;
                 (cosine_pdf, cosine_pdf)
             }
         }
     }
 
-    /// Draws a direction; `None` where a lobe reflects it below the horizon.
-    fn scatter(&self, lobed: &Option<Scattering>, u: [f32; 2]) -> Option<Scattered> {
-        if let Some(scattering) = lobed {
+    /// Samples a direction; `None` if a lobe reflects below the horizon.
+    fn scatter(&self, scattering: &Option<Scattering>, u: [f32; 2]) -> Option<Scattered> {
+        if let Some(scattering) = scattering {
             return scattering.sample(u);
         }
         let local = warp::cosine_hemisphere(u);
         Some(Scattered {
-            wi: Frame::around(self.seen.normal).to_world(local),
+            wi: Frame::around(self.point.normal).to_world(local),
             weight: 1.0,
             pdf: warp::cosine_hemisphere_pdf(local.z),
         })

@@ -1,30 +1,30 @@
-//! How much work each preset does, and what error it stops at.
+//! The amount of work of each preset, and the error at which it stops.
 
 use crate::inverse::settings::{Preset, Settings};
 
 /// Work and targets of a solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Budget {
-    /// Pixels looked at to find what they see.
+    /// Pixels of the g-buffer.
     pub gbuffer_pixels: usize,
-    /// Pixels fitted.
+    /// Pixels of the fit.
     pub pixels: usize,
     /// Paths of the first stage, which end in measured radiance.
     pub light_field_paths: u64,
-    /// Paths of each round that goes all the way to the lamps; zero leaves the refinement out.
+    /// Full paths of each round; zero ends the solve after the first stage.
     pub round_paths: u64,
-    /// Rounds at most.
+    /// Greatest number of rounds.
     pub rounds: u32,
-    /// Textures are looked for after so many rounds at the latest.
+    /// Greatest number of rounds before textures are fitted.
     pub texture_rounds: u32,
-    /// Stops when the median relative standard error of the seen albedos is below this.
+    /// Target of the median relative standard error of the seen albedos.
     pub median_error: f64,
-    /// And when 95 % of them are below this.
+    /// Target of their 95th percentile.
     pub tail_error: f64,
 }
 
 impl Budget {
-    /// What the settings ask for, and their preset where they leave it open.
+    /// The budget of the preset, with the values that the settings override; related values scale in proportion.
     pub fn of(settings: &Settings) -> Self {
         let mut budget = Self::of_preset(settings.preset);
         if settings.pixels > 0 {

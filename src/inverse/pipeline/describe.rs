@@ -1,4 +1,4 @@
-//! From fitted unknowns to the estimate that people see, saying what could not be known.
+//! Converts the fitted unknowns to an estimate, with remarks on what is not determined.
 
 use crate::calibrate::gbuffer::GBuffer;
 use crate::inverse::estimate::{Estimate, ObjectEstimate, Outside};
@@ -13,18 +13,18 @@ use crate::scene::Scene;
 use crate::transport::material::Lobe;
 use glam::{DVec3, Vec3};
 
-/// An albedo with a larger standard error than this is as good as unknown.
+/// Standard error above which an albedo counts as undetermined.
 const UNKNOWN_ALBEDO: f32 = 0.2 * ALBEDO_DEVIATION;
-/// An emission with a larger relative standard error than this is as good as unknown.
+/// Relative standard error above which an emission counts as undetermined.
 const UNKNOWN_EMISSION: f32 = 0.5;
-/// An emitting object that fewer pixels see is known only through its light.
+/// Lamps that fewer pixels see get a remark.
 const FEW_PIXELS: u64 = 19;
 
-/// Relative difference in radiance, and of an albedo from one, below which a wall and a lamp may be taken for each other.
+/// Relative difference in radiance, and difference of an albedo from one, below which a wall may be confused with a lamp.
 const WHITE: f32 = 0.01;
 
-/// The estimate of some unknowns and of the objects' lobes.
-#[expect(clippy::too_many_arguments, reason = "all that a solve has found out")]
+/// The estimate for the given unknowns, standard errors and lobes.
+#[expect(clippy::too_many_arguments, reason = "the whole result of a solve")]
 pub fn estimate(
     scene: &Scene,
     gbuffer: &GBuffer,
@@ -36,7 +36,7 @@ pub fn estimate(
     lobes: &[Option<Lobe>],
 ) -> Estimate {
     let typical = typical_albedo(scene, roles, unknowns, errors);
-    // Between surfaces that lose nothing any light lives for ever: without a source nothing tells how much they keep.
+    // Without any source, photographs are also explained by albedos of one in arbitrary light.
     let sourceless = sky.is_none() && unknowns.emission.iter().all(|&e| e == Vec3::ZERO);
     let objects = (0..scene.objects.len())
         .map(|k| {
@@ -55,7 +55,7 @@ pub fn estimate(
                 Role::Reflector | Role::Glowing => {
                     let unknown = errors.albedo[k].max_element() > UNKNOWN_ALBEDO;
                     if unknown {
-                        object.albedo = drawn(unknowns.albedo[k], errors.albedo[k], typical);
+                        object.albedo = shrunk(unknowns.albedo[k], errors.albedo[k], typical);
                     }
                     if unknown || sourceless {
                         object.albedo_identifiable = false;
@@ -86,15 +86,14 @@ pub fn estimate(
                     object.identifiable = false;
                     object.albedo_identifiable = false;
                     object.note =
-                        "no photograph sees it; its light is inferred from what it does to others"
+                        "no photograph sees it; its emission is inferred from its effect on others"
                             .into();
                 }
                 Role::Dark => {
                     object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION);
                     object.identifiable = false;
                     object.albedo_identifiable = false;
-                    object.note =
-                        "no photograph sees it; its albedo is taken to be middling".into();
+                    object.note = "no photograph sees it; its albedo is assumed".into();
                 }
             }
             object
@@ -125,9 +124,9 @@ pub fn estimate(
     }
 }
 
-/// Between white surfaces all radiance nears that of the lamp, as in a furnace, and which of them gives the light cannot be
-/// told: a reflector of nearly all light that shows the radiance of one that is taken for a lamp. `brightness` holds the mean of each object's
-/// brightest channel over its pixels.
+/// Marks white walls and lamps of equal radiance as not identifiable. Between white surfaces all radiance approaches that of the
+/// lamp, as in a furnace, so a reflector with an albedo of about one and the radiance of a lamp may be the lamp instead.
+/// `brightness` is the mean of each object's brightest channel over its pixels.
 pub fn doubt_white(estimate: &mut Estimate, brightness: &[f32]) {
     let objects = &mut estimate.objects;
     let lamps: Vec<usize> = (0..objects.len())
@@ -136,13 +135,13 @@ pub fn doubt_white(estimate: &mut Estimate, brightness: &[f32]) {
     let mut doubtful: Vec<usize> = Vec::new();
     for k in 0..objects.len() {
         let white = (objects[k].albedo + objects[k].albedo_stderr).max_element() > 1.0 - WHITE;
-        let like = |lamp: usize| (brightness[k] / brightness[lamp] - 1.0).abs() < WHITE;
-        let alike: Vec<usize> = (lamps.iter().copied())
-            .filter(|&lamp| lamp != k && like(lamp))
+        let is_similar = |lamp: usize| (brightness[k] / brightness[lamp] - 1.0).abs() < WHITE;
+        let similar: Vec<usize> = (lamps.iter().copied())
+            .filter(|&lamp| lamp != k && is_similar(lamp))
             .collect();
-        if white && !alike.is_empty() {
+        if white && !similar.is_empty() {
             doubtful.push(k);
-            doubtful.extend(alike);
+            doubtful.extend(similar);
         }
     }
     for k in doubtful {
@@ -153,19 +152,20 @@ pub fn doubt_white(estimate: &mut Estimate, brightness: &[f32]) {
     }
 }
 
-/// Whether an emission is as good as unknown; how strong a channel is that hardly shines does not matter.
+/// Whether an emission is undetermined, by its errors relative to its brightest channel.
 fn is_unknown(emission: Vec3, stderr: Vec3) -> bool {
     stderr.max_element() > UNKNOWN_EMISSION * emission.max_element()
 }
 
-/// What to take for an albedo that is hardly known: drawn to the room's typical one by what is believed of any albedo.
-fn drawn(albedo: Vec3, stderr: Vec3, typical: Vec3) -> Vec3 {
-    let known = stderr * stderr / (ALBEDO_DEVIATION * ALBEDO_DEVIATION);
-    let fraction = (known + Vec3::ONE).recip();
+/// An uncertain albedo shrunk to the room's typical one: the mean of both, weighted by the inverse variances of the fit and of the
+/// prior.
+fn shrunk(albedo: Vec3, stderr: Vec3, typical: Vec3) -> Vec3 {
+    let variance = stderr * stderr / (ALBEDO_DEVIATION * ALBEDO_DEVIATION);
+    let fraction = (variance + Vec3::ONE).recip();
     albedo * fraction + typical * (Vec3::ONE - fraction)
 }
 
-/// Area-weighted mean of the albedos that are known.
+/// Area-weighted mean of the determined albedos; 0.5 if there are none.
 fn typical_albedo(
     scene: &Scene,
     roles: &[Role],
@@ -188,7 +188,7 @@ fn typical_albedo(
     }
 }
 
-/// Infinite errors as the largest finite number, which every file format can hold.
+/// Replaces infinite errors by the largest finite number, for file formats without infinity.
 fn finite(error: Vec3) -> Vec3 {
     error.min(Vec3::splat(f32::MAX))
 }
@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn an_albedo_that_is_hardly_known_is_drawn_to_the_typical_one() {
         let typical = Vec3::splat(0.4);
-        let at = |stderr| drawn(Vec3::ZERO, Vec3::splat(stderr), typical).x;
+        let at = |stderr| shrunk(Vec3::ZERO, Vec3::splat(stderr), typical).x;
         assert!(at(UNKNOWN_ALBEDO) < 0.02);
         assert!((at(ALBEDO_DEVIATION) - 0.2).abs() < 1e-6);
         assert!((at(f32::INFINITY) - 0.4).abs() < 1e-6);

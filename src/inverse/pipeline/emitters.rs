@@ -1,7 +1,7 @@
-//! Which objects give light: tests on traced paths, and how light samples are shared out.
+//! Settles which objects emit light, by tests on stored paths, and sets the weights of light sampling.
 
 use crate::inverse::emitters::classify::classify;
-use crate::inverse::fit::errors::{Released, release};
+use crate::inverse::fit::errors::{ScoreTest, score_tests};
 use crate::inverse::fit::gauss_newton::Fit;
 use crate::inverse::paths::PathCache;
 use crate::inverse::pipeline::Pipeline;
@@ -11,19 +11,18 @@ use crate::math::color::luminance;
 use crate::transport::emitters::Emitters;
 use glam::Vec3;
 
-/// χ² (three channels) above which a light is there, and below which it is not.
+/// χ² (three channels) above which an emission is significant.
 pub(super) const SIGNIFICANT: f64 = 25.0;
-/// Rounds of changing roles at most.
+/// Greatest number of rounds of role changes.
 const MAX_CHANGES: usize = 8;
-/// A glow below this fraction of an object's photographed radiance is no light but a shortcoming of the model.
+/// An emission below this fraction of an object's photographed radiance is attributed to model error.
 const FAINT: f32 = 0.1;
-/// Fraction of the light samples that go to all objects, whatever is known of their light: half by area, half by number, or a bulb
-/// that no photograph sees would get none.
+/// Fraction of the light samples that are spread over all objects: half by area, half by number, so that small bulbs get some.
 const EXPLORATION: f64 = 0.05;
 
 impl Pipeline<'_, '_> {
-    /// What the paths say of light from objects that are held dark.
-    pub(super) fn test_dark(&mut self, cache: &PathCache) -> Vec<Released> {
+    /// Score tests of emission from objects that are held dark.
+    pub(super) fn test_dark(&mut self, cache: &PathCache) -> Vec<ScoreTest> {
         let objects = self.roles.len();
         let mut free = self.free();
         let active = free.len();
@@ -35,32 +34,34 @@ impl Pipeline<'_, '_> {
                 .map(|k| objects + k),
         );
         let equations = cache.normal_equations(&self.unknowns, &free, &self.robust, &self.prior);
-        let released = release(&equations, &free, active);
-        for test in &released {
+        let tests = score_tests(&equations, &free, active);
+        for test in &tests {
             self.errors.emission[test.index - objects] =
                 Vec3::from_array(test.stderr.map(|e| e as f32));
         }
         self.describe();
-        released
+        tests
     }
 
-    /// Drops the light of unseen objects where nothing speaks for it, least significant first, refitting in between.
+    /// χ² of an object's emission.
+    fn significance(&self, k: usize) -> f64 {
+        let z =
+            self.unknowns.emission[k] / self.errors.emission[k].max(Vec3::splat(f32::MIN_POSITIVE));
+        f64::from(z.length_squared())
+    }
+
+    /// Removes insignificant emission of unseen objects, the least significant half at a time, with a refit after each.
     fn prune_unseen(&mut self, cache: &PathCache) -> Result<(), Termination> {
         loop {
-            let significance = |k: usize| {
-                let z = self.unknowns.emission[k]
-                    / self.errors.emission[k].max(Vec3::splat(f32::MIN_POSITIVE));
-                f64::from(z.length_squared())
-            };
             let mut doubtful: Vec<(f64, usize)> = (0..self.problem.scene.objects.len())
                 .filter(|&k| self.roles[k] == Role::Unseen && !self.emission_is_known(k))
-                .map(|k| (significance(k), k))
+                .map(|k| (self.significance(k), k))
                 .filter(|(significance, _)| *significance < SIGNIFICANT)
                 .collect();
             if doubtful.is_empty() {
                 return Ok(());
             }
-            // Lamps that cannot be told from each other are all doubtful: without some of them others may be certain.
+            // Indistinguishable lamps are all insignificant; without some of them the others may be significant.
             doubtful.sort_by(|a, b| a.0.total_cmp(&b.0));
             for &(_, k) in &doubtful[..doubtful.len().div_ceil(2)] {
                 self.roles[k] = Role::Dark;
@@ -71,22 +72,22 @@ impl Pipeline<'_, '_> {
         }
     }
 
-    /// From a fit under the present roles on, lets objects change between reflecting and giving light until the photographs
-    /// call for no more of it, refitting in between; then drops the light of unseen objects that nothing speaks for.
+    /// Starting from a fit with the present roles, changes the roles of objects and refits until the classification is stable; then
+    /// removes insignificant emission of unseen objects.
     pub(super) fn settle_roles(
         &mut self,
         cache: &PathCache,
         mut fitted: Fit,
     ) -> Result<(), Termination> {
         self.take_values(&fitted);
-        let mut returned = vec![false; self.roles.len()];
+        let mut was_emitter = vec![false; self.roles.len()];
         for _ in 0..MAX_CHANGES {
             let mut changed = false;
             for change in classify(cache, &self.unknowns, &self.roles) {
                 let k = change.object;
                 let role = self.allowed(k, change.role);
-                // What has gone both ways is left a reflector; what is known, what it is.
-                if returned[k] || role == self.roles[k] {
+                // An object that became a reflector stays one, which ends oscillations; known roles do not change.
+                if was_emitter[k] || role == self.roles[k] {
                     continue;
                 }
                 changed = true;
@@ -95,7 +96,7 @@ impl Pipeline<'_, '_> {
                     self.unknowns.albedo[k] = Vec3::ZERO;
                     self.unknowns.emission[k] = change.value;
                 } else {
-                    returned[k] = true;
+                    was_emitter[k] = true;
                     self.unknowns.albedo[k] = change.value;
                     self.unknowns.emission[k] = Vec3::ZERO;
                 }
@@ -111,17 +112,17 @@ impl Pipeline<'_, '_> {
         self.prune_unseen(cache)
     }
 
-    /// Tests whether any reflector or dark object gives light after all: the one that the paths call for most is set
-    /// free, refitted, and kept if it stays significant. Returns their names.
+    /// Adds emission to reflectors or dark objects: the one with the most significant score test is set free, refitted, and kept if
+    /// it stays significant. Returns the names of the added lamps.
     ///
-    /// One that is refused ends the search: next in line is what a texture or a highlight makes look like light.
+    /// The first rejection ends the search: less significant candidates are due to textures or highlights.
     pub(super) fn test_glow(&mut self, cache: &PathCache) -> Result<Vec<String>, Termination> {
         let objects = self.roles.len();
         let in_mesh = self.problem.scene.objects.len();
         let mut added = Vec::new();
         while added.len() < MAX_CHANGES {
             let tested = self.test_dark(cache);
-            let open = |test: &Released| {
+            let open = |test: &ScoreTest| {
                 let k = test.index - objects;
                 k < in_mesh && !self.emission_is_known(k)
             };
@@ -144,10 +145,8 @@ impl Pipeline<'_, '_> {
             };
             let fitted = self.fit(cache)?;
             self.take(&fitted);
-            let z = self.unknowns.emission[k]
-                / self.errors.emission[k].max(Vec3::splat(f32::MIN_POSITIVE));
             let faint = self.unknowns.emission[k].max_element() < FAINT * self.brightness[k];
-            if f64::from(z.length_squared()) < SIGNIFICANT || faint {
+            if self.significance(k) < SIGNIFICANT || faint {
                 (self.unknowns, self.errors, self.roles) = before;
                 break;
             }
@@ -156,24 +155,20 @@ impl Pipeline<'_, '_> {
         Ok(added)
     }
 
-    /// Emitters as they are known now, drawn by area × luminance.
+    /// Emitters with the present emission, sampled in proportion to area × luminance.
     pub(super) fn lights(&self) -> Emitters {
         Emitters::new(&self.problem.scene, &self.light_weights())
     }
 
-    /// Area × luminance of each object, as it is known now.
+    /// Area × luminance of the present emission of each object.
     pub(super) fn light_weights(&self) -> Vec<f64> {
-        (self
-            .problem
-            .scene
-            .objects
-            .iter()
-            .zip(&self.unknowns.emission))
-        .map(|(object, emission)| object.area * f64::from(luminance(*emission)))
-        .collect()
+        let objects = self.problem.scene.objects.iter();
+        (objects.zip(&self.unknowns.emission))
+            .map(|(object, emission)| object.area * f64::from(luminance(*emission)))
+            .collect()
     }
 
-    /// Weights with a fraction spread over all objects that have an area.
+    /// Adds a fraction of the weights to all objects with an area.
     pub(super) fn explore(&self, weights: Vec<f64>) -> Vec<f64> {
         let objects = &self.problem.scene.objects;
         let extended: Vec<usize> = (0..objects.len())
@@ -182,11 +177,11 @@ impl Pipeline<'_, '_> {
         self.spread(weights, &extended, EXPLORATION)
     }
 
-    /// Weights with this part of their sum added to some objects that have an area: half by area, half by number.
-    pub(super) fn spread(&self, mut weights: Vec<f64>, over: &[usize], part: f64) -> Vec<f64> {
+    /// Adds `fraction` of the sum of the weights to the objects in `over`, which have an area: half by area, half by number.
+    pub(super) fn spread(&self, mut weights: Vec<f64>, over: &[usize], fraction: f64) -> Vec<f64> {
         let area = |k: usize| self.problem.scene.objects[k].area;
         let total: f64 = weights.iter().sum();
-        let added = if total > 0.0 { total * part } else { 1.0 };
+        let added = if total > 0.0 { total * fraction } else { 1.0 };
         let all: f64 = over.iter().map(|&k| area(k)).sum();
         for &k in over {
             weights[k] += added * 0.5 * (area(k) / all + 1.0 / over.len() as f64);

@@ -1,23 +1,22 @@
-//! What was found out about the exposures of the photographs, in words.
+//! Records the stage of exposures.
 
 use crate::calibrate::exposure::Exposures;
 use crate::inverse::pipeline::Pipeline;
-use crate::inverse::solver::Stage;
 use glam::{DVec2, Vec3};
 
 impl Pipeline<'_, '_> {
-    /// Records what was found out about exposures.
+    /// Records the estimated exposures, vignetting and response.
     pub(super) fn tell_exposures(&mut self, exposures: &Exposures, started: f64) {
-        let (least, most) = exposures.range();
+        let (min, max) = exposures.range();
         let fraction = exposures.gain.max(0.0) * 100.0;
         let mut why = if exposures.differ {
             format!(
-                "exposure and white balance of each photograph, {least:.2} to {most:.2} times their median, explain {fraction:.0} % of \
-                 how they disagree about surfaces that they share"
+                "exposure and white balance of each photograph, {min:.2} to {max:.2} times their median, explain {fraction:.0} % of \
+                 the disagreement between photographs on shared surfaces"
             )
         } else {
             format!(
-                "exposures would explain {fraction:.0} % of how the photographs disagree: they agree"
+                "exposures would explain only {fraction:.0} % of the disagreement between photographs and are not used"
             )
         };
         if let Some((vignetting, camera)) =
@@ -25,7 +24,7 @@ impl Pipeline<'_, '_> {
         {
             let corner = vignetting.factor(&camera.intrinsics, DVec2::ZERO);
             why.push_str(&format!(
-                "; a lens that lets {:.0} % through in the corners explains {:.0} % of the rest",
+                "; vignetting to {:.0} % in the corners explains {:.0} % of the rest",
                 corner.element_sum() / 3.0 * 100.0,
                 exposures.vignetting_gain * 100.0
             ));
@@ -35,23 +34,14 @@ impl Pipeline<'_, '_> {
                 [0.5, 1.0].map(|value| response.light(Vec3::splat(value), Vec3::ONE));
             let of_half = half / full * 100.0;
             why.push_str(&format!(
-                "; a response other than the files' own curve, by which half of the greatest value is {:.0} %, {:.0} % and {:.0} % of the \
-                 greatest light (red, green, blue), explains {:.0} % of what is left",
+                "; a camera response that maps half of the largest value to {:.0} %, {:.0} % and {:.0} % of the largest radiance \
+                 (red, green, blue) explains {:.0} % of what remains",
                 of_half.x,
                 of_half.y,
                 of_half.z,
                 exposures.response_gain * 100.0
             ));
         }
-        let stage = Stage {
-            name: "exposures".to_owned(),
-            seconds: self.monitor.seconds() - started,
-            iterations: 0,
-            train_loss: None,
-            held_out_loss: None,
-            kept: exposures.needed(),
-            why,
-        };
-        self.monitor.stage(stage);
+        self.record_unmeasured("exposures", started, exposures.needed(), why);
     }
 }

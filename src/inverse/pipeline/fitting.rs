@@ -1,4 +1,4 @@
-//! One fit of all free parameters to stored paths: which are free, and what is taken over from it.
+//! One fit of all free parameters to stored paths.
 
 use crate::inverse::fit::errors::{StandardErrors, standard_errors};
 use crate::inverse::fit::gauss_newton::{Fit, fit};
@@ -9,32 +9,33 @@ use crate::inverse::roles;
 use crate::inverse::roles::Role;
 use crate::inverse::solver::Termination;
 
-/// Gauss–Newton steps at most in one fit.
+/// Greatest number of Gauss–Newton steps in one fit.
 const MAX_STEPS: u64 = 30;
-/// Part of the mesh's area that a surface out of sight must have for its albedo to be fitted: what is smaller changes the light
-/// in the room by less than the errors that are aimed at.
+/// Least area of an unseen surface whose albedo is fitted, as a fraction of the mesh's area. Smaller ones change the light in the
+/// room by less than the target errors.
 const UNSEEN_AREA: f64 = 1e-3;
 
 impl Pipeline<'_, '_> {
-    /// The parameters that are fitted. What leaves a surface out of sight is one unknown to the light field, however much of it
-    /// is reflected; paths that go all the way tell the albedo.
+    /// The free parameters. In the light field an unseen surface has one unknown, its exitant radiance; full paths determine its
+    /// albedo too.
     pub(super) fn free(&self) -> Vec<usize> {
         let has_albedo = |k| self.roles[k] != Role::Emitter && self.has_free_albedo(k);
         roles::free(&self.roles, has_albedo)
     }
 
-    /// Whether a surface's albedo is fitted, if it is no lamp: where photographs see it, or where so much of it is out of sight
-    /// that what it reflects counts.
+    /// Whether a surface's albedo is fitted, unless it is a lamp: photographs see it, or it is an unseen surface of at least
+    /// [`UNSEEN_AREA`].
     pub(super) fn has_free_albedo(&self, k: usize) -> bool {
         match self.gbuffer.seen.get(k) {
             None => false,
-            // What a lamp out of sight reflects cannot be told from its own light.
+            // Emission and reflection of an unseen lamp cannot be separated.
             Some(0) if self.stages == 0 || self.roles[k] == Role::Unseen => false,
             Some(0) => self.problem.scene.objects[k].area > UNSEEN_AREA * self.mesh_area,
             Some(_) => true,
         }
     }
 
+    /// Fits the free parameters to stored paths, starting at the present unknowns.
     pub(super) fn fit(&mut self, cache: &PathCache) -> Result<Fit, Termination> {
         let free = self.free();
         let (monitor, estimate, checkpoint) = (&mut self.monitor, &self.estimate, &self.checkpoint);
@@ -54,7 +55,7 @@ impl Pipeline<'_, '_> {
         Ok(fitted)
     }
 
-    /// Weighs the clusters by the residuals that the last fit left, and fits again.
+    /// Sets the robust weights and the model error from the residuals of the last fit, and fits again.
     pub(super) fn weigh(&mut self, cache: &PathCache) -> Result<(), Termination> {
         let residuals = cache.residuals(&self.unknowns);
         self.tell_model_error(&residuals);
@@ -64,7 +65,7 @@ impl Pipeline<'_, '_> {
         Ok(())
     }
 
-    /// Takes over a fit under the present roles, with its errors.
+    /// Sets the unknowns and standard errors from a fit with the present roles.
     pub(super) fn take(&mut self, fitted: &Fit) {
         let free = self.free();
         let errors = standard_errors(&fitted.equations, &free, self.roles.len());
@@ -72,14 +73,14 @@ impl Pipeline<'_, '_> {
         self.take_values(fitted);
     }
 
-    /// Takes over the unknowns alone; errors take longer where unknowns are many.
+    /// Sets the unknowns alone, since standard errors of many unknowns are expensive.
     pub(super) fn take_values(&mut self, fitted: &Fit) {
         self.unknowns = fitted.unknowns.clone();
         self.hold();
         self.describe();
     }
 
-    /// Takes over the errors of what is fitted; what is held keeps those that its tests gave it.
+    /// Sets the standard errors of fitted parameters. Fixed ones keep those of their score tests.
     pub(super) fn merge_errors(&mut self, errors: StandardErrors) {
         for (k, role) in self.roles.iter().enumerate() {
             if *role != Role::Emitter && self.has_free_albedo(k) {

@@ -1,22 +1,22 @@
-//! The second stage: full paths to the lamps found, with all roles settled on them.
+//! The second stage: full paths to the lamps, and roles settled on them.
 
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::paths::PathCache;
 use crate::inverse::pipeline::Pipeline;
 use crate::inverse::solver::Termination;
 
-/// Searches for lamps out of sight at most.
+/// Greatest number of searches for unseen lamps.
 const MAX_SEARCHES: usize = 3;
 
 impl Pipeline<'_, '_> {
-    /// Second stage: full paths to the lamps found. Lights that the first stage missed or imagined are tested here,
-    /// where nothing but the model enters.
+    /// Second stage: full paths to the lamps. Lamps that the light field missed or imagined are found here, since full paths
+    /// depend on the model alone.
     pub(super) fn full_paths(&mut self) -> Result<(), Termination> {
         let started = self.monitor.seconds();
         self.search_anew()?;
         let (mut cache, mut limit) = self.fit_full_paths()?;
         for _ in 1..MAX_SEARCHES {
-            // Albedos that a lamp put right may show another.
+            // With albedos corrected by a new lamp, another one may become significant.
             if !self.search_unseen(false)? {
                 break;
             }
@@ -35,13 +35,14 @@ impl Pipeline<'_, '_> {
         Ok(())
     }
 
-    /// Paths to the lamps as they are known, stored, with all roles settled on them; and what is to be said of their number.
+    /// Stores full paths to the present lamps and settles all roles on them. Also returns the remark of
+    /// [`Self::stored`] on their number.
     pub(super) fn fit_full_paths(&mut self) -> Result<(PathCache, String), Termination> {
         self.monitor.phase("tracing paths to the lamps");
         let lights = self.lights();
         let (cache, limit) = self.stored(&lights, None, 1, self.budget.round_paths)?;
         self.monitor.phase("fitting albedo and emission");
-        // Tests of roles weigh all alike: whatever the residuals of a wrong role say is no measure of trust.
+        // Roles are tested with even weights, since residuals under a wrong role are no measure of noise.
         self.robust = RobustWeights::even(self.roles.len());
         let fitted = self.fit(&cache)?;
         self.settle_roles(&cache, fitted)?;

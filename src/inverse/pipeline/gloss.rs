@@ -1,62 +1,54 @@
-//! Rough specular lobes, tried on objects that look different from different sides.
+//! The stage of rough specular lobes: screening, trials, and refits.
 
 use crate::inverse::known::Pinned;
-use crate::inverse::lobe::{Found, Lobes, Task};
+use crate::inverse::lobe::{Gain, LobeFit, Lobes, Task};
 use crate::inverse::pipeline::Pipeline;
 use crate::inverse::roles::Role;
-use crate::inverse::solver::{Stage, Termination};
+use crate::inverse::solver::Termination;
 use crate::transport::arrival::Cast;
 use glam::Vec3;
 
-/// Fraction of a round's paths that a trial of a lobe takes; finding one anew, whose roughness is about known, takes all of them.
-const PATHS_FRACTION: u64 = 4;
-/// More objects than this fraction what so many take.
-const FULL_FRACTIONS: u64 = 4;
+/// Paths of a round over the paths of a trial; a refit of a known lobe takes all paths of a round.
+const TRIAL_DIVISOR: u64 = 4;
+/// Number of objects above which they share the paths of this many.
+const MAX_FULL_TRIALS: u64 = 4;
 
 impl<'a> Pipeline<'a, '_> {
-    /// Tries a lobe on each object that calls for one; where any is kept, what gives light is judged anew.
+    /// Tries a lobe on each promising object. If any is kept, glowing objects become reflectors and full paths are fitted again.
     pub(super) fn gloss(&mut self) -> Result<(), Termination> {
         let started = self.monitor.seconds();
         self.monitor.phase("looking for gloss");
         let objects: Vec<usize> = (0..self.problem.scene.objects.len())
             .filter(|&k| self.roles[k].reflects() || self.roles[k] == Role::Emitter)
-            .filter(|&k| self.monitor.known.of(k) == Pinned::default())
+            .filter(|&k| self.monitor.known.object(k) == Pinned::default())
             .collect();
         let mut lobes = Lobes::new(self.lobe_task(1), &self.gbuffer);
         let estimate = self.estimate.clone();
         let evidence = lobes.evidence(&estimate, &objects, &mut |cast| self.cast(cast))?;
-        let called: Vec<usize> = (objects.iter().zip(&evidence))
-            .filter(|(_, e)| Lobes::calls(**e))
+        let promising: Vec<usize> = (objects.iter().zip(&evidence))
+            .filter(|(_, e)| Lobes::is_promising(**e))
             .map(|(&k, _)| k)
             .collect();
-        if called.is_empty() {
-            let most = evidence.iter().flatten().fold(0.0f64, |a, b| a.max(*b));
-            self.monitor.stage(Stage {
-                name: "lobes".to_owned(),
-                seconds: self.monitor.seconds() - started,
-                iterations: self.monitor.progress.iterations,
-                train_loss: None,
-                held_out_loss: None,
-                kept: false,
-                why: format!(
-                    "none of {} objects looks glossy: photographs of the same spots differ as a lobe would make them by {most:.1} \
-                     standard errors at most",
-                    objects.len()
-                ),
-            });
+        if promising.is_empty() {
+            let max = evidence.iter().flatten().fold(0.0f64, |a, b| a.max(*b));
+            let why = format!(
+                "none of {} objects looks glossy: differences between photographs of the same spots give at most {max:.1} \
+                 standard errors of evidence for a lobe",
+                objects.len()
+            );
+            self.record_unmeasured("lobes", started, false, why);
             return Ok(());
         }
 
-        // Try those that call for one.
-        lobes.task = self.lobe_task(called.len());
+        lobes.task = self.lobe_task(promising.len());
         let lit = estimate.lit(&self.problem.scene);
         let (mut kept, mut refused) = (Vec::new(), Vec::new());
-        for &k in &called {
+        for &k in &promising {
             self.monitor.phase("trying a rough lobe");
             let emits = self.roles[k].emits();
             let found = lobes.find(&lit, k, emits, None, &mut |cast| self.cast(cast))?;
             match found {
-                Some(found) if found.is_called_for() => kept.push((k, found)),
+                Some(found) if found.is_significant() => kept.push((k, found)),
                 Some(found) => refused.push(self.words(k, &found, true)),
                 None => refused.push(self.problem.scene.objects[k].name.clone()),
             }
@@ -73,17 +65,19 @@ impl<'a> Pipeline<'a, '_> {
             .collect();
         if !refused.is_empty() {
             let refused = refused.join("; ");
-            why.push(format!("untouched pixels do not ask for: {refused}"));
+            why.push(format!(
+                "not significant on pixels outside the fit: {refused}"
+            ));
         }
         why.push(format!(
-            "{} of {} objects look different from different sides",
-            called.len(),
+            "{} of {} objects look different in different views",
+            promising.len(),
             objects.len()
         ));
         let why = why.join("; ");
         self.record("lobes", started, !kept.is_empty(), why)?;
 
-        // What was taken for light may have been gloss.
+        // Emission of glowing objects may have been gloss.
         let glowing: Vec<usize> = (0..self.roles.len())
             .filter(|&k| self.roles[k] == Role::Glowing && !self.emission_is_known(k))
             .collect();
@@ -97,9 +91,8 @@ impl<'a> Pipeline<'a, '_> {
         Ok(())
     }
 
-    /// Finds the lobes that were kept anew for the `turn`th time, in the light as it is known now. Where there is a texture it
-    /// stays, and the lobe that it was found under.
-    pub(super) fn settle_lobes(&mut self, turn: u64) -> Result<(), Termination> {
+    /// Refits the kept lobes with the present light, for the `refit`th time. Lobes of textured objects stay as they are.
+    pub(super) fn settle_lobes(&mut self, refit: u64) -> Result<(), Termination> {
         let texels = self.estimate.texels.clone();
         let textured =
             |k: usize| (texels.as_ref()).is_some_and(|t| t.textured.get(k) == Some(&true));
@@ -112,12 +105,12 @@ impl<'a> Pipeline<'a, '_> {
         let started = self.monitor.seconds();
         self.monitor.phase("refining lobes");
         let mut task = self.lobe_task(glossy.len());
-        task.paths *= PATHS_FRACTION;
+        task.paths *= TRIAL_DIVISOR;
         let lobes = Lobes::new(task, &self.gbuffer);
         let lit = self.estimate.lit(&self.problem.scene);
         let mut names = Vec::new();
         for k in glossy {
-            let known = self.lobes[k].map(|lobe| (lobe, turn));
+            let known = self.lobes[k].map(|lobe| (lobe, refit));
             let found = lobes.find(&lit, k, false, known, &mut |cast| self.cast(cast))?;
             if let Some(found) = found {
                 self.take_lobe(k, &found);
@@ -129,19 +122,19 @@ impl<'a> Pipeline<'a, '_> {
         Ok(())
     }
 
-    /// The task of finding the lobes of so many objects.
+    /// The task of fitting the lobes of `objects` objects.
     fn lobe_task(&self, objects: usize) -> Task<'a> {
-        let fraction = FULL_FRACTIONS.max(objects as u64);
+        let divisor = MAX_FULL_TRIALS.max(objects as u64);
         Task {
             problem: self.problem,
             seed: self.monitor.settings.seed,
-            paths: self.budget.round_paths / PATHS_FRACTION * FULL_FRACTIONS / fraction,
+            paths: self.budget.round_paths / TRIAL_DIVISOR * MAX_FULL_TRIALS / divisor,
             max_bounces: self.max_bounces,
         }
     }
 
-    /// Takes over a lobe and the base under it; what the light field said of the object as a diffuse one counts no more.
-    fn take_lobe(&mut self, k: usize, found: &Found) {
+    /// Sets an object's lobe and base, and resets the prior of its albedo, which assumed a diffuse surface.
+    fn take_lobe(&mut self, k: usize, found: &LobeFit) {
         self.lobes[k] = Some(found.lobe());
         self.unknowns.albedo[k] = found.albedo.as_vec3();
         self.errors.albedo[k] = found.albedo_error().min(Vec3::splat(0.5));
@@ -154,19 +147,19 @@ impl<'a> Pipeline<'a, '_> {
             .tick(&self.estimate, &|_| self.checkpoint.clone())
     }
 
-    /// An object's lobe in words.
-    fn words(&self, k: usize, found: &Found, gains: bool) -> String {
+    /// An object's lobe in words; with its gains if `gains`.
+    fn words(&self, k: usize, found: &LobeFit, gains: bool) -> String {
         let [.., specular, roughness] = found.errors;
         let mut words = format!(
             "{}: roughness {:.3} ± {roughness:.3}, specular {:.3} ± {specular:.3}",
             self.problem.scene.objects[k].name, found.roughness, found.specular
         );
         if gains {
-            let sure = |gain: &crate::inverse::lobe::Gain| gain.mean / gain.noise;
+            let significance = |gain: &Gain| gain.mean / gain.noise;
             words.push_str(&format!(
-                " (untouched pixels better by {:.0} standard errors, differences by view by {:.0})",
-                sure(&found.gain),
-                sure(&found.by_view)
+                " (pixels outside the fit better by {:.0} standard errors, differences between views by {:.0})",
+                significance(&found.gain),
+                significance(&found.by_view)
             ));
         }
         words

@@ -1,4 +1,4 @@
-//! Values that are known beforehand: held through every change of roles and every fit.
+//! Holds known values fixed through all changes of roles and all fits.
 
 use crate::inverse::known::Pinned;
 use crate::inverse::pipeline::Pipeline;
@@ -6,17 +6,17 @@ use crate::inverse::roles::Role;
 use glam::Vec3;
 
 impl Pipeline<'_, '_> {
-    /// The role that an object may have of the one that the photographs speak for.
+    /// The role of an object, given its role according to the photographs and its known values.
     pub(super) fn allowed(&self, object: usize, role: Role) -> Role {
-        role_under(self.monitor.known.of(object), role)
+        role_under(self.monitor.known.object(object), role)
     }
 
     /// Whether an object's emission is known.
     pub(super) fn emission_is_known(&self, object: usize) -> bool {
-        self.monitor.known.of(object).emission.is_some()
+        self.monitor.known.object(object).emission.is_some()
     }
 
-    /// Gives what is known its roles, its values, and no error.
+    /// Sets the roles and values of objects with known values, with standard errors of zero.
     pub(super) fn hold(&mut self) {
         for (k, pinned) in self.monitor.known.objects() {
             if k >= self.problem.scene.objects.len() {
@@ -39,7 +39,7 @@ impl Pipeline<'_, '_> {
         }
     }
 
-    /// Says of every object what of it is held.
+    /// Sets known values in the estimate, with a note on each.
     pub(super) fn describe_known(&mut self) {
         for (k, pinned) in self.monitor.known.objects() {
             let Some(object) = self.estimate.objects.get_mut(k) else {
@@ -57,10 +57,10 @@ impl Pipeline<'_, '_> {
     }
 }
 
-/// A known emission decides whether an object gives light; one whose albedo is known reflects in any case.
+/// The role under known values: a known emission decides whether the object emits, and with a known albedo it reflects.
 fn role_under(pinned: Pinned, role: Role) -> Role {
-    let lit = pinned.emission.map(|emission| emission != Vec3::ZERO);
-    match (lit, role) {
+    let emits = pinned.emission.map(|emission| emission != Vec3::ZERO);
+    match (emits, role) {
         (Some(false), Role::Emitter | Role::Glowing) => Role::Reflector,
         (Some(false), Role::Unseen) => Role::Dark,
         (Some(true), Role::Dark) => Role::Unseen,

@@ -1,4 +1,4 @@
-//! The first stage: each object fitted to the light that the photographs measured around it; light from outside.
+//! The first stage: each object fitted to its measured irradiance; and the trial of outside light.
 
 use crate::calibrate::measured_radiance::MeasuredRadiance;
 use crate::inverse::fit::equations::NormalEquations;
@@ -21,17 +21,16 @@ use crate::transport::emitters::Emitters;
 use crate::transport::surroundings::Surroundings;
 use glam::{DVec3, Vec3};
 
-/// Fraction of paths that must leave the mesh before light from outside is tried.
+/// Least fraction of paths that leave the mesh for which outside light is tried.
 const ESCAPING: f64 = 1e-3;
-/// Fraction of the held-out loss that light from outside must take away.
+/// Least relative decrease of the held-out loss by outside light.
 const OUTSIDE_GAIN: f64 = 0.03;
-/// Relative error of albedo that the light field's resolution is trusted to stay below, where edges blur: a
-/// cautious assumption until full paths have replaced it.
+/// Assumed relative error of albedo by the light field's limited resolution at edges, until full paths replace it.
 const LIGHT_FIELD_BIAS: f32 = 0.01;
-/// No albedo is held closer than this.
+/// Least standard deviation of the prior of an albedo.
 const MIN_DEVIATION: f32 = 1e-3;
 
-/// The outcome of a trial of light from outside.
+/// The result of a trial of outside light.
 #[derive(Clone)]
 struct Found {
     roles: Vec<Role>,
@@ -44,7 +43,7 @@ struct Found {
     sky: Option<MeasuredOutside>,
 }
 
-/// The part of the loss that is gone after a change: of held-out pixels, or where there are none, of those of the fit.
+/// Relative decrease of the loss: on held-out pixels, or in the fit if none is held out.
 fn fall(before: Losses, after: Losses) -> f64 {
     match (
         before.held_out.zip(after.held_out),
@@ -56,7 +55,7 @@ fn fall(before: Losses, after: Losses) -> f64 {
 }
 
 impl Pipeline<'_, '_> {
-    /// Takes what was seen of the outside for what to expect of the rest of it.
+    /// Sets the prior of unmeasured outside directions from the measured ones.
     pub(super) fn expect_of_outside(&mut self) {
         if let Some(sky) = &self.sky {
             let grid = self.outside;
@@ -69,14 +68,14 @@ impl Pipeline<'_, '_> {
         }
     }
 
-    /// First stage: paths end where a photograph measured the radiance, so each object is nearly a linear fit of its
-    /// own: what it sends against what it receives.
+    /// First stage: paths end at measured radiance, so that each object's albedo is nearly an independent linear fit of its radiance
+    /// to its irradiance.
     pub(super) fn light_field(&mut self) -> Result<(), Termination> {
         let started = self.monitor.seconds();
         self.monitor.phase("gathering light from the photographs");
         let measured = MeasuredRadiance::new(self.problem, &self.gbuffer);
 
-        // Light samples go where the photographs are bright: in proportion to area × radiance².
+        // Light samples are drawn in proportion to area × squared photographed radiance.
         let scene = &self.problem.scene;
         let bright: Vec<f64> = (scene.objects.iter().zip(&measured.object_means))
             .map(|(object, mean)| {
@@ -87,7 +86,7 @@ impl Pipeline<'_, '_> {
         let paths = self.budget.light_field_paths;
         let (cache, limit) = self.stored(&lights, Some(&measured), 0, paths)?;
 
-        // First as if no light came from outside, then, where rays leave the mesh, as if some did.
+        // First without outside light, then, if rays leave the mesh, with it.
         self.monitor.phase("telling lamps from walls");
         self.tell_lamps(&cache, Role::Dark)?;
         self.monitor
@@ -108,8 +107,8 @@ impl Pipeline<'_, '_> {
             .report(&self.estimate, &|_| self.checkpoint.clone())
     }
 
-    /// Where light comes from outside, full paths know it only by a coarse map, and albedos would drift to make up for
-    /// what that lacks. What the light field said of them, which measures all light that arrives, holds them.
+    /// With outside light, sets the prior of albedos from the light field, which measures all irradiance. Full paths have only a
+    /// coarse map of the outside light, and albedos would drift to compensate its errors.
     fn expect_of_albedo(&mut self) {
         if !self.open {
             return;
@@ -125,12 +124,12 @@ impl Pipeline<'_, '_> {
         self.prior = (self.prior.clone()).with_albedo(expected);
     }
 
-    /// Fits all seen objects as reflectors, then those that plainly give light as emitters; light from outside is
-    /// fitted where `outside` is [`Role::Unseen`].
+    /// Fits all seen objects as reflectors, then settles which are emitters. Outside light is fitted if `outside` is
+    /// [`Role::Unseen`].
     fn tell_lamps(&mut self, cache: &PathCache, outside: Role) -> Result<(), Termination> {
         self.unknowns = Unknowns::new(self.roles.len());
         self.robust = RobustWeights::even(self.roles.len());
-        // Lamps in view first: taken for white walls they would call for light upon them from whatever is out of sight.
+        // Seen lamps first: while they are fitted as white walls, unseen objects would be given light to explain them.
         for out_of_sight in [Role::Dark, Role::Unseen] {
             for (k, role) in self.roles.iter_mut().enumerate() {
                 match self.gbuffer.seen.get(k) {
@@ -153,8 +152,8 @@ impl Pipeline<'_, '_> {
         Ok(())
     }
 
-    /// Tries light from outside the mesh, from far away and of a scan from a box around it, and keeps what predicts pixels held out of
-    /// the fit better than the model without it.
+    /// Tries light from infinity, and for a scan also from a box around the mesh. Keeps the better one if it predicts held-out pixels
+    /// better than the model without it.
     fn light_from_outside(
         &mut self,
         cache: &PathCache,
@@ -166,7 +165,7 @@ impl Pipeline<'_, '_> {
         let started = self.monitor.seconds();
         self.monitor.phase("trying light from outside");
         let leave = format!("{:.1} % of the paths leave the mesh", escaping * 100.0);
-        // A linear step tells about what could be gained, at a small part of the cost of a trial.
+        // A linear step estimates the gain at a small fraction of the cost of a trial.
         let gain = self.outside_gain(cache);
         if gain < OUTSIDE_GAIN {
             let why = format!(
@@ -180,7 +179,7 @@ impl Pipeline<'_, '_> {
         let scene = &self.problem.scene;
         let cameras = scene.cameras.iter().map(|camera| camera.center);
         let places = scene.positions.iter().copied().chain(cameras);
-        // Only full paths tell the two apart. A mesh made of objects is taken to lack nothing but windows.
+        // Only full paths can distinguish both. A mesh that is not a scan is assumed to lack windows only.
         let around = match (scene.scanned, self.budget.round_paths) {
             (false, _) | (_, 0) => None,
             (true, _) => Surroundings::around(places),
@@ -219,7 +218,7 @@ impl Pipeline<'_, '_> {
         Ok(())
     }
 
-    /// Fits everything with light from outside; the losses after it.
+    /// Fits everything with outside light; returns the losses.
     fn fit_open(
         &mut self,
         surroundings: Surroundings,
@@ -244,8 +243,8 @@ impl Pipeline<'_, '_> {
         Ok(self.measure())
     }
 
-    /// Where there are two to choose from: the losses of each once full paths were fitted. The light field is blurred, and what makes
-    /// up for that looks better than it is.
+    /// If there are two results to choose from, replaces their losses by those after a fit of full paths: the losses of the light
+    /// field are biased by its blur.
     fn by_full_paths(
         &mut self,
         gained: Vec<(Losses, Found)>,
@@ -263,7 +262,7 @@ impl Pipeline<'_, '_> {
         Ok(compared)
     }
 
-    /// What a trial of light from outside changes.
+    /// The present result of a trial.
     fn found(&self) -> Found {
         Found {
             roles: self.roles.clone(),
@@ -277,7 +276,7 @@ impl Pipeline<'_, '_> {
         }
     }
 
-    /// Goes back to what was found.
+    /// Restores the result of a trial.
     fn go_back_to(&mut self, found: Found) {
         self.roles = found.roles;
         self.unknowns = found.unknowns;
@@ -289,7 +288,7 @@ impl Pipeline<'_, '_> {
         self.sky = found.sky;
     }
 
-    /// From now on light from outside is held near the colours that are expected of it, at the brightness found.
+    /// Sets the prior of outside light to its expected colours at the fitted brightness.
     fn expect_colors_of_outside(&mut self) {
         let photographed = mean_radiance(&self.clusters);
         let bound = self.sky.as_ref().map(|sky| sky.mean_bound());
@@ -303,8 +302,8 @@ impl Pipeline<'_, '_> {
         self.prior = self.prior.clone().with_outside_found(found, color);
     }
 
-    /// The fraction of the clusters' squared residuals that one linear step takes away once light from every direction
-    /// outside is free. The fall is measured across the two sets of paths, so that fitting their noise gains nothing.
+    /// Relative decrease of the clusters' squared residuals by one linear step with light from all outside directions free. It is
+    /// measured across the two sets of paths, so that fitting path noise gains nothing.
     fn outside_gain(&self, cache: &PathCache) -> f64 {
         let surfaces = self.roles.len();
         let mut free = self.free();
@@ -331,7 +330,7 @@ impl Pipeline<'_, '_> {
         if all > 0.0 { fall / all } else { 0.0 }
     }
 
-    /// Objects that give light.
+    /// Number of objects that emit light.
     fn lamps(&self) -> usize {
         self.roles.iter().filter(|r| r.emits()).count()
     }

@@ -1,5 +1,5 @@
-//! The transport-cache solver. [`Pipeline::run`] is the algorithm of a solve: light field, full paths, gloss, refinement; each
-//! stage is a method in the file of its name and leaves its outcome in the [`Pipeline`].
+//! The transport-cache solver. [`Pipeline::run`] is the algorithm of a solve: light field, full paths, gloss, refinement. Each
+//! stage is a method in the file of its name and stores its result in the [`Pipeline`].
 
 pub mod budget;
 mod depth;
@@ -47,12 +47,12 @@ use glam::Vec3;
 use refine::Summed;
 use textures::Detail;
 
-/// Columns and rows of the map of light from outside.
+/// Columns and rows of the fitted map of outside light.
 const OUTSIDE_WIDTH: usize = 12;
 const OUTSIDE_HEIGHT: usize = 6;
-/// Longest path in bounces of losses, textures, lobes and of what lamps reflect; those of the fits end by chance alone.
+/// Greatest number of bounces of losses, textures, lobes and lamp patches; the paths of fits end by Russian roulette alone.
 const MAX_DEPTH: u32 = 1000;
-/// Stages of a solve that goes all the way.
+/// Number of stages of a complete solve.
 const STAGES: u32 = 4;
 
 /// The state of a solve.
@@ -62,41 +62,42 @@ pub struct Pipeline<'a, 'o> {
     monitor: Monitor<'o>,
     gbuffer: GBuffer,
     clusters: Vec<Cluster>,
+    /// Image width of each frame.
     widths: Vec<u32>,
-    /// In square metres.
+    /// Area of the mesh in square metres.
     mesh_area: f64,
     losses: LossProbe,
     max_bounces: u32,
     outside: OutsideGrid,
     /// Whether light comes from outside.
     open: bool,
-    /// What is known of it from pixels that see it, if light comes from there.
+    /// Measured outside light, if light comes from outside.
     sky: Option<MeasuredOutside>,
     roles: Vec<Role>,
     robust: RobustWeights,
     prior: Prior,
-    /// Of the lamps, once all of them are found.
+    /// Patches of the lamps, from the third stage on.
     patches: LampPatches,
-    /// For each surface, the fraction of the paths' noise in its residuals.
+    /// For each surface, the fraction of its squared residuals that is path noise.
     path_noise: Vec<f64>,
     unknowns: Unknowns,
     errors: StandardErrors,
-    /// Variance of what the model lacks, relative to what surfaces reflect.
+    /// Variance of the model error, relative to reflected radiance.
     model_variance: f64,
     /// The rough specular lobe of each object that has one.
     lobes: Vec<Option<Lobe>>,
-    /// Where the photographs disagree.
+    /// Exposures, vignetting and response, if any is needed.
     exposures: Option<Exposures>,
     estimate: Estimate,
-    /// What the rounds know, once they are done.
+    /// The sum over all rounds, after they are done.
     summed: Option<Summed>,
-    /// Spatial detail, once it was looked for.
+    /// Textures, after their stage.
     detail: Option<Detail>,
-    /// Mean of each surface's brightest channel in the photographs; zero where none sees it.
+    /// Mean of each surface's brightest channel in the photographs; zero for unseen surfaces.
     brightness: Vec<f32>,
-    /// Stages finished.
+    /// Number of finished stages.
     stages: u32,
-    /// Where the last of them ended.
+    /// The state after the last finished stage.
     checkpoint: Checkpoint,
 }
 
@@ -216,7 +217,7 @@ pub fn solve(
 }
 
 impl Pipeline<'_, '_> {
-    /// The algorithm: each stage once, from where an earlier solve has left off.
+    /// The algorithm: runs the stages that are not finished yet.
     fn run(&mut self) -> Result<Termination, Termination> {
         if self.stages < 1 {
             self.light_field()?;
@@ -233,7 +234,7 @@ impl Pipeline<'_, '_> {
         if self.stages < 3 {
             if self.monitor.settings.lobes {
                 self.gloss()?;
-                // Paths and textures are found under them.
+                // The following stages hold the lobes fixed.
                 self.settle_lobes(0)?;
             }
             self.end_stage(3)?;

@@ -1,4 +1,4 @@
-//! What is told of a solve: the estimate as it stands, stages with their losses, and checkpoints.
+//! Reports of a solve: the present estimate, stages with their losses, and checkpoints.
 
 use crate::inverse::fit::model_error;
 use crate::inverse::loss::Losses;
@@ -8,6 +8,7 @@ use crate::inverse::pipeline::{Pipeline, STAGES, describe};
 use crate::inverse::solver::{Checkpoint, Solution, Stage, Termination};
 
 impl Pipeline<'_, '_> {
+    /// Updates the estimate from the present unknowns.
     pub(super) fn describe(&mut self) {
         self.estimate = describe::estimate(
             &self.problem.scene,
@@ -33,7 +34,7 @@ impl Pipeline<'_, '_> {
         self.describe_known();
     }
 
-    /// Finds how far the model is off from the residuals that a fit has left.
+    /// Estimates the variance of the model error from the residuals of a fit.
     pub(super) fn tell_model_error(&mut self, residuals: &[Linearised]) {
         let textured = self.estimate.texels.as_ref().map(|t| t.textured.as_slice());
         self.model_variance = model_error::variance(
@@ -44,13 +45,14 @@ impl Pipeline<'_, '_> {
         );
     }
 
+    /// The losses of the present estimate.
     pub(super) fn measure(&mut self) -> Losses {
         let losses = self.losses.measure(self.problem, &self.estimate);
         self.monitor.cast(losses.cast);
         losses
     }
 
-    /// Records a stage with its losses, which become a point of the loss curve.
+    /// Records a stage with its losses, and adds them to the loss curve.
     pub(super) fn record(
         &mut self,
         name: &str,
@@ -75,14 +77,27 @@ impl Pipeline<'_, '_> {
         Ok(losses)
     }
 
-    /// Ends a stage, and lets the observer keep it, however soon the next one ends.
+    /// Records a stage that leaves the estimate as it is, without losses.
+    pub(super) fn record_unmeasured(&mut self, name: &str, started: f64, kept: bool, why: String) {
+        self.monitor.stage(Stage {
+            name: name.to_owned(),
+            seconds: self.monitor.seconds() - started,
+            iterations: self.monitor.progress.iterations,
+            train_loss: None,
+            held_out_loss: None,
+            kept,
+            why,
+        });
+    }
+
+    /// Ends a stage: updates the checkpoint, and offers it to the observer.
     pub(super) fn end_stage(&mut self, stages: u32) -> Result<(), Termination> {
         self.keep_checkpoint(stages);
         self.monitor
             .report(&self.estimate, &|_| self.checkpoint.clone())
     }
 
-    /// Marks the end of a stage, from where a solve can be taken up again.
+    /// Updates the checkpoint after `stages` finished stages.
     pub(super) fn keep_checkpoint(&mut self, stages: u32) {
         self.stages = stages;
         self.monitor.progress.seconds = self.monitor.seconds();
@@ -100,8 +115,9 @@ impl Pipeline<'_, '_> {
         self.checkpoint = Checkpoint::new(&self.monitor.progress, &state);
     }
 
+    /// The solution; it has a checkpoint unless the solve is complete.
     pub(super) fn finish(mut self, termination: Termination) -> Solution {
-        // A finished stage has measured its loss already.
+        // A complete solve has measured the loss of its last stage.
         let done = self.stages >= STAGES || termination == Termination::Converged;
         if !done {
             let losses = self.measure();

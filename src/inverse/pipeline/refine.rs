@@ -1,4 +1,4 @@
-//! Rounds of independent paths, added up until the reported errors are small enough or no longer the paths'.
+//! The third stage: rounds of independent paths, summed until the reported errors are small or no longer due to path noise.
 
 use crate::inverse::emitters::lamp_albedo;
 use crate::inverse::estimate::{ENOUGH_PIXELS, relative_to_albedo};
@@ -19,41 +19,41 @@ use crate::transport::emitters::Emitters;
 use crate::transport::path::PathOptions;
 use glam::Vec3;
 
-/// A step asks for linearising anew where its square is more than this fraction of a standard error.
+/// Squared step, as a fraction of the standard error, above which paths are linearised again.
 const NONLINEAR: f32 = 0.3;
-/// Emissions whose standard error is below this fraction of them are well known.
+/// Relative standard error below which an emission counts as well determined.
 const WELL_KNOWN: f32 = 0.3;
-/// What the paths add to an error is negligible below this fraction of it: without them it would be 6 % less.
+/// Fraction of an error below which the part due to path noise is negligible: without it the error would be 6 % less.
 const NEGLIGIBLE: f64 = 1.0 / 3.0;
-/// Levels that clusters are weighed by take this part of the paths of a round.
+/// Paths of a round over the paths that predict the levels of clusters.
 const PREDICTING: u64 = 4;
-/// So many go to each cluster besides, or its part of those of a whole round: by a dozen paths a pixel beside a lamp may seem
-/// dark, and would then weigh more than all others.
+/// Least number of such paths per cluster, unless a whole round has fewer: with a dozen paths a pixel next to a lamp may seem
+/// dark, and would then outweigh all others.
 const MIN_PREDICTING: u64 = 256;
-/// What arrives at lamps takes this part of them.
+/// Paths of a round over the paths that light the patches of lamps.
 const LIGHTING_LAMPS: u64 = 32;
-/// Textures are no worse for light that is no better known than this: a single pixel knows them to some per cent. Small objects
-/// that are known less well are not worth waiting for.
+/// Accuracy of the light that suffices for textures, since a single pixel determines a texel to some per cent. Small objects that
+/// are less accurate are not waited for.
 const ENOUGH_FOR_TEXTURES: Aim = Aim {
     median: 5e-3,
     tail: f64::INFINITY,
 };
 
-/// What all rounds know of the parameters that are free.
+/// The linearised clusters over all rounds.
 #[derive(Debug)]
 pub struct Summed {
-    /// Means over the rounds.
+    /// Mean over the rounds of each cluster.
     pub clusters: Vec<Linearised>,
-    /// What they are linearised about.
+    /// The unknowns that they are linearised about.
     pub about: Unknowns,
 }
 
-/// Rounds of the paths of one set of clusters, added up.
+/// The sum over rounds of paths.
 pub(super) struct Rounds {
     lights: Emitters,
-    /// Places of the free parameters.
+    /// Rows of the free parameters.
     places: Vec<usize>,
-    /// What the sums are linearised about.
+    /// The unknowns that the sums are linearised about.
     about: Unknowns,
     sums: Accumulated,
     next: u32,
@@ -70,24 +70,24 @@ impl Rounds {
 /// A part of the rounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Leg {
-    /// As far as it takes to look for textures.
+    /// Until the light is accurate enough for textures.
     UntilTextures,
-    /// All of them.
+    /// Until the end.
     UntilDone,
 }
 
-/// Relative standard errors of albedo that rounds aim at.
+/// Target relative standard errors of albedo.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Aim {
     /// Median over objects.
     pub median: f64,
-    /// What 95 of 100 objects stay below.
+    /// 95th percentile over objects.
     pub tail: f64,
 }
 
 impl Pipeline<'_, '_> {
-    /// Third stage: rounds of independent paths, added up until the reported errors are small enough; textures as soon as
-    /// errors are small enough for them, or after some rounds, however many more are to come.
+    /// Third stage: sums rounds of independent paths until the reported errors reach the target. Textures are fitted as soon as
+    /// errors are small enough for them, or after the budget's number of rounds.
     pub(super) fn refine(&mut self) -> Result<Termination, Termination> {
         let mut rounds = self.begin_rounds()?;
         let textures = self.monitor.settings.textures;
@@ -106,7 +106,7 @@ impl Pipeline<'_, '_> {
         Ok(ended)
     }
 
-    /// Clusters weighed, and nothing added up yet.
+    /// Sets the weights and paths of clusters, and starts empty sums.
     fn begin_rounds(&mut self) -> Result<Rounds, Termination> {
         self.monitor.phase("refining");
         let lights = self.lights();
@@ -117,7 +117,7 @@ impl Pipeline<'_, '_> {
             self.roles.len(),
             self.budget.round_paths,
         );
-        // The albedos of lamps among them.
+        // Including the albedos of lamps.
         let free = roles::free(&self.roles, |k| self.has_free_albedo(k));
         Ok(Rounds {
             lights,
@@ -128,7 +128,7 @@ impl Pipeline<'_, '_> {
         })
     }
 
-    /// Adds rounds until the reported errors are small enough, or there are as many as there may be.
+    /// Adds rounds until the reported errors reach the target, or up to the greatest number of rounds.
     fn add_rounds(&mut self, rounds: &mut Rounds, leg: Leg) -> Result<Termination, Termination> {
         if rounds.next > 0 && rounds.next >= self.aim_of(leg).0 {
             return Ok(Termination::Steps);
@@ -137,14 +137,14 @@ impl Pipeline<'_, '_> {
         self.monitor.phase("refining");
         let mut outcome = Termination::Steps;
         loop {
-            // What is asked for may change while a solve runs.
+            // The target may change while a solve runs.
             let (most, aim) = self.aim_of(leg);
             if rounds.next >= most {
                 break;
             }
             let round = rounds.next;
             rounds.next += 1;
-            // What lamps reflect is not linearised but followed.
+            // The reflected light of lamps is traced again each round instead of linearised.
             self.light_patches(round);
             let linearised =
                 self.linearised(&rounds.lights, 2, round, &rounds.about, &rounds.places)?;
@@ -154,7 +154,7 @@ impl Pipeline<'_, '_> {
             let found = self.descend(clusters, &rounds.about);
             self.robust = found.robust;
             self.path_noise = path_noise::fractions(&found.clusters, self.roles.len());
-            // Textures stand for what was found about the first point.
+            // The effect of textures is relative to the present linearisation, which then must stay.
             let may_restart = self.detail.is_none() && round < most.min(self.budget.rounds) / 4;
             let far = may_restart && is_nonlinear(&rounds.about, &self.unknowns, &self.errors);
             self.describe();
@@ -190,7 +190,8 @@ impl Pipeline<'_, '_> {
         Ok(outcome)
     }
 
-    /// Fits all that is free, the lamps' own albedos among it, to clusters linearised about `about`, and takes what was found.
+    /// Fits all free parameters, including the albedos of lamps, to clusters linearised about `about`, and sets unknowns, standard
+    /// errors and model error.
     pub(super) fn descend(&mut self, clusters: Vec<Linearised>, about: &Unknowns) -> Descended {
         let free = roles::free(&self.roles, |k| self.has_free_albedo(k));
         let prior = lamp_albedo::beliefs(&self.prior, &self.roles);
@@ -216,7 +217,7 @@ impl Pipeline<'_, '_> {
         found
     }
 
-    /// Rounds at most up to the end of a leg, and the errors aimed at.
+    /// Greatest number of rounds up to the end of a leg, and its target errors.
     fn aim_of(&self, leg: Leg) -> (u32, Aim) {
         let (most, aim) = self.aim();
         match leg {
@@ -225,7 +226,7 @@ impl Pipeline<'_, '_> {
         }
     }
 
-    /// Rounds at most, and the errors aimed at: the preset's, or without end a smaller median that was asked for.
+    /// Greatest number of rounds and the target errors of the preset; a smaller median in the settings has no limit of rounds.
     fn aim(&self) -> (u32, Aim) {
         let asked = self.monitor.settings.target_error * 0.01;
         let (most, median) = if asked > 0.0 && asked < self.budget.median_error {
@@ -237,7 +238,7 @@ impl Pipeline<'_, '_> {
         (most, Aim { median, tail })
     }
 
-    /// Finds out what the patches of lamps reflect, as the room is known by now.
+    /// Traces the reflected light of lamp patches with the present estimate.
     fn light_patches(&mut self, round: u32) {
         let options = PathOptions {
             max_bounces: self.max_bounces,
@@ -252,7 +253,7 @@ impl Pipeline<'_, '_> {
         self.monitor.cast(cast);
     }
 
-    /// Weighs the clusters by what a few paths of their own predict, of which those of the rounds are independent.
+    /// Weights the clusters by levels predicted from a few paths, which are independent of those of the rounds.
     fn weigh_by_prediction(&mut self, lights: &Emitters) -> Result<(), Termination> {
         let paths = self.budget.round_paths / PREDICTING;
         distribute_paths(&mut self.clusters, self.roles.len(), paths);
@@ -269,7 +270,7 @@ impl Pipeline<'_, '_> {
         Ok(())
     }
 
-    /// How large the relative standard errors of albedo are over the reflectors that enough pixels see.
+    /// The relative standard errors of albedo over reflectors that at least [`ENOUGH_PIXELS`] pixels see.
     fn reported(&self) -> Reported {
         let counted: Vec<usize> = (0..self.roles.len())
             .filter(|&k| self.roles[k].reflects())
@@ -293,23 +294,23 @@ impl Pipeline<'_, '_> {
     }
 }
 
-/// Relative standard errors of albedo: the median over objects, and what 95 of 100 stay below.
+/// Relative standard errors of albedo: median and 95th percentile over objects.
 struct Reported {
     all: [f64; 2],
-    /// The part of them that the noise of the paths makes.
+    /// The part due to path noise.
     of_paths: [f64; 2],
 }
 
 impl Reported {
-    /// Whether more paths would gain little: the error is small, or next to none of it is theirs.
+    /// Whether more paths would gain little: the error is below its target, or the part due to path noise is negligible.
     fn is_enough(&self, targets: [f64; 2]) -> bool {
         (0..2).all(|i| self.all[i] < targets[i] || self.of_paths[i] < self.all[i] * NEGLIGIBLE)
     }
 }
 
-/// Whether a step is so long that what is left of it to second order, about its square, is no longer small against the standard
-/// errors: albedos count in full, emissions relative to themselves. Lamps that are hardly known count not at all: light is linear
-/// in them, and what they multiply moves little with them.
+/// Whether a step's second-order term, about its square, is not small compared with the standard errors. Albedos count
+/// absolutely, emissions relatively. Badly determined lamps do not count: radiance is linear in them, and albedos depend little
+/// on them.
 fn is_nonlinear(from: &Unknowns, to: &Unknowns, errors: &StandardErrors) -> bool {
     let exceeds = |step: Vec3, size: Vec3, error: Vec3| {
         let known = error.cmpgt(Vec3::ZERO) & error.cmplt(Vec3::INFINITY);
@@ -343,15 +344,15 @@ mod tests {
             emission: vec![Vec3::INFINITY, Vec3::splat(0.01)],
         };
         let from = unknowns(0.5, 10.0);
-        // What is hardly known may move far, what is well known may not.
+        // Uncertain parameters may move far, certain ones may not.
         assert!(!is_nonlinear(&from, &unknowns(0.6, 10.0), &errors));
         errors.albedo[0] = Vec3::splat(0.003);
         assert!(is_nonlinear(&from, &unknowns(0.6, 10.0), &errors));
         assert!(!is_nonlinear(&from, &unknowns(0.51, 10.0), &errors));
-        // Lamps relative to themselves, in any unit.
+        // Emissions count relatively.
         assert!(!is_nonlinear(&from, &unknowns(0.5, 10.1), &errors));
         assert!(is_nonlinear(&from, &unknowns(0.5, 10.3), &errors));
-        // One that is hardly known may vanish.
+        // An uncertain lamp may vanish.
         errors.emission[1] = Vec3::splat(4.0);
         assert!(!is_nonlinear(&from, &unknowns(0.5, 0.0), &errors));
     }

@@ -1,4 +1,4 @@
-//! After textures were found: all colours and lamps once more, in the light as the textures send it on.
+//! Refits all albedos and lamps with the effect of the textures.
 
 use crate::inverse::fit::path_noise::distribute_paths;
 use crate::inverse::pipeline::Pipeline;
@@ -6,15 +6,14 @@ use crate::inverse::pipeline::textures::Detail;
 use crate::inverse::solver::Termination;
 use crate::math::stats::Moments;
 
-/// Held-out loss may rise by so many standard errors of the rise before what was found is taken back.
+/// Increase of the held-out loss, in standard errors, above which the refit is undone.
 const SIGNIFICANT: f64 = 2.0;
 
 impl Pipeline<'_, '_> {
-    /// Fits all rounds again to the photographs less what the textures change in them, which one set of paths tells; the
-    /// textures are shown scaled with their objects.
+    /// Fits the sum of all rounds again to the photographs minus the change by the textures, which is traced once. Textures are
+    /// scaled with the mean albedo of their objects.
     ///
-    /// The light that a printed poster sends to a wall, and what its border adds to the pixels of its frame, are otherwise
-    /// those of one mean colour.
+    /// Without this, the light from a textured object, and mixed pixels at its edges, would be those of its mean colour.
     pub(super) fn refit(&mut self) -> Result<(), Termination> {
         let detail = self.detail.clone();
         let texels = detail.as_ref().and_then(|d| d.refined.texels.clone());
@@ -35,7 +34,7 @@ impl Pipeline<'_, '_> {
             self.roles.len(),
             self.budget.round_paths,
         );
-        // What textures change is told against the single colours that they were found with.
+        // The change by textures is relative to the mean albedos that they were fitted with.
         let mut flat = self.unknowns.clone();
         for (k, albedo) in detail.albedo.iter().enumerate() {
             if texels.textured.get(k) == Some(&true) {
@@ -53,16 +52,16 @@ impl Pipeline<'_, '_> {
         self.describe();
 
         let after = self.held_out_each();
-        let mut rise = Moments::default();
+        let mut increase = Moments::default();
         for (before, after) in before.2.iter().zip(&after) {
-            rise.push(after - before);
+            increase.push(after - before);
         }
-        let kept = after.is_empty() || rise.mean <= SIGNIFICANT * rise.standard_error();
+        let kept = after.is_empty() || increase.mean <= SIGNIFICANT * increase.standard_error();
         if !kept {
             (self.unknowns, self.errors, self.detail) = (before.0.clone(), before.1, Some(detail));
             self.describe();
         }
-        let moved = (0..self.problem.scene.objects.len())
+        let change = (0..self.problem.scene.objects.len())
             .filter(|&k| self.roles[k].reflects())
             .map(|k| {
                 (self.unknowns.albedo[k] - before.0.albedo[k])
@@ -72,11 +71,13 @@ impl Pipeline<'_, '_> {
             .fold(0.0, f32::max);
         let why = match kept {
             true => {
-                format!("with the light that textures send on, albedos move by {moved:.3} at most")
+                format!(
+                    "with the light that textures reflect, albedos change by {change:.3} at most"
+                )
             }
             false => format!(
-                "held-out pixels get worse by {:.1} standard errors, so what was found before stays",
-                rise.mean / rise.standard_error()
+                "held-out pixels get worse by {:.1} standard errors, so the refit is undone",
+                increase.mean / increase.standard_error()
             ),
         };
         self.record("refit", started, kept, why)?;

@@ -1,4 +1,4 @@
-//! What the stages so far have found: all that the next stage starts from, and what a checkpoint holds.
+//! The state between stages, which a checkpoint stores.
 
 use crate::inverse::fit::errors::StandardErrors;
 use crate::inverse::fit::prior::{ExpectedAlbedo, Prior};
@@ -9,26 +9,26 @@ use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-/// The outcome of the finished stages.
+/// The result of the finished stages.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SolverState {
-    /// Stages finished.
+    /// Number of finished stages.
     pub stages: u32,
     /// Whether light comes from outside.
     pub open: bool,
-    /// How far away it comes from.
+    /// Distance of the outside light.
     #[serde(default)]
     pub surroundings: Surroundings,
-    /// What the light field said of the albedos, where that still counts.
+    /// Prior of the albedos, which may come from the light field.
     #[serde(default)]
     pub expected: Option<ExpectedAlbedo>,
-    /// What is expected of light from outside: mean and standard deviation by direction.
+    /// Prior of the outside light: mean and standard deviation by direction.
     pub directions: Vec<(Vec3, Vec3)>,
-    /// What each object is taken for.
+    /// Role of each surface.
     pub roles: Vec<Role>,
     /// Values of all unknowns.
     pub unknowns: Unknowns,
-    /// Variance of what the model lacks, relative to what surfaces reflect.
+    /// Variance of the model error, relative to reflected radiance.
     #[serde(default)]
     pub model_variance: f64,
     albedo_errors: Vec<[Option<f32>; 3]>,
@@ -39,7 +39,7 @@ pub struct SolverState {
 }
 
 impl SolverState {
-    /// Writes down what was found; an infinite error becomes `null`.
+    /// Stores the result of the stages; infinite errors become `null`.
     pub fn new(
         stages: u32,
         open: bool,
@@ -70,7 +70,7 @@ impl SolverState {
         }
     }
 
-    /// Whether it speaks of as many surfaces as there are, of which so many are directions outside.
+    /// Whether the sizes fit this number of surfaces, of which `outside` are outside directions.
     pub fn fits(&self, objects: usize, outside: usize) -> bool {
         self.roles.len() == objects
             && self.directions.len() == outside

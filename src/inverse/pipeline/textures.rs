@@ -1,4 +1,4 @@
-//! Albedo that varies over an object, where its pixels show more than one colour.
+//! The stage of textures.
 
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::sharpness::Sharpness;
@@ -12,29 +12,29 @@ use crate::transport::arrival::Cast;
 use glam::{DVec3, Vec3};
 use std::cell::Cell;
 
-/// Textures, and what they stand for in the fit of single colours.
+/// Textures, and their effect on the fit of mean albedos.
 #[derive(Debug, Clone)]
 pub(super) struct Detail {
-    /// What was found.
+    /// The textures.
     pub refined: Refined,
-    /// The single colours that it was found with, one an object.
+    /// The albedo of each object that they were fitted with.
     pub albedo: Vec<Vec3>,
-    /// By how much the textures change the radiance of each cluster; empty until that was traced.
+    /// Change of the radiance of each cluster by the textures; empty until it is traced.
     pub offsets: Vec<DVec3>,
 }
 
-/// No texture grows brighter or darker by more than this factor.
-const MOST: f32 = 1.5;
+/// Greatest factor by which a texture is scaled.
+const MAX_SCALE: f32 = 1.5;
 
 impl Detail {
-    /// What was found, the textures scaled as the single colours of their objects have changed since.
+    /// The textures scaled by the change of their objects' albedos since they were fitted.
     pub fn scaled_to(&self, albedo: &[Vec3], object_of: &[u32]) -> Refined {
         let factors: Vec<Vec3> = (albedo.iter().zip(&self.albedo))
             .map(|(new, old)| {
                 let known = old.cmpgt(Vec3::ZERO);
-                let grown = *new / Vec3::select(known, *old, Vec3::ONE);
-                let within = grown.clamp(Vec3::splat(1.0 / MOST), Vec3::splat(MOST));
-                Vec3::select(known, within, Vec3::ONE)
+                let ratio = *new / Vec3::select(known, *old, Vec3::ONE);
+                let scale = ratio.clamp(Vec3::splat(1.0 / MAX_SCALE), Vec3::splat(MAX_SCALE));
+                Vec3::select(known, scale, Vec3::ONE)
             })
             .collect();
         let mut scaled = self.refined.clone();
@@ -44,7 +44,7 @@ impl Detail {
 }
 
 impl Pipeline<'_, '_> {
-    /// Takes what the textures add out of the residuals, where that is known.
+    /// Subtracts the effect of the textures from the residuals, if it is traced.
     pub(super) fn leave_textures_out(&self, clusters: &mut [Linearised]) {
         let offsets = self.detail.iter().flat_map(|detail| &detail.offsets);
         for (cluster, &offset) in clusters.iter_mut().zip(offsets) {
@@ -52,13 +52,13 @@ impl Pipeline<'_, '_> {
         }
     }
 
-    /// Tries a texture on every object that reflects and gives no light.
+    /// Tries a texture on every reflector without a known albedo.
     pub(super) fn detail(&mut self) -> Result<(), Termination> {
         let started = self.monitor.seconds();
         self.monitor.phase("looking for textures");
         let objects: Vec<usize> = (0..self.problem.scene.objects.len())
             .filter(|&k| {
-                self.roles[k] == Role::Reflector && self.monitor.known.of(k).albedo.is_none()
+                self.roles[k] == Role::Reflector && self.monitor.known.object(k).albedo.is_none()
             })
             .collect();
         let unfitted = self.gbuffer.unfitted(self.problem.photographs.len());
@@ -102,7 +102,7 @@ impl Pipeline<'_, '_> {
         self.monitor.cast(judged.get());
         let mut why = refined.summary(|k| self.problem.scene.objects[k].name.clone());
         if ended.is_err() {
-            why.push_str("; ended before all were looked at as often as they should be");
+            why.push_str("; the stage ended early");
         }
         let kept = refined.texels.is_some();
         self.detail = Some(Detail {
@@ -111,7 +111,7 @@ impl Pipeline<'_, '_> {
             offsets: Vec::new(),
         });
         self.describe();
-        // Where time is up, the stage is still recorded.
+        // The stage is recorded even if it ended early.
         let recorded = self.record("textures", started, kept, why);
         ended.and(recorded.map(drop))
     }

@@ -1,4 +1,4 @@
-//! Tracing for the ladder: in slices, between which the observer hears, and within the memory that paths may take.
+//! Traces the paths of the pipeline in slices, with reports in between, and within the memory limit.
 
 use crate::calibrate::measured_radiance::MeasuredRadiance;
 use crate::inverse::estimate::TexelEstimate;
@@ -7,7 +7,7 @@ use crate::inverse::fit::prior::ALBEDO_MEAN;
 use crate::inverse::paths::clusters::{Cluster, cluster};
 use crate::inverse::paths::evaluate::Linearised;
 use crate::inverse::paths::memory::PILOT_CLUSTERS;
-use crate::inverse::paths::trace::{Tracer, longest_mean_path};
+use crate::inverse::paths::trace::{Tracer, max_mean_path_length};
 use crate::inverse::paths::{PathCache, memory};
 use crate::inverse::pipeline::Pipeline;
 use crate::inverse::roles::Role;
@@ -17,20 +17,21 @@ use crate::transport::emitters::Emitters;
 use glam::{DVec3, Vec3};
 use std::time::{Duration, Instant};
 
-/// Work between two reports to the observer.
+/// Target duration of a slice.
 const SLICE: Duration = Duration::from_millis(25);
-/// The paths of one slice take at most this part of the memory that stored ones may.
+/// Memory limit of stored paths over that of one slice.
 const SLICE_FRACTION: u64 = 8;
 
-/// Paths of some clusters, both sets.
+/// Number of paths of clusters, in both sets.
 fn paths(clusters: &[Cluster]) -> u64 {
-    let of = |c: &Cluster| 2 * u64::from(c.paths) * c.pixels.len() as u64;
-    clusters.iter().map(of).sum()
+    (clusters.iter())
+        .map(|c| 2 * u64::from(c.paths) * c.pixels.len() as u64)
+        .sum()
 }
 
 impl Pipeline<'_, '_> {
-    /// The clusters' paths, kept so that any unknowns can be tried on them: about as many as asked for, fewer where they
-    /// would take more memory than they may, and what is to be said of that.
+    /// Traces and stores about `paths` paths of the clusters, fewer if memory does not suffice. Also returns a remark on that, or
+    /// an empty string.
     pub(super) fn stored(
         &mut self,
         lights: &Emitters,
@@ -41,21 +42,25 @@ impl Pipeline<'_, '_> {
         let allowed = memory::allowed(self.monitor.settings.memory);
         let surfaces = self.roles.len();
         let mut fits = paths;
-        let believed = self.believed();
-        if !memory::suffices(allowed, paths, longest_mean_path(self.brightest(&believed))) {
-            // A few paths of the same kind tell how long they are.
+        let expected = self.expected_albedo();
+        if !memory::suffices(
+            allowed,
+            paths,
+            max_mean_path_length(self.max_albedo(&expected)),
+        ) {
+            // A pilot measures the mean length of these paths.
             distribute_paths(&mut self.clusters, surfaces, 0);
             let step = self.clusters.len().div_ceil(PILOT_CLUSTERS).max(1);
             let pilot: Vec<_> = self.clusters.iter().step_by(step).cloned().collect();
             let pilot = self
-                .tracer(lights, measured, &believed, stage, 0)
+                .tracer(lights, measured, &expected, stage, 0)
                 .trace(&pilot, &self.widths);
             self.monitor.cast(pilot.cast);
             fits = paths.min(memory::paths_that_fit(allowed, &pilot));
         }
         let pixels: usize = self.clusters.iter().map(|c| c.pixels.len()).sum();
         if fits < 2 * pixels as u64 {
-            // A pixel has a path in each set; there is no room for that.
+            // There is not room for a path per pixel in each set, so pixels are reduced.
             let pixels = (fits / 2).min(self.budget.pixels as u64);
             self.clusters = cluster(self.problem, &self.gbuffer, pixels as usize);
         }
@@ -72,8 +77,8 @@ impl Pipeline<'_, '_> {
         Ok((cache, limit))
     }
 
-    /// The clusters' levels as paths predict them, where each albedo is as high as it may well be: what was taken for black
-    /// by mistake would else weigh as if its photographs had no noise.
+    /// The clusters' levels predicted by paths, with each albedo raised by its standard error: objects wrongly estimated as black
+    /// would otherwise get too much weight.
     pub(super) fn levels(
         &mut self,
         lights: &Emitters,
@@ -92,7 +97,7 @@ impl Pipeline<'_, '_> {
         Ok(all)
     }
 
-    /// By how much the textures found change the radiance of each cluster from that of some unknowns.
+    /// Change of the radiance of each cluster by textures, relative to the albedos of `unknowns`.
     pub(super) fn texture_offsets(
         &mut self,
         lights: &Emitters,
@@ -107,7 +112,7 @@ impl Pipeline<'_, '_> {
         Ok(all)
     }
 
-    /// The clusters' paths linearised about some unknowns and forgotten; `places` maps parameters to rows.
+    /// Traces the clusters' paths and linearises them about given unknowns, without storing them; `places` maps parameters to rows.
     pub(super) fn linearised(
         &mut self,
         lights: &Emitters,
@@ -124,7 +129,7 @@ impl Pipeline<'_, '_> {
         Ok(all)
     }
 
-    /// Traces the clusters' paths in slices, reporting between them.
+    /// Traces the clusters' paths in slices, with reports in between; `take` receives the slices in order.
     fn slices(
         &mut self,
         lights: &Emitters,
@@ -133,25 +138,25 @@ impl Pipeline<'_, '_> {
         round: u32,
         mut take: impl FnMut(PathCache),
     ) -> Result<(), Termination> {
-        let believed = self.believed();
-        let most = memory::allowed(self.monitor.settings.memory) / SLICE_FRACTION;
-        let longest = longest_mean_path(self.brightest(&believed));
+        let expected = self.expected_albedo();
+        let allowed = memory::allowed(self.monitor.settings.memory) / SLICE_FRACTION;
+        let vertices = max_mean_path_length(self.max_albedo(&expected));
         let mut next = 0;
         let mut slice = 16;
         while next < self.clusters.len() {
             let mut end = (next + slice).min(self.clusters.len());
             while end > next + 1
-                && !memory::suffices(most, paths(&self.clusters[next..end]), longest)
+                && !memory::suffices(allowed, paths(&self.clusters[next..end]), vertices)
             {
                 end = next + (end - next) / 2;
             }
-            let begun = Instant::now();
+            let started = Instant::now();
             let traced = self
-                .tracer(lights, measured, &believed, stage, round)
+                .tracer(lights, measured, &expected, stage, round)
                 .trace(&self.clusters[next..end], &self.widths);
             self.monitor.cast(traced.cast);
             take(traced);
-            let elapsed = begun.elapsed();
+            let elapsed = started.elapsed();
             self.monitor
                 .tick(&self.estimate, &|_| self.checkpoint.clone())?;
             slice = if elapsed > SLICE {
@@ -164,8 +169,8 @@ impl Pipeline<'_, '_> {
         Ok(())
     }
 
-    /// For each surface, the largest channel of its albedo as believed now; of a lamp, whose own is left out, what may be.
-    fn believed(&self) -> Vec<f32> {
+    /// For each surface, the largest channel of its present albedo, and the prior's mean for emitters, whose albedo is unknown.
+    fn expected_albedo(&self) -> Vec<f32> {
         let albedo = self.unknowns.albedo.iter().zip(&self.roles);
         albedo
             .map(|(albedo, role)| match role {
@@ -175,11 +180,11 @@ impl Pipeline<'_, '_> {
             .collect()
     }
 
-    /// The largest albedo of any surface as believed; what has a lobe may reflect all light at a grazing angle.
-    fn brightest(&self, believed: &[f32]) -> f32 {
+    /// The largest expected albedo; 1 if there are lobes, which may reflect all light at grazing angles.
+    fn max_albedo(&self, expected: &[f32]) -> f32 {
         match self.lobes.iter().any(Option::is_some) {
             true => 1.0,
-            false => believed.iter().copied().fold(0.0, f32::max),
+            false => expected.iter().copied().fold(0.0, f32::max),
         }
     }
 
@@ -187,7 +192,7 @@ impl Pipeline<'_, '_> {
         &'t self,
         lights: &'t Emitters,
         measured: Option<&'t MeasuredRadiance>,
-        believed: &'t [f32],
+        expected_albedo: &'t [f32],
         stage: u64,
         round: u32,
     ) -> Tracer<'t> {
@@ -196,7 +201,7 @@ impl Pipeline<'_, '_> {
             lights,
             measured,
             surface_of: &self.problem.scene.object_of,
-            believed_albedo: believed,
+            expected_albedo,
             texels: self.estimate.texels.as_deref(),
             lobes: &self.lobes,
             patches: Some(&self.patches),

@@ -1,11 +1,11 @@
-//! Lamps that no photograph sees, found by what they do to the room.
+//! Finds lamps that no photograph sees, by their effect on the room.
 //!
-//! The light field says what leaves a surface out of sight, and not whether it is its own light or another's that it reflects.
-//! Paths that go all the way to a lamp tell: with the right one all albedos fall into place. Each object out of sight is a
-//! candidate. Those that a linear step promises most of are tried, each with paths of its own and with all else fitted anew; the
-//! one that leaves least of the photographs unexplained is taken, and so on until none makes a difference that is sure.
+//! The light field determines the exitant radiance of an unseen surface, but not whether it is emitted or reflected. Full paths
+//! do: only the right lamps explain the photographs with consistent albedos. All unseen objects are candidates. Those with the
+//! best score tests are tried, each with its own paths and a refit of everything. The one with the smallest residuals is
+//! accepted, and the search is repeated until no candidate reduces the residuals significantly.
 
-use crate::inverse::fit::errors::{Released, release};
+use crate::inverse::fit::errors::{ScoreTest, score_tests};
 use crate::inverse::fit::gauss_newton::Fit;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::paths::PathCache;
@@ -19,39 +19,39 @@ use crate::math::stats::Moments;
 use crate::transport::emitters::Emitters;
 use glam::Vec3;
 
-/// Lamps out of sight at most.
+/// Greatest number of unseen lamps.
 const MAX_LAMPS: usize = 24;
-/// So many candidates are tried at first by either of two tests, and later, when the light is about known, ...
+/// Greatest number of candidates tried per score test: in the first iteration, which has two tests, and later.
 const MAX_TRIED: [usize; 2] = [4, 2];
-/// ... of those that promise at least this part of the most.
+/// Least gain of a candidate, relative to the best one.
 const PROMISING: f64 = 0.2;
-/// A lamp must make residuals smaller by so many standard errors of the mean over all clusters.
-const SURE: f64 = 5.0;
-/// The search takes this part of the paths of a round, and each that is tried as much again.
-const PART: u64 = 4;
+/// Least decrease of the mean residual over clusters, in standard errors.
+const MIN_DECREASE: f64 = 5.0;
+/// Paths of a round over the paths of the search, and of each trial.
+const PATHS_DIVISOR: u64 = 4;
 
-/// Light from one more object, with all else fitted to it.
+/// A set of lamps with everything fitted to it.
 struct Hypothesis {
     cache: PathCache,
     fitted: Fit,
-    /// What each cluster's residual is in the end, relative to its level.
+    /// Absolute residual of each cluster, relative to its level.
     residuals: Vec<f64>,
 }
 
 impl Hypothesis {
-    /// By how much residuals fall to those of another, if that is sure.
-    fn surely_falls_to(&self, other: &Self) -> Option<f64> {
-        let mut fall = Moments::default();
+    /// Decrease of the mean residual from this hypothesis to another one, if it is significant.
+    fn decrease_to(&self, other: &Self) -> Option<f64> {
+        let mut decrease = Moments::default();
         for (before, after) in self.residuals.iter().zip(&other.residuals) {
-            fall.push(before - after);
+            decrease.push(before - after);
         }
-        (fall.mean > SURE * fall.standard_error()).then_some(fall.mean)
+        (decrease.mean > MIN_DECREASE * decrease.standard_error()).then_some(decrease.mean)
     }
 }
 
 impl Pipeline<'_, '_> {
-    /// Looks for lamps out of sight anew, as if the light field had said nothing of them; what it said stays where that explains
-    /// the photographs as well.
+    /// Searches for unseen lamps from scratch, without those of the light field. The lamps of the light field are kept unless the
+    /// new ones are significantly better.
     pub(super) fn search_anew(&mut self) -> Result<(), Termination> {
         let by_light_field: Vec<usize> = (0..self.problem.scene.objects.len())
             .filter(|&k| self.roles[k] == Role::Unseen && !self.emission_is_known(k))
@@ -61,21 +61,21 @@ impl Pipeline<'_, '_> {
             return Ok(());
         }
         let before = (self.roles.clone(), self.unknowns.clone());
-        let paths = self.budget.round_paths / PART;
+        let paths = self.budget.round_paths / PATHS_DIVISOR;
         self.monitor.phase("looking for lamps out of sight");
-        let said = self.hypothesis(paths)?;
+        let light_field = self.hypothesis(paths)?;
         for &k in &by_light_field {
             self.roles[k] = Role::Dark;
             self.unknowns.emission[k] = Vec3::ZERO;
         }
         let found = self.search_unseen(true)?;
-        if !found || said.surely_falls_to(&self.hypothesis(paths)?).is_none() {
+        if !found || light_field.decrease_to(&self.hypothesis(paths)?).is_none() {
             (self.roles, self.unknowns) = before;
         }
         Ok(())
     }
 
-    /// Looks for lamps out of sight, `anew` as long as nothing is known of them; says whether one was found.
+    /// Searches for more unseen lamps; `anew` if none is known yet. Returns whether one was found.
     pub(super) fn search_unseen(&mut self, anew: bool) -> Result<bool, Termination> {
         let dark = |k: usize| self.roles[k] == Role::Dark && !self.emission_is_known(k);
         let mut candidates: Vec<usize> = (0..self.problem.scene.objects.len())
@@ -85,49 +85,49 @@ impl Pipeline<'_, '_> {
             return Ok(false);
         }
         self.monitor.phase("looking for lamps out of sight");
-        let paths = self.budget.round_paths / PART;
-        // As many light samples for candidates as for lamps: a bulb would else get none.
+        let paths = self.budget.round_paths / PATHS_DIVISOR;
+        // Half of the light samples are spread over the candidates.
         let weights = self.spread(self.light_weights(), &candidates, 1.0);
         let lights = Emitters::new(&self.problem.scene, &weights);
         let (explored, _) = self.stored(&lights, None, 5, paths)?;
         self.robust = RobustWeights::even(self.roles.len());
         let is_dark = self.unknowns.emission.iter().all(|&e| e == Vec3::ZERO);
         let mut found = false;
-        for turn in 0..MAX_LAMPS {
-            let promising = self.promising(&explored, &candidates, anew && turn == 0);
+        for iteration in 0..MAX_LAMPS {
+            let promising = self.promising(&explored, &candidates, anew && iteration == 0);
             if promising.is_empty() {
                 break;
             }
-            let begun = self.unknowns.clone();
-            let now = self.hypothesis(paths)?;
-            // A room without any lamp is fitted by absurd albedos; those of the light field are better to begin with.
-            self.unknowns = match is_dark && turn == 0 {
-                true => begun.clone(),
-                false => now.fitted.unknowns.clone(),
+            let start = self.unknowns.clone();
+            let present = self.hypothesis(paths)?;
+            // The fit of a room without lamps has absurd albedos; those of the light field are better start values.
+            self.unknowns = match is_dark && iteration == 0 {
+                true => start.clone(),
+                false => present.fitted.unknowns.clone(),
             };
-            let Some((k, best)) = self.best_of(&promising, &now, paths)? else {
-                self.unknowns = begun;
+            let Some((k, best)) = self.best_of(&promising, &present, paths)? else {
+                self.unknowns = start;
                 break;
             };
             found = true;
             candidates.retain(|&c| c != k);
             self.roles[k] = Role::Unseen;
-            // What is seen is judged in the new light.
+            // Classify the seen objects with the new lamp.
             self.settle_roles(&best.cache, best.fitted)?;
         }
         Ok(found)
     }
 
-    /// Candidates of which a linear step promises most, where light alone follows it, and where albedos do too.
+    /// The candidates with the best score tests: with all parameters active, and at first also with emissions alone.
     fn promising(
         &self,
         explored: &PathCache,
         candidates: &[usize],
         at_first: bool,
-    ) -> Vec<Released> {
+    ) -> Vec<ScoreTest> {
         let surfaces = self.roles.len();
         let max_tried = MAX_TRIED[usize::from(!at_first)];
-        let mut promising: Vec<Released> = Vec::new();
+        let mut promising: Vec<ScoreTest> = Vec::new();
         let all = self.free();
         let light = all.iter().copied().filter(|&i| i >= surfaces).collect();
         let tests = if at_first {
@@ -140,24 +140,25 @@ impl Pipeline<'_, '_> {
             free.extend(candidates.iter().map(|k| surfaces + k));
             let equations =
                 explored.normal_equations(&self.unknowns, &free, &self.robust, &self.prior);
-            let mut tests: Vec<Released> = (release(&equations, &free, active).into_iter())
+            let mut tests: Vec<ScoreTest> = (score_tests(&equations, &free, active).into_iter())
                 .filter(|test| test.significance() > SIGNIFICANT)
                 .collect();
             tests.sort_by(|a, b| b.gain().total_cmp(&a.gain()).then(a.index.cmp(&b.index)));
-            let most = tests.first().map_or(0.0, Released::gain);
+            let max_gain = tests.first().map_or(0.0, ScoreTest::gain);
             tests.truncate(max_tried);
-            let is_new = |test: &Released| promising.iter().all(|p| p.index != test.index);
-            tests.retain(|test| test.gain() > PROMISING * most && is_new(test));
+            let is_new = |test: &ScoreTest| promising.iter().all(|p| p.index != test.index);
+            tests.retain(|test| test.gain() > PROMISING * max_gain && is_new(test));
             promising.extend(tests);
         }
         promising
     }
 
-    /// Tries each of some candidates from the present unknowns on: the one that leaves least, if it surely leaves less than `now`.
+    /// Fits each candidate from the present unknowns; returns the one with the largest significant decrease of the residuals
+    /// relative to `present`.
     fn best_of(
         &mut self,
-        promising: &[Released],
-        now: &Hypothesis,
+        promising: &[ScoreTest],
+        present: &Hypothesis,
         paths: u64,
     ) -> Result<Option<(usize, Hypothesis)>, Termination> {
         let surfaces = self.roles.len();
@@ -168,28 +169,28 @@ impl Pipeline<'_, '_> {
             self.roles[k] = Role::Unseen;
             self.unknowns.emission[k] = Vec3::from_array(test.step.map(|s| s.max(0.0) as f32));
             let tried = self.hypothesis(paths)?;
-            if let Some(fall) = now.surely_falls_to(&tried)
-                && best.as_ref().is_none_or(|(most, ..)| fall > *most)
+            if let Some(decrease) = present.decrease_to(&tried)
+                && best.as_ref().is_none_or(|(max, ..)| decrease > *max)
             {
-                best = Some((fall, k, tried));
+                best = Some((decrease, k, tried));
             }
             (self.roles, self.unknowns) = before.clone();
         }
         Ok(best.map(|(_, k, tried)| (k, tried)))
     }
 
-    /// Paths to the present lamps, and all fitted to them.
+    /// Traces full paths with the present lamps, and fits everything to them.
     fn hypothesis(&mut self, paths: u64) -> Result<Hypothesis, Termination> {
         let lights = self.lights();
         let (cache, _) = self.stored(&lights, None, 6, paths)?;
         let fitted = self.fit(&cache)?;
-        let left = cache.residuals(&fitted.unknowns);
+        let clusters = cache.residuals(&fitted.unknowns);
         let size = |cluster: &Linearised| {
             let weight = cluster.weight_now();
             (weight.powf(0.5) * cluster.residual().abs()).element_sum()
         };
         Ok(Hypothesis {
-            residuals: left.iter().map(size).collect(),
+            residuals: clusters.iter().map(size).collect(),
             cache,
             fitted,
         })

@@ -1,45 +1,44 @@
-//! The cells of an object: parts of its surface that fraction one unknown albedo, as small as the pixels that see them.
+//! The cells of an object: parts of its surface with one unknown albedo each, about as large as the pixels that see them.
 //!
-//! Triangles larger than a pixel's footprint are cut into four again and again, where pixels see them finely enough;
-//! triangles much smaller than a footprint share a cell with their neighbours. Either way there are no more cells than
-//! a few for each pixel, however large or dense the mesh is.
+//! Triangles larger than a pixel's footprint are subdivided into four recursively. Triangles much smaller than a footprint share
+//! a cell with their neighbours. The number of cells is limited by the number of pixels, for any mesh.
 
-use crate::inverse::texture::look::{Landing, RAYS, SeenPixel};
+use crate::inverse::texture::look::{PixelHit, RAYS, SeenPixel};
 use crate::scene::Scene;
 use crate::scene::geometry::Hit;
 use glam::Vec3;
 use std::collections::HashMap;
 
-/// A part of a triangle is cut while at least so many pixels land on it.
+/// Least number of pixels on a part of a triangle that is subdivided.
 const MIN_PIXELS: usize = 2;
-/// A part is cut while its longest edge is longer than so many footprints.
+/// Least length of the longest edge of a part that is subdivided, in footprints.
 const EDGE_FOOTPRINTS: f32 = 1.25;
 /// Triangles whose longest edge is below this many footprints share cells.
 const SMALL_FOOTPRINTS: f32 = 0.5;
-/// A triangle is cut into at most so many parts for each pixel that it is seen by.
+/// Greatest number of parts of a triangle per pixel that sees it.
 const TEXELS_PER_PIXEL: usize = 16;
-/// Cuts at most.
+/// Greatest depth of subdivision.
 const MAX_CUTS: u8 = 10;
 
-/// One part of a triangle: its corners in barycentric coordinates (b1, b2) of the whole.
+/// A part of a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Piece {
     /// Triangle index.
     pub triangle: u32,
-    /// Its corners.
+    /// Its corners, in barycentric coordinates (b1, b2) of the triangle.
     pub corners: [[f32; 2]; 3],
 }
 
 /// A part of a surface with one albedo.
 #[derive(Debug, Clone, Default)]
 pub struct Cell {
-    /// Its middle.
+    /// Centroid.
     pub center: Vec3,
     /// Unit normal of the side that is seen.
     pub normal: Vec3,
-    /// Its width: the root of its area, in metres.
+    /// Square root of its area, in metres.
     pub size: f32,
-    /// What it is made of.
+    /// The parts of triangles that it consists of.
     pub pieces: Vec<Piece>,
 }
 
@@ -48,7 +47,7 @@ pub struct Cell {
 pub struct Cells {
     /// The cells.
     pub cells: Vec<Cell>,
-    /// Where each seen triangle's tree of cuts begins.
+    /// The root of each seen triangle's quadtree.
     roots: HashMap<u32, Root>,
     nodes: Vec<Node>,
 }
@@ -68,22 +67,22 @@ enum Node {
     Cut(u32),
 }
 
-/// The place and the footprint of a ray's landing within its triangle.
+/// Barycentric position within a part of a triangle, and footprint, of a ray's hit.
 type Spot = ([f32; 2], f32);
 
 impl Cells {
-    /// Cuts the triangles on which the pixels land, into cells `width` times as wide as what the pixels resolve.
+    /// Subdivides the triangles that the pixels see, into cells `width` times as wide as the pixels' footprints.
     pub fn new(scene: &Scene, pixels: &[SeenPixel], width: f32) -> Self {
-        let mut landings: Vec<Landing> = (pixels.iter().flat_map(|p| &p.landings))
-            .map(|&landing| Landing {
-                footprint: landing.footprint * width,
-                ..landing
+        let mut hits: Vec<PixelHit> = (pixels.iter().flat_map(|p| &p.hits))
+            .map(|&hit| PixelHit {
+                footprint: hit.footprint * width,
+                ..hit
             })
             .collect();
-        landings.sort_by_key(|l| l.hit.triangle);
+        hits.sort_by_key(|l| l.hit.triangle);
         let mut cells = Self::default();
         let mut shared = HashMap::new();
-        for group in landings.chunk_by(|a, b| a.hit.triangle == b.hit.triangle) {
+        for group in hits.chunk_by(|a, b| a.hit.triangle == b.hit.triangle) {
             cells.triangle(scene, group, &mut shared);
         }
         for cell in &mut cells.cells {
@@ -92,7 +91,7 @@ impl Cells {
         cells
     }
 
-    fn triangle(&mut self, scene: &Scene, group: &[Landing], shared: &mut HashMap<[i64; 5], u32>) {
+    fn triangle(&mut self, scene: &Scene, group: &[PixelHit], shared: &mut HashMap<[i64; 5], u32>) {
         let triangle = group[0].hit.triangle;
         let fronts = group.iter().filter(|l| l.front).count();
         let front = 2 * fronts >= group.len();
@@ -109,13 +108,13 @@ impl Cells {
         };
         let normal = scene.normals[triangle as usize] * if front { 1.0 } else { -1.0 };
 
-        // A small triangle joins the others around it that look the same way.
+        // Small triangles in one cube of space with the same dominant axis of the normal share a cell.
         if longest < SMALL_FOOTPRINTS * footprint {
             let scale = footprint.log2().floor();
-            let place = ((a + b + c) / (3.0 * scale.exp2())).floor();
+            let cube = ((a + b + c) / (3.0 * scale.exp2())).floor();
             let axis = normal.abs().max_position();
             let facing = 2 * axis as i64 + i64::from(normal[axis] < 0.0);
-            let [x, y, z] = place.to_array().map(|v| v as i64);
+            let [x, y, z] = cube.to_array().map(|v| v as i64);
             let cell = *shared
                 .entry([scale as i64, x, y, z, facing])
                 .or_insert_with(|| {
@@ -136,7 +135,7 @@ impl Cells {
             return;
         }
 
-        // A large one is cut for itself.
+        // A large triangle is subdivided.
         let max_parts = spots.len() / RAYS as usize * TEXELS_PER_PIXEL;
         let max_cuts = (max_parts.max(1).ilog2() / 2).min(u32::from(MAX_CUTS)) as u8;
         self.nodes.push(Node::Leaf(0));
@@ -144,7 +143,7 @@ impl Cells {
         self.roots.insert(triangle, Root { node, front, depth });
     }
 
-    /// Cuts a part of a triangle into four, or makes it a cell; returns how many cuts deep it went.
+    /// Subdivides a part of a triangle recursively, or makes it a cell; returns the depth.
     fn cut(
         &mut self,
         node: u32,
@@ -168,20 +167,20 @@ impl Cells {
         let first = self.nodes.len() as u32;
         self.nodes[node as usize] = Node::Cut(first);
         self.nodes.extend([Node::Leaf(0); 4]);
-        spots.sort_by_key(|(place, _)| child(*place).0);
+        spots.sort_by_key(|(position, _)| child(*position).0);
         let mut depth = 0;
         let mut rest = spots;
         for (quarter, part) in quarters(&piece).into_iter().enumerate() {
-            let count = rest.partition_point(|(place, _)| child(*place).0 <= quarter);
-            let (mine, others) = rest.split_at_mut(count);
-            for (place, _) in mine.iter_mut() {
-                *place = child(*place).1;
+            let count = rest.partition_point(|(position, _)| child(*position).0 <= quarter);
+            let (own, others) = rest.split_at_mut(count);
+            for (position, _) in own.iter_mut() {
+                *position = child(*position).1;
             }
             let below = self.cut(
                 first + quarter as u32,
                 part,
                 normal,
-                mine,
+                own,
                 longest * 0.5,
                 max_cuts - 1,
             );
@@ -191,28 +190,28 @@ impl Cells {
         depth
     }
 
-    /// The cell that a hit lies in; `None` on triangles that no pixel sees.
+    /// The cell of a hit; `None` on triangles that no pixel sees.
     pub fn locate(&self, hit: &Hit) -> Option<u32> {
         let mut node = self.roots.get(&hit.triangle)?.node;
-        let mut place = [hit.b1, hit.b2];
+        let mut position = [hit.b1, hit.b2];
         loop {
             match self.nodes[node as usize] {
                 Node::Leaf(cell) => return Some(cell),
                 Node::Cut(first) => {
-                    let (quarter, within) = child(place);
+                    let (quarter, within) = child(position);
                     node = first + quarter as u32;
-                    place = within;
+                    position = within;
                 }
             }
         }
     }
 
-    /// Whether the front of a triangle is the side that is seen; `None` where no pixel sees it.
+    /// Whether pixels see the front of a triangle; `None` if no pixel sees it.
     pub fn front(&self, triangle: u32) -> Option<bool> {
         self.roots.get(&triangle).map(|root| root.front)
     }
 
-    /// How often a triangle's smallest cell is cut; `None` where no pixel sees it.
+    /// Depth of subdivision of a triangle; `None` if no pixel sees it.
     pub fn depth(&self, triangle: u32) -> Option<u8> {
         self.roots.get(&triangle).map(|root| root.depth)
     }
@@ -224,7 +223,7 @@ impl Cells {
 }
 
 impl Cell {
-    /// Works out middle, normal and size from the pieces.
+    /// Sets centre, normal and size from the pieces.
     fn describe(&mut self, scene: &Scene) {
         let mut area = 0.0;
         for piece in &self.pieces {
@@ -245,20 +244,20 @@ impl Cell {
 }
 
 impl Piece {
-    /// Its corners in space.
+    /// Its corners in world space.
     pub fn corners(&self, scene: &Scene) -> [Vec3; 3] {
         let [a, b, c] = scene.corners(self.triangle);
         (self.corners).map(|[b1, b2]| a * (1.0 - b1 - b2) + b * b1 + c * b2)
     }
 
-    /// Barycentric (b1, b2) on the whole triangle of a point given within the piece.
+    /// Converts barycentric coordinates of the piece to those (b1, b2) of the triangle.
     pub fn within(&self, [u, v]: [f32; 2]) -> [f32; 2] {
         let [a, b, c] = self.corners;
         std::array::from_fn(|i| a[i] * (1.0 - u - v) + b[i] * u + c[i] * v)
     }
 }
 
-/// Which quarter of a triangle a point lies in (at corner 0, 1 or 2, or 3 in the middle), and where in it.
+/// The quarter of a triangle that a point lies in (0, 1, 2 at the corners, 3 in the middle), and its barycentric position within.
 fn child([b1, b2]: [f32; 2]) -> (usize, [f32; 2]) {
     if b1 >= 0.5 {
         (1, [2.0 * b1 - 1.0, 2.0 * b2])
@@ -271,7 +270,7 @@ fn child([b1, b2]: [f32; 2]) -> (usize, [f32; 2]) {
     }
 }
 
-/// The quarters of a piece, their corners in the order that [`child`] counts in.
+/// The quarters of a piece, in the order of [`child`].
 fn quarters(piece: &Piece) -> [Piece; 4] {
     let [a, b, c] = piece.corners;
     let middle = |p: [f32; 2], q: [f32; 2]| [(p[0] + q[0]) * 0.5, (p[1] + q[1]) * 0.5];

@@ -1,8 +1,8 @@
-//! Standard errors of a fitted texture, by drawing from what the fit leaves open.
+//! Standard errors of a fitted texture, from samples of its posterior.
 //!
-//! Linearised at the solution, fit and penalty are a Gaussian with the precision (Σ ω wwᵀ + penalties) / ν², where ν²
-//! is the variance that pixels left out of the fit show about it. Perturbing every measurement and every difference
-//! by its own noise and solving again draws from that Gaussian (Papandreou and Yuille 2010), so no inverse is needed.
+//! Linearised at the solution, the posterior is a Gaussian with the precision (Σ ω wwᵀ + penalties) / ν², where ν² is the
+//! variance of cross-validated pixels about the fit. Perturbing every measurement and every difference by its noise and solving
+//! again samples that Gaussian without an inverse (Papandreou and Yuille 2010).
 
 use crate::inverse::texture::fit::{Measurements, Texture};
 use crate::inverse::texture::fuse::{System, penalties};
@@ -12,12 +12,12 @@ use crate::math::rng::Stream;
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Draws; a standard deviation from so many, pooled with the neighbours', is known to about a tenth.
+/// Number of samples. Pooled with the neighbours', they give a standard deviation to 10 %.
 const DRAWS: u64 = 8;
 /// First of the sample keys of the draws.
 const KEY: u64 = 11 << 58;
 
-/// The standard error of each cell's albedo that the photographs' noise leaves.
+/// Standard error of each cell's albedo by the noise of the photographs.
 pub fn standard_errors(
     measurements: &Measurements,
     links: &Links,
@@ -49,13 +49,13 @@ pub fn standard_errors(
         }
     }
 
-    // Neighbours' variances are much alike, and pooled they are better known.
+    // Neighbours have similar variances, so these are pooled.
     let noise = texture.noise * unit;
     (0..count)
         .into_par_iter()
         .map(|cell| {
             let (mut sum, mut n) = (squares[cell], 1.0);
-            for (_, other) in links.of(cell) {
+            for (_, other) in links.neighbours(cell) {
                 sum += squares[other];
                 n += 1.0;
             }
@@ -73,18 +73,24 @@ fn perturbation(system: &System, seed: u64, object: usize, draw: u64) -> Vec<Vec
     let measured: Vec<Vec3> = (system.row_weights.par_iter().enumerate())
         .map(|(row, weight)| normal(0, row) / weight.max(Vec3::splat(f32::MIN_POSITIVE)).powf(0.5))
         .collect();
-    let mut right = system.observations.gathered(system.row_weights, &measured);
+    let mut right = system
+        .observations
+        .transpose_times(system.row_weights, &measured);
     for cell in 0..right.len() {
-        for (at, other) in system.links.of(cell).filter(|&(_, other)| other > cell) {
-            let pull = normal(1, at) * system.penalties[at].sqrt();
-            right[cell] += pull;
-            right[other] -= pull;
+        for (at, other) in system
+            .links
+            .neighbours(cell)
+            .filter(|&(_, other)| other > cell)
+        {
+            let noise = normal(1, at) * system.penalties[at].sqrt();
+            right[cell] += noise;
+            right[other] -= noise;
         }
     }
     right
 }
 
-/// The standard errors with those of the light added: of its smoothing and of the object's overall scale.
+/// Adds the `relative` standard error of the light, by its tracing and the object's overall scale, in quadrature.
 pub fn with_light(errors: &[Vec3], texture: &Texture, relative: Vec3) -> Vec<Vec3> {
     let pairs = errors.iter().zip(&texture.colors);
     pairs
@@ -95,7 +101,7 @@ pub fn with_light(errors: &[Vec3], texture: &Texture, relative: Vec3) -> Vec<Vec
         .collect()
 }
 
-/// The spread of a texture's colours: what is known of a place that no pixel sees.
+/// Standard deviation of a texture's colours about `mean`, which is the standard error of unseen texels.
 pub fn spread(colors: &[Vec3], mean: Vec3) -> Vec3 {
     let sum: Vec3 = colors.iter().map(|c| (*c - mean) * (*c - mean)).sum();
     let spread = (sum / colors.len().max(1) as f32).powf(0.5);

@@ -1,4 +1,4 @@
-//! The albedo of an object's cells from its pixels, smoothed as far as pixels left out of the fit ask for.
+//! Fits the albedo of an object's cells to its pixels, with the smoothing chosen by cross-validation.
 
 use crate::inverse::texture::fuse::{Problem, fuse, mean, mean_channel};
 use crate::inverse::texture::links::Links;
@@ -9,40 +9,42 @@ use crate::math::stats::quantile;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// So many pixels left out are enough to choose by.
+/// Number of cross-validated pixels that suffices; with more pixels fewer folds are used.
 const ENOUGH: usize = 4_000;
-/// The strongest smoothing tried, for one pixel a cell, and the factor to the next.
+/// The strongest smoothing that is tried, for one pixel per cell.
 const STRONGEST: f32 = 2.0;
+/// Ratio between consecutive strengths.
 const FACTOR: f32 = 0.5;
-/// The weakest, and how many worse ones in a row end the search.
+/// The weakest smoothing that is tried.
 const WEAKEST: f32 = 1e-3;
+/// Consecutive worse strengths that end the search.
 const PATIENCE: u32 = 3;
-/// Albedos are counted in the object's own luminance, but never in less than this.
+/// Albedos are relative to the luminance of the object's mean albedo, or to this if it is larger.
 const MIN_UNIT: f32 = 1e-4;
-/// Below this fraction of the object's median level, pixels weigh no more for being darker.
+/// Fraction of the object's median level below which weights stop growing.
 const DARK: f32 = 0.5;
-/// Light that a channel must receive, in means over the object's pixels.
+/// Least irradiance of a channel, relative to the mean luminance over the object's pixels.
 const MIN_LIGHT: f32 = 1e-6;
-/// Turns in which one colour and the lower bounds that it keeps are found.
-const BOUND_TURNS: u32 = 3;
-/// Squared residuals count up to so many times their median.
+/// Iterations over which lower bounds hold at the constant albedo.
+const BOUND_ITERATIONS: u32 = 3;
+/// Squared residuals are clamped to this multiple of their median.
 const CLIP: f64 = 30.0;
 
 /// The pixels of an object that are in the fit, as measurements of its albedo.
 #[derive(Debug, Clone)]
 pub struct Measurements {
-    /// Which cells each pixel sees.
+    /// The cells that each pixel sees.
     pub observations: Observations,
-    /// Measured radiance, less that of a lobe, over that of a white surface.
+    /// Albedo of each pixel: measured radiance, minus that of a lobe, over that of a white surface.
     pub albedo: Vec<Vec3>,
-    /// Weight of each channel of each: the squared radiance of a white surface over the pixel's variance, on average 1; zero
-    /// of lower bounds that the fit lies above.
+    /// Weight of each pixel and channel: the squared radiance of a white surface over the pixel's variance, scaled to a mean of
+    /// 1; zero for lower bounds that hold.
     pub weights: Vec<Vec3>,
-    /// Which are lower bounds, as their pixels are saturated.
+    /// Whether each pixel is saturated, and so a lower bound.
     bounds: Vec<bool>,
-    /// The fold of each.
+    /// The fold of each pixel.
     folds: Vec<usize>,
-    /// The weighted mean of `albedo`, from 0 to 1.
+    /// The best constant albedo, the weighted mean of `albedo`, from 0 to 1.
     pub constant: Vec3,
 }
 
@@ -51,25 +53,25 @@ pub struct Measurements {
 pub struct Texture {
     /// Albedo of each cell.
     pub colors: Vec<Vec3>,
-    /// Strength of the smoothing; `None` where one colour did best.
+    /// Strength of the smoothing; `None` if one colour was best.
     pub strength: Option<f32>,
-    /// The same without the pixels of a fold, for each fold that was left out in turn.
+    /// For each fold of the cross-validation, the colours fitted without it.
     pub without: Vec<Vec<Vec3>>,
-    /// Standard deviation of a pixel of weight 1 that was left out, about the fit, in units of the mean albedo.
+    /// Standard deviation of cross-validated pixels of weight 1 about the fit, in units of the mean albedo.
     pub noise: Vec3,
 }
 
 impl Measurements {
-    /// Of pixels and what their cells would send if they were white.
+    /// From pixels, and the radiance `white` of each cell with an albedo of one.
     pub fn new(pixels: &[&SeenPixel], observations: Observations, white: &[Vec3]) -> Self {
-        let irradiance: Vec<Vec3> = (observations.all_of(white).iter().zip(pixels))
+        let irradiance: Vec<Vec3> = (observations.values(white).iter().zip(pixels))
             .map(|(r, pixel)| *r * pixel.base)
             .collect();
-        // A channel whose light hardly reached a pixel's cells says nothing there, and weighs nothing.
+        // Channels with almost no irradiance have no weight.
         let whites: Vec<f32> = irradiance.iter().map(|r| luminance(*r)).collect();
-        let least = Vec3::splat((MIN_LIGHT * mean(&whites)).max(f32::MIN_POSITIVE));
+        let min = Vec3::splat((MIN_LIGHT * mean(&whites)).max(f32::MIN_POSITIVE));
         let irradiance: Vec<Vec3> = (irradiance.iter())
-            .map(|r| Vec3::select(r.cmpge(least), *r, Vec3::ZERO))
+            .map(|r| Vec3::select(r.cmpge(min), *r, Vec3::ZERO))
             .collect();
         let albedo: Vec<Vec3> = (pixels.iter().zip(&irradiance))
             .map(|(pixel, r)| {
@@ -77,7 +79,7 @@ impl Measurements {
                 Vec3::select(known, (pixel.measured - pixel.gloss) / *r, Vec3::ZERO)
             })
             .collect();
-        // Noise grows with the level, down to a floor, in each channel as in its light.
+        // The noise of a pixel is proportional to its level, down to a floor.
         let floor = Vec3::from_array([0, 1, 2].map(|channel| {
             let mut levels: Vec<f64> = (pixels.iter())
                 .map(|p| f64::from(p.measured[channel]))
@@ -100,20 +102,17 @@ impl Measurements {
         let first = weighted_mean(&albedo, &squares);
         let weights = weigh(weighted_mean(&albedo, &weigh(first)));
         let bounds: Vec<bool> = pixels.iter().map(|p| p.saturated).collect();
-        // One colour, below no bound: bounds that it comes to lie above have no say.
+        // The constant albedo, without the lower bounds that it meets.
         let mut constant = weighted_mean(&albedo, &weights);
-        for _ in 0..BOUND_TURNS {
+        for _ in 0..BOUND_ITERATIONS {
             let rows = albedo.iter().zip(&weights).zip(&bounds);
-            let told: Vec<Vec3> = (rows)
-                .map(|((a, w), bound)| {
-                    if *bound && is_kept(constant, *a, *w) {
-                        Vec3::ZERO
-                    } else {
-                        *w
-                    }
+            let active: Vec<Vec3> = (rows)
+                .map(|((a, w), bound)| match *bound && is_met(constant, *a, *w) {
+                    true => Vec3::ZERO,
+                    false => *w,
                 })
                 .collect();
-            constant = weighted_mean(&albedo, &told);
+            constant = weighted_mean(&albedo, &active);
         }
         Self {
             constant,
@@ -125,8 +124,8 @@ impl Measurements {
         }
     }
 
-    /// Fits the cells, with the smoothing that predicts pixels left out best, in so many folds at least; bounds that the fit
-    /// lies above lose their weight.
+    /// Fits the cells with the smoothing that predicts cross-validated pixels best, with at least `min_folds` folds. Lower bounds
+    /// that the fit meets lose their weight.
     pub fn fit(&mut self, links: &Links, min_folds: usize) -> Texture {
         let unit = self.unit();
         let values: Vec<Vec3> = self.albedo.iter().map(|a| *a / unit).collect();
@@ -145,7 +144,7 @@ impl Measurements {
             fuse(&problem, strength, start)
         };
 
-        // From strong to weak, until it is plainly past the best.
+        // From strong to weak smoothing.
         let mut colors: Vec<Vec<Vec3>> = vec![flat.clone(); folds];
         let clip = self.clip(&values, &flat);
         let mut best = (self.score(&values, &colors, clip), None, colors.clone());
@@ -196,40 +195,40 @@ impl Measurements {
         }
     }
 
-    /// The luminance that albedos are counted in.
+    /// The luminance that albedos are relative to.
     pub fn unit(&self) -> f32 {
         luminance(self.constant).max(MIN_UNIT)
     }
 
-    /// Weights with those of one fold at zero, and of the bounds that some colours lie above.
+    /// The weights, with those of one fold and of inactive rows set to zero.
     fn weights_at(&self, colors: &[Vec3], values: &[Vec3], without: Option<usize>) -> Vec<Vec3> {
         (0..values.len())
             .map(|row| {
-                let out = without == Some(self.folds[row]) || !self.tells(row, colors, values);
+                let out = without == Some(self.folds[row]) || !self.is_active(row, colors, values);
                 if out { Vec3::ZERO } else { self.weights[row] }
             })
             .collect()
     }
 
-    /// Whether a row says something of some colours: a bound does not to those above it.
-    fn tells(&self, row: usize, colors: &[Vec3], values: &[Vec3]) -> bool {
+    /// Whether a row constrains the given colours: lower bounds that are met do not.
+    fn is_active(&self, row: usize, colors: &[Vec3], values: &[Vec3]) -> bool {
         !self.bounds[row]
-            || !is_kept(
-                self.observations.of(row, colors),
+            || !is_met(
+                self.observations.value(row, colors),
                 values[row],
                 self.weights[row],
             )
     }
 
-    /// Mean squared residual of the pixels left out, each by the colours that were fitted without it; none of bounds that
-    /// these lie above.
+    /// Mean squared residual of the cross-validated pixels, each for the colours fitted without it; zero for lower bounds that are
+    /// met.
     fn score(&self, values: &[Vec3], colors: &[Vec<Vec3>], clip: f64) -> f64 {
         let (mut sum, mut count) = (0.0, 0u64);
         for (row, value) in values.iter().enumerate() {
             if let Some(colors) = colors.get(self.folds[row]) {
-                let residual = *value - self.observations.of(row, colors);
+                let residual = *value - self.observations.value(row, colors);
                 let square = f64::from((residual * residual).dot(self.weights[row]));
-                if self.tells(row, colors, values) {
+                if self.is_active(row, colors, values) {
                     sum += square.min(clip);
                 }
                 count += 1;
@@ -238,13 +237,13 @@ impl Measurements {
         sum / count.max(1) as f64
     }
 
-    /// Root mean square weighted residual of the pixels left out, per channel.
+    /// Root mean square weighted residual of the cross-validated pixels, per channel.
     fn noise(&self, values: &[Vec3], colors: &[Vec<Vec3>]) -> Vec3 {
         let (mut sum, mut count) = (DVec3::ZERO, 0u64);
         for (row, value) in values.iter().enumerate() {
             let colors = colors.get(self.folds[row]);
-            if let Some(colors) = colors.filter(|c| self.tells(row, c, values)) {
-                let residual = (*value - self.observations.of(row, colors)).as_dvec3();
+            if let Some(colors) = colors.filter(|c| self.is_active(row, c, values)) {
+                let residual = (*value - self.observations.value(row, colors)).as_dvec3();
                 sum += residual * residual * self.weights[row].as_dvec3();
                 count += 1;
             }
@@ -252,10 +251,11 @@ impl Measurements {
         (sum / count.max(1) as f64).powf(0.5).as_vec3()
     }
 
+    /// Greatest squared residual that counts: [`CLIP`] times the median for the colours `flat`.
     fn clip(&self, values: &[Vec3], flat: &[Vec3]) -> f64 {
         let mut squares: Vec<f64> = (0..values.len())
             .map(|row| {
-                let residual = values[row] - self.observations.of(row, flat);
+                let residual = values[row] - self.observations.value(row, flat);
                 f64::from((residual * residual).dot(self.weights[row]))
             })
             .collect();
@@ -263,13 +263,13 @@ impl Measurements {
     }
 }
 
-/// Whether what a surface of some albedo sends lies above a lower bound, given as an albedo too.
-fn is_kept(albedo: Vec3, bound: Vec3, weight: Vec3) -> bool {
+/// Whether the luminance of a surface is at least a lower bound; both are given as albedos.
+fn is_met(albedo: Vec3, bound: Vec3, weight: Vec3) -> bool {
     let irradiance = weight.powf(0.5);
     luminance(albedo * irradiance) >= luminance(bound * irradiance)
 }
 
-/// The mean of each channel, within 0 and 1; zero where nothing weighs.
+/// The weighted mean of each channel, clamped to [0, 1]; zero without weight.
 fn weighted_mean(values: &[Vec3], weights: &[Vec3]) -> Vec3 {
     let (mut sum, mut total) = (DVec3::ZERO, DVec3::ZERO);
     for (value, weight) in values.iter().zip(weights) {
@@ -285,21 +285,26 @@ fn weighted_mean(values: &[Vec3], weights: &[Vec3]) -> Vec3 {
 mod tests {
     use super::*;
 
-    #[test]
-    fn pixels_that_no_light_reaches_have_no_say_and_leave_all_finite() {
-        let pixel = |index: u32| SeenPixel {
+    fn pixel(index: u32, measured: Vec3, saturated: bool) -> SeenPixel {
+        SeenPixel {
             frame: 0,
             pixel: index,
             held_out: false,
-            measured: Vec3::splat(0.3),
-            saturated: false,
+            measured,
+            saturated,
             fold: index as usize % FOLDS,
             weight: 1.0,
             base: 1.0,
             gloss: Vec3::ZERO,
-            landings: Vec::new(),
-        };
-        let pixels: Vec<SeenPixel> = (0..20).map(pixel).collect();
+            hits: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn pixels_that_no_light_reaches_have_no_say_and_leave_all_finite() {
+        let pixels: Vec<SeenPixel> = (0..20)
+            .map(|index| pixel(index, Vec3::splat(0.3), false))
+            .collect();
         let seen: Vec<&SeenPixel> = pixels.iter().collect();
         let rows = |cell: fn(u32) -> u32| -> Vec<Vec<(u32, f32)>> {
             (0..20).map(|i| vec![(cell(i), 1.0)]).collect()
@@ -315,28 +320,19 @@ mod tests {
         assert_eq!(dark.constant, Vec3::ZERO);
     }
 
-    /// The light of one channel reaches a few pixels only by the noise of paths: what it would make of the others says nothing.
+    /// A few pixels have almost no irradiance in one channel; dividing by it must not spoil the mean.
     #[test]
     fn a_channel_without_light_does_not_spoil_the_colour() {
         let truth = Vec3::new(0.2, 0.5, 0.3);
         let white = |cell: usize| Vec3::new(1.0, 0.8, if cell < 90 { 0.4 } else { 1e-8 });
-        let pixel = |index: u32| SeenPixel {
-            frame: 0,
-            pixel: index,
-            held_out: false,
-            // Some light that no path found comes besides.
-            measured: truth * white(index as usize) + 1e-3,
-            saturated: index >= 95,
-            fold: index as usize % FOLDS,
-            weight: 1.0,
-            base: 1.0,
-            gloss: Vec3::ZERO,
-            landings: Vec::new(),
-        };
-        let pixels: Vec<SeenPixel> = (0..100).map(pixel).collect();
+        // Plus some light that the paths missed.
+        let measured = |index: u32| truth * white(index as usize) + 1e-3;
+        let pixels: Vec<SeenPixel> = (0..100)
+            .map(|index| pixel(index, measured(index), index >= 95))
+            .collect();
         let seen: Vec<&SeenPixel> = pixels.iter().collect();
         let light: Vec<Vec3> = (0..100).map(white).collect();
-        let found = Measurements::new(&seen, Observations::of_each(100), &light);
+        let found = Measurements::new(&seen, Observations::one_per_cell(100), &light);
         assert!(
             (found.constant - truth).length() < 0.01,
             "{}",
@@ -344,29 +340,18 @@ mod tests {
         );
         let weight = found.weights[0];
         assert!(found.weights[95].z < 1e-10 && weight.z > 0.0 && weight.x > weight.z);
-        // What saturates lies above the bound, however little of one channel arrives.
+        // The lower bound is met in spite of the channel without irradiance.
         let bound = (found.albedo[95], found.weights[95]);
-        assert!(is_kept(truth * 1.1, bound.0, bound.1));
+        assert!(is_met(truth * 1.1, bound.0, bound.1));
     }
 
-    /// Half of a surface whose albedo is known is saturated in other photographs, which changes nothing; of another part all
-    /// but a few stray dark pixels are saturated, which keeps it bright.
+    /// Saturated pixels below the measured albedo of a cell change nothing. In another cell all but a few dark outliers are
+    /// saturated, which keeps it bright.
     #[test]
     fn saturated_pixels_are_lower_bounds() {
         let part = |cell: u32, count: u32, measured: f32, saturated: bool| {
             (0..count).map(move |i| {
-                let pixel = SeenPixel {
-                    frame: cell,
-                    pixel: 2 * i + u32::from(saturated),
-                    held_out: false,
-                    measured: Vec3::splat(measured),
-                    saturated,
-                    fold: i as usize % FOLDS,
-                    weight: 1.0,
-                    base: 1.0,
-                    gloss: Vec3::ZERO,
-                    landings: Vec::new(),
-                };
+                let pixel = pixel(i, Vec3::splat(measured), saturated);
                 (pixel, vec![(cell, 1.0)])
             })
         };

@@ -1,44 +1,44 @@
-//! Colours of cells from noisy measurements: least squares with a total-variation penalty on a graph of neighbours,
-//! which pools what belongs together and keeps edges (the fused lasso on a graph).
+//! Colours of cells from noisy measurements: least squares with a total-variation penalty on the graph of neighbours, which
+//! smooths but keeps edges (the fused lasso on a graph).
 //!
 //! Minimises ½ Σ ω ‖y − Σ w x‖² + λ Σ b φ(‖xᵢ − xⱼ‖ / l) over pairs of neighbours with common border b and mean level l,
-//! where φ is Huber's: quadratic up to [`FLAT`], linear beyond. Colours change together, so edges lie at the same place
-//! in all channels. Solved by iteratively reweighted least squares with preconditioned conjugate gradients.
+//! where φ is Huber's: quadratic up to [`FLAT`], linear beyond. The norm couples the channels, so that edges coincide in all of
+//! them. Solved by iteratively reweighted least squares with preconditioned conjugate gradients.
 
 use crate::inverse::texture::links::Links;
 use crate::inverse::texture::observations::Observations;
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Differences below this fraction of the level count as gradients rather than as edges.
+/// Relative differences below this are penalised quadratically, as gradients instead of edges.
 pub const FLAT: f32 = 0.02;
-/// Reweightings at most.
-const REWEIGHTINGS: u32 = 5;
-/// Steps of conjugate gradients in each.
-const STEPS: u32 = 12;
-/// The iteration stands when the root mean square change is below this.
-const STANDING: f64 = 1e-3;
-/// Weight, in mean observations, that pulls every cell to where it started, so that none is without an answer.
+/// Greatest number of reweighted solves.
+const MAX_REWEIGHTINGS: u32 = 5;
+/// Greatest number of conjugate gradient iterations in each.
+const MAX_STEPS: u32 = 12;
+/// Root mean square change of the colours below which the iteration ends.
+const CONVERGED: f64 = 1e-3;
+/// Weight of the start values, relative to the mean weight of the observations; it makes the system definite.
 const TETHER: f32 = 1e-5;
 /// Terms added up by one thread.
 const CHUNK: usize = 4096;
 
-/// What is measured, and how far neighbours may differ.
+/// The measurements and the penalty of a fit.
 #[derive(Clone, Copy)]
 pub struct Problem<'a> {
-    /// Which cells each measurement sees.
+    /// The weights w of cells in each measurement.
     pub observations: &'a Observations,
     /// ω of each measurement, per channel.
     pub weights: &'a [Vec3],
     /// y of each measurement.
     pub values: &'a [Vec3],
-    /// The neighbours.
+    /// The graph of neighbours.
     pub links: &'a Links,
-    /// For each cell, the level against which differences count.
+    /// The level l of each cell, to which differences are relative.
     pub levels: &'a [f32],
 }
 
-/// Finds the colours for one strength λ of the penalty, starting from `start`.
+/// Finds the colours for the strength λ of the penalty, starting from `start`.
 pub fn fuse(problem: &Problem, strength: f32, start: &[Vec3]) -> Vec<Vec3> {
     let Problem {
         observations,
@@ -49,12 +49,12 @@ pub fn fuse(problem: &Problem, strength: f32, start: &[Vec3]) -> Vec<Vec3> {
     } = *problem;
     let data = observations.diagonal(row_weights);
     let tether = TETHER * mean_channel(&data).max(f32::MIN_POSITIVE);
-    let mut right = observations.gathered(row_weights, values);
+    let mut right = observations.transpose_times(row_weights, values);
     for (r, s) in right.iter_mut().zip(start) {
         *r += *s * tether;
     }
     let mut colors = start.to_vec();
-    for _ in 0..REWEIGHTINGS {
+    for _ in 0..MAX_REWEIGHTINGS {
         let system = System {
             observations,
             row_weights,
@@ -65,7 +65,7 @@ pub fn fuse(problem: &Problem, strength: f32, start: &[Vec3]) -> Vec<Vec3> {
         let before = colors.clone();
         system.solve(&data, &right, &mut colors);
         let change: f64 = sum(&colors, &before, |a, b| f64::from((a - b).length_squared()));
-        if change <= STANDING * STANDING * colors.len() as f64 {
+        if change <= CONVERGED * CONVERGED * colors.len() as f64 {
             break;
         }
     }
@@ -78,7 +78,7 @@ pub fn penalties(links: &Links, levels: &[f32], strength: f32, colors: &[Vec3]) 
         .into_par_iter()
         .map(|cell| {
             links
-                .of(cell)
+                .neighbours(cell)
                 .map(|(at, other)| {
                     let difference = (colors[cell] - colors[other]).length();
                     let level = 0.5 * (levels[cell] + levels[other]);
@@ -92,20 +92,20 @@ pub fn penalties(links: &Links, levels: &[f32], strength: f32, colors: &[Vec3]) 
 
 /// The normal equations of one reweighting.
 pub struct System<'a> {
-    /// What is measured.
+    /// The weights of cells in each measurement.
     pub observations: &'a Observations,
-    /// ω of each row, per channel.
+    /// ω of each measurement, per channel.
     pub row_weights: &'a [Vec3],
-    /// The neighbours.
+    /// The graph of neighbours.
     pub links: &'a Links,
     /// The weight of each link's squared difference.
     pub penalties: Vec<f32>,
-    /// The weight that pulls every cell to where it started.
+    /// The weight of the start values.
     pub tether: f32,
 }
 
 impl System<'_> {
-    /// Solves for the right-hand side by conjugate gradients, from `colors` on.
+    /// Solves for the right-hand side by conjugate gradients, starting at `colors`; `data` is the diagonal of the data term.
     pub fn solve(&self, data: &[Vec3], right: &[Vec3], colors: &mut [Vec3]) {
         let scale: Vec<Vec3> = (0..colors.len())
             .into_par_iter()
@@ -125,7 +125,7 @@ impl System<'_> {
         let mut direction = z.clone();
         let mut rz = dot(&residual, &z);
         let goal = rz * 1e-4;
-        for _ in 0..STEPS {
+        for _ in 0..MAX_STEPS {
             if !(rz > goal && rz > 0.0) {
                 break;
             }
@@ -152,14 +152,14 @@ impl System<'_> {
     }
 
     fn apply(&self, x: &[Vec3]) -> Vec<Vec3> {
-        let seen = self.observations.all_of(x);
+        let measured = self.observations.values(x);
         (0..x.len())
             .into_par_iter()
             .map(|cell| {
                 let data: Vec3 = (self.observations.column(cell))
-                    .map(|(row, w)| seen[row] * self.row_weights[row] * w)
+                    .map(|(row, w)| measured[row] * self.row_weights[row] * w)
                     .sum();
-                let smooth: Vec3 = (self.links.of(cell))
+                let smooth: Vec3 = (self.links.neighbours(cell))
                     .map(|(at, other)| (x[cell] - x[other]) * self.penalties[at])
                     .sum();
                 data + smooth + x[cell] * self.tether
@@ -172,7 +172,7 @@ fn dot(a: &[Vec3], b: &[Vec3]) -> f64 {
     sum(a, b, |a, b| a.as_dvec3().dot(b.as_dvec3()))
 }
 
-/// Adds up a function of pairs in an order that does not depend on threads.
+/// Sums a function of pairs, in an order that does not depend on the number of threads.
 fn sum(a: &[Vec3], b: &[Vec3], f: impl Fn(Vec3, Vec3) -> f64 + Sync) -> f64 {
     let parts: Vec<f64> = a
         .par_chunks(CHUNK)
@@ -182,13 +182,13 @@ fn sum(a: &[Vec3], b: &[Vec3], f: impl Fn(Vec3, Vec3) -> f64 + Sync) -> f64 {
     parts.iter().sum()
 }
 
-/// The mean over all channels of some weights.
+/// The mean over all channels and entries.
 pub fn mean_channel(weights: &[Vec3]) -> f32 {
     let means: Vec<f32> = weights.iter().map(|w| w.element_sum() / 3.0).collect();
     mean(&means)
 }
 
-/// The mean of some numbers, added up in f64.
+/// The mean, summed in f64.
 pub fn mean(values: &[f32]) -> f32 {
     (values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len().max(1) as f64) as f32
 }

@@ -1,4 +1,4 @@
-//! What a surface sends whose albedo is looked for: its base, and the lobe above it where there is one.
+//! Traces the radiance of a textured surface: of its base with unit albedo, and of the lobe above it.
 
 use crate::inverse::texture::look::SeenPixel;
 use crate::math::frame::Frame;
@@ -10,11 +10,10 @@ use crate::transport::world::SurfacePoint;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// First of the sample keys of these paths, far from those of other stages.
+/// First of the sample keys of these paths, disjoint from those of other stages.
 const KEY: u64 = 11 << 59;
 
-/// Radiance that the base would send along `normal` if its albedo were one, estimated by one path or two: irradiance / π
-/// where there is no lobe.
+/// Radiance of the base along `normal` with an albedo of one, estimated by one or two paths; irradiance / π without a lobe.
 pub fn white_base(
     lit: &Lit,
     surface: &SurfacePoint,
@@ -31,7 +30,7 @@ pub fn white_base(
         return (path.radiance, cast);
     };
     let frame = Frame::around(normal);
-    let mut found = Vec::new();
+    let mut incident = Vec::new();
     let cast = arrivals(
         lit,
         surface,
@@ -40,43 +39,50 @@ pub fn white_base(
         &[],
         stream,
         options,
-        &mut found,
+        &mut incident,
     );
-    let light = (found.iter()).map(|a| a.light.as_dvec3() * lobe.base(Vec3::Z, a.wi));
+    let light = (incident.iter()).map(|a| a.light.as_dvec3() * lobe.base(Vec3::Z, a.wi));
     (light.sum::<DVec3>().as_vec3(), cast)
 }
 
-/// Radiance that the lobe of the `landing`th place where a pixel's rays land sends to the camera, estimated by a few paths;
-/// none where there is no lobe.
+/// Radiance of the lobe towards the camera at one of a pixel's hits (`index` modulo their number), estimated by a few paths;
+/// zero without a lobe.
 pub fn gloss(
     lit: &Lit,
     pixel: &SeenPixel,
-    landing: usize,
+    index: usize,
     stream: &mut Stream,
     options: &PathOptions,
 ) -> (Vec3, Cast) {
-    let landing = &pixel.landings[landing % pixel.landings.len()];
-    let surface = lit.surface(&landing.hit);
+    let hit = &pixel.hits[index % pixel.hits.len()];
+    let surface = lit.surface(&hit.hit);
     let Some(lobe) = surface.lobe else {
         return (Vec3::ZERO, Cast::default());
     };
     let camera = &lit.scene.cameras[pixel.frame as usize];
-    let frame = Frame::around(landing.normal(lit));
+    let frame = Frame::around(hit.normal(lit));
     let wo = frame.to_local((camera.center - surface.point).normalize_or_zero());
     if wo.z <= 0.0 {
         return (Vec3::ZERO, Cast::default());
     }
-    let mut found = Vec::new();
+    let mut incident = Vec::new();
     let drawn = [f64::from(lobe.roughness)];
     let cast = arrivals(
-        lit, &surface, &frame, wo, &drawn, stream, options, &mut found,
+        lit,
+        &surface,
+        &frame,
+        wo,
+        &drawn,
+        stream,
+        options,
+        &mut incident,
     );
-    let light = (found.iter()).map(|a| a.light.as_dvec3() * lobe.reflected(wo, a.wi));
+    let light = (incident.iter()).map(|a| a.light.as_dvec3() * lobe.reflected(wo, a.wi));
     (light.sum::<DVec3>().as_vec3(), cast)
 }
 
-/// Finds the gloss of each pixel in the fit by so many paths.
-pub fn find_gloss(
+/// Sets the gloss of each pixel in the fit, from `samples` paths each.
+pub fn trace_gloss(
     lit: &Lit,
     pixels: &mut [SeenPixel],
     samples: u32,
@@ -88,11 +94,11 @@ pub fn find_gloss(
         .map(|pixel| {
             let (mut sum, mut cast) = (DVec3::ZERO, Cast::default());
             for sample in 0..samples {
-                let place = (u64::from(pixel.frame) << 32) + u64::from(pixel.pixel);
-                let mut stream = Stream::new(seed, key, place, KEY + u64::from(sample));
-                let (light, took) = gloss(lit, pixel, sample as usize, &mut stream, options);
+                let pixel_key = (u64::from(pixel.frame) << 32) + u64::from(pixel.pixel);
+                let mut stream = Stream::new(seed, key, pixel_key, KEY + u64::from(sample));
+                let (light, own_cast) = gloss(lit, pixel, sample as usize, &mut stream, options);
                 sum += light.as_dvec3();
-                cast += took;
+                cast += own_cast;
             }
             pixel.gloss = (sum / f64::from(samples.max(1))).as_vec3();
             cast

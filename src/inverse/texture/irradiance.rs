@@ -1,4 +1,4 @@
-//! The light that cells receive: traced twice independently, then smoothed as far as the two agree that it may be.
+//! The irradiance of cells: traced in two independent sets, then smoothed as much as each set predicts the other best.
 
 use crate::inverse::texture::cells::Cells;
 use crate::inverse::texture::fuse::{Problem, fuse, mean};
@@ -15,39 +15,39 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// First of the sample keys of these paths, far from those of the fit.
+/// First of the sample keys of these paths, disjoint from those of the fit.
 const KEY: u64 = 5 << 59;
-/// Averagings over neighbours that give the level against which differences count.
-const LEVELLING: u32 = 40;
-/// Least level, in means over the object.
+/// Averages over neighbours that give the level of a cell.
+const AVERAGES: u32 = 40;
+/// Least level of a cell, relative to the mean over the object.
 const MIN_LEVEL: f32 = 1e-2;
 /// Strengths of smoothing that are tried, strongest first.
 const STRENGTHS: [f32; 9] = [8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.12, 0.06, 0.03];
-/// Worse strengths in a row that end the search.
+/// Consecutive worse strengths that end the search.
 const PATIENCE: u32 = 2;
 
-/// What cells would send along their normals if they were white, below their lobe where they have one, as two independent
-/// sets of paths found it.
+/// Radiance of cells along their normals with an albedo of one (irradiance / π; of the base only below a lobe), from two
+/// independent sets of paths.
 #[derive(Debug, Clone, Default)]
 pub struct Irradiance {
-    /// One value a cell in each set.
+    /// One value per cell in each set.
     pub sets: [Vec<Vec3>; 2],
-    /// Rays cast.
+    /// Number of rays cast.
     pub rays: u64,
-    /// Paths dropped because they were not finite.
+    /// Number of paths rejected because they were not finite.
     pub rejected: u64,
 }
 
-/// Smoothed light.
+/// Smoothed irradiance.
 #[derive(Debug, Clone)]
 pub struct Smoothed {
-    /// What each cell would send if it were white.
+    /// Radiance of each cell with an albedo of one.
     pub radiance: Vec<Vec3>,
-    /// Relative standard error that is left, root mean square over cells.
+    /// Relative standard error, root mean square over cells.
     pub noise: f32,
 }
 
-/// Traces `samples` paths a set from random points of each cell in the range.
+/// Traces `samples` paths per set from random points of each cell in the range.
 pub fn trace(
     lit: &Lit,
     cells: &Cells,
@@ -89,7 +89,7 @@ pub fn trace(
     irradiance
 }
 
-/// A point uniform in area on a cell, and the normal of its seen side.
+/// A point on a cell, uniform in area, and the normal of its seen side.
 fn point_on(lit: &Lit, cells: &Cells, cell: usize, stream: &mut Stream) -> (Hit, Vec3) {
     let cell = &cells.cells[cell];
     let choice = stream.uniform();
@@ -123,7 +123,7 @@ fn point_on(lit: &Lit, cells: &Cells, cell: usize, stream: &mut Stream) -> (Hit,
 }
 
 impl Irradiance {
-    /// Adds the cells that follow.
+    /// Appends the following cells.
     pub fn append(&mut self, other: Self) {
         for (all, more) in self.sets.iter_mut().zip(other.sets) {
             all.extend(more);
@@ -132,14 +132,14 @@ impl Irradiance {
         self.rejected += other.rejected;
     }
 
-    /// Smooths with the strength for which each set predicts the other best.
+    /// Smooths with the strength at which each set predicts the other best.
     pub fn smoothed(&self, links: &Links) -> Smoothed {
         let count = self.sets[0].len();
         let both: Vec<Vec3> = (self.sets[0].iter().zip(&self.sets[1]))
             .map(|(a, b)| (*a + *b) * 0.5)
             .collect();
         let levels = levels(&both, links);
-        let each = Observations::of_each(count);
+        let each = Observations::one_per_cell(count);
         let weights: Vec<Vec3> = levels.iter().map(|l| Vec3::splat(1.0 / (l * l))).collect();
         let problem = |values| Problem {
             observations: &each,
@@ -155,8 +155,8 @@ impl Irradiance {
                 .sum()
         };
 
-        // From strong to weak, while the sets agree better and better.
-        let mut smooth = [0, 1].map(|s| levelled(&self.sets[s], links));
+        // From strong to weak, until the prediction gets worse.
+        let mut smooth = [0, 1].map(|s| local_mean(&self.sets[s], links));
         let mut best = (f64::INFINITY, STRENGTHS[0], 0.0);
         let mut worse = 0;
         for strength in STRENGTHS {
@@ -174,7 +174,7 @@ impl Irradiance {
             }
         }
 
-        // Both sets together carry half the variance of one.
+        // The mean of both sets has half the variance of one.
         let strength = best.1 * std::f32::consts::FRAC_1_SQRT_2;
         let start: Vec<Vec3> = (smooth[0].iter().zip(&smooth[1]))
             .map(|(a, b)| (*a + *b) * 0.5)
@@ -186,16 +186,16 @@ impl Irradiance {
     }
 }
 
-/// A wide local mean.
-fn levelled(values: &[Vec3], links: &Links) -> Vec<Vec3> {
+/// A wide local mean by repeated averages over neighbours.
+fn local_mean(values: &[Vec3], links: &Links) -> Vec<Vec3> {
     let mut level = values.to_vec();
-    for _ in 0..LEVELLING {
+    for _ in 0..AVERAGES {
         level = (0..level.len())
             .into_par_iter()
             .map(|cell| {
                 let mut sum = level[cell];
                 let mut weight = 1.0;
-                for (at, other) in links.of(cell) {
+                for (at, other) in links.neighbours(cell) {
                     sum += level[other] * links.borders[at];
                     weight += links.borders[at];
                 }
@@ -206,12 +206,12 @@ fn levelled(values: &[Vec3], links: &Links) -> Vec<Vec3> {
     level
 }
 
-/// Luminance around each cell, nowhere below a small fraction of the mean over all.
+/// Luminance of the local mean at each cell, at least [`MIN_LEVEL`] times the mean over all cells.
 fn levels(values: &[Vec3], links: &Links) -> Vec<f32> {
-    let around: Vec<f32> = levelled(values, links)
+    let local: Vec<f32> = local_mean(values, links)
         .iter()
         .map(|v| luminance(*v))
         .collect();
-    let least = (mean(&around) * MIN_LEVEL).max(f32::MIN_POSITIVE.sqrt());
-    around.iter().map(|l| l.max(least)).collect()
+    let min = (mean(&local) * MIN_LEVEL).max(f32::MIN_POSITIVE.sqrt());
+    local.iter().map(|l| l.max(min)).collect()
 }

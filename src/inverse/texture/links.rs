@@ -1,6 +1,7 @@
-//! Which cells lie side by side, found by stepping over their edges.
+//! The graph of neighbouring cells, found by stepping over their edges.
 
 use crate::inverse::texture::cells::{Cell, Cells};
+use crate::inverse::texture::observations::row_range;
 use crate::scene::Scene;
 use crate::scene::geometry::{Hit, Ray};
 use glam::Vec3;
@@ -8,34 +9,34 @@ use rayon::prelude::*;
 
 /// Points along each edge from which to step over it, as fractions of its length.
 const STEPS: [f32; 2] = [0.25, 0.75];
-/// Length of a step in heights of the piece over the edge.
+/// Length of a step, relative to the height of the piece over the edge.
 const STRIDE: f32 = 0.2;
 /// Cosine of the largest angle between neighbours' normals.
 const FOLD: f32 = 0.7;
 
-/// A symmetric graph of neighbours, in compressed rows.
+/// A symmetric graph of neighbours, in compressed sparse rows.
 #[derive(Debug, Clone, Default)]
 pub struct Links {
     /// End of each cell's row.
     pub ends: Vec<u32>,
     /// The neighbours.
     pub to: Vec<u32>,
-    /// Length of the common border in mean widths of the two cells.
+    /// Length of the common border, in mean widths of the two cells.
     pub borders: Vec<f32>,
 }
 
 impl Links {
     /// Finds the neighbours of all cells of an object.
     pub fn new(scene: &Scene, cells: &Cells) -> Self {
-        let found: Vec<Vec<(u32, u32, f32)>> = (0..cells.count() as u32)
+        let directed: Vec<Vec<(u32, u32, f32)>> = (0..cells.count() as u32)
             .into_par_iter()
             .map(|cell| neighbours(scene, cells, cell))
             .collect();
 
-        // Each border is met from both of its sides.
+        // Each border is found from both of its sides.
         let mut both: Vec<(u32, u32, f32)> =
-            Vec::with_capacity(2 * found.iter().map(Vec::len).sum::<usize>());
-        for (a, b, border) in found.into_iter().flatten() {
+            Vec::with_capacity(2 * directed.iter().map(Vec::len).sum::<usize>());
+        for (a, b, border) in directed.into_iter().flatten() {
             both.extend([(a, b, border * 0.5), (b, a, border * 0.5)]);
         }
         both.sort_by_key(|&(a, b, _)| (a, b));
@@ -57,21 +58,21 @@ impl Links {
         links
     }
 
-    /// A cell's neighbours with their borders.
+    /// A cell's links: index of the link and the neighbour.
     #[inline]
-    pub fn of(&self, cell: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
+    pub fn neighbours(&self, cell: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
         let row = self.row(cell);
         row.map(|at| (at, self.to[at] as usize))
     }
 
-    /// Where a cell's neighbours stand.
+    /// Indices of a cell's links.
     #[inline]
     pub fn row(&self, cell: usize) -> std::ops::Range<usize> {
-        let start = if cell == 0 { 0 } else { self.ends[cell - 1] };
-        start as usize..self.ends[cell] as usize
+        row_range(&self.ends, cell)
     }
 }
 
+/// The borders of a cell: its index, the neighbour, and the length of the border in mean widths of both.
 fn neighbours(scene: &Scene, cells: &Cells, index: u32) -> Vec<(u32, u32, f32)> {
     let cell = &cells.cells[index as usize];
     let mut found = Vec::new();
@@ -104,7 +105,7 @@ fn neighbours(scene: &Scene, cells: &Cells, index: u32) -> Vec<(u32, u32, f32)> 
     found
 }
 
-/// The cell at a point beside a triangle, in its plane or folded off it a little.
+/// The cell at a point near a triangle: in its plane, or on a surface of similar normal within `reach`.
 fn cell_at(
     scene: &Scene,
     cells: &Cells,
@@ -127,7 +128,7 @@ fn cell_at(
     (cells.cells[other as usize].normal.dot(cell.normal) > FOLD).then_some(other)
 }
 
-/// The barycentrics of a point in a triangle's plane; `None` outside the triangle.
+/// The barycentric coordinates of a point in a triangle's plane; `None` outside the triangle.
 fn on_triangle(scene: &Scene, triangle: u32, point: Vec3) -> Option<Hit> {
     let [a, b, c] = scene.corners(triangle);
     let (u, v, p) = (b - a, c - a, point - a);

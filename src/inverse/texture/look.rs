@@ -1,4 +1,4 @@
-//! Where the parts of each pixel of an object land on its triangles.
+//! Samples the pixels of an object: where the rays through each pixel hit its triangles.
 
 use crate::calibrate::gbuffer::GBufferPixel;
 use crate::calibrate::problem::Problem;
@@ -14,64 +14,64 @@ use rayon::prelude::*;
 const SIDE: u32 = 4;
 /// Rays through a pixel.
 pub const RAYS: u32 = SIDE * SIDE;
-/// First of the sample keys of these rays, far from those of paths.
+/// First of the sample keys of these rays, disjoint from those of paths.
 const KEY: u64 = 3 << 60;
-/// Of the pixels in the fit, or of the photographs under a lobe, one in so many is left out in turn.
+/// Folds of the cross-validation: of pixels, or of photographs if the object is glossy.
 pub const FOLDS: usize = 5;
-/// Key of the choice.
+/// Key of the assignment of pixels to folds.
 const FOLD_KEY: u64 = 0x51f0_1d5e;
 
-/// A pixel that sees one smooth surface of one object, through which rays were cast.
+/// A pixel that sees one smooth surface of one object.
 #[derive(Debug, Clone)]
 pub struct SeenPixel {
     /// Frame index.
     pub frame: u32,
-    /// Row by row from the top left.
+    /// Pixel index, row by row from the top left.
     pub pixel: u32,
-    /// Whether it is kept out of every fit.
+    /// Whether it is held out of every fit.
     pub held_out: bool,
-    /// What the photograph holds.
+    /// Photographed radiance.
     pub measured: Vec3,
-    /// Whether that is saturated: the surface sends so much at least.
+    /// Whether it is saturated, so that `measured` is a lower bound.
     pub saturated: bool,
-    /// Which of the [`FOLDS`] it belongs to.
+    /// Its fold, below [`FOLDS`].
     pub fold: usize,
-    /// How much it says beside a pixel of a photograph of the usual sharpness.
+    /// Weight by the sharpness of its photograph, see [`Sharpness::weight`].
     pub weight: f32,
-    /// What the base of the surface sends in this direction over what it sends along its normal; 1 without a lobe.
+    /// Radiance of the surface's base towards the camera over that along the normal; 1 without a lobe.
     pub base: f32,
-    /// Radiance that its lobe sends here, where that was found.
+    /// Radiance of the lobe towards the camera; zero until it is traced.
     pub gloss: Vec3,
-    /// Where its rays land.
-    pub landings: Vec<Landing>,
+    /// Hits of its rays.
+    pub hits: Vec<PixelHit>,
 }
 
-/// Where one ray through a pixel meets the object.
+/// The hit of one ray through a pixel.
 #[derive(Debug, Clone, Copy)]
-pub struct Landing {
-    /// The place on its triangle.
+pub struct PixelHit {
+    /// Triangle and barycentric position.
     pub hit: Hit,
-    /// Whether it meets the triangle's front.
+    /// Whether it is on the triangle's front.
     pub front: bool,
-    /// Width of the pixel's footprint there: the root of its area, in metres.
+    /// Square root of the area of the pixel's footprint, in metres.
     pub footprint: f32,
-    /// Cosine of the angle between the normal on that side and the ray.
+    /// Cosine between the normal of that side and the direction to the camera.
     pub cosine: f32,
 }
 
-impl Landing {
-    /// The normal on the side that is met.
+impl PixelHit {
+    /// The normal of the side that is hit.
     pub fn normal(&self, lit: &Lit) -> Vec3 {
         let normal = lit.scene.normals[self.hit.triangle as usize];
         if self.front { normal } else { -normal }
     }
 }
 
-/// Looks through the given pixels, all of which see `object`; those that also see something else are left out.
+/// Casts rays through the given pixels, all of which see `object`; pixels that also see something else are left out.
 ///
-/// Where it is `glossy`, folds are whole photographs, those next to each other together: a highlight that was taken for
-/// texture is elsewhere in the photographs left out.
-pub fn look(
+/// If the object is `glossy`, each fold is a run of whole photographs: a highlight fitted as texture is at another place in the
+/// photographs left out.
+pub fn sample_pixels(
     problem: &Problem,
     object: u32,
     pixels: &[&GBufferPixel],
@@ -81,7 +81,7 @@ pub fn look(
 ) -> Vec<SeenPixel> {
     let seen: Vec<Option<SeenPixel>> = pixels
         .par_iter()
-        .map(|pixel| look_through(problem, object, pixel, sharpness, seed))
+        .map(|pixel| sample_pixel(problem, object, pixel, sharpness, seed))
         .collect();
     let mut seen: Vec<SeenPixel> = seen.into_iter().flatten().collect();
     if glossy {
@@ -91,38 +91,31 @@ pub fn look(
         for pixel in &mut seen {
             let before = frames.partition_point(|&frame| frame < pixel.frame);
             pixel.fold = before * FOLDS / frames.len();
-            let sum: f32 = (pixel.landings.iter())
-                .map(|l| base_by_view(l.cosine))
-                .sum();
-            pixel.base = sum / pixel.landings.len() as f32;
+            let sum: f32 = (pixel.hits.iter()).map(|l| base_by_view(l.cosine)).sum();
+            pixel.base = sum / pixel.hits.len() as f32;
         }
     }
     seen
 }
 
-fn look_through(
+fn sample_pixel(
     problem: &Problem,
     object: u32,
-    pixels_of_frame: &GBufferPixel,
+    pixel: &GBufferPixel,
     sharpness: &Sharpness,
     seed: u64,
 ) -> Option<SeenPixel> {
     let scene = &*problem.scene;
-    let photograph = &problem.photographs[pixels_of_frame.frame as usize];
-    let measured = photograph.pixels[pixels_of_frame.pixel as usize];
-    let camera = &scene.cameras[pixels_of_frame.frame as usize];
+    let (frame, index) = (pixel.frame as usize, pixel.pixel as usize);
+    let photograph = &problem.photographs[frame];
+    let camera = &scene.cameras[frame];
     let corner = Vec2::new(
-        (pixels_of_frame.pixel % photograph.width) as f32,
-        (pixels_of_frame.pixel / photograph.width) as f32,
+        (pixel.pixel % photograph.width) as f32,
+        (pixel.pixel / photograph.width) as f32,
     );
     let focal2 = (camera.intrinsics.fx * camera.intrinsics.fy) as f32;
-    let mut stream = Stream::new(
-        seed,
-        u64::from(pixels_of_frame.frame),
-        u64::from(pixels_of_frame.pixel),
-        KEY,
-    );
-    let mut landings = Vec::with_capacity(RAYS as usize);
+    let mut stream = Stream::new(seed, frame as u64, index as u64, KEY);
+    let mut hits = Vec::with_capacity(RAYS as usize);
     for i in 0..RAYS {
         let [dx, dy] = stream.uniform2();
         let offset = Vec2::new((i % SIDE) as f32 + dx, (i / SIDE) as f32 + dy) / SIDE as f32;
@@ -132,7 +125,7 @@ fn look_through(
         }
         let to_camera = camera.center - scene.point(&hit);
         let cosine = scene.normals[hit.triangle as usize].dot(to_camera.normalize_or_zero());
-        landings.push(Landing {
+        hits.push(PixelHit {
             hit,
             front: cosine >= 0.0,
             footprint: (to_camera.length_squared() / (focal2 * cosine.abs().max(0.05))).sqrt(),
@@ -140,20 +133,20 @@ fn look_through(
         });
     }
     Some(SeenPixel {
-        frame: pixels_of_frame.frame,
-        pixel: pixels_of_frame.pixel,
-        held_out: pixels_of_frame.held_out,
-        measured,
-        saturated: photograph.is_saturated(pixels_of_frame.pixel as usize),
-        fold: fold(pixels_of_frame.frame, pixels_of_frame.pixel),
-        weight: sharpness.weight(pixels_of_frame.frame as usize),
+        frame: pixel.frame,
+        pixel: pixel.pixel,
+        held_out: pixel.held_out,
+        measured: photograph.pixels[index],
+        saturated: photograph.is_saturated(index),
+        fold: fold(pixel.frame, pixel.pixel),
+        weight: sharpness.weight(frame),
         base: 1.0,
         gloss: Vec3::ZERO,
-        landings,
+        hits,
     })
 }
 
-/// The fold that a pixel belongs to by chance.
+/// The fold of a pixel, by hash.
 fn fold(frame: u32, pixel: u32) -> usize {
     let key = splitmix64(splitmix64(u64::from(frame) ^ FOLD_KEY) ^ u64::from(pixel));
     (key % FOLDS as u64) as usize

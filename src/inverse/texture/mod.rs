@@ -1,10 +1,10 @@
-//! Spatial detail: the albedo of an object's cells, where pixels held out of the fit ask for it.
+//! Fits textures: the albedo of each cell of an object, kept where it improves held-out pixels.
 //!
-//! For a diffuse point, albedo = radiance in the photograph / radiance of a white surface there. The second is traced
-//! by full paths with the lights and albedos found so far and smoothed where it varies slowly ([`irradiance`]). Where there is
-//! a lobe, what it reflects to each pixel is traced and taken out, and the rest is that of the base below it ([`gloss`]). The
-//! first is noisy, so neighbouring cells are pooled as far as pixels left out of the fit ask for ([`fit`]). A texture
-//! is kept where it predicts held-out pixels better than one colour does, by more than their noise ([`trial`]).
+//! The albedo of a diffuse point is its photographed radiance over the radiance of a white surface at that point. The latter
+//! (irradiance / π) is traced by full paths through the present estimate and smoothed ([`irradiance`]). The radiance of a lobe
+//! is traced per pixel and subtracted, and the rest belongs to the base below it ([`gloss`]). Neighbouring cells are smoothed
+//! as much as cross-validation asks for ([`fit`]). A texture is kept if it predicts held-out pixels significantly better than
+//! one colour ([`trial`]).
 
 mod cells;
 mod errors;
@@ -31,68 +31,70 @@ use std::sync::Arc;
 use surface::TexturedSurface;
 pub use trial::Trial;
 
-/// A gain on held-out pixels of so many standard errors is no accident.
+/// A gain on held-out pixels of this many standard errors is significant.
 const SIGNIFICANT: f64 = 4.0;
-/// Pixels in the fit and held out that an object needs.
+/// Least number of pixels of an object in the fit.
 const MIN_PIXELS: usize = 60;
+/// Least number of held-out pixels of an object.
 const MIN_HELD_OUT: usize = 10;
-/// Fraction of the paths, and width of cells in the finest ones', that are enough to see whether an object has a texture.
-const FIRST_LOOK: f64 = 0.4;
-const COARSE: f32 = 2.0;
-/// A held-out loss so many times the best one is plainly worse.
-const PLAINLY: f64 = 1.02;
-/// Times that light and texture are found in turn.
+/// Fraction of the paths for the first, coarse fit.
+const COARSE_PATHS: f64 = 0.4;
+/// Width of its cells, relative to the finest ones.
+const COARSE_WIDTH: f32 = 2.0;
+/// Held-out loss, relative to the best one, above which a state is rejected.
+const MAX_LOSS_RATIO: f64 = 1.02;
+/// Number of alternations between light and textures.
 const SWEEPS: u32 = 2;
 
-/// What the stage works on.
+/// The inputs of the stage.
 #[derive(Debug, Clone, Copy)]
 pub struct Task<'a> {
     /// Scene and photographs.
     pub problem: &'a Problem,
     /// What the pixels see.
     pub gbuffer: &'a GBuffer,
-    /// How sharp the photographs are.
+    /// Sharpness of the photographs.
     pub sharpness: &'a Sharpness,
-    /// Parameters.
+    /// Settings of the solve.
     pub settings: &'a Settings,
-    /// Paths to trace in each sweep.
+    /// Number of paths in each sweep.
     pub paths: u64,
-    /// Longest path in bounces.
+    /// Greatest number of bounces.
     pub max_bounces: u32,
 }
 
-/// What happened to one object.
+/// The outcome for one object.
 #[derive(Debug, Clone)]
 pub struct Attempt {
     /// Object index.
     pub object: usize,
-    /// Cells that its surface was cut into.
+    /// Number of its cells.
     pub cells: usize,
-    /// Pixels in the fit.
+    /// Number of its pixels in the fit.
     pub pixels: usize,
-    /// How it did on held-out pixels; unset where the fit itself found one colour.
+    /// Comparison on held-out pixels; `None` if the fit itself chose one colour.
     pub trial: Option<Trial>,
     /// Whether its texture is kept.
     pub kept: bool,
 }
 
-/// What was found.
+/// The outcome of the stage.
 #[derive(Debug, Clone, Default)]
 pub struct Refined {
     /// The objects that were tried.
     pub attempts: Vec<Attempt>,
-    /// The texels, where any object kept a texture.
+    /// The texels; `None` if no texture is kept.
     pub texels: Option<Arc<TexelEstimate>>,
-    /// Mean albedo of each textured object over what pixels see of it.
+    /// Object and mean albedo of each textured object, over the cells that pixels see.
     pub means: Vec<(usize, Vec3)>,
-    /// Greatest change of a mean albedo in the last sweep, relative.
-    pub unrest: f64,
-    /// Whether textures were found but made held-out pixels worse all together, so that none is kept.
+    /// Greatest relative change of a mean albedo in the last sweep.
+    pub change: f64,
+    /// Whether all textures were rejected because together they made held-out pixels worse.
     pub worse: bool,
 }
 
 impl Refined {
-    /// Puts the textures into an estimate.
+    /// Sets the textures and mean albedos of an estimate.
     pub fn apply(&self, estimate: &mut Estimate) {
         estimate.texels.clone_from(&self.texels);
         for &(object, mean) in &self.means {
@@ -105,8 +107,7 @@ impl Refined {
         }
     }
 
-    /// Scales the textures as the mean albedos of their objects changed, given factors a channel by
-    /// object, and the object of each triangle.
+    /// Scales the textures by a factor per object and channel; `object_of` is the object of each triangle.
     pub fn scale(&mut self, factor: impl Fn(usize) -> Vec3, object_of: &[u32]) {
         for (object, mean) in &mut self.means {
             *mean = (*mean * factor(*object)).min(Vec3::ONE);
@@ -116,13 +117,13 @@ impl Refined {
         }
     }
 
-    /// What was added where and what it bought, in a sentence.
+    /// One sentence on the textures and their gains. `name` gives the names of objects.
     pub fn summary(&self, name: impl Fn(usize) -> String) -> String {
         let kept: Vec<String> = (self.attempts.iter().filter(|a| a.kept))
             .filter_map(|a| {
                 let trial = a.trial?;
                 Some(format!(
-                    "{} ({} cells, squared error of untouched pixels {:.0} % less)",
+                    "{} ({} cells, squared error of pixels outside the fit {:.0} % less)",
                     name(a.object),
                     a.cells,
                     100.0 * (1.0 - trial.after / trial.before)
@@ -145,11 +146,11 @@ impl Refined {
             "{cells} unknowns: {}; {} of {tried} objects tried show one colour; mean albedo moved {:.1} % in the last sweep",
             kept.join(", "),
             tried - kept.len(),
-            self.unrest * 100.0
+            self.change * 100.0
         )
     }
 
-    /// Cells of the objects that kept a texture.
+    /// Number of cells of the objects that kept a texture.
     pub fn unknowns(&self) -> usize {
         self.attempts
             .iter()
@@ -159,18 +160,18 @@ impl Refined {
     }
 }
 
-/// Hears of rays cast, paths dropped and the fraction of the work that is done; may end the stage.
-pub type Tell<'t> = dyn FnMut(u64, u64, f64) -> Result<(), Termination> + 't;
+/// Receives rays cast, paths rejected and the fraction of the work that is done; its error ends the stage.
+pub type Report<'t> = dyn FnMut(u64, u64, f64) -> Result<(), Termination> + 't;
 
-/// Tries a texture on each of the given objects, keeps those that held-out pixels ask for, and sweeps over them until
-/// light and texture agree. Where the listener ends that early, what was found by then is kept; where light and texture do
-/// not come to agree and `judge`, the loss on held-out pixels, gets worse, the state before that.
+/// Tries a texture on each of the given objects, keeps those that improve held-out pixels, and then alternates between light and
+/// textures. `judge` is the loss of an estimate on held-out pixels: a sweep that makes it worse is undone. If `report` ends the
+/// stage, the result of the sweeps so far is returned with its error.
 pub fn refine(
     task: &Task,
     estimate: &Estimate,
     objects: &[usize],
     judge: &dyn Fn(&Estimate) -> Option<f64>,
-    tell: &mut Tell,
+    report: &mut Report,
 ) -> (Refined, Result<(), Termination>) {
     let mut refinement = Refinement {
         task,
@@ -181,21 +182,22 @@ pub fn refine(
         },
         attempts: Vec::new(),
         kept: Vec::new(),
-        unrest: 0.0,
+        change: 0.0,
     };
-    let mut ended = refinement.look(&candidates(task, objects), tell);
+    let mut ended = refinement.fit_coarse(&candidates(task, objects), report);
     let mut states = vec![refinement.refined()];
     for sweep in 1..=SWEEPS {
-        let found = states.last().and_then(|state| state.texels.clone());
-        if let (Ok(()), Some(found)) = (&ended, found) {
-            ended = refinement.sweep(sweep, found, tell);
+        let texels = states.last().and_then(|state| state.texels.clone());
+        if let (Ok(()), Some(texels)) = (&ended, texels) {
+            ended = refinement.sweep(sweep, texels, report);
             states.push(refinement.refined());
         }
     }
     (latest_good(states, estimate, judge), ended)
 }
 
-/// The latest state whose held-out loss is not plainly above that of the best, one colour an object included.
+/// The latest state whose held-out loss is at most [`MAX_LOSS_RATIO`] times the least, over all states and the estimate without
+/// textures.
 fn latest_good(
     mut states: Vec<Refined>,
     estimate: &Estimate,
@@ -212,9 +214,9 @@ fn latest_good(
     let losses: Vec<Option<f64>> = states.iter().map(loss).collect();
     let flat = judge(estimate);
     let best = (losses.iter().chain([&flat]).flatten()).fold(f64::INFINITY, |a, b| a.min(*b));
-    let good = |loss: &Option<f64>| loss.is_none_or(|loss| loss <= best * PLAINLY);
+    let good = |loss: &Option<f64>| loss.is_none_or(|loss| loss <= best * MAX_LOSS_RATIO);
     match losses.iter().rposition(good) {
-        Some(place) => states.swap_remove(place),
+        Some(index) => states.swap_remove(index),
         None => {
             let mut refused = states.pop().unwrap_or_default();
             refused.attempts.iter_mut().for_each(|a| a.kept = false);
@@ -234,26 +236,27 @@ struct Refinement<'a> {
     options: PathOptions,
     attempts: Vec<Attempt>,
     kept: Vec<TexturedSurface>,
-    unrest: f64,
+    change: f64,
 }
 
 impl Refinement<'_> {
-    /// Looks at each candidate in coarse cells, and keeps those that show more than one colour.
-    fn look(
+    /// Fits each candidate in coarse cells, and keeps those whose texture is significant.
+    fn fit_coarse(
         &mut self,
         candidates: &[(usize, Vec<&GBufferPixel>)],
-        tell: &mut Tell,
+        report: &mut Report,
     ) -> Result<(), Termination> {
         let lit = self.estimate.lit(&self.task.problem.scene);
-        let fractions: f64 = candidates.iter().map(|c| (c.1.len() as f64).sqrt()).sum();
+        let total: f64 = candidates.iter().map(|c| (c.1.len() as f64).sqrt()).sum();
         for (index, (object, pixels)) in candidates.iter().enumerate() {
             let paths =
-                self.task.paths as f64 * FIRST_LOOK * (pixels.len() as f64).sqrt() / fractions;
+                self.task.paths as f64 * COARSE_PATHS * (pixels.len() as f64).sqrt() / total;
             let fraction = index as f64 / candidates.len() as f64 * 0.6;
-            let mut done = |rays, rejected| tell(rays, rejected, fraction);
+            let mut done = |rays, rejected| report(rays, rejected, fraction);
             done(0, 0)?;
             let glossy = self.estimate.objects[*object].lobe().is_some();
-            let Some(mut coarse) = TexturedSurface::new(self.task, *object, glossy, pixels, COARSE)
+            let Some(mut coarse) =
+                TexturedSurface::new(self.task, *object, glossy, pixels, COARSE_WIDTH)
             else {
                 continue;
             };
@@ -278,28 +281,27 @@ impl Refinement<'_> {
         Ok(())
     }
 
-    /// Finds the light as the textures `found` send it on, and the textures, from now on in fine cells, as that light
-    /// shows them.
+    /// Traces the light again with the textures `texels`, and fits the textures to it; in fine cells from the first sweep on.
     fn sweep(
         &mut self,
         sweep: u32,
-        found: Arc<TexelEstimate>,
-        tell: &mut Tell,
+        texels: Arc<TexelEstimate>,
+        report: &mut Report,
     ) -> Result<(), Termination> {
         let textured = Estimate {
-            texels: Some(found),
+            texels: Some(texels),
             ..self.estimate.clone()
         };
         let lit = textured.lit(&self.task.problem.scene);
         let count = self.kept.len();
-        let fractions: f64 = (self.kept.iter())
+        let total: f64 = (self.kept.iter())
             .map(|s| (s.pixel_count() as f64).sqrt())
             .sum();
-        self.unrest = 0.0;
+        self.change = 0.0;
         for (index, surface) in self.kept.iter_mut().enumerate() {
-            let paths = self.task.paths as f64 * (surface.pixel_count() as f64).sqrt() / fractions;
+            let paths = self.task.paths as f64 * (surface.pixel_count() as f64).sqrt() / total;
             let fraction = (f64::from(sweep - 1) + index as f64 / count as f64) / f64::from(SWEEPS);
-            let mut done = |rays, rejected| tell(rays, rejected, 0.6 + 0.4 * fraction);
+            let mut done = |rays, rejected| report(rays, rejected, 0.6 + 0.4 * fraction);
             let before = surface.mean();
             let known = &self.estimate.objects[surface.object];
             let scale_error = known.albedo_stderr / known.albedo.max(Vec3::splat(1e-3));
@@ -314,20 +316,17 @@ impl Refinement<'_> {
                 surface.find(&lit, &self.options, paths as u64, sweep, errors, &mut done)?;
             }
             let change = (surface.mean() - before).abs().max_element();
-            self.unrest = f64::max(
-                self.unrest,
-                f64::from(change / before.max_element().max(1e-4)),
-            );
+            self.change = (self.change).max(f64::from(change / before.max_element().max(1e-4)));
         }
         Ok(())
     }
 
-    /// The state as it is now.
+    /// The present state.
     fn refined(&self) -> Refined {
         let mut attempts = self.attempts.clone();
         for attempt in &mut attempts {
-            let found = self.kept.iter().find(|s| s.object == attempt.object);
-            attempt.cells = found.map_or(attempt.cells, TexturedSurface::cell_count);
+            let surface = self.kept.iter().find(|s| s.object == attempt.object);
+            attempt.cells = surface.map_or(attempt.cells, TexturedSurface::cell_count);
         }
         let scene = &self.task.problem.scene;
         Refined {
@@ -335,23 +334,23 @@ impl Refinement<'_> {
                 .then(|| Arc::new(whole::texels(scene, self.estimate, &self.kept))),
             means: self.kept.iter().map(|s| (s.object, s.mean())).collect(),
             attempts,
-            unrest: self.unrest,
+            change: self.change,
             worse: false,
         }
     }
 }
 
-/// The objects that enough pixels see, with those pixels.
+/// Those of the given objects that enough pixels see, with their pure pixels.
 fn candidates<'a>(task: &Task<'a>, objects: &[usize]) -> Vec<(usize, Vec<&'a GBufferPixel>)> {
-    let mut of_object = vec![None; task.problem.scene.objects.len()];
-    for (place, &object) in objects.iter().enumerate() {
-        of_object[object] = Some(place);
+    let mut index_of = vec![None; task.problem.scene.objects.len()];
+    for (index, &object) in objects.iter().enumerate() {
+        index_of[object] = Some(index);
     }
     let mut pixels: Vec<(usize, Vec<&GBufferPixel>)> =
         objects.iter().map(|&o| (o, Vec::new())).collect();
     for pixel in task.gbuffer.pixels.iter().filter(|p| p.pure) {
-        if let Some(&Some(place)) = of_object.get(pixel.object as usize) {
-            pixels[place].1.push(pixel);
+        if let Some(&Some(index)) = index_of.get(pixel.object as usize) {
+            pixels[index].1.push(pixel);
         }
     }
     pixels.retain(|(_, pixels)| {

@@ -1,9 +1,17 @@
-//! What is known of the cells: weighted means over a few cells each, and their normal equations.
+//! Measurements as weighted means over cells, in sparse rows and columns, with the products of the normal equations.
 
 use glam::Vec3;
 use rayon::prelude::*;
+use std::ops::Range;
 
-/// Measurements y ≈ Σ w x of colours x of cells, one row each; the weights of a row sum to one.
+/// The indices of a row in compressed sparse rows, given the end of each row.
+#[inline]
+pub fn row_range(ends: &[u32], row: usize) -> Range<usize> {
+    let start = if row == 0 { 0 } else { ends[row - 1] };
+    start as usize..ends[row] as usize
+}
+
+/// Measurements y ≈ Σ w x of the colours x of cells, one row each; the weights of a row sum to one.
 #[derive(Debug, Clone, Default)]
 pub struct Observations {
     /// End of each row.
@@ -49,8 +57,8 @@ impl Observations {
         this
     }
 
-    /// One observation of each cell.
-    pub fn of_each(cell_count: usize) -> Self {
+    /// One measurement of each cell.
+    pub fn one_per_cell(cell_count: usize) -> Self {
         let rows: Vec<Vec<(u32, f32)>> = (0..cell_count as u32).map(|c| vec![(c, 1.0)]).collect();
         Self::new(&rows, cell_count)
     }
@@ -68,39 +76,32 @@ impl Observations {
     /// The cells and weights of a row.
     #[inline]
     pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, f32)> + '_ {
-        let start = if row == 0 { 0 } else { self.ends[row - 1] } as usize;
-        let range = start..self.ends[row] as usize;
-        range.map(|at| (self.cells[at] as usize, self.weights[at]))
+        row_range(&self.ends, row).map(|at| (self.cells[at] as usize, self.weights[at]))
     }
 
     /// The rows and weights of a cell.
     #[inline]
     pub fn column(&self, cell: usize) -> impl Iterator<Item = (usize, f32)> + '_ {
-        let start = if cell == 0 {
-            0
-        } else {
-            self.column_ends[cell - 1]
-        } as usize;
-        let range = start..self.column_ends[cell] as usize;
-        range.map(|at| (self.column_rows[at] as usize, self.column_weights[at]))
+        row_range(&self.column_ends, cell)
+            .map(|at| (self.column_rows[at] as usize, self.column_weights[at]))
     }
 
-    /// What a row measures of the given colours.
+    /// The value Σ w x of a row for the given colours.
     #[inline]
-    pub fn of(&self, row: usize, colors: &[Vec3]) -> Vec3 {
+    pub fn value(&self, row: usize, colors: &[Vec3]) -> Vec3 {
         self.row(row).map(|(cell, w)| colors[cell] * w).sum()
     }
 
-    /// What all rows measure.
-    pub fn all_of(&self, colors: &[Vec3]) -> Vec<Vec3> {
+    /// The values of all rows.
+    pub fn values(&self, colors: &[Vec3]) -> Vec<Vec3> {
         (0..self.rows())
             .into_par_iter()
-            .map(|row| self.of(row, colors))
+            .map(|row| self.value(row, colors))
             .collect()
     }
 
-    /// For each cell, Σ w · ω · value over its rows, with one weight ω (a channel) and one value a row.
-    pub fn gathered(&self, row_weights: &[Vec3], values: &[Vec3]) -> Vec<Vec3> {
+    /// For each cell, Σ w ω y over its rows, with the weights ω (per channel) and values y of rows.
+    pub fn transpose_times(&self, row_weights: &[Vec3], values: &[Vec3]) -> Vec<Vec3> {
         (0..self.cells())
             .into_par_iter()
             .map(|cell| {

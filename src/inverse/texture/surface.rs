@@ -1,4 +1,4 @@
-//! One object under refinement: its cells, the light that they receive, and their albedo.
+//! One textured object: its cells, their irradiance, and their albedo.
 
 use crate::calibrate::gbuffer::GBufferPixel;
 use crate::inverse::solver::Termination;
@@ -6,28 +6,28 @@ use crate::inverse::texture::Task;
 use crate::inverse::texture::cells::Cells;
 use crate::inverse::texture::errors::{standard_errors, with_light};
 use crate::inverse::texture::fit::{Measurements, Texture};
-use crate::inverse::texture::gloss::find_gloss;
+use crate::inverse::texture::gloss::trace_gloss;
 use crate::inverse::texture::irradiance::{Irradiance, trace};
 use crate::inverse::texture::links::Links;
-use crate::inverse::texture::look::{FOLDS, RAYS, SeenPixel, look};
+use crate::inverse::texture::look::{FOLDS, RAYS, SeenPixel, sample_pixels};
 use crate::inverse::texture::observations::Observations;
-use crate::inverse::texture::trial::{Trial, Untouched, try_out};
+use crate::inverse::texture::trial::{TestPixel, Trial, compare};
 use crate::scene::Scene;
 use crate::transport::lit::Lit;
 use crate::transport::path::PathOptions;
 use glam::{DVec3, Vec3};
 
-/// Cells traced between two reports.
+/// Number of cells traced between two reports.
 const SLICE: usize = 2048;
-/// Paths a cell at most, in each of two sets.
+/// Greatest number of paths per cell in each of two sets.
 const MAX_SAMPLES: u64 = 256;
 
-/// What a path from a pixel to what its lobe reflects costs, in paths from a cell; and such paths a pixel at least: one for each
-/// of its rays.
+/// Cost of a gloss sample, in paths from a cell.
 const GLOSS_COST: u64 = 3;
+/// Least number of gloss samples per pixel: one for each of its rays.
 const MIN_GLOSS: u64 = RAYS as u64;
 
-/// Fewer held-out pixels than this are joined by others.
+/// With fewer held-out pixels than this, cross-validated pixels join the trial.
 const FEW_HELD_OUT: usize = 1_000;
 
 /// The state of one object.
@@ -40,24 +40,24 @@ pub struct TexturedSurface {
     pixels: Vec<SeenPixel>,
     /// Its cells.
     pub cells: Cells,
-    /// Which of them lie side by side.
+    /// The graph of neighbouring cells.
     pub links: Links,
-    /// Pixels in the fit that see each cell.
+    /// Number of pixels in the fit that see each cell.
     pub seen: Vec<u32>,
-    /// What was found last.
+    /// The latest texture.
     pub texture: Texture,
-    /// One colour for all of it, by the same pixels and the same light.
+    /// The best single albedo for the same pixels and irradiance.
     pub constant: Vec3,
-    /// Standard error of each cell's albedo.
+    /// Standard error of each cell's albedo; empty until it is computed.
     pub stderr: Vec<Vec3>,
 }
 
-/// Hears of rays cast and paths dropped.
+/// Receives rays cast and paths rejected; its error ends the stage.
 type Done<'d> = dyn FnMut(u64, u64) -> Result<(), Termination> + 'd;
 
 impl TexturedSurface {
-    /// Cuts the object into cells, `width` times as wide as the finest that its pixels resolve; `None` where none of the
-    /// pixels sees it alone.
+    /// Cuts the object into cells, `width` times as wide as the footprints of its pixels; `None` if no usable pixel sees only this
+    /// object.
     pub fn new(
         task: &Task,
         object: usize,
@@ -66,7 +66,7 @@ impl TexturedSurface {
         width: f32,
     ) -> Option<Self> {
         let seed = task.settings.seed;
-        let pixels = look(
+        let pixels = sample_pixels(
             task.problem,
             object as u32,
             pixels,
@@ -92,9 +92,8 @@ impl TexturedSurface {
         width: f32,
     ) -> Option<Self> {
         let cells = Cells::new(scene, &pixels, width);
-        // One side of a triangle receives the light that its texture is measured in.
-        pixels
-            .retain(|p| (p.landings.iter()).all(|l| cells.front(l.hit.triangle) == Some(l.front)));
+        // Cells have one side, whose irradiance is traced: pixels that see the other side are left out.
+        pixels.retain(|p| (p.hits.iter()).all(|l| cells.front(l.hit.triangle) == Some(l.front)));
         if pixels.iter().all(|p| p.held_out || p.saturated) {
             return None;
         }
@@ -124,8 +123,8 @@ impl TexturedSurface {
         Some(surface)
     }
 
-    /// Traces the light that arrives and fits the texture to it; finds its standard errors too where the relative
-    /// error of the object's overall albedo is given.
+    /// Traces the irradiance and fits the texture. `errors`, the relative standard error of the object's overall albedo, asks for
+    /// standard errors too.
     pub fn find(
         &mut self,
         lit: &Lit,
@@ -150,7 +149,7 @@ impl TexturedSurface {
             let samples = paths / (GLOSS_COST * self.pixels.len() as u64);
             let samples = samples.clamp(MIN_GLOSS, MAX_SAMPLES) as u32;
             for pixels in self.pixels.chunks_mut(SLICE) {
-                let cast = find_gloss(lit, pixels, samples, options, self.seed, key);
+                let cast = trace_gloss(lit, pixels, samples, options, self.seed, key);
                 done(cast.rays, cast.rejected)?;
             }
         }
@@ -176,28 +175,28 @@ impl TexturedSurface {
         done(0, 0)
     }
 
-    /// Compares texture and one colour on held-out pixels.
+    /// Compares the texture with one colour on pixels outside the fit.
     pub fn try_out(
         &self,
         lit: &Lit,
         options: &PathOptions,
         done: &mut Done,
     ) -> Result<Trial, Termination> {
-        // Held-out pixels; where they are few, also those that were left out in turn to choose the smoothing. Under a lobe
-        // these alone, held-out ones included: their photographs were left out whole.
+        // Held-out pixels; if they are few, also each fold with the texture fitted without it. Glossy objects are tested by
+        // folds alone, which are whole photographs.
         let colors = self.texture.colors.as_slice();
-        let told = || self.pixels.iter().filter(|p| !p.saturated);
-        let held_out = told().filter(|p| p.held_out && !self.glossy);
-        let mut pixels: Vec<Untouched> =
-            held_out.map(|pixel| Untouched { pixel, colors }).collect();
+        let unsaturated = || self.pixels.iter().filter(|p| !p.saturated);
+        let held_out = unsaturated().filter(|p| p.held_out && !self.glossy);
+        let mut pixels: Vec<TestPixel> =
+            held_out.map(|pixel| TestPixel { pixel, colors }).collect();
         if pixels.len() < FEW_HELD_OUT {
-            let left_out = told().filter(|p| self.glossy || !p.held_out);
+            let left_out = unsaturated().filter(|p| self.glossy || !p.held_out);
             pixels.extend(left_out.filter_map(|pixel| {
                 let colors = self.texture.without.get(pixel.fold)?;
-                Some(Untouched { pixel, colors })
+                Some(TestPixel { pixel, colors })
             }));
         }
-        let trial = try_out(
+        let trial = compare(
             lit,
             &self.cells,
             &pixels,
@@ -210,7 +209,7 @@ impl TexturedSurface {
         Ok(trial)
     }
 
-    /// Whether the fit found more than one colour.
+    /// Whether the fit chose more than one colour.
     pub fn is_textured(&self) -> bool {
         self.texture.strength.is_some()
     }
@@ -220,21 +219,21 @@ impl TexturedSurface {
         self.cells.count()
     }
 
-    /// Pixels in the fit.
+    /// Number of pixels in the fit.
     pub fn pixel_count(&self) -> usize {
         self.pixels.iter().filter(|p| !p.held_out).count()
     }
 
-    /// Mean albedo by area over the cells that pixels see.
+    /// Area-weighted mean albedo over the cells that pixels see.
     pub fn mean(&self) -> Vec3 {
         let (mut sum, mut area) = (DVec3::ZERO, 0.0);
         for ((cell, color), seen) in
             (self.cells.cells.iter().zip(&self.texture.colors)).zip(&self.seen)
         {
             if *seen > 0 {
-                let fraction = f64::from(cell.size * cell.size);
-                sum += color.as_dvec3() * fraction;
-                area += fraction;
+                let own = f64::from(cell.size * cell.size);
+                sum += color.as_dvec3() * own;
+                area += own;
             }
         }
         if area > 0.0 {
@@ -244,12 +243,12 @@ impl TexturedSurface {
         }
     }
 
-    /// For each pixel in the fit, the cells that it sees and their fractions of it.
+    /// For each pixel in the fit, the cells that it sees and the fraction of its rays on each.
     fn rows(&self) -> Vec<Vec<(u32, f32)>> {
         (self.pixels.iter().filter(|p| !p.held_out))
             .map(|pixel| {
-                let fraction = 1.0 / pixel.landings.len() as f32;
-                let mut row: Vec<(u32, f32)> = (pixel.landings.iter())
+                let fraction = 1.0 / pixel.hits.len() as f32;
+                let mut row: Vec<(u32, f32)> = (pixel.hits.iter())
                     .filter_map(|l| self.cells.locate(&l.hit))
                     .map(|cell| (cell, fraction))
                     .collect();

@@ -1,4 +1,4 @@
-//! Whether a texture explains pixels that no fit has seen better than one colour does.
+//! Compares a texture with one colour on pixels outside its fit.
 
 use crate::inverse::texture::SIGNIFICANT;
 use crate::inverse::texture::cells::Cells;
@@ -13,66 +13,65 @@ use crate::transport::path::PathOptions;
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// First of the sample keys of these paths, far from those of the fits.
+/// First of the sample keys of these paths, disjoint from those of the fits.
 const KEY: u64 = 7 << 59;
 /// Paths over all pixels, in each of two sets.
 const PATHS: usize = 64_000;
-/// Paths a pixel at least and at most, in each set.
-const PATHS_A_PIXEL: (usize, usize) = (32, 512);
-/// Pixels used at most, and how many of them decide whether to go on with the rest.
+/// Least and greatest number of paths per pixel and set.
+const PATHS_PER_PIXEL: (usize, usize) = (32, 512);
+/// Greatest number of pixels.
 const MAX_PIXELS: usize = 2_000;
+/// Number of pixels that decide whether the rest is needed.
 const FIRST_PIXELS: usize = 250;
-/// A gain of so many standard errors on the first pixels needs no more of them.
-const PLAIN: f64 = 2.0 * SIGNIFICANT;
-/// Photographs that a standard error over photographs takes.
+/// A gain of this many standard errors on the first pixels is decisive.
+const DECISIVE: f64 = 2.0 * SIGNIFICANT;
+/// Least number of photographs for a standard error over photographs.
 const MIN_PHOTOGRAPHS: f64 = 5.0;
-/// One pixel's gain counts up to so many times what two of three stay below.
+/// The gain of a pixel is clamped to this multiple of the 68th percentile.
 const CLIP: f64 = 5.0;
 
-/// The outcome: squared errors relative to the squared level, mean over held-out pixels, noise of the photographs
-/// included.
+/// The outcome. Errors are squared, relative to the squared level, and averaged over pixels; they include photograph noise.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Trial {
-    /// Of one colour.
+    /// Error of one colour.
     pub before: f64,
-    /// Of the texture.
+    /// Error of the texture.
     pub after: f64,
-    /// Mean of the difference, single pixels held back from deciding alone.
+    /// Mean decrease, with clamped outliers.
     pub gain: f64,
     /// Standard error of `gain`.
     pub noise: f64,
-    /// Pixels.
+    /// Number of pixels.
     pub pixels: usize,
-    /// What tracing took; dropped samples count as black, for both alike.
+    /// Rays cast and paths rejected; rejected samples count as black in both predictions.
     pub cast: Cast,
 }
 
-/// A pixel, and the texture that was fitted without it.
+/// A pixel, and a texture that was fitted without it.
 #[derive(Clone, Copy)]
-pub struct Untouched<'a> {
+pub struct TestPixel<'a> {
     /// The pixel.
     pub pixel: &'a SeenPixel,
     /// Albedo of each cell.
     pub colors: &'a [Vec3],
 }
 
-/// Compares one colour and a texture on pixels that the texture was fitted without.
+/// Compares one colour with a texture on pixels that the texture was fitted without.
 ///
-/// Both see the same light: full paths from the pixel's own points, in two independent sets whose errors are
-/// multiplied, so that the noise of the paths favours neither. Where a first part of the pixels speaks plainly for the
-/// texture, or leaves no hope that all of them together would, the rest are not traced. Where the surface is `glossy`, what
-/// the pixels of one photograph share counts once.
-pub fn try_out(
+/// Both are lit by the same full paths from the pixel's hits, in two independent sets whose residuals are multiplied, so that
+/// path noise causes no bias. The test ends after the first pixels if these are decisive, or if all pixels together would
+/// hardly reach significance. If the surface is `glossy`, errors are correlated within each photograph.
+pub fn compare(
     lit: &Lit,
     cells: &Cells,
-    pixels: &[Untouched],
+    pixels: &[TestPixel],
     constant: Vec3,
     glossy: bool,
     options: &PathOptions,
     seed: u64,
 ) -> Trial {
     let count = pixels.len().min(MAX_PIXELS);
-    let chosen: Vec<Untouched> = (0..count)
+    let chosen: Vec<TestPixel> = (0..count)
         .map(|i| pixels[i * pixels.len() / count])
         .collect();
     let mut levels: Vec<f64> = (chosen.iter())
@@ -84,48 +83,48 @@ pub fn try_out(
         constant,
         options,
         seed,
-        paths: (PATHS / count.max(1)).clamp(PATHS_A_PIXEL.0, PATHS_A_PIXEL.1),
+        paths: (PATHS / count.max(1)).clamp(PATHS_PER_PIXEL.0, PATHS_PER_PIXEL.1),
         floor: 0.5 * quantile(&mut levels, 0.5).unwrap_or(0.0) as f32,
     };
     let every = count.div_ceil(FIRST_PIXELS).max(1);
     let part = |first: bool| {
         let indices = (0..count).filter(|i| (i % every == 0) == first);
-        let pixels: Vec<Untouched> = indices.map(|i| chosen[i]).collect();
+        let pixels: Vec<TestPixel> = indices.map(|i| chosen[i]).collect();
         comparison.compare(&pixels)
     };
     let mut compared = part(true);
-    let first = Trial::of(&compared, glossy);
-    if !is_plain(&first) && !is_hopeless(&first, count) {
+    let first = Trial::new(&compared, glossy);
+    if !is_decisive(&first) && !is_hopeless(&first, count) {
         compared.extend(part(false));
     }
-    Trial::of(&compared, glossy)
+    Trial::new(&compared, glossy)
 }
 
-/// Whether the pixels compared so far decide for the texture already.
-fn is_plain(first: &Trial) -> bool {
-    first.pixels >= FIRST_PIXELS / 2 && first.gain > PLAIN * first.noise
+/// Whether the first pixels decide for the texture.
+fn is_decisive(first: &Trial) -> bool {
+    first.pixels >= FIRST_PIXELS / 2 && first.gain > DECISIVE * first.noise
 }
 
-/// Whether `count` pixels would hardly reach a significant gain, after what some of them showed.
+/// Whether `count` pixels would hardly reach a significant gain, given the first ones and one standard error of luck.
 fn is_hopeless(first: &Trial, count: usize) -> bool {
     let growth = (count as f64 / first.pixels.max(1) as f64).sqrt();
     (first.gain / first.noise.max(f64::MIN_POSITIVE) + 1.0) * growth < SIGNIFICANT
 }
 
-/// What both predictions of a pixel are made and weighed by.
+/// The inputs of both predictions.
 struct Comparison<'a> {
     lit: &'a Lit,
     cells: &'a Cells,
     constant: Vec3,
     options: &'a PathOptions,
     seed: u64,
-    /// Paths a pixel in each set.
+    /// Paths per pixel and set.
     paths: usize,
-    /// Level below which errors weigh no more.
+    /// Luminance added in quadrature to the level.
     floor: f32,
 }
 
-/// Squared relative errors of one pixel, and what tracing it took.
+/// Squared relative errors of one pixel.
 struct Compared {
     frame: u32,
     flat: f64,
@@ -134,11 +133,11 @@ struct Compared {
 }
 
 impl Comparison<'_> {
-    fn compare(&self, pixels: &[Untouched]) -> Vec<Compared> {
+    fn compare(&self, pixels: &[TestPixel]) -> Vec<Compared> {
         pixels.par_iter().map(|pixel| self.pixel(pixel)).collect()
     }
 
-    fn pixel(&self, &Untouched { pixel, colors }: &Untouched) -> Compared {
+    fn pixel(&self, &TestPixel { pixel, colors }: &TestPixel) -> Compared {
         let texture = |hit| {
             let cell = self.cells.locate(hit);
             cell.map_or(self.constant, |c| colors[c as usize])
@@ -147,19 +146,19 @@ impl Comparison<'_> {
         let sets = [0u64, 1].map(|set| {
             let (mut flat, mut textured) = (Vec3::ZERO, Vec3::ZERO);
             for path in 0..self.paths {
-                let landing = &pixel.landings[path % pixel.landings.len()];
+                let hit = &pixel.hits[path % pixel.hits.len()];
                 let sample = KEY + 2 * path as u64 + set;
                 let key = (u64::from(pixel.frame), u64::from(pixel.pixel));
                 let mut stream = Stream::new(self.seed, key.0, key.1, sample);
-                let surface = self.lit.surface(&landing.hit);
-                let normal = landing.normal(self.lit);
-                let (white, took) =
+                let surface = self.lit.surface(&hit.hit);
+                let normal = hit.normal(self.lit);
+                let (white, base_cast) =
                     white_base(self.lit, &surface, normal, &mut stream, self.options);
-                let (lobe, more) = gloss(self.lit, pixel, path, &mut stream, self.options);
-                cast += took;
-                cast += more;
+                let (lobe, gloss_cast) = gloss(self.lit, pixel, path, &mut stream, self.options);
+                cast += base_cast;
+                cast += gloss_cast;
                 flat += white * pixel.base * self.constant + lobe;
-                textured += white * pixel.base * texture(&landing.hit) + lobe;
+                textured += white * pixel.base * texture(&hit.hit) + lobe;
             }
             [flat, textured].map(|sum| sum / self.paths as f32)
         });
@@ -168,7 +167,7 @@ impl Comparison<'_> {
         let square = f64::from(level * level + self.floor * self.floor);
         let error = |[a, b]: [Vec3; 2]| {
             let product = (pixel.measured - a) * (pixel.measured - b);
-            // Where all is black there is no level to count in.
+            // The level is zero if everything is black.
             if square > 0.0 {
                 f64::from(product.element_sum() / 3.0) / square
             } else {
@@ -185,12 +184,12 @@ impl Comparison<'_> {
 }
 
 impl Trial {
-    /// Whether the gain is no accident.
+    /// Whether the gain is significant.
     pub fn is_gain(&self) -> bool {
         self.gain > SIGNIFICANT * self.noise
     }
 
-    fn of(pixels: &[Compared], glossy: bool) -> Self {
+    fn new(pixels: &[Compared], glossy: bool) -> Self {
         let mut sizes: Vec<f64> = (pixels.iter())
             .map(|p| (p.flat - p.textured).abs())
             .collect();
@@ -220,8 +219,8 @@ impl Trial {
     }
 }
 
-/// Standard error of the mean of gains where those of a photograph depend on each other, as they share what is wrong with a
-/// highlight; infinite where photographs are too few to tell.
+/// Standard error of the mean of gains that are correlated within each photograph, as the errors of a highlight are; infinite
+/// with fewer than [`MIN_PHOTOGRAPHS`] photographs.
 fn error_by_frame(mut gains: Vec<(u32, f64)>, mean: f64) -> f64 {
     gains.sort_by_key(|&(frame, _)| frame);
     let sums = (gains.chunk_by(|a, b| a.0 == b.0))
@@ -237,13 +236,13 @@ fn error_by_frame(mut gains: Vec<(u32, f64)>, mean: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Ten photographs of fifty pixels each, whose gains differ by photograph alone: as good as ten measurements.
+    /// Ten photographs of fifty pixels each, whose gains are equal within each photograph, count as ten measurements.
     #[test]
     fn what_pixels_of_a_photograph_share_counts_once() {
         let of_frame = |frame: u32| f64::from(frame % 5) - 2.0;
         let gains: Vec<(u32, f64)> = (0..500).map(|i| (i % 10, of_frame(i % 10))).collect();
         let error = error_by_frame(gains, 0.0);
-        // Variance 2 of each, unbiased 20/9, over ten.
+        // The variance is 2, the unbiased estimate 20/9; of the mean of ten, 2/9.
         assert!((error - (20.0f64 / 90.0).sqrt()).abs() < 1e-12, "{error}");
         assert_eq!(error_by_frame(vec![(3, 1.0), (3, 2.0)], 1.5), f64::INFINITY);
     }
@@ -256,22 +255,22 @@ mod tests {
             pixels: 250,
             ..Trial::default()
         };
-        // Eight times the pixels make 2.8 times the significance; one standard error is granted for luck.
+        // Eight times the pixels give 2.8 times the significance; one standard error is granted for luck.
         assert!(is_hopeless(&first(-1.0), 2000));
         assert!(is_hopeless(&first(0.3), 2000));
         assert!(!is_hopeless(&first(0.5), 2000));
-        assert!(is_plain(&first(8.5)) && !is_plain(&first(7.0)));
-        // A few pixels are never enough, whatever they show.
-        assert!(!is_plain(&Trial {
+        assert!(is_decisive(&first(8.5)) && !is_decisive(&first(7.0)));
+        // A few pixels are never decisive.
+        assert!(!is_decisive(&Trial {
             pixels: 40,
             ..first(50.0)
         }));
-        // No noise at all: whatever is gained is significant.
-        let bound_met = |gain: f64| Trial {
+        // Without noise, any gain is significant.
+        let noise_free = |gain: f64| Trial {
             noise: 0.0,
             ..first(gain)
         };
-        assert!(!is_hopeless(&bound_met(1e-9), 2000));
-        assert!(is_hopeless(&bound_met(-1e-9), 2000));
+        assert!(!is_hopeless(&noise_free(1e-9), 2000));
+        assert!(is_hopeless(&noise_free(-1e-9), 2000));
     }
 }

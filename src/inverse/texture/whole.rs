@@ -1,4 +1,4 @@
-//! The textures of all objects as texels of the whole mesh; what no pixel sees takes its neighbours' value.
+//! Texels of the whole mesh from the textures of all objects; unseen texels are interpolated from seen cells.
 
 use crate::inverse::estimate::{Estimate, TexelEstimate};
 use crate::inverse::texture::errors::spread;
@@ -12,34 +12,34 @@ use rstar::RTree;
 use rstar::primitives::GeomWithData;
 use std::sync::Arc;
 
-/// Seen cells that an unseen place takes its colour from, the nearer and the better seen the more.
+/// Number of seen cells that an unseen texel is interpolated from.
 const NEIGHBOURS: usize = 32;
-/// Pixels beyond which a cell is not better seen for more of them.
+/// Number of pixels above which the weight of a cell stops growing.
 const WELL_SEEN: u32 = 8;
 
-/// The middle of a seen cell.
-type Place = GeomWithData<[f32; 3], usize>;
+/// The centre of a seen cell.
+type Center = GeomWithData<[f32; 3], usize>;
 
-/// The colour around a place: the mean over the seen cells nearest to it, by the inverse square of the distance and by how
-/// often each is seen. `None` where no cell is.
-fn surroundings(surface: &TexturedSurface, tree: &RTree<Place>, point: Vec3) -> Option<Vec3> {
+/// Colour at an unseen point: the mean over the nearest seen cells, weighted by inverse squared distance and number of pixels;
+/// `None` if no cell is seen.
+fn interpolated(surface: &TexturedSurface, tree: &RTree<Center>, point: Vec3) -> Option<Vec3> {
     let near = tree
         .nearest_neighbor_iter(point.to_array())
         .take(NEIGHBOURS);
-    let neighbours = near.map(|place| Neighbour {
-        distance: Vec3::from(*place.geom()).distance(point),
-        size: surface.cells.cells[place.data].size,
-        seen: surface.seen[place.data],
-        color: surface.texture.colors[place.data],
+    let neighbours = near.map(|center| Neighbour {
+        distance: Vec3::from(*center.geom()).distance(point),
+        size: surface.cells.cells[center.data].size,
+        seen: surface.seen[center.data],
+        color: surface.texture.colors[center.data],
     });
     mean_color(neighbours)
 }
 
-/// A seen cell from an unseen place.
+/// A seen cell near an unseen point.
 struct Neighbour {
     distance: f32,
     size: f32,
-    /// Pixels that see it.
+    /// Number of pixels that see it.
     seen: u32,
     color: Vec3,
 }
@@ -47,7 +47,7 @@ struct Neighbour {
 fn mean_color(neighbours: impl Iterator<Item = Neighbour>) -> Option<Vec3> {
     let (mut sum, mut total) = (Vec3::ZERO, 0.0);
     for neighbour in neighbours {
-        // Nearer than its own size a cell gains little.
+        // The weight is bounded at distances below the size of the cell.
         let relative = neighbour.distance / neighbour.size.max(f32::MIN_POSITIVE);
         let weight = neighbour.seen.min(WELL_SEEN) as f32 / (relative * relative + 1.0);
         sum += neighbour.color * weight;
@@ -56,7 +56,7 @@ fn mean_color(neighbours: impl Iterator<Item = Neighbour>) -> Option<Vec3> {
     (total > 0.0).then(|| sum / total)
 }
 
-/// The texels of an estimate with these surfaces textured.
+/// The texels of an estimate in which the given surfaces are textured.
 pub fn texels(scene: &Scene, estimate: &Estimate, surfaces: &[TexturedSurface]) -> TexelEstimate {
     let mut levels = vec![0; scene.triangles.len()];
     let mut textured = vec![false; scene.objects.len()];
@@ -71,7 +71,7 @@ pub fn texels(scene: &Scene, estimate: &Estimate, surfaces: &[TexturedSurface]) 
     let mut stderr = vec![Vec3::ZERO; layout.len()];
     let mut seen = vec![0; layout.len()];
 
-    // Objects of one colour have it on each triangle.
+    // Objects without a texture.
     for (index, object) in scene.objects.iter().enumerate() {
         if let Some(known) = estimate.objects.get(index).filter(|_| !textured[index]) {
             for &triangle in &object.triangles {
@@ -83,11 +83,11 @@ pub fn texels(scene: &Scene, estimate: &Estimate, surfaces: &[TexturedSurface]) 
     }
 
     for surface in surfaces {
-        let places: Vec<Place> = (0..surface.cells.count())
+        let centers: Vec<Center> = (0..surface.cells.count())
             .filter(|&cell| surface.seen[cell] > 0)
             .map(|cell| GeomWithData::new(surface.cells.cells[cell].center.to_array(), cell))
             .collect();
-        let tree = RTree::bulk_load(places);
+        let tree = RTree::bulk_load(centers);
         let mean = surface.mean();
         let unseen = spread(&surface.texture.colors, mean);
         for &triangle in &scene.objects[surface.object].triangles {
@@ -106,7 +106,7 @@ pub fn texels(scene: &Scene, estimate: &Estimate, surfaces: &[TexturedSurface]) 
                     seen[at] = surface.seen[cell as usize];
                     stderr[at] = surface.stderr.get(cell as usize).copied().unwrap_or(unseen);
                 } else {
-                    colors[at] = surroundings(surface, &tree, scene.point(&hit)).unwrap_or(mean);
+                    colors[at] = interpolated(surface, &tree, scene.point(&hit)).unwrap_or(mean);
                     stderr[at] = unseen;
                 }
             }
@@ -132,13 +132,13 @@ mod tests {
             seen,
             color: Vec3::splat(color),
         };
-        // One stray pixel next to it against the floor around.
+        // One badly seen cell nearby against many well seen ones farther away.
         let stray = mean_color(
             std::iter::once(neighbour(0.02, 1, 0.0))
                 .chain((0..31).map(|_| neighbour(0.03, 40, 0.6))),
         );
         assert!(stray.is_some_and(|c| (c.x - 0.6).abs() < 0.01), "{stray:?}");
-        // Of two that are seen alike the nearer one counts.
+        // Of two equally seen cells the nearer one dominates.
         let near = mean_color([neighbour(0.01, 9, 0.2), neighbour(0.1, 9, 0.8)].into_iter());
         assert!(near.is_some_and(|c| (c.x - 0.2).abs() < 0.02), "{near:?}");
         assert_eq!(mean_color(std::iter::empty()), None);

@@ -75,7 +75,7 @@ pub fn noise(
 pub fn tracer<'a>(
     scene: &'a Scene,
     lights: &'a Emitters,
-    believed_albedo: &'a [f32],
+    expected_albedo: &'a [f32],
     sampling: LightSampling,
     max_bounces: u32,
 ) -> Tracer<'a> {
@@ -84,7 +84,7 @@ pub fn tracer<'a>(
         lights,
         measured: None,
         surface_of: &scene.object_of,
-        believed_albedo,
+        expected_albedo,
         texels: None,
         lobes: &[],
         patches: None,

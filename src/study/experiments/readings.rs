@@ -139,12 +139,12 @@ fn run(bench: &Bench) -> Result<Findings> {
     let subject = bench.subject.map(|subject| (*subject.capture).clone());
     let mut captures = vec![in_memory(&subject.map_or_else(room::capture, Ok)?)?];
     let first = decide(&captures[0], None)?;
-    let (mut sound, mut refused, mut doubtful, mut astray) = (0, 0, 0, 0);
+    let (mut sound, mut refused, mut doubtful, mut mispaired) = (0, 0, 0, 0);
     let mut count = |outcome: &Outcome| {
         sound += 1;
         refused += u64::from(outcome.detected);
         doubtful += u64::from(outcome.alignment.decision == Decision::Doubtful);
-        astray += outcome.alignment.astray.len();
+        mispaired += outcome.alignment.mispaired.len();
     };
     count(&first);
     row(&captures[0], "none", &first);
@@ -202,7 +202,7 @@ fn run(bench: &Bench) -> Result<Findings> {
                 "Of {made} captures with a mistake {found} were refused, {mended} with the right remedy."
             ),
             format!(
-                "Of {sound} sound captures {refused} were refused, and of {doubtful} it was said that it cannot be told. {astray} of \
+                "Of {sound} sound captures {refused} were refused, and of {doubtful} it was said that it cannot be told. {mispaired} of \
                 their photographs were said to have another's pose."
             ),
         ],

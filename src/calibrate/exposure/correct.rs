@@ -1,4 +1,4 @@
-//! Photographs as they would be if all were exposed alike, through a lens that dims nothing.
+//! Corrects photographs for exposure, vignetting and response.
 
 use crate::calibrate::exposure::Exposures;
 use crate::calibrate::problem::Problem;
@@ -9,8 +9,8 @@ use rayon::prelude::*;
 use std::sync::Arc;
 
 impl Exposures {
-    /// The problem as photographs of equal exposure, taken by a lens that dims nothing and a camera that bends nothing, show it.
-    pub fn undone(&self, problem: &Problem) -> Problem {
+    /// The problem with photographs of equal exposure and white balance, without vignetting, and linear in radiance.
+    pub fn corrected(&self, problem: &Problem) -> Problem {
         let cameras = &problem.scene.cameras;
         let photographs = (problem.photographs.par_iter().zip(cameras))
             .zip(&self.factors)
@@ -20,9 +20,9 @@ impl Exposures {
                     vignetting: self.vignetting,
                     response: self.response,
                 };
-                let full = photograph.saturation;
-                let light = |value: Vec3| exposure.light(value, full);
-                // What is close to it counts as saturated before and after.
+                let saturation = photograph.saturation;
+                let light = |value: Vec3| exposure.light(value, saturation);
+                // A value counts as saturated afterwards if and only if it did before.
                 let limit = |limit: Vec3| {
                     light(limit).min(light(limit * BELOW_SATURATION) / BELOW_SATURATION)
                 };
@@ -30,8 +30,8 @@ impl Exposures {
                 let factors: Vec<Vec3> = (0..photograph.pixels.len())
                     .map(|pixel| exposure.at(&camera.intrinsics, size, pixel))
                     .collect();
-                let varies = self.vignetting.is_some() && photograph.saturation.is_finite();
-                let limits = match varies || !photograph.limits.is_empty() {
+                let limit_varies = self.vignetting.is_some() && photograph.saturation.is_finite();
+                let limits = match limit_varies || !photograph.limits.is_empty() {
                     true => (factors.iter().enumerate())
                         .map(|(pixel, factor)| limit(photograph.limit(pixel)) / *factor)
                         .collect(),
@@ -42,7 +42,7 @@ impl Exposures {
                     pixels: pixels
                         .map(|(value, factor)| light(*value) / *factor)
                         .collect(),
-                    saturation: limit(full) / *factor,
+                    saturation: limit(saturation) / *factor,
                     limits,
                     usable: photograph.usable.clone(),
                     ..**photograph
