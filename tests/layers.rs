@@ -188,6 +188,127 @@ fn the_window_library_stays_in_the_window() {
     }
 }
 
+/// Files of the window that may name all of its state: they make, update and change it, or hand its parts to panes.
+const WHOLE: [&str; 6] = ["state", "update", "perform", "panes", "window", "run"];
+
+/// All paths below `crate::` that a source names, one a name in braces; tests are left out.
+fn paths(source: &str) -> Vec<Vec<String>> {
+    let code = source.split("#[cfg(test)]").next().unwrap_or("");
+    let code: String = (code.lines())
+        .filter_map(|line| line.split("//").next())
+        .collect();
+    let mut paths = Vec::new();
+    for rest in code.split("crate::").skip(1) {
+        let mut open: Vec<usize> = Vec::new();
+        let mut path = vec![String::new()];
+        for c in rest.chars() {
+            match c {
+                '{' => open.push(path.len() - 1),
+                ',' | '}' if !open.is_empty() => {
+                    paths.push(path.clone());
+                    if c == '}' {
+                        open.pop();
+                    }
+                    path.truncate(open.last().copied().unwrap_or(0));
+                    path.push(String::new());
+                }
+                ':' if path.last().is_some_and(|name| !name.is_empty()) => path.push(String::new()),
+                c if c.is_alphanumeric() || c == '_' => path.last_mut().expect("one").push(c),
+                ':' => {}
+                c if c.is_whitespace() && !open.is_empty() => {}
+                _ => break,
+            }
+        }
+        paths.push(path);
+    }
+    paths
+}
+
+/// The modules of the window by their paths below `app`, and the text of each.
+fn window() -> Vec<(Vec<String>, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/app");
+    let mut files = Vec::new();
+    sources(&root, &mut files);
+    let module = |file: &PathBuf| {
+        let inside = file
+            .strip_prefix(&root)
+            .expect("within app")
+            .with_extension("");
+        let names = inside
+            .iter()
+            .map(|name| name.to_string_lossy().into_owned());
+        names.filter(|name| name != "mod").collect()
+    };
+    let text = |file| fs::read_to_string(file).expect("readable");
+    files
+        .iter()
+        .map(|file| (module(file), text(file)))
+        .collect()
+}
+
+/// Modules that import each other in a circle: taken away one by one, those that import none of the others.
+fn circle(modules: &[(Vec<String>, String)]) -> Vec<Vec<String>> {
+    let find = |path: &[String]| {
+        let fits = |k: &usize| modules.iter().any(|(module, _)| module == &path[..*k]);
+        let longest = (1..=path.len()).rev().find(fits)?;
+        modules
+            .iter()
+            .position(|(module, _)| module == &path[..longest])
+    };
+    let imports: Vec<Vec<usize>> = (modules.iter().enumerate())
+        .map(|(own, (_, text))| {
+            let paths = paths(text);
+            let inside = paths.iter().filter(|path| path[0] == "app");
+            inside
+                .filter_map(|path| find(&path[1..]))
+                .filter(|to| *to != own)
+                .collect()
+        })
+        .collect();
+    let mut left: Vec<usize> = (0..modules.len()).collect();
+    loop {
+        let before = left.clone();
+        left.retain(|&own| imports[own].iter().any(|to| before.contains(to)));
+        if left.len() == before.len() {
+            return left.iter().map(|&own| modules[own].0.clone()).collect();
+        }
+    }
+}
+
+#[test]
+fn panes_borrow_parts_of_the_windows_state_and_no_files_of_it_import_each_other() {
+    let modules = window();
+    assert!(modules.len() > 60, "only {} files found", modules.len());
+    for (module, text) in &modules {
+        let whole = module
+            .first()
+            .is_some_and(|name| WHOLE.contains(&name.as_str()));
+        let state = ["app".to_owned(), "state".to_owned()];
+        let names = paths(text).iter().any(|path| path.starts_with(&state));
+        assert!(whole || !names, "{} names App", module.join("/"));
+    }
+    let circle = circle(&modules);
+    assert!(circle.is_empty(), "in a circle, or above one: {circle:?}");
+}
+
+#[test]
+fn a_circle_would_be_found() {
+    let module = |name: &str, text: &str| (vec![name.to_owned()], text.to_owned());
+    let [a, b] = ["use crate::app::{b::B, c};", "use crate::app::a::{A};"];
+    let modules = [module("a", a), module("b", b), module("c", "")];
+    assert_eq!(circle(&modules), [["a"], ["b"]]);
+    assert!(
+        circle(&[
+            module("a", a),
+            module("b", "// crate::app::a"),
+            module("c", "")
+        ])
+        .is_empty()
+    );
+    let found = paths("use crate::app::{a::{A, B}, state::App};\n#[cfg(test)]\nuse crate::x;");
+    assert!(found.contains(&vec!["app".into(), "state".into(), "App".into()]));
+}
+
 #[test]
 fn upward_and_sideways_imports_would_be_found() {
     assert!(violations("math", "use crate::scene::Scene;").len() == 1);

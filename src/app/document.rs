@@ -1,107 +1,169 @@
-//! Everything that is edited by hand, with one history for all of it.
+//! What a person would save or undo: the capture with what the worker says of it, parameters, edits, inserted and
+//! regrouped objects, with one history for all that is changed by hand.
 
-use crate::app::insertion::Inserted;
-use crate::app::state::App;
+use crate::app::insertion::Insertions;
 use crate::app::undo::History;
 use crate::capture::regroup::Regroup;
-use crate::session::command::Command;
-use crate::session::edits::{Edits, ObjectEdit};
+use crate::compose::placement::Placement;
+use crate::inverse::estimate::Estimate;
+use crate::inverse::settings::Settings;
+use crate::session::command::Source;
+use crate::session::edits::{Edited, Edits, ObjectEdit};
+use crate::session::snapshot::{OpenCapture, Phase, Snapshot};
 use glam::Vec3;
+use std::sync::Arc;
 
 /// What undo and redo go back and forth in.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Document {
-    inserted: Vec<Inserted>,
-    objects: Vec<Regroup>,
+pub struct Step {
+    inserted: Vec<Placement>,
+    regroups: Vec<Regroup>,
     edits: Edits,
 }
 
-impl App {
-    fn document(&self) -> Document {
-        Document {
+/// The document.
+#[derive(Default)]
+pub struct Document {
+    /// The worker's newest snapshot.
+    pub snapshot: Arc<Snapshot>,
+    /// What is being opened.
+    pub opening: Option<Source>,
+    /// The parameters as edited here.
+    pub settings: Settings,
+    /// Changes made by hand to the estimate.
+    pub edits: Edits,
+    /// The estimate with those changes.
+    pub estimate: Arc<Estimate>,
+    /// The inserted objects.
+    pub insertions: Insertions,
+    /// All changes of the capture's objects since it was read.
+    pub regroups: Vec<Regroup>,
+    /// Steps of what is edited by hand.
+    pub history: History<Step>,
+    edited: Edited,
+}
+
+impl Document {
+    /// What is open.
+    pub fn capture(&self) -> Option<&Arc<OpenCapture>> {
+        self.snapshot.capture.as_ref()
+    }
+
+    /// Number of photographs.
+    pub fn frames(&self) -> usize {
+        self.capture().map_or(0, |open| open.scene.cameras.len())
+    }
+
+    /// Why nothing is open, in words.
+    pub fn nothing_open(&self) -> &'static str {
+        match self.snapshot.phase == Phase::Loading || self.opening.is_some() {
+            true => "Reading the capture…",
+            false => "No capture is open",
+        }
+    }
+
+    /// Whether the solver runs, and would be paused by "Run / Pause".
+    pub fn is_running(&self) -> bool {
+        matches!(self.snapshot.phase, Phase::Solving | Phase::Loading)
+    }
+
+    /// The unit of radiance: relative where photographs of 8 or 16 bits leave the scale open.
+    pub fn radiance_unit(&self) -> &'static str {
+        let relative = |open: &Arc<OpenCapture>| {
+            let mut photographs = open.photographs.iter();
+            photographs.any(|photograph| photograph.saturation.is_finite())
+        };
+        match self.capture().is_some_and(relative) {
+            true => "relative units",
+            false => "W/(sr·m²)",
+        }
+    }
+
+    /// Whether the worker has regrouped the objects as asked; until then no edit of an object can be made, since edits go
+    /// by an object's index.
+    pub fn is_steady(&self) -> bool {
+        let capture = self.capture();
+        capture.is_none_or(|open| open.options.objects == self.regroups)
+    }
+
+    /// Whether objects can be regrouped.
+    pub fn can_regroup(&self) -> bool {
+        self.capture().is_some() && self.is_steady()
+    }
+
+    /// Names of the capture's objects.
+    pub fn names(&self, objects: &[u32]) -> Vec<String> {
+        let all = (self.capture()).map_or(&[][..], |open| &open.capture.mesh.objects);
+        let names = objects.iter().filter_map(|&k| all.get(k as usize));
+        names.cloned().collect()
+    }
+
+    /// Takes up edits, objects and regroupings that a capture was opened with, and begins a new history.
+    pub fn start(&mut self) {
+        self.insertions.take_up(&self.snapshot.inserted);
+        self.regroups = (self.capture()).map_or_else(Vec::new, |open| open.options.objects.clone());
+        self.edits = self.snapshot.edits.clone();
+        self.history = History::starting_at(self.step());
+    }
+
+    /// Applies the edits to the estimate.
+    pub fn apply_edits(&mut self) {
+        self.estimate = self.edited.of(&self.snapshot.estimate, &self.edits);
+    }
+
+    fn step(&self) -> Step {
+        Step {
             inserted: self.insertions.objects.clone(),
-            objects: self.grouping.changes.clone(),
+            regroups: self.regroups.clone(),
             edits: self.edits.clone(),
         }
     }
 
-    fn restore(&mut self, document: Document) {
-        self.insertions.replace(document.inserted);
-        self.grouping.changes = document.objects;
-        self.edits = document.edits;
-    }
-
     /// Records a step where something changed; to be called while no button is down, so that a drag is one step.
     pub fn settle(&mut self) {
-        let document = self.document();
-        self.history.settle(&document);
+        let step = self.step();
+        self.history.settle(&step);
     }
 
     /// Takes the last step back.
     pub fn undo(&mut self) {
-        let mut document = self.document();
-        if self.history.undo(&mut document) {
-            self.restore(document);
+        let mut step = self.step();
+        if self.history.undo(&mut step) {
+            self.restore(step);
         }
     }
 
     /// Makes the last undone step again.
     pub fn redo(&mut self) {
-        let mut document = self.document();
-        if self.history.redo(&mut document) {
-            self.restore(document);
+        let mut step = self.step();
+        if self.history.redo(&mut step) {
+            self.restore(step);
         }
     }
 
-    /// Hands the worker the changes to the estimate where they differ from those it has.
-    pub fn send_edits(&mut self) {
-        if self.edits != self.sent_edits && self.connect(Command::Edit(self.edits.clone())) {
-            self.sent_edits = self.edits.clone();
-        }
-        self.estimate = self.edited.of(&self.snapshot.estimate, &self.edits);
+    fn restore(&mut self, step: Step) {
+        self.insertions.replace(step.inserted);
+        self.regroups = step.regroups;
+        self.edits = step.edits;
     }
 
-    /// Takes up the changes that the worker's capture came with.
-    pub fn take_edits(&mut self) {
-        self.edits = self.snapshot.edits.clone();
-        self.sent_edits = self.edits.clone();
-        self.history = History::starting_at(self.document());
+    /// Index of an object that the estimate knows.
+    pub fn estimated(&self, object: Option<u32>) -> Option<usize> {
+        object
+            .map(|object| object as usize)
+            .filter(|&object| object < self.snapshot.estimate.objects.len())
     }
 
-    /// The selected object, where something is known of it.
-    fn selected_object(&self) -> Option<usize> {
-        let object = self.selected? as usize;
-        (object < self.snapshot.estimate.objects.len()).then_some(object)
+    /// Whether an object emits light or was switched off.
+    pub fn is_lamp(&self, object: usize) -> bool {
+        let found = self.estimate.objects.get(object);
+        self.edits.object(object).off || found.is_some_and(|found| found.emission != Vec3::ZERO)
     }
 
-    /// Whether the selected object emits light or was switched off.
-    pub fn can_switch_lamp(&self) -> bool {
-        self.selected_object().is_some_and(|object| {
-            let lit = (self.estimate.objects.get(object))
-                .is_some_and(|found| found.emission != Vec3::ZERO);
-            self.edits.object(object).off || lit
-        })
-    }
-
-    /// Whether the selected object was changed.
-    pub fn can_reset_material(&self) -> bool {
-        let object = self.selected_object();
-        object.is_some_and(|object| self.edits.object(object) != ObjectEdit::default())
-    }
-
-    /// Switches the selected lamp off, or on again.
-    pub fn switch_lamp(&mut self) {
-        if let Some(object) = self.selected_object() {
-            let mut edit = self.edits.object(object);
-            edit.off = !edit.off;
-            self.edits.set(object, edit);
-        }
-    }
-
-    /// Puts the selected object back to what was found.
-    pub fn reset_material(&mut self) {
-        if let Some(object) = self.selected_object() {
-            self.edits.set(object, ObjectEdit::default());
-        }
+    /// Switches a lamp off, or on again.
+    pub fn switch_lamp(&mut self, object: usize) {
+        let edit = self.edits.object(object);
+        let off = !edit.off;
+        self.edits.set(object, ObjectEdit { off, ..edit });
     }
 }

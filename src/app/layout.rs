@@ -1,9 +1,7 @@
 //! The panes and where they are: a tree of tiles that can be moved, closed, brought back and reset.
 
 use crate::app::picture::quantity::Quantity;
-use crate::app::state::App;
-use crate::app::{model, panels, picture, theme};
-use egui_tiles::{Behavior, SimplificationOptions, TileId, Tiles, Tree, UiResponse};
+use egui_tiles::{Container, Tile, TileId, Tiles, Tree};
 use serde::{Deserialize, Serialize};
 
 /// What a tile shows.
@@ -166,9 +164,7 @@ fn inspect() -> Tree<Pane> {
 }
 
 fn set_sizes(tiles: &mut Tiles<Pane>, parent: TileId, fractions: &[(TileId, f32)]) {
-    if let Some(egui_tiles::Tile::Container(egui_tiles::Container::Linear(linear))) =
-        tiles.get_mut(parent)
-    {
+    if let Some(Tile::Container(Container::Linear(linear))) = tiles.get_mut(parent) {
         for &(child, fraction) in fractions {
             linear.shares.set_share(child, fraction);
         }
@@ -209,113 +205,12 @@ pub fn is_open(tree: &Tree<Pane>, pane: Pane) -> bool {
 fn largest_tabs(tree: &Tree<Pane>, root: TileId) -> TileId {
     tree.tiles
         .iter()
-        .filter(|(_, tile)| {
-            matches!(
-                tile,
-                egui_tiles::Tile::Container(egui_tiles::Container::Tabs(_))
-            )
-        })
+        .filter(|(_, tile)| matches!(tile, Tile::Container(Container::Tabs(_))))
         .max_by(|(a, _), (b, _)| {
             let area = |id: TileId| tree.tiles.rect(id).map_or(0.0, |rect| rect.area());
             area(**a).total_cmp(&area(**b)).then(b.0.cmp(&a.0))
         })
         .map_or(root, |(id, _)| *id)
-}
-
-/// Draws panes for the tree.
-pub struct Panes<'a> {
-    /// The state they show.
-    pub app: &'a mut App,
-    /// The tabs in front. Only these have a button that closes them, so that all have room for their names.
-    pub front: Vec<TileId>,
-}
-
-impl Behavior<Pane> for Panes<'_> {
-    fn pane_ui(&mut self, ui: &mut egui::Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
-        // What fills itself needs no ground: on a software renderer every layer counts.
-        match *pane {
-            Pane::Picture(Quantity::Composite) => picture::hero::pane(ui, self.app),
-            Pane::Picture(quantity) => picture::canvas::pane(ui, self.app, quantity),
-            Pane::Compare => picture::compare::pane(ui, self.app),
-            Pane::Model => model::pane::pane(ui, self.app),
-            other => {
-                let tokens = theme::tokens(ui);
-                ui.painter().rect_filled(ui.max_rect(), 0.0, tokens.panel);
-                egui::Frame::NONE.inner_margin(theme::GAP).show(ui, |ui| {
-                    ui.take_available_space();
-                    match other {
-                        Pane::Objects => panels::objects::pane(ui, self.app),
-                        Pane::Material => panels::material::pane(ui, self.app),
-                        Pane::Lights => panels::lights::pane(ui, self.app),
-                        Pane::Insert => panels::insert::pane(ui, self.app),
-                        Pane::Settings => panels::settings::pane(ui, self.app),
-                        Pane::Capture => panels::capture::pane(ui, self.app),
-                        Pane::Loss => panels::loss::pane(ui, self.app),
-                        Pane::Stages => panels::stages::pane(ui, self.app),
-                        Pane::Trade => panels::trade::pane(ui, self.app),
-                        _ => panels::log::pane(ui, self.app),
-                    }
-                });
-            }
-        }
-        UiResponse::None
-    }
-
-    fn tab_title_for_pane(&mut self, pane: &Pane) -> egui::WidgetText {
-        pane.title().into()
-    }
-
-    fn is_tab_closable(&self, _tiles: &Tiles<Pane>, tile: TileId) -> bool {
-        self.front.contains(&tile)
-    }
-
-    fn close_button_outer_size(&self) -> f32 {
-        11.0
-    }
-
-    fn simplification_options(&self) -> SimplificationOptions {
-        SimplificationOptions {
-            all_panes_must_have_tabs: true,
-            ..SimplificationOptions::default()
-        }
-    }
-
-    fn gap_width(&self, _style: &egui::Style) -> f32 {
-        3.0
-    }
-
-    fn min_size(&self) -> f32 {
-        120.0
-    }
-
-    fn tab_bar_color(&self, visuals: &egui::Visuals) -> egui::Color32 {
-        theme::of(visuals).sunken
-    }
-
-    fn tab_text_color(
-        &self,
-        visuals: &egui::Visuals,
-        _tiles: &Tiles<Pane>,
-        _tile: TileId,
-        state: &egui_tiles::TabState,
-    ) -> egui::Color32 {
-        let tokens = theme::of(visuals);
-        if state.active {
-            tokens.strong
-        } else {
-            tokens.weak
-        }
-    }
-
-    fn tab_outline_stroke(
-        &self,
-        _visuals: &egui::Visuals,
-        _tiles: &Tiles<Pane>,
-        _tile: TileId,
-        _state: &egui_tiles::TabState,
-    ) -> egui::Stroke {
-        egui::Stroke::NONE
-    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The light of each lamp: a switch, a strength and a colour, kept as changes of the lamps' emission. A lamp stays in the list
 //! whatever is made of it.
 
-use crate::app::state::App;
+use crate::app::document::Document;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::session::edits::ObjectEdit;
@@ -54,7 +54,7 @@ impl Gain {
     }
 }
 
-impl App {
+impl Document {
     /// The lamps that were found, and which objects each stands for.
     pub fn lamps(&self) -> Vec<(LightSource, Vec<usize>)> {
         let found = &self.snapshot.estimate;

@@ -1,30 +1,36 @@
-//! The window: panes over a session, drawn by egui and wgpu. Talks to the worker through [`connection::Connection`].
+//! The window: panes over a session, drawn by egui and wgpu. Talks to the worker through [`worker::Connection`].
 
 pub mod action;
 pub mod batch;
-pub mod connection;
+pub mod controls;
 pub mod describe;
 pub mod document;
-pub mod grouping;
 pub mod insertion;
+pub mod jobs;
 pub mod layout;
 pub mod lights;
 pub mod model;
-pub mod opening;
+pub mod number;
 pub mod pace;
 pub mod panels;
+mod panes;
 mod perform;
-pub mod pick;
 pub mod picture;
 pub mod preferences;
+pub mod request;
 mod run;
+pub mod selection;
 pub mod shell;
-pub mod size;
+pub mod shown;
 pub mod state;
 pub mod task;
 pub mod theme;
+pub mod tool;
 pub mod trade;
 pub mod undo;
+mod update;
+pub mod view;
 pub mod window;
+pub mod worker;
 
 pub use run::run;

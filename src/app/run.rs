@@ -2,6 +2,7 @@
 
 use crate::app::pace::Pace;
 use crate::app::preferences::{self, Preferences};
+use crate::app::shell::size::WINDOW;
 use crate::app::state::App;
 use crate::app::window::Window;
 use crate::error::{Error, Result};
@@ -12,9 +13,6 @@ use crate::session::worker::Backend;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Size of the window at first, in points.
-pub const WINDOW: [f32; 2] = [1280.0, 800.0];
 
 /// Opens the window and returns when it is closed. With no `start` it shows the start page.
 ///
@@ -101,8 +99,8 @@ fn window(
     };
     let session = Session::spawn_with(start.clone(), settings.clone(), wake, backend)?;
     let mut app = App::new(Box::new(session), preferences_of_user);
-    app.settings = settings;
-    app.opened_with(start.as_ref());
+    app.document.settings = settings;
+    app.document.opening = start.map(Start::source);
     Ok(Window::new(cc, app, kept).paced(pace))
 }
 

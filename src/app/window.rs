@@ -1,9 +1,12 @@
 //! The window as eframe sees it: one pass draws bars, panes and what floats over them.
 
-use crate::app::layout::{self, Pane, Panes, Workspace};
+use crate::app::layout::{self, Pane, Workspace};
 use crate::app::pace::Pace;
+use crate::app::panes::Panes;
 use crate::app::picture::inspect;
+use crate::app::picture::needed::Needed;
 use crate::app::preferences::Preferences;
+use crate::app::request::{Request, Requests};
 use crate::app::shell::{
     alignment, files, keys, menu, palette, sessions, start, status, thumbnails, toolbar,
 };
@@ -58,43 +61,58 @@ impl Window {
         }
     }
 
-    fn bars(&mut self, ui: &mut Ui) {
+    fn bars(&mut self, ui: &mut Ui, requests: &mut Requests) {
         let frame = |ui: &Ui, x: i8, y: i8| {
             Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(x, y))
         };
-        let app = &mut self.app;
-        Panel::top("menu")
-            .frame(frame(ui, 6, 2))
-            .show(ui, |ui| menu::bar(ui, app, &mut self.tree));
-        Panel::top("tools")
-            .frame(frame(ui, 8, 4))
-            .show(ui, |ui| toolbar::bar(ui, app));
-        if sessions::has_line(app) {
+        let start_page = self.app.shows_start_page();
+        let (app, tree) = (&mut self.app, &mut self.tree);
+        let (document, view) = (&app.document, &mut app.view);
+        Panel::top("menu").frame(frame(ui, 6, 2)).show(ui, |ui| {
+            let name = document.capture().map(|open| open.name.as_str());
+            menu::bar(ui, name, app.preferences.workspace, tree, requests);
+        });
+        Panel::top("tools").frame(frame(ui, 8, 4)).show(ui, |ui| {
+            toolbar::bar(ui, document, &view.shown, &mut view.look, requests)
+        });
+        app.preferences.tone = view.look.tone;
+        if let Some(name) = &document.snapshot.continued
+            && !view.shell.sessions.closed
+            && !start_page
+        {
             Panel::top("session")
                 .exact_size(sessions::LINE)
                 .frame(frame(ui, 8, 4))
-                .show(ui, |ui| sessions::line(ui, app));
+                .show(ui, |ui| {
+                    sessions::line(ui, name, &mut view.shell.sessions, requests)
+                });
         }
         Panel::bottom("status")
             .exact_size(24.0)
             .frame(frame(ui, 8, 2))
-            .show(ui, |ui| status::bar(ui, app));
-        if app.shows_start_page() {
+            .show(ui, |ui| {
+                let batch = app.jobs.batch.as_ref();
+                status::bar(ui, document, batch, &mut view.shell.memory, requests);
+            });
+        if start_page {
             return;
         }
         Panel::bottom("inspector")
             .exact_size(22.0)
             .frame(frame(ui, 8, 2))
-            .show(ui, |ui| inspect::bar(ui, app));
-        if app.preferences.thumbnails && app.frames() > 0 {
+            .show(ui, |ui| inspect::bar(ui, document, view));
+        if app.preferences.thumbnails && document.frames() > 0 {
             Panel::bottom("thumbnails")
                 .exact_size(theme::THUMBNAIL + 18.0)
                 .frame(frame(ui, 8, 4))
-                .show(ui, |ui| thumbnails::strip(ui, app));
+                .show(ui, |ui| {
+                    let (exposure, strip) = (view.look.exposure, &mut view.shell.thumbnails);
+                    thumbnails::strip(ui, document, &view.shown, exposure, strip, requests);
+                });
         }
     }
 
-    fn panes(&mut self, ui: &mut Ui) {
+    fn panes(&mut self, ui: &mut Ui, requests: &mut Requests) {
         let wanted = self.app.preferences.workspace;
         if wanted != self.workspace {
             let before = std::mem::replace(&mut self.workspace, wanted);
@@ -102,31 +120,32 @@ impl Window {
             let tree = std::mem::replace(&mut self.tree, tree);
             *self.app.preferences.layout(before) = Some(tree);
         }
-        if std::mem::take(&mut self.app.reset_layout) {
+        let asked = std::mem::take(&mut self.app.view.layout);
+        if asked.reset {
             self.tree = wanted.first_layout();
         }
-        if let Some(pane) = self.app.bring_forward.take() {
+        if let Some(pane) = asked.front {
             layout::show(&mut self.tree, pane);
         }
         let fill = theme::tokens(ui).sunken;
-        CentralPanel::no_frame()
-            .frame(Frame::NONE.fill(fill))
-            .show(ui, |ui| {
-                if self.app.shows_start_page() {
-                    start::page(ui, &mut self.app);
-                    return;
-                }
-                self.app.pixels_needed = 0.0;
-                self.app.composite_needed = false;
-                self.app.render_needed = false;
-                self.app.layers_needed = false;
-                self.app.irradiance_needed = false;
-                let mut panes = Panes {
-                    app: &mut self.app,
-                    front: self.tree.active_tiles(),
-                };
-                self.tree.ui(&mut panes, ui);
-            });
+        let panel = CentralPanel::no_frame().frame(Frame::NONE.fill(fill));
+        panel.show(ui, |ui| {
+            if self.app.shows_start_page() {
+                let (document, shell) = (&self.app.document, &mut self.app.view.shell);
+                let importing = self.app.jobs.importing.as_ref();
+                let importing = importing.map(|(_, task)| task.doing());
+                let recent = &self.app.preferences.recent;
+                start::page(ui, document, shell, importing, recent, requests);
+                return;
+            }
+            self.app.view.needed = Needed::default();
+            let mut panes = Panes {
+                app: &mut self.app,
+                requests,
+                front: self.tree.active_tiles(),
+            };
+            self.tree.ui(&mut panes, ui);
+        });
     }
 
     /// Writes the preferences where they differ from what was written last.
@@ -157,35 +176,45 @@ fn arranged(preferences: &mut Preferences, workspace: Workspace) -> Tree<Pane> {
 impl eframe::App for Window {
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
         self.app.update(ctx);
-        self.app.follow_size(ctx);
+        let size = &mut self.app.preferences.size;
+        self.app.view.shell.size.follow(ctx, size);
         if let Some(pace) = &self.pace {
             let size = ctx.viewport_rect().size() * ctx.pixels_per_point();
             let touched = ctx.input(|input| !input.raw.events.is_empty());
-            pace.note((size.x * size.y) as u64, touched, self.app.is_running());
+            pace.note(
+                (size.x * size.y) as u64,
+                touched,
+                self.app.document.is_running(),
+            );
         }
     }
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
-        if self.app.palette.is_none() {
-            for action in action::pressed(&ctx, self.app.shows_start_page()) {
-                self.app.perform(action, &ctx);
+        let app = &mut self.app;
+        if app.view.shell.palette.is_none() {
+            for action in action::pressed(&ctx, app.shows_start_page()) {
+                app.perform(action, &ctx);
             }
         }
         let dropped = ctx.input(|input| input.raw.dropped_files.clone());
         for path in dropped.iter().map(|file| file.path().to_owned()) {
-            self.app.open_path(&path, &ctx);
+            app.perform(Request::OpenPath(path), &ctx);
         }
         if !ctx.input(|input| input.pointer.has_pointer()) {
-            self.app.look.cursor = None;
+            app.view.look.cursor = None;
         }
-        self.bars(ui);
-        self.panes(ui);
-        files::show(&ctx, &mut self.app);
-        keys::show(&ctx, &mut self.app);
-        palette::show(&ctx, &mut self.app);
-        self.app.notices.show(&ctx);
-        alignment::show(&mut self.app, &ctx);
+        let mut requests = Requests::new(app.possible());
+        self.bars(ui, &mut requests);
+        self.app.perform_all(&mut requests, &ctx);
+        self.panes(ui, &mut requests);
+        let (document, view) = (&self.app.document, &mut self.app.view);
+        files::show(&ctx, document, view, &mut requests);
+        keys::show(&ctx, &mut view.shell.keys);
+        palette::show(&ctx, &mut view.shell.palette, &mut requests);
+        self.app.jobs.notices.show(&ctx);
+        alignment::show(&ctx, document, &mut requests);
+        self.app.perform_all(&mut requests, &ctx);
         // A drag is saved once it has ended.
         if !ctx.input(|input| input.pointer.any_down()) {
             self.save();

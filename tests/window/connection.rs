@@ -2,11 +2,11 @@
 
 use egui_kittest::Harness;
 use glam::{DMat3, DVec3, Vec3};
-use relit::app::connection::Connection;
 use relit::app::layout::Workspace;
 use relit::app::preferences::Preferences;
 use relit::app::state::App;
 use relit::app::window::Window;
+use relit::app::worker::Connection;
 use relit::capture::camera::{Intrinsics, Pose};
 use relit::capture::mesh::Mesh;
 use relit::capture::photograph::{Encoding, Photograph, PhotographSource};

@@ -81,16 +81,16 @@ fn a_failed_open_is_said_where_it_was_typed_and_letters_typed_after_it_do_nothin
     harness.get_by_label("Open the built-in room");
     // T would change the tone curve, L show the lights.
     let (tone, path) = (
-        harness.state().app.look.tone,
-        harness.state().app.path.clone(),
+        harness.state().app.view.look.tone,
+        harness.state().app.view.shell.start.path.clone(),
     );
     for key in [Key::T, Key::L] {
         press(&mut harness, Modifiers::NONE, key);
     }
-    assert_eq!(harness.state().app.look.tone, tone);
+    assert_eq!(harness.state().app.view.look.tone, tone);
     harness.event(egui::Event::Text("x".into()));
     harness.run_steps(2);
-    assert_ne!(harness.state().app.path, path);
+    assert_ne!(harness.state().app.view.shell.start.path, path);
 }
 
 #[test]
@@ -113,7 +113,7 @@ fn a_folder_that_is_neither_capture_nor_scan_says_what_to_choose() {
         }
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
-    panic!("{:?}", harness.state().app.trouble);
+    panic!("{:?}", harness.state().app.view.shell.start.trouble);
 }
 
 #[test]
@@ -165,22 +165,37 @@ fn photographs_are_stepped_through_around_the_ends() {
     assert_eq!(asked(&recorder), Some(1));
     // The photograph is there at once, the re-render when the worker has sent it.
     let app = &harness.state().app;
-    assert!(app.drawn(Quantity::Photograph).is_some() && app.drawn(Quantity::Render).is_none());
+    assert!(
+        app.view
+            .drawn(&app.document, Quantity::Photograph)
+            .is_some()
+            && app.view.drawn(&app.document, Quantity::Render).is_none()
+    );
     recorder.show(|snapshot| {
         let capture = snapshot.capture.clone().expect("open");
         snapshot.view = Some(Arc::new(view(&capture, 1)));
     });
     harness.run_steps(2);
-    assert!(harness.state().app.drawn(Quantity::Render).is_some());
+    assert!(
+        harness
+            .state()
+            .app
+            .view
+            .drawn(&harness.state().app.document, Quantity::Render)
+            .is_some()
+    );
 }
 
 #[test]
 fn the_table_is_sorted_and_selects() {
     let (mut harness, _recorder) = solving(Harness::builder());
-    assert_eq!(harness.state().app.objects.sort, SortBy::Pixels);
+    assert_eq!(harness.state().app.view.panels.objects.sort, SortBy::Pixels);
     click(&mut harness, "Sort by Emission");
-    assert_eq!(harness.state().app.objects.sort, SortBy::Emission);
-    assert!(harness.state().app.objects.descending);
+    assert_eq!(
+        harness.state().app.view.panels.objects.sort,
+        SortBy::Emission
+    );
+    assert!(harness.state().app.view.panels.objects.descending);
     let height = |harness: &Harness<'_, Window>, name: &str| {
         harness.get_by_label(&format!("Select {name}")).rect().top()
     };
@@ -188,9 +203,9 @@ fn the_table_is_sorted_and_selects() {
     click(&mut harness, "Sort by Emission");
     assert!(height(&harness, "lamp") > height(&harness, "floor"));
     click(&mut harness, "Select wall");
-    assert_eq!(harness.state().app.selected, Some(1));
+    assert_eq!(harness.state().app.view.selection.object, Some(1));
     press(&mut harness, Modifiers::NONE, Key::Escape);
-    assert_eq!(harness.state().app.selected, None);
+    assert_eq!(harness.state().app.view.selection.object, None);
 }
 
 #[test]
@@ -199,7 +214,7 @@ fn a_click_in_a_picture_selects_the_object_there() {
     let pane = harness.get_by_label("Albedo picture").rect();
     for (fraction, object) in [(0.36, 1), (0.8, 0)] {
         let app = &harness.state().app;
-        let placement = app.look.placement(pane, [64, 48]);
+        let placement = app.view.look.placement(pane, [64, 48]);
         let at = placement.min + placement.size() * egui::vec2(0.5, fraction);
         harness.hover_at(at);
         harness.run_steps(1);
@@ -207,24 +222,28 @@ fn a_click_in_a_picture_selects_the_object_there() {
         harness.run_steps(1);
         harness.drop_at(at);
         harness.run_steps(3);
-        assert_eq!(harness.state().app.selected, Some(object), "at {fraction}");
+        assert_eq!(
+            harness.state().app.view.selection.object,
+            Some(object),
+            "at {fraction}"
+        );
     }
 }
 
 #[test]
 fn exposure_and_tone_curve_follow_their_keys() {
     let (mut harness, _recorder) = solving(Harness::builder());
-    let before = harness.state().app.look.exposure;
+    let before = harness.state().app.view.look.exposure;
     press(&mut harness, Modifiers::NONE, Key::Plus);
-    assert_eq!(harness.state().app.look.exposure, before + 0.5);
+    assert_eq!(harness.state().app.view.look.exposure, before + 0.5);
     press(&mut harness, Modifiers::NONE, Key::Minus);
     press(&mut harness, Modifiers::NONE, Key::Minus);
-    assert_eq!(harness.state().app.look.exposure, before - 0.5);
+    assert_eq!(harness.state().app.view.look.exposure, before - 0.5);
     click(&mut harness, "Auto");
-    assert_eq!(harness.state().app.look.exposure, before);
-    let tone = harness.state().app.look.tone;
+    assert_eq!(harness.state().app.view.look.exposure, before);
+    let tone = harness.state().app.view.look.tone;
     press(&mut harness, Modifiers::NONE, Key::T);
-    assert_ne!(harness.state().app.look.tone, tone);
+    assert_ne!(harness.state().app.view.look.tone, tone);
 }
 
 #[test]
@@ -242,10 +261,10 @@ fn two_pictures_are_wiped_flipped_and_shown_side_by_side() {
     harness.run_steps(1);
     harness.drop_at(line + egui::vec2(pane.width() * 0.25, 0.0));
     harness.run_steps(2);
-    let split = harness.state().app.compare.split;
+    let split = harness.state().app.view.compare.split;
     assert!((split - 0.75).abs() < 0.02, "{split}");
     click(&mut harness, "Swap");
-    assert_eq!(harness.state().app.compare.left, Quantity::Render);
+    assert_eq!(harness.state().app.view.compare.left, Quantity::Render);
     click(&mut harness, "Side by side");
     harness.get_by_label("second picture");
     press(&mut harness, Modifiers::NONE, Key::C);
@@ -277,10 +296,10 @@ fn a_file_that_is_no_object_is_said_where_it_was_typed_and_joins_nothing() {
             }
             std::thread::sleep(std::time::Duration::from_millis(5));
         }
-        let trouble = harness.state().app.insertions.trouble.clone();
+        let trouble = harness.state().app.view.panels.adding.trouble.clone();
         assert!(trouble.is_some_and(|line| line.contains(word)), "{file}");
         harness.get_by_label_contains(word);
-        assert!(harness.state().app.insertions.objects.is_empty());
+        assert!(harness.state().app.document.insertions.objects.is_empty());
     }
     assert_eq!(placements(&recorder), None);
 }
@@ -290,7 +309,7 @@ fn an_added_object_stands_on_the_floor_in_view_and_says_its_size() {
     let (mut harness, _recorder) = solving(Harness::builder());
     let folder = tempfile::tempdir().expect("a folder");
     insert(&mut harness, &block(folder.path()));
-    let at = harness.state().app.insertions.objects[0].placement.at;
+    let at = harness.state().app.document.insertions.objects[0].at;
     let at = at.expect("a place");
     assert!(at.y.abs() < 1e-5 && at.x.abs() < 0.5, "{at}");
     harness.get_by_label("0.50 m wide, 0.50 m high, 0.50 m deep");
@@ -303,11 +322,11 @@ fn objects_are_inserted_moved_duplicated_deleted_and_brought_back() {
     insert(&mut harness, &block(folder.path()));
     harness.run_steps(2);
     assert_eq!(placements(&recorder), Some(1));
-    assert!(harness.state().app.insertions.placing);
+    assert!(harness.state().app.view.tool.placing);
 
     // A click on the floor places it.
     let pane = harness.get_by_label("Photograph picture").rect();
-    let placement = harness.state().app.look.placement(pane, [64, 48]);
+    let placement = harness.state().app.view.look.placement(pane, [64, 48]);
     let at = placement.min + placement.size() * egui::vec2(0.5, 0.8);
     harness.hover_at(at);
     harness.run_steps(1);
@@ -315,9 +334,9 @@ fn objects_are_inserted_moved_duplicated_deleted_and_brought_back() {
     harness.run_steps(1);
     harness.drop_at(at);
     harness.run_steps(3);
-    let point = harness.state().app.insertions.objects[0].placement.at;
+    let point = harness.state().app.document.insertions.objects[0].at;
     assert!(point.is_some_and(|p| p.y.abs() < 1e-5), "{point:?}");
-    assert!(!harness.state().app.insertions.placing);
+    assert!(!harness.state().app.view.tool.placing);
 
     click(&mut harness, "Blur and grain of the photograph");
     let matched = |command: &Command| matches!(command, Command::Match(false));
@@ -338,7 +357,7 @@ fn objects_are_inserted_moved_duplicated_deleted_and_brought_back() {
     recorder.show(|snapshot| snapshot.insertion = Some(Arc::new(insertion(0))));
     harness.run_steps(2);
     click(&mut harness, "Naive beside ours");
-    let compare = &harness.state().app.compare;
+    let compare = &harness.state().app.view.compare;
     assert_eq!(
         (compare.left, compare.right),
         (Quantity::Naive, Quantity::Composite)
@@ -364,10 +383,10 @@ fn a_drag_is_one_step_of_undo() {
     }
     harness.drop_at(turn + egui::vec2(40.0, 0.0));
     harness.run_steps(3);
-    assert!(harness.state().app.insertions.objects[0].placement.rotate > 10.0);
+    assert!(harness.state().app.document.insertions.objects[0].rotate > 10.0);
     press(&mut harness, Modifiers::COMMAND, Key::Z);
     assert_eq!(
-        harness.state().app.insertions.objects[0].placement.rotate,
+        harness.state().app.document.insertions.objects[0].rotate,
         0.0
     );
     assert_eq!(placements(&recorder), Some(1));
@@ -383,7 +402,7 @@ fn the_palette_finds_and_does() {
         recorder.sent()[..],
         [Command::Open(Source::BuiltInRoom)]
     ));
-    assert!(harness.state().app.palette.is_none());
+    assert!(harness.state().app.view.shell.palette.is_none());
 }
 
 #[test]
@@ -436,7 +455,7 @@ fn every_pane_draws_in_both_themes_with_the_fonts_shipped() {
     for light in [false, true] {
         assert_eq!(harness.state().app.preferences.light, light);
         for pane in Pane::all() {
-            harness.state_mut().app.bring_forward = Some(pane);
+            harness.state_mut().app.view.layout.front = Some(pane);
             harness.run_steps(2);
             assert!(is_open(&harness.state().tree, pane), "{pane:?}");
         }
@@ -444,7 +463,7 @@ fn every_pane_draws_in_both_themes_with_the_fonts_shipped() {
     }
     press(&mut harness, Modifiers::NONE, Key::Questionmark);
     assert!(harness.query_all_by_label("Keys and mouse").count() > 0);
-    harness.state_mut().app.keys = false;
+    harness.state_mut().app.view.shell.keys = false;
     harness.run_steps(2);
     for menu in ["File", "Edit", "Solve", "View", "Help", "Window"] {
         click(&mut harness, menu);
@@ -458,7 +477,7 @@ fn the_layout_is_reset() {
     relit::app::layout::close(&mut harness.state_mut().tree, Pane::Model);
     harness.run_steps(2);
     assert!(harness.query_by_label("3D view").is_none());
-    harness.state_mut().app.reset_layout = true;
+    harness.state_mut().app.view.layout.reset = true;
     harness.run_steps(2);
     assert!(is_open(&harness.state().tree, Pane::Model));
 }
@@ -489,7 +508,11 @@ fn the_photograph_as_changed_is_the_largest_picture_and_grids_are_a_workspace_of
     assert!(harness.query_by_label("Albedo picture").is_none());
     // It is the photograph while nothing is changed, and what the worker makes of it then.
     let pixel = |harness: &Harness<'_, Window>| {
-        let drawn = harness.state().app.drawn(Quantity::Composite);
+        let drawn = harness
+            .state()
+            .app
+            .view
+            .drawn(&harness.state().app.document, Quantity::Composite);
         drawn.expect("a picture").picture.pixels[0].x
     };
     assert_eq!(pixel(&harness), 0.0);
@@ -508,7 +531,10 @@ fn the_photograph_as_changed_is_the_largest_picture_and_grids_are_a_workspace_of
         });
     assert_eq!(asked, Some(64));
     press(&mut harness, Modifiers::COMMAND, Key::B);
-    assert_eq!(harness.state().app.against, Some(Quantity::Render));
+    assert_eq!(
+        harness.state().app.view.compare.against,
+        Some(Quantity::Render)
+    );
     harness.get_by_label("Wipe position");
     click(&mut harness, "Inspect");
     harness.get_by_label("Albedo picture");

@@ -24,7 +24,7 @@ fn sent(recorder: &Recorder) -> Option<Vec<Regroup>> {
 
 /// Answers as the worker does: the capture with objects changed.
 fn answer(harness: &mut Harness<'_, Window>, recorder: &Recorder, changes: &[Regroup]) {
-    let edits = harness.state().app.edits.clone();
+    let edits = harness.state().app.document.edits.clone();
     recorder.show(|snapshot| {
         let open = crate::connection::room();
         let mut capture = relit::capture::Capture::clone(&open.capture);
@@ -66,11 +66,11 @@ fn chosen_objects_are_joined_and_come_apart_again_with_what_was_changed_of_them(
         off: true,
         ..ObjectEdit::default()
     };
-    harness.state_mut().app.edits.set(1, recoloured);
-    harness.state_mut().app.edits.set(2, off);
+    harness.state_mut().app.document.edits.set(1, recoloured);
+    harness.state_mut().app.document.edits.set(2, off);
     harness.run_steps(3);
     add(&mut harness, "Select floor");
-    assert_eq!(harness.state().app.chosen_objects(), [1, 0]);
+    assert_eq!(harness.state().app.view.selection.all(), [1, 0]);
     click(&mut harness, "Join objects");
     let joined = vec![Regroup::Join {
         objects: vec!["wall".into(), "floor".into()],
@@ -87,10 +87,10 @@ fn chosen_objects_are_joined_and_come_apart_again_with_what_was_changed_of_them(
     // The lamp has another place now, and is still off; of the wall that was, nothing is left.
     let app = &harness.state().app;
     assert_eq!(
-        (app.edits.object(1), app.edits.object(0)),
+        (app.document.edits.object(1), app.document.edits.object(0)),
         (off, ObjectEdit::default())
     );
-    assert!(app.selected.is_none());
+    assert!(app.view.selection.object.is_none());
 
     press(&mut harness, Modifiers::COMMAND, Key::Z);
     assert_eq!(sent(&recorder), Some(Vec::new()));
@@ -98,7 +98,7 @@ fn chosen_objects_are_joined_and_come_apart_again_with_what_was_changed_of_them(
     harness.get_by_label("Select floor");
     let app = &harness.state().app;
     assert_eq!(
-        (app.edits.object(1), app.edits.object(2)),
+        (app.document.edits.object(1), app.document.edits.object(2)),
         (recoloured, off)
     );
     press(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
@@ -111,11 +111,11 @@ fn objects_that_cannot_be_read_again_stay_as_they_are() {
     click(&mut harness, "Select floor");
     add(&mut harness, "Select wall");
     click(&mut harness, "Join objects");
-    assert!(sent(&recorder).is_some() && !harness.state().app.is_steady());
+    assert!(sent(&recorder).is_some() && !harness.state().app.document.is_steady());
     recorder.show(|snapshot| snapshot.regroupings += 1);
     harness.run_steps(3);
     let app = &harness.state().app;
-    assert!(app.is_steady() && app.grouping.changes.is_empty());
+    assert!(app.document.is_steady() && app.document.regroups.is_empty());
 }
 
 #[test]
@@ -171,5 +171,5 @@ fn a_line_around_faces_cuts_them_out() {
     // Of the chosen object alone, all of which is seen.
     let cut = vec![Regroup::cut([0, 1], "cut 1".into())];
     assert_eq!(sent(&recorder), Some(cut));
-    assert!(harness.state().app.picking.is_none());
+    assert!(harness.state().app.view.tool.pick.is_none());
 }

@@ -39,16 +39,16 @@ pub fn retype(harness: &mut Harness<'_, Window>, label: &str, text: &str) {
 pub fn insert(harness: &mut Harness<'_, Window>, file: &Path) {
     click(harness, "Insert");
     retype(harness, "Object file", &file.to_string_lossy());
-    let before = harness.state().app.insertions.objects.len();
+    let before = harness.state().app.document.insertions.objects.len();
     click(harness, "Add");
     for _ in 0..400 {
         harness.run_steps(1);
-        if harness.state().app.insertions.objects.len() > before {
+        if harness.state().app.document.insertions.objects.len() > before {
             return;
         }
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
-    panic!("{:?}", harness.state().app.insertions.trouble);
+    panic!("{:?}", harness.state().app.view.panels.adding.trouble);
 }
 
 /// A file of an object: a block of half a metre, cut in half.

@@ -33,7 +33,7 @@ fn slide(harness: &mut Harness<'_, Window>, label: &str, to: f32) {
 
 /// What is made of the lamp's light.
 fn gain(harness: &Harness<'_, Window>) -> Gain {
-    harness.state().app.gain(&[2])
+    harness.state().app.document.gain(&[2])
 }
 
 #[test]
@@ -101,9 +101,12 @@ fn a_lamp_is_selected_compared_and_its_light_saved() {
     harness.get_by_label("Colour of lamp");
     harness.get_by_role_and_label(Role::Button, "lamp").click();
     harness.run_steps(3);
-    assert_eq!(harness.state().app.selected, Some(2));
+    assert_eq!(harness.state().app.view.selection.object, Some(2));
     press(&mut harness, Modifiers::NONE, Key::B);
-    assert_eq!(harness.state().app.against, Some(Quantity::Photograph));
+    assert_eq!(
+        harness.state().app.view.compare.against,
+        Some(Quantity::Photograph)
+    );
     harness.get_by_label("wiped pictures");
     press(&mut harness, Modifiers::NONE, Key::B);
     harness.get_by_label("Composite picture");
@@ -156,8 +159,8 @@ fn a_wall_is_recoloured_taken_back_and_reset() {
     assert_eq!(sent.object(1).albedo, Some(Vec3::new(0.7, 0.25, 0.7)));
     // The table shows what was changed, the estimate stays.
     let app = &harness.state().app;
-    assert_eq!(app.estimate.objects[1].albedo.y, 0.25);
-    assert_eq!(app.snapshot.estimate.objects[1].albedo.y, 0.7);
+    assert_eq!(app.document.estimate.objects[1].albedo.y, 0.25);
+    assert_eq!(app.document.snapshot.estimate.objects[1].albedo.y, 0.7);
 
     press(&mut harness, Modifiers::COMMAND, Key::Z);
     assert!(edits(&recorder.sent()).expect("sent").is_empty());
@@ -180,7 +183,8 @@ fn a_wall_is_given_gloss_polished_made_dull_and_taken_back() {
         harness.run_steps(3);
     };
     switch_gloss(&mut harness);
-    let lobe = |harness: &Harness<'_, Window>| harness.state().app.estimate.objects[1].lobe();
+    let lobe =
+        |harness: &Harness<'_, Window>| harness.state().app.document.estimate.objects[1].lobe();
     assert_eq!(lobe(&harness), Some((0.3, 0.04)));
     type_value(&mut harness, "roughness", "0.1");
     type_value(&mut harness, "specular", "0.6");
@@ -234,7 +238,7 @@ fn a_drag_of_a_material_is_one_step_of_undo() {
     );
     press(&mut harness, Modifiers::COMMAND, Key::Z);
     assert!(edits(&recorder.sent()).expect("sent").is_empty());
-    assert!(!harness.state().app.history.can_undo());
+    assert!(!harness.state().app.document.history.can_undo());
 }
 
 #[test]
@@ -245,7 +249,10 @@ fn a_lamp_is_switched_off_and_on_by_its_key() {
     click(&mut harness, "Select lamp");
     press(&mut harness, Modifiers::NONE, Key::K);
     assert!(edits(&recorder.sent()).expect("sent").object(2).off);
-    assert_eq!(harness.state().app.estimate.objects[2].emission, Vec3::ZERO);
+    assert_eq!(
+        harness.state().app.document.estimate.objects[2].emission,
+        Vec3::ZERO
+    );
     press(&mut harness, Modifiers::NONE, Key::K);
     assert!(edits(&recorder.sent()).expect("sent").is_empty());
 }

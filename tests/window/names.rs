@@ -48,11 +48,11 @@ fn every_control_has_a_name() {
     let mut count = 0;
     let app = &mut harness.state_mut().app;
     app.insert("chair.obj".into());
-    app.insertions.placing = false;
-    app.selected = Some(2);
+    app.view.tool.placing = false;
+    app.view.selection.object = Some(2);
     recorder.show(|snapshot| snapshot.insertion = Some(Arc::new(insertion(0))));
     for pane in Pane::all() {
-        harness.state_mut().app.bring_forward = Some(pane);
+        harness.state_mut().app.view.layout.front = Some(pane);
         harness.run_steps(3);
         count += look(&harness, pane.title(), &mut nameless);
     }
@@ -80,7 +80,7 @@ fn every_control_has_a_name() {
         harness.key_press_modifiers(Modifiers::NONE, Key::Escape);
         harness.run_steps(3);
     }
-    harness.state_mut().app.start_page = true;
+    harness.state_mut().app.view.shell.start.asked = true;
     harness.run_steps(3);
     count += look(&harness, "start page", &mut nameless);
     assert!(count > 300, "only {count} controls were seen");

@@ -21,7 +21,7 @@ fn palette(harness: &mut Harness<'_, Window>, name: &str) {
 /// A point of a picture, in fractions of its size, on the screen.
 fn point(harness: &Harness<'_, Window>, label: &str, at: egui::Vec2) -> Pos2 {
     let pane = harness.get_by_label(label).rect();
-    let placement = harness.state().app.look.placement(pane, [64, 48]);
+    let placement = harness.state().app.view.look.placement(pane, [64, 48]);
     placement.min + placement.size() * at
 }
 
@@ -54,9 +54,15 @@ pub fn insert_block(harness: &mut Harness<'_, Window>, folder: &Path) {
     tap(harness, at);
     for _ in 0..200 {
         let app = &harness.state().app;
-        let placement = &app.insertions.objects[0].placement;
-        let scene = &app.capture().expect("open").scene;
-        if app.insertions.models.corners(placement, scene).is_some() {
+        let placement = &app.document.insertions.objects[0];
+        let scene = &app.document.capture().expect("open").scene;
+        if app
+            .document
+            .insertions
+            .models
+            .corners(placement, scene)
+            .is_some()
+        {
             return;
         }
         std::thread::sleep(Duration::from_millis(5));
@@ -68,8 +74,8 @@ pub fn insert_block(harness: &mut Harness<'_, Window>, folder: &Path) {
 /// Where a point above the foot of the first object is in the photograph.
 pub fn seen(harness: &Harness<'_, Window>, height: f64) -> Pos2 {
     let app = &harness.state().app;
-    let scene = &app.capture().expect("open").scene;
-    let at = app.insertions.objects[0].placement.at.expect("placed");
+    let scene = &app.document.capture().expect("open").scene;
+    let at = app.document.insertions.objects[0].at.expect("placed");
     let point_above = at + scene.up.as_dvec3() * height - scene.origin;
     let pixel = (scene.cameras[0].project(point_above.as_vec3())).expect("in view");
     let fraction = egui::vec2(pixel.x / 64.0, pixel.y / 48.0);
@@ -80,7 +86,7 @@ fn wait_for_batch(harness: &mut Harness<'_, Window>) {
     let begun = Instant::now();
     while begun.elapsed() < Duration::from_secs(60) {
         harness.run_steps(1);
-        if harness.state().app.batch.is_none() {
+        if harness.state().app.jobs.batch.is_none() {
             return;
         }
         std::thread::sleep(Duration::from_millis(5));
@@ -89,7 +95,7 @@ fn wait_for_batch(harness: &mut Harness<'_, Window>) {
 }
 
 fn said(harness: &Harness<'_, Window>, part: &str) -> bool {
-    let log = &harness.state().app.notices.log;
+    let log = &harness.state().app.jobs.notices.log;
     log.iter().any(|event| event.message.contains(part))
 }
 
@@ -144,7 +150,7 @@ fn all_photographs_are_written_with_the_object_and_in_the_changed_light() {
     assert!(
         said(&harness, "3 photographs written"),
         "{:?}",
-        harness.state().app.notices.log
+        harness.state().app.jobs.notices.log
     );
     for frame in 0..3 {
         for kind in [
@@ -210,7 +216,7 @@ fn the_light_at_a_clicked_point_is_exported() {
     assert!(at.y > 0.01 && at.y < 0.1 && at.x.abs() < 0.3, "{at}");
     assert_eq!(path, PathBuf::from("small-room-light.hdr"));
     // The click selected nothing.
-    assert_eq!(harness.state().app.selected, None);
+    assert_eq!(harness.state().app.view.selection.object, None);
 }
 
 #[test]
@@ -230,7 +236,9 @@ fn two_clicks_and_a_length_set_the_scale_and_one_click_the_ground() {
         let at = point(&harness, "Albedo picture", egui::vec2(x, y));
         tap(&mut harness, at);
     }
-    let relit::app::shell::files::Sheet::Length { found, .. } = harness.state().app.sheet else {
+    let relit::app::shell::sheet::Sheet::Length { found, .. } =
+        harness.state().app.view.shell.sheet
+    else {
         panic!("no length is asked for");
     };
     assert!((0.5..2.5).contains(&found), "{found}");
@@ -257,7 +265,7 @@ fn an_object_is_scaled_and_raised_by_its_handles_one_step_of_undo_each() {
     let folder = tempfile::tempdir().expect("a folder");
     insert_block(&mut harness, folder.path());
     let placement =
-        |harness: &Harness<'_, Window>| harness.state().app.insertions.objects[0].placement.clone();
+        |harness: &Harness<'_, Window>| harness.state().app.document.insertions.objects[0].clone();
     let before = placement(&harness);
     // The handle stands a little above the block: 0.5 m, and a fifth of that more.
     let (top, foot) = (seen(&harness, 0.6), seen(&harness, 0.0));

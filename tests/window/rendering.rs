@@ -47,7 +47,7 @@ fn expected(linear: f32, exposure: f32) -> u8 {
 
 fn picture_rect(harness: &Harness<'_, Window>, label: &str) -> Rect {
     let pane = harness.get_by_label(label).rect();
-    harness.state().app.look.placement(pane, [64, 48])
+    harness.state().app.view.look.placement(pane, [64, 48])
 }
 
 #[test]
@@ -57,7 +57,7 @@ fn pictures_are_drawn_with_exposure_and_the_srgb_curve() {
     }
     let (mut harness, _recorder) = solving(Harness::builder().wgpu());
     for exposure in [0.0, 1.0, -2.0] {
-        harness.state_mut().app.look.exposure = exposure;
+        harness.state_mut().app.view.look.exposure = exposure;
         harness.run_steps(2);
         let image = harness.render().expect("rendered");
         let render = picture_rect(&harness, "Re-render picture").center();
@@ -71,7 +71,7 @@ fn pictures_are_drawn_with_exposure_and_the_srgb_curve() {
         );
     }
     // Each pixel of the photograph is where the cursor says it is.
-    harness.state_mut().app.look.exposure = 0.0;
+    harness.state_mut().app.view.look.exposure = 0.0;
     harness.run_steps(2);
     let image = harness.render().expect("rendered");
     let rect = picture_rect(&harness, "Photograph picture");
@@ -106,8 +106,8 @@ fn the_mesh_is_drawn_and_its_selected_object_stands_out() {
         return;
     }
     let (mut harness, _recorder) = solving(Harness::builder().wgpu());
-    harness.state_mut().app.model.coloring = relit::app::model::coloring::Coloring::Albedo;
-    harness.state_mut().app.model.cameras = false;
+    harness.state_mut().app.view.model.coloring = relit::app::model::coloring::Coloring::Albedo;
+    harness.state_mut().app.view.model.cameras = false;
     // The faces are made on a thread.
     let mut colors = Vec::new();
     for _ in 0..200 {
@@ -118,7 +118,7 @@ fn the_mesh_is_drawn_and_its_selected_object_stands_out() {
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
     for selected in [None, Some(0)] {
-        harness.state_mut().app.selected = selected;
+        harness.state_mut().app.view.selection.object = selected;
         harness.run_steps(2);
         let image = harness.render().expect("rendered");
         let rect = harness.get_by_label("3D view picture").rect();
@@ -158,13 +158,13 @@ fn what_is_copied_is_what_is_seen() {
     ] {
         for tone in ToneCurve::ALL {
             let app = &mut harness.state_mut().app;
-            app.bring_forward = Some(Pane::Picture(quantity));
-            app.look.tone = tone;
+            app.view.layout.front = Some(Pane::Picture(quantity));
+            app.view.look.tone = tone;
             harness.run_steps(4);
             let image = harness.render().expect("rendered");
             let app = &harness.state().app;
-            let drawn = app.drawn(quantity).expect("a picture");
-            let copied = as_seen(&drawn, &app.look);
+            let drawn = app.view.drawn(&app.document, quantity).expect("a picture");
+            let copied = as_seen(&drawn, &app.view.look);
             let at = picture_rect(&harness, &format!("{} picture", quantity.name())).center();
             let [r, g, b, _] = copied.pixels[24 * 64 + 32].to_array();
             for (seen, copied) in pixel(&image, at).into_iter().zip([r, g, b]) {

@@ -61,8 +61,8 @@ fn trade() -> Trade {
 
 fn shown() -> (Harness<'static, Window>, Recorder) {
     let (mut harness, recorder) = solving(Harness::builder());
-    harness.state_mut().app.bring_forward = Some(Pane::Trade);
-    harness.state_mut().app.trade.trade = Some(Arc::new(trade()));
+    harness.state_mut().app.view.layout.front = Some(Pane::Trade);
+    harness.state_mut().app.jobs.measured.trade = Some(Arc::new(trade()));
     harness.run_steps(4);
     (harness, recorder)
 }
@@ -102,9 +102,9 @@ fn a_click_on_a_point_of_the_curve_stops_there() {
         (Vertical::Claimed, (0.4, 0.0)),
         (Vertical::Measured, (0.0, 12.0)),
     ] {
-        harness.state_mut().app.trade.vertical = vertical;
+        harness.state_mut().app.view.panels.trade.vertical = vertical;
         harness.run_steps(3);
-        let places = harness.state().app.trade.places.clone();
+        let places = harness.state().app.view.panels.trade.places.clone();
         let at = places.iter().find(|place| (place.1, place.2) == (1, 1));
         let at = at.expect("drawn").0;
         harness.hover_at(at);
@@ -149,7 +149,7 @@ fn stops_are_typed_and_the_running_solve_draws_its_mark() {
 #[test]
 fn it_is_measured_only_while_nothing_runs_and_can_be_cancelled() {
     let (mut harness, recorder) = shown();
-    let doing = |harness: &Harness<'_, Window>| harness.state().app.trade.doing();
+    let doing = |harness: &Harness<'_, Window>| harness.state().app.jobs.measured.doing();
     click(&mut harness, "Measure");
     assert_eq!(doing(&harness), None, "the solve runs");
 
@@ -172,7 +172,7 @@ fn it_is_measured_only_while_nothing_runs_and_can_be_cancelled() {
 fn ended(harness: &mut Harness<'_, Window>) {
     for _ in 0..1500 {
         harness.run_steps(1);
-        if harness.state().app.trade.doing().is_none() {
+        if harness.state().app.jobs.measured.doing().is_none() {
             return;
         }
         std::thread::sleep(Duration::from_millis(20));
@@ -184,8 +184,14 @@ fn ended(harness: &mut Harness<'_, Window>) {
 fn the_trade_of_the_open_capture_is_read_and_that_of_another_is_not() {
     let (mut harness, _recorder) = shown();
     let folder = tempfile::tempdir().expect("a folder");
-    let capture = harness.state().app.capture().expect("open").clone();
-    let view = &mut harness.state_mut().app.trade;
+    let capture = harness
+        .state()
+        .app
+        .document
+        .capture()
+        .expect("open")
+        .clone();
+    let view = &mut harness.state_mut().app.jobs.measured;
     view.trade = None;
     assert_eq!(view.load(folder.path(), &capture), Ok(()));
     assert!(view.trade.is_none());

@@ -1,52 +1,21 @@
 //! The inserted objects as the window edits them: placed, moved, duplicated, hidden.
 
-mod adding;
 pub mod handles;
 pub mod models;
 
-use crate::session::command::Placement;
+use crate::compose::placement::Placement;
 use glam::DVec3;
-use handles::Handle;
 use models::Models;
 use std::path::{Path, PathBuf};
 
-/// An inserted object.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Inserted {
-    /// What the worker is told.
-    pub placement: Placement,
-}
-
-impl Inserted {
-    /// The file's name without its ending.
-    pub fn name(&self) -> String {
-        self.placement.file.file_stem().map_or_else(
-            || "object".to_owned(),
-            |stem| stem.to_string_lossy().into_owned(),
-        )
-    }
-}
-
-/// All inserted objects and how they are being edited.
+/// All inserted objects.
 pub struct Insertions {
     /// The objects, in the order in which they were added.
-    pub objects: Vec<Inserted>,
+    pub objects: Vec<Placement>,
     /// The one that is edited.
     pub chosen: Option<usize>,
-    /// Whether the next click in a view places the chosen object.
-    pub placing: bool,
-    /// The handle that is being dragged.
-    pub dragged: Option<Handle>,
     /// Whether they take the blur and the grain of 8-bit photographs.
     pub finish: bool,
-    /// The path as typed.
-    pub path: String,
-    /// Whether the field for a path is to take the keys.
-    pub typing: bool,
-    /// Files that are read before they join the objects.
-    pub wanted: Vec<PathBuf>,
-    /// Why the last file did not join them.
-    pub trouble: Option<String>,
     /// The shapes of the objects' files.
     pub models: Models,
 }
@@ -56,16 +25,23 @@ impl Default for Insertions {
         Self {
             objects: Vec::new(),
             chosen: None,
-            placing: false,
-            dragged: None,
             finish: true,
-            path: String::new(),
-            typing: false,
-            wanted: Vec::new(),
-            trouble: None,
             models: Models::default(),
         }
     }
+}
+
+/// Objects that are being added: the path as typed, and files that are read first.
+#[derive(Debug, Default)]
+pub struct Adding {
+    /// The path as typed.
+    pub path: String,
+    /// Whether the field for a path is to take the keys.
+    pub typing: bool,
+    /// Files that are read before they join the objects.
+    pub wanted: Vec<PathBuf>,
+    /// Why the last file did not join them.
+    pub trouble: Option<String>,
 }
 
 /// Endings that can be inserted.
@@ -78,95 +54,78 @@ pub fn is_object(path: &Path) -> bool {
         .is_some_and(|ending| ENDINGS.contains(&ending.to_ascii_lowercase().as_str()))
 }
 
+/// The name of an object's file, without its ending.
+pub fn name(placement: &Placement) -> String {
+    let stem = placement.file.file_stem();
+    stem.map_or_else(
+        || "object".into(),
+        |stem| stem.to_string_lossy().into_owned(),
+    )
+}
+
 impl Insertions {
-    /// Adds an object at `at`, chooses it, and waits for a click that places it.
-    pub fn add(&mut self, file: PathBuf, at: Option<DVec3>) {
-        self.objects.push(Inserted {
-            placement: Placement {
-                file,
-                at,
-                scale: 1.0,
-                rotate: 0.0,
-                hidden: false,
-            },
+    /// Adds an object at `at` and chooses it.
+    pub fn add(&mut self, file: PathBuf, at: Option<DVec3>, scale: f64) {
+        self.objects.push(Placement {
+            file,
+            at,
+            scale,
+            rotate: 0.0,
+            hidden: false,
         });
-        self.chosen = Some(self.objects.len() - 1);
-        self.placing = true;
+        self.chosen = self.objects.len().checked_sub(1);
     }
 
     /// The chosen object.
-    pub fn chosen(&mut self) -> Option<&mut Inserted> {
-        self.chosen.and_then(|index| self.objects.get_mut(index))
-    }
-
-    /// Puts the chosen object at a point of the capture; false where none is chosen.
-    pub fn place(&mut self, at: DVec3) -> bool {
-        let Some(object) = self.chosen() else {
-            return false;
-        };
-        object.placement.at = Some(at);
-        true
+    pub fn chosen(&self) -> Option<(usize, &Placement)> {
+        let index = self.chosen?;
+        Some((index, self.objects.get(index)?))
     }
 
     /// Copies the chosen object, a little aside along `aside`.
     pub fn duplicate(&mut self, aside: DVec3) {
-        let Some(mut copy) = self.chosen().cloned() else {
-            return;
-        };
-        copy.placement.at = copy.placement.at.map(|at| at + aside);
-        self.objects.push(copy);
-        self.chosen = Some(self.objects.len() - 1);
+        if let Some((_, object)) = self.chosen() {
+            let at = object.at.map(|at| at + aside);
+            let copy = Placement {
+                at,
+                ..object.clone()
+            };
+            self.objects.push(copy);
+            self.chosen = self.objects.len().checked_sub(1);
+        }
     }
 
     /// Takes the chosen object away.
     pub fn delete(&mut self) {
-        if let Some(index) = self.chosen.filter(|&index| index < self.objects.len()) {
+        if let Some((index, _)) = self.chosen() {
             self.objects.remove(index);
             self.chosen = self
                 .objects
                 .len()
                 .checked_sub(1)
                 .map(|last| index.min(last));
-            self.placing = false;
         }
     }
 
     /// Takes up the objects that a new capture comes with, in place of those there are.
     pub fn take_up(&mut self, placements: &[Placement]) {
-        let inserted = |placement: &Placement| Inserted {
-            placement: placement.clone(),
-        };
-        self.objects = placements.iter().map(inserted).collect();
+        self.objects = placements.to_vec();
         self.chosen = self.objects.len().checked_sub(1);
-        self.placing = false;
-        self.dragged = None;
     }
 
-    /// All objects, as the worker is told them.
-    pub fn placements(&self) -> Vec<Placement> {
-        (self.objects.iter())
-            .map(|object| object.placement.clone())
-            .collect()
-    }
-
-    /// Those that are shown.
+    /// The objects that are shown.
     pub fn visible(&self) -> Vec<Placement> {
-        let mut visible = self.placements();
-        visible.retain(|placement| !placement.hidden);
-        visible
+        let visible = self.objects.iter().filter(|object| !object.hidden);
+        visible.cloned().collect()
     }
 
     /// Replaces all objects, as undo does.
-    pub fn replace(&mut self, objects: Vec<Inserted>) {
-        if self.objects == objects {
-            return;
+    pub fn replace(&mut self, objects: Vec<Placement>) {
+        if self.objects != objects {
+            let last = objects.len().checked_sub(1);
+            self.chosen = last.map(|last| self.chosen.unwrap_or(last).min(last));
+            self.objects = objects;
         }
-        self.objects = objects;
-        self.placing = false;
-        self.chosen = match (self.chosen, self.objects.len()) {
-            (_, 0) => None,
-            (chosen, count) => Some(chosen.unwrap_or(count - 1).min(count - 1)),
-        };
     }
 }
 
@@ -175,30 +134,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn hidden_objects_are_told_as_such_and_replacing_keeps_a_choice() {
+    fn hidden_objects_are_not_visible_and_replacing_keeps_a_choice() {
         let mut insertions = Insertions::default();
-        insertions.add("chair.glb".into(), Some(DVec3::ZERO));
+        insertions.add("chair.glb".into(), Some(DVec3::ZERO), 1.0);
         insertions.duplicate(DVec3::X);
-        assert_eq!(insertions.placements().len(), 2);
-        assert_eq!(insertions.placements()[1].at, Some(DVec3::X));
-        insertions.objects[0].placement.hidden = true;
-        let hidden: Vec<bool> = (insertions.placements().iter())
-            .map(|placement| placement.hidden)
-            .collect();
-        assert_eq!((hidden, insertions.visible().len()), (vec![true, false], 1));
-        let mut taken_up = Insertions::default();
-        taken_up.take_up(&insertions.placements());
-        assert_eq!(taken_up.objects, insertions.objects);
+        assert_eq!(insertions.objects.len(), 2);
+        assert_eq!(insertions.objects[1].at, Some(DVec3::X));
+        insertions.objects[0].hidden = true;
+        assert_eq!(insertions.visible().len(), 1);
         let before = insertions.objects.clone();
         insertions.delete();
         insertions.delete();
         assert!(insertions.objects.is_empty() && insertions.chosen.is_none());
         insertions.replace(before);
-        assert_eq!(
-            (insertions.objects.len(), insertions.visible().len()),
-            (2, 1)
-        );
-        assert_eq!(insertions.chosen, Some(1));
+        assert_eq!((insertions.objects.len(), insertions.chosen), (2, Some(1)));
     }
 
     #[test]

@@ -1,11 +1,10 @@
 //! The shapes of inserted objects, read on threads of their own, for boxes in the views.
 
-use crate::app::insertion::Inserted;
 use crate::compose::object::ObjectModel;
 use crate::compose::object::surface::ObjectSurface;
+use crate::compose::placement::Placement;
 use crate::error::Result;
 use crate::scene::Scene;
-use crate::session::command::Placement;
 use egui::{Color32, Painter, Pos2, Stroke};
 use glam::{DVec3, Vec3};
 use std::collections::HashMap;
@@ -41,9 +40,9 @@ impl Default for Models {
 
 impl Models {
     /// Starts reading what is not known yet; gives the files that have been read since the last call.
-    pub fn update(&mut self, ctx: &egui::Context, objects: &[Inserted]) -> Vec<Read> {
+    pub fn update(&mut self, ctx: &egui::Context, objects: &[Placement]) -> Vec<Read> {
         for object in objects {
-            self.ask(ctx, &object.placement.file);
+            self.ask(ctx, &object.file);
         }
         let mut read = Vec::new();
         while let Ok((file, model)) = self.receiver.try_recv() {

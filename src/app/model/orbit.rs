@@ -85,7 +85,7 @@ impl Orbit {
     }
 
     /// The same view as a camera to render from.
-    pub fn camera(&self, _scene: &Scene) -> Camera {
+    pub fn camera(&self) -> Camera {
         let size = self.size.max(Vec2::ONE).round();
         let focal = f64::from(size.y) * 0.5 / f64::from(self.fov * 0.5).tan();
         Camera {
@@ -212,7 +212,7 @@ mod tests {
     #[test]
     fn the_drawn_and_the_rendered_camera_agree() {
         let (scene, orbit) = framed();
-        let camera = orbit.camera(&scene);
+        let camera = orbit.camera();
         let pixels: Vec<(Vec3, Vec2)> = (scene.positions.iter())
             .filter_map(|&point| Some((point, camera.project(point)?)))
             .collect();

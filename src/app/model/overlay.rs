@@ -1,11 +1,13 @@
 //! Lines over the 3D view: the photographs' cameras and the places of inserted objects.
 
+use crate::app::insertion::Insertions;
 use crate::app::insertion::models::draw_box;
-use crate::app::state::App;
+use crate::app::model::orbit::Orbit;
+use crate::app::model::view::ModelView;
 use crate::app::theme;
+use crate::app::view::ViewState;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
-use crate::session::snapshot::OpenCapture;
 use egui::{Painter, Pos2, Rect, Stroke, Ui, pos2};
 use glam::{Mat4, Vec2, Vec3};
 
@@ -19,9 +21,9 @@ pub(super) struct Projection {
 }
 
 impl Projection {
-    pub fn new(app: &App, scene: &Scene, rect: Rect) -> Self {
+    pub fn new(orbit: &Orbit, scene: &Scene, rect: Rect) -> Self {
         Self {
-            clip_from_scene: app.model.orbit.clip_from_scene(scene),
+            clip_from_scene: orbit.clip_from_scene(scene),
             rect,
         }
     }
@@ -45,56 +47,36 @@ impl Projection {
 }
 
 /// Draws everything that lies over the mesh.
-pub fn draw(ui: &Ui, app: &App, capture: &OpenCapture, rect: Rect) {
-    let tokens = theme::tokens(ui);
-    let scene = &capture.scene;
-    let projection = Projection::new(app, scene, rect);
+pub fn draw(ui: &Ui, insertions: &Insertions, view: &ViewState, scene: &Scene, rect: Rect) {
+    let (tokens, model) = (theme::tokens(ui), &view.model);
+    let projection = Projection::new(&model.orbit, scene, rect);
     let painter = ui.painter().with_clip_rect(rect);
-    if app.model.cameras {
+    if model.cameras {
         let stride = scene.cameras.len().div_ceil(CAMERAS).max(1);
         for (index, camera) in scene.cameras.iter().enumerate() {
-            let chosen = index == app.frame;
+            let chosen = index == view.shown.frame;
+            let stroke = match chosen {
+                true => Stroke::new(2.0, tokens.accent),
+                false => Stroke::new(1.0, tokens.camera.gamma_multiply(0.8)),
+            };
             if chosen || index % stride == 0 {
-                let stroke = if chosen {
-                    Stroke::new(2.0, tokens.accent)
-                } else {
-                    Stroke::new(1.0, tokens.camera.gamma_multiply(0.8))
-                };
-                frustum(
-                    &projection,
-                    &painter,
-                    camera,
-                    scene.diameter * 0.018,
-                    stroke,
-                );
+                let depth = scene.diameter * 0.018;
+                frustum(&projection, &painter, camera, depth, stroke);
             }
         }
     }
-    for object in app
-        .insertions
-        .objects
-        .iter()
-        .filter(|o| !o.placement.hidden)
-    {
-        if let Some(corners) = app.insertions.models.corners(&object.placement, scene) {
-            let project = |p| projection.at(p);
+    let project = |point| projection.at(point);
+    for object in insertions.objects.iter().filter(|object| !object.hidden) {
+        if let Some(corners) = insertions.models.corners(object, scene) {
             draw_box(&painter, &corners, project, tokens.inserted, 1.0);
         }
     }
-    app.insertions
-        .draw_handles(&painter, scene, tokens, true, |p| projection.at(p));
-    let line = &app.model.lasso.line;
+    insertions.draw_handles(&painter, scene, tokens, true, project);
+    let line = &model.lasso.line;
     if line.len() > 1 {
         let closed = line.iter().chain(line.first()).copied().collect();
         painter.line(closed, Stroke::new(2.0, tokens.accent));
     }
-}
-
-/// Takes the handle of an inserted object under the pointer.
-pub fn take_handle(app: &mut App, scene: &Scene, rect: Rect, pointer: Pos2) {
-    let projection = Projection::new(app, scene, rect);
-    app.insertions
-        .take_handle(scene, pointer, |p| projection.at(p));
 }
 
 /// The corners of the far end of a camera's pyramid.
@@ -123,16 +105,11 @@ fn frustum(
 }
 
 /// The photograph whose camera is drawn under the pointer.
-pub fn camera_at(app: &App, scene: &Scene, rect: Rect, pointer: Pos2) -> Option<usize> {
-    if !app.model.cameras {
-        return None;
-    }
-    let projection = Projection::new(app, scene, rect);
+pub fn camera_at(model: &ModelView, scene: &Scene, rect: Rect, pointer: Pos2) -> Option<usize> {
+    let projection = Projection::new(&model.orbit, scene, rect);
     let distance = |camera: &Camera| Some(projection.at(camera.center)?.distance(pointer));
-    scene
-        .cameras
-        .iter()
-        .enumerate()
+    let cameras = scene.cameras.iter().enumerate().filter(|_| model.cameras);
+    cameras
         .filter_map(|(index, camera)| Some((index, distance(camera)?)))
         .filter(|(_, distance)| *distance < 9.0)
         .min_by(|a, b| a.1.total_cmp(&b.1))

@@ -1,14 +1,14 @@
 //! The checked summary of what is open.
 
-use crate::app::state::App;
+use crate::app::document::Document;
 use crate::app::theme;
 use egui::{RichText, ScrollArea, Ui};
 
 /// Draws the pane.
-pub fn pane(ui: &mut Ui, app: &mut App) {
+pub fn pane(ui: &mut Ui, document: &Document) {
     let tokens = theme::tokens(ui);
-    let Some(capture) = app.capture() else {
-        ui.weak(app.nothing_open());
+    let Some(capture) = document.capture() else {
+        ui.weak(document.nothing_open());
         return;
     };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
@@ -16,18 +16,14 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         for line in &capture.summary {
             ui.label(line);
         }
-        let warnings = capture
-            .warnings
-            .iter()
-            .chain(&app.snapshot.progress.warnings);
-        for warning in warnings {
+        let progress = &document.snapshot.progress;
+        for warning in capture.warnings.iter().chain(&progress.warnings) {
             ui.colored_label(tokens.warning, warning);
         }
-        let rejected = &app.snapshot.progress.rejected;
-        if !rejected.is_empty() {
+        if !progress.rejected.is_empty() {
             ui.add_space(theme::GAP);
             ui.strong("Samples dropped");
-            for (cause, count) in rejected {
+            for (cause, count) in &progress.rejected {
                 ui.label(format!("{cause}: {count}"));
             }
         }

@@ -1,15 +1,15 @@
 //! A well that shows a linear colour and opens a picker for it.
 
-use egui::{Role, Ui, WidgetInfo};
+use crate::app::controls::named;
+use egui::{Role, Ui};
 use glam::Vec3;
 
 /// Draws the well of a linear colour in [0, 1]; true when it was changed.
 pub fn well(ui: &mut Ui, name: &str, help: &str, color: &mut Vec3) -> bool {
     let mut rgb = color.clamp(Vec3::ZERO, Vec3::ONE).to_array();
     let response = ui.color_edit_button_rgb(&mut rgb).on_hover_text(help);
-    response.widget_info(|| WidgetInfo::labeled(Role::ColorWell, true, name));
     // The picker rounds; only what a hand changed is taken over.
-    let changed = response.changed();
+    let changed = named(response, Role::ColorWell, name).changed();
     if changed {
         *color = Vec3::from_array(rgb).clamp(Vec3::ZERO, Vec3::ONE);
     }

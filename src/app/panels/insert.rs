@@ -1,96 +1,107 @@
 //! Putting objects into the photographs: adding, placing, moving, turning, scaling, and the two results.
 
 use crate::app::action::Action;
+use crate::app::controls::{named, path_field, point, switched};
+use crate::app::document::Document;
+use crate::app::insertion::handles::SCALES;
+use crate::app::insertion::{Adding, Insertions, name};
+use crate::app::request::{Request, Requests};
 use crate::app::shell::dialogs::Ask;
-use crate::app::state::App;
 use crate::app::theme;
-use egui::{Button, Checkbox, DragValue, Grid, ScrollArea, TextEdit, Ui};
+use crate::app::tool::Tool;
+use crate::compose::placement::Placement;
+use egui::{Button, Checkbox, DragValue, Grid, Role, ScrollArea, Ui};
 use glam::DVec3;
 use std::path::PathBuf;
 
 /// Draws the pane.
-pub fn pane(ui: &mut Ui, app: &mut App) {
-    let Some(capture) = app.capture().cloned() else {
-        ui.weak(app.nothing_open());
+pub fn pane(
+    ui: &mut Ui,
+    document: &Document,
+    tool: &Tool,
+    adding: &mut Adding,
+    requests: &mut Requests,
+) {
+    let Some(capture) = document.capture() else {
+        ui.weak(document.nothing_open());
         return;
     };
+    let insertions = &document.insertions;
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        add(ui, app);
-        if let Some(trouble) = &app.insertions.trouble {
+        add(ui, adding, requests);
+        if let Some(trouble) = &adding.trouble {
             ui.colored_label(theme::tokens(ui).error, trouble);
         }
-        if app.insertions.objects.is_empty() {
+        if insertions.objects.is_empty() {
             ui.add_space(theme::GAP);
             ui.weak("OBJ and GLB files can also be dropped on the window. Then click where the object should stand.");
             return;
         }
         ui.separator();
-        list(ui, app);
+        list(ui, insertions, requests);
         ui.separator();
-        actions(ui, app);
-        edit(ui, app, f64::from(capture.scene.diameter));
-        size(ui, app);
+        actions(ui, tool.placing, requests);
+        if let Some((index, object)) = insertions.chosen() {
+            let mut edited = object.clone();
+            edit(ui, &mut edited, f64::from(capture.scene.diameter));
+            if let Some(size) = insertions.models.size(&edited.file) {
+                let [width, height, depth] = (size * edited.scale).to_array();
+                ui.weak(format!("{width:.2} m wide, {height:.2} m high, {depth:.2} m deep"));
+            }
+            if edited != *object {
+                requests.ask(Request::Place(index, edited));
+            }
+        }
         ui.separator();
-        results(ui, app);
+        results(ui, insertions.finish, requests);
     });
 }
 
-fn add(ui: &mut Ui, app: &mut App) {
+fn add(ui: &mut Ui, adding: &mut Adding, requests: &mut Requests) {
     ui.horizontal(|ui| {
-        let label = ui.label("Object file");
-        let width = (ui.available_width() - 136.0).max(60.0);
-        let field = TextEdit::singleline(&mut app.insertions.path)
-            .hint_text("chair.glb")
-            .desired_width(width);
-        let response = ui.add(field).labelled_by(label.id);
-        if std::mem::take(&mut app.insertions.typing) {
-            response.request_focus();
+        let width = (ui.available_width() - 210.0).max(60.0);
+        let (field, entered) = path_field(ui, "Object file", &mut adding.path, "chair.glb", width);
+        if std::mem::take(&mut adding.typing) {
+            field.request_focus();
         }
-        let entered =
-            response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
-        let add = ui
-            .button("Add")
-            .on_hover_text("Adds the object whose path is typed");
-        if (entered || add.clicked()) && !app.insertions.path.trim().is_empty() {
-            let path = PathBuf::from(app.insertions.path.trim());
-            app.insert(path);
+        let add = ui.button("Add");
+        let add = add.on_hover_text("Adds the object whose path is typed");
+        let path = adding.path.trim();
+        if (entered || add.clicked()) && !path.is_empty() {
+            requests.ask(Request::Insert(PathBuf::from(path)));
         }
-        if ui
-            .button("Browse…")
-            .on_hover_text("Chooses an object with a file dialog")
-            .clicked()
-        {
-            app.ask(Ask::Object, &ui.ctx().clone());
+        let browse = ui.button("Browse…");
+        let browse = browse.on_hover_text("Chooses an object with a file dialog");
+        if browse.clicked() {
+            requests.ask(Request::Browse(Ask::Object));
         }
     });
 }
 
 /// All inserted objects.
-fn list(ui: &mut Ui, app: &mut App) {
-    for index in 0..app.insertions.objects.len() {
+fn list(ui: &mut Ui, insertions: &Insertions, requests: &mut Requests) {
+    for (index, object) in insertions.objects.iter().enumerate() {
         ui.horizontal(|ui| {
-            let object = &mut app.insertions.objects[index];
-            let name = object.name();
-            let mut visible = !object.placement.hidden;
+            let (name, number) = (name(object), index + 1);
+            let mut visible = !object.hidden;
             let shown = ui
                 .add(Checkbox::without_text(&mut visible))
                 .on_hover_text("Shows or hides the object");
-            shown.widget_info(|| {
-                egui::WidgetInfo::selected(
-                    egui::Role::CheckBox,
-                    true,
-                    visible,
-                    format!("Show {name} {}", index + 1),
-                )
-            });
-            object.placement.hidden = !visible;
-            let chosen = app.insertions.chosen == Some(index);
-            let text = format!("{}  {name}", index + 1);
-            if ui.selectable_label(chosen, text).clicked() {
-                app.insertions.chosen = Some(index);
+            let shown = switched(
+                shown,
+                Role::CheckBox,
+                visible,
+                &format!("Show {name} {number}"),
+            );
+            if shown.changed() {
+                requests.ask(Request::Hide(index, !visible));
             }
-            let object = &app.insertions.objects[index];
-            if object.placement.at.is_none() {
+            let chosen = insertions.chosen == Some(index);
+            let row = ui.selectable_label(chosen, format!("{number}  {name}"));
+            if row.clicked() {
+                requests.ask(Request::Choose(index));
+            }
+            if object.at.is_none() {
                 ui.weak("as modelled");
             }
         });
@@ -98,144 +109,76 @@ fn list(ui: &mut Ui, app: &mut App) {
 }
 
 /// Buttons for the chosen object.
-fn actions(ui: &mut Ui, app: &mut App) {
-    let ctx = ui.ctx().clone();
+fn actions(ui: &mut Ui, placing: bool, requests: &mut Requests) {
     ui.horizontal_wrapped(|ui| {
-        let placing = app.insertions.placing;
-        let text = if placing {
-            "Click in a view…"
-        } else {
-            "Place by click"
+        let text = match placing {
+            true => "Click in a view…",
+            false => "Place by click",
         };
-        let place = ui
-            .add(Button::new(text).selected(placing))
-            .on_hover_text(Action::Place.help());
-        if place.clicked() {
-            app.perform(Action::Place, &ctx);
-        }
+        requests.button(ui, Action::Place, Button::new(text).selected(placing));
         for (action, text) in [
             (Action::Duplicate, "Duplicate"),
             (Action::Delete, "Delete"),
             (Action::Undo, "Undo"),
             (Action::Redo, "Redo"),
         ] {
-            let button = ui.add_enabled(app.can(action), Button::new(text));
-            if button.on_hover_text(action.help()).clicked() {
-                app.perform(action, &ctx);
-            }
+            requests.button(ui, action, Button::new(text));
         }
     });
 }
 
-/// Place, turn and size of the chosen object.
-fn edit(ui: &mut Ui, app: &mut App, diameter: f64) {
-    let Some(object) = app.insertions.chosen() else {
-        return;
-    };
-    let placement = &mut object.placement;
+/// Place, turn and size of an object.
+fn edit(ui: &mut Ui, object: &mut Placement, diameter: f64) {
     Grid::new("placement").num_columns(2).show(ui, |ui| {
         ui.label("Place").on_hover_text(
             "Where the middle of the object's base stands, in the capture's coordinates",
         );
         ui.horizontal(|ui| {
-            let mut at = placement.at.unwrap_or(DVec3::ZERO);
-            let mut changed = false;
-            for (axis, value) in ["x", "y", "z"].into_iter().zip(at.as_mut()) {
-                let drag = DragValue::new(value)
-                    .speed(diameter * 1e-3)
-                    .max_decimals(3)
-                    .prefix(format!("{axis} "));
-                let response = ui.add(drag);
-                response.widget_info(|| {
-                    egui::WidgetInfo::labeled(egui::Role::SpinButton, true, format!("Place {axis}"))
-                });
-                changed |= response.changed();
+            let mut at = object.at.unwrap_or(DVec3::ZERO);
+            if point(ui, "Place", &mut at, diameter * 1e-3) {
+                object.at = Some(at);
             }
-            if changed {
-                placement.at = Some(at);
-            }
-            if ui
-                .add_enabled(placement.at.is_some(), Button::new("As modelled"))
-                .on_hover_text("Takes the file's own coordinates for the capture's")
-                .clicked()
-            {
-                placement.at = None;
+            let as_modelled = Button::new("As modelled");
+            let as_modelled = ui.add_enabled(object.at.is_some(), as_modelled);
+            let help = "Takes the file's own coordinates for the capture's";
+            if as_modelled.on_hover_text(help).clicked() {
+                object.at = None;
             }
         });
         ui.end_row();
-        for (title, value, range, speed, unit, help) in [
-            (
-                "Turn",
-                &mut placement.rotate,
-                -360.0..=360.0,
-                1.0,
-                "°",
-                "Counter-clockwise from above",
-            ),
-            (
-                "Scale",
-                &mut placement.scale,
-                1e-6..=1e6,
-                0.01,
-                "×",
-                "Factor on the file's size; 0.01 for files in centimetres",
-            ),
-        ] {
-            ui.label(title).on_hover_text(help);
-            let speed = if title == "Scale" {
-                value.abs() * speed
-            } else {
-                speed
-            };
-            let drag = DragValue::new(value)
-                .range(range)
-                .speed(speed)
-                .max_decimals(4)
-                .suffix(format!(" {unit}"));
-            let response = ui.add(drag);
-            response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, title));
-            ui.end_row();
-        }
+        ui.label("Turn")
+            .on_hover_text("Counter-clockwise from above");
+        let turn = DragValue::new(&mut object.rotate);
+        let turn = turn.range(-360.0..=360.0).speed(1.0).suffix(" °");
+        named(ui.add(turn.max_decimals(4)), Role::SpinButton, "Turn");
+        ui.end_row();
+        ui.label("Scale")
+            .on_hover_text("Factor on the file's size; 0.01 for files in centimetres");
+        let speed = object.scale.abs() * 0.01;
+        let scale = DragValue::new(&mut object.scale);
+        let scale = scale.range(SCALES.0..=SCALES.1).speed(speed).suffix(" ×");
+        named(ui.add(scale.max_decimals(4)), Role::SpinButton, "Scale");
+        ui.end_row();
     });
 }
 
-/// How large the chosen object is.
-fn size(ui: &mut Ui, app: &mut App) {
-    let Some(object) = app.insertions.chosen().cloned() else {
-        return;
-    };
-    let placement = &object.placement;
-    if let Some(size) = app.insertions.models.size(&placement.file) {
-        let [width, height, depth] = (size * placement.scale).to_array();
-        ui.weak(format!(
-            "{width:.2} m wide, {height:.2} m high, {depth:.2} m deep"
-        ));
-    }
-}
-
 /// The ways to look at what came out.
-fn results(ui: &mut Ui, app: &mut App) {
-    let ctx = ui.ctx().clone();
+fn results(ui: &mut Ui, finish: bool, requests: &mut Requests) {
     ui.horizontal_wrapped(|ui| {
         for action in [
             Action::NaiveBesideOurs,
             Action::WipeNaiveOurs,
             Action::BeforeAfter,
         ] {
-            if ui
-                .button(action.text())
-                .on_hover_text(action.help())
-                .clicked()
-            {
-                app.perform(action, &ctx);
-            }
+            requests.button(ui, action, Button::new(action.text()));
         }
     });
-    ui.checkbox(
-        &mut app.insertions.finish,
-        "Blur and grain of the photograph",
-    )
-    .on_hover_text(
-        "Makes objects as soft and as grainy as the 8-bit photograph that they are put into",
-    );
+    let mut wanted = finish;
+    ui.checkbox(&mut wanted, "Blur and grain of the photograph")
+        .on_hover_text(
+            "Makes objects as soft and as grainy as the 8-bit photograph that they are put into",
+        );
+    if wanted != finish {
+        requests.ask(Request::Finish(wanted));
+    }
 }

@@ -1,11 +1,14 @@
 //! A switch, a strength and a colour for every lamp.
 
 use crate::app::action::Action;
-use crate::app::lights::{Gain, place};
+use crate::app::controls::{named, switched};
+use crate::app::document::Document;
+use crate::app::lights::place;
 use crate::app::panels::color;
-use crate::app::state::App;
+use crate::app::request::{Request, Requests};
 use crate::export::light_layers;
 use crate::scene::Scene;
+use crate::scene::camera::Camera;
 use crate::session::snapshot::LightSource;
 use egui::{
     Button, Checkbox, DragValue, Grid, Role, ScrollArea, Slider, SliderClamping, Ui, WidgetInfo,
@@ -14,18 +17,23 @@ use egui::{
 /// The strength at the end of a slider; a larger one can be typed.
 const MAX: f32 = 4.0;
 
-/// Draws the pane.
-pub fn pane(ui: &mut Ui, app: &mut App) {
-    if !app.is_steady() {
+/// Draws the pane; `camera` is that of the shown view.
+pub fn pane(
+    ui: &mut Ui,
+    document: &Document,
+    selected: Option<u32>,
+    camera: Option<&Camera>,
+    requests: &mut Requests,
+) {
+    if !document.is_steady() {
         ui.weak("Reading the mesh again…");
         return;
     }
-    let Some(capture) = app.capture().cloned() else {
-        ui.weak(app.nothing_open());
+    let Some(capture) = document.capture() else {
+        ui.weak(document.nothing_open());
         return;
     };
-    let ctx = ui.ctx().clone();
-    let lamps = app.lamps();
+    let lamps = document.lamps();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         if lamps.is_empty() {
             ui.weak("Nothing emits light in this estimate yet.");
@@ -39,30 +47,33 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
                 (Action::Undo, "Undo"),
                 (Action::Redo, "Redo"),
             ] {
-                let button = ui.add_enabled(app.can(action), Button::new(text));
-                if button.on_hover_text(action.help()).clicked() {
-                    app.perform(action, &ctx);
-                }
+                requests.button(ui, action, Button::new(text));
             }
         });
         ui.separator();
-        Grid::new("lights")
-            .num_columns(5)
-            .striped(true)
-            .show(ui, |ui| {
-                for (source, objects) in &lamps {
-                    let name = named(app, *source, &capture.scene);
-                    row(ui, app, *source, objects, &name);
-                    ui.end_row();
-                }
-            });
+        let grid = Grid::new("lights").num_columns(5).striped(true);
+        grid.show(ui, |ui| {
+            for (source, objects) in &lamps {
+                let name = title(*source, &capture.scene, camera);
+                light(ui, document, objects, &name, requests);
+                let lamp = match source {
+                    LightSource::Lamp(object) => Some(*object),
+                    _ => None,
+                };
+                let label = ui
+                    .selectable_label(lamp.is_some() && selected == lamp, &name)
+                    .on_hover_text("Selects this lamp");
+                requests.ask_all(lamp.filter(|_| label.clicked()).map(Request::Reveal));
+                ui.end_row();
+            }
+        });
     });
 }
 
 /// A lamp's name; that of a segment says where it is.
-fn named(app: &App, source: LightSource, scene: &Scene) -> String {
+fn title(source: LightSource, scene: &Scene, camera: Option<&Camera>) -> String {
     let name = light_layers::name(source, scene);
-    let place = match (source, app.camera()) {
+    let place = match (source, camera) {
         (LightSource::Lamp(object), Some(camera)) if name.starts_with("segment ") => {
             place(scene, object, camera)
         }
@@ -71,16 +82,14 @@ fn named(app: &App, source: LightSource, scene: &Scene) -> String {
     place.map_or_else(|| name.to_owned(), |place| format!("{name}, {place}"))
 }
 
-/// One lamp.
-fn row(ui: &mut Ui, app: &mut App, source: LightSource, objects: &[usize], name: &str) {
-    let before = app.gain(objects);
-    let mut gain: Gain = before;
+/// The light of one lamp.
+fn light(ui: &mut Ui, document: &Document, objects: &[usize], name: &str, requests: &mut Requests) {
+    let before = document.gain(objects);
+    let mut gain = before;
     let on = ui
         .add(Checkbox::without_text(&mut gain.on))
         .on_hover_text("Switches this light off and on");
-    on.widget_info(|| {
-        WidgetInfo::selected(Role::CheckBox, true, gain.on, format!("{name} is lit"))
-    });
+    switched(on, Role::CheckBox, gain.on, &format!("{name} is lit"));
     color::well(
         ui,
         &format!("Colour of {name}"),
@@ -92,13 +101,8 @@ fn row(ui: &mut Ui, app: &mut App, source: LightSource, objects: &[usize], name:
         .clamping(SliderClamping::Never)
         .show_value(false);
     let strength = ui.add(slider).on_hover_text(help);
-    strength.widget_info(|| {
-        WidgetInfo::slider(
-            true,
-            f64::from(gain.strength),
-            format!("Strength of {name}"),
-        )
-    });
+    let named_strength = format!("Strength of {name}");
+    strength.widget_info(|| WidgetInfo::slider(true, f64::from(gain.strength), &named_strength));
     let number = DragValue::new(&mut gain.strength)
         .range(0.0..=f32::MAX)
         .speed(0.01)
@@ -106,22 +110,8 @@ fn row(ui: &mut Ui, app: &mut App, source: LightSource, objects: &[usize], name:
         .suffix(" ×")
         .update_while_editing(false);
     let typed = ui.add(number).on_hover_text(help);
-    typed.widget_info(|| {
-        WidgetInfo::labeled(Role::SpinButton, true, format!("Strength of {name}, typed"))
-    });
-    let lamp = match source {
-        LightSource::Lamp(object) => Some(object),
-        _ => None,
-    };
-    let selected = lamp.is_some() && app.selected == lamp;
-    let label = ui
-        .selectable_label(selected, name)
-        .on_hover_text("Selects this lamp");
-    if label.clicked() && lamp.is_some() {
-        app.select(lamp, false);
-    }
+    named(typed, Role::SpinButton, &format!("{named_strength}, typed"));
     if gain != before {
-        app.set_gain(objects, gain);
-        ui.ctx().request_repaint();
+        requests.ask(Request::Light(objects.to_vec(), gain));
     }
 }

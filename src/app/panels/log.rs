@@ -1,12 +1,11 @@
 //! Everything that happened, the newest at the end.
 
-use crate::app::shell::notices::{level_color, level_word};
-use crate::app::state::App;
+use crate::app::shell::notices::{Notices, level_color, level_word};
 use egui::{Label, ScrollArea, Ui};
 
 /// Draws the pane.
-pub fn pane(ui: &mut Ui, app: &mut App) {
-    if app.notices.log.is_empty() {
+pub fn pane(ui: &mut Ui, notices: &Notices) {
+    if notices.log.is_empty() {
         ui.weak("No messages yet");
         return;
     }
@@ -14,7 +13,7 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         .auto_shrink(false)
         .stick_to_bottom(true)
         .show(ui, |ui| {
-            for event in &app.notices.log {
+            for event in &notices.log {
                 ui.horizontal_top(|ui| {
                     ui.colored_label(level_color(ui, event.level), level_word(event.level));
                     ui.add(Label::new(&event.message).wrap());

@@ -1,10 +1,9 @@
 //! The loss curve on a logarithmic axis, with the held-out loss and the ends of stages.
 
+use crate::app::number::number;
 use crate::app::panels::plot::decades;
-use crate::app::picture::inspect::number;
-use crate::app::state::App;
 use crate::app::theme;
-use crate::inverse::solver::LossPoint;
+use crate::inverse::solver::{LossPoint, Progress};
 use egui::Ui;
 use egui_plot::{Corner, HoverPosition, Legend, Line, LineStyle, Plot, PlotPoints, Points, VLine};
 
@@ -12,9 +11,8 @@ use egui_plot::{Corner, HoverPosition, Legend, Line, LineStyle, Plot, PlotPoints
 const POINTS: usize = 2000;
 
 /// Draws the pane.
-pub fn pane(ui: &mut Ui, app: &mut App) {
+pub fn pane(ui: &mut Ui, progress: &Progress) {
     let tokens = theme::tokens(ui);
-    let progress = app.snapshot.progress.clone();
     if progress.losses.is_empty() && progress.fits.is_empty() {
         ui.weak("No loss has been measured yet");
         return;

@@ -1,45 +1,47 @@
 //! The selected object's colour, light and gloss, changed by hand.
 
 use crate::app::action::Action;
+use crate::app::controls::{named, switched};
+use crate::app::document::Document;
+use crate::app::number::{number, triple};
 use crate::app::panels::color;
-use crate::app::picture::inspect::{number, triple};
-use crate::app::state::App;
+use crate::app::request::{Request, Requests};
 use crate::app::theme;
-use crate::inverse::estimate::ObjectEstimate;
+use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::session::edits::ObjectEdit;
 use crate::transport::material::DIELECTRIC;
-use egui::{Button, DragValue, Grid, Role, ScrollArea, Ui, WidgetInfo};
+use egui::{Button, DragValue, Grid, Role, ScrollArea, Ui};
 use glam::Vec3;
 
 /// Names of the channels.
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 
 /// Draws the pane.
-pub fn pane(ui: &mut Ui, app: &mut App) {
-    if !app.is_steady() {
+pub fn pane(ui: &mut Ui, document: &Document, selected: Option<u32>, requests: &mut Requests) {
+    if !document.is_steady() {
         ui.weak("Reading the mesh again…");
         return;
     }
-    let Some(capture) = app.capture().cloned() else {
-        ui.weak(app.nothing_open());
+    let Some(capture) = document.capture() else {
+        ui.weak(document.nothing_open());
         return;
     };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        let Some(object) = app.selected.map(|object| object as usize) else {
+        let Some(object) = selected.map(|object| object as usize) else {
             ui.weak("Select an object by a click in a picture or in the table");
-            buttons(ui, app, &[Action::ResetEdits]);
+            buttons(ui, requests, &[Action::ResetEdits]);
             return;
         };
-        let estimate = app.snapshot.estimate.clone();
-        let name = capture.scene.objects.get(object);
-        let Some((name, found)) = name.zip(estimate.objects.get(object)) else {
+        let named = capture.scene.objects.get(object);
+        let known = named.zip(document.snapshot.estimate.objects.get(object));
+        let Some((named, found)) = known else {
             ui.weak("Nothing is known of this object yet");
             return;
         };
-        let before = app.edits.object(object);
+        let before = document.edits.object(object);
         let mut edit = before;
         ui.horizontal(|ui| {
-            ui.strong(&name.name);
+            ui.strong(&named.name);
             if before != ObjectEdit::default() {
                 ui.colored_label(theme::tokens(ui).warning, "edited");
             }
@@ -47,40 +49,40 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         Grid::new("material").num_columns(2).show(ui, |ui| {
             albedo(ui, found, &mut edit);
             ui.end_row();
-            emission(ui, app, found, &mut edit);
+            emission(ui, document, found, &mut edit);
             ui.end_row();
             gloss(ui, found, &mut edit);
             ui.end_row();
         });
         if edit != before {
-            app.edits.set(object, edit);
-            ui.ctx().request_repaint();
+            requests.ask(Request::Edit(object, edit));
         }
-        buttons(
-            ui,
-            app,
-            &[
-                Action::SwitchLamp,
-                Action::SolveOn,
-                Action::ResetMaterial,
-                Action::ResetEdits,
-            ],
-        );
+        let actions = [
+            Action::SwitchLamp,
+            Action::SolveOn,
+            Action::ResetMaterial,
+            Action::ResetEdits,
+        ];
+        buttons(ui, requests, &actions);
         let gloss = match found.lobe() {
-            Some((roughness, specular)) => format!(
-                "roughness {}, specular reflectance {}",
-                number(roughness),
-                number(specular)
-            ),
+            Some((roughness, specular)) => {
+                let (roughness, specular) = (number(roughness), number(specular));
+                format!("roughness {roughness}, specular reflectance {specular}")
+            }
             None => "no gloss".to_owned(),
         };
+        let (albedo, emission) = (triple(found.albedo), triple(found.emission));
+        let unit = document.radiance_unit();
         ui.weak(format!(
-            "found: albedo {}, emission {} {}, {gloss}",
-            triple(found.albedo),
-            triple(found.emission),
-            app.radiance_unit()
+            "found: albedo {albedo}, emission {emission} {unit}, {gloss}"
         ));
     });
+}
+
+/// A number that is dragged or typed; true when it was changed.
+fn drag(ui: &mut Ui, drag: DragValue<'_>, name: &str, help: &str) -> bool {
+    let response = ui.add(drag.update_while_editing(false)).on_hover_text(help);
+    named(response, Role::SpinButton, name).changed()
 }
 
 /// Colour of the surface.
@@ -91,17 +93,9 @@ fn albedo(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
         let mut albedo = edit.albedo(found.albedo);
         let mut changed = color::well(ui, "Albedo colour", help, &mut albedo);
         for (channel, value) in CHANNELS.into_iter().zip(albedo.as_mut()) {
-            let drag = DragValue::new(value)
-                .range(0.0..=1.0)
-                .speed(0.005)
-                .max_decimals(3)
-                .prefix(format!("{} ", &channel[..1]))
-                .update_while_editing(false);
-            let response = ui.add(drag).on_hover_text(help);
-            response.widget_info(|| {
-                WidgetInfo::labeled(Role::SpinButton, true, format!("Albedo {channel}"))
-            });
-            changed |= response.changed();
+            let value = DragValue::new(value).range(0.0..=1.0).speed(0.005);
+            let value = value.max_decimals(3).prefix(format!("{} ", &channel[..1]));
+            changed |= drag(ui, value, &format!("Albedo {channel}"), help);
         }
         if changed {
             edit.albedo = Some(albedo);
@@ -116,12 +110,11 @@ fn albedo(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
 fn pin(ui: &mut Ui, name: &str, known: &mut bool) -> bool {
     let help = "Known: held at this value by the next “Solve on with pinned values”, Reset or Run";
     let response = ui.checkbox(known, "Pin").on_hover_text(help);
-    response.widget_info(|| WidgetInfo::selected(Role::CheckBox, true, *known, name));
-    response.changed() && *known
+    switched(response, Role::CheckBox, *known, name).changed() && *known
 }
 
 /// Strength and colour of its light.
-fn emission(ui: &mut Ui, app: &App, found: &ObjectEstimate, edit: &mut ObjectEdit) {
+fn emission(ui: &mut Ui, document: &Document, found: &ObjectEstimate, edit: &mut ObjectEdit) {
     let help = "Emitted radiance of the strongest channel";
     ui.label("Emission").on_hover_text(help);
     ui.horizontal(|ui| {
@@ -140,16 +133,11 @@ fn emission(ui: &mut Ui, app: &App, found: &ObjectEstimate, edit: &mut ObjectEdi
                 color::well(ui, "Emission colour", help, &mut color)
             })
             .inner;
-        let speed = drag_speed(app, strength);
-        let drag = DragValue::new(&mut strength)
-            .range(0.0..=1e12)
-            .speed(speed)
-            .max_decimals(4)
-            .suffix(format!(" {}", app.radiance_unit()))
-            .update_while_editing(false);
-        let response = ui.add(drag).on_hover_text(help);
-        response.widget_info(|| WidgetInfo::labeled(Role::SpinButton, true, "Emission strength"));
-        changed |= response.changed();
+        let speed = drag_speed(&document.snapshot.estimate, strength);
+        let value = DragValue::new(&mut strength).range(0.0..=1e12).speed(speed);
+        let unit = format!(" {}", document.radiance_unit());
+        let value = value.max_decimals(4).suffix(unit);
+        changed |= drag(ui, value, "Emission strength", help);
         if changed {
             // A colour is as strong as its strongest channel.
             let peak = color.max_element();
@@ -171,8 +159,7 @@ fn gloss(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
         let lobe = edit.lobe(found.lobe());
         let mut glossy = lobe.is_some();
         let response = ui.checkbox(&mut glossy, "").on_hover_text(help);
-        response.widget_info(|| WidgetInfo::selected(Role::CheckBox, true, glossy, "Gloss"));
-        if response.changed() {
+        if switched(response, Role::CheckBox, glossy, "Gloss").changed() {
             // Back to what was found, where that is glossy or dull as asked.
             (edit.roughness, edit.specular) = (None, None);
             if found.lobe().is_some() != glossy {
@@ -184,21 +171,15 @@ fn gloss(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
             return;
         };
         let value = |ui: &mut Ui, value: &mut f32, name, range, help| {
-            let drag = DragValue::new(value)
-                .range(range)
-                .speed(0.005)
-                .max_decimals(3)
-                .prefix(format!("{name} "))
-                .update_while_editing(false);
-            let response = ui.add(drag).on_hover_text(help);
-            response.widget_info(|| WidgetInfo::labeled(Role::SpinButton, true, name));
-            response.changed()
+            let value = DragValue::new(value).range(range).speed(0.005);
+            let value = value.max_decimals(3).prefix(format!("{name} "));
+            drag(ui, value, name, help)
         };
         let help = "GGX roughness α (no unit): near 0 a mirror, 1 as dull as gloss can be";
         if value(ui, &mut roughness, "roughness", 0.01..=1.0, help) {
             edit.roughness = Some(roughness);
         }
-        let help = "Share of the light reflected straight on (no unit): 0.04 plastic, paint and wood, 0.5 and more metal";
+        let help = "Fraction of the light reflected straight on (no unit): 0.04 plastic, paint and wood, 0.5 and more metal";
         if value(ui, &mut specular, "specular", 0.001..=1.0, help) {
             edit.specular = Some(specular);
         }
@@ -206,22 +187,16 @@ fn gloss(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
 }
 
 /// Radiance a point of dragging: a fraction of the light itself, or of the brightest lamp where it is dark.
-fn drag_speed(app: &App, strength: f32) -> f64 {
-    let objects = app.snapshot.estimate.objects.iter();
-    let brightest = objects
-        .map(|o| o.emission.max_element())
-        .fold(0.0f32, f32::max);
+fn drag_speed(estimate: &Estimate, strength: f32) -> f64 {
+    let emissions = estimate.objects.iter().map(|o| o.emission.max_element());
+    let brightest = emissions.fold(0.0f32, f32::max);
     f64::from((strength * 0.01).max(brightest * 1e-3).max(1e-6))
 }
 
-fn buttons(ui: &mut Ui, app: &mut App, actions: &[Action]) {
-    let ctx = ui.ctx().clone();
+fn buttons(ui: &mut Ui, requests: &mut Requests, actions: &[Action]) {
     ui.horizontal_wrapped(|ui| {
         for &action in actions.iter().chain(&[Action::Undo, Action::Redo]) {
-            let button = ui.add_enabled(app.can(action), Button::new(action.text()));
-            if button.on_hover_text(action.help()).clicked() {
-                app.perform(action, &ctx);
-            }
+            requests.button(ui, action, Button::new(action.text()));
         }
     });
 }

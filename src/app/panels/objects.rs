@@ -1,12 +1,16 @@
 //! The table of objects: swatches, errors, pixels seen; sortable, with a filter, linked to the views.
 
 use crate::app::action::Action;
+use crate::app::controls::{named, switched};
 use crate::app::describe::described;
-use crate::app::picture::inspect::{number, triple};
-use crate::app::state::App;
+use crate::app::document::Document;
+use crate::app::number::{number, triple};
+use crate::app::request::{Request, Requests};
+use crate::app::selection::Selection;
 use crate::app::theme;
 use crate::inverse::estimate::ObjectEstimate;
-use egui::{Align, Button, Color32, Key, Sense, TextEdit, Ui, vec2};
+use crate::math::color::luminance;
+use egui::{Align, Button, Color32, Key, Label, RichText, Role, Sense, TextEdit, Ui, vec2};
 use egui_extras::{Column, TableBuilder};
 use glam::Vec3;
 
@@ -53,6 +57,10 @@ pub struct ObjectsTable {
     pub filter: String,
     /// Whether to scroll to the selected row.
     pub reveal: bool,
+    /// The object whose name is being typed, and the name so far.
+    pub renamed: Option<(u32, String)>,
+    /// Whether the field of the name is to take the keys.
+    pub naming: bool,
 }
 
 impl Default for ObjectsTable {
@@ -62,6 +70,8 @@ impl Default for ObjectsTable {
             descending: true,
             filter: String::new(),
             reveal: false,
+            renamed: None,
+            naming: false,
         }
     }
 }
@@ -76,9 +86,9 @@ impl ObjectsTable {
         let key = |row: usize| {
             estimates.get(row).map_or(0.0, |object| match self.sort {
                 SortBy::Name => 0.0,
-                SortBy::Albedo => f64::from(crate::math::color::luminance(object.albedo)),
+                SortBy::Albedo => f64::from(luminance(object.albedo)),
                 SortBy::Error => f64::from(object.albedo_stderr.element_sum() / 3.0),
-                SortBy::Emission => f64::from(crate::math::color::luminance(object.emission)),
+                SortBy::Emission => f64::from(luminance(object.emission)),
                 SortBy::Pixels => object.seen_pixels as f64,
             })
         };
@@ -87,10 +97,9 @@ impl ObjectsTable {
                 SortBy::Name => names[a].cmp(names[b]),
                 _ => key(a).total_cmp(&key(b)),
             };
-            let by_key = if self.descending {
-                by_key.reverse()
-            } else {
-                by_key
+            let by_key = match self.descending {
+                true => by_key.reverse(),
+                false => by_key,
             };
             // Equal ones stay in the capture's order.
             by_key.then(a.cmp(&b))
@@ -100,37 +109,41 @@ impl ObjectsTable {
 }
 
 /// Draws the pane.
-pub fn pane(ui: &mut Ui, app: &mut App) {
-    let Some(capture) = app.capture().cloned() else {
-        ui.weak(app.nothing_open());
+pub fn pane(
+    ui: &mut Ui,
+    document: &Document,
+    selection: &Selection,
+    table: &mut ObjectsTable,
+    requests: &mut Requests,
+) {
+    let Some(capture) = document.capture() else {
+        ui.weak(document.nothing_open());
         return;
     };
-    let (estimate, unit) = (app.estimate.clone(), app.radiance_unit());
+    let (estimate, unit) = (&document.estimate, document.radiance_unit());
     let objects = &capture.scene.objects;
     let area: f64 = objects.iter().map(|object| object.area).sum();
-    let told = |index: usize| {
+    let albedo = |index: usize| {
         let found = estimate.objects.get(index);
-        found
-            .filter(|o| o.identifiable && o.albedo_identifiable)
-            .map(|found| found.albedo)
+        let told = found.filter(|o| o.identifiable && o.albedo_identifiable);
+        told.map(|found| found.albedo)
     };
     let described: Vec<String> = (objects.iter().enumerate())
-        .map(|(index, object)| described(object, area, told(index)))
+        .map(|(index, object)| described(object, area, albedo(index)))
         .collect();
     let names: Vec<&str> = described.iter().map(String::as_str).collect();
     ui.horizontal(|ui| {
         let label = ui.label("Filter");
-        ui.add(TextEdit::singleline(&mut app.objects.filter).desired_width(120.0))
+        ui.add(TextEdit::singleline(&mut table.filter).desired_width(120.0))
             .labelled_by(label.id);
         ui.weak(format!("{} objects", names.len()));
     });
-    let own: Vec<&str> = objects.iter().map(|o| o.name.as_str()).collect();
-    changes(ui, app, &own);
-    let rows = app.objects.rows(&names, &estimate.objects);
-    let selected_row = app
-        .selected
+    regroup(ui, document, selection, table, requests);
+    let rows = table.rows(&names, &estimate.objects);
+    let selected_row = selection
+        .object
         .and_then(|object| rows.iter().position(|&row| row == object as usize));
-    let mut table = TableBuilder::new(ui)
+    let mut drawn = TableBuilder::new(ui)
         .id_salt("objects")
         .striped(true)
         .sense(Sense::click())
@@ -141,36 +154,28 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         .column(Column::initial(48.0).at_least(40.0))
         .column(Column::initial(76.0).at_least(60.0))
         .column(Column::initial(58.0).at_least(46.0));
-    if std::mem::take(&mut app.objects.reveal)
+    if std::mem::take(&mut table.reveal)
         && let Some(row) = selected_row
     {
-        table = table.scroll_to_row(row, Some(Align::Center));
+        drawn = drawn.scroll_to_row(row, Some(Align::Center));
     }
     let mut clicked = None;
-    table
+    drawn
         .header(theme::ROW, |mut header| {
             for (sort, title, help) in COLUMNS {
-                header.col(|ui| head(ui, &mut app.objects, sort, title, help));
+                header.col(|ui| head(ui, table, sort, title, help));
             }
         })
         .body(|body| {
             body.rows(theme::ROW, rows.len(), |mut row| {
                 let object = rows[row.index()];
-                let chosen = app.selected == Some(object as u32)
-                    || app.grouping.also.contains(&(object as u32));
-                row.set_selected(chosen);
+                let selected = selection.contains(object as u32);
+                row.set_selected(selected);
                 let none = ObjectEstimate::default();
                 let found = estimate.objects.get(object).unwrap_or(&none);
                 cells(&mut row, names[object], found);
-                let response = row.response();
-                response.widget_info(|| {
-                    egui::WidgetInfo::selected(
-                        egui::Role::Button,
-                        true,
-                        chosen,
-                        format!("Select {}", names[object]),
-                    )
-                });
+                let name = format!("Select {}", names[object]);
+                let response = switched(row.response(), Role::Button, selected, &name);
                 if response.clicked() {
                     clicked = Some(object as u32);
                 }
@@ -179,60 +184,58 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
         });
     if let Some(object) = clicked {
         let more = ui.input(|input| input.modifiers.command);
-        let again = !more && app.selected == Some(object);
-        app.choose((!again).then_some(object), more);
+        let again = !more && selection.object == Some(object);
+        requests.ask(Request::Select((!again).then_some(object), more));
     }
 }
 
 /// Buttons and a field that change which faces are one object, and its name.
-fn changes(ui: &mut Ui, app: &mut App, names: &[&str]) {
-    let ctx = ui.ctx().clone();
+fn regroup(
+    ui: &mut Ui,
+    document: &Document,
+    selection: &Selection,
+    table: &mut ObjectsTable,
+    requests: &mut Requests,
+) {
     ui.horizontal_wrapped(|ui| {
         for action in [Action::JoinObjects, Action::CutOut] {
-            let button = ui.add_enabled(app.can(action), Button::new(action.text()));
             let help = format!("{}. The solve then starts over.", action.help());
-            if button.on_hover_text(help).clicked() {
-                app.perform(action, &ctx);
-            }
+            requests.button_with_help(ui, action, Button::new(action.text()), &help);
         }
-        if !app.can_regroup() {
+        let name = |object: u32| document.capture()?.scene.objects.get(object as usize);
+        if !document.can_regroup() {
             ui.weak("Reading the mesh again…");
-        } else if let Some((object, name)) =
-            (app.selected).and_then(|object| Some((object, *names.get(object as usize)?)))
-        {
-            rename(ui, app, object, name);
+        } else if let Some((object, named)) = (selection.object).and_then(|o| Some((o, name(o)?))) {
+            rename(ui, table, object, &named.name, requests);
         }
     });
 }
 
 /// The name of an object, to be typed over.
-fn rename(ui: &mut Ui, app: &mut App, object: u32, name: &str) {
-    if app.grouping.name.0 != Some(object) {
-        app.grouping.name = (Some(object), name.to_owned());
-    }
+fn rename(ui: &mut Ui, table: &mut ObjectsTable, object: u32, name: &str, requests: &mut Requests) {
+    let mut typed = match table.renamed.take() {
+        Some((known, typed)) if known == object => typed,
+        _ => name.to_owned(),
+    };
     let label = ui.label("Name");
-    let field = TextEdit::singleline(&mut app.grouping.name.1).desired_width(110.0);
+    let field = TextEdit::singleline(&mut typed).desired_width(110.0);
     let response = ui.add(field).labelled_by(label.id);
-    if std::mem::take(&mut app.grouping.naming) {
+    if std::mem::take(&mut table.naming) {
         response.request_focus();
     }
-    if response.lost_focus() {
+    if !response.lost_focus() {
+        table.renamed = Some((object, typed));
+    } else if ui.input(|input| input.key_pressed(Key::Enter)) {
         // Enter takes the name; anything else leaves it.
-        let typed = std::mem::take(&mut app.grouping.name).1;
-        if ui.input(|input| input.key_pressed(Key::Enter)) {
-            app.rename_object(object, &typed);
-        }
+        requests.ask(Request::Rename(object, typed));
     }
 }
 
 /// A title that sorts by its column, and the other way round when clicked again.
 fn head(ui: &mut Ui, table: &mut ObjectsTable, sort: SortBy, title: &str, help: &str) {
     let active = table.sort == sort;
-    let text = if active {
-        format!("{title}    ")
-    } else {
-        title.to_owned()
-    };
+    // Room for the arrow.
+    let text = format!("{title}{}", if active { "    " } else { "" });
     let response = ui
         .selectable_label(active, text)
         .on_hover_text(format!("{help}. Click to sort."));
@@ -249,75 +252,61 @@ fn head(ui: &mut Ui, table: &mut ObjectsTable, sort: SortBy, title: &str, help: 
             egui::Stroke::NONE,
         ));
     }
-    response.widget_info(|| {
-        egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Sort by {title}"))
-    });
+    let response = named(response, Role::Button, &format!("Sort by {title}"));
     if response.clicked() {
-        table.descending = if active {
-            !table.descending
-        } else {
-            sort != SortBy::Name
+        table.descending = match active {
+            true => !table.descending,
+            false => sort != SortBy::Name,
         };
         table.sort = sort;
     }
 }
 
 fn cells(row: &mut egui_extras::TableRow<'_, '_>, name: &str, object: &ObjectEstimate) {
+    let text = |ui: &mut Ui, text: RichText| ui.add(Label::new(text).selectable(false));
     row.col(|ui| {
-        let text = egui::RichText::new(name);
-        let text = if object.identifiable {
-            text
-        } else {
-            text.weak().italics()
+        let text = RichText::new(name);
+        let text = match object.identifiable {
+            true => text,
+            false => text.weak().italics(),
         };
-        ui.add(egui::Label::new(text).truncate().selectable(false));
+        ui.add(Label::new(text).truncate().selectable(false));
     });
     row.col(|ui| {
         swatch(ui, object.albedo);
-        let known = object.albedo_identifiable;
-        let mean = if known {
-            number(object.albedo.element_sum() / 3.0)
-        } else {
-            "?".to_owned()
+        let mean = match object.albedo_identifiable {
+            true => number(object.albedo.element_sum() / 3.0),
+            false => "?".to_owned(),
         };
-        ui.add(egui::Label::new(mean).selectable(false));
+        text(ui, mean.into());
     });
     row.col(|ui| {
-        let text = number(object.albedo_stderr.element_sum() / 3.0);
-        ui.add(egui::Label::new(text).selectable(false));
+        text(ui, number(object.albedo_stderr.element_sum() / 3.0).into());
     });
     row.col(|ui| {
         let peak = object.emission.max_element();
         if peak > 0.0 {
             swatch(ui, object.emission / peak);
-            ui.add(egui::Label::new(number(peak)).selectable(false));
+            text(ui, number(peak).into());
         } else {
-            ui.add(egui::Label::new(egui::RichText::new("none").weak()).selectable(false));
+            text(ui, RichText::new("none").weak());
         }
     });
     row.col(|ui| {
-        ui.add(egui::Label::new(object.seen_pixels.to_string()).selectable(false));
+        text(ui, object.seen_pixels.to_string().into());
     });
 }
 
 fn details(ui: &mut Ui, name: &str, object: &ObjectEstimate, unit: &str) {
+    let measured = |value, error| format!("{} ± {}", triple(value), triple(error));
     ui.strong(name);
-    ui.label(format!(
-        "albedo {} ± {}",
-        triple(object.albedo),
-        triple(object.albedo_stderr)
-    ));
-    ui.label(format!(
-        "emission {} ± {} {unit}",
-        triple(object.emission),
-        triple(object.emission_stderr)
-    ));
+    let albedo = measured(object.albedo, object.albedo_stderr);
+    ui.label(format!("albedo {albedo}"));
+    let emission = measured(object.emission, object.emission_stderr);
+    ui.label(format!("emission {emission} {unit}"));
     if let Some((roughness, specular)) = object.lobe() {
-        ui.label(format!(
-            "roughness {}, specular {}",
-            number(roughness),
-            number(specular)
-        ));
+        let (roughness, specular) = (number(roughness), number(specular));
+        ui.label(format!("roughness {roughness}, specular {specular}"));
     }
     ui.label(format!("seen by {} pixels", object.seen_pixels));
     if !object.note.is_empty() {

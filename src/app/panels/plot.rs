@@ -29,7 +29,7 @@ pub fn decades(input: GridInput) -> Vec<GridMark> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::picture::inspect::number;
+    use crate::app::number::number;
 
     #[test]
     fn logarithmic_axes_have_lines_at_round_values() {

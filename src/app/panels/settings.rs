@@ -1,14 +1,15 @@
 //! The solver's parameters: widgets made from the one table that declares them.
 
-use crate::app::state::App;
+use crate::app::controls::named;
+use crate::app::request::{Request, Requests};
 use crate::app::theme;
-use crate::inverse::settings::{Kind, PARAMETERS, Parameter, Value};
-use crate::session::command::Command;
+use crate::inverse::settings::{Kind, PARAMETERS, Parameter, Settings, Value};
+use crate::session::snapshot::Level;
 use egui::{Checkbox, ComboBox, DragValue, Grid, ScrollArea, Ui};
 
 /// Draws the pane.
-pub fn pane(ui: &mut Ui, app: &mut App) {
-    let mut settings = app.settings.clone();
+pub fn pane(ui: &mut Ui, before: &Settings, requests: &mut Requests) {
+    let mut settings = before.clone();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         Grid::new("settings")
             .num_columns(3)
@@ -36,17 +37,15 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
                     if value != before
                         && let Err(message) = parameter.set(&mut settings, &value)
                     {
-                        app.notices
-                            .say(crate::session::snapshot::Level::Warning, message);
+                        requests.ask(Request::Say(Level::Warning, message));
                     }
                 }
             });
         ui.add_space(theme::GAP);
         ui.weak("What is not live takes effect at the next reset.");
     });
-    if settings != app.settings {
-        app.settings = settings.clone();
-        app.send(Command::Set(Box::new(settings)));
+    if settings != *before {
+        requests.ask(Request::Set(Box::new(settings)));
     }
 }
 
@@ -66,8 +65,7 @@ fn help(parameter: &Parameter) -> String {
 
 fn widget(ui: &mut Ui, parameter: &Parameter, title: &str, value: &mut Value) {
     let name = |response: egui::Response, kind| {
-        response.widget_info(|| egui::WidgetInfo::labeled(kind, true, title));
-        response.on_hover_text(help(parameter));
+        named(response, kind, title).on_hover_text(help(parameter));
     };
     match (parameter.kind, value) {
         (Kind::Flag, Value::Flag(flag)) => {

@@ -1,14 +1,13 @@
-//! The ladder of models: what was tried, what it cost, and why it was kept or not.
+//! The stages of the solve: what was tried, what it cost, and why it was kept or dropped.
 
-use crate::app::picture::inspect::number;
-use crate::app::state::App;
+use crate::app::number::number;
 use crate::app::theme;
+use crate::inverse::solver::Progress;
 use egui::{Label, ScrollArea, Ui};
 
 /// Draws the pane.
-pub fn pane(ui: &mut Ui, app: &mut App) {
+pub fn pane(ui: &mut Ui, progress: &Progress) {
     let tokens = theme::tokens(ui);
-    let progress = &app.snapshot.progress;
     if progress.stages.is_empty() {
         ui.weak("No stage has ended yet");
         return;
@@ -16,11 +15,10 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         for stage in &progress.stages {
             ui.horizontal(|ui| {
-                if stage.kept {
-                    ui.colored_label(tokens.good, "kept");
-                } else {
-                    ui.colored_label(tokens.weak, "dropped");
-                }
+                match stage.kept {
+                    true => ui.colored_label(tokens.good, "kept"),
+                    false => ui.colored_label(tokens.weak, "dropped"),
+                };
                 ui.strong(&stage.name);
                 ui.weak(format!(
                     "{:.1} s, {} iterations",
@@ -31,13 +29,10 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
             let loss = |name: &str, loss: Option<f64>| {
                 loss.map(|loss| format!("{name} {}", number(loss as f32)))
             };
-            let losses: Vec<String> = [
-                loss("loss", stage.train_loss),
-                loss("held out", stage.held_out_loss),
-            ]
-            .into_iter()
-            .flatten()
-            .collect();
+            let train = loss("loss", stage.train_loss);
+            let losses: Vec<String> = (train.into_iter())
+                .chain(loss("held out", stage.held_out_loss))
+                .collect();
             if !losses.is_empty() {
                 ui.weak(losses.join(", "));
             }

@@ -1,14 +1,15 @@
 //! The trade of the open capture: error over seconds, where the running solve is on it, and where to stop.
 
 use crate::app::action::Action;
+use crate::app::document::Document;
+use crate::app::number::number;
 use crate::app::panels::plot::decades;
-use crate::app::picture::inspect::number;
-use crate::app::state::App;
+use crate::app::request::{Request, Requests};
 use crate::app::theme::{self, Tokens};
 use crate::app::trade::choice::{Stop, offers, stop_at};
-use crate::app::trade::{Limit, Vertical};
-use crate::inverse::settings::Preset;
-use crate::session::command::Command;
+use crate::app::trade::{Limit, Measured, TradeView, Vertical};
+use crate::inverse::settings::{Preset, Settings};
+use crate::session::snapshot::Snapshot;
 use crate::study::trade::{Curve, Point, Trade};
 use egui::{Button, Color32, DragValue, Pos2, Ui};
 use egui_plot::{
@@ -22,27 +23,29 @@ const REACH: f32 = 14.0;
 const LEGEND: f32 = 160.0;
 
 /// Draws the pane.
-pub fn pane(ui: &mut Ui, app: &mut App) {
-    measuring(ui, app);
-    stops(ui, app);
-    let Some(trade) = app.trade.trade.clone() else {
+pub fn pane(
+    ui: &mut Ui,
+    document: &Document,
+    measured: &Measured,
+    view: &mut TradeView,
+    requests: &mut Requests,
+) {
+    measuring(ui, measured, &mut view.limit, requests);
+    stops(ui, &document.settings, requests);
+    let Some(trade) = &measured.trade else {
         ui.weak("The trade of this capture was not measured yet");
         return;
     };
-    let mut chosen = None;
     ui.horizontal_wrapped(|ui| {
-        for offer in offers(&trade) {
-            if ui
-                .small_button(offer.stop.words())
-                .on_hover_text(&offer.expected)
-                .clicked()
-            {
-                chosen = Some((offer.curve, offer.stop));
+        for offer in offers(trade) {
+            let button = ui.small_button(offer.stop.words());
+            if button.on_hover_text(&offer.expected).clicked() {
+                requests.ask(Request::Stop(offer.curve, offer.stop));
             }
         }
     });
     ui.horizontal(|ui| {
-        let vertical = &mut app.trade.vertical;
+        let vertical = &mut view.vertical;
         ui.selectable_value(vertical, Vertical::Claimed, "Claimed error")
             .on_hover_text("The relative error of albedo that estimates claim of themselves");
         ui.selectable_value(vertical, Vertical::Measured, "Measured error")
@@ -50,27 +53,19 @@ pub fn pane(ui: &mut Ui, app: &mut App) {
     })
     .response
     .on_hover_text(trade.machine.words());
-    chosen = plot(ui, app, &trade).or(chosen);
-    if let Some((curve, stop)) = chosen {
-        app.choose_stop(curve, stop);
-    }
+    let now = live(&document.snapshot);
+    let chosen = plot(ui, now, view, trade);
+    requests.ask_all(chosen.map(|(curve, stop)| Request::Stop(curve, stop)));
 }
 
 /// The button that measures, and what it is at.
-fn measuring(ui: &mut Ui, app: &mut App) {
-    let ctx = ui.ctx().clone();
+fn measuring(ui: &mut Ui, measured: &Measured, limit: &mut Limit, requests: &mut Requests) {
     ui.horizontal(|ui| {
-        let doing = app.trade.doing();
+        let doing = measured.doing();
         let text = if doing.is_some() { "Cancel" } else { "Measure" };
-        let button = ui.add_enabled(app.can(Action::MeasureTrade), Button::new(text));
-        let help = Action::MeasureTrade.help();
-        if button
-            .on_hover_text(help)
-            .on_disabled_hover_text("Measured only while no solve runs: pause it or let it end")
-            .clicked()
-        {
-            app.perform(Action::MeasureTrade, &ctx);
-        }
+        requests
+            .button(ui, Action::MeasureTrade, Button::new(text))
+            .on_disabled_hover_text("Measured only while no solve runs: pause it or let it end");
         match doing {
             Some(doing) => {
                 ui.spinner();
@@ -78,12 +73,12 @@ fn measuring(ui: &mut Ui, app: &mut App) {
             }
             None => {
                 let label = ui.label("in");
-                let Limit(seconds) = &mut app.trade.limit;
-                ui.add(DragValue::new(seconds).range(5.0..=3600.0).suffix(" s"))
+                let seconds = DragValue::new(&mut limit.0);
+                ui.add(seconds.range(5.0..=3600.0).suffix(" s"))
                     .labelled_by(label.id)
                     .on_hover_text("Time for all presets together");
-                if app.trade.unsaved && ui.button("Keep").on_hover_text(KEEP).clicked() {
-                    app.keep_trade();
+                if measured.unsaved && ui.button("Keep").on_hover_text(KEEP).clicked() {
+                    requests.ask(Request::KeepTrade);
                 }
             }
         }
@@ -93,46 +88,40 @@ fn measuring(ui: &mut Ui, app: &mut App) {
 const KEEP: &str = "Writes trade.csv, trade.json and trade.png into the folder where this capture's results are looked for when it is opened";
 
 /// The two stops as numbers.
-fn stops(ui: &mut Ui, app: &mut App) {
-    let mut settings = app.settings.clone();
+fn stops(ui: &mut Ui, before: &Settings, requests: &mut Requests) {
+    let mut settings = before.clone();
     ui.horizontal(|ui| {
         let label = ui.label("Stop at error");
-        ui.add(
-            DragValue::new(&mut settings.target_error)
-                .range(0.0..=100.0)
-                .speed(0.01)
-                .max_decimals(3)
-                .suffix(" %"),
-        )
-        .labelled_by(label.id)
-        .on_hover_text("Relative error of albedo that the estimate claims of itself; 0 leaves it to the preset");
+        let error = DragValue::new(&mut settings.target_error).range(0.0..=100.0);
+        ui.add(error.speed(0.01).max_decimals(3).suffix(" %"))
+            .labelled_by(label.id)
+            .on_hover_text("Relative error of albedo that the estimate claims of itself; 0 leaves it to the preset");
         let label = ui.label("Stop at time");
-        ui.add(
-            DragValue::new(&mut settings.time)
-                .range(0.0..=1e9)
-                .speed(0.1)
-                .suffix(" s"),
-        )
-        .labelled_by(label.id)
-        .on_hover_text("Seconds of solving; 0 sets no limit");
+        let time = DragValue::new(&mut settings.time).range(0.0..=1e9);
+        ui.add(time.speed(0.1).suffix(" s"))
+            .labelled_by(label.id)
+            .on_hover_text("Seconds of solving; 0 sets no limit");
     });
-    if settings != app.settings {
-        app.settings = settings.clone();
-        app.send(Command::Set(Box::new(settings)));
+    if settings != *before {
+        requests.ask(Request::Set(Box::new(settings)));
     }
 }
 
 /// Draws the curves; gives the curve and the stop of a point that was clicked.
-fn plot(ui: &mut Ui, app: &mut App, trade: &Trade) -> Option<(usize, Stop)> {
+fn plot(
+    ui: &mut Ui,
+    now: Option<(f64, Option<f64>)>,
+    view: &mut TradeView,
+    trade: &Trade,
+) -> Option<(usize, Stop)> {
     let tokens = theme::tokens(ui);
-    let vertical = app.trade.vertical;
+    let vertical = view.vertical;
     let height = move |point: &Point| height(point, vertical);
     let percent = vertical == Vertical::Claimed;
     let value = move |log: f64| {
         let value = number(10f64.powf(log) as f32);
         if percent { format!("{value} %") } else { value }
     };
-    let now = live(app);
     let mut drawn = Plot::new("trade");
     // A legend would cover a small plot.
     if ui.available_height() > LEGEND {
@@ -213,14 +202,14 @@ fn plot(ui: &mut Ui, app: &mut App, trade: &Trade) -> Option<(usize, Stop)> {
         let place = PlotPoint::new(at[0], at[1]);
         response.transform.position_from_point(&place)
     };
-    app.trade.places = (response.inner.iter())
+    view.places = (response.inner.iter())
         .map(|&(at, curve, point)| (on_screen(at), curve, point))
         .collect();
     if !response.response.clicked() {
         return None;
     }
     let at = response.response.interact_pointer_pos()?;
-    let (curve, point) = nearest(&app.trade.places, at)?;
+    let (curve, point) = nearest(&view.places, at)?;
     let stop = stop_at(trade.curves.get(curve)?.points.get(point)?, vertical)?;
     Some((curve, stop))
 }
@@ -235,10 +224,10 @@ fn height(point: &Point, vertical: Vertical) -> Option<f64> {
 }
 
 /// Seconds of the solve that is under way or has ended, and the relative error that it claims.
-fn live(app: &App) -> Option<(f64, Option<f64>)> {
-    let progress = &app.snapshot.progress;
+fn live(snapshot: &Snapshot) -> Option<(f64, Option<f64>)> {
+    let progress = &snapshot.progress;
     progress.seconds_to_first_estimate?;
-    let claim = app.snapshot.estimate.relative_error().filter(|e| *e > 0.0);
+    let claim = snapshot.estimate.relative_error().filter(|e| *e > 0.0);
     (progress.seconds > 0.0).then_some((progress.seconds, claim))
 }
 

@@ -1,159 +1,51 @@
 //! A pane with one picture: zoom and pan shared by all, clicks that select or place, numbers inside large pixels.
 
+use crate::app::controls::named;
+use crate::app::document::Document;
 use crate::app::insertion::handles::Along;
+use crate::app::number::number;
+use crate::app::picture::drawn::Drawn;
 use crate::app::picture::gpu::PicturePaint;
+use crate::app::picture::inspect;
 use crate::app::picture::look::{Cursor, fraction};
 use crate::app::picture::quantity::{Quantity, Shading};
-use crate::app::picture::{inspect, ramp};
-use crate::app::state::{App, Shown};
+use crate::app::request::{Request, Requests};
+use crate::app::shown::ray;
 use crate::app::theme;
+use crate::app::view::ViewState;
 use crate::scene::camera::Camera;
-use crate::session::snapshot::{Picture, View};
-use egui::{Align2, Color32, FontId, Pos2, Rect, Sense, Ui, vec2};
-use std::sync::Arc;
-
-/// A picture to draw.
-#[derive(Debug, Clone)]
-pub struct Drawn {
-    /// What it is.
-    pub quantity: Quantity,
-    /// Its numbers.
-    pub picture: Arc<Picture>,
-    /// Object index of each of its pixels, where known.
-    pub objects: Option<Arc<Vec<u32>>>,
-    /// Magnitude at the end of false colours.
-    pub range: f32,
-}
-
-/// The objects that the pixels of a view show, for a picture of the same view in another size; made once for each view.
-#[derive(Debug, Default)]
-pub struct Resized(Option<(Indices, [u32; 2], Indices)>);
-
-/// An object's index for each pixel of a picture.
-type Indices = Arc<Vec<u32>>;
-
-impl Resized {
-    fn of(&mut self, objects: &Indices, from: [u32; 2], to: [u32; 2]) -> Option<Indices> {
-        if objects.len() as u64 != u64::from(from[0]) * u64::from(from[1]) {
-            return None;
-        }
-        let known = self.0.as_ref();
-        if let Some((_, _, made)) = known.filter(|k| Arc::ptr_eq(&k.0, objects) && k.1 == to) {
-            return Some(made.clone());
-        }
-        let at = |i: u32, axis: usize| {
-            (u64::from(i) * u64::from(from[axis]) / u64::from(to[axis].max(1))) as usize
-        };
-        let row = |y: u32| (0..to[0]).map(move |x| objects[at(y, 1) * from[0] as usize + at(x, 0)]);
-        let made = Arc::new((0..to[1]).flat_map(row).collect::<Vec<u32>>());
-        self.0 = Some((objects.clone(), to, made.clone()));
-        Some(made)
-    }
-}
-
-impl App {
-    /// The pictures of the shown view, once the worker has sent them.
-    pub fn view(&self) -> Option<&Arc<View>> {
-        let frame = match self.shown {
-            Shown::Frame => Some(self.frame),
-            Shown::Free(..) => None,
-        };
-        self.snapshot
-            .view
-            .as_ref()
-            .filter(|view| view.frame == frame)
-    }
-
-    /// A picture of the shown view.
-    pub fn drawn(&self, quantity: Quantity) -> Option<Drawn> {
-        let view = self.view();
-        let insertion = self.snapshot.insertion.as_ref().filter(|insertion| {
-            matches!(self.shown, Shown::Frame) && insertion.frame == self.frame
-        });
-        let picture = match quantity {
-            // At the size at which it is looked at, where that is known.
-            Quantity::Photograph => (insertion.filter(|_| self.composite_needed))
-                .map(|insertion| insertion.photograph.clone())
-                .or_else(|| view.and_then(|view| view.photograph.clone()))
-                .or_else(|| self.photograph()),
-            Quantity::Render => view.and_then(|view| view.render.clone()),
-            Quantity::Albedo => view.and_then(|view| view.albedo.clone()),
-            Quantity::Emission => view.and_then(|view| view.emission.clone()),
-            Quantity::Irradiance => self.irradiance.picture(),
-            Quantity::Error => view.and_then(|view| view.error.clone()),
-            Quantity::StandardError => view.and_then(|view| view.stderr.clone()),
-            Quantity::Naive => insertion.map(|insertion| insertion.naive.clone()),
-            Quantity::NaiveEstimate => insertion.map(|insertion| insertion.naive_estimate.clone()),
-            Quantity::Composite => insertion
-                .map(|insertion| insertion.composite.clone())
-                .or_else(|| self.photograph()),
-        }?;
-        let range = match quantity.shading() {
-            Shading::Signed | Shading::Positive => {
-                let now = ramp::range(&picture, quantity.shading());
-                self.scales.borrow_mut().follow(quantity, now)
-            }
-            _ => 1.0,
-        };
-        let objects = view.and_then(|view| {
-            let (objects, seen) = (view.objects.as_ref()?, view.albedo.as_ref()?);
-            let from = [seen.width, seen.height];
-            let to = [picture.width, picture.height];
-            match from == to {
-                true => Some(objects.clone()),
-                false => self.resized.borrow_mut().of(objects, from, to),
-            }
-        });
-        Some(Drawn {
-            quantity,
-            picture,
-            objects,
-            range,
-        })
-    }
-}
+use crate::session::snapshot::Picture;
+use egui::{Align2, Color32, FontId, Pos2, Rect, Response, Role, Sense, Ui, vec2};
 
 /// Draws the pane of one picture.
-pub fn pane(ui: &mut Ui, app: &mut App, quantity: Quantity) {
+pub fn pane(
+    ui: &mut Ui,
+    document: &Document,
+    view: &mut ViewState,
+    requests: &mut Requests,
+    quantity: Quantity,
+) {
     let rect = ui.max_rect();
-    let shown = if app.look.photograph {
-        Quantity::Photograph
-    } else {
-        quantity
-    };
-    app.need(shown);
-    let Some(drawn) = app.drawn(shown) else {
-        missing(ui, app, shown);
+    let shown = view.look.held(quantity);
+    view.needed.note(shown);
+    let Some(drawn) = view.drawn(document, shown) else {
+        missing(ui, document, view, shown);
         return;
     };
-    interact(
-        ui,
-        app,
-        rect,
-        &drawn,
-        &format!("{} picture", quantity.name()),
-    );
-    paint(
-        ui,
-        app,
-        rect,
-        &drawn,
-        egui::Id::unique(("picture", quantity)),
-    );
-    overlay(ui, app, rect, &drawn);
+    let name = format!("{} picture", quantity.name());
+    interact(ui, document, view, requests, rect, &drawn, &name);
+    let slot = egui::Id::unique(("picture", quantity));
+    paint(ui, view, rect, &drawn, slot);
+    overlay(ui, document, view, rect, &drawn);
 }
 
 /// Says why there is no picture.
-pub fn missing(ui: &mut Ui, app: &App, quantity: Quantity) {
+pub fn missing(ui: &mut Ui, document: &Document, view: &ViewState, quantity: Quantity) {
+    let free = view.shown.free.is_some();
     let text = match quantity {
-        _ if app.capture().is_none() => app.nothing_open(),
+        _ if document.capture().is_none() => document.nothing_open(),
         Quantity::Photograph => "No photograph was taken from here",
-        Quantity::Error if !matches!(app.shown, Shown::Frame) => {
-            "No photograph was taken from here"
-        }
-        Quantity::Composite if !matches!(app.shown, Shown::Frame) => {
-            "No photograph was taken from here"
-        }
+        Quantity::Error | Quantity::Composite if free => "No photograph was taken from here",
         Quantity::Naive | Quantity::NaiveEstimate => "Compositing…",
         _ => "Waiting for the first picture…",
     };
@@ -163,70 +55,83 @@ pub fn missing(ui: &mut Ui, app: &App, quantity: Quantity) {
 }
 
 /// Zoom, pan, cursor, selection and placing.
-pub fn interact(ui: &mut Ui, app: &mut App, rect: Rect, drawn: &Drawn, name: &str) {
+pub fn interact(
+    ui: &mut Ui,
+    document: &Document,
+    view: &mut ViewState,
+    requests: &mut Requests,
+    rect: Rect,
+    drawn: &Drawn,
+    name: &str,
+) {
     let size = [drawn.picture.width, drawn.picture.height];
     let response = ui.allocate_rect(rect, Sense::click_and_drag());
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, name));
-    let needed = app.look.placement(rect, size).size().max_elem() * ui.pixels_per_point();
-    app.pixels_needed = app.pixels_needed.max(needed);
+    let response = named(response, Role::Image, name);
+    let side = view.look.placement(rect, size).size().max_elem() * ui.pixels_per_point();
+    view.needed.pixels = view.needed.pixels.max(side);
 
     if let Some(pointer) = response.hover_pos() {
         let (scroll, pinch) = ui.input(|input| (input.smooth_scroll_delta.y, input.zoom_delta()));
         let factor = (scroll * 0.005).exp() * pinch;
         if factor != 1.0 {
-            app.look.zoom_at(rect, size, pointer, factor);
+            view.look.zoom_at(rect, size, pointer, factor);
         }
-        let at = fraction(app.look.placement(rect, size), pointer);
-        let inside = Rect::from_min_size(Pos2::ZERO, vec2(1.0, 1.0)).contains(at);
-        if inside {
-            app.look.cursor = Some(Cursor {
-                at,
-                over: drawn.quantity,
-            });
+        let at = fraction(view.look.placement(rect, size), pointer);
+        if Rect::from_min_size(Pos2::ZERO, vec2(1.0, 1.0)).contains(at) {
+            let over = drawn.quantity;
+            view.look.cursor = Some(Cursor { at, over });
         }
     }
-    drag(ui, app, rect, size, &response);
+    drag(ui, document, view, requests, rect, size, &response);
     if response.double_clicked() {
-        app.look.fit();
+        view.look.fit();
     } else if response.clicked()
         && let Some(pointer) = response.interact_pointer_pos()
     {
-        let at = fraction(app.look.placement(rect, size), pointer);
+        let at = fraction(view.look.placement(rect, size), pointer);
         let more = ui.input(|input| input.modifiers.command);
-        app.clicked(app.surface_at(at), more);
+        requests.ask(Request::Click(view.shown.surface_at(document, at), more));
     }
-    if app.aims() {
+    if view.tool.is_active() {
         response.on_hover_cursor(egui::CursorIcon::Crosshair);
     }
 }
 
 /// Drags a handle of an inserted object, or pans.
-fn drag(ui: &Ui, app: &mut App, rect: Rect, size: [u32; 2], response: &egui::Response) {
-    let placement = app.look.placement(rect, size);
-    let Some((capture, camera)) = app.capture().cloned().zip(app.camera().cloned()) else {
+fn drag(
+    ui: &Ui,
+    document: &Document,
+    view: &mut ViewState,
+    requests: &mut Requests,
+    rect: Rect,
+    size: [u32; 2],
+    response: &Response,
+) {
+    let placement = view.look.placement(rect, size);
+    let Some((capture, camera)) = document.capture().zip(view.shown.camera(document)) else {
         return;
     };
+    let (scene, insertions) = (&capture.scene, &document.insertions);
     if response.drag_started()
         && let Some(press) = ui.input(|input| input.pointer.press_origin())
     {
-        let project = |point| on_screen(&camera, placement, point);
-        app.insertions.take_handle(&capture.scene, press, project);
+        let project = |point| on_screen(camera, placement, point);
+        view.tool.dragged = insertions.handle_at(scene, press, project);
     }
     if response.drag_stopped() {
-        app.insertions.dragged = None;
+        view.tool.dragged = None;
     }
-    if let Some(pointer) = response
-        .interact_pointer_pos()
-        .filter(|_| response.dragged())
-    {
-        let at = fraction(placement, pointer);
-        let k = &camera.intrinsics;
-        let ray = camera.ray(glam::vec2(at.x * k.width as f32, at.y * k.height as f32));
-        let surface = app.surface_at(at).map(|at| at.point);
-        let along = Along::of(ui.input(|input| input.modifiers));
-        if !(app.insertions).drag_handle(&capture.scene, &ray, surface, along) {
-            app.look.pan(rect, size, response.drag_delta());
+    let pointer = response.interact_pointer_pos();
+    match (pointer.filter(|_| response.dragged()), view.tool.dragged) {
+        (Some(pointer), Some(handle)) => {
+            let at = fraction(placement, pointer);
+            let surface = view.shown.surface_at(document, at).map(|at| at.point);
+            let along = Along::of(ui.input(|input| input.modifiers));
+            let dragged = insertions.dragged(handle, scene, &ray(camera, at), surface, along);
+            requests.ask_all(dragged.map(|(index, to)| Request::Place(index, to)));
         }
+        (Some(_), None) => view.look.pan(rect, size, response.drag_delta()),
+        (None, _) => {}
     }
 }
 
@@ -238,76 +143,60 @@ fn on_screen(camera: &Camera, placement: Rect, point: glam::Vec3) -> Option<Pos2
     Some(placement.min + fraction * placement.size())
 }
 
-impl App {
-    /// Notes that a picture is shown, for what has to be made for it.
-    pub fn need(&mut self, quantity: Quantity) {
-        self.composite_needed |= matches!(
-            quantity,
-            Quantity::Composite | Quantity::Naive | Quantity::NaiveEstimate
-        );
-        self.render_needed |= matches!(
-            quantity,
-            Quantity::Render | Quantity::Error | Quantity::Irradiance
-        );
-        self.irradiance_needed |= quantity == Quantity::Irradiance;
-    }
-
-    /// Selects an object of the scene, or where `more` chooses it too, and shows it in the table.
-    pub fn select(&mut self, object: Option<u32>, more: bool) {
-        self.choose(object, more);
-        self.objects.reveal = object.is_some();
-    }
-}
-
 /// Draws the picture itself.
-pub fn paint(ui: &Ui, app: &App, rect: Rect, drawn: &Drawn, slot: egui::Id) {
+pub fn paint(ui: &Ui, view: &ViewState, rect: Rect, drawn: &Drawn, slot: egui::Id) {
     let tokens = theme::tokens(ui);
     let paint = PicturePaint {
         objects: drawn.objects.clone(),
         shading: drawn.quantity.shading(),
         range: drawn.range,
         smooth: drawn.quantity.shading() == Shading::Radiance,
-        selected: app.selected,
-        ..PicturePaint::new(slot, drawn.picture.clone(), rect, &app.look, tokens)
+        selected: view.selection.object,
+        ..PicturePaint::new(slot, drawn.picture.clone(), rect, &view.look, tokens)
     };
-    ui.painter()
-        .add(eframe::egui_wgpu::Callback::new_paint_callback(rect, paint));
+    let paint = eframe::egui_wgpu::Callback::new_paint_callback(rect, paint);
+    ui.painter().add(paint);
 }
 
-/// What lies over the picture: cursor, legend, numbers, anchors of inserted objects.
-pub fn overlay(ui: &Ui, app: &App, rect: Rect, drawn: &Drawn) {
+/// What lies over the picture: cursor, legend, numbers, handles of inserted objects.
+pub fn overlay(ui: &Ui, document: &Document, view: &ViewState, rect: Rect, drawn: &Drawn) {
     let tokens = theme::tokens(ui);
     let size = [drawn.picture.width, drawn.picture.height];
-    let placement = app.look.placement(rect, size);
+    let placement = view.look.placement(rect, size);
     let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
 
     numbers(&painter, rect, placement, &drawn.picture);
-    anchors(ui, app, rect, placement);
+    handles(ui, document, view, rect, placement);
 
     // The cursor of the pane that the pointer is in, in all the others.
-    if let Some(cursor) = app.look.cursor
+    if let Some(cursor) = view.look.cursor
         && cursor.over != drawn.quantity
     {
         let at = placement.min + cursor.at.to_vec2() * placement.size();
         for (color, width) in [(Color32::from_black_alpha(160), 3.0), (tokens.strong, 1.0)] {
             let stroke = egui::Stroke::new(width, color);
-            for (from, to) in [
-                (vec2(-9.0, 0.0), vec2(-3.0, 0.0)),
-                (vec2(3.0, 0.0), vec2(9.0, 0.0)),
-                (vec2(0.0, -9.0), vec2(0.0, -3.0)),
-                (vec2(0.0, 3.0), vec2(0.0, 9.0)),
+            for arm in [
+                vec2(1.0, 0.0),
+                vec2(-1.0, 0.0),
+                vec2(0.0, 1.0),
+                vec2(0.0, -1.0),
             ] {
-                painter.line_segment([at + from, at + to], stroke);
+                painter.line_segment([at + arm * 3.0, at + arm * 9.0], stroke);
             }
         }
     }
-    if matches!(
-        drawn.quantity.shading(),
-        Shading::Signed | Shading::Positive
-    ) {
+    let shading = drawn.quantity.shading();
+    if matches!(shading, Shading::Signed | Shading::Positive) {
         inspect::legend(ui, rect, drawn);
     }
 }
+
+/// The colours that the numbers of red, green and blue are written in.
+const CHANNELS: [Color32; 3] = [
+    Color32::from_rgb(255, 120, 110),
+    Color32::from_rgb(120, 235, 120),
+    Color32::from_rgb(130, 175, 255),
+];
 
 /// Writes each pixel's three numbers into it once it is large enough.
 fn numbers(painter: &egui::Painter, rect: Rect, placement: Rect, picture: &Picture) {
@@ -315,74 +204,40 @@ fn numbers(painter: &egui::Painter, rect: Rect, placement: Rect, picture: &Pictu
     if side < 44.0 {
         return;
     }
-    let first = ((rect.min - placement.min) / side)
-        .floor()
-        .max(vec2(0.0, 0.0));
+    let first = ((rect.min - placement.min) / side).floor();
+    let first = first.max(vec2(0.0, 0.0));
     let last = ((rect.max - placement.min) / side).ceil();
     let font = FontId::monospace((side * 0.17).min(13.0));
+    let write = |at, text, color| {
+        painter.text(at, Align2::CENTER_CENTER, text, font.clone(), color);
+    };
     for j in first.y as u32..(last.y.max(0.0) as u32).min(picture.height) {
         for i in first.x as u32..(last.x.max(0.0) as u32).min(picture.width) {
             let Some(value) = picture.pixels.get((j * picture.width + i) as usize) else {
                 continue;
             };
             let center = placement.min + vec2(i as f32 + 0.5, j as f32 + 0.5) * side;
-            for (k, (v, color)) in value
-                .to_array()
-                .into_iter()
-                .zip([
-                    Color32::from_rgb(255, 120, 110),
-                    Color32::from_rgb(120, 235, 120),
-                    Color32::from_rgb(130, 175, 255),
-                ])
-                .enumerate()
-            {
+            for (k, (v, color)) in value.to_array().into_iter().zip(CHANNELS).enumerate() {
                 let at = center + vec2(0.0, (k as f32 - 1.0) * font.size * 1.25);
-                let text = inspect::number(v);
                 // A shadow keeps the numbers readable on any picture.
-                painter.text(
-                    at + vec2(1.0, 1.0),
-                    Align2::CENTER_CENTER,
-                    &text,
-                    font.clone(),
-                    Color32::BLACK,
-                );
-                painter.text(at, Align2::CENTER_CENTER, text, font.clone(), color);
+                write(at + vec2(1.0, 1.0), number(v), Color32::BLACK);
+                write(at, number(v), color);
             }
         }
     }
 }
 
 /// Handles of inserted objects, and a box around the chosen one while it is placed or moved.
-fn anchors(ui: &Ui, app: &App, rect: Rect, placement: Rect) {
-    if let Some((capture, camera)) = app.capture().zip(app.camera()) {
+fn handles(ui: &Ui, document: &Document, view: &ViewState, rect: Rect, placement: Rect) {
+    let Some((capture, camera)) = document.capture().zip(view.shown.camera(document)) else {
+        return;
+    };
+    let boxed = view.tool.placing || view.tool.dragged.is_some();
+    // Nothing covers a result that is only looked at.
+    if boxed || ui.rect_contains_pointer(rect) {
         let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
-        let boxed = app.insertions.placing || app.insertions.dragged.is_some();
-        // Nothing covers a result that is only looked at.
-        if !boxed && !ui.rect_contains_pointer(rect) {
-            return;
-        }
-        app.insertions.draw_handles(
-            &painter,
-            &capture.scene,
-            theme::tokens(ui),
-            boxed,
-            |point| on_screen(camera, placement, point),
-        );
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn objects_are_told_in_a_picture_of_another_size() {
-        let objects = Arc::new(vec![0, 1, 2, 3]);
-        let mut resized = Resized::default();
-        let large = resized.of(&objects, [2, 2], [4, 2]).expect("made");
-        assert_eq!(*large, [0, 0, 1, 1, 2, 2, 3, 3]);
-        let again = resized.of(&objects, [2, 2], [4, 2]).expect("made");
-        assert!(Arc::ptr_eq(&large, &again));
-        assert!(resized.of(&objects, [3, 2], [4, 2]).is_none());
+        let project = |point| on_screen(camera, placement, point);
+        let (scene, tokens) = (&capture.scene, theme::tokens(ui));
+        (document.insertions).draw_handles(&painter, scene, tokens, boxed, project);
     }
 }

@@ -1,30 +1,12 @@
 //! A picture as it is seen, for the clipboard: the arithmetic of `picture.wgsl` on the processor.
 
-use crate::app::picture::canvas::Drawn;
+use crate::app::picture::drawn::Drawn;
 use crate::app::picture::look::{Look, ToneCurve};
-use crate::app::picture::quantity::{Quantity, Shading};
+use crate::app::picture::quantity::Shading;
 use crate::app::picture::ramp;
-use crate::app::state::App;
 use crate::math::color::to_srgb8;
-use crate::session::snapshot::Level;
 use egui::{Color32, ColorImage};
 use glam::Vec3;
-
-impl App {
-    /// Copies the picture under the pointer, or the re-render, whole and as it is seen, to the clipboard.
-    pub fn copy_picture(&mut self, ctx: &egui::Context) {
-        let over = self.look.cursor.map(|cursor| cursor.over);
-        let quantity = over.unwrap_or(Quantity::Render);
-        let Some(drawn) = self.drawn(quantity) else {
-            let message = format!("copy: there is no {} yet", quantity.name());
-            self.notices.say(Level::Warning, message);
-            return;
-        };
-        ctx.copy_image(as_seen(&drawn, &self.look));
-        let message = format!("{} copied to the clipboard", quantity.name());
-        self.notices.say(Level::Info, message);
-    }
-}
 
 /// All pixels of a picture in the colours that panes show.
 pub fn as_seen(drawn: &Drawn, look: &Look) -> ColorImage {
@@ -66,6 +48,7 @@ fn color(value: Vec3, shading: Shading, range: f32, look: &Look) -> [u8; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::picture::quantity::Quantity;
     use crate::math::color::srgb_to_linear;
     use crate::session::snapshot::Picture;
     use std::sync::Arc;

@@ -1,55 +1,55 @@
 //! The photograph as it was changed: other light, other materials, inserted objects. Alone, or beside another picture.
 
+use crate::app::document::Document;
 use crate::app::picture::canvas;
-use crate::app::picture::compare;
 use crate::app::picture::quantity::Quantity;
-use crate::app::state::App;
+use crate::app::picture::wipe::wipe;
+use crate::app::request::Requests;
 use crate::app::theme;
-use egui::Ui;
+use crate::app::view::ViewState;
+use egui::{Ui, UiBuilder};
 
 /// What it can be wiped against.
 const AGAINST: [Quantity; 3] = [Quantity::Photograph, Quantity::Naive, Quantity::Render];
 
 /// Draws the pane.
-pub fn pane(ui: &mut Ui, app: &mut App) {
-    app.need(Quantity::Composite);
+pub fn pane(ui: &mut Ui, document: &Document, view: &mut ViewState, requests: &mut Requests) {
+    view.needed.note(Quantity::Composite);
     theme::strip(ui).show(ui, |ui| {
         ui.set_min_width(ui.available_width());
-        controls(ui, app);
+        controls(ui, document, view);
     });
     let rect = ui.available_rect_before_wrap();
-    match app.against.filter(|_| !app.look.photograph) {
+    let composite = Quantity::Composite;
+    match view.compare.against.filter(|_| !view.look.photograph) {
         Some(left) => {
-            app.need(left);
-            compare::wipe(ui, app, rect, left, Quantity::Composite);
+            view.needed.note(left);
+            wipe(ui, document, view, requests, rect, left, composite);
         }
         None => {
-            let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(rect));
-            canvas::pane(&mut ui, app, Quantity::Composite);
+            let mut ui = ui.new_child(UiBuilder::new().max_rect(rect));
+            canvas::pane(&mut ui, document, view, requests, composite);
         }
     }
 }
 
-fn controls(ui: &mut Ui, app: &mut App) {
+fn controls(ui: &mut Ui, document: &Document, view: &mut ViewState) {
     ui.horizontal_wrapped(|ui| {
         ui.label("Wipe against");
-        let nothing = ui.selectable_value(&mut app.against, None, "nothing");
+        let against = &mut view.compare.against;
+        let nothing = ui.selectable_value(against, None, "nothing");
         nothing.on_hover_text("The photograph as you changed it, alone");
         for quantity in AGAINST {
             let name = quantity.name().to_lowercase();
-            let choice = ui.selectable_value(&mut app.against, Some(quantity), name);
+            let choice = ui.selectable_value(against, Some(quantity), name);
             choice.on_hover_text(quantity.help());
         }
-        let shown = app.snapshot.insertion.as_ref();
-        let samples = shown
-            .filter(|i| i.frame == app.frame)
-            .and_then(|i| i.samples);
-        ui.weak(samples.map_or_else(
-            || "as taken".to_owned(),
-            |samples| match samples {
-                0 => "a first look".to_owned(),
-                samples => format!("{samples} samples a pixel"),
-            },
-        ));
+        let insertion = document.snapshot.insertion.as_ref();
+        let insertion = insertion.filter(|insertion| insertion.frame == view.shown.frame);
+        ui.weak(match insertion.and_then(|insertion| insertion.samples) {
+            None => "as taken".to_owned(),
+            Some(0) => "a first look".to_owned(),
+            Some(samples) => format!("{samples} samples a pixel"),
+        });
     });
 }

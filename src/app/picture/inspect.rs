@@ -1,123 +1,75 @@
 //! What a pixel holds, in words; and the legend of false colours.
 
-use crate::app::picture::canvas::Drawn;
-use crate::app::picture::quantity::{Quantity, Shading};
+use crate::app::document::Document;
+use crate::app::number::{number, triple};
+use crate::app::picture::drawn::Drawn;
+use crate::app::picture::quantity::Shading;
 use crate::app::picture::ramp;
-use crate::app::state::App;
 use crate::app::theme;
+use crate::app::view::ViewState;
 use crate::math::color::linear_to_srgb;
 use egui::{Align2, Color32, FontId, Mesh, Rect, RichText, Ui, pos2, vec2};
 use glam::Vec3;
 
-/// A number in few characters.
-pub fn number(v: f32) -> String {
-    let magnitude = v.abs();
-    if v == 0.0 {
-        "0".to_owned()
-    } else if !v.is_finite() {
-        v.to_string()
-    } else if !(1e-3..1e4).contains(&magnitude) {
-        format!("{v:.1e}")
-    } else if magnitude < 1.0 {
-        let decimals = (2.0 - magnitude.log10().floor()) as usize;
-        format!("{v:.decimals$}")
-    } else if magnitude < 100.0 {
-        format!("{v:.2}")
-    } else {
-        format!("{v:.0}")
-    }
-}
-
-/// Three numbers with a space between.
-pub fn triple(v: Vec3) -> String {
-    let [r, g, b] = v.to_array().map(number);
-    format!("{r} {g} {b}")
-}
-
 /// One line about the pixel under the pointer, or what the next click is asked for.
-pub fn bar(ui: &mut Ui, app: &App) {
+pub fn bar(ui: &mut Ui, document: &Document, view: &ViewState) {
     let tokens = theme::tokens(ui);
-    if let Some(pick) = app.picking {
+    if let Some(pick) = view.tool.pick {
         ui.horizontal(|ui| {
             ui.colored_label(tokens.accent, pick.prompt());
             ui.weak("Esc ends this");
         });
         return;
     }
-    let Some(cursor) = app.look.cursor else {
+    let Some(cursor) = view.look.cursor else {
         ui.label(RichText::new("Point at a picture to read its values").color(tokens.weak));
         return;
     };
-    let Some(drawn) = app.drawn(cursor.over) else {
+    let quantity = cursor.over;
+    let Some(drawn) = view.drawn(document, quantity) else {
         return;
     };
-    let pixel = |drawn: &Drawn| {
-        let (w, h) = (drawn.picture.width, drawn.picture.height);
-        let x = ((cursor.at.x * w as f32) as u32).min(w.saturating_sub(1));
-        let y = ((cursor.at.y * h as f32) as u32).min(h.saturating_sub(1));
-        (x, y, (y * w + x) as usize)
-    };
-    let (x, y, index) = pixel(&drawn);
+    let along = |at: f32, size: u32| ((at * size as f32) as u32).min(size.saturating_sub(1));
+    let x = along(cursor.at.x, drawn.picture.width);
+    let y = along(cursor.at.y, drawn.picture.height);
+    let index = (y * drawn.picture.width + x) as usize;
     let Some(&value) = drawn.picture.pixels.get(index) else {
         return;
     };
     let mut text = egui::text::LayoutJob::default();
     let mut part = |label: &str, value: &str| {
         let font = |color| egui::TextFormat::simple(FontId::monospace(11.5), color);
-        text.append(
-            label,
-            if label.is_empty() { 0.0 } else { 12.0 },
-            font(tokens.weak),
-        );
+        let space = if label.is_empty() { 0.0 } else { 12.0 };
+        text.append(label, space, font(tokens.weak));
         text.append(value, 4.0, font(tokens.strong));
     };
     part("", &format!("({x}, {y})"));
-    part(
-        cursor.over.name(),
-        &match cursor.over.shading() == Shading::Positive && value.x < 0.0 {
-            true => "not known".to_owned(),
-            false => format!(
-                "{} {}",
-                triple(value),
-                cursor.over.unit(app.radiance_unit())
-            ),
-        },
-    );
-    if cursor.over.shading() == Shading::Radiance {
-        let shown = (value * app.look.exposure.exp2())
-            .to_array()
-            .map(linear_to_srgb);
-        part(
-            "sRGB",
-            &shown
-                .map(|v| ((v * 255.0 + 0.5) as u8).to_string())
-                .join(" "),
-        );
-    } else if cursor.over == Quantity::Albedo {
-        let shown = value.to_array().map(linear_to_srgb);
-        part(
-            "sRGB",
-            &shown
-                .map(|v| ((v * 255.0 + 0.5) as u8).to_string())
-                .join(" "),
-        );
+    let unit = quantity.unit(document.radiance_unit());
+    match quantity.shading() == Shading::Positive && value.x < 0.0 {
+        true => part(quantity.name(), "not known"),
+        false => part(quantity.name(), &format!("{} {unit}", triple(value))),
     }
-    let object = drawn
-        .objects
-        .as_ref()
-        .and_then(|objects| objects.get(index))
-        .map(|&object| object as usize);
-    let named = object.and_then(|index| {
-        let name = &app.capture()?.scene.objects.get(index)?.name;
-        Some((name, app.estimate.objects.get(index)?))
+    let shown = match quantity.shading() {
+        Shading::Radiance => Some(value * view.look.exposure.exp2()),
+        Shading::Reflectance => Some(value),
+        _ => None,
+    };
+    if let Some(shown) = shown {
+        let srgb = shown.to_array().map(linear_to_srgb);
+        let bytes = srgb.map(|v| ((v * 255.0 + 0.5) as u8).to_string());
+        part("sRGB", &bytes.join(" "));
+    }
+    let objects = drawn.objects.as_ref();
+    let object = objects.and_then(|objects| objects.get(index));
+    let named = object.and_then(|&object| {
+        let object = object as usize;
+        let name = &document.capture()?.scene.objects.get(object)?.name;
+        Some((name, document.estimate.objects.get(object)?))
     });
     if let Some((name, estimate)) = named {
         part("object", name);
-        let error = (estimate.albedo_stderr.element_sum()) / 3.0;
-        part(
-            "albedo",
-            &format!("{} ± {}", triple(estimate.albedo), number(error)),
-        );
+        let error = number(estimate.albedo_stderr.element_sum() / 3.0);
+        part("albedo", &format!("{} ± {error}", triple(estimate.albedo)));
         if estimate.emission != Vec3::ZERO {
             part("emission", &triple(estimate.emission));
         }
@@ -169,26 +121,5 @@ pub fn legend(ui: &Ui, pane: Rect, drawn: &Drawn) {
             font.clone(),
             Color32::WHITE,
         );
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_short_and_keep_their_size() {
-        for (value, text) in [
-            (0.0, "0"),
-            (0.12345, "0.123"),
-            (0.02344, "0.0234"),
-            (-3.456, "-3.46"),
-            (1234.5, "1234"),
-            (1e-5, "1.0e-5"),
-            (2.5e7, "2.5e7"),
-        ] {
-            assert_eq!(number(value), text);
-        }
-        assert_eq!(number(f32::NAN), "NaN");
     }
 }

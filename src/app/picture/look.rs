@@ -81,6 +81,14 @@ impl Default for Look {
 const MAX_ZOOM: f32 = 512.0;
 
 impl Look {
+    /// The picture that a pane shows now: the photograph in place of any other while that is held.
+    pub fn held(&self, quantity: Quantity) -> Quantity {
+        match self.photograph {
+            true => Quantity::Photograph,
+            false => quantity,
+        }
+    }
+
     /// Shows whole pictures.
     pub fn fit(&mut self) {
         self.center = Pos2::new(0.5, 0.5);

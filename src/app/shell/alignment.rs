@@ -1,27 +1,24 @@
 //! What the window offers where photographs do not show the mesh from their poses.
 
-use crate::app::state::App;
+use crate::app::document::Document;
+use crate::app::request::{Request, Requests};
 use crate::capture::reading::Reading;
 use crate::session::command::Command;
 use crate::session::snapshot::Phase;
 use egui::{Align2, Context, Window};
 
 /// Shows, as long as the solve has not begun, that the capture is read wrongly and how to read it.
-pub fn show(app: &mut App, ctx: &Context) {
-    let Some(capture) = app.capture().cloned() else {
+pub fn show(ctx: &Context, document: &Document, requests: &mut Requests) {
+    let snapshot = &document.snapshot;
+    let waits = snapshot.phase == Phase::Paused && snapshot.progress.iterations == 0;
+    let Some(capture) = document.capture().filter(|_| waits) else {
         return;
     };
-    let waits = app.snapshot.phase == Phase::Paused && app.snapshot.progress.iterations == 0;
-    let Some(reading) = capture.other_reading().filter(|_| waits) else {
+    let alignment = capture.alignment.as_ref();
+    let error = alignment.and_then(|a| a.error(&capture.name, &capture.options.reading));
+    let Some((reading, error)) = capture.other_reading().zip(error) else {
         return;
     };
-    let Some(error) = (capture.alignment.as_ref())
-        .and_then(|alignment| alignment.error(&capture.name, &capture.options.reading))
-    else {
-        return;
-    };
-    let mut options = None;
-    let mut as_it_is = false;
     Window::new("The photographs do not fit the mesh")
         .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
         .collapsible(false)
@@ -31,21 +28,17 @@ pub fn show(app: &mut App, ctx: &Context) {
             ui.label(&error.problem);
             ui.add_space(8.0);
             ui.horizontal_wrapped(|ui| {
-                if ui.button(button(&reading)).clicked() {
-                    options = Some(crate::session::command::OpenOptions {
-                        reading,
-                        ..capture.options.clone()
-                    });
+                let reread = ui.button(button(&reading)).clicked();
+                if reread {
+                    let mut options = capture.options.clone();
+                    options.reading = reading;
+                    requests.ask(Request::Send(Command::Reframe(Box::new(options))));
                 }
-                as_it_is = ui.button("Solve as it is").clicked();
+                if ui.button("Solve as it is").clicked() || reread {
+                    requests.ask(Request::Send(Command::Run));
+                }
             });
         });
-    if let Some(options) = options {
-        app.send(Command::Reframe(Box::new(options)));
-        app.send(Command::Run);
-    } else if as_it_is {
-        app.send(Command::Run);
-    }
 }
 
 /// What the button that reads the capture so says.

@@ -1,7 +1,6 @@
 //! The window of keys and mouse.
 
 use crate::app::action::{Action, Menu};
-use crate::app::state::App;
 use egui::{Grid, ScrollArea, Window};
 
 /// What the mouse does: where, how, what.
@@ -32,10 +31,9 @@ const MOUSE: [(&str, &str); 14] = [
 ];
 
 /// Draws the window while it is open.
-pub fn show(ctx: &egui::Context, app: &mut App) {
-    let mut open = app.keys;
+pub fn show(ctx: &egui::Context, open: &mut bool) {
     Window::new("Keys and mouse")
-        .open(&mut open)
+        .open(open)
         .collapsible(false)
         .resizable(false)
         .anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0])
@@ -72,5 +70,4 @@ pub fn show(ctx: &egui::Context, app: &mut App) {
                         });
                 });
         });
-    app.keys = open;
 }

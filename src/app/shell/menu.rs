@@ -2,20 +2,25 @@
 
 use crate::app::action::{Action, Menu};
 use crate::app::layout::{self, Pane, Workspace};
-use crate::app::state::App;
+use crate::app::request::Requests;
 use egui::{Button, Ui};
 use egui_tiles::Tree;
 
-/// Draws the menu bar.
-pub fn bar(ui: &mut Ui, app: &mut App, tree: &mut Tree<Pane>) {
+/// Draws the menu bar, with the name of the capture and the workspaces at its end.
+pub fn bar(
+    ui: &mut Ui,
+    capture: Option<&str>,
+    workspace: Workspace,
+    tree: &mut Tree<Pane>,
+    requests: &mut Requests,
+) {
     egui::MenuBar::new().ui(ui, |ui| {
         for menu in Menu::ALL {
             ui.menu_button(menu.title(), |ui| {
                 ui.set_min_width(220.0);
-                let ctx = ui.ctx().clone();
                 for &action in Action::ALL.iter().filter(|a| a.menu() == menu) {
-                    if item(ui, app, action) {
-                        app.perform(action, &ctx);
+                    let button = Button::new(action.text()).shortcut_text(action.keys(ui.ctx()));
+                    if requests.button(ui, action, button).clicked() {
                         ui.close();
                     }
                 }
@@ -26,30 +31,21 @@ pub fn bar(ui: &mut Ui, app: &mut App, tree: &mut Tree<Pane>) {
             });
         }
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            for (workspace, action) in [
+            for (shown, action) in [
                 (Workspace::Inspect, Action::Inspect),
                 (Workspace::Compose, Action::Compose),
             ] {
-                let shown = app.preferences.workspace == workspace;
-                let tab = ui.selectable_label(shown, action.text());
+                let tab = ui.selectable_label(workspace == shown, action.text());
                 if tab.on_hover_text(action.help()).clicked() {
-                    app.perform(action, &ui.ctx().clone());
+                    requests.ask(action);
                 }
             }
             ui.separator();
-            if let Some(capture) = app.capture() {
-                ui.weak(&capture.name);
+            if let Some(name) = capture {
+                ui.weak(name);
             }
         });
     });
-}
-
-/// One item; true when it is chosen.
-fn item(ui: &mut Ui, app: &App, action: Action) -> bool {
-    let button = Button::new(action.text()).shortcut_text(action.keys(ui.ctx()));
-    ui.add_enabled(app.can(action), button)
-        .on_hover_text(action.help())
-        .clicked()
 }
 
 /// A tick for each pane, to open and close it.
@@ -57,10 +53,9 @@ fn panes(ui: &mut Ui, tree: &mut Tree<Pane>) {
     for pane in Pane::all() {
         let mut open = layout::is_open(tree, pane);
         if ui.checkbox(&mut open, pane.title()).clicked() {
-            if open {
-                layout::show(tree, pane);
-            } else {
-                layout::close(tree, pane);
+            match open {
+                true => layout::show(tree, pane),
+                false => layout::close(tree, pane),
             }
         }
     }

@@ -1,8 +1,9 @@
 //! The command palette: any action by a few letters of its name.
 
 use crate::app::action::Action;
-use crate::app::state::App;
-use egui::{Align, Button, Id, Key, Modal, Modifiers, ScrollArea, TextEdit};
+use crate::app::controls::named;
+use crate::app::request::Requests;
+use egui::{Align, Button, Id, Key, Modal, Modifiers, Role, ScrollArea, TextEdit};
 
 /// What is typed, and which of the matches is marked.
 #[derive(Debug, Clone, Default)]
@@ -32,8 +33,8 @@ pub fn matches(query: &str) -> Vec<Action> {
 }
 
 /// Draws the palette while it is open.
-pub fn show(ctx: &egui::Context, app: &mut App) {
-    let Some(mut palette) = app.palette.take() else {
+pub fn show(ctx: &egui::Context, open: &mut Option<Palette>, requests: &mut Requests) {
+    let Some(mut palette) = open.take() else {
         return;
     };
     let found = matches(&palette.query);
@@ -54,8 +55,7 @@ pub fn show(ctx: &egui::Context, app: &mut App) {
         let field = TextEdit::singleline(&mut palette.query)
             .hint_text("Type a command")
             .desired_width(f32::INFINITY);
-        let response = ui.add(field);
-        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Command"));
+        let response = named(ui.add(field), Role::TextInput, "Command");
         if response.changed() {
             palette.marked = 0;
         }
@@ -68,7 +68,7 @@ pub fn show(ctx: &egui::Context, app: &mut App) {
                     for (index, &action) in found.iter().enumerate() {
                         let button = Button::selectable(index == palette.marked, action.text())
                             .right_text(egui::RichText::new(action.keys(ctx)).weak());
-                        let response = ui.add_enabled(app.can(action), button);
+                        let response = ui.add_enabled(requests.can(action), button);
                         if index == palette.marked && (up || down) {
                             response.scroll_to_me(None);
                         }
@@ -80,9 +80,9 @@ pub fn show(ctx: &egui::Context, app: &mut App) {
             });
     });
     if let Some(action) = chosen {
-        app.perform(action, ctx);
+        requests.ask(action);
     } else if !modal.should_close() {
-        app.palette = Some(palette);
+        *open = Some(palette);
     }
 }
 

@@ -1,12 +1,14 @@
 //! Sessions that are kept: the line that says which one is gone on with, and the list of all.
 
 use crate::app::action::Action;
+use crate::app::controls::named;
+use crate::app::document::Document;
+use crate::app::request::{Request, Requests};
 use crate::app::shell::status::ending;
-use crate::app::state::App;
 use crate::app::theme;
 use crate::session::command::Command;
 use crate::session::keep::{Kept, State, THUMBNAIL};
-use egui::{Button, Image, Role, ScrollArea, TextureHandle, TextureOptions, Ui, WidgetInfo, vec2};
+use egui::{Button, Image, Role, ScrollArea, TextureHandle, TextureOptions, Ui, vec2};
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
@@ -24,54 +26,49 @@ pub struct Sessions {
     pictures: HashMap<PathBuf, (SystemTime, Option<TextureHandle>)>,
 }
 
-/// Whether there is a line to draw.
-pub fn has_line(app: &App) -> bool {
-    app.snapshot.continued.is_some() && !app.sessions.closed && !app.shows_start_page()
-}
-
 /// Draws the line that says which session is gone on with.
-pub fn line(ui: &mut Ui, app: &mut App) {
-    let name = app.snapshot.continued.clone().unwrap_or_default();
+pub fn line(ui: &mut Ui, name: &str, sessions: &mut Sessions, requests: &mut Requests) {
     ui.horizontal(|ui| {
         ui.label(format!(
             "This goes on with {name}, with its changes and objects."
         ));
-        let over = ui.button(Action::StartOver.text());
-        if over.on_hover_text(Action::StartOver.help()).clicked() {
-            app.perform(Action::StartOver, &ui.ctx().clone());
-        }
+        let over = Button::new(Action::StartOver.text());
+        requests.button(ui, Action::StartOver, over);
         let close = ui.button("Hide").on_hover_text("Hides this line");
-        app.sessions.closed |= close.clicked();
+        sessions.closed |= close.clicked();
     });
 }
 
 /// Draws the sheet of all sessions; true when it is to close.
-pub fn sheet(ui: &mut Ui, app: &mut App) -> bool {
+pub fn sheet(
+    ui: &mut Ui,
+    document: &Document,
+    sessions: &mut Sessions,
+    requests: &mut Requests,
+) -> bool {
     ui.heading("Sessions");
-    let chosen = list(ui, app, usize::MAX);
+    let chosen = list(ui, &document.snapshot.kept, sessions, requests);
     chosen || ui.button("Cancel").clicked()
 }
 
-/// Draws the newest sessions, at most so many; true when one is chosen.
-pub fn list(ui: &mut Ui, app: &mut App, most: usize) -> bool {
-    let kept = app.snapshot.kept.clone();
+/// Draws sessions; true when one is chosen.
+pub fn list(ui: &mut Ui, kept: &[Kept], sessions: &mut Sessions, requests: &mut Requests) -> bool {
     if kept.is_empty() {
         ui.weak("None is kept yet");
         return false;
     }
     let mut chosen = false;
     ScrollArea::vertical().max_height(420.0).show(ui, |ui| {
-        for session in kept.iter().take(most) {
-            ui.horizontal(|ui| chosen |= row(ui, app, session));
+        for session in kept {
+            ui.horizontal(|ui| chosen |= row(ui, sessions, session, requests));
         }
     });
     chosen
 }
 
-fn row(ui: &mut Ui, app: &mut App, session: &Kept) -> bool {
-    let picture = app.sessions.picture(ui, session);
+fn row(ui: &mut Ui, sessions: &mut Sessions, session: &Kept, requests: &mut Requests) -> bool {
     let place = vec2(HEIGHT * 1.5, HEIGHT);
-    match picture {
+    match sessions.picture(ui, session) {
         Some(texture) => ui.add(Image::new(&texture).fit_to_exact_size(place)),
         None => ui.allocate_response(place, egui::Sense::hover()),
     };
@@ -82,27 +79,21 @@ fn row(ui: &mut Ui, app: &mut App, session: &Kept) -> bool {
     };
     let text = format!("{}\n{state}, {}", session.name, age(session.saved));
     let open = ui.add(Button::new(text).min_size(vec2(220.0, HEIGHT)));
-    open.widget_info(|| {
-        WidgetInfo::labeled(Role::Button, true, format!("Go on with {}", session.name))
-    });
-    let chosen = open
-        .on_hover_text("Goes on with this session; the open one is kept")
-        .clicked();
+    let open = named(open, Role::Button, &format!("Go on with {}", session.name));
+    let help = "Goes on with this session; the open one is kept";
+    let chosen = open.on_hover_text(help).clicked();
     if chosen {
-        app.start_page = false;
-        app.send(Command::Resume(session.folder.clone()));
+        requests.ask(Request::Resume(session.folder.clone()));
     }
-    let doomed = app.sessions.doomed.as_ref() == Some(&session.folder);
+    let doomed = sessions.doomed.as_ref() == Some(&session.folder);
     let text = if doomed { "For good?" } else { "Remove" };
     let remove = ui.add(Button::new(text).small());
-    remove.widget_info(|| {
-        WidgetInfo::labeled(Role::Button, true, format!("{text} {}", session.name))
-    });
+    let remove = named(remove, Role::Button, &format!("{text} {}", session.name));
     if remove.clicked() && doomed {
-        app.sessions.doomed = None;
-        app.send(Command::Remove(session.folder.clone()));
+        sessions.doomed = None;
+        requests.ask(Request::Send(Command::Remove(session.folder.clone())));
     } else if remove.clicked() {
-        app.sessions.doomed = Some(session.folder.clone());
+        sessions.doomed = Some(session.folder.clone());
     }
     chosen
 }

@@ -1,8 +1,10 @@
 //! The status bar: what the worker does, how fast, how long still, and with how much memory.
 
-use crate::app::picture::inspect::number;
+use crate::app::batch::Batch;
+use crate::app::document::Document;
+use crate::app::number::number;
+use crate::app::request::Requests;
 use crate::app::shell::photographs;
-use crate::app::state::App;
 use crate::app::theme;
 use crate::inverse::solver::Termination;
 use crate::session::snapshot::Phase;
@@ -48,14 +50,14 @@ impl Memory {
 }
 
 /// Word of a phase.
-pub fn phase_word(phase: &Phase) -> String {
+fn phase_word(phase: &Phase) -> &'static str {
     match phase {
-        Phase::Idle => "Idle".to_owned(),
-        Phase::Loading => "Loading".to_owned(),
-        Phase::Solving => "Solving".to_owned(),
-        Phase::Paused => "Paused".to_owned(),
-        Phase::Finished(why) => ending(*why).to_owned(),
-        Phase::Failed => "Failed".to_owned(),
+        Phase::Idle => "Idle",
+        Phase::Loading => "Loading",
+        Phase::Solving => "Solving",
+        Phase::Paused => "Paused",
+        Phase::Finished(why) => ending(*why),
+        Phase::Failed => "Failed",
     }
 }
 
@@ -72,10 +74,16 @@ pub fn ending(why: Termination) -> &'static str {
 }
 
 /// Draws the bar.
-pub fn bar(ui: &mut Ui, app: &mut App) {
+pub fn bar(
+    ui: &mut Ui,
+    document: &Document,
+    batch: Option<&Batch>,
+    memory: &mut Memory,
+    requests: &mut Requests,
+) {
     let tokens = theme::tokens(ui);
-    let bytes = app.memory.bytes();
-    let snapshot = app.snapshot.clone();
+    let bytes = memory.bytes();
+    let snapshot = &document.snapshot;
     let color = match snapshot.phase {
         Phase::Solving | Phase::Loading => tokens.accent,
         Phase::Finished(Termination::Cancelled) => tokens.weak,
@@ -85,31 +93,24 @@ pub fn bar(ui: &mut Ui, app: &mut App) {
         Phase::Paused | Phase::Idle => tokens.weak,
     };
     ui.horizontal_centered(|ui| {
-        ui.label(
-            RichText::new(phase_word(&snapshot.phase))
-                .color(color)
-                .strong(),
-        );
+        let phase = RichText::new(phase_word(&snapshot.phase));
+        ui.label(phase.color(color).strong());
         let progress = &snapshot.progress;
-        if app.is_running() {
+        if document.is_running() {
             if let Some(fraction) = progress.fraction {
-                ui.add(
-                    ProgressBar::new(fraction)
-                        .desired_width(90.0)
-                        .desired_height(8.0),
-                );
+                let bar = ProgressBar::new(fraction).desired_width(90.0);
+                ui.add(bar.desired_height(8.0));
             }
             ui.label(&progress.phase);
         }
         if let Some(stage) = progress.stages.last() {
             ui.separator();
-            ui.label(format!(
-                "after stage {}: {}",
-                progress.stages.len(),
-                stage.name
-            ));
+            let count = progress.stages.len();
+            ui.label(format!("after stage {count}: {}", stage.name));
         }
-        photographs::progress(ui, app);
+        if let Some(batch) = batch {
+            photographs::progress(ui, batch, requests);
+        }
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             ui.label(format!("{} MB", bytes / 1_000_000))
                 .on_hover_text("Memory in use");
@@ -123,10 +124,8 @@ pub fn bar(ui: &mut Ui, app: &mut App) {
             ui.separator();
             ui.label(format!("{} rays/s", magnitude(snapshot.rays_per_second)));
             ui.separator();
-            ui.label(format!(
-                "{} iterations/s",
-                number(snapshot.iterations_per_second as f32)
-            ));
+            let rate = number(snapshot.iterations_per_second as f32);
+            ui.label(format!("{rate} iterations/s"));
             ui.separator();
             ui.label(format!("iteration {}", progress.iterations));
         });
@@ -135,21 +134,21 @@ pub fn bar(ui: &mut Ui, app: &mut App) {
 
 /// Seconds as people read them.
 fn duration(seconds: f64) -> String {
-    let whole = seconds.max(0.0);
-    if whole < 60.0 {
-        format!("{whole:.1} s")
-    } else if whole < 3600.0 {
-        format!(
-            "{:.0} min {:02.0} s",
-            (whole / 60.0).floor(),
-            (whole % 60.0).floor()
+    let seconds = seconds.max(0.0);
+    let parts = |unit: f64| {
+        (
+            (seconds / unit).floor(),
+            (seconds % unit * 60.0 / unit).floor(),
         )
+    };
+    if seconds < 60.0 {
+        format!("{seconds:.1} s")
+    } else if seconds < 3600.0 {
+        let (minutes, seconds) = parts(60.0);
+        format!("{minutes} min {seconds:02} s")
     } else {
-        format!(
-            "{:.0} h {:02.0} min",
-            (whole / 3600.0).floor(),
-            (whole % 3600.0 / 60.0).floor()
-        )
+        let (hours, minutes) = parts(3600.0);
+        format!("{hours} h {minutes:02} min")
     }
 }
 

@@ -1,11 +1,17 @@
 //! The strip of photographs.
 
-use crate::app::state::{App, Shown};
+use crate::app::controls::named;
+use crate::app::document::Document;
+use crate::app::request::{Request, Requests};
+use crate::app::shown::Shown;
 use crate::app::theme;
 use crate::capture::photograph::Photograph;
 use crate::math::color::to_srgb8;
 use crate::session::snapshot::OpenCapture;
-use egui::{ColorImage, ScrollArea, Sense, TextureHandle, TextureOptions, Ui, vec2};
+use egui::{
+    Color32, ColorImage, Image, Role, ScrollArea, Sense, StrokeKind, TextureHandle, TextureOptions,
+    Ui, vec2,
+};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -48,62 +54,55 @@ fn small(photograph: &Photograph, exposure: f32) -> ColorImage {
 }
 
 /// Draws the strip.
-pub fn strip(ui: &mut Ui, app: &mut App) {
-    let Some(capture) = app.capture().cloned() else {
+pub fn strip(
+    ui: &mut Ui,
+    document: &Document,
+    shown: &Shown,
+    exposure: f32,
+    thumbnails: &mut Thumbnails,
+    requests: &mut Requests,
+) {
+    let Some(capture) = document.capture() else {
         return;
     };
-    let new = !matches!(&app.thumbnails.capture, Some(known) if Arc::ptr_eq(known, &capture));
-    if new {
-        app.thumbnails = Thumbnails {
+    if !matches!(&thumbnails.capture, Some(known) if Arc::ptr_eq(known, capture)) {
+        *thumbnails = Thumbnails {
             capture: Some(capture.clone()),
-            exposure: app.look.exposure.exp2(),
+            exposure: exposure.exp2(),
             ..Thumbnails::default()
         };
     }
     let tokens = theme::tokens(ui);
-    let mut chosen = None;
     ScrollArea::horizontal().auto_shrink(false).show(ui, |ui| {
         ui.horizontal(|ui| {
             for (frame, photograph) in capture.photographs.iter().enumerate() {
                 let aspect = photograph.width as f32 / photograph.height.max(1) as f32;
                 let size = vec2(theme::THUMBNAIL * aspect, theme::THUMBNAIL);
                 let (rect, response) = ui.allocate_exact_size(size, Sense::click());
-                response.widget_info(|| {
-                    egui::WidgetInfo::labeled(
-                        egui::Role::Button,
-                        true,
-                        format!("Photograph {}", frame + 1),
-                    )
-                });
-                let current = frame == app.frame && matches!(app.shown, Shown::Frame);
-                if current && app.thumbnails.followed != frame {
+                let name = format!("Photograph {}", frame + 1);
+                let response = named(response, Role::Button, &name);
+                let current = shown.photograph() == Some(frame);
+                if current && thumbnails.followed != frame {
                     response.scroll_to_me(None);
-                    app.thumbnails.followed = frame;
+                    thumbnails.followed = frame;
                 }
                 if ui.is_rect_visible(rect) {
-                    let texture = app.thumbnails.texture(ui, frame, photograph);
-                    egui::Image::new(&texture).paint_at(ui, rect);
-                    let color = if current {
-                        tokens.accent
-                    } else if response.hovered() {
-                        tokens.strong
-                    } else {
-                        egui::Color32::TRANSPARENT
+                    let texture = thumbnails.texture(ui, frame, photograph);
+                    Image::new(&texture).paint_at(ui, rect);
+                    let color = match (current, response.hovered()) {
+                        (true, _) => tokens.accent,
+                        (false, true) => tokens.strong,
+                        (false, false) => Color32::TRANSPARENT,
                     };
-                    ui.painter()
-                        .rect_stroke(rect, 0.0, (2.0, color), egui::StrokeKind::Inside);
+                    let (stroke, inside) = ((2.0, color), StrokeKind::Inside);
+                    ui.painter().rect_stroke(rect, 0.0, stroke, inside);
                 }
-                if response
-                    .on_hover_text(format!("Photograph {}, in files {frame:03}", frame + 1))
-                    .clicked()
-                {
-                    chosen = Some(frame);
+                let help = format!("{name}, in files {frame:03}");
+                if response.on_hover_text(help).clicked() {
+                    thumbnails.followed = frame;
+                    requests.ask(Request::Show(frame));
                 }
             }
         });
     });
-    if let Some(frame) = chosen {
-        app.thumbnails.followed = frame;
-        app.show_frame(frame);
-    }
 }

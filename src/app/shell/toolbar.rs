@@ -1,100 +1,86 @@
 //! The tool bar: the solver, the photograph, and how pictures are shown.
 
 use crate::app::action::Action;
-use crate::app::picture::look::ToneCurve;
-use crate::app::state::{App, Shown};
+use crate::app::controls::named;
+use crate::app::document::Document;
+use crate::app::picture::look::{Look, ToneCurve};
+use crate::app::request::Requests;
+use crate::app::shown::Shown;
 use crate::app::theme;
-use egui::{Button, ComboBox, Slider, Ui, vec2};
+use egui::{Button, ComboBox, Key, Role, Slider, Ui, vec2};
 
 /// Draws the bar.
-pub fn bar(ui: &mut Ui, app: &mut App) {
+pub fn bar(
+    ui: &mut Ui,
+    document: &Document,
+    shown: &Shown,
+    look: &mut Look,
+    requests: &mut Requests,
+) {
     ui.horizontal_wrapped(|ui| {
-        let run = if app.is_running() { "Pause" } else { "Run" };
-        button(ui, app, Action::RunPause, run, 52.0);
-        button(ui, app, Action::Step, "Step", 0.0);
-        button(ui, app, Action::Finish, "Finish", 0.0);
-        button(ui, app, Action::Reset, "Reset", 0.0);
-        ui.separator();
-        button(ui, app, Action::PreviousFrame, "‹", 22.0);
-        let frames = app.frames();
-        let text = match app.shown {
-            Shown::Free(..) => "3D view".to_owned(),
-            Shown::Frame if frames == 0 => "no photograph".to_owned(),
-            Shown::Frame => format!("photograph {} of {frames}", app.frame + 1),
+        let run = match document.is_running() {
+            true => "Pause",
+            false => "Run",
         };
-        ui.allocate_ui_with_layout(
-            vec2(132.0, theme::ROW),
-            egui::Layout::centered_and_justified(egui::Direction::LeftToRight),
-            |ui| ui.label(text),
-        );
-        button(ui, app, Action::NextFrame, "›", 22.0);
+        button(ui, requests, Action::RunPause, run, 52.0);
+        button(ui, requests, Action::Step, "Step", 0.0);
+        button(ui, requests, Action::Finish, "Finish", 0.0);
+        button(ui, requests, Action::Reset, "Reset", 0.0);
         ui.separator();
-        exposure(ui, app);
+        button(ui, requests, Action::PreviousFrame, "‹", 22.0);
+        let text = match (shown.photograph(), document.frames()) {
+            (None, _) => "3D view".to_owned(),
+            (_, 0) => "no photograph".to_owned(),
+            (Some(frame), frames) => format!("photograph {} of {frames}", frame + 1),
+        };
+        let centered = egui::Layout::centered_and_justified(egui::Direction::LeftToRight);
+        let size = vec2(132.0, theme::ROW);
+        ui.allocate_ui_with_layout(size, centered, |ui| ui.label(text));
+        button(ui, requests, Action::NextFrame, "›", 22.0);
         ui.separator();
-        button(ui, app, Action::FitPictures, "Fit", 0.0);
-        let hold = ui
-            .add(Button::new("Hold: photograph").sense(egui::Sense::drag()))
-            .on_hover_text(
-                "While the button or the key P is down all pictures show the photograph",
-            );
+        exposure(ui, look, requests);
+        ui.separator();
+        button(ui, requests, Action::FitPictures, "Fit", 0.0);
+        let hold = Button::new("Hold: photograph").sense(egui::Sense::drag());
+        let help = "While the button or the key P is down all pictures show the photograph";
+        let hold = ui.add(hold).on_hover_text(help);
         let key = !ui.ctx().text_edit_focused()
-            && ui.input(|input| input.key_down(egui::Key::P) && !input.modifiers.command);
-        app.look.photograph = hold.is_pointer_button_down_on() || key;
-        let free = matches!(app.shown, Shown::Free(..));
-        let response = ui
-            .add_enabled(
-                app.can(Action::RenderFromHere),
-                Button::new("From 3D view").selected(free),
-            )
-            .on_hover_text(Action::RenderFromHere.help());
-        if response.clicked() {
-            app.perform(Action::RenderFromHere, &ui.ctx().clone());
-        }
+            && ui.input(|input| input.key_down(Key::P) && !input.modifiers.command);
+        look.photograph = hold.is_pointer_button_down_on() || key;
+        let from_here = Button::new("From 3D view").selected(shown.free.is_some());
+        requests.button(ui, Action::RenderFromHere, from_here);
     });
 }
 
 /// A button for an action, named for people who cannot see its glyph.
-fn button(ui: &mut Ui, app: &mut App, action: Action, text: &str, width: f32) {
-    let ctx = ui.ctx().clone();
-    let keys = action.keys(&ctx);
-    let help = if keys.is_empty() {
-        action.help().to_owned()
-    } else {
-        format!("{} ({keys})", action.help())
+fn button(ui: &mut Ui, requests: &mut Requests, action: Action, text: &str, width: f32) {
+    let keys = action.keys(ui.ctx());
+    let help = match keys.is_empty() {
+        true => action.help().to_owned(),
+        false => format!("{} ({keys})", action.help()),
     };
-    let response = ui.add_enabled(
-        app.can(action),
-        Button::new(text).min_size(vec2(width, theme::ROW)),
-    );
+    let button = Button::new(text).min_size(vec2(width, theme::ROW));
+    let response = requests.button_with_help(ui, action, button, &help);
     if !text.is_ascii() {
-        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, action.text()));
-    }
-    if response.on_hover_text(help).clicked() {
-        app.perform(action, &ctx);
+        named(response, Role::Button, action.text());
     }
 }
 
-fn exposure(ui: &mut Ui, app: &mut App) {
+fn exposure(ui: &mut Ui, look: &mut Look, requests: &mut Requests) {
     let label = ui
         .label("Exposure")
         .on_hover_text("Stops: radiance is multiplied by 2 to this power");
-    ui.add(
-        Slider::new(&mut app.look.exposure, -12.0..=12.0)
-            .step_by(0.05)
-            .fixed_decimals(2)
-            .suffix(" EV"),
-    )
-    .labelled_by(label.id);
-    button(ui, app, Action::AutoExposure, "Auto", 0.0);
-    let response = ComboBox::from_id_salt("tone curve")
-        .selected_text(app.look.tone.name())
+    let slider = Slider::new(&mut look.exposure, -12.0..=12.0).step_by(0.05);
+    ui.add(slider.fixed_decimals(2).suffix(" EV"))
+        .labelled_by(label.id);
+    button(ui, requests, Action::AutoExposure, "Auto", 0.0);
+    let choices = ComboBox::from_id_salt("tone curve")
+        .selected_text(look.tone.name())
         .width(104.0)
         .show_ui(ui, |ui| {
             for tone in ToneCurve::ALL {
-                ui.selectable_value(&mut app.look.tone, tone, tone.name());
+                ui.selectable_value(&mut look.tone, tone, tone.name());
             }
-        })
-        .response;
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ComboBox, true, "Tone curve"));
-    app.preferences.tone = app.look.tone;
+        });
+    named(choices.response, Role::ComboBox, "Tone curve");
 }

@@ -1,10 +1,7 @@
 //! Choosing where on the curve to stop.
 
-use crate::app::state::App;
 use crate::app::trade::Vertical;
 use crate::inverse::settings::{PARAMETERS, Settings};
-use crate::session::command::Command;
-use crate::session::snapshot::Level;
 use crate::study::trade::{Curve, Point, Trade};
 
 /// Claimed errors in percent that are offered.
@@ -112,33 +109,8 @@ fn round_up(value: f64) -> f64 {
     back((scaled - 1e-9).ceil(), unit)
 }
 
-impl App {
-    /// Takes over a curve's parameters, as far as they differ from the defaults, and stops where it was chosen.
-    pub fn choose_stop(&mut self, curve: usize, stop: Stop) {
-        let Some(trade) = self.trade.trade.clone() else {
-            return;
-        };
-        let Some(curve) = trade.curves.get(curve) else {
-            return;
-        };
-        let before = self.settings.preset;
-        let mut settings = taken_over(&self.settings, &curve.settings);
-        match stop {
-            Stop::Error(percent) => (settings.target_error, settings.time) = (percent, 0.0),
-            Stop::Seconds(seconds) => (settings.target_error, settings.time) = (0.0, seconds),
-        }
-        let mut message = format!("{} with {}", stop.words(), curve.name);
-        if settings.preset != before && !self.snapshot.progress.phase.is_empty() {
-            message += ": the preset is changed, which takes effect at the next reset";
-        }
-        self.notices.say(Level::Info, message);
-        self.settings = settings.clone();
-        self.send(Command::Set(Box::new(settings)));
-    }
-}
-
 /// `settings` with the preset of `other` and every parameter in which it differs from the defaults; the seed stays.
-fn taken_over(settings: &Settings, other: &Settings) -> Settings {
+pub fn taken_over(settings: &Settings, other: &Settings) -> Settings {
     let defaults = Settings::default();
     let mut taken = Settings {
         preset: other.preset,

@@ -13,35 +13,21 @@ use crate::session::save::{CHECKPOINT, ESTIMATE};
 use crate::session::snapshot::Level;
 use std::path::{Path, PathBuf};
 
-/// A scan being imported; it ends with what was found and guessed.
-pub struct Importing {
-    out: PathBuf,
-    task: Task<(), Vec<String>>,
-}
-
-impl Importing {
-    /// What it is at, in words.
-    pub fn doing(&self) -> String {
-        self.task.doing()
-    }
-}
-
 impl App {
     /// Opens what lies at a path.
     pub fn open_path(&mut self, path: &Path, ctx: &egui::Context) {
-        self.trouble = None;
+        self.view.shell.start.trouble = None;
         let holds = |name: &str| path.join(name).exists();
-        if is_object(path) && self.capture().is_some() {
+        if is_object(path) && self.document.capture().is_some() {
             self.insert(path.to_owned());
-            self.bring_forward = Some(Pane::Insert);
+            self.view.bring_forward(Pane::Insert);
         } else if path.file_name().is_some_and(|name| name == CAMERAS) {
             let folder = path.parent().unwrap_or(Path::new("."));
             self.open(Source::Folder(folder.to_owned()));
         } else if holds(CAMERAS) {
             self.open(Source::Folder(path.to_owned()));
         } else if holds(ESTIMATE) || holds(CHECKPOINT) {
-            self.start_page = false;
-            self.send(Command::Resume(path.to_owned()));
+            self.resume(path.to_owned());
         } else if path.is_dir() {
             self.import(path, ctx);
         } else {
@@ -52,16 +38,8 @@ impl App {
                     "is no capture; choose the folder that holds transforms.json or a scan's files"
                 }
             };
-            self.trouble = Some(format!("{}: {found}", path.display()));
-            self.start_page = true;
-        }
-    }
-
-    /// Opens the folder whose path was typed.
-    pub fn open_typed(&mut self, ctx: &egui::Context) {
-        let path = PathBuf::from(self.path.trim());
-        if !path.as_os_str().is_empty() {
-            self.open_path(&path, ctx);
+            self.view.shell.start.trouble = Some(format!("{}: {found}", path.display()));
+            self.view.shell.start.asked = true;
         }
     }
 
@@ -71,7 +49,7 @@ impl App {
         let out = results.join("capture");
         if out.join(CAMERAS).exists() {
             let said = format!("the scan was imported into {} before", out.display());
-            self.notices.say(Level::Info, said);
+            self.say(Level::Info, said);
             self.open(Source::Folder(out));
             return;
         }
@@ -79,39 +57,40 @@ impl App {
         let (from, into) = (source.to_owned(), out.clone());
         let work = move |course: &Course<()>| import(course, &from, &into);
         match Task::begin("import", move || ctx.request_repaint(), work) {
-            Ok(task) => self.importing = Some(Importing { out, task }),
-            Err(error) => self.trouble = Some(error.to_string()),
+            Ok(task) => self.jobs.importing = Some((out, task)),
+            Err(error) => self.view.shell.start.trouble = Some(error.to_string()),
         }
-        self.start_page = true;
-    }
-
-    /// Ends an import; nothing is written of it.
-    pub fn cancel_import(&mut self) {
-        self.importing = None;
+        self.view.shell.start.asked = true;
     }
 
     /// Opens what was imported.
     pub(in crate::app) fn take_import(&mut self) {
-        let Some(importing) = &mut self.importing else {
+        let Some((out, task)) = &mut self.jobs.importing else {
             return;
         };
-        let Some(end) = importing.task.end() else {
+        let Some(end) = task.end() else {
             return;
         };
-        let out = importing.out.clone();
-        self.importing = None;
+        let out = std::mem::take(out);
+        self.jobs.importing = None;
         match end {
             Ok(said) => {
                 for line in said {
-                    self.notices.say(Level::Info, line);
+                    self.say(Level::Info, line);
                 }
                 self.open(Source::Folder(out));
             }
             Err(why) => {
-                self.trouble = Some(why);
-                self.start_page = true;
+                self.view.shell.start.trouble = Some(why);
+                self.view.shell.start.asked = true;
             }
         }
+    }
+
+    /// Goes on with a session that is kept, or with results.
+    pub(super) fn resume(&mut self, folder: PathBuf) {
+        self.view.shell.start.asked = false;
+        self.send(Command::Resume(folder));
     }
 }
 

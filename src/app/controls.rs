@@ -1,0 +1,54 @@
+//! Controls that several panes share, each with a name for those who do not see it.
+
+use egui::{Button, DragValue, Key, Response, Role, TextEdit, Ui, WidgetInfo};
+use glam::DVec3;
+
+/// A response with a name that is read out.
+pub fn named(response: Response, role: Role, name: &str) -> Response {
+    response.widget_info(|| WidgetInfo::labeled(role, true, name));
+    response
+}
+
+/// A response that is on or off, with a name that is read out.
+pub fn switched(response: Response, role: Role, on: bool, name: &str) -> Response {
+    response.widget_info(|| WidgetInfo::selected(role, true, on, name));
+    response
+}
+
+/// Three numbers for a point of the capture, of which one is dragged by `speed` a point of the screen; true when changed.
+pub fn point(ui: &mut Ui, name: &str, at: &mut DVec3, speed: f64) -> bool {
+    let mut changed = false;
+    for (axis, value) in ["x", "y", "z"].into_iter().zip(at.as_mut()) {
+        let drag = DragValue::new(value).speed(speed).max_decimals(3);
+        let response = ui.add(drag.prefix(format!("{axis} ")));
+        let name = format!("{name} {axis}");
+        changed |= named(response, Role::SpinButton, &name).changed();
+    }
+    changed
+}
+
+/// A field for a path with a label; the field, and whether Enter was pressed in it.
+pub fn path_field(
+    ui: &mut Ui,
+    label: &str,
+    path: &mut String,
+    hint: &str,
+    width: f32,
+) -> (Response, bool) {
+    let label = ui.label(label);
+    let field = TextEdit::singleline(path).hint_text(hint);
+    let response = ui.add(field.desired_width(width)).labelled_by(label.id);
+    let enter = ui.input(|input| input.key_pressed(Key::Enter));
+    let entered = response.lost_focus() && enter;
+    (response, entered)
+}
+
+/// The two buttons at the end of a sheet: whether each was clicked.
+pub fn go_or_cancel(ui: &mut Ui, go: &str, enabled: bool) -> (bool, bool) {
+    ui.horizontal(|ui| {
+        let cancel = ui.button("Cancel").clicked();
+        let go = ui.add_enabled(enabled, Button::new(go)).clicked();
+        (go, cancel)
+    })
+    .inner
+}

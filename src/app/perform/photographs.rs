@@ -1,0 +1,83 @@
+//! Writing photographs in one go.
+
+use crate::app::batch::Batch;
+use crate::app::shell::sheet::Wanted;
+use crate::app::state::App;
+use crate::session::photographs::Photographs;
+use crate::session::snapshot::Level;
+use crate::transport::denoise::Denoiser;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+impl App {
+    /// Whether there is anything to make of photographs: an object to put in, or light to change.
+    pub(super) fn can_write_photographs(&self) -> bool {
+        let document = &self.document;
+        let changed = !document.edits.is_empty() || !document.insertions.visible().is_empty();
+        document.capture().is_some() && self.jobs.batch.is_none() && changed
+    }
+
+    /// Begins to write photographs.
+    pub(super) fn write_photographs(&mut self, wanted: &Wanted, ctx: &egui::Context) {
+        let document = &self.document;
+        let Some(capture) = document.capture().filter(|_| self.can_write_photographs()) else {
+            return;
+        };
+        let (found, edits) = (&document.snapshot.estimate, &document.edits);
+        let frames = match wanted.all {
+            true => (0..document.frames()).collect(),
+            false => vec![self.view.shown.frame],
+        };
+        let work = Photographs {
+            frames,
+            capture: capture.clone(),
+            found: found.clone(),
+            edited: Arc::new(edits.apply(found)),
+            settings: document.snapshot.settings.clone(),
+            placements: document.insertions.visible(),
+            relight: !edits.is_empty(),
+            samples: wanted.samples,
+            denoise: wanted.denoise.then(Denoiser::best),
+            finish: document.insertions.finish,
+        };
+        let folder = PathBuf::from(wanted.folder.trim());
+        let ctx = ctx.clone();
+        match Batch::begin(work, folder, move || ctx.request_repaint()) {
+            Ok(batch) => self.jobs.batch = Some(batch),
+            Err(error) => self.say(Level::Error, error.to_string()),
+        }
+    }
+
+    /// Follows a batch, and says how it ended.
+    pub(in crate::app) fn take_batch(&mut self) {
+        let Some(batch) = &mut self.jobs.batch else {
+            return;
+        };
+        batch.doing = batch.task.newest().or(batch.doing);
+        let Some(end) = batch.task.end() else {
+            return;
+        };
+        let (folder, wanted) = (batch.folder.display().to_string(), batch.wanted);
+        self.jobs.batch = None;
+        let written = match end {
+            Ok(written) => written,
+            Err(message) => return self.say(Level::Error, message),
+        };
+        for warning in written.warnings {
+            self.say(Level::Warning, warning);
+        }
+        let done = written.photographs;
+        let s = if done == 1 { "" } else { "s" };
+        let (level, message) = match done == wanted {
+            true => (
+                Level::Info,
+                format!("{done} photograph{s} written to {folder}"),
+            ),
+            false => (
+                Level::Warning,
+                format!("ended after {done} of {wanted} photographs, written to {folder}"),
+            ),
+        };
+        self.say(level, message);
+    }
+}

@@ -1,0 +1,77 @@
+//! What is shown and how. Nothing of it is saved with the capture or undone.
+
+use crate::app::document::Document;
+use crate::app::insertion::Adding;
+use crate::app::layout::Pane;
+use crate::app::model::view::ModelView;
+use crate::app::panels::objects::ObjectsTable;
+use crate::app::picture::compare::Compare;
+use crate::app::picture::drawn::{Derived, Drawn};
+use crate::app::picture::look::Look;
+use crate::app::picture::needed::Needed;
+use crate::app::picture::quantity::Quantity;
+use crate::app::selection::Selection;
+use crate::app::shell::Shell;
+use crate::app::shown::Shown;
+use crate::app::tool::Tool;
+use crate::app::trade::TradeView;
+
+/// What is shown and how.
+#[derive(Default)]
+pub struct ViewState {
+    /// Whose pictures are shown.
+    pub shown: Shown,
+    /// How pictures are looked at.
+    pub look: Look,
+    /// Which pictures are compared.
+    pub compare: Compare,
+    /// Pictures made of the worker's.
+    pub derived: Derived,
+    /// What the panes of this pass show.
+    pub needed: Needed,
+    /// The selected objects of the scene.
+    pub selection: Selection,
+    /// What a click does.
+    pub tool: Tool,
+    /// The 3D view.
+    pub model: ModelView,
+    /// The panes of words and numbers.
+    pub panels: PanelsView,
+    /// What is around and above the panes.
+    pub shell: Shell,
+    /// What is asked of the layout.
+    pub layout: LayoutRequest,
+}
+
+/// How the panes of words and numbers are shown.
+#[derive(Default)]
+pub struct PanelsView {
+    /// The table of objects.
+    pub objects: ObjectsTable,
+    /// Objects that are being added.
+    pub adding: Adding,
+    /// The plot of the trade.
+    pub trade: TradeView,
+}
+
+/// What is asked of the layout in this pass.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct LayoutRequest {
+    /// A pane to bring to the front.
+    pub front: Option<Pane>,
+    /// Whether to put all panes back where they were at first.
+    pub reset: bool,
+}
+
+impl ViewState {
+    /// A picture of the shown view.
+    pub fn drawn(&self, document: &Document, quantity: Quantity) -> Option<Drawn> {
+        let sized = self.needed.composite;
+        (self.derived).drawn(document, &self.shown, sized, quantity)
+    }
+
+    /// Brings a pane to the front.
+    pub fn bring_forward(&mut self, pane: Pane) {
+        self.layout.front = Some(pane);
+    }
+}

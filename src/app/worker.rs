@@ -1,0 +1,148 @@
+//! The window's end of a session: a way to ask, the newest answer, and what the worker was told last.
+
+use crate::app::document::Document;
+use crate::capture::regroup::Regroup;
+use crate::session::command::{Command, Placement, Regrouping, ViewRequest};
+use crate::session::edits::Edits;
+use crate::session::snapshot::Snapshot;
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// What the window needs of a session. Neither method ever waits.
+pub trait Connection {
+    /// Hands a command to the worker; false where its queue is full, to be tried again.
+    fn send(&self, command: Command) -> bool;
+
+    /// The newest snapshot.
+    fn latest(&self) -> Arc<Snapshot>;
+}
+
+impl Connection for crate::session::Session {
+    fn send(&self, command: Command) -> bool {
+        Self::send(self, command)
+    }
+
+    fn latest(&self) -> Arc<Snapshot> {
+        Self::latest(self)
+    }
+}
+
+/// What tells requests for a view apart: the photograph, moves of the 3D view, and what of the request differs by size
+/// or kind.
+pub type ViewKey = (Option<usize>, u64, u32, u32, bool, bool);
+
+/// What the worker was told last.
+#[derive(Debug)]
+pub struct Sent {
+    /// The view; `None` asks again.
+    pub view: Option<ViewKey>,
+    /// The inserted objects.
+    pub insertions: Vec<Placement>,
+    /// Whether they take blur and grain.
+    pub finish: bool,
+    /// The edits.
+    pub edits: Edits,
+    /// The regroupings.
+    pub regroups: Vec<Regroup>,
+}
+
+/// The worker as the window sees it.
+pub struct Worker {
+    connection: Box<dyn Connection>,
+    pending: VecDeque<Command>,
+    /// What it was told last.
+    pub sent: Sent,
+}
+
+impl Worker {
+    /// The worker behind a connection.
+    pub fn new(connection: Box<dyn Connection>) -> Self {
+        Self {
+            connection,
+            pending: VecDeque::new(),
+            sent: Sent {
+                view: None,
+                insertions: Vec::new(),
+                finish: true,
+                edits: Edits::default(),
+                regroups: Vec::new(),
+            },
+        }
+    }
+
+    /// The newest snapshot.
+    pub fn latest(&self) -> Arc<Snapshot> {
+        self.connection.latest()
+    }
+
+    /// Asks something; kept and tried again while the queue is full.
+    pub fn send(&mut self, command: Command) {
+        self.pending.push_back(command);
+        self.flush();
+    }
+
+    /// Sends what waits; whether all is sent.
+    pub fn flush(&mut self) -> bool {
+        while let Some(command) = self.pending.front() {
+            if !self.connection.send(command.clone()) {
+                return false;
+            }
+            self.pending.pop_front();
+        }
+        true
+    }
+
+    /// Notes that a capture was opened, which comes with all that the document says now.
+    pub fn has(&mut self, document: &Document) {
+        self.sent.view = None;
+        self.sent.insertions = document.insertions.objects.clone();
+        self.sent.edits = document.edits.clone();
+        self.sent.regroups = document.regroups.clone();
+    }
+
+    /// Asks for a view where it differs from the last.
+    pub fn send_view(&mut self, key: ViewKey, request: impl FnOnce() -> ViewRequest) {
+        if self.sent.view != Some(key) && self.connection.send(Command::View(request())) {
+            self.sent.view = Some(key);
+        }
+    }
+
+    /// Sends the inserted objects where they differ.
+    pub fn send_insertions(&mut self, document: &Document) {
+        let finish = document.insertions.finish;
+        if finish != self.sent.finish && self.connection.send(Command::Match(finish)) {
+            self.sent.finish = finish;
+        }
+        let objects = &document.insertions.objects;
+        if *objects != self.sent.insertions
+            && self.connection.send(Command::Insert(objects.clone()))
+        {
+            self.sent.insertions.clone_from(objects);
+        }
+    }
+
+    /// Sends the regroupings where they differ, with the edits that belong to the objects after them.
+    pub fn send_regroups(&mut self, document: &Document) {
+        let changed = document.regroups != self.sent.regroups;
+        let Some(capture) = document.capture().filter(|_| changed) else {
+            return;
+        };
+        let wanted = Regrouping {
+            hash: capture.hash.clone(),
+            changes: document.regroups.clone(),
+            edits: document.edits.clone(),
+        };
+        if self.connection.send(Command::Regroup(Box::new(wanted))) {
+            self.sent.regroups.clone_from(&document.regroups);
+            self.sent.edits = document.edits.clone();
+        }
+    }
+
+    /// Sends the edits where they differ.
+    pub fn send_edits(&mut self, document: &Document) {
+        let edits = &document.edits;
+        if *edits != self.sent.edits && self.connection.send(Command::Edit(edits.clone())) {
+            self.sent.edits = edits.clone();
+        }
+    }
+}
