@@ -125,7 +125,7 @@ fn the_keys_are_documented_as_they_are() {
     for menu in Menu::ALL {
         made += &format!(
             "\n### {}\n\n| keys | command | what it does |\n| --- | --- | --- |\n",
-            menu.title()
+            menu.name()
         );
         for action in Action::ALL.iter().filter(|action| action.menu() == menu) {
             let keys = action.shortcut().map_or_else(String::new, |shortcut| {

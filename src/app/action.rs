@@ -1,10 +1,11 @@
 //! Everything that can be asked of the window, once: menus, palette, shortcuts and the window of keys read this table.
 
+use crate::app::choices::choices;
 use egui::{Key, KeyboardShortcut, Modifiers};
 
-/// One row: variant, text, tooltip, menu, shortcut.
+/// One row: variant, menu, what it needs, text, tooltip, shortcut.
 macro_rules! actions {
-    ($($variant:ident, $menu:ident, $text:literal, $help:literal, $shortcut:expr;)*) => {
+    ($($variant:ident, $menu:ident, $needs:ident, $text:literal, $help:literal, $shortcut:expr;)*) => {
         /// An action of the window.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         pub enum Action { $(#[doc = $help] $variant,)* }
@@ -28,6 +29,11 @@ macro_rules! actions {
                 match self { $(Self::$variant => Menu::$menu,)* }
             }
 
+            /// What must be there.
+            pub fn needs(self) -> Needs {
+                match self { $(Self::$variant => Needs::$needs,)* }
+            }
+
             /// Its keys.
             pub fn shortcut(self) -> Option<KeyboardShortcut> {
                 match self { $(Self::$variant => $shortcut,)* }
@@ -36,45 +42,27 @@ macro_rules! actions {
     };
 }
 
-/// A menu of the menu bar.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Menu {
-    /// Captures and results.
-    File,
-    /// Undo and inserted objects.
-    Edit,
-    /// The solver.
-    Solve,
-    /// Pictures and the 3D view.
-    View,
-    /// Panes and themes.
-    Window,
-    /// Help.
-    Help,
+choices! {
+    /// A menu of the menu bar, from the left.
+    Menu {
+        File, "File", "Captures and results";
+        Edit, "Edit", "Undo and inserted objects";
+        Solve, "Solve", "The solver";
+        View, "View", "Pictures and the 3D view";
+        Window, "Window", "Panes and themes";
+        Help, "Help", "Help";
+    }
 }
 
-impl Menu {
-    /// All menus, from the left.
-    pub const ALL: [Menu; 6] = [
-        Self::File,
-        Self::Edit,
-        Self::Solve,
-        Self::View,
-        Self::Window,
-        Self::Help,
-    ];
-
-    /// Its title.
-    pub fn title(self) -> &'static str {
-        match self {
-            Self::File => "File",
-            Self::Edit => "Edit",
-            Self::Solve => "Solve",
-            Self::View => "View",
-            Self::Window => "Window",
-            Self::Help => "Help",
-        }
-    }
+/// What must be there for an action to make sense.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Needs {
+    /// Nothing.
+    Nothing,
+    /// An open capture.
+    Capture,
+    /// An open capture whose objects are as the edits have them, which go by an object's index.
+    Steady,
 }
 
 const fn key(key: Key) -> Option<KeyboardShortcut> {
@@ -91,76 +79,76 @@ const fn ctrl_shift(key: Key) -> Option<KeyboardShortcut> {
 }
 
 actions! {
-    OpenFolder, File, "Open capture…", "Chooses a capture's folder with a file dialog", ctrl(Key::O);
-    OpenRoom, File, "Open built-in room", "Opens the room that is built into the program", ctrl_shift(Key::O);
-    Sessions, File, "Sessions…", "Lists all sessions that are kept, to go on with one", None;
-    StartPage, File, "Start page", "Shows recent captures and the field for a typed path", ctrl(Key::N);
-    Save, File, "Save results…", "Writes estimate, report and pictures into a folder", ctrl(Key::S);
-    Export, File, "Export…", "Writes one file for another program", ctrl(Key::E);
-    SaveLayers, File, "Save light layers…", "Writes the light of each lamp as a layer of one OpenEXR file", ctrl_shift(Key::S);
-    SavePhotographs, File, "Save photographs…", "Writes all photographs, or one, with the inserted objects and in the changed light", ctrl_shift(Key::E);
-    CancelPhotographs, File, "Cancel photographs", "Ends the writing of photographs; those that are done stay", None;
-    Probe, File, "Light probe by click…", "The light at the place of the next click as a panorama (.hdr or .exr), for other programs", None;
-    SetScale, Edit, "Set the scale by two clicks…", "Two clicks in a view and the length between them make the capture's unit a metre", None;
-    SetGround, Edit, "Set the ground by a click", "The clicked surface lies at height 0, and up is its normal", None;
-    Screenshot, File, "Screenshot of the window", "Writes a picture of the whole window into the current folder", key(Key::F12);
-    Quit, File, "Quit", "Closes the window", ctrl(Key::Q);
+    OpenFolder, File, Nothing, "Open capture…", "Chooses a capture's folder with a file dialog", ctrl(Key::O);
+    OpenRoom, File, Nothing, "Open built-in room", "Opens the room that is built into the program", ctrl_shift(Key::O);
+    Sessions, File, Nothing, "Sessions…", "Lists all sessions that are kept, to go on with one", None;
+    StartPage, File, Nothing, "Start page", "Shows recent captures and the field for a typed path", ctrl(Key::N);
+    Save, File, Steady, "Save results…", "Writes estimate, report and pictures into a folder", ctrl(Key::S);
+    Export, File, Steady, "Export…", "Writes one file for another program", ctrl(Key::E);
+    SaveLayers, File, Steady, "Save light layers…", "Writes the light of each lamp as a layer of one OpenEXR file", ctrl_shift(Key::S);
+    SavePhotographs, File, Steady, "Save photographs…", "Writes all photographs, or one, with the inserted objects and in the changed light", ctrl_shift(Key::E);
+    CancelPhotographs, File, Nothing, "Cancel photographs", "Ends the writing of photographs; those that are done stay", None;
+    Probe, File, Capture, "Light probe by click…", "The light at the place of the next click as a panorama (.hdr or .exr), for other programs", None;
+    SetScale, Edit, Steady, "Set the scale by two clicks…", "Two clicks in a view and the length between them make the capture's unit a metre", None;
+    SetGround, Edit, Steady, "Set the ground by a click", "The clicked surface lies at height 0, and up is its normal", None;
+    Screenshot, File, Nothing, "Screenshot of the window", "Writes a picture of the whole window into the current folder", key(Key::F12);
+    Quit, File, Nothing, "Quit", "Closes the window", ctrl(Key::Q);
 
-    Undo, Edit, "Undo", "Takes back the last change to objects or light", ctrl(Key::Z);
-    Redo, Edit, "Redo", "Makes the last change that was undone again", ctrl_shift(Key::Z);
-    CopyPicture, Edit, "Copy picture", "Copies the picture under the pointer, whole and as it is seen, to the clipboard", ctrl_shift(Key::C);
-    InsertObject, Edit, "Insert object…", "Shows the panel that puts OBJ and GLB objects into the photographs", ctrl(Key::I);
-    Place, Edit, "Place by click", "The next click in a view puts the chosen object there", key(Key::G);
-    Duplicate, Edit, "Duplicate object", "Copies the chosen inserted object", ctrl(Key::D);
-    Delete, Edit, "Delete object", "Takes the chosen inserted object away", key(Key::Delete);
-    NaiveBesideOurs, Edit, "Naive beside ours", "Shows the naive composite and ours side by side", None;
-    WipeNaiveOurs, Edit, "Wipe naive and ours", "Shows the naive composite and ours under a wipe", ctrl(Key::W);
-    BeforeAfter, Edit, "Before and after", "Shows the photograph as taken and as it was changed under a wipe", key(Key::B);
-    WipeRender, Edit, "Wipe with the re-render", "Shows the re-render and the changed photograph under a wipe", ctrl(Key::B);
-    Lights, Edit, "Lights", "Shows a switch, a strength and a colour for the light of each lamp", key(Key::L);
-    ResetLights, Edit, "Reset all lights", "Puts all lamps and the light from outside back to what was found", None;
-    Material, Edit, "Material", "Shows albedo, emission and gloss of the selected object, to be changed", key(Key::M);
-    SwitchLamp, Edit, "Switch lamp off / on", "Switches the selected lamp off, or on again", key(Key::K);
-    SolveOn, Solve, "Solve on with pinned values", "Holds the pinned values and solves the rest on from the last stage", ctrl_shift(Key::R);
-    ResetMaterial, Edit, "Reset material", "Puts the selected object back to what was found", None;
-    ResetEdits, Edit, "Reset all materials", "Puts all objects and the light from outside back to what was found", None;
-    JoinObjects, Edit, "Join objects", "Makes one object of those that are chosen; Ctrl and a click choose more than one", ctrl(Key::J);
-    CutOut, Edit, "Cut out by lasso…", "A line drawn around faces in the 3D view makes them an object of their own, of the chosen objects alone where any are", ctrl_shift(Key::X);
-    RenameObject, Edit, "Rename object", "Puts the name of the selected object up for change, in the table of objects", key(Key::F2);
-    Deselect, Edit, "Deselect", "Selects nothing and ends placing", key(Key::Escape);
+    Undo, Edit, Steady, "Undo", "Takes back the last change to objects or light", ctrl(Key::Z);
+    Redo, Edit, Steady, "Redo", "Makes the last change that was undone again", ctrl_shift(Key::Z);
+    CopyPicture, Edit, Capture, "Copy picture", "Copies the picture under the pointer, whole and as it is seen, to the clipboard", ctrl_shift(Key::C);
+    InsertObject, Edit, Capture, "Insert object…", "Shows the panel that puts OBJ and GLB objects into the photographs", ctrl(Key::I);
+    Place, Edit, Nothing, "Place by click", "The next click in a view puts the chosen object there", key(Key::G);
+    Duplicate, Edit, Nothing, "Duplicate object", "Copies the chosen inserted object", ctrl(Key::D);
+    Delete, Edit, Nothing, "Delete object", "Takes the chosen inserted object away", key(Key::Delete);
+    NaiveBesideOurs, Edit, Nothing, "Naive beside ours", "Shows the naive composite and ours side by side", None;
+    WipeNaiveOurs, Edit, Capture, "Wipe naive and ours", "Shows the naive composite and ours under a wipe", ctrl(Key::W);
+    BeforeAfter, Edit, Capture, "Before and after", "Shows the photograph as taken and as it was changed under a wipe", key(Key::B);
+    WipeRender, Edit, Capture, "Wipe with the re-render", "Shows the re-render and the changed photograph under a wipe", ctrl(Key::B);
+    Lights, Edit, Capture, "Lights", "Shows a switch, a strength and a colour for the light of each lamp", key(Key::L);
+    ResetLights, Edit, Steady, "Reset all lights", "Puts all lamps and the light from outside back to what was found", None;
+    Material, Edit, Capture, "Material", "Shows albedo, emission and gloss of the selected object, to be changed", key(Key::M);
+    SwitchLamp, Edit, Steady, "Switch lamp off / on", "Switches the selected lamp off, or on again", key(Key::K);
+    SolveOn, Solve, Steady, "Solve on with pinned values", "Holds the pinned values and solves the rest on from the last stage", ctrl_shift(Key::R);
+    ResetMaterial, Edit, Steady, "Reset material", "Puts the selected object back to what was found", None;
+    ResetEdits, Edit, Steady, "Reset all materials", "Puts all objects and the light from outside back to what was found", None;
+    JoinObjects, Edit, Nothing, "Join objects", "Makes one object of those that are chosen; Ctrl and a click choose more than one", ctrl(Key::J);
+    CutOut, Edit, Nothing, "Cut out by lasso…", "A line drawn around faces in the 3D view makes them an object of their own, of the chosen objects alone where any are", ctrl_shift(Key::X);
+    RenameObject, Edit, Nothing, "Rename object", "Puts the name of the selected object up for change, in the table of objects", key(Key::F2);
+    Deselect, Edit, Nothing, "Deselect", "Selects nothing and ends placing", key(Key::Escape);
 
-    RunPause, Solve, "Run / Pause", "Starts, holds or goes on with the solve", key(Key::Space);
-    Step, Solve, "Step", "One iteration, then pause", key(Key::Period);
-    Finish, Solve, "Finish", "Ends the solve and keeps the estimate", None;
-    Reset, Solve, "Reset", "Solves anew, with changes and objects as they are; the session so far is kept under File > Sessions", ctrl(Key::R);
-    StartOver, Solve, "Start over", "Solves as if nothing had been done; the session so far is kept under File > Sessions", None;
-    MeasureTrade, Solve, "Measure / cancel the trade", "Measures what exactness costs in seconds on this capture, or ends the measurement", ctrl(Key::M);
+    RunPause, Solve, Capture, "Run / Pause", "Starts, holds or goes on with the solve", key(Key::Space);
+    Step, Solve, Capture, "Step", "One iteration, then pause", key(Key::Period);
+    Finish, Solve, Nothing, "Finish", "Ends the solve and keeps the estimate", None;
+    Reset, Solve, Capture, "Reset", "Solves anew, with changes and objects as they are; the session so far is kept under File > Sessions", ctrl(Key::R);
+    StartOver, Solve, Capture, "Start over", "Solves as if nothing had been done; the session so far is kept under File > Sessions", None;
+    MeasureTrade, Solve, Nothing, "Measure / cancel the trade", "Measures what exactness costs in seconds on this capture, or ends the measurement", ctrl(Key::M);
 
-    PreviousFrame, View, "Previous photograph", "Steps to the photograph before", key(Key::OpenBracket);
-    NextFrame, View, "Next photograph", "Steps to the next photograph", key(Key::CloseBracket);
-    ShowPhotograph, View, "Hold to see the photograph", "While the key is down all pictures show the photograph", key(Key::P);
-    Flip, View, "Flip", "Swaps the two pictures of the comparison", key(Key::X);
-    CompareMode, View, "Wipe / flip / side by side", "Steps through the ways to compare two pictures", key(Key::C);
-    Brighter, View, "Brighter", "Half a stop more exposure", key(Key::Plus);
-    Darker, View, "Darker", "Half a stop less exposure", key(Key::Minus);
-    AutoExposure, View, "Automatic exposure", "Puts the photograph's 99th percentile at 1", key(Key::Num0);
-    ToneCurve, View, "Next tone curve", "Steps through none, Reinhard and filmic", key(Key::T);
-    FitPictures, View, "Fit pictures", "Shows whole pictures", key(Key::Home);
-    FrameSelection, View, "Frame selection", "Turns the 3D view to the selected object, or to the whole scene", key(Key::F);
-    JumpToFrame, View, "View from photograph", "Puts the 3D view's camera where the photograph was taken", key(Key::J);
-    RenderFromHere, View, "Re-render from 3D view", "Re-renders from the 3D view's camera instead of the photograph's", key(Key::R);
+    PreviousFrame, View, Capture, "Previous photograph", "Steps to the photograph before", key(Key::OpenBracket);
+    NextFrame, View, Capture, "Next photograph", "Steps to the next photograph", key(Key::CloseBracket);
+    ShowPhotograph, View, Nothing, "Hold to see the photograph", "While the key is down all pictures show the photograph", key(Key::P);
+    Flip, View, Nothing, "Flip", "Swaps the two pictures of the comparison", key(Key::X);
+    CompareMode, View, Nothing, "Wipe / flip / side by side", "Steps through the ways to compare two pictures", key(Key::C);
+    Brighter, View, Nothing, "Brighter", "Half a stop more exposure", key(Key::Plus);
+    Darker, View, Nothing, "Darker", "Half a stop less exposure", key(Key::Minus);
+    AutoExposure, View, Capture, "Automatic exposure", "Puts the photograph's 99th percentile at 1", key(Key::Num0);
+    ToneCurve, View, Nothing, "Next tone curve", "Steps through none, Reinhard and filmic", key(Key::T);
+    FitPictures, View, Nothing, "Fit pictures", "Shows whole pictures", key(Key::Home);
+    FrameSelection, View, Capture, "Frame selection", "Turns the 3D view to the selected object, or to the whole scene", key(Key::F);
+    JumpToFrame, View, Capture, "View from photograph", "Puts the 3D view's camera where the photograph was taken", key(Key::J);
+    RenderFromHere, View, Capture, "Re-render from 3D view", "Re-renders from the 3D view's camera instead of the photograph's", key(Key::R);
 
-    Compose, Window, "Compose", "Shows the photograph as you change it, large", ctrl(Key::Num1);
-    Inspect, Window, "Inspect", "Shows all pictures of the view in a grid", ctrl(Key::Num2);
-    Thumbnails, Window, "Thumbnails", "Shows or hides the strip of photographs", ctrl(Key::T);
-    ResetLayout, Window, "Reset layout", "Puts all panes back where they were at first", None;
-    Larger, Window, "Larger interface", "Makes everything in the window larger", ctrl(Key::Plus);
-    Smaller, Window, "Smaller interface", "Makes everything in the window smaller", ctrl(Key::Minus);
-    OwnSize, Window, "Interface as large as the screen asks for", "Takes the size of everything in the window back to that of the screen", ctrl(Key::Num0);
-    Theme, Window, "Light / dark theme", "Changes between the light and the dark theme", ctrl(Key::L);
+    Compose, Window, Nothing, "Compose", "Shows the photograph as you change it, large", ctrl(Key::Num1);
+    Inspect, Window, Nothing, "Inspect", "Shows all pictures of the view in a grid", ctrl(Key::Num2);
+    Thumbnails, Window, Nothing, "Thumbnails", "Shows or hides the strip of photographs", ctrl(Key::T);
+    ResetLayout, Window, Nothing, "Reset layout", "Puts all panes back where they were at first", None;
+    Larger, Window, Nothing, "Larger interface", "Makes everything in the window larger", ctrl(Key::Plus);
+    Smaller, Window, Nothing, "Smaller interface", "Makes everything in the window smaller", ctrl(Key::Minus);
+    OwnSize, Window, Nothing, "Interface as large as the screen asks for", "Takes the size of everything in the window back to that of the screen", ctrl(Key::Num0);
+    Theme, Window, Nothing, "Light / dark theme", "Changes between the light and the dark theme", ctrl(Key::L);
 
-    Palette, Help, "Command palette", "Finds any command by name", ctrl(Key::P);
-    Keys, Help, "Keys and mouse", "Shows what keys and mouse do", key(Key::Questionmark);
+    Palette, Help, Nothing, "Command palette", "Finds any command by name", ctrl(Key::P);
+    Keys, Help, Nothing, "Keys and mouse", "Shows what keys and mouse do", key(Key::Questionmark);
 }
 
 impl Action {

@@ -1,6 +1,6 @@
 //! Controls that several panes share, each with a name for those who do not see it.
 
-use egui::{Button, DragValue, Key, Response, Role, TextEdit, Ui, WidgetInfo};
+use egui::{Button, ComboBox, DragValue, Key, Response, Role, TextEdit, Ui, WidgetInfo};
 use glam::DVec3;
 
 /// A response with a name that is read out.
@@ -51,4 +51,26 @@ pub fn go_or_cancel(ui: &mut Ui, go: &str, enabled: bool) -> (bool, bool) {
         (go, cancel)
     })
     .inner
+}
+
+/// What is chosen from a list.
+pub trait Choice: Copy + PartialEq + 'static {
+    /// All, in the order shown.
+    const ALL: &'static [Self];
+
+    /// Its name, and what it is in a sentence.
+    fn name_and_help(self) -> (&'static str, &'static str);
+}
+
+/// A list that opens, to choose from.
+pub fn choose<T: Choice>(ui: &mut Ui, name: &str, width: f32, value: &mut T) {
+    let list = ComboBox::from_id_salt(name).width(width);
+    let list = list.selected_text(value.name_and_help().0);
+    let list = list.show_ui(ui, |ui| {
+        for &choice in T::ALL {
+            let (name, help) = choice.name_and_help();
+            ui.selectable_value(value, choice, name).on_hover_text(help);
+        }
+    });
+    named(list.response, Role::ComboBox, name);
 }

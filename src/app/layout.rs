@@ -1,5 +1,6 @@
 //! The panes and where they are: a tree of tiles that can be moved, closed, brought back and reset.
 
+use crate::app::choices::choices;
 use crate::app::picture::quantity::Quantity;
 use egui_tiles::{Container, Tile, TileId, Tiles, Tree};
 use serde::{Deserialize, Serialize};
@@ -27,7 +28,7 @@ pub enum Pane {
     Capture,
     /// The loss curve.
     Loss,
-    /// The ladder of models.
+    /// The stages of the solve.
     Stages,
     /// Error over seconds, and where to stop.
     Trade,
@@ -38,134 +39,90 @@ pub enum Pane {
 impl Pane {
     /// All panes, in the order in which the menu shows them.
     pub fn all() -> Vec<Pane> {
-        let pictures = Quantity::ALL.into_iter().map(Pane::Picture);
-        let rest = [
-            Self::Compare,
-            Self::Model,
-            Self::Objects,
-            Self::Material,
-            Self::Lights,
-            Self::Insert,
-            Self::Settings,
-            Self::Capture,
-            Self::Loss,
-            Self::Stages,
-            Self::Trade,
-            Self::Log,
+        use Pane::*;
+        let pictures = Quantity::ALL.map(Picture);
+        let others = [
+            Compare, Model, Objects, Material, Lights, Insert, Settings, Capture, Loss, Stages,
+            Trade, Log,
         ];
-        pictures.chain(rest).collect()
+        [&pictures[..], &others].concat()
     }
 
     /// Title of the tab.
-    pub fn title(self) -> &'static str {
+    pub fn title(self) -> String {
         match self {
-            Self::Picture(quantity) => quantity.name(),
-            Self::Compare => "Compare",
-            Self::Model => "3D view",
-            Self::Objects => "Objects",
-            Self::Material => "Material",
-            Self::Lights => "Lights",
-            Self::Insert => "Insert",
-            Self::Settings => "Settings",
-            Self::Capture => "Capture",
-            Self::Loss => "Loss",
-            Self::Stages => "Stages",
-            Self::Trade => "Trade",
-            Self::Log => "Log",
+            Self::Picture(quantity) => quantity.name().to_owned(),
+            Self::Model => "3D view".to_owned(),
+            other => format!("{other:?}"),
         }
     }
 }
 
-/// What the panes are arranged for.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Workspace {
-    /// Changing a photograph: it is large.
-    #[default]
-    Compose,
-    /// Looking into what was found: all pictures in a grid.
-    Inspect,
+choices! {
+    /// What the panes are arranged for.
+    Workspace {
+        Compose, "compose", "Changing a photograph: it is large";
+        Inspect, "inspect", "Looking into what was found: all pictures in a grid";
+    }
 }
 
 impl Workspace {
     /// Its layout of the first start; made for 1280 × 800 and up.
     pub fn first_layout(self) -> Tree<Pane> {
-        match self {
-            Self::Compose => compose(),
-            Self::Inspect => inspect(),
-        }
+        use Quantity::*;
+        let mut tiles = Tiles::default();
+        let mut tabs = |pictures: &[Quantity], others: &[Pane]| {
+            let pictures = pictures.iter().map(|&quantity| Pane::Picture(quantity));
+            let panes = pictures.chain(others.iter().copied());
+            let children: Vec<TileId> = panes.map(|pane| tiles.insert_pane(pane)).collect();
+            tiles.insert_tab_tile(children)
+        };
+        let side = [Pane::Objects, Pane::Lights, Pane::Insert];
+        let (views, side, below, heights) = match self {
+            Self::Compose => {
+                let views = tabs(&[Composite], &[Pane::Model, Pane::Compare]);
+                let below = [
+                    Pane::Material,
+                    Pane::Loss,
+                    Pane::Stages,
+                    Pane::Settings,
+                    Pane::Log,
+                ];
+                (views, tabs(&[], &side), tabs(&[], &below), [0.6, 0.4])
+            }
+            Self::Inspect => {
+                let photograph = tabs(&[Photograph], &[Pane::Compare]);
+                let render = tabs(&[Render, Composite], &[]);
+                let model = tabs(&[], &[Pane::Model]);
+                let albedo = tabs(&[Albedo, Emission, Irradiance], &[]);
+                let error = tabs(&[Error, StandardError], &[]);
+                let side = tabs(&[], &[&side[..], &[Pane::Settings, Pane::Trade]].concat());
+                let below = [
+                    Pane::Loss,
+                    Pane::Material,
+                    Pane::Stages,
+                    Pane::Capture,
+                    Pane::Log,
+                ];
+                let below = tabs(&[], &below);
+                let upper = tiles.insert_horizontal_tile(vec![photograph, render]);
+                let lower = tiles.insert_horizontal_tile(vec![model, albedo, error]);
+                let views = tiles.insert_vertical_tile(vec![upper, lower]);
+                set_sizes(&mut tiles, views, [(upper, 0.53), (lower, 0.47)]);
+                (views, side, below, [0.62, 0.38])
+            }
+        };
+        let right = tiles.insert_vertical_tile(vec![side, below]);
+        let root = tiles.insert_horizontal_tile(vec![views, right]);
+        set_sizes(&mut tiles, root, [(views, 0.69), (right, 0.31)]);
+        set_sizes(&mut tiles, right, [(side, heights[0]), (below, heights[1])]);
+        Tree::new(egui::Id::unique(self.name()), root, tiles)
     }
 }
 
-fn compose() -> Tree<Pane> {
-    let mut tiles = Tiles::default();
-    let mut tabs = |panes: &[Pane]| {
-        let children: Vec<TileId> = panes.iter().map(|&pane| tiles.insert_pane(pane)).collect();
-        tiles.insert_tab_tile(children)
-    };
-    let hero = tabs(&[
-        Pane::Picture(Quantity::Composite),
-        Pane::Model,
-        Pane::Compare,
-    ]);
-    let side = tabs(&[Pane::Objects, Pane::Lights, Pane::Insert]);
-    let course = tabs(&[
-        Pane::Material,
-        Pane::Loss,
-        Pane::Stages,
-        Pane::Settings,
-        Pane::Log,
-    ]);
-    let right = tiles.insert_vertical_tile(vec![side, course]);
-    let root = tiles.insert_horizontal_tile(vec![hero, right]);
-    set_sizes(&mut tiles, root, &[(hero, 0.69), (right, 0.31)]);
-    set_sizes(&mut tiles, right, &[(side, 0.6), (course, 0.4)]);
-    Tree::new(egui::Id::unique("compose"), root, tiles)
-}
-
-fn inspect() -> Tree<Pane> {
-    let mut tiles = Tiles::default();
-    let mut tabs = |panes: &[Pane]| {
-        let children: Vec<TileId> = panes.iter().map(|&pane| tiles.insert_pane(pane)).collect();
-        tiles.insert_tab_tile(children)
-    };
-    let picture = Pane::Picture;
-    let photograph = tabs(&[picture(Quantity::Photograph), Pane::Compare]);
-    let render = tabs(&[picture(Quantity::Render), picture(Quantity::Composite)]);
-    let model = tabs(&[Pane::Model]);
-    let albedo = tabs(&[
-        picture(Quantity::Albedo),
-        picture(Quantity::Emission),
-        picture(Quantity::Irradiance),
-    ]);
-    let error = tabs(&[picture(Quantity::Error), picture(Quantity::StandardError)]);
-    let side = tabs(&[
-        Pane::Objects,
-        Pane::Lights,
-        Pane::Insert,
-        Pane::Settings,
-        Pane::Trade,
-    ]);
-    let course = tabs(&[
-        Pane::Loss,
-        Pane::Material,
-        Pane::Stages,
-        Pane::Capture,
-        Pane::Log,
-    ]);
-    let upper = tiles.insert_horizontal_tile(vec![photograph, render]);
-    let lower = tiles.insert_horizontal_tile(vec![model, albedo, error]);
-    let views = tiles.insert_vertical_tile(vec![upper, lower]);
-    let right = tiles.insert_vertical_tile(vec![side, course]);
-    let root = tiles.insert_horizontal_tile(vec![views, right]);
-    set_sizes(&mut tiles, root, &[(views, 0.69), (right, 0.31)]);
-    set_sizes(&mut tiles, views, &[(upper, 0.53), (lower, 0.47)]);
-    set_sizes(&mut tiles, right, &[(side, 0.62), (course, 0.38)]);
-    Tree::new(egui::Id::unique("inspect"), root, tiles)
-}
-
-fn set_sizes(tiles: &mut Tiles<Pane>, parent: TileId, fractions: &[(TileId, f32)]) {
+fn set_sizes(tiles: &mut Tiles<Pane>, parent: TileId, fractions: [(TileId, f32); 2]) {
     if let Some(Tile::Container(Container::Linear(linear))) = tiles.get_mut(parent) {
-        for &(child, fraction) in fractions {
+        for (child, fraction) in fractions {
             linear.shares.set_share(child, fraction);
         }
     }
@@ -173,18 +130,16 @@ fn set_sizes(tiles: &mut Tiles<Pane>, parent: TileId, fractions: &[(TileId, f32)
 
 /// Brings a pane to the front, opening it beside the last where it was closed.
 pub fn show(tree: &mut Tree<Pane>, pane: Pane) {
-    let found = tree.tiles.find_pane(&pane);
-    let Some(tile) = found else {
+    let tile = tree.tiles.find_pane(&pane).unwrap_or_else(|| {
         let tile = tree.tiles.insert_pane(pane);
         match tree.root {
             Some(root) => {
-                tree.move_tile_to_container(tile, largest_tabs(tree, root), usize::MAX, true)
+                tree.move_tile_to_container(tile, largest_tabs(tree, root), usize::MAX, true);
             }
             None => tree.root = Some(tile),
         }
-        tree.make_active(|id, _| id == tile);
-        return;
-    };
+        tile
+    });
     tree.tiles.set_visible(tile, true);
     tree.make_active(|id, _| id == tile);
 }
@@ -203,14 +158,12 @@ pub fn is_open(tree: &Tree<Pane>, pane: Pane) -> bool {
 
 /// The container of tabs that takes most of the window, or the root.
 fn largest_tabs(tree: &Tree<Pane>, root: TileId) -> TileId {
-    tree.tiles
-        .iter()
-        .filter(|(_, tile)| matches!(tile, Tile::Container(Container::Tabs(_))))
-        .max_by(|(a, _), (b, _)| {
-            let area = |id: TileId| tree.tiles.rect(id).map_or(0.0, |rect| rect.area());
-            area(**a).total_cmp(&area(**b)).then(b.0.cmp(&a.0))
-        })
-        .map_or(root, |(id, _)| *id)
+    let area = |id: TileId| tree.tiles.rect(id).map_or(0.0, |rect| rect.area());
+    let is_tabs = |tile: &Tile<Pane>| matches!(tile, Tile::Container(Container::Tabs(_)));
+    let tabs = tree.tiles.iter().filter(|(_, tile)| is_tabs(tile));
+    tabs.map(|(id, _)| *id)
+        .max_by(|&a, &b| area(a).total_cmp(&area(b)).then(b.0.cmp(&a.0)))
+        .unwrap_or(root)
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 pub mod action;
 pub mod batch;
+mod choices;
 pub mod controls;
 pub mod describe;
 pub mod document;

@@ -85,28 +85,26 @@ impl Preferences {
 
 /// The file of this user, where the system names a folder for it.
 pub fn path() -> Option<PathBuf> {
-    let named = |variable| std::env::var_os(variable).map(PathBuf::from);
-    let folder = if cfg!(windows) {
-        named("APPDATA")?
-    } else if cfg!(target_os = "macos") {
-        std::env::home_dir()?.join("Library/Application Support")
-    } else {
-        named("XDG_CONFIG_HOME").or_else(|| Some(std::env::home_dir()?.join(".config")))?
-    };
+    let folder = folder("APPDATA", "XDG_CONFIG_HOME", ".config")?;
     Some(folder.join("relit").join("window.json"))
 }
 
 /// The folder of this user's sessions, where the system names one for such things.
 pub fn sessions() -> Option<PathBuf> {
-    let named = |variable| std::env::var_os(variable).map(PathBuf::from);
-    let folder = if cfg!(windows) {
-        named("LOCALAPPDATA")?
-    } else if cfg!(target_os = "macos") {
-        std::env::home_dir()?.join("Library/Application Support")
-    } else {
-        named("XDG_STATE_HOME").or_else(|| Some(std::env::home_dir()?.join(".local/state")))?
-    };
+    let folder = folder("LOCALAPPDATA", "XDG_STATE_HOME", ".local/state")?;
     Some(folder.join("relit").join("sessions"))
+}
+
+/// A user's folder: named by a variable on Windows, and elsewhere by another, or else below the home.
+fn folder(windows: &str, elsewhere: &str, below_home: &str) -> Option<PathBuf> {
+    let named = |variable| std::env::var_os(variable).map(PathBuf::from);
+    if cfg!(windows) {
+        named(windows)
+    } else if cfg!(target_os = "macos") {
+        Some(std::env::home_dir()?.join("Library/Application Support"))
+    } else {
+        named(elsewhere).or_else(|| Some(std::env::home_dir()?.join(below_home)))
+    }
 }
 
 #[cfg(test)]

@@ -1,92 +1,43 @@
 //! Design tokens: every colour, size and rounding of the window, for the dark and the light theme.
 
 use egui::style::{Selection, WidgetVisuals};
-use egui::{Color32, CornerRadius, FontFamily, FontId, Stroke, TextStyle, Theme, Ui, Visuals};
+use egui::{Color32, CornerRadius, FontId, Stroke, TextStyle, Theme, Ui, Visuals};
 
-/// The named colours of one theme.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tokens {
-    /// Behind tiles and in text fields.
-    pub sunken: Color32,
-    /// Panels and tiles.
-    pub panel: Color32,
-    /// Buttons and menus.
-    pub raised: Color32,
-    /// Buttons under the pointer.
-    pub hovered: Color32,
-    /// Lines between things.
-    pub outline: Color32,
-    /// Text.
-    pub text: Color32,
-    /// Text of less weight; still at least 4.5 : 1 against `panel`.
-    pub weak: Color32,
-    /// Titles, and text on what is pressed.
-    pub strong: Color32,
-    /// What is selected, active or can be followed.
-    pub accent: Color32,
-    /// Behind selected rows and text.
-    pub selection: Color32,
-    /// Done, kept.
-    pub good: Color32,
-    /// Worked around.
-    pub warning: Color32,
-    /// Failed.
-    pub error: Color32,
-    /// The loss over pixels in the fit.
-    pub train: Color32,
-    /// The loss over held-out pixels.
-    pub held_out: Color32,
-    /// Around pictures, where no pixel is.
-    pub surround: Color32,
-    /// Camera outlines in the 3D view.
-    pub camera: Color32,
-    /// Inserted objects in the views.
-    pub inserted: Color32,
+/// One row: the colour's name, what it is for, and its red, green and blue in the dark and in the light theme.
+macro_rules! tokens {
+    ($($name:ident, $what:literal, $dark:tt, $light:tt;)*) => {
+        /// The named colours of one theme.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct Tokens { $(#[doc = $what] pub $name: Color32,)* }
+
+        /// The dark theme.
+        pub const DARK: Tokens = Tokens { $($name: Color32::from_rgb $dark,)* };
+
+        /// The light theme.
+        pub const LIGHT: Tokens = Tokens { $($name: Color32::from_rgb $light,)* };
+    };
 }
 
-/// The dark theme.
-pub const DARK: Tokens = Tokens {
-    sunken: Color32::from_rgb(22, 23, 26),
-    panel: Color32::from_rgb(32, 34, 38),
-    raised: Color32::from_rgb(52, 55, 61),
-    hovered: Color32::from_rgb(68, 72, 80),
-    outline: Color32::from_rgb(60, 63, 70),
-    text: Color32::from_rgb(214, 217, 222),
-    weak: Color32::from_rgb(154, 159, 168),
-    strong: Color32::from_rgb(245, 246, 248),
-    accent: Color32::from_rgb(255, 170, 61),
-    selection: Color32::from_rgb(108, 72, 24),
-    good: Color32::from_rgb(116, 196, 118),
-    warning: Color32::from_rgb(240, 196, 83),
-    error: Color32::from_rgb(242, 109, 97),
-    train: Color32::from_rgb(110, 173, 236),
-    held_out: Color32::from_rgb(255, 170, 61),
-    surround: Color32::from_rgb(14, 15, 17),
-    camera: Color32::from_rgb(110, 173, 236),
-    inserted: Color32::from_rgb(116, 216, 168),
-};
-
-/// The light theme.
-pub const LIGHT: Tokens = Tokens {
-    sunken: Color32::from_rgb(255, 255, 255),
-    panel: Color32::from_rgb(243, 243, 244),
-    raised: Color32::from_rgb(224, 225, 228),
-    hovered: Color32::from_rgb(208, 210, 215),
-    outline: Color32::from_rgb(196, 198, 204),
-    text: Color32::from_rgb(38, 40, 45),
-    weak: Color32::from_rgb(92, 96, 105),
-    strong: Color32::from_rgb(10, 11, 13),
-    accent: Color32::from_rgb(166, 86, 0),
-    selection: Color32::from_rgb(255, 219, 168),
-    good: Color32::from_rgb(26, 122, 44),
-    warning: Color32::from_rgb(138, 92, 0),
-    error: Color32::from_rgb(188, 38, 28),
-    train: Color32::from_rgb(21, 98, 176),
-    held_out: Color32::from_rgb(172, 85, 0),
-    surround: Color32::from_rgb(214, 215, 218),
-    camera: Color32::from_rgb(21, 98, 176),
-    inserted: Color32::from_rgb(0, 120, 78),
-};
+tokens! {
+    sunken, "Behind tiles and in text fields.", (22, 23, 26), (255, 255, 255);
+    panel, "Panels and tiles.", (32, 34, 38), (243, 243, 244);
+    raised, "Buttons and menus.", (52, 55, 61), (224, 225, 228);
+    hovered, "Buttons under the pointer.", (68, 72, 80), (208, 210, 215);
+    outline, "Lines between things.", (60, 63, 70), (196, 198, 204);
+    text, "Text.", (214, 217, 222), (38, 40, 45);
+    weak, "Text of less weight; still at least 4.5 : 1 against `panel`.", (154, 159, 168), (92, 96, 105);
+    strong, "Titles, and text on what is pressed.", (245, 246, 248), (10, 11, 13);
+    accent, "What is selected, active or can be followed.", (255, 170, 61), (166, 86, 0);
+    selection, "Behind selected rows and text.", (108, 72, 24), (255, 219, 168);
+    good, "Done, kept.", (116, 196, 118), (26, 122, 44);
+    warning, "Worked around.", (240, 196, 83), (138, 92, 0);
+    error, "Failed.", (242, 109, 97), (188, 38, 28);
+    train, "The loss over pixels in the fit.", (110, 173, 236), (21, 98, 176);
+    held_out, "The loss over held-out pixels.", (255, 170, 61), (172, 85, 0);
+    surround, "Around pictures, where no pixel is.", (14, 15, 17), (214, 215, 218);
+    camera, "Camera outlines in the 3D view.", (110, 173, 236), (21, 98, 176);
+    inserted, "Inserted objects in the views.", (116, 216, 168), (0, 120, 78);
+}
 
 /// Height of a row in tables, in points.
 pub const ROW: f32 = 20.0;
@@ -122,23 +73,11 @@ pub fn install(ctx: &egui::Context) {
         ctx.style_mut_of(theme, |style| {
             style.visuals = visuals(theme, tokens);
             style.text_styles = [
-                (
-                    TextStyle::Small,
-                    FontId::new(10.5, FontFamily::Proportional),
-                ),
-                (TextStyle::Body, FontId::new(13.0, FontFamily::Proportional)),
-                (
-                    TextStyle::Button,
-                    FontId::new(13.0, FontFamily::Proportional),
-                ),
-                (
-                    TextStyle::Heading,
-                    FontId::new(19.0, FontFamily::Proportional),
-                ),
-                (
-                    TextStyle::Monospace,
-                    FontId::new(12.0, FontFamily::Monospace),
-                ),
+                (TextStyle::Small, FontId::proportional(10.5)),
+                (TextStyle::Body, FontId::proportional(13.0)),
+                (TextStyle::Button, FontId::proportional(13.0)),
+                (TextStyle::Heading, FontId::proportional(19.0)),
+                (TextStyle::Monospace, FontId::monospace(12.0)),
             ]
             .into();
             style.spacing.item_spacing = egui::vec2(GAP, 4.0);

@@ -54,7 +54,7 @@ fn every_control_has_a_name() {
     for pane in Pane::all() {
         harness.state_mut().app.view.layout.front = Some(pane);
         harness.run_steps(3);
-        count += look(&harness, pane.title(), &mut nameless);
+        count += look(&harness, &pane.title(), &mut nameless);
     }
     for menu in ["File", "Edit", "Solve", "View", "Window", "Help"] {
         harness.get_by_label(menu).click();

@@ -1,40 +1,25 @@
 //! What the 3D view's faces are coloured by.
 
+use crate::app::choices::choices;
 use crate::app::model::surface::Surface;
 use crate::inverse::estimate::Estimate;
 use crate::scene::Scene;
 use glam::Vec3;
 
-/// A quantity shown on the mesh.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Coloring {
-    /// Estimated diffuse reflectance.
-    Albedo,
-    /// Estimated emitted radiance.
-    Emission,
-    /// Radiance in the photographs.
-    Photograph,
-    /// One colour an object.
-    Object,
+choices! {
+    /// A quantity shown on the mesh.
+    Coloring {
+        Photograph, "Photograph", "Radiance in the photographs";
+        Albedo, "Albedo", "Estimated diffuse reflectance";
+        Emission, "Emission", "Estimated emitted radiance";
+        Object, "Object", "One colour an object";
+    }
 }
 
 /// Marks faces that no photograph sees; the shader gives them a colour that no exposure changes.
 const UNSEEN: Vec3 = Vec3::splat(-1.0);
 
 impl Coloring {
-    /// All, in order.
-    pub const ALL: [Coloring; 4] = [Self::Photograph, Self::Albedo, Self::Emission, Self::Object];
-
-    /// Name shown to people.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Albedo => "Albedo",
-            Self::Emission => "Emission",
-            Self::Photograph => "Photograph",
-            Self::Object => "Object",
-        }
-    }
-
     /// Whether exposure and tone curve apply.
     pub fn is_radiance(self) -> bool {
         matches!(self, Self::Emission | Self::Photograph)

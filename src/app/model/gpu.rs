@@ -2,6 +2,7 @@
 
 use crate::app::model::surface::Surface;
 use crate::app::model::view::Colors;
+use crate::app::picture::gpu::over_screen;
 use eframe::egui_wgpu::{CallbackResources, CallbackTrait, RenderState, ScreenDescriptor};
 use egui::PaintCallbackInfo;
 use std::sync::Arc;
@@ -103,27 +104,8 @@ pub fn install(render_state: &RenderState) {
         multiview_mask: None,
         cache: None,
     });
-    let screen_pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("3D view"),
-        layout: None,
-        vertex: wgpu::VertexState {
-            module: &shader,
-            entry_point: Some("screen_vertex"),
-            compilation_options: options(),
-            buffers: &[],
-        },
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: None,
-        multisample: wgpu::MultisampleState::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &shader,
-            entry_point: Some("screen_fragment"),
-            compilation_options: options(),
-            targets: &[Some(render_state.target_format.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    });
+    let entry_points = ["screen_vertex", "screen_fragment"];
+    let screen_pipeline = over_screen(render_state, &shader, entry_points);
     let uniform = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("3D view"),
         size: size_of::<SceneUniform>() as u64,

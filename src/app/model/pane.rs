@@ -1,9 +1,8 @@
 //! The pane of the 3D view: tool line, mouse and keys, and drawing.
 
-use crate::app::controls::named;
+use crate::app::controls::{choose, named};
 use crate::app::document::Document;
 use crate::app::insertion::handles::Along;
-use crate::app::model::coloring::Coloring;
 use crate::app::model::gpu::{MeshPaint, SceneUniform};
 use crate::app::model::lasso::Lasso;
 use crate::app::model::overlay::{self, Projection};
@@ -15,7 +14,7 @@ use crate::app::tool::{Clicked, Pick};
 use crate::app::view::ViewState;
 use crate::scene::Scene;
 use crate::scene::geometry::{Hit, Ray};
-use egui::{ComboBox, Key, PointerButton, Rect, Response, Role, Sense, Ui};
+use egui::{Key, PointerButton, Rect, Response, Role, Sense, Ui};
 use glam::{Vec2, Vec3};
 
 /// Draws the pane.
@@ -88,15 +87,7 @@ pub fn pane(ui: &mut Ui, document: &Document, view: &mut ViewState, requests: &m
 
 fn controls(ui: &mut Ui, model: &mut ModelView) {
     ui.horizontal(|ui| {
-        let choices = ComboBox::from_id_salt("coloured by")
-            .selected_text(model.coloring.name())
-            .width(88.0)
-            .show_ui(ui, |ui| {
-                for coloring in Coloring::ALL {
-                    ui.selectable_value(&mut model.coloring, coloring, coloring.name());
-                }
-            });
-        named(choices.response, Role::ComboBox, "Coloured by");
+        choose(ui, "Coloured by", 88.0, &mut model.coloring);
         ui.toggle_value(&mut model.cull, "See inside")
             .on_hover_text("Leaves out faces seen from behind");
         ui.toggle_value(&mut model.cameras, "Cameras")

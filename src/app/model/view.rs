@@ -4,21 +4,18 @@ use crate::app::model::coloring::Coloring;
 use crate::app::model::lasso::Lasso;
 use crate::app::model::orbit::Orbit;
 use crate::app::model::surface::Surface;
+use crate::app::task::Task;
 use crate::inverse::estimate::Estimate;
 use crate::say;
 use crate::session::snapshot::OpenCapture;
 use glam::Vec3;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, channel};
 
 /// Colours of all faces.
 pub type Colors = Arc<Vec<[f32; 4]>>;
 
-/// What the thread sends.
-enum Made {
-    Surface(Arc<Surface>),
-    Photographed(Vec<Option<Vec3>>),
-}
+/// Faces, and the radiance that photographs saw at each once that is known.
+type Made = (Arc<Surface>, Vec<Option<Vec3>>);
 
 /// The state of the 3D view.
 pub struct ModelView {
@@ -32,9 +29,8 @@ pub struct ModelView {
     pub cameras: bool,
     /// The line that is being drawn.
     pub lasso: Lasso,
-    surface: Option<Arc<Surface>>,
-    photographed: Vec<Option<Vec3>>,
-    making: Option<Receiver<Made>>,
+    made: Option<Made>,
+    making: Option<Task<Made, ()>>,
     colors: Option<(Coloring, Arc<Estimate>, Colors)>,
 }
 
@@ -46,8 +42,7 @@ impl Default for ModelView {
             cull: true,
             cameras: true,
             lasso: Lasso::default(),
-            surface: None,
-            photographed: Vec::new(),
+            made: None,
             making: None,
             colors: None,
         }
@@ -57,9 +52,8 @@ impl Default for ModelView {
 impl ModelView {
     /// Makes faces and colours anew, for a mesh whose objects are others.
     pub fn remake(&mut self) {
-        (self.surface, self.making, self.colors) = (None, None, None);
+        (self.made, self.making, self.colors) = (None, None, None);
         self.lasso = Lasso::default();
-        self.photographed.clear();
     }
 
     /// The faces and their present colours, once they are made.
@@ -69,54 +63,39 @@ impl ModelView {
         capture: &Arc<OpenCapture>,
         estimate: &Arc<Estimate>,
     ) -> Option<(Arc<Surface>, Colors)> {
-        let receiver = self.making.get_or_insert_with(|| make(ctx, capture));
-        while let Ok(made) = receiver.try_recv() {
-            match made {
-                Made::Surface(surface) => self.surface = Some(surface),
-                Made::Photographed(colors) => {
-                    self.photographed = colors;
-                    self.colors = None;
-                }
-            }
+        if self.making.is_none() {
+            self.making = make(ctx, capture);
         }
-        let surface = self.surface.clone()?;
+        if let Some(made) = self.making.as_ref().and_then(Task::newest) {
+            (self.made, self.colors) = (Some(made), None);
+        }
+        let (surface, photographed) = self.made.as_ref()?;
         let depends = !matches!(self.coloring, Coloring::Photograph | Coloring::Object);
         if let Some((coloring, made_of, colors)) = &self.colors
             && *coloring == self.coloring
             && (!depends || Arc::ptr_eq(made_of, estimate))
         {
-            return Some((surface, colors.clone()));
+            return Some((surface.clone(), colors.clone()));
         }
-        let colors =
-            Arc::new(
-                self.coloring
-                    .colors(&surface, &capture.scene, estimate, &self.photographed),
-            );
+        let scene = &capture.scene;
+        let colors = Arc::new((self.coloring).colors(surface, scene, estimate, photographed));
         self.colors = Some((self.coloring, estimate.clone(), colors.clone()));
-        Some((surface, colors))
+        Some((surface.clone(), colors))
     }
 }
 
 /// Cuts up the mesh and colours it by the photographs, on a thread; wakes the window as parts are ready.
-fn make(ctx: &egui::Context, capture: &Arc<OpenCapture>) -> Receiver<Made> {
-    let (sender, receiver) = channel();
+fn make(ctx: &egui::Context, capture: &Arc<OpenCapture>) -> Option<Task<Made, ()>> {
     let (ctx, capture) = (ctx.clone(), capture.clone());
-    let spawned = std::thread::Builder::new()
-        .name("3D view".to_owned())
-        .spawn(move || {
-            let surface = Arc::new(Surface::new(&capture.scene));
-            let sent = sender.send(Made::Surface(surface.clone()));
-            ctx.request_repaint();
-            if sent.is_ok()
-                && sender
-                    .send(Made::Photographed(surface.photographed(&capture)))
-                    .is_ok()
-            {
-                ctx.request_repaint();
-            }
-        });
-    if let Err(error) = spawned {
-        say::aside(format_args!("3D view: {error}; close other programs"));
-    }
-    receiver
+    let wake = move || ctx.request_repaint();
+    let made = Task::begin("3D view", wake, move |course| {
+        let surface = Arc::new(Surface::new(&capture.scene));
+        course.show((surface.clone(), Vec::new()));
+        if !course.is_ended() {
+            course.show((surface.clone(), surface.photographed(&capture)));
+        }
+        Ok(())
+    });
+    made.map_err(|error| say::aside(format_args!("{error}")))
+        .ok()
 }

@@ -7,7 +7,7 @@ mod photographs;
 mod regroup;
 mod trade;
 
-use crate::app::action::Action;
+use crate::app::action::{Action, Needs};
 use crate::app::layout::{Pane, Workspace};
 use crate::app::model::lasso::Lasso;
 use crate::app::picture::compare::Mode;
@@ -28,39 +28,28 @@ use egui::{Context, Theme, ViewportCommand};
 use glam::DVec3;
 use std::collections::HashSet;
 
-/// Whether an action changes or writes edits, which go by an object's index.
-fn goes_by_index(action: Action) -> bool {
-    matches!(
-        action,
-        Action::Undo
-            | Action::Redo
-            | Action::SwitchLamp
-            | Action::ResetMaterial
-            | Action::ResetEdits
-            | Action::ResetLights
-            | Action::SolveOn
-            | Action::Save
-            | Action::Export
-            | Action::SaveLayers
-            | Action::SavePhotographs
-            | Action::SetScale
-            | Action::SetGround
-    )
-}
-
 impl App {
     /// All actions that make sense now.
     pub fn possible(&self) -> HashSet<Action> {
-        let steady = self.document.is_steady();
         let all = Action::ALL.iter().copied();
-        all.filter(|&action| (steady || !goes_by_index(action)) && self.can(action))
-            .collect()
+        all.filter(|&action| self.can(action)).collect()
     }
 
-    /// Whether an action makes sense, where the objects are as edits have them.
+    /// Whether an action makes sense now.
     fn can(&self, action: Action) -> bool {
-        let (document, selection) = (&self.document, &self.view.selection);
+        let document = &self.document;
         let open = document.capture().is_some();
+        let ready = match action.needs() {
+            Needs::Nothing => true,
+            Needs::Capture => open,
+            Needs::Steady => open && document.is_steady(),
+        };
+        ready && self.is_possible(action)
+    }
+
+    /// Whether an action that has what it needs would do something.
+    fn is_possible(&self, action: Action) -> bool {
+        let (document, selection) = (&self.document, &self.view.selection);
         match action {
             Action::Undo => document.history.can_undo(),
             Action::Redo => document.history.can_redo(),
@@ -80,29 +69,6 @@ impl App {
             Action::Finish => matches!(document.snapshot.phase, Phase::Solving | Phase::Paused),
             Action::SavePhotographs => self.can_write_photographs(),
             Action::CancelPhotographs => self.jobs.batch.is_some(),
-            Action::Save
-            | Action::SaveLayers
-            | Action::Export
-            | Action::Probe
-            | Action::SetScale
-            | Action::SetGround
-            | Action::CopyPicture
-            | Action::InsertObject
-            | Action::Lights
-            | Action::Material
-            | Action::BeforeAfter
-            | Action::WipeRender
-            | Action::WipeNaiveOurs
-            | Action::RunPause
-            | Action::Step
-            | Action::Reset
-            | Action::StartOver
-            | Action::PreviousFrame
-            | Action::NextFrame
-            | Action::FrameSelection
-            | Action::JumpToFrame
-            | Action::RenderFromHere
-            | Action::AutoExposure => open,
             _ => true,
         }
     }
@@ -166,8 +132,7 @@ impl App {
 
     /// Does what an action says, where it makes sense.
     fn act(&mut self, action: Action, ctx: &Context) {
-        let steady = !goes_by_index(action) || self.document.is_steady();
-        if !steady || !self.can(action) {
+        if !self.can(action) {
             return;
         }
         match action {
@@ -255,7 +220,7 @@ impl App {
             Action::ShowPhotograph => self.view.look.photograph = true,
             Action::Flip => self.view.compare.flip(),
             Action::CompareMode => {
-                self.view.compare.next_mode();
+                self.view.compare.mode = self.view.compare.mode.next();
                 self.view.bring_forward(Pane::Compare);
             }
             Action::Brighter => self.view.look.exposure += 0.5,

@@ -1,29 +1,14 @@
 //! Which two pictures are compared, and how.
 
+use crate::app::choices::choices;
 use crate::app::picture::quantity::Quantity;
 
-/// How two pictures are compared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mode {
-    /// A line that can be dragged divides them.
-    Wipe,
-    /// One at a time.
-    Flip,
-    /// Both in full.
-    SideBySide,
-}
-
-impl Mode {
-    /// All, in order.
-    pub const ALL: [Mode; 3] = [Self::Wipe, Self::Flip, Self::SideBySide];
-
-    /// Name shown to people.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Wipe => "Wipe",
-            Self::Flip => "Flip",
-            Self::SideBySide => "Side by side",
-        }
+choices! {
+    /// How two pictures are compared.
+    Mode {
+        Wipe, "Wipe", "A line that can be dragged divides them";
+        Flip, "Flip", "One at a time";
+        SideBySide, "Side by side", "Both in full";
     }
 }
 
@@ -58,14 +43,5 @@ impl Compare {
     /// Swaps the two.
     pub fn flip(&mut self) {
         std::mem::swap(&mut self.left, &mut self.right);
-    }
-
-    /// Goes on to the next way of comparing.
-    pub fn next_mode(&mut self) {
-        self.mode = match self.mode {
-            Mode::Wipe => Mode::Flip,
-            Mode::Flip => Mode::SideBySide,
-            Mode::SideBySide => Mode::Wipe,
-        };
     }
 }

@@ -96,17 +96,8 @@ impl PicturePaint {
             step: (step / pixels_per_point).into(),
             corner: [corner.x.round(), corner.y.round()],
             exposure: self.exposure,
-            tone: match self.tone {
-                ToneCurve::None => 0,
-                ToneCurve::Reinhard => 1,
-                ToneCurve::Filmic => 2,
-            },
-            shading: match self.shading {
-                Shading::Radiance => 0,
-                Shading::Reflectance => 1,
-                Shading::Signed => 2,
-                Shading::Positive => 3,
-            },
+            tone: self.tone as u32,
+            shading: self.shading as u32,
             range: self.range,
             selected: self.selected.map_or(-1.0, |object| object as f32),
             smooth: f32::from(u8::from(
@@ -127,7 +118,6 @@ pub fn rgba(color: Color32) -> [f32; 4] {
 /// What all pictures share on the card.
 struct Pictures {
     pipeline: wgpu::RenderPipeline,
-    layout: wgpu::BindGroupLayout,
     slots: HashMap<egui::Id, Slot>,
 }
 
@@ -144,66 +134,46 @@ struct Slot {
 pub fn install(render_state: &eframe::egui_wgpu::RenderState) {
     let device = &render_state.device;
     let shader = device.create_shader_module(wgpu::include_wgsl!("picture.wgsl"));
-    let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("picture"),
-        entries: &[
-            wgpu::BindGroupLayoutEntry {
-                binding: 0,
-                visibility: wgpu::ShaderStages::FRAGMENT,
-                ty: wgpu::BindingType::Buffer {
-                    ty: wgpu::BufferBindingType::Uniform,
-                    has_dynamic_offset: false,
-                    min_binding_size: None,
-                },
-                count: None,
-            },
-            wgpu::BindGroupLayoutEntry {
-                binding: 1,
-                visibility: wgpu::ShaderStages::FRAGMENT,
-                ty: wgpu::BindingType::Texture {
-                    sample_type: wgpu::TextureSampleType::Float { filterable: false },
-                    view_dimension: wgpu::TextureViewDimension::D2,
-                    multisampled: false,
-                },
-                count: None,
-            },
-        ],
-    });
-    let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some("picture"),
-        bind_group_layouts: &[Some(&layout)],
-        immediate_size: 0,
-    });
-    let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("picture"),
-        layout: Some(&pipeline_layout),
-        vertex: wgpu::VertexState {
-            module: &shader,
-            entry_point: Some("vertex"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            buffers: &[],
-        },
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: None,
-        multisample: wgpu::MultisampleState::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &shader,
-            entry_point: Some("fragment"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            targets: &[Some(render_state.target_format.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    });
+    let pipeline = over_screen(render_state, &shader, ["vertex", "fragment"]);
     render_state
         .renderer
         .write()
         .callback_resources
         .insert(Pictures {
             pipeline,
-            layout,
             slots: HashMap::new(),
         });
+}
+
+/// A pipeline whose one triangle covers what is drawn into, with the entry points of a shader.
+pub fn over_screen(
+    render_state: &eframe::egui_wgpu::RenderState,
+    shader: &wgpu::ShaderModule,
+    [vertex, fragment]: [&str; 2],
+) -> wgpu::RenderPipeline {
+    let compilation_options = wgpu::PipelineCompilationOptions::default;
+    let descriptor = wgpu::RenderPipelineDescriptor {
+        label: Some(fragment),
+        layout: None,
+        vertex: wgpu::VertexState {
+            module: shader,
+            entry_point: Some(vertex),
+            compilation_options: compilation_options(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: None,
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: shader,
+            entry_point: Some(fragment),
+            compilation_options: compilation_options(),
+            targets: &[Some(render_state.target_format.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    };
+    render_state.device.create_render_pipeline(&descriptor)
 }
 
 impl CallbackTrait for PicturePaint {
@@ -218,26 +188,22 @@ impl CallbackTrait for PicturePaint {
         let Some(pictures) = resources.get_mut::<Pictures>() else {
             return Vec::new();
         };
-        let slot = match pictures.slots.entry(self.slot) {
-            std::collections::hash_map::Entry::Occupied(entry) => {
-                let slot = entry.into_mut();
-                if slot.picture.width != self.picture.width
-                    || slot.picture.height != self.picture.height
-                {
-                    *slot = Slot::new(device, queue, &pictures.layout, self);
-                } else if !slot.shows(self) {
+        let size = |picture: &Picture| [picture.width, picture.height];
+        let known = pictures.slots.remove(&self.slot);
+        let slot = match known.filter(|slot| size(&slot.picture) == size(&self.picture)) {
+            None => Slot::new(device, queue, &pictures.pipeline, self),
+            Some(mut slot) => {
+                if !slot.shows(self) {
                     slot.picture = self.picture.clone();
                     slot.objects = self.objects.clone();
                     upload(queue, &slot.texture, &self.picture, self.objects.as_deref());
                 }
                 slot
             }
-            std::collections::hash_map::Entry::Vacant(entry) => {
-                entry.insert(Slot::new(device, queue, &pictures.layout, self))
-            }
         };
         let uniform = self.uniform(screen.pixels_per_point);
         queue.write_buffer(&slot.uniform, 0, bytemuck::bytes_of(&uniform));
+        pictures.slots.insert(self.slot, slot);
         Vec::new()
     }
 
@@ -262,7 +228,7 @@ impl Slot {
     fn new(
         device: &wgpu::Device,
         queue: &wgpu::Queue,
-        layout: &wgpu::BindGroupLayout,
+        pipeline: &wgpu::RenderPipeline,
         paint: &PicturePaint,
     ) -> Self {
         let texture = device.create_texture(&wgpu::TextureDescriptor {
@@ -281,9 +247,10 @@ impl Slot {
             contents: bytemuck::bytes_of(&paint.uniform(1.0)),
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
         });
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("picture"),
-            layout,
+            layout: &pipeline.get_bind_group_layout(0),
             entries: &[
                 wgpu::BindGroupEntry {
                     binding: 0,
@@ -291,9 +258,7 @@ impl Slot {
                 },
                 wgpu::BindGroupEntry {
                     binding: 1,
-                    resource: wgpu::BindingResource::TextureView(
-                        &texture.create_view(&wgpu::TextureViewDescriptor::default()),
-                    ),
+                    resource: wgpu::BindingResource::TextureView(&view),
                 },
             ],
         });
@@ -307,12 +272,8 @@ impl Slot {
     }
 
     fn shows(&self, paint: &PicturePaint) -> bool {
-        let same_objects = match (&self.objects, &paint.objects) {
-            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
-            (None, None) => true,
-            _ => false,
-        };
-        same_objects && Arc::ptr_eq(&self.picture, &paint.picture)
+        let place = |objects: &Option<Arc<Vec<u32>>>| objects.as_ref().map(Arc::as_ptr);
+        place(&self.objects) == place(&paint.objects) && Arc::ptr_eq(&self.picture, &paint.picture)
     }
 }
 

@@ -1,40 +1,15 @@
 //! How pictures are looked at: exposure, tone curve, and the zoom and cursor that all of them share.
 
+use crate::app::choices::choices;
 use crate::app::picture::quantity::Quantity;
 use egui::{Pos2, Rect, Vec2};
-use serde::{Deserialize, Serialize};
 
-/// What becomes of radiance times exposure before the sRGB curve.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum ToneCurve {
-    /// Nothing: values above 1 clip.
-    None,
-    /// x / (1 + x) a channel (Reinhard et al. 2002).
-    Reinhard,
-    /// A filmic shoulder and toe (Narkowicz's fit of the ACES curve, 2015).
-    Filmic,
-}
-
-impl ToneCurve {
-    /// All, in order.
-    pub const ALL: [ToneCurve; 3] = [Self::None, Self::Reinhard, Self::Filmic];
-
-    /// Name shown to people.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::None => "No tone curve",
-            Self::Reinhard => "Reinhard",
-            Self::Filmic => "Filmic",
-        }
-    }
-
-    /// The next in order.
-    pub fn next(self) -> Self {
-        match self {
-            Self::None => Self::Reinhard,
-            Self::Reinhard => Self::Filmic,
-            Self::Filmic => Self::None,
-        }
+choices! {
+    /// What becomes of radiance times exposure before the sRGB curve; numbered as in `picture.wgsl`.
+    ToneCurve {
+        None, "No tone curve", "Nothing: values above 1 clip";
+        Reinhard, "Reinhard", "x / (1 + x) a channel (Reinhard et al. 2002)";
+        Filmic, "Filmic", "A filmic shoulder and toe (Narkowicz's fit of the ACES curve, 2015)";
     }
 }
 

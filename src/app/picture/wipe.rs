@@ -1,6 +1,6 @@
 //! Two pictures at a time: under a wipe, flipped, or side by side, with one exposure and tone curve.
 
-use crate::app::controls::named;
+use crate::app::controls::{choose, named};
 use crate::app::document::Document;
 use crate::app::picture::canvas;
 use crate::app::picture::compare::{Compare, Mode};
@@ -8,9 +8,7 @@ use crate::app::picture::quantity::Quantity;
 use crate::app::request::Requests;
 use crate::app::theme;
 use crate::app::view::ViewState;
-use egui::{
-    Align2, Color32, ComboBox, FontId, Id, Rect, Role, Sense, Ui, UiBuilder, WidgetInfo, pos2, vec2,
-};
+use egui::{Align2, Color32, FontId, Id, Rect, Role, Sense, Ui, UiBuilder, WidgetInfo, pos2, vec2};
 
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, document: &Document, view: &mut ViewState, requests: &mut Requests) {
@@ -48,29 +46,17 @@ fn controls(ui: &mut Ui, compare: &mut Compare) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
         ui.spacing_mut().button_padding.x = 6.0;
-        pick(ui, "First picture", &mut compare.left);
+        choose(ui, "First picture", 88.0, &mut compare.left);
         let swap = ui.button("‹ ›").on_hover_text("Swaps the two pictures (X)");
         if named(swap, Role::Button, "Swap").clicked() {
             compare.flip();
         }
-        pick(ui, "Second picture", &mut compare.right);
+        choose(ui, "Second picture", 88.0, &mut compare.right);
         for mode in Mode::ALL {
-            ui.selectable_value(&mut compare.mode, mode, mode.name());
+            ui.selectable_value(&mut compare.mode, mode, mode.name())
+                .on_hover_text(mode.help());
         }
     });
-}
-
-fn pick(ui: &mut Ui, name: &str, quantity: &mut Quantity) {
-    let choices = ComboBox::from_id_salt(name)
-        .selected_text(quantity.name())
-        .width(88.0)
-        .show_ui(ui, |ui| {
-            for choice in Quantity::ALL {
-                ui.selectable_value(quantity, choice, choice.name())
-                    .on_hover_text(choice.help());
-            }
-        });
-    named(choices.response, Role::ComboBox, name);
 }
 
 /// Draws two pictures under a line that can be dragged.

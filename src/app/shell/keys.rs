@@ -43,8 +43,8 @@ pub fn show(ctx: &egui::Context, open: &mut bool) {
                 .min_scrolled_height(560.0)
                 .show(ui, |ui| {
                     for menu in Menu::ALL {
-                        ui.strong(menu.title());
-                        Grid::new(menu.title())
+                        ui.strong(menu.name());
+                        Grid::new(menu.name())
                             .num_columns(2)
                             .striped(true)
                             .show(ui, |ui| {

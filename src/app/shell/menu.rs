@@ -16,7 +16,7 @@ pub fn bar(
 ) {
     egui::MenuBar::new().ui(ui, |ui| {
         for menu in Menu::ALL {
-            ui.menu_button(menu.title(), |ui| {
+            ui.menu_button(menu.name(), |ui| {
                 ui.set_min_width(220.0);
                 for &action in Action::ALL.iter().filter(|a| a.menu() == menu) {
                     let button = Button::new(action.text()).shortcut_text(action.keys(ui.ctx()));

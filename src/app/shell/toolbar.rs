@@ -1,13 +1,13 @@
 //! The tool bar: the solver, the photograph, and how pictures are shown.
 
 use crate::app::action::Action;
-use crate::app::controls::named;
+use crate::app::controls::{choose, named};
 use crate::app::document::Document;
-use crate::app::picture::look::{Look, ToneCurve};
+use crate::app::picture::look::Look;
 use crate::app::request::Requests;
 use crate::app::shown::Shown;
 use crate::app::theme;
-use egui::{Button, ComboBox, Key, Role, Slider, Ui, vec2};
+use egui::{Button, Key, Role, Slider, Ui, vec2};
 
 /// Draws the bar.
 pub fn bar(
@@ -74,13 +74,5 @@ fn exposure(ui: &mut Ui, look: &mut Look, requests: &mut Requests) {
     ui.add(slider.fixed_decimals(2).suffix(" EV"))
         .labelled_by(label.id);
     button(ui, requests, Action::AutoExposure, "Auto", 0.0);
-    let choices = ComboBox::from_id_salt("tone curve")
-        .selected_text(look.tone.name())
-        .width(104.0)
-        .show_ui(ui, |ui| {
-            for tone in ToneCurve::ALL {
-                ui.selectable_value(&mut look.tone, tone, tone.name());
-            }
-        });
-    named(choices.response, Role::ComboBox, "Tone curve");
+    choose(ui, "Tone curve", 104.0, &mut look.tone);
 }
