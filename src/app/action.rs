@@ -91,7 +91,6 @@ actions! {
     Probe, File, Capture, "Light probe by click…", "The light at the place of the next click as a panorama (.hdr or .exr), for other programs", None;
     SetScale, Edit, Steady, "Set the scale by two clicks…", "Two clicks in a view and the length between them make the capture's unit a metre", None;
     SetGround, Edit, Steady, "Set the ground by a click", "The clicked surface lies at height 0, and up is its normal", None;
-    Screenshot, File, Nothing, "Screenshot of the window", "Writes a picture of the whole window into the current folder", key(Key::F12);
     Quit, File, Nothing, "Quit", "Closes the window", ctrl(Key::Q);
 
     Undo, Edit, Steady, "Undo", "Takes back the last change to objects or light", ctrl(Key::Z);
@@ -180,12 +179,12 @@ pub fn pressed(ctx: &egui::Context, start_page: bool) -> Vec<Action> {
         let Some(shortcut) = action.shortcut() else {
             continue;
         };
-        // Held rather than pressed; see `App::show_photograph`.
+        // Held rather than pressed; the tool bar looks at it.
         if action == Action::ShowPhotograph {
             continue;
         }
         let plain = shortcut.modifiers.is_none();
-        if plain && typing && !matches!(shortcut.logical_key, Key::F12 | Key::Escape) {
+        if plain && typing && shortcut.logical_key != Key::Escape {
             continue;
         }
         if ctx.input_mut(|input| input.consume_shortcut(&shortcut)) {

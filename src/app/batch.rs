@@ -30,14 +30,14 @@ impl Batch {
     ) -> Result<Self> {
         std::fs::create_dir_all(&folder).map_err(|error| Error::io(&folder, &error))?;
         let (into, wanted) = (folder.clone(), work.frames.len());
-        let task = Task::begin("photographs", wake, move |course| {
+        let task = Task::begin("photographs", wake, move |progress| {
             let shown = Cell::new(None);
             let tell = |doing: WriteProgress| {
                 if is_news(shown.get(), doing) {
                     shown.set(Some(doing));
-                    course.show(doing);
+                    progress.show(doing);
                 }
-                !course.is_ended()
+                !progress.is_cancelled()
             };
             work.write(&|frame| into.join(format!("{frame:03}")), &tell)
         })?;

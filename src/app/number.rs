@@ -1,4 +1,4 @@
-//! Numbers as people read them.
+//! Numbers and words as people read them.
 
 use glam::Vec3;
 
@@ -25,6 +25,13 @@ pub fn number(v: f32) -> String {
 pub fn triple(v: Vec3) -> String {
     let [r, g, b] = v.to_array().map(number);
     format!("{r} {g} {b}")
+}
+
+/// Words with a capital letter.
+pub fn capitalized(words: &str) -> String {
+    let mut letters = words.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).collect()
 }
 
 #[cfg(test)]

@@ -1,26 +1,26 @@
 //! Work on a thread of its own, which tells how far it is and can be ended.
 
 use crate::error::{Error, Result};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::JoinHandle;
 
 /// Work under way. `N` is what it shows on the way, `E` what it ends with. Dropping it asks it to end.
 pub struct Task<N, E> {
-    name: &'static str,
-    course: Arc<Course<N>>,
-    thread: Option<JoinHandle<Result<E>>>,
+    progress: Arc<Progress<N>>,
+    end: Receiver<std::result::Result<E, String>>,
 }
 
 /// What the thread tells and hears.
-pub struct Course<N> {
-    ended: AtomicBool,
+pub struct Progress<N> {
+    cancelled: AtomicBool,
     doing: Mutex<String>,
     newest: Mutex<Option<N>>,
     wake: Box<dyn Fn() + Send + Sync>,
 }
 
-impl<N> Course<N> {
+impl<N> Progress<N> {
     /// Says what is done now, in words.
     pub fn say(&self, doing: impl Into<String>) {
         *self.doing.lock().unwrap_or_else(PoisonError::into_inner) = doing.into();
@@ -34,8 +34,8 @@ impl<N> Course<N> {
     }
 
     /// Whether it is to end.
-    pub fn is_ended(&self) -> bool {
-        self.ended.load(Ordering::Relaxed)
+    pub fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
     }
 }
 
@@ -47,61 +47,53 @@ impl<N: Send + 'static, E: Send + 'static> Task<N, E> {
     pub fn begin(
         name: &'static str,
         wake: impl Fn() + Send + Sync + 'static,
-        work: impl FnOnce(&Course<N>) -> Result<E> + Send + 'static,
+        work: impl FnOnce(&Progress<N>) -> Result<E> + Send + 'static,
     ) -> Result<Self> {
-        let course = Arc::new(Course {
-            ended: AtomicBool::new(false),
+        let progress = Arc::new(Progress {
+            cancelled: AtomicBool::new(false),
             doing: Mutex::default(),
             newest: Mutex::new(None),
             wake: Box::new(wake),
         });
-        let shared = course.clone();
-        let thread = std::thread::Builder::new()
+        let shared = progress.clone();
+        let (sender, end) = channel();
+        std::thread::Builder::new()
             .name(name.to_owned())
             .spawn(move || {
-                let end = work(&shared);
+                let end = match catch_unwind(AssertUnwindSafe(|| work(&shared))) {
+                    Ok(end) => end.map_err(|error| error.to_string()),
+                    Err(_) => Err(format!("{name}: internal error; try again")),
+                };
+                // Nobody hears it where the task was dropped.
+                let _ = sender.send(end);
                 (shared.wake)();
-                end
             })
             .map_err(|error| Error::new(name, error, "close other programs and try again"))?;
-        Ok(Self {
-            name,
-            course,
-            thread: Some(thread),
-        })
+        Ok(Self { progress, end })
     }
 }
 
 impl<N, E> Task<N, E> {
     /// Asks it to end soon.
     pub fn cancel(&self) {
-        self.course.ended.store(true, Ordering::Relaxed);
-    }
-
-    /// Whether it was asked to end.
-    pub fn is_cancelled(&self) -> bool {
-        self.course.is_ended()
+        self.progress.cancelled.store(true, Ordering::Relaxed);
     }
 
     /// What it is at, in words.
     pub fn doing(&self) -> String {
-        let doing = self.course.doing.lock();
+        let doing = self.progress.doing.lock();
         doing.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// What it showed since the last call.
     pub fn newest(&self) -> Option<N> {
-        let newest = self.course.newest.lock();
+        let newest = self.progress.newest.lock();
         newest.unwrap_or_else(PoisonError::into_inner).take()
     }
 
     /// How it ended, once it has; to be asked after [`Task::newest`].
     pub fn end(&mut self) -> Option<std::result::Result<E, String>> {
-        let thread = self.thread.take_if(|thread| thread.is_finished())?;
-        Some(match thread.join() {
-            Ok(end) => end.map_err(|error| error.to_string()),
-            Err(_) => Err(format!("{}: internal error; try again", self.name)),
-        })
+        self.end.try_recv().ok()
     }
 }
 

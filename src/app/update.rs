@@ -126,7 +126,7 @@ impl App {
             render,
             layers,
         );
-        self.jobs.worker.send_view(key, || ViewRequest {
+        let request = ViewRequest {
             camera: match &shown.free {
                 Some((camera, _)) => ViewCamera::Free(camera.clone()),
                 None => ViewCamera::Frame(shown.frame),
@@ -135,7 +135,8 @@ impl App {
             composite,
             render,
             layers,
-        });
+        };
+        self.jobs.worker.send_view(key, request);
     }
 
     fn answered(&mut self, ask: Ask, answer: Option<PathBuf>, ctx: &egui::Context) {

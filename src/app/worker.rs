@@ -101,24 +101,27 @@ impl Worker {
     }
 
     /// Asks for a view where it differs from the last.
-    pub fn send_view(&mut self, key: ViewKey, request: impl FnOnce() -> ViewRequest) {
-        if self.sent.view != Some(key) && self.connection.send(Command::View(request())) {
-            self.sent.view = Some(key);
-        }
+    pub fn send_view(&mut self, key: ViewKey, request: ViewRequest) {
+        let Self {
+            connection, sent, ..
+        } = self;
+        told(&mut sent.view, &Some(key), || {
+            connection.send(Command::View(request))
+        });
     }
 
     /// Sends the inserted objects where they differ.
     pub fn send_insertions(&mut self, document: &Document) {
-        let finish = document.insertions.finish;
-        if finish != self.sent.finish && self.connection.send(Command::Match(finish)) {
-            self.sent.finish = finish;
-        }
-        let objects = &document.insertions.objects;
-        if *objects != self.sent.insertions
-            && self.connection.send(Command::Insert(objects.clone()))
-        {
-            self.sent.insertions.clone_from(objects);
-        }
+        let Self {
+            connection, sent, ..
+        } = self;
+        let (objects, finish) = (&document.insertions.objects, document.insertions.finish);
+        told(&mut sent.finish, &finish, || {
+            connection.send(Command::Match(finish))
+        });
+        told(&mut sent.insertions, objects, || {
+            connection.send(Command::Insert(objects.clone()))
+        });
     }
 
     /// Sends the regroupings where they differ, with the edits that belong to the objects after them.
@@ -140,9 +143,18 @@ impl Worker {
 
     /// Sends the edits where they differ.
     pub fn send_edits(&mut self, document: &Document) {
-        let edits = &document.edits;
-        if *edits != self.sent.edits && self.connection.send(Command::Edit(edits.clone())) {
-            self.sent.edits = edits.clone();
-        }
+        let Self {
+            connection, sent, ..
+        } = self;
+        told(&mut sent.edits, &document.edits, || {
+            connection.send(Command::Edit(document.edits.clone()))
+        });
+    }
+}
+
+/// Tells the worker a value where it differs from the last; it is kept as told unless the queue was full.
+fn told<T: Clone + PartialEq>(last: &mut T, value: &T, tell: impl FnOnce() -> bool) {
+    if last != value && tell() {
+        last.clone_from(value);
     }
 }

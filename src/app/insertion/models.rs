@@ -1,5 +1,6 @@
 //! The shapes of inserted objects, read on threads of their own, for boxes in the views.
 
+use crate::app::task::{Progress, Task};
 use crate::compose::object::ObjectModel;
 use crate::compose::object::surface::ObjectSurface;
 use crate::compose::placement::Placement;
@@ -9,34 +10,19 @@ use egui::{Color32, Painter, Pos2, Stroke};
 use glam::{DVec3, Vec3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, Sender, channel};
 
 /// An object's file, and its shape or why it cannot be read.
 pub type Read = (PathBuf, std::result::Result<(), String>);
 
 /// What is known of an object's file.
 enum Shape {
-    Reading,
+    Reading(Task<(), ObjectModel>),
     Read(ObjectModel),
 }
 
 /// Shapes by file.
-pub struct Models {
-    known: HashMap<PathBuf, Shape>,
-    sender: Sender<(PathBuf, Result<ObjectModel>)>,
-    receiver: Receiver<(PathBuf, Result<ObjectModel>)>,
-}
-
-impl Default for Models {
-    fn default() -> Self {
-        let (sender, receiver) = channel();
-        Self {
-            known: HashMap::new(),
-            sender,
-            receiver,
-        }
-    }
-}
+#[derive(Default)]
+pub struct Models(HashMap<PathBuf, Shape>);
 
 impl Models {
     /// Starts reading what is not known yet; gives the files that have been read since the last call.
@@ -45,35 +31,34 @@ impl Models {
             self.ask(ctx, &object.file);
         }
         let mut read = Vec::new();
-        while let Ok((file, model)) = self.receiver.try_recv() {
-            let known = model.map(|model| {
-                self.known.insert(file.clone(), Shape::Read(model));
-            });
-            // What cannot be read is tried again when it is asked for again.
-            if known.is_err() {
-                self.known.remove(&file);
-            }
-            read.push((file, known.map_err(|error| error.to_string())));
-        }
+        // What cannot be read is tried again when it is asked for again.
+        self.0.retain(|file, shape| {
+            let end = match shape {
+                Shape::Reading(task) => task.end(),
+                Shape::Read(_) => None,
+            };
+            let Some(end) = end else {
+                return true;
+            };
+            let end = end.map(|model| *shape = Shape::Read(model));
+            read.push((file.clone(), end.clone()));
+            end.is_ok()
+        });
         read
     }
 
     /// Starts reading a file unless it is known; true where it is read already.
     pub fn ask(&mut self, ctx: &egui::Context, file: &Path) -> bool {
-        if let Some(known) = self.known.get(file) {
+        if let Some(known) = self.0.get(file) {
             return matches!(known, Shape::Read(_));
         }
-        self.known.insert(file.to_owned(), Shape::Reading);
-        let (sender, ctx, file) = (self.sender.clone(), ctx.clone(), file.to_owned());
+        let (ctx, path) = (ctx.clone(), file.to_owned());
+        let wake = move || ctx.request_repaint();
+        let read = move |_: &Progress<()>| extent(&ObjectModel::read(&path)?);
         // Without a thread there is no box, and nothing else is lost.
-        let _ = std::thread::Builder::new()
-            .name("object".to_owned())
-            .spawn(move || {
-                let model = ObjectModel::read(&file).and_then(|model| extent(&model));
-                if sender.send((file, model)).is_ok() {
-                    ctx.request_repaint();
-                }
-            });
+        if let Ok(task) = Task::begin("object", wake, read) {
+            self.0.insert(file.to_owned(), Shape::Reading(task));
+        }
         false
     }
 
@@ -84,9 +69,9 @@ impl Models {
     }
 
     fn shape(&self, file: &Path) -> Option<&ObjectModel> {
-        match self.known.get(file)? {
+        match self.0.get(file)? {
             Shape::Read(model) => Some(model),
-            Shape::Reading => None,
+            Shape::Reading(_) => None,
         }
     }
 
@@ -168,7 +153,7 @@ mod tests {
         let model = ObjectModel::from_corners("cube", corners, material).expect("a model");
         let model = extent(&model).expect("it has a size");
         let mut models = Models::default();
-        models.known.insert("cube.obj".into(), Shape::Read(model));
+        models.0.insert("cube.obj".into(), Shape::Read(model));
         models
     }
 

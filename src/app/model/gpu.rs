@@ -2,7 +2,7 @@
 
 use crate::app::model::surface::Surface;
 use crate::app::model::view::Colors;
-use crate::app::picture::gpu::over_screen;
+use crate::app::picture::gpu::{bind, over_screen};
 use eframe::egui_wgpu::{CallbackResources, CallbackTrait, RenderState, ScreenDescriptor};
 use egui::PaintCallbackInfo;
 use std::sync::Arc;
@@ -162,30 +162,25 @@ impl CallbackTrait for MeshPaint {
 impl Meshes {
     /// Brings faces and colours up to date.
     fn upload(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, paint: &MeshPaint) {
-        let changed = |target: &mut Option<Target>| {
-            if let Some(target) = target {
-                target.shows = None;
-            }
-        };
+        let mut changed = false;
         if !matches!(&self.corners, Some((surface, _)) if Arc::ptr_eq(surface, &paint.surface)) {
-            let points: Vec<[f32; 3]> = paint
-                .surface
-                .corners
-                .iter()
-                .flat_map(|corners| corners.map(|p| p.to_array()))
-                .collect();
+            let corners = paint.surface.corners.iter();
+            let points: Vec<[f32; 3]> = corners.flat_map(|c| c.map(|p| p.to_array())).collect();
             let buffer = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
                 label: Some("faces"),
                 contents: bytemuck::cast_slice(&points),
                 usage: wgpu::BufferUsages::VERTEX,
             });
             self.corners = Some((paint.surface.clone(), buffer));
-            changed(&mut self.target);
+            changed = true;
         }
         if !matches!(&self.colors, Some((colors, _)) if Arc::ptr_eq(colors, &paint.colors)) {
             let group = self.color_group(device, queue, &paint.colors);
             self.colors = Some((paint.colors.clone(), group));
-            changed(&mut self.target);
+            changed = true;
+        }
+        if let Some(target) = self.target.as_mut().filter(|_| changed) {
+            target.shows = None;
         }
     }
 
@@ -217,21 +212,7 @@ impl Meshes {
             wgpu::util::TextureDataOrder::LayerMajor,
             bytemuck::cast_slice(&texels),
         );
-        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("faces"),
-            layout: &self.mesh_pipeline.get_bind_group_layout(0),
-            entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: self.uniform.as_entire_binding(),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: wgpu::BindingResource::TextureView(&view),
-                },
-            ],
-        })
+        bind(device, &self.mesh_pipeline, &self.uniform, &texture)
     }
 
     /// Draws the faces, unless the picture already shows them so.

@@ -88,11 +88,11 @@ impl ModelView {
 fn make(ctx: &egui::Context, capture: &Arc<OpenCapture>) -> Option<Task<Made, ()>> {
     let (ctx, capture) = (ctx.clone(), capture.clone());
     let wake = move || ctx.request_repaint();
-    let made = Task::begin("3D view", wake, move |course| {
+    let made = Task::begin("3D view", wake, move |progress| {
         let surface = Arc::new(Surface::new(&capture.scene));
-        course.show((surface.clone(), Vec::new()));
-        if !course.is_ended() {
-            course.show((surface.clone(), surface.photographed(&capture)));
+        progress.show((surface.clone(), Vec::new()));
+        if !progress.is_cancelled() {
+            progress.show((surface.clone(), surface.photographed(&capture)));
         }
         Ok(())
     });

@@ -1,11 +1,10 @@
 //! The loss curve on a logarithmic axis, with the held-out loss and the ends of stages.
 
-use crate::app::number::number;
-use crate::app::panels::plot::decades;
+use crate::app::panels::plot::{at, decades, hovered, legend};
 use crate::app::theme;
 use crate::inverse::solver::{LossPoint, Progress};
 use egui::Ui;
-use egui_plot::{Corner, HoverPosition, Legend, Line, LineStyle, Plot, PlotPoints, Points, VLine};
+use egui_plot::{Line, LineStyle, Plot, PlotPoints, Points, VLine};
 
 /// Points drawn of a curve at most.
 const POINTS: usize = 2000;
@@ -31,32 +30,20 @@ pub fn pane(ui: &mut Ui, progress: &Progress) {
         marks.push((end, stage.name.clone()));
     }
     Plot::new("loss")
-        .legend(
-            Legend::default()
-                // Falling curves leave this corner free.
-                .position(Corner::LeftBottom)
-                .background_alpha(0.6),
-        )
-        .y_axis_formatter(|mark, _| power_of_ten(mark.value))
+        .legend(legend())
+        .y_axis_formatter(|mark, _| at(mark.value))
         .x_axis_formatter(|mark, _| format!("{} s", mark.value))
-        .label_formatter(|position| match position {
-            HoverPosition::NearDataPoint {
-                plot_name,
-                position,
-                ..
-            } => Some(format!(
-                "{plot_name}\n{:.1} s: {}",
-                position.x,
-                number(10f64.powf(position.y) as f32)
-            )),
-            HoverPosition::Elsewhere { .. } => None,
+        .label_formatter(|position| {
+            hovered(position, |name, p| {
+                format!("{name}\n{:.1} s: {}", p.x, at(p.y))
+            })
         })
         .y_grid_spacer(decades)
         .y_axis_min_width(36.0)
         .show(ui, |plot| {
-            for (at, name) in marks {
+            for (end, name) in marks {
                 plot.vline(
-                    VLine::new(name, at)
+                    VLine::new(name, end)
                         .color(tokens.outline)
                         .style(LineStyle::dashed_loose()),
                 );
@@ -98,10 +85,6 @@ fn logarithmic(points: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
         thinned.push(last);
     }
     thinned
-}
-
-fn power_of_ten(exponent: f64) -> String {
-    number(10f64.powf(exponent) as f32)
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
-//! Grid lines of logarithmic axes.
+//! What plots with logarithmic axes share.
 
-use egui_plot::{GridInput, GridMark, log_grid_spacer};
+use crate::app::number::number;
+use egui_plot::{Corner, GridInput, GridMark, HoverPosition, Legend, PlotPoint, log_grid_spacer};
 
 /// Decades of an axis below and above which its lines are spaced evenly.
 const NARROW: f64 = 0.5;
@@ -26,10 +27,35 @@ pub fn decades(input: GridInput) -> Vec<GridMark> {
         .collect()
 }
 
+/// The number that a place on such an axis stands for, in words.
+pub fn at(logarithm: f64) -> String {
+    number(10f64.powf(logarithm) as f32)
+}
+
+/// A legend in the corner that falling curves leave free.
+pub fn legend() -> Legend {
+    let legend = Legend::default().position(Corner::LeftBottom);
+    legend.background_alpha(0.6)
+}
+
+/// What is said of a point of a curve under the pointer, from its name and place; nothing elsewhere.
+pub fn hovered(
+    position: &HoverPosition<'_>,
+    say: impl Fn(&str, PlotPoint) -> String,
+) -> Option<String> {
+    match position {
+        HoverPosition::NearDataPoint {
+            plot_name,
+            position,
+            ..
+        } => Some(say(plot_name, *position)),
+        HoverPosition::Elsewhere { .. } => None,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::number::number;
 
     #[test]
     fn logarithmic_axes_have_lines_at_round_values() {
@@ -38,9 +64,7 @@ mod tests {
             base_step_size: 0.01,
         };
         let labelled = decades(input).into_iter().filter(|m| m.step_size > 0.1);
-        let values: Vec<String> = labelled
-            .map(|m| number(10f64.powf(m.value) as f32))
-            .collect();
+        let values: Vec<String> = labelled.map(|mark| at(mark.value)).collect();
         let expected = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0].map(number);
         assert_eq!(values, expected);
     }

@@ -1,6 +1,7 @@
 //! The solver's parameters: widgets made from the one table that declares them.
 
 use crate::app::controls::named;
+use crate::app::number::capitalized;
 use crate::app::request::{Request, Requests};
 use crate::app::theme;
 use crate::inverse::settings::{Kind, PARAMETERS, Parameter, Settings, Value};
@@ -17,7 +18,7 @@ pub fn pane(ui: &mut Ui, before: &Settings, requests: &mut Requests) {
             .show(ui, |ui| {
                 for parameter in PARAMETERS {
                     let before = parameter.get(&settings);
-                    let title = title(parameter);
+                    let title = capitalized(&parameter.name.replace('_', " "));
                     let help = help(parameter);
                     ui.label(&title).on_hover_text(&help);
                     let mut value = before.clone();
@@ -47,15 +48,6 @@ pub fn pane(ui: &mut Ui, before: &Settings, requests: &mut Requests) {
     if settings != *before {
         requests.ask(Request::Set(Box::new(settings)));
     }
-}
-
-/// The name in words.
-fn title(parameter: &Parameter) -> String {
-    let words = parameter.name.replace('_', " ");
-    let mut letters = words.chars();
-    letters.next().map_or_else(String::new, |first| {
-        first.to_uppercase().collect::<String>() + letters.as_str()
-    })
 }
 
 /// Help, unit and range.

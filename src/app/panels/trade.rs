@@ -2,8 +2,7 @@
 
 use crate::app::action::Action;
 use crate::app::document::Document;
-use crate::app::number::number;
-use crate::app::panels::plot::decades;
+use crate::app::panels::plot::{at, decades, hovered, legend};
 use crate::app::request::{Request, Requests};
 use crate::app::theme::{self, Tokens};
 use crate::app::trade::choice::{Stop, offers, stop_at};
@@ -12,10 +11,7 @@ use crate::inverse::settings::{Preset, Settings};
 use crate::session::snapshot::Snapshot;
 use crate::study::trade::{Curve, Point, Trade};
 use egui::{Button, Color32, DragValue, Pos2, Ui};
-use egui_plot::{
-    Corner, HoverPosition, Legend, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints,
-    Points, VLine,
-};
+use egui_plot::{Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints, Points, VLine};
 
 /// How near to a point a click must be, in points of the screen.
 const REACH: f32 = 14.0;
@@ -118,30 +114,22 @@ fn plot(
     let vertical = view.vertical;
     let height = move |point: &Point| height(point, vertical);
     let percent = vertical == Vertical::Claimed;
-    let value = move |log: f64| {
-        let value = number(10f64.powf(log) as f32);
-        if percent { format!("{value} %") } else { value }
+    let value = move |log: f64| match percent {
+        true => format!("{} %", at(log)),
+        false => at(log),
     };
     let mut drawn = Plot::new("trade");
     // A legend would cover a small plot.
     if ui.available_height() > LEGEND {
-        let legend = Legend::default().position(Corner::LeftBottom);
-        drawn = drawn.legend(legend.background_alpha(0.6));
+        drawn = drawn.legend(legend());
     }
     let response = drawn
-        .x_axis_formatter(|mark, _| format!("{} s", number(10f64.powf(mark.value) as f32)))
+        .x_axis_formatter(|mark, _| format!("{} s", at(mark.value)))
         .y_axis_formatter(move |mark, _| value(mark.value))
-        .label_formatter(move |position| match position {
-            HoverPosition::NearDataPoint {
-                plot_name,
-                position,
-                ..
-            } => Some(format!(
-                "{plot_name}\n{} s: {}",
-                number(10f64.powf(position.x) as f32),
-                value(position.y)
-            )),
-            HoverPosition::Elsewhere { .. } => None,
+        .label_formatter(move |position| {
+            hovered(position, |name, p| {
+                format!("{name}\n{} s: {}", at(p.x), value(p.y))
+            })
         })
         .x_grid_spacer(decades)
         .y_grid_spacer(decades)
@@ -158,11 +146,8 @@ fn plot(
                     }
                 }
                 if curve.is_preset {
-                    plot.line(
-                        Line::new(&curve.name, PlotPoints::from(line.clone()))
-                            .color(color)
-                            .width(1.6),
-                    );
+                    let line = Line::new(&curve.name, PlotPoints::from(line.clone()));
+                    plot.line(line.color(color).width(1.6));
                 }
                 plot.points(Points::new(&curve.name, line).color(color).radius(2.2));
             }
@@ -171,29 +156,17 @@ fn plot(
                 .filter_map(|point| Some([point.seconds.log10(), height(point)?]))
                 .collect();
             if !percent {
-                plot.points(
-                    Points::new("Pareto front", front)
-                        .shape(MarkerShape::Circle)
-                        .filled(false)
-                        .color(tokens.strong)
-                        .radius(4.0),
-                );
+                let front = Points::new("Pareto front", front).shape(MarkerShape::Circle);
+                plot.points(front.filled(false).color(tokens.strong).radius(4.0));
             }
             if let Some((seconds, claim)) = now {
                 let x = seconds.log10();
-                plot.vline(
-                    VLine::new("running solve", x)
-                        .color(tokens.accent)
-                        .style(LineStyle::dashed_loose()),
-                );
+                let line = VLine::new("running solve", x).color(tokens.accent);
+                plot.vline(line.style(LineStyle::dashed_loose()));
                 if let Some(claim) = claim.filter(|_| percent) {
-                    let at = vec![[x, (claim * 100.0).log10()]];
-                    plot.points(
-                        Points::new("running solve", at)
-                            .shape(MarkerShape::Diamond)
-                            .color(tokens.accent)
-                            .radius(6.0),
-                    );
+                    let here = vec![[x, (claim * 100.0).log10()]];
+                    let here = Points::new("running solve", here).shape(MarkerShape::Diamond);
+                    plot.points(here.color(tokens.accent).radius(6.0));
                 }
             }
             places

@@ -20,7 +20,6 @@ use crate::app::shell::sheet::Sheet;
 use crate::app::state::App;
 use crate::app::tool::Pick;
 use crate::inverse::settings::Settings;
-use crate::say;
 use crate::session::command::{Command, Source};
 use crate::session::edits::{Edits, ObjectEdit};
 use crate::session::snapshot::{Level, Phase};
@@ -156,7 +155,6 @@ impl App {
             Action::Probe => self.view.tool.pick(Pick::Probe),
             Action::SetScale => self.view.tool.pick(Pick::Length(None)),
             Action::SetGround => self.view.tool.pick(Pick::Ground),
-            Action::Screenshot => self.screenshot(ctx),
             Action::Quit => ctx.send_viewport_cmd(ViewportCommand::Close),
 
             Action::Undo | Action::Redo => self.undo_or_redo(action == Action::Undo),
@@ -390,30 +388,5 @@ impl App {
             Some(_) => None,
             None => Some((camera, 0)),
         };
-    }
-
-    fn screenshot(&mut self, ctx: &Context) {
-        let path = (1..)
-            .map(|n| std::path::PathBuf::from(format!("relit-{n}.png")))
-            .find(|path| !path.exists())
-            .unwrap_or_default();
-        self.say(Level::Info, format!("screenshot: {}", path.display()));
-        let finished = egui::ScreenshotCallback::new(move |image| {
-            let bytes: Vec<u8> = image
-                .pixels
-                .iter()
-                .flat_map(|p| [p.r(), p.g(), p.b()])
-                .collect();
-            let [width, height] = image.size.map(|side| side as u32);
-            if let Some(picture) = image::RgbImage::from_raw(width, height, bytes)
-                && let Err(error) = picture.save(&path)
-            {
-                say::aside(format_args!(
-                    "{}: {error}; choose a folder that can be written",
-                    path.display()
-                ));
-            }
-        });
-        ctx.send_viewport_cmd(ViewportCommand::Screenshot(finished));
     }
 }

@@ -3,7 +3,7 @@
 use crate::app::insertion::is_object;
 use crate::app::layout::Pane;
 use crate::app::state::App;
-use crate::app::task::{Course, Task};
+use crate::app::task::{Progress, Task};
 use crate::capture::import::{self, ImportOptions};
 use crate::capture::read::CAMERAS;
 use crate::error::{Error, Result};
@@ -55,7 +55,7 @@ impl App {
         }
         let ctx = ctx.clone();
         let (from, into) = (source.to_owned(), out.clone());
-        let work = move |course: &Course<()>| import(course, &from, &into);
+        let work = move |progress: &Progress<()>| import(progress, &from, &into);
         match Task::begin("import", move || ctx.request_repaint(), work) {
             Ok(task) => self.jobs.importing = Some((out, task)),
             Err(error) => self.view.shell.start.trouble = Some(error.to_string()),
@@ -94,19 +94,19 @@ impl App {
     }
 }
 
-fn import(course: &Course<()>, source: &Path, out: &Path) -> Result<Vec<String>> {
-    course.say("looking for a scan");
+fn import(progress: &Progress<()>, source: &Path, out: &Path) -> Result<Vec<String>> {
+    progress.say("looking for a scan");
     let scan = import::read(source, &ImportOptions::default(), &mut |done, all| {
-        course.say(format!("{done} of {all} depth images fused"));
+        progress.say(format!("{done} of {all} depth images fused"));
     })?;
-    if course.is_ended() {
+    if progress.is_cancelled() {
         return Err(Error::file(
             source,
             "the import was cancelled",
             "import it again",
         ));
     }
-    course.say("writing the capture");
+    progress.say("writing the capture");
     export::import::write(out, &scan)?;
     Ok(scan.remarks)
 }

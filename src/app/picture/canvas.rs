@@ -1,9 +1,8 @@
-//! A pane with one picture: zoom and pan shared by all, clicks that select or place, numbers inside large pixels.
+//! A pane with one picture: zoom and pan shared by all, clicks that select or place.
 
 use crate::app::controls::named;
 use crate::app::document::Document;
 use crate::app::insertion::handles::Along;
-use crate::app::number::number;
 use crate::app::picture::drawn::Drawn;
 use crate::app::picture::gpu::PicturePaint;
 use crate::app::picture::inspect;
@@ -14,8 +13,7 @@ use crate::app::shown::ray;
 use crate::app::theme;
 use crate::app::view::ViewState;
 use crate::scene::camera::Camera;
-use crate::session::snapshot::Picture;
-use egui::{Align2, Color32, FontId, Pos2, Rect, Response, Role, Sense, Ui, vec2};
+use egui::{Color32, Pos2, Rect, Response, Role, Sense, Ui, vec2};
 
 /// Draws the pane of one picture.
 pub fn pane(
@@ -145,27 +143,25 @@ fn on_screen(camera: &Camera, placement: Rect, point: glam::Vec3) -> Option<Pos2
 
 /// Draws the picture itself.
 pub fn paint(ui: &Ui, view: &ViewState, rect: Rect, drawn: &Drawn, slot: egui::Id) {
-    let tokens = theme::tokens(ui);
     let paint = PicturePaint {
-        objects: drawn.objects.clone(),
-        shading: drawn.quantity.shading(),
-        range: drawn.range,
-        smooth: drawn.quantity.shading() == Shading::Radiance,
+        slot,
+        drawn: drawn.clone(),
+        look: view.look.clone(),
+        pane: rect,
         selected: view.selection.object,
-        ..PicturePaint::new(slot, drawn.picture.clone(), rect, &view.look, tokens)
+        tokens: theme::tokens(ui),
     };
     let paint = eframe::egui_wgpu::Callback::new_paint_callback(rect, paint);
     ui.painter().add(paint);
 }
 
-/// What lies over the picture: cursor, legend, numbers, handles of inserted objects.
+/// What lies over the picture: cursor, legend, handles of inserted objects.
 pub fn overlay(ui: &Ui, document: &Document, view: &ViewState, rect: Rect, drawn: &Drawn) {
     let tokens = theme::tokens(ui);
     let size = [drawn.picture.width, drawn.picture.height];
     let placement = view.look.placement(rect, size);
     let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
 
-    numbers(&painter, rect, placement, &drawn.picture);
     handles(ui, document, view, rect, placement);
 
     // The cursor of the pane that the pointer is in, in all the others.
@@ -188,42 +184,6 @@ pub fn overlay(ui: &Ui, document: &Document, view: &ViewState, rect: Rect, drawn
     let shading = drawn.quantity.shading();
     if matches!(shading, Shading::Signed | Shading::Positive) {
         inspect::legend(ui, rect, drawn);
-    }
-}
-
-/// The colours that the numbers of red, green and blue are written in.
-const CHANNELS: [Color32; 3] = [
-    Color32::from_rgb(255, 120, 110),
-    Color32::from_rgb(120, 235, 120),
-    Color32::from_rgb(130, 175, 255),
-];
-
-/// Writes each pixel's three numbers into it once it is large enough.
-fn numbers(painter: &egui::Painter, rect: Rect, placement: Rect, picture: &Picture) {
-    let side = placement.width() / picture.width.max(1) as f32;
-    if side < 44.0 {
-        return;
-    }
-    let first = ((rect.min - placement.min) / side).floor();
-    let first = first.max(vec2(0.0, 0.0));
-    let last = ((rect.max - placement.min) / side).ceil();
-    let font = FontId::monospace((side * 0.17).min(13.0));
-    let write = |at, text, color| {
-        painter.text(at, Align2::CENTER_CENTER, text, font.clone(), color);
-    };
-    for j in first.y as u32..(last.y.max(0.0) as u32).min(picture.height) {
-        for i in first.x as u32..(last.x.max(0.0) as u32).min(picture.width) {
-            let Some(value) = picture.pixels.get((j * picture.width + i) as usize) else {
-                continue;
-            };
-            let center = placement.min + vec2(i as f32 + 0.5, j as f32 + 0.5) * side;
-            for (k, (v, color)) in value.to_array().into_iter().zip(CHANNELS).enumerate() {
-                let at = center + vec2(0.0, (k as f32 - 1.0) * font.size * 1.25);
-                // A shadow keeps the numbers readable on any picture.
-                write(at + vec2(1.0, 1.0), number(v), Color32::BLACK);
-                write(at, number(v), color);
-            }
-        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Linear pictures on the graphics card: uploads on change, and the paint callback that draws them.
 
-use crate::app::picture::look::{Look, ToneCurve};
+use crate::app::picture::drawn::Drawn;
+use crate::app::picture::look::Look;
 use crate::app::picture::quantity::Shading;
 use crate::app::picture::ramp;
 use crate::app::theme::Tokens;
@@ -37,23 +38,11 @@ pub struct PicturePaint {
     /// Which texture to keep it in: one for each pane and side.
     pub slot: egui::Id,
     /// The picture.
-    pub picture: Arc<Picture>,
-    /// Object index of each pixel, for outlines.
-    pub objects: Option<Arc<Vec<u32>>>,
+    pub drawn: Drawn,
+    /// How it is looked at.
+    pub look: Look,
     /// The pane, in points.
     pub pane: Rect,
-    /// Where the picture lies, in points.
-    pub placement: Rect,
-    /// How numbers become colours.
-    pub shading: Shading,
-    /// Magnitude at the end of false colours.
-    pub range: f32,
-    /// Factor on radiance.
-    pub exposure: f32,
-    /// Tone curve of radiance.
-    pub tone: ToneCurve,
-    /// Whether enlarged pixels are blended into each other, as long as they are small.
-    pub smooth: bool,
     /// Object to outline.
     pub selected: Option<u32>,
     /// Colours.
@@ -61,51 +50,28 @@ pub struct PicturePaint {
 }
 
 impl PicturePaint {
-    /// The picture as `look` shows it in `pane`.
-    pub fn new(
-        slot: egui::Id,
-        picture: Arc<Picture>,
-        pane: Rect,
-        look: &Look,
-        tokens: &'static Tokens,
-    ) -> Self {
-        let placement = look.placement(pane, [picture.width, picture.height]);
-        Self {
-            slot,
-            picture,
-            objects: None,
-            pane,
-            placement,
-            shading: Shading::Radiance,
-            range: 1.0,
-            exposure: look.exposure.exp2(),
-            tone: look.tone,
-            smooth: false,
-            selected: None,
-            tokens,
-        }
-    }
-
     fn uniform(&self, pixels_per_point: f32) -> ViewUniform {
-        let size = egui::vec2(self.picture.width as f32, self.picture.height as f32);
-        let step = size / self.placement.size();
-        let origin = (self.pane.min - self.placement.min) * step;
+        let Drawn { picture, range, .. } = &self.drawn;
+        let shading = self.drawn.quantity.shading();
+        let size = [picture.width, picture.height];
+        let placement = self.look.placement(self.pane, size);
+        let step = egui::Vec2::from(size.map(|side| side as f32)) / placement.size();
+        let origin = (self.pane.min - placement.min) * step;
         let corner = self.pane.min.to_vec2() * pixels_per_point;
+        let enlarged = step.x > SMOOTH_STEP && step.x < 1.0;
         ViewUniform {
             origin: origin.into(),
             step: (step / pixels_per_point).into(),
             corner: [corner.x.round(), corner.y.round()],
-            exposure: self.exposure,
-            tone: self.tone as u32,
-            shading: self.shading as u32,
-            range: self.range,
+            exposure: self.look.exposure.exp2(),
+            tone: self.look.tone as u32,
+            shading: shading as u32,
+            range: *range,
             selected: self.selected.map_or(-1.0, |object| object as f32),
-            smooth: f32::from(u8::from(
-                self.smooth && step.x > SMOOTH_STEP && step.x < 1.0,
-            )),
+            smooth: f32::from(u8::from(enlarged && shading == Shading::Radiance)),
             surround: rgba(self.tokens.surround),
             outline: rgba(self.tokens.accent),
-            ramp: ramp::stops(self.shading).map(|[r, g, b]| [r, g, b, 1.0]),
+            ramp: ramp::stops(shading).map(|[r, g, b]| [r, g, b, 1.0]),
         }
     }
 }
@@ -123,8 +89,7 @@ struct Pictures {
 
 /// One picture on the card, and what it was made from.
 struct Slot {
-    picture: Arc<Picture>,
-    objects: Option<Arc<Vec<u32>>>,
+    drawn: Drawn,
     texture: wgpu::Texture,
     uniform: wgpu::Buffer,
     bind_group: wgpu::BindGroup,
@@ -190,13 +155,13 @@ impl CallbackTrait for PicturePaint {
         };
         let size = |picture: &Picture| [picture.width, picture.height];
         let known = pictures.slots.remove(&self.slot);
-        let slot = match known.filter(|slot| size(&slot.picture) == size(&self.picture)) {
+        let slot = match known.filter(|slot| size(&slot.drawn.picture) == size(&self.drawn.picture))
+        {
             None => Slot::new(device, queue, &pictures.pipeline, self),
             Some(mut slot) => {
                 if !slot.shows(self) {
-                    slot.picture = self.picture.clone();
-                    slot.objects = self.objects.clone();
-                    upload(queue, &slot.texture, &self.picture, self.objects.as_deref());
+                    slot.drawn = self.drawn.clone();
+                    upload(queue, &slot.texture, &self.drawn);
                 }
                 slot
             }
@@ -233,7 +198,7 @@ impl Slot {
     ) -> Self {
         let texture = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("picture"),
-            size: extent(&paint.picture),
+            size: extent(&paint.drawn.picture),
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
@@ -241,30 +206,15 @@ impl Slot {
             usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         });
-        upload(queue, &texture, &paint.picture, paint.objects.as_deref());
+        upload(queue, &texture, &paint.drawn);
         let uniform = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: Some("picture view"),
             contents: bytemuck::bytes_of(&paint.uniform(1.0)),
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
         });
-        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("picture"),
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: uniform.as_entire_binding(),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: wgpu::BindingResource::TextureView(&view),
-                },
-            ],
-        });
+        let bind_group = bind(device, pipeline, &uniform, &texture);
         Self {
-            picture: paint.picture.clone(),
-            objects: paint.objects.clone(),
+            drawn: paint.drawn.clone(),
             texture,
             uniform,
             bind_group,
@@ -272,8 +222,9 @@ impl Slot {
     }
 
     fn shows(&self, paint: &PicturePaint) -> bool {
-        let place = |objects: &Option<Arc<Vec<u32>>>| objects.as_ref().map(Arc::as_ptr);
-        place(&self.objects) == place(&paint.objects) && Arc::ptr_eq(&self.picture, &paint.picture)
+        let place = |drawn: &Drawn| drawn.objects.as_ref().map(Arc::as_ptr);
+        let same = Arc::ptr_eq(&self.drawn.picture, &paint.drawn.picture);
+        same && place(&self.drawn) == place(&paint.drawn)
     }
 }
 
@@ -285,25 +236,40 @@ fn extent(picture: &Picture) -> wgpu::Extent3d {
     }
 }
 
-/// Writes a picture, with the object index of each pixel in alpha (−1 where none is known).
-fn upload(
-    queue: &wgpu::Queue,
+/// Binds a uniform block and a texture to a pipeline that reads these two.
+pub fn bind(
+    device: &wgpu::Device,
+    pipeline: &wgpu::RenderPipeline,
+    uniform: &wgpu::Buffer,
     texture: &wgpu::Texture,
-    picture: &Picture,
-    objects: Option<&Vec<u32>>,
-) {
+) -> wgpu::BindGroup {
+    let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+    let resources = [
+        uniform.as_entire_binding(),
+        wgpu::BindingResource::TextureView(&view),
+    ];
+    let entries = [0, 1].map(|binding| wgpu::BindGroupEntry {
+        binding,
+        resource: resources[binding as usize].clone(),
+    });
+    device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout: &pipeline.get_bind_group_layout(0),
+        entries: &entries,
+    })
+}
+
+/// Writes a picture, with the object index of each pixel in alpha (−1 where none is known).
+fn upload(queue: &wgpu::Queue, texture: &wgpu::Texture, drawn: &Drawn) {
+    let picture = &drawn.picture;
+    let objects = drawn.objects.as_ref();
     let objects = objects.filter(|objects| objects.len() == picture.pixels.len());
-    let texels: Vec<[f32; 4]> = picture
-        .pixels
-        .iter()
-        .enumerate()
-        .map(|(index, p)| {
-            let object = objects.map_or(-1.0, |objects| match objects[index] {
-                u32::MAX => -1.0,
-                object => object as f32,
-            });
-            [p.x, p.y, p.z, object]
-        })
+    let object = |index: usize| match objects.map(|objects| objects[index]) {
+        None | Some(u32::MAX) => -1.0,
+        Some(object) => object as f32,
+    };
+    let texels: Vec<[f32; 4]> = (picture.pixels.iter().enumerate())
+        .map(|(index, p)| p.extend(object(index)).to_array())
         .collect();
     let size = extent(picture);
     if texels.len() != (size.width * size.height) as usize {

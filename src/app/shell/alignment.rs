@@ -1,6 +1,7 @@
 //! What the window offers where photographs do not show the mesh from their poses.
 
 use crate::app::document::Document;
+use crate::app::number::capitalized;
 use crate::app::request::{Request, Requests};
 use crate::capture::reading::Reading;
 use crate::session::command::Command;
@@ -43,10 +44,8 @@ pub fn show(ctx: &Context, document: &Document, requests: &mut Requests) {
 
 /// What the button that reads the capture so says.
 fn button(reading: &Reading) -> String {
-    let words = reading.words();
-    let mut letters = words.chars();
-    match letters.next() {
-        Some(first) => first.to_uppercase().chain(letters).collect(),
-        None => "Read the files by their format's conventions".to_owned(),
+    match reading.words() {
+        words if words.is_empty() => "Read the files by their format's conventions".to_owned(),
+        words => capitalized(&words),
     }
 }

@@ -1,7 +1,7 @@
 //! File dialogs on a thread of their own, so that the window goes on while one is open.
 
+use crate::app::task::Task;
 use std::path::PathBuf;
-use std::sync::mpsc::{Receiver, Sender, channel};
 
 /// What a dialog asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,51 +16,25 @@ pub enum Ask {
     Object,
 }
 
-/// The dialogs' mailbox.
-#[derive(Debug)]
-pub struct Dialogs {
-    sender: Sender<(Ask, Option<PathBuf>)>,
-    receiver: Receiver<(Ask, Option<PathBuf>)>,
-    open: bool,
-}
-
-impl Default for Dialogs {
-    fn default() -> Self {
-        let (sender, receiver) = channel();
-        Self {
-            sender,
-            receiver,
-            open: false,
-        }
-    }
-}
+/// The dialog that is open.
+#[derive(Default)]
+pub struct Dialogs(Option<(Ask, Task<(), Option<PathBuf>>)>);
 
 impl Dialogs {
-    /// Opens a dialog unless one is open. `answered` is called on the dialog's thread when it has closed.
-    pub fn open(&mut self, ask: Ask, answered: impl FnOnce() + Send + 'static) {
-        if self.open {
-            return;
+    /// Opens a dialog unless one is open. `wake` is called when it has closed.
+    pub fn open(&mut self, ask: Ask, wake: impl Fn() + Send + Sync + 'static) {
+        if self.0.is_none() {
+            let task = Task::begin("file dialog", wake, move |_| Ok(choose(ask)));
+            self.0 = task.ok().map(|task| (ask, task));
         }
-        let sender = self.sender.clone();
-        let spawned = std::thread::Builder::new()
-            .name("file dialog".to_owned())
-            .spawn(move || {
-                // Where there is no portal and no dialog program the answer is the same as for Cancel.
-                let answer = std::panic::catch_unwind(|| choose(ask)).ok().flatten();
-                if sender.send((ask, answer)).is_ok() {
-                    answered();
-                }
-            });
-        self.open = spawned.is_ok();
     }
 
-    /// The answer of a dialog that has closed since the last call.
+    /// The answer of a dialog that has closed. Where there is no portal and no dialog program it is the same as for Cancel.
     pub fn take(&mut self) -> Option<(Ask, Option<PathBuf>)> {
-        let answer = self.receiver.try_recv().ok();
-        if answer.is_some() {
-            self.open = false;
-        }
-        answer
+        let (ask, task) = self.0.as_mut()?;
+        let answer = (*ask, task.end()?.ok().flatten());
+        self.0 = None;
+        Some(answer)
     }
 }
 

@@ -3,32 +3,22 @@
 use crate::app::action::{Action, Menu};
 use egui::{Grid, ScrollArea, Window};
 
-/// What the mouse does: where, how, what.
-const MOUSE: [(&str, &str); 14] = [
-    (
-        "Picture: wheel",
-        "Zoom to the pointer, in all pictures at once",
-    ),
-    ("Picture: drag", "Pan"),
-    (
-        "Picture: click",
-        "Select the object, or place the chosen one",
-    ),
-    ("Picture: double click", "Fit"),
-    (
-        "Inserted object: drag its foot",
-        "Move it over surfaces; with Shift up and down, with Ctrl on its level",
-    ),
-    ("Inserted object: drag the ring beside it", "Turn"),
-    ("Inserted object: drag the square above it", "Scale"),
-    ("3D view: drag", "Orbit"),
-    ("3D view: right drag, middle drag, Shift + drag", "Pan"),
-    ("3D view: wheel", "Zoom to the pointer"),
-    ("3D view: W A S D, Q E", "Fly; with Shift faster"),
-    ("3D view: click", "Select, place, or look through a camera"),
-    ("3D view: double click", "Turn about this depth"),
-    ("Tab: drag", "Move a pane"),
-];
+/// What the mouse does: where and how, and what.
+const MOUSE: &str = "\
+Picture: wheel | Zoom to the pointer, in all pictures at once
+Picture: drag | Pan
+Picture: click | Select the object, or place the chosen one
+Picture: double click | Fit
+Inserted object: drag its foot | Move it over surfaces; with Shift up and down, with Ctrl on its level
+Inserted object: drag the ring beside it | Turn
+Inserted object: drag the square above it | Scale
+3D view: drag | Orbit
+3D view: right drag, middle drag, Shift + drag | Pan
+3D view: wheel | Zoom to the pointer
+3D view: W A S D, Q E | Fly; with Shift faster
+3D view: click | Select, place, or look through a camera
+3D view: double click | Turn about this depth
+Tab: drag | Move a pane";
 
 /// Draws the window while it is open.
 pub fn show(ctx: &egui::Context, open: &mut bool) {
@@ -62,7 +52,9 @@ pub fn show(ctx: &egui::Context, open: &mut bool) {
                         .num_columns(2)
                         .striped(true)
                         .show(ui, |ui| {
-                            for (how, what) in MOUSE {
+                            for (how, what) in
+                                MOUSE.lines().filter_map(|line| line.split_once(" | "))
+                            {
                                 ui.label(how);
                                 ui.label(what);
                                 ui.end_row();

@@ -1,6 +1,6 @@
 //! Measuring on a thread of its own.
 
-use crate::app::task::{Course, Task};
+use crate::app::task::{Progress, Task};
 use crate::error::Result;
 use crate::inverse::settings::Settings;
 use crate::session::snapshot::OpenCapture;
@@ -29,20 +29,20 @@ impl Measuring {
     ) -> Result<Self> {
         let subject = capture.clone();
         let limit = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
-        let task = Task::begin("trade", wake, move |course| {
-            run(course, &subject, seed, limit)
+        let task = Task::begin("trade", wake, move |progress| {
+            run(progress, &subject, seed, limit)
         })?;
         Ok(Self { capture, task })
     }
 }
 
 fn run(
-    course: &Course<Arc<Trade>>,
+    progress: &Progress<Arc<Trade>>,
     capture: &OpenCapture,
     seed: u64,
     limit: Duration,
 ) -> Result<()> {
-    course.say("reading the truth, if there is one");
+    progress.say("reading the truth, if there is one");
     let subject = capture.subject()?;
     let runs = plan::presets(&Settings {
         seed,
@@ -51,10 +51,10 @@ fn run(
     let begun = Instant::now();
     let mut curves: Vec<Curve> = Vec::new();
     let mut tell = |heard: SolveEvent| match heard {
-        SolveEvent::Begins(run) => course.say(format!("measuring {}", run.name)),
+        SolveEvent::Begins(run) => progress.say(format!("measuring {}", run.name)),
         SolveEvent::Ended(curve) => {
             curves.push(curve.clone());
-            course.show(Arc::new(Trade::new(
+            progress.show(Arc::new(Trade::new(
                 &subject.name,
                 Some(capture.hash.clone()),
                 subject.judge.measure(),
@@ -63,7 +63,7 @@ fn run(
             )));
         }
     };
-    let ended = || course.is_ended();
+    let ended = || progress.is_cancelled();
     measure(
         &subject.problem,
         &subject.judge,
