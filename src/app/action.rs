@@ -62,7 +62,7 @@ pub enum Needs {
     /// An open capture.
     Capture,
     /// An open capture whose objects are as the edits have them, which go by an object's index.
-    Steady,
+    CurrentObjects,
 }
 
 const fn key(key: Key) -> Option<KeyboardShortcut> {
@@ -83,18 +83,18 @@ actions! {
     OpenRoom, File, Nothing, "Open built-in room", "Opens the room that is built into the program", ctrl_shift(Key::O);
     Sessions, File, Nothing, "Sessions…", "Lists all sessions that are kept, to go on with one", None;
     StartPage, File, Nothing, "Start page", "Shows recent captures and the field for a typed path", ctrl(Key::N);
-    Save, File, Steady, "Save results…", "Writes estimate, report and pictures into a folder", ctrl(Key::S);
-    Export, File, Steady, "Export…", "Writes one file for another program", ctrl(Key::E);
-    SaveLayers, File, Steady, "Save light layers…", "Writes the light of each lamp as a layer of one OpenEXR file", ctrl_shift(Key::S);
-    SavePhotographs, File, Steady, "Save photographs…", "Writes all photographs, or one, with the inserted objects and in the changed light", ctrl_shift(Key::E);
+    Save, File, CurrentObjects, "Save results…", "Writes estimate, report and pictures into a folder", ctrl(Key::S);
+    Export, File, CurrentObjects, "Export…", "Writes one file for another program", ctrl(Key::E);
+    SaveLayers, File, CurrentObjects, "Save light layers…", "Writes the light of each lamp as a layer of one OpenEXR file", ctrl_shift(Key::S);
+    SavePhotographs, File, CurrentObjects, "Save photographs…", "Writes all photographs, or one, with the inserted objects and in the changed light", ctrl_shift(Key::E);
     CancelPhotographs, File, Nothing, "Cancel photographs", "Ends the writing of photographs; those that are done stay", None;
     Probe, File, Capture, "Light probe by click…", "The light at the place of the next click as a panorama (.hdr or .exr), for other programs", None;
-    SetScale, Edit, Steady, "Set the scale by two clicks…", "Two clicks in a view and the length between them make the capture's unit a metre", None;
-    SetGround, Edit, Steady, "Set the ground by a click", "The clicked surface lies at height 0, and up is its normal", None;
+    SetScale, Edit, CurrentObjects, "Set the scale by two clicks…", "Two clicks in a view and the length between them make the capture's unit a metre", None;
+    SetGround, Edit, CurrentObjects, "Set the ground by a click", "The clicked surface lies at height 0, and up is its normal", None;
     Quit, File, Nothing, "Quit", "Closes the window", ctrl(Key::Q);
 
-    Undo, Edit, Steady, "Undo", "Takes back the last change to objects or light", ctrl(Key::Z);
-    Redo, Edit, Steady, "Redo", "Makes the last change that was undone again", ctrl_shift(Key::Z);
+    Undo, Edit, CurrentObjects, "Undo", "Takes back the last change to objects or light", ctrl(Key::Z);
+    Redo, Edit, CurrentObjects, "Redo", "Makes the last change that was undone again", ctrl_shift(Key::Z);
     CopyPicture, Edit, Capture, "Copy picture", "Copies the picture under the pointer, whole and as it is seen, to the clipboard", ctrl_shift(Key::C);
     InsertObject, Edit, Capture, "Insert object…", "Shows the panel that puts OBJ and GLB objects into the photographs", ctrl(Key::I);
     Place, Edit, Nothing, "Place by click", "The next click in a view puts the chosen object there", key(Key::G);
@@ -105,12 +105,12 @@ actions! {
     BeforeAfter, Edit, Capture, "Before and after", "Shows the photograph as taken and as it was changed under a wipe", key(Key::B);
     WipeRender, Edit, Capture, "Wipe with the re-render", "Shows the re-render and the changed photograph under a wipe", ctrl(Key::B);
     Lights, Edit, Capture, "Lights", "Shows a switch, a strength and a colour for the light of each lamp", key(Key::L);
-    ResetLights, Edit, Steady, "Reset all lights", "Puts all lamps and the light from outside back to what was found", None;
+    ResetLights, Edit, CurrentObjects, "Reset all lights", "Puts all lamps and the light from outside back to what was found", None;
     Material, Edit, Capture, "Material", "Shows albedo, emission and gloss of the selected object, to be changed", key(Key::M);
-    SwitchLamp, Edit, Steady, "Switch lamp off / on", "Switches the selected lamp off, or on again", key(Key::K);
-    SolveOn, Solve, Steady, "Solve on with pinned values", "Holds the pinned values and solves the rest on from the last stage", ctrl_shift(Key::R);
-    ResetMaterial, Edit, Steady, "Reset material", "Puts the selected object back to what was found", None;
-    ResetEdits, Edit, Steady, "Reset all materials", "Puts all objects and the light from outside back to what was found", None;
+    SwitchLamp, Edit, CurrentObjects, "Switch lamp off / on", "Switches the selected lamp off, or on again", key(Key::K);
+    SolveOn, Solve, CurrentObjects, "Solve on with pinned values", "Holds the pinned values and solves the rest on from the last stage", ctrl_shift(Key::R);
+    ResetMaterial, Edit, CurrentObjects, "Reset material", "Puts the selected object back to what was found", None;
+    ResetEdits, Edit, CurrentObjects, "Reset all materials", "Puts all objects and the light from outside back to what was found", None;
     JoinObjects, Edit, Nothing, "Join objects", "Makes one object of those that are chosen; Ctrl and a click choose more than one", ctrl(Key::J);
     CutOut, Edit, Nothing, "Cut out by lasso…", "A line drawn around faces in the 3D view makes them an object of their own, of the chosen objects alone where any are", ctrl_shift(Key::X);
     RenameObject, Edit, Nothing, "Rename object", "Puts the name of the selected object up for change, in the table of objects", key(Key::F2);
@@ -167,31 +167,20 @@ pub fn pressed(ctx: &egui::Context, start_page: bool) -> Vec<Action> {
     // What comes together with a click belongs to the field that was clicked.
     let clicked = ctx.input(|input| input.pointer.any_pressed() || input.pointer.any_released());
     let typing = start_page || clicked || ctx.text_edit_focused();
-    let mut actions = Vec::new();
     // Longer combinations first, so that Ctrl+Shift+Z is not taken for Ctrl+Z.
-    let mut by_length: Vec<Action> = Action::ALL.to_vec();
-    by_length.sort_by_key(|action| {
-        std::cmp::Reverse(action.shortcut().map_or(0, |s| {
-            u8::from(s.modifiers.command) + u8::from(s.modifiers.shift)
-        }))
+    let length =
+        |keys: KeyboardShortcut| u8::from(keys.modifiers.command) + u8::from(keys.modifiers.shift);
+    let mut by_length = Action::ALL.to_vec();
+    by_length.sort_by_key(|action| std::cmp::Reverse(action.shortcut().map_or(0, length)));
+    by_length.retain(|action| {
+        action.shortcut().is_some_and(|keys| {
+            let plain = keys.modifiers.is_none() && keys.logical_key != Key::Escape;
+            // The key that is held rather than pressed is looked at by the tool bar.
+            let left = (plain && typing) || *action == Action::ShowPhotograph;
+            !left && ctx.input_mut(|input| input.consume_shortcut(&keys))
+        })
     });
-    for action in by_length {
-        let Some(shortcut) = action.shortcut() else {
-            continue;
-        };
-        // Held rather than pressed; the tool bar looks at it.
-        if action == Action::ShowPhotograph {
-            continue;
-        }
-        let plain = shortcut.modifiers.is_none();
-        if plain && typing && shortcut.logical_key != Key::Escape {
-            continue;
-        }
-        if ctx.input_mut(|input| input.consume_shortcut(&shortcut)) {
-            actions.push(action);
-        }
-    }
-    actions
+    by_length
 }
 
 #[cfg(test)]
@@ -204,25 +193,18 @@ mod tests {
         let mut texts = HashSet::new();
         let mut keys = HashSet::new();
         for action in Action::ALL {
-            assert!(texts.insert(action.text()), "{}", action.text());
-            assert!(!action.help().is_empty());
-            if let Some(shortcut) = action.shortcut() {
-                let press = (
-                    shortcut.modifiers.command,
-                    shortcut.modifiers.shift,
-                    shortcut.logical_key,
-                );
-                assert!(
-                    keys.insert(press),
-                    "{} has keys of another action",
-                    action.text()
-                );
-            }
+            let text = action.text();
+            assert!(texts.insert(text) && !action.help().is_empty(), "{text}");
+            let new = |s: KeyboardShortcut| {
+                keys.insert((s.modifiers.command, s.modifiers.shift, s.logical_key))
+            };
+            assert!(
+                action.shortcut().is_none_or(new),
+                "{text} has keys of another"
+            );
         }
-        assert!(
-            Menu::ALL
-                .iter()
-                .all(|menu| Action::ALL.iter().any(|a| a.menu() == *menu))
-        );
+        for menu in Menu::ALL {
+            assert!(Action::ALL.iter().any(|action| action.menu() == menu));
+        }
     }
 }

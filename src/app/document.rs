@@ -81,14 +81,14 @@ impl Document {
 
     /// Whether the worker has regrouped the objects as asked; until then no edit of an object can be made, since edits go
     /// by an object's index.
-    pub fn is_steady(&self) -> bool {
+    pub fn objects_are_current(&self) -> bool {
         let capture = self.capture();
         capture.is_none_or(|open| open.options.objects == self.regroups)
     }
 
     /// Whether objects can be regrouped.
     pub fn can_regroup(&self) -> bool {
-        self.capture().is_some() && self.is_steady()
+        self.capture().is_some() && self.objects_are_current()
     }
 
     /// Names of the capture's objects.
@@ -120,31 +120,23 @@ impl Document {
     }
 
     /// Records a step where something changed; to be called while no button is down, so that a drag is one step.
-    pub fn settle(&mut self) {
+    pub fn record(&mut self) {
         let step = self.step();
-        self.history.settle(&step);
+        self.history.record(&step);
     }
 
-    /// Takes the last step back.
-    pub fn undo(&mut self) {
+    /// Takes the last step back, or makes the last undone step again.
+    pub fn undo_or_redo(&mut self, undo: bool) {
         let mut step = self.step();
-        if self.history.undo(&mut step) {
-            self.restore(step);
+        let stepped = match undo {
+            true => self.history.undo(&mut step),
+            false => self.history.redo(&mut step),
+        };
+        if stepped {
+            self.insertions.replace(step.inserted);
+            self.regroups = step.regroups;
+            self.edits = step.edits;
         }
-    }
-
-    /// Makes the last undone step again.
-    pub fn redo(&mut self) {
-        let mut step = self.step();
-        if self.history.redo(&mut step) {
-            self.restore(step);
-        }
-    }
-
-    fn restore(&mut self, step: Step) {
-        self.insertions.replace(step.inserted);
-        self.regroups = step.regroups;
-        self.edits = step.edits;
     }
 
     /// Index of an object that the estimate knows.

@@ -9,8 +9,8 @@ use crate::session::snapshot::LightSource;
 use crate::transport::layers::Split;
 use glam::Vec3;
 
-/// Triangles that tell where an object is, at most.
-const TOLD_BY: usize = 64;
+/// Triangles of an object whose mean position says where it is, at most.
+const SAMPLED: usize = 64;
 
 /// What is made of a lamp's light.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -122,16 +122,9 @@ impl Document {
     /// Puts all lamps and the light from outside back to what was found.
     pub fn reset_lights(&mut self) {
         for object in 0..self.snapshot.estimate.objects.len() {
-            let edit = self.edits.object(object);
-            self.edits.set(
-                object,
-                ObjectEdit {
-                    off: false,
-                    emission: None,
-                    emission_known: false,
-                    ..edit
-                },
-            );
+            let mut edit = self.edits.object(object);
+            (edit.off, edit.emission, edit.emission_known) = (false, None, false);
+            self.edits.set(object, edit);
         }
         self.edits.set_outside(Vec3::ONE);
     }
@@ -140,7 +133,7 @@ impl Document {
 /// Where an object is, as the camera sees it.
 pub fn place(scene: &Scene, object: u32, camera: &Camera) -> Option<String> {
     let triangles = &scene.objects.get(object as usize)?.triangles;
-    let stride = triangles.len().div_ceil(TOLD_BY).max(1);
+    let stride = triangles.len().div_ceil(SAMPLED).max(1);
     let (mut sum, mut count) = (Vec3::ZERO, 0.0);
     for &triangle in triangles.iter().step_by(stride) {
         let corners = scene.triangles.get(triangle as usize)?;

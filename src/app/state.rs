@@ -52,7 +52,7 @@ impl App {
     /// Opens a capture.
     pub fn open(&mut self, source: Source) {
         self.view.shell.start.asked = false;
-        self.view.shell.start.trouble = None;
+        self.view.shell.start.problem = None;
         self.document.opening = Some(source.clone());
         self.send(Command::Open(source));
     }

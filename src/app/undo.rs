@@ -3,7 +3,7 @@
 /// The history of a value.
 #[derive(Debug, Clone, Default)]
 pub struct History<T> {
-    settled: T,
+    current: T,
     past: Vec<T>,
     future: Vec<T>,
 }
@@ -15,7 +15,7 @@ impl<T: Clone + PartialEq> History<T> {
     /// A history that begins with a value.
     pub fn starting_at(value: T) -> Self {
         Self {
-            settled: value,
+            current: value,
             past: Vec::new(),
             future: Vec::new(),
         }
@@ -23,12 +23,12 @@ impl<T: Clone + PartialEq> History<T> {
 
     /// Records `value` as one step if it differs from the last. To be called whenever no drag is under way, so that
     /// a drag is one step however many frames it lasts.
-    pub fn settle(&mut self, value: &T) {
-        if *value == self.settled {
+    pub fn record(&mut self, value: &T) {
+        if *value == self.current {
             return;
         }
         self.past
-            .push(std::mem::replace(&mut self.settled, value.clone()));
+            .push(std::mem::replace(&mut self.current, value.clone()));
         if self.past.len() > DEPTH {
             self.past.remove(0);
         }
@@ -47,26 +47,35 @@ impl<T: Clone + PartialEq> History<T> {
 
     /// Takes the last step back; false where there is none.
     pub fn undo(&mut self, value: &mut T) -> bool {
-        self.settle(value);
-        let Some(before) = self.past.pop() else {
-            return false;
-        };
-        self.future
-            .push(std::mem::replace(&mut self.settled, before));
-        *value = self.settled.clone();
-        true
+        self.record(value);
+        let Self {
+            current,
+            past,
+            future,
+        } = self;
+        step(value, current, past, future)
     }
 
     /// Makes the last step that was taken back again; false where there is none.
     pub fn redo(&mut self, value: &mut T) -> bool {
-        self.settle(value);
-        let Some(after) = self.future.pop() else {
-            return false;
-        };
-        self.past.push(std::mem::replace(&mut self.settled, after));
-        *value = self.settled.clone();
-        true
+        self.record(value);
+        let Self {
+            current,
+            past,
+            future,
+        } = self;
+        step(value, current, future, past)
     }
+}
+
+/// Goes to the newest value of `from`, leaving the current one in `to`.
+fn step<T: Clone>(value: &mut T, current: &mut T, from: &mut Vec<T>, to: &mut Vec<T>) -> bool {
+    let Some(next) = from.pop() else {
+        return false;
+    };
+    to.push(std::mem::replace(current, next));
+    value.clone_from(current);
+    true
 }
 
 #[cfg(test)]
@@ -79,14 +88,14 @@ mod tests {
         let mut value = 0;
         for step in 1..=3 {
             value = step;
-            history.settle(&value);
-            history.settle(&value);
+            history.record(&value);
+            history.record(&value);
         }
         assert!(history.undo(&mut value) && value == 2);
         assert!(history.undo(&mut value) && value == 1);
         assert!(history.redo(&mut value) && value == 2);
         value = 9;
-        history.settle(&value);
+        history.record(&value);
         assert!(!history.redo(&mut value) && value == 9);
         assert!(history.undo(&mut value) && value == 2);
         assert!(history.undo(&mut value) && history.undo(&mut value) && value == 0);
@@ -94,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_yet_settled_is_undone_first() {
+    fn what_was_not_yet_recorded_is_undone_first() {
         let mut history = History::<i32>::default();
         let mut value = 5;
         assert!(history.undo(&mut value) && value == 0);

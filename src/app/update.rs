@@ -24,7 +24,7 @@ impl App {
             self.answered(ask, answer, ctx);
         }
         if !ctx.input(|input| input.pointer.any_down()) {
-            self.document.settle();
+            self.document.record();
         }
         let (derived, shown) = (&mut self.view.derived, &self.view.shown);
         derived.convert_photograph(&self.document, shown.frame);
@@ -64,7 +64,7 @@ impl App {
         {
             // Said where the person looks.
             let mut errors = now.events.iter().rev().filter(|e| e.level == Level::Error);
-            self.view.shell.start.trouble = errors.next().map(|event| event.message.clone());
+            self.view.shell.start.problem = errors.next().map(|event| event.message.clone());
         }
         if !self.take_regrouped(&before) && other_capture {
             self.capture_changed();

@@ -62,53 +62,38 @@ impl Window {
     }
 
     fn bars(&mut self, ui: &mut Ui, requests: &mut Requests) {
-        let frame = |ui: &Ui, x: i8, y: i8| {
-            Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(x, y))
-        };
         let start_page = self.app.shows_start_page();
         let (app, tree) = (&mut self.app, &mut self.tree);
         let (document, view) = (&app.document, &mut app.view);
-        Panel::top("menu").frame(frame(ui, 6, 2)).show(ui, |ui| {
+        let (look, shown, shell) = (&mut view.look, &view.shown, &mut view.shell);
+        bar(ui, Panel::top("menu"), 6, 2).show(ui, |ui| {
             let name = document.capture().map(|open| open.name.as_str());
             menu::bar(ui, name, app.preferences.workspace, tree, requests);
         });
-        Panel::top("tools").frame(frame(ui, 8, 4)).show(ui, |ui| {
-            toolbar::bar(ui, document, &view.shown, &mut view.look, requests)
-        });
-        app.preferences.tone = view.look.tone;
-        if let Some(name) = &document.snapshot.continued
-            && !view.shell.sessions.closed
-            && !start_page
-        {
-            Panel::top("session")
-                .exact_size(sessions::LINE)
-                .frame(frame(ui, 8, 4))
-                .show(ui, |ui| {
-                    sessions::line(ui, name, &mut view.shell.sessions, requests)
-                });
-        }
-        Panel::bottom("status")
-            .exact_size(24.0)
-            .frame(frame(ui, 8, 2))
-            .show(ui, |ui| {
-                let batch = app.jobs.batch.as_ref();
-                status::bar(ui, document, batch, &mut view.shell.memory, requests);
+        bar(ui, Panel::top("tools"), 8, 4)
+            .show(ui, |ui| toolbar::bar(ui, document, shown, look, requests));
+        app.preferences.tone = look.tone;
+        let continued = document.snapshot.continued.as_ref();
+        if let Some(name) = continued.filter(|_| !shell.sessions.closed && !start_page) {
+            bar(ui, Panel::top("session").exact_size(sessions::LINE), 8, 4).show(ui, |ui| {
+                sessions::line(ui, name, &mut shell.sessions, requests)
             });
+        }
+        bar(ui, Panel::bottom("status").exact_size(24.0), 8, 2).show(ui, |ui| {
+            let batch = app.jobs.batch.as_ref();
+            status::bar(ui, document, batch, &mut shell.memory, requests);
+        });
         if start_page {
             return;
         }
-        Panel::bottom("inspector")
-            .exact_size(22.0)
-            .frame(frame(ui, 8, 2))
+        bar(ui, Panel::bottom("inspector").exact_size(22.0), 8, 2)
             .show(ui, |ui| inspect::bar(ui, document, view));
         if app.preferences.thumbnails && document.frames() > 0 {
-            Panel::bottom("thumbnails")
-                .exact_size(theme::THUMBNAIL + 18.0)
-                .frame(frame(ui, 8, 4))
-                .show(ui, |ui| {
-                    let (exposure, strip) = (view.look.exposure, &mut view.shell.thumbnails);
-                    thumbnails::strip(ui, document, &view.shown, exposure, strip, requests);
-                });
+            let strip = Panel::bottom("thumbnails").exact_size(theme::THUMBNAIL + 18.0);
+            bar(ui, strip, 8, 4).show(ui, |ui| {
+                let (exposure, strip) = (view.look.exposure, &mut view.shell.thumbnails);
+                thumbnails::strip(ui, document, &view.shown, exposure, strip, requests);
+            });
         }
     }
 
@@ -164,6 +149,11 @@ impl Window {
             ));
         }
     }
+}
+
+/// A bar with margins, in points.
+fn bar(ui: &Ui, panel: Panel, x: i8, y: i8) -> Panel {
+    panel.frame(Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(x, y)))
 }
 
 /// The remembered layout of a workspace, or its first.

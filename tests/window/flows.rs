@@ -113,7 +113,7 @@ fn a_folder_that_is_neither_capture_nor_scan_says_what_to_choose() {
         }
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
-    panic!("{:?}", harness.state().app.view.shell.start.trouble);
+    panic!("{:?}", harness.state().app.view.shell.start.problem);
 }
 
 #[test]
@@ -296,8 +296,8 @@ fn a_file_that_is_no_object_is_said_where_it_was_typed_and_joins_nothing() {
             }
             std::thread::sleep(std::time::Duration::from_millis(5));
         }
-        let trouble = harness.state().app.view.panels.adding.trouble.clone();
-        assert!(trouble.is_some_and(|line| line.contains(word)), "{file}");
+        let problem = harness.state().app.view.panels.adding.problem.clone();
+        assert!(problem.is_some_and(|line| line.contains(word)), "{file}");
         harness.get_by_label_contains(word);
         assert!(harness.state().app.document.insertions.objects.is_empty());
     }

@@ -111,11 +111,11 @@ fn objects_that_cannot_be_read_again_stay_as_they_are() {
     click(&mut harness, "Select floor");
     add(&mut harness, "Select wall");
     click(&mut harness, "Join objects");
-    assert!(sent(&recorder).is_some() && !harness.state().app.document.is_steady());
+    assert!(sent(&recorder).is_some() && !harness.state().app.document.objects_are_current());
     recorder.show(|snapshot| snapshot.regroupings += 1);
     harness.run_steps(3);
     let app = &harness.state().app;
-    assert!(app.document.is_steady() && app.document.regroups.is_empty());
+    assert!(app.document.objects_are_current() && app.document.regroups.is_empty());
 }
 
 #[test]

@@ -48,7 +48,7 @@ pub fn insert(harness: &mut Harness<'_, Window>, file: &Path) {
         }
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
-    panic!("{:?}", harness.state().app.view.panels.adding.trouble);
+    panic!("{:?}", harness.state().app.view.panels.adding.problem);
 }
 
 /// A file of an object: a block of half a metre, cut in half.

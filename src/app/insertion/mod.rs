@@ -41,7 +41,7 @@ pub struct Adding {
     /// Files that are read before they join the objects.
     pub wanted: Vec<PathBuf>,
     /// Why the last file did not join them.
-    pub trouble: Option<String>,
+    pub problem: Option<String>,
 }
 
 /// Endings that can be inserted.

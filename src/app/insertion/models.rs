@@ -92,13 +92,8 @@ impl Models {
         let (low, high) = model.bounds();
         let transform = placement.transform(model, scene.up.as_dvec3()).ok()?;
         Some(std::array::from_fn(|index| {
-            let pick =
-                |bit: usize, low: f64, high: f64| if index >> bit & 1 == 0 { low } else { high };
-            let corner = DVec3::new(
-                pick(0, low.x, high.x),
-                pick(1, low.y, high.y),
-                pick(2, low.z, high.z),
-            );
+            let high_along = glam::BVec3::new(index & 1 != 0, index & 2 != 0, index & 4 != 0);
+            let corner = DVec3::select(high_along, high, low);
             (transform.transform_point3(corner) - scene.origin).as_vec3()
         }))
     }
@@ -121,19 +116,12 @@ pub fn draw_box(
     width: f32,
 ) {
     let points = corners.map(project);
-    for from in 0..8usize {
-        for bit in 0..3 {
-            let to = from | 1 << bit;
-            if to == from {
-                continue;
-            }
-            if let Some((a, b)) = points[from].zip(points[to]) {
-                painter.line_segment(
-                    [a, b],
-                    Stroke::new(width + 1.5, Color32::from_black_alpha(120)),
-                );
-                painter.line_segment([a, b], Stroke::new(width, color));
-            }
+    for (from, bit) in (0..8usize).flat_map(|from| [1, 2, 4].map(|bit| (from, bit))) {
+        let end = points[from | bit].filter(|_| from & bit == 0);
+        if let Some((a, b)) = points[from].zip(end) {
+            let shadow = Color32::from_black_alpha(120);
+            painter.line_segment([a, b], Stroke::new(width + 1.5, shadow));
+            painter.line_segment([a, b], Stroke::new(width, color));
         }
     }
 }

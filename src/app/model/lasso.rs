@@ -20,11 +20,8 @@ pub struct Lasso {
 impl Lasso {
     /// Goes on to a point.
     pub fn draw(&mut self, to: Pos2) {
-        if self
-            .line
-            .last()
-            .is_none_or(|last| last.distance(to) >= STEP)
-        {
+        let last = self.line.last();
+        if last.is_none_or(|last| last.distance(to) >= STEP) {
             self.line.push(to);
         }
     }

@@ -133,10 +133,8 @@ impl Orbit {
 
     /// Looks at an object from outside, or at the whole scene.
     pub fn frame(&mut self, scene: &Scene, object: Option<u32>) {
-        let triangles = object
-            .and_then(|object| scene.objects.get(object as usize))
-            .map(|object| object.triangles.as_slice());
-        let corners: Vec<Vec3> = match triangles {
+        let object = object.and_then(|object| scene.objects.get(object as usize));
+        let corners: Vec<Vec3> = match object.map(|object| &object.triangles) {
             Some(triangles) => triangles.iter().flat_map(|&t| scene.corners(t)).collect(),
             None => scene.positions.clone(),
         };
@@ -144,23 +142,13 @@ impl Orbit {
             return;
         }
         // A scan has stray triangles far out, which one corner in fifty may be.
-        let mut axes = [Vec::new(), Vec::new(), Vec::new()];
-        for corner in &corners {
-            (0..3).for_each(|axis| axes[axis].push(corner[axis]));
+        let stray = (corners.len() - 1) / 100;
+        let [mut low, mut high] = [Vec3::ZERO; 2];
+        for axis in 0..3 {
+            let mut along: Vec<f32> = corners.iter().map(|corner| corner[axis]).collect();
+            along.sort_unstable_by(f32::total_cmp);
+            (low[axis], high[axis]) = (along[stray], along[along.len() - 1 - stray]);
         }
-        let last = (corners.len() - 1) as f32;
-        let mut at = |fraction: f32, axis: usize| {
-            let index = if fraction < 0.5 {
-                (last * fraction).floor()
-            } else {
-                (last * fraction).ceil()
-            };
-            *axes[axis]
-                .select_nth_unstable_by(index as usize, f32::total_cmp)
-                .1
-        };
-        let low = Vec3::new(at(0.01, 0), at(0.01, 1), at(0.01, 2));
-        let high = Vec3::new(at(0.99, 0), at(0.99, 1), at(0.99, 2));
         let radius = ((high - low).length() * 0.5).max(scene.diameter * 1e-3);
         self.up = scene.up;
         self.target = (low + high) * 0.5;
@@ -178,11 +166,8 @@ impl Orbit {
         let (east, north) = self.horizon();
         let forward = camera.forward();
         self.yaw = forward.dot(north).atan2(forward.dot(east));
-        self.pitch = forward
-            .dot(self.up)
-            .clamp(-1.0, 1.0)
-            .asin()
-            .clamp(-MAX_PITCH, MAX_PITCH);
+        let pitch = forward.dot(self.up).clamp(-1.0, 1.0).asin();
+        self.pitch = pitch.clamp(-MAX_PITCH, MAX_PITCH);
         self.fov = 2.0 * (f64::from(k.height) * 0.5 / k.fy).atan() as f32;
         self.distance = distance;
         self.target = camera.center + self.forward() * distance;

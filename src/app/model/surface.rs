@@ -62,10 +62,8 @@ impl Surface {
     pub fn photographed(&self, capture: &OpenCapture) -> Vec<Option<Vec3>> {
         use rayon::prelude::*;
         let scene = &capture.scene;
-        self.middles
-            .par_iter()
-            .map(|middle| seen(scene, capture, middle))
-            .collect()
+        let middles = self.middles.par_iter();
+        middles.map(|middle| seen(scene, capture, middle)).collect()
     }
 }
 
@@ -73,10 +71,7 @@ impl Surface {
 fn seen(scene: &Scene, capture: &OpenCapture, middle: &Hit) -> Option<Vec3> {
     let point = scene.point(middle);
     let normal = *scene.normals.get(middle.triangle as usize)?;
-    let mut cameras: Vec<(f32, usize, Vec2)> = scene
-        .cameras
-        .iter()
-        .enumerate()
+    let mut cameras: Vec<(f32, usize, Vec2)> = (scene.cameras.iter().enumerate())
         .filter_map(|(index, camera)| {
             let pixel = camera.project(point)?;
             let to = camera.center - point;
@@ -95,10 +90,8 @@ fn seen(scene: &Scene, capture: &OpenCapture, middle: &Hit) -> Option<Vec3> {
         let k = &scene.cameras[index].intrinsics;
         let x = (pixel.x / k.width as f32 * photograph.width as f32) as usize;
         let y = (pixel.y / k.height as f32 * photograph.height as f32) as usize;
-        photograph
-            .pixels
-            .get(y * photograph.width as usize + x)
-            .copied()
+        let pixels = &photograph.pixels;
+        pixels.get(y * photograph.width as usize + x).copied()
     })
 }
 

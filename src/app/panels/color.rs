@@ -5,7 +5,7 @@ use egui::{Role, Ui};
 use glam::Vec3;
 
 /// Draws the well of a linear colour in [0, 1]; true when it was changed.
-pub fn well(ui: &mut Ui, name: &str, help: &str, color: &mut Vec3) -> bool {
+pub fn color_button(ui: &mut Ui, name: &str, help: &str, color: &mut Vec3) -> bool {
     let mut rgb = color.clamp(Vec3::ZERO, Vec3::ONE).to_array();
     let response = ui.color_edit_button_rgb(&mut rgb).on_hover_text(help);
     // The picker rounds; only what a hand changed is taken over.

@@ -29,8 +29,8 @@ pub fn pane(
     let insertions = &document.insertions;
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         add(ui, adding, requests);
-        if let Some(trouble) = &adding.trouble {
-            ui.colored_label(theme::tokens(ui).error, trouble);
+        if let Some(problem) = &adding.problem {
+            ui.colored_label(theme::tokens(ui).error, problem);
         }
         if insertions.objects.is_empty() {
             ui.add_space(theme::GAP);

@@ -25,7 +25,7 @@ pub fn pane(
     camera: Option<&Camera>,
     requests: &mut Requests,
 ) {
-    if !document.is_steady() {
+    if !document.objects_are_current() {
         ui.weak("Reading the mesh again…");
         return;
     }
@@ -90,7 +90,7 @@ fn light(ui: &mut Ui, document: &Document, objects: &[usize], name: &str, reques
         .add(Checkbox::without_text(&mut gain.on))
         .on_hover_text("Switches this light off and on");
     switched(on, Role::CheckBox, gain.on, &format!("{name} is lit"));
-    color::well(
+    color::color_button(
         ui,
         &format!("Colour of {name}"),
         "Factor on red, green and blue of this light (no unit); white leaves its colour as it is",

@@ -18,7 +18,7 @@ const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, document: &Document, selected: Option<u32>, requests: &mut Requests) {
-    if !document.is_steady() {
+    if !document.objects_are_current() {
         ui.weak("Reading the mesh again…");
         return;
     }
@@ -91,7 +91,7 @@ fn albedo(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
     ui.label("Albedo").on_hover_text(help);
     ui.horizontal(|ui| {
         let mut albedo = edit.albedo(found.albedo);
-        let mut changed = color::well(ui, "Albedo colour", help, &mut albedo);
+        let mut changed = color::color_button(ui, "Albedo colour", help, &mut albedo);
         for (channel, value) in CHANNELS.into_iter().zip(albedo.as_mut()) {
             let value = DragValue::new(value).range(0.0..=1.0).speed(0.005);
             let value = value.max_decimals(3).prefix(format!("{} ", &channel[..1]));
@@ -130,7 +130,7 @@ fn emission(ui: &mut Ui, document: &Document, found: &ObjectEstimate, edit: &mut
         let mut changed = ui
             .add_enabled_ui(strength > 0.0, |ui| {
                 let help = "Colour of the light at its strength (no unit), linear";
-                color::well(ui, "Emission colour", help, &mut color)
+                color::color_button(ui, "Emission colour", help, &mut color)
             })
             .inner;
         let speed = drag_speed(&document.snapshot.estimate, strength);

@@ -1,6 +1,7 @@
 //! The table of objects: swatches, errors, pixels seen; sortable, with a filter, linked to the views.
 
 use crate::app::action::Action;
+use crate::app::choices::choices;
 use crate::app::controls::{named, switched};
 use crate::app::describe::described;
 use crate::app::document::Document;
@@ -10,41 +11,23 @@ use crate::app::selection::Selection;
 use crate::app::theme;
 use crate::inverse::estimate::ObjectEstimate;
 use crate::math::color::luminance;
-use egui::{Align, Button, Color32, Key, Label, RichText, Role, Sense, TextEdit, Ui, vec2};
+use egui::{
+    Align, Button, Color32, Key, Label, RichText, Role, Sense, Shape, Stroke, StrokeKind, TextEdit,
+    Ui, vec2,
+};
 use egui_extras::{Column, TableBuilder};
 use glam::Vec3;
 
-/// What rows are sorted by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SortBy {
-    /// Name.
-    Name,
-    /// Luminance of the albedo.
-    Albedo,
-    /// Standard error of the albedo.
-    Error,
-    /// Luminance of the emission.
-    Emission,
-    /// Pixels that see it.
-    Pixels,
+choices! {
+    /// What rows are sorted by: the columns, from the left.
+    SortBy {
+        Name, "Object", "The capture's name for it";
+        Albedo, "Albedo", "Diffuse reflectance";
+        Error, "±", "Standard error of the albedo, mean over RGB";
+        Emission, "Emission", "Emitted radiance";
+        Pixels, "Pixels", "Pixels of all photographs that see it";
+    }
 }
-
-/// The columns that can be sorted by, with titles and tooltips.
-const COLUMNS: [(SortBy, &str, &str); 5] = [
-    (SortBy::Name, "Object", "The capture's name for it"),
-    (SortBy::Albedo, "Albedo", "Diffuse reflectance"),
-    (
-        SortBy::Error,
-        "±",
-        "Standard error of the albedo, mean over RGB",
-    ),
-    (SortBy::Emission, "Emission", "Emitted radiance"),
-    (
-        SortBy::Pixels,
-        "Pixels",
-        "Pixels of all photographs that see it",
-    ),
-];
 
 /// How the table is shown.
 #[derive(Debug)]
@@ -149,11 +132,10 @@ pub fn pane(
         .sense(Sense::click())
         .auto_shrink(false)
         .cell_layout(egui::Layout::left_to_right(Align::Center))
-        .column(Column::remainder().at_least(84.0).clip(true))
-        .column(Column::initial(64.0).at_least(52.0))
-        .column(Column::initial(48.0).at_least(40.0))
-        .column(Column::initial(76.0).at_least(60.0))
-        .column(Column::initial(58.0).at_least(46.0));
+        .column(Column::remainder().at_least(84.0).clip(true));
+    for (width, least) in [(64.0, 52.0), (48.0, 40.0), (76.0, 60.0), (58.0, 46.0)] {
+        drawn = drawn.column(Column::initial(width).at_least(least));
+    }
     if std::mem::take(&mut table.reveal)
         && let Some(row) = selected_row
     {
@@ -162,8 +144,8 @@ pub fn pane(
     let mut clicked = None;
     drawn
         .header(theme::ROW, |mut header| {
-            for (sort, title, help) in COLUMNS {
-                header.col(|ui| head(ui, table, sort, title, help));
+            for sort in SortBy::ALL {
+                header.col(|ui| head(ui, table, sort));
             }
         })
         .body(|body| {
@@ -232,7 +214,8 @@ fn rename(ui: &mut Ui, table: &mut ObjectsTable, object: u32, name: &str, reques
 }
 
 /// A title that sorts by its column, and the other way round when clicked again.
-fn head(ui: &mut Ui, table: &mut ObjectsTable, sort: SortBy, title: &str, help: &str) {
+fn head(ui: &mut Ui, table: &mut ObjectsTable, sort: SortBy) {
+    let (title, help) = (sort.name(), sort.help());
     let active = table.sort == sort;
     // Room for the arrow.
     let text = format!("{title}{}", if active { "    " } else { "" });
@@ -246,11 +229,8 @@ fn head(ui: &mut Ui, table: &mut ObjectsTable, sort: SortBy, title: &str, help: 
         let corners = [vec2(-4.0, -2.5), vec2(4.0, -2.5), vec2(0.0, 3.5)]
             .map(|v| middle + v * vec2(1.0, down));
         let color = theme::tokens(ui).strong;
-        ui.painter().add(egui::Shape::convex_polygon(
-            corners.to_vec(),
-            color,
-            egui::Stroke::NONE,
-        ));
+        let arrow = Shape::convex_polygon(corners.to_vec(), color, Stroke::NONE);
+        ui.painter().add(arrow);
     }
     let response = named(response, Role::Button, &format!("Sort by {title}"));
     if response.clicked() {
@@ -317,14 +297,12 @@ fn details(ui: &mut Ui, name: &str, object: &ObjectEstimate, unit: &str) {
 /// A square of a linear colour.
 fn swatch(ui: &mut Ui, color: Vec3) {
     let (rect, _) = ui.allocate_exact_size(vec2(theme::SWATCH, theme::SWATCH), Sense::hover());
-    let fill = if color.is_finite() {
-        theme::swatch(color)
-    } else {
-        Color32::TRANSPARENT
+    let fill = match color.is_finite() {
+        true => theme::swatch(color),
+        false => Color32::TRANSPARENT,
     };
     let stroke = (1.0, theme::tokens(ui).outline);
-    ui.painter()
-        .rect(rect, 2.0, fill, stroke, egui::StrokeKind::Inside);
+    (ui.painter()).rect(rect, 2.0, fill, stroke, StrokeKind::Inside);
 }
 
 #[cfg(test)]

@@ -13,12 +13,12 @@ impl App {
     /// Adds an object once its file is read; one that cannot be read is said and joins nothing.
     pub fn insert(&mut self, file: PathBuf) {
         let adding = &mut self.view.panels.adding;
-        adding.trouble = None;
+        adding.problem = None;
         if is_object(&file) {
             adding.wanted.push(file);
         } else {
             let problem = "is no object that can be inserted; save it as GLB, glTF or OBJ";
-            adding.trouble = Some(format!("{}: {problem}", file.display()));
+            adding.problem = Some(format!("{}: {problem}", file.display()));
         }
     }
 
@@ -51,7 +51,7 @@ impl App {
                 && adding.wanted.contains(&file)
             {
                 adding.wanted.retain(|wanted| *wanted != file);
-                adding.trouble = Some(why);
+                adding.problem = Some(why);
             }
         }
         let wanted = std::mem::take(&mut adding.wanted);

@@ -41,7 +41,7 @@ impl App {
         let ready = match action.needs() {
             Needs::Nothing => true,
             Needs::Capture => open,
-            Needs::Steady => open && document.is_steady(),
+            Needs::CurrentObjects => open && document.objects_are_current(),
         };
         ready && self.is_possible(action)
     }
@@ -253,10 +253,7 @@ impl App {
 
     fn undo_or_redo(&mut self, undo: bool) {
         let before = self.document.insertions.objects.clone();
-        match undo {
-            true => self.document.undo(),
-            false => self.document.redo(),
-        }
+        self.document.undo_or_redo(undo);
         if self.document.insertions.objects != before {
             self.view.tool.placing = false;
         }

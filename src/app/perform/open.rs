@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 impl App {
     /// Opens what lies at a path.
     pub fn open_path(&mut self, path: &Path, ctx: &egui::Context) {
-        self.view.shell.start.trouble = None;
+        self.view.shell.start.problem = None;
         let holds = |name: &str| path.join(name).exists();
         if is_object(path) && self.document.capture().is_some() {
             self.insert(path.to_owned());
@@ -38,7 +38,7 @@ impl App {
                     "is no capture; choose the folder that holds transforms.json or a scan's files"
                 }
             };
-            self.view.shell.start.trouble = Some(format!("{}: {found}", path.display()));
+            self.view.shell.start.problem = Some(format!("{}: {found}", path.display()));
             self.view.shell.start.asked = true;
         }
     }
@@ -58,7 +58,7 @@ impl App {
         let work = move |progress: &Progress<()>| import(progress, &from, &into);
         match Task::begin("import", move || ctx.request_repaint(), work) {
             Ok(task) => self.jobs.importing = Some((out, task)),
-            Err(error) => self.view.shell.start.trouble = Some(error.to_string()),
+            Err(error) => self.view.shell.start.problem = Some(error.to_string()),
         }
         self.view.shell.start.asked = true;
     }
@@ -81,7 +81,7 @@ impl App {
                 self.open(Source::Folder(out));
             }
             Err(why) => {
-                self.view.shell.start.trouble = Some(why);
+                self.view.shell.start.problem = Some(why);
                 self.view.shell.start.asked = true;
             }
         }

@@ -83,10 +83,8 @@ pub fn legend(ui: &Ui, pane: Rect, drawn: &Drawn) {
     let font = FontId::proportional(11.0);
     let width = (pane.width() - 24.0).clamp(60.0, 180.0);
     let box_size = vec2(width + 16.0, 32.0);
-    let frame = Rect::from_min_size(
-        pos2(pane.left() + 6.0, pane.bottom() - box_size.y - 6.0),
-        box_size,
-    );
+    let corner = pane.left_bottom() + vec2(6.0, -6.0 - box_size.y);
+    let frame = Rect::from_min_size(corner, box_size);
     let painter = ui.painter().with_clip_rect(pane.intersect(ui.clip_rect()));
     painter.rect_filled(frame, 3.0, Color32::from_black_alpha(190));
     let strip = Rect::from_min_size(frame.min + vec2(8.0, 5.0), vec2(width, 8.0));
@@ -114,12 +112,7 @@ pub fn legend(ui: &Ui, pane: Rect, drawn: &Drawn) {
         (strip.center().x, middle, Align2::CENTER_CENTER),
         (strip.right(), drawn.range, Align2::RIGHT_CENTER),
     ] {
-        painter.text(
-            pos2(x, y),
-            align,
-            number(value),
-            font.clone(),
-            Color32::WHITE,
-        );
+        let (at, text) = (pos2(x, y), number(value));
+        painter.text(at, align, text, font.clone(), Color32::WHITE);
     }
 }

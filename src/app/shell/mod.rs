@@ -46,5 +46,5 @@ pub struct StartPage {
     /// The capture's path as typed.
     pub path: String,
     /// Why nothing was opened, with the remedy.
-    pub trouble: Option<String>,
+    pub problem: Option<String>,
 }

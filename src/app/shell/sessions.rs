@@ -22,7 +22,7 @@ pub struct Sessions {
     /// Whether the line that says which session is gone on with was closed.
     pub closed: bool,
     /// The session whose button to remove it was clicked once.
-    doomed: Option<PathBuf>,
+    removing: Option<PathBuf>,
     pictures: HashMap<PathBuf, (SystemTime, Option<TextureHandle>)>,
 }
 
@@ -85,15 +85,15 @@ fn row(ui: &mut Ui, sessions: &mut Sessions, session: &Kept, requests: &mut Requ
     if chosen {
         requests.ask(Request::Resume(session.folder.clone()));
     }
-    let doomed = sessions.doomed.as_ref() == Some(&session.folder);
-    let text = if doomed { "For good?" } else { "Remove" };
+    let removing = sessions.removing.as_ref() == Some(&session.folder);
+    let text = if removing { "For good?" } else { "Remove" };
     let remove = ui.add(Button::new(text).small());
     let remove = named(remove, Role::Button, &format!("{text} {}", session.name));
-    if remove.clicked() && doomed {
-        sessions.doomed = None;
+    if remove.clicked() && removing {
+        sessions.removing = None;
         requests.ask(Request::Send(Command::Remove(session.folder.clone())));
     } else if remove.clicked() {
-        sessions.doomed = Some(session.folder.clone());
+        sessions.removing = Some(session.folder.clone());
     }
     chosen
 }

@@ -42,8 +42,8 @@ pub fn page(
                 }
             });
         }
-        if let Some(trouble) = &shell.start.trouble {
-            ui.colored_label(tokens.error, trouble);
+        if let Some(problem) = &shell.start.problem {
+            ui.colored_label(tokens.error, problem);
         }
         ui.add_space(10.0);
         drop_area(ui);

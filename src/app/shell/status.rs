@@ -135,20 +135,11 @@ pub fn bar(
 /// Seconds as people read them.
 fn duration(seconds: f64) -> String {
     let seconds = seconds.max(0.0);
-    let parts = |unit: f64| {
-        (
-            (seconds / unit).floor(),
-            (seconds % unit * 60.0 / unit).floor(),
-        )
-    };
-    if seconds < 60.0 {
-        format!("{seconds:.1} s")
-    } else if seconds < 3600.0 {
-        let (minutes, seconds) = parts(60.0);
-        format!("{minutes} min {seconds:02} s")
-    } else {
-        let (hours, minutes) = parts(3600.0);
-        format!("{hours} h {minutes:02} min")
+    let (minutes, hours) = ((seconds / 60.0).floor(), (seconds / 3600.0).floor());
+    match seconds {
+        s if s < 60.0 => format!("{s:.1} s"),
+        s if s < 3600.0 => format!("{minutes} min {:02} s", (s % 60.0).floor()),
+        _ => format!("{hours} h {:02} min", minutes % 60.0),
     }
 }
 
