@@ -110,10 +110,9 @@ impl Behavior<Pane> for Panes<'_> {
         state: &TabState,
     ) -> Color32 {
         let tokens = theme::of(visuals);
-        if state.active {
-            tokens.strong
-        } else {
-            tokens.weak
+        match state.active {
+            true => tokens.strong,
+            false => tokens.weak,
         }
     }
 

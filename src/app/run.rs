@@ -8,7 +8,7 @@ use crate::app::window::Window;
 use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
 use crate::session::Session;
-use crate::session::command::Start;
+use crate::session::command::{Source, Start};
 use crate::session::worker::Backend;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
@@ -66,12 +66,9 @@ pub fn run(start: Option<Start>, settings: Settings) -> Result<()> {
         Ok(Err(error)) => Err(no_window(&error.to_string())),
         Err(panic) if opened.load(Ordering::Relaxed) => resume_unwind(panic),
         Err(panic) => {
-            let words = panic
-                .downcast_ref::<String>()
-                .map(String::as_str)
-                .or_else(|| panic.downcast_ref::<&str>().copied())
-                .unwrap_or("the window library failed");
-            Err(no_window(words))
+            let text = panic.downcast_ref::<String>().map(String::as_str);
+            let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
+            Err(no_window(text.unwrap_or("the window library failed")))
         }
     }
 }
@@ -88,19 +85,20 @@ fn window(
     let pace = Arc::new(Pace::new(software));
     let (ctx, paced) = (cc.egui_ctx.clone(), pace.clone());
     let wake = Arc::new(move || ctx.request_repaint_after(paced.interval()));
-    let mut preferences_of_user = Preferences::default();
     let kept = preferences::path();
-    if let Some(path) = &kept {
-        preferences_of_user = Preferences::load(path);
-    }
+    let preferences =
+        (kept.as_ref()).map_or_else(Preferences::default, |path| Preferences::load(path));
     let backend = Backend {
         sessions: preferences::sessions(),
         ..Backend::default()
     };
     let session = Session::spawn_with(start.clone(), settings.clone(), wake, backend)?;
-    let mut app = App::new(Box::new(session), preferences_of_user);
+    let mut app = App::new(Box::new(session), preferences);
     app.document.settings = settings;
-    app.document.opening = start.map(Start::source);
+    app.document.opening = start.map(|start| match start {
+        Start::Capture(source, _) => source,
+        Start::Results(folder) => Source::Folder(folder),
+    });
     Ok(Window::new(cc, app, kept).paced(pace))
 }
 

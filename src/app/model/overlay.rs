@@ -8,7 +8,7 @@ use crate::app::theme;
 use crate::app::view::ViewState;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
-use egui::{Painter, Pos2, Rect, Stroke, Ui, pos2};
+use egui::{Painter, Pos2, Rect, Stroke, Ui, vec2};
 use glam::{Mat4, Vec2, Vec3};
 
 /// Cameras drawn at most.
@@ -31,12 +31,8 @@ impl Projection {
     /// `None` behind the eye.
     pub fn at(&self, point: Vec3) -> Option<Pos2> {
         let clip = self.clip_from_scene * point.extend(1.0);
-        (clip.w > 0.0 && clip.z < clip.w).then(|| {
-            pos2(
-                self.rect.left() + (0.5 + 0.5 * clip.x / clip.w) * self.rect.width(),
-                self.rect.top() + (0.5 - 0.5 * clip.y / clip.w) * self.rect.height(),
-            )
-        })
+        let across = 0.5 * vec2(clip.x, -clip.y) / clip.w * self.rect.size();
+        (clip.w > 0.0 && clip.z < clip.w).then(|| self.rect.center() + across)
     }
 
     fn line(&self, painter: &Painter, a: Vec3, b: Vec3, stroke: Stroke) {

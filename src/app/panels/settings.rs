@@ -6,7 +6,7 @@ use crate::app::request::{Request, Requests};
 use crate::app::theme;
 use crate::inverse::settings::{Kind, PARAMETERS, Parameter, Settings, Value};
 use crate::session::snapshot::Level;
-use egui::{Checkbox, ComboBox, DragValue, Grid, ScrollArea, Ui};
+use egui::{Checkbox, ComboBox, DragValue, Grid, Role, ScrollArea, Ui};
 
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, before: &Settings, requests: &mut Requests) {
@@ -56,18 +56,11 @@ fn help(parameter: &Parameter) -> String {
 }
 
 fn widget(ui: &mut Ui, parameter: &Parameter, title: &str, value: &mut Value) {
-    let name = |response: egui::Response, kind| {
-        named(response, kind, title).on_hover_text(help(parameter));
-    };
-    match (parameter.kind, value) {
-        (Kind::Flag, Value::Flag(flag)) => {
-            let response = ui.add(Checkbox::without_text(flag));
-            name(response, egui::Role::CheckBox);
-        }
+    let (response, role) = match (parameter.kind, value) {
+        (Kind::Flag, Value::Flag(flag)) => (ui.add(Checkbox::without_text(flag)), Role::CheckBox),
         (Kind::Whole { min, max }, Value::Whole(n)) => {
             let drag = DragValue::new(n).range(min..=max).speed(0.1);
-            let response = ui.add(automatic(drag, parameter));
-            name(response, egui::Role::SpinButton);
+            (ui.add(automatic(drag, parameter)), Role::SpinButton)
         }
         (
             Kind::Real {
@@ -77,44 +70,37 @@ fn widget(ui: &mut Ui, parameter: &Parameter, title: &str, value: &mut Value) {
             },
             Value::Real(x),
         ) => {
-            let speed = if logarithmic {
-                (x.abs() * 0.01).max(1e-6)
-            } else {
-                (max - min) * 1e-3
+            let speed = match logarithmic {
+                true => (x.abs() * 0.01).max(1e-6),
+                false => (max - min) * 1e-3,
             };
             let drag = DragValue::new(x).range(min..=max).speed(speed);
-            let response = ui.add(automatic(drag.max_decimals(6), parameter));
-            name(response, egui::Role::SpinButton);
+            let drag = automatic(drag.max_decimals(6), parameter);
+            (ui.add(drag), Role::SpinButton)
         }
         (Kind::Choice(words), Value::Choice(word)) => {
-            let response = ComboBox::from_id_salt("choice")
-                .selected_text(word.as_str())
-                .width(96.0)
-                .show_ui(ui, |ui| {
-                    for choice in words {
-                        ui.selectable_value(word, (*choice).to_owned(), *choice);
-                    }
-                })
-                .response;
-            name(response, egui::Role::ComboBox);
+            let list = ComboBox::from_id_salt("choice").width(96.0);
+            let list = list.selected_text(word.as_str()).show_ui(ui, |ui| {
+                for choice in words {
+                    ui.selectable_value(word, (*choice).to_owned(), *choice);
+                }
+            });
+            (list.response, Role::ComboBox)
         }
-        (_, value) => {
-            ui.label(format!("{value:?}"));
-        }
-    }
+        (_, value) => (ui.label(format!("{value:?}")), Role::Label),
+    };
+    named(response, role, title).on_hover_text(help(parameter));
 }
 
 /// Says in words what 0 stands for, where that is no amount.
 fn automatic<'a>(drag: DragValue<'a>, parameter: &Parameter) -> DragValue<'a> {
-    let words = match parameter.help {
-        help if help.contains("0 sets no limit") || help.contains("0 goes on") => "no limit",
-        help if help.contains("0 leaves")
-            || help.contains("0 chooses")
-            || help.contains("0 takes") =>
-        {
-            "automatic"
-        }
-        _ => return drag,
+    let says = |phrases: &[&str]| phrases.iter().any(|phrase| parameter.help.contains(phrase));
+    let words = if says(&["0 sets no limit", "0 goes on"]) {
+        "no limit"
+    } else if says(&["0 leaves", "0 chooses", "0 takes"]) {
+        "automatic"
+    } else {
+        return drag;
     };
     drag.custom_formatter(move |value, _| match value == 0.0 {
         true => words.to_owned(),

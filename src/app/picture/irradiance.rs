@@ -52,11 +52,8 @@ impl Irradiance {
 
 /// E = π (L − Le) / ρ of diffuse surfaces, W·m⁻²; zero where the surface reflects next to nothing.
 fn irradiance(render: &Picture, albedo: &Picture, emission: &Picture) -> Picture {
-    let pixels = render
-        .pixels
-        .iter()
-        .zip(&albedo.pixels)
-        .zip(&emission.pixels);
+    let pixels = render.pixels.iter().zip(&albedo.pixels);
+    let pixels = pixels.zip(&emission.pixels);
     let arriving = pixels.map(|((render, albedo), emission)| {
         let known = albedo.cmpgt(Vec3::splat(DARKEST));
         let light = (*render - *emission).max(Vec3::ZERO) * PI / albedo.max(Vec3::splat(DARKEST));

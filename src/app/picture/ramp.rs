@@ -53,10 +53,7 @@ pub fn color(shading: Shading, t: f32) -> [f32; 3] {
 /// Looks at no more than about 4096 pixels. At least the smallest positive step, so that it may be divided by.
 pub fn range(picture: &Picture, shading: Shading) -> f32 {
     let stride = (picture.pixels.len() / 4096).max(1);
-    let mut magnitudes: Vec<f32> = picture
-        .pixels
-        .iter()
-        .step_by(stride)
+    let mut magnitudes: Vec<f32> = (picture.pixels.iter().step_by(stride))
         .map(|p| p.element_sum() / 3.0)
         .filter(|mean| shading == Shading::Signed || *mean >= 0.0)
         .map(f32::abs)
@@ -83,9 +80,7 @@ impl Scales {
 /// Stops of exposure that put the 99th percentile of a picture's brightest channel at 1.
 pub fn automatic_exposure(pixels: &[Vec3]) -> f32 {
     let stride = (pixels.len() / 16384).max(1);
-    let mut values: Vec<f32> = pixels
-        .iter()
-        .step_by(stride)
+    let mut values: Vec<f32> = (pixels.iter().step_by(stride))
         .map(|p| p.max_element())
         .filter(|v| v.is_finite())
         .collect();

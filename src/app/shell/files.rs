@@ -28,8 +28,8 @@ pub fn show(
         match &mut sheet {
             Sheet::Closed => true,
             Sheet::Sessions => sessions::sheet(ui, document, &mut view.shell.sessions, requests),
-            Sheet::Save { folder } => save(ui, folder, requests),
-            Sheet::Layers { file } => layers(ui, document, view, file, requests),
+            Sheet::Save(folder) => save(ui, folder, requests),
+            Sheet::Layers(file) => layers(ui, document, view, file, requests),
             Sheet::Export { file, format, at } => {
                 export(ui, document, (file, format, at), requests)
             }

@@ -57,15 +57,7 @@ impl Notices {
             .anchor(Align2::RIGHT_BOTTOM, [-12.0, -64.0])
             .show(ctx, |ui| {
                 ui.set_max_width(420.0);
-                let mut closed = None;
-                for (index, (event, _)) in self.toasts.iter().enumerate() {
-                    if toast(ui, event) {
-                        closed = Some(index);
-                    }
-                }
-                if let Some(index) = closed {
-                    self.toasts.remove(index);
-                }
+                self.toasts.retain(|(event, _)| !toast(ui, event));
             });
         // The next to go is the oldest.
         if let Some((_, since)) = self.toasts.first() {
@@ -78,15 +70,14 @@ impl Notices {
 fn toast(ui: &mut Ui, event: &Event) -> bool {
     let color = level_color(ui, event.level);
     let frame = Frame::popup(ui.style()).stroke(egui::Stroke::new(1.0, color));
-    let response = frame
-        .show(ui, |ui| {
-            ui.horizontal(|ui| {
-                ui.colored_label(color, level_word(event.level));
-                ui.add(egui::Label::new(&event.message).wrap().selectable(false));
-            });
-        })
-        .response;
-    response.interact(egui::Sense::click()).clicked()
+    let shown = frame.show(ui, |ui| {
+        ui.horizontal(|ui| {
+            ui.colored_label(color, level_word(event.level));
+            ui.add(egui::Label::new(&event.message).wrap().selectable(false));
+        });
+    });
+    let response = shown.response.interact(egui::Sense::click());
+    response.clicked()
 }
 
 /// Colour of a level.

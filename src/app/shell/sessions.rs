@@ -105,15 +105,14 @@ impl Sessions {
         if let Some((_, picture)) = known.filter(|(saved, _)| *saved == session.saved) {
             return picture.clone();
         }
-        let read = image::open(session.folder.join(THUMBNAIL))
-            .ok()
-            .map(|image| {
-                let image = image.to_rgb8();
-                let size = [image.width() as usize, image.height() as usize];
-                let image = egui::ColorImage::from_rgb(size, image.as_raw());
-                let name = session.folder.display().to_string();
-                ui.ctx().load_texture(name, image, TextureOptions::LINEAR)
-            });
+        let image = image::open(session.folder.join(THUMBNAIL)).ok();
+        let read = image.map(|image| {
+            let image = image.to_rgb8();
+            let size = [image.width() as usize, image.height() as usize];
+            let image = egui::ColorImage::from_rgb(size, image.as_raw());
+            let name = session.folder.display().to_string();
+            ui.ctx().load_texture(name, image, TextureOptions::LINEAR)
+        });
         let entry = (session.saved, read.clone());
         self.pictures.insert(session.folder.clone(), entry);
         read

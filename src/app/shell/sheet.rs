@@ -13,16 +13,10 @@ pub enum Sheet {
     Closed,
     /// The sessions that are kept.
     Sessions,
-    /// Saving results into a folder.
-    Save {
-        /// The folder.
-        folder: String,
-    },
-    /// Saving the light of each lamp.
-    Layers {
-        /// The file.
-        file: String,
-    },
+    /// Saving results into the folder.
+    Save(String),
+    /// Saving the light of each lamp into the file.
+    Layers(String),
     /// Exporting one file.
     Export {
         /// The file.
@@ -91,14 +85,12 @@ pub fn ending(format: usize) -> &'static str {
 impl Sheet {
     /// The sheet for saving.
     pub fn save(name: &str) -> Self {
-        let folder = format!("relit-out/{}", file_name(name));
-        Self::Save { folder }
+        Self::Save(format!("relit-out/{}", file_name(name)))
     }
 
     /// The sheet for layers of light.
     pub fn layers(name: &str) -> Self {
-        let file = format!("{}-lights.exr", file_name(name));
-        Self::Layers { file }
+        Self::Layers(format!("{}-lights.exr", file_name(name)))
     }
 
     /// The sheet for exporting; `at` is where a probe would be taken.
@@ -131,10 +123,10 @@ impl Sheet {
     pub fn chosen(&mut self, ask: Ask, path: PathBuf) {
         let text = path.to_string_lossy().into_owned();
         match (self, ask) {
-            (Self::Save { folder } | Self::Photographs(Wanted { folder, .. }), Ask::SaveFolder) => {
+            (Self::Save(folder) | Self::Photographs(Wanted { folder, .. }), Ask::SaveFolder) => {
                 *folder = text;
             }
-            (Self::Export { file, .. } | Self::Layers { file }, Ask::ExportFile) => *file = text,
+            (Self::Export { file, .. } | Self::Layers(file), Ask::ExportFile) => *file = text,
             _ => {}
         }
     }

@@ -32,10 +32,8 @@ impl Default for Memory {
 impl Memory {
     /// Resident bytes, at most two seconds old.
     fn bytes(&mut self) -> u64 {
-        let fresh = self
-            .looked_up
-            .is_some_and(|at| at.elapsed() < Duration::from_secs(2));
-        if !fresh
+        let age = self.looked_up.map(|at| at.elapsed());
+        if age.is_none_or(|age| age >= Duration::from_secs(2))
             && let Some(system) = &mut self.system
             && let Ok(process) = sysinfo::get_current_pid()
         {

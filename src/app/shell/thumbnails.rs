@@ -26,15 +26,14 @@ pub struct Thumbnails {
 
 impl Thumbnails {
     fn texture(&mut self, ui: &Ui, frame: usize, photograph: &Photograph) -> TextureHandle {
-        let exposure = self.exposure;
-        self.textures
-            .entry(frame)
-            .or_insert_with(|| {
-                let image = small(photograph, exposure);
-                ui.ctx()
-                    .load_texture(format!("photograph {frame}"), image, TextureOptions::LINEAR)
-            })
-            .clone()
+        let texture = self.textures.entry(frame).or_insert_with(|| {
+            let (name, image) = (
+                format!("photograph {frame}"),
+                small(photograph, self.exposure),
+            );
+            ui.ctx().load_texture(name, image, TextureOptions::LINEAR)
+        });
+        texture.clone()
     }
 }
 

@@ -100,13 +100,11 @@ fn round_up(value: f64) -> f64 {
     }
     let decimals = 1 - value.log10().floor() as i32;
     let unit = 10f64.powi(decimals.abs());
-    let (scaled, back): (f64, fn(f64, f64) -> f64) = if decimals >= 0 {
-        (value * unit, |v, unit| v / unit)
-    } else {
-        (value / unit, |v, unit| v * unit)
-    };
     // Products such as 0.7 · 10 are a hair above the whole number that they stand for.
-    back((scaled - 1e-9).ceil(), unit)
+    match decimals >= 0 {
+        true => (value * unit - 1e-9).ceil() / unit,
+        false => (value / unit - 1e-9).ceil() * unit,
+    }
 }
 
 /// `settings` with the preset of `other` and every parameter in which it differs from the defaults; the seed stays.

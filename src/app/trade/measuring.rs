@@ -27,11 +27,10 @@ impl Measuring {
         seconds: f64,
         wake: impl Fn() + Send + Sync + 'static,
     ) -> Result<Self> {
-        let subject = capture.clone();
+        let measured = capture.clone();
         let limit = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
-        let task = Task::begin("trade", wake, move |progress| {
-            run(progress, &subject, seed, limit)
-        })?;
+        let run = move |progress: &Progress<_>| run(progress, &measured, seed, limit);
+        let task = Task::begin("trade", wake, run)?;
         Ok(Self { capture, task })
     }
 }
@@ -48,29 +47,18 @@ fn run(
         seed,
         ..Settings::default()
     });
-    let begun = Instant::now();
+    let (begun, hash, judge) = (Instant::now(), &capture.hash, &subject.judge);
     let mut curves: Vec<Curve> = Vec::new();
     let mut tell = |heard: SolveEvent| match heard {
         SolveEvent::Begins(run) => progress.say(format!("measuring {}", run.name)),
         SolveEvent::Ended(curve) => {
             curves.push(curve.clone());
-            progress.show(Arc::new(Trade::new(
-                &subject.name,
-                Some(capture.hash.clone()),
-                subject.judge.measure(),
-                begun.elapsed(),
-                curves.clone(),
-            )));
+            let (hash, measure, curves) = (Some(hash.clone()), judge.measure(), curves.clone());
+            let trade = Trade::new(&subject.name, hash, measure, begun.elapsed(), curves);
+            progress.show(Arc::new(trade));
         }
     };
     let ended = || progress.is_cancelled();
-    measure(
-        &subject.problem,
-        &subject.judge,
-        &runs,
-        limit,
-        &ended,
-        &mut tell,
-    )?;
+    measure(&subject.problem, judge, &runs, limit, &ended, &mut tell)?;
     Ok(())
 }
