@@ -61,7 +61,7 @@ pub enum Needs {
     Nothing,
     /// An open capture.
     Capture,
-    /// An open capture whose objects are as the edits have them, which go by an object's index.
+    /// An open capture with its objects regrouped as asked: edits go by an object's index.
     CurrentObjects,
 }
 
@@ -164,7 +164,7 @@ impl Action {
 /// Plain keys are left to a focused text field.
 pub fn pressed(ctx: &egui::Context, start_page: bool) -> Vec<Action> {
     // On the start page every letter belongs to the path.
-    // What comes together with a click belongs to the field that was clicked.
+    // Keys that arrive together with a click belong to the field that was clicked.
     let clicked = ctx.input(|input| input.pointer.any_pressed() || input.pointer.any_released());
     let typing = start_page || clicked || ctx.text_edit_focused();
     // Longer combinations first, so that Ctrl+Shift+Z is not taken for Ctrl+Z.
@@ -175,7 +175,7 @@ pub fn pressed(ctx: &egui::Context, start_page: bool) -> Vec<Action> {
     by_length.retain(|action| {
         action.shortcut().is_some_and(|keys| {
             let plain = keys.modifiers.is_none() && keys.logical_key != Key::Escape;
-            // The key that is held rather than pressed is looked at by the tool bar.
+            // The tool bar reads this key, which is held rather than pressed.
             let left = (plain && typing) || *action == Action::ShowPhotograph;
             !left && ctx.input_mut(|input| input.consume_shortcut(&keys))
         })

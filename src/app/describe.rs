@@ -1,11 +1,11 @@
-//! Segments in words, so that people find them again: how large, of which colour.
+//! Names of segments: their number, size and colour, so that people can find them.
 
 use crate::math::color::linear_to_srgb;
 use crate::scene::Object;
 use egui::ecolor::Hsva;
 use glam::Vec3;
 
-/// The name of an object; that of a segment says how large it is, of the scene's area, and of which colour.
+/// The name of an object; a segment's says whether it is large or small (in the scene's area), and its colour.
 pub fn described(object: &Object, area: f64, albedo: Option<Vec3>) -> String {
     if !object.name.starts_with("segment ") {
         return object.name.clone();

@@ -67,7 +67,7 @@ impl Document {
         matches!(self.snapshot.phase, Phase::Solving | Phase::Loading)
     }
 
-    /// The unit of radiance: relative where photographs of 8 or 16 bits leave the scale open.
+    /// The unit of radiance; relative if the photographs have 8 or 16 bits, which leave its scale open.
     pub fn radiance_unit(&self) -> &'static str {
         let relative = |open: &Arc<OpenCapture>| {
             let mut photographs = open.photographs.iter();
@@ -98,7 +98,7 @@ impl Document {
         names.cloned().collect()
     }
 
-    /// Takes up edits, objects and regroupings that a capture was opened with, and begins a new history.
+    /// Loads the edits, objects and regroupings that a capture was opened with, and begins a new history.
     pub fn start(&mut self) {
         self.insertions.take_up(&self.snapshot.inserted);
         self.regroups = (self.capture()).map_or_else(Vec::new, |open| open.options.objects.clone());

@@ -12,7 +12,7 @@ use glam::Vec3;
 /// Triangles of an object whose mean position says where it is, at most.
 const SAMPLED: usize = 64;
 
-/// What is made of a lamp's light.
+/// The gain of a lamp's objects; of the light from outside where there are no objects.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gain {
     /// Whether it is lit.
@@ -35,7 +35,7 @@ impl Gain {
         }
     }
 
-    /// A factor on three channels, of which those that are not lit tell nothing.
+    /// The gain of a factor on emission; channels that emit nothing take no colour from it.
     fn by(factor: Vec3, lit: glam::BVec3) -> Self {
         let strength = factor.max_element().max(0.0);
         let color = match strength > 0.0 {
@@ -73,7 +73,7 @@ impl Document {
             .collect()
     }
 
-    /// What is made of a lamp's light.
+    /// The gain of a lamp's objects; of the light from outside where there are no objects.
     pub fn gain(&self, objects: &[usize]) -> Gain {
         let found = |object: usize| self.snapshot.estimate.objects.get(object);
         let first = objects.first().and_then(|&o| Some((o, found(o)?)));
@@ -89,7 +89,7 @@ impl Document {
         }
     }
 
-    /// Replaces what is made of a lamp's light; that from outside where there are no objects.
+    /// Sets the gain of a lamp's objects; of the light from outside where there are no objects.
     pub fn set_gain(&mut self, objects: &[usize], gain: Gain) {
         let factor = gain.factor();
         if objects.is_empty() {
@@ -119,7 +119,7 @@ impl Document {
         self.edits.outside() != Vec3::ONE || objects.any(|o| changed(self.edits.object(o)))
     }
 
-    /// Puts all lamps and the light from outside back to what was found.
+    /// Resets all lamps and the light from outside to the estimate.
     pub fn reset_lights(&mut self) {
         for object in 0..self.snapshot.estimate.objects.len() {
             let mut edit = self.edits.object(object);

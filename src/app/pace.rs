@@ -5,13 +5,13 @@ use std::time::{Duration, Instant};
 
 /// Time between two pictures where a graphics card draws.
 const CARD: Duration = Duration::from_millis(16);
-/// The same where the processor has to draw, while a person is at it or nothing is solved.
-const AT_IT: Duration = Duration::from_millis(250);
-/// How long a person counts as being at it after a key or a movement.
-const ATTENTION: Duration = Duration::from_secs(3);
-/// Time of one core for a pixel of the window, about, where the processor draws (Mesa's llvmpipe).
+/// The same where the processor draws, while a person is active or nothing is solved.
+const ACTIVE: Duration = Duration::from_millis(250);
+/// How long a person counts as active after a key or a movement.
+const ACTIVE_FOR: Duration = Duration::from_secs(3);
+/// About the time that one core takes to draw a pixel of the window (Mesa's llvmpipe).
 const PIXEL: Duration = Duration::from_nanos(150);
-/// Fraction of all cores that painting may take from a solve that is only watched.
+/// Greatest fraction of all cores that painting takes from a solve while nobody is active.
 const FRACTION: f64 = 0.025;
 /// Longest time between two pictures.
 const LONGEST: Duration = Duration::from_secs(8);
@@ -57,19 +57,19 @@ impl Pace {
         let idle = self.began.elapsed().saturating_sub(touched);
         if !self.software {
             CARD
-        } else if idle < ATTENTION || !self.solving.load(Ordering::Relaxed) {
-            AT_IT
+        } else if idle < ACTIVE_FOR || !self.solving.load(Ordering::Relaxed) {
+            ACTIVE
         } else {
             watching(self.pixels.load(Ordering::Relaxed), self.cores)
         }
     }
 }
 
-/// Time between two pictures of so many pixels that takes no more than its fraction of so many cores.
+/// Time between two pictures of so many pixels, so that painting takes at most its fraction of the cores.
 fn watching(pixels: u64, cores: usize) -> Duration {
     let paint = PIXEL.as_secs_f64() * pixels as f64;
     let wanted = Duration::from_secs_f64(paint / (FRACTION * cores.max(1) as f64));
-    wanted.clamp(AT_IT, LONGEST)
+    wanted.clamp(ACTIVE, LONGEST)
 }
 
 #[cfg(test)]
@@ -80,19 +80,19 @@ mod tests {
     fn painting_waits_for_a_solve_that_is_only_watched_and_never_for_a_person() {
         let pace = Pace::new(true);
         pace.note(1280 * 800, false, true);
-        assert_eq!(pace.interval(), AT_IT);
+        assert_eq!(pace.interval(), ACTIVE);
         let later = Pace {
             began: Instant::now()
-                .checked_sub(ATTENTION * 2)
+                .checked_sub(ACTIVE_FOR * 2)
                 .expect("the machine ran that long"),
             ..Pace::new(true)
         };
         later.note(1280 * 800, false, true);
-        assert!(later.interval() > AT_IT);
+        assert!(later.interval() > ACTIVE);
         later.note(1280 * 800, false, false);
-        assert_eq!(later.interval(), AT_IT);
+        assert_eq!(later.interval(), ACTIVE);
         later.note(1280 * 800, true, true);
-        assert_eq!(later.interval(), AT_IT);
+        assert_eq!(later.interval(), ACTIVE);
         assert_eq!(Pace::new(false).interval(), CARD);
     }
 
@@ -102,6 +102,6 @@ mod tests {
         assert!((small.as_secs_f64() - 3.0).abs() < 1e-9);
         assert!(watching(1_000_000, 8) < small && watching(2_000_000, 2) > small);
         assert_eq!(watching(u64::from(u32::MAX), 1), LONGEST);
-        assert_eq!(watching(0, 0), AT_IT);
+        assert_eq!(watching(0, 0), ACTIVE);
     }
 }

@@ -23,7 +23,7 @@ impl Behavior<Pane> for Panes<'_> {
     fn pane_ui(&mut self, ui: &mut egui::Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
         let (document, view, jobs) = (&self.app.document, &mut self.app.view, &self.app.jobs);
         let requests = &mut *self.requests;
-        // What fills itself needs no ground: on a software renderer every layer counts.
+        // Panes that fill themselves get no background: a software renderer pays for every layer.
         match *pane {
             Pane::Picture(Quantity::Composite) => {
                 picture::hero::pane(ui, document, view, requests);

@@ -1,4 +1,4 @@
-//! Opening the window on a session of its own; where none can be opened, an error that says why in one line.
+//! Opens the window on a session of its own; if it cannot be opened, the error says why in one line.
 
 use crate::app::pace::Pace;
 use crate::app::preferences::{self, Preferences};
@@ -26,7 +26,7 @@ pub fn run(start: Option<Start>, settings: Settings) -> Result<()> {
             .with_inner_size(WINDOW)
             .with_min_inner_size([760.0, 480.0]),
         renderer: eframe::Renderer::Wgpu,
-        // Costs time at every pixel, for gradients that the window does not have.
+        // Dithering costs time at every pixel; the window has no gradients.
         dithering: false,
         ..Default::default()
     };

@@ -1,4 +1,4 @@
-//! What the next click or drag in a view does, where that is something else than to select.
+//! The active tool: what the next click or drag in a view does instead of selecting.
 
 use crate::app::insertion::handles::Handle;
 use crate::scene::Scene;

@@ -1,4 +1,4 @@
-//! Undo and redo of a value that is edited in place: a step is recorded when the hand comes to rest.
+//! Undo and redo of a value that is edited in place: a step is recorded at the end of each drag.
 
 /// The history of a value.
 #[derive(Debug, Clone, Default)]

@@ -92,7 +92,7 @@ impl Worker {
         true
     }
 
-    /// Notes that a capture was opened, which comes with all that the document says now.
+    /// Notes that the worker opened a capture and knows all that the document says now.
     pub fn has(&mut self, document: &Document) {
         self.sent.view = None;
         self.sent.insertions = document.insertions.objects.clone();

@@ -1,4 +1,4 @@
-//! Handles on inserted objects: the foot moves one, the knob beside it turns it, the one above it scales it. The crates
+//! Handles that move, rotate and scale an inserted object: at its base, beside it and above it. The crates
 //! that draw such things are made for another egui.
 
 use crate::app::insertion::Insertions;
@@ -13,12 +13,12 @@ use glam::{DVec3, Quat, Vec3};
 /// What can be dragged, by the object's index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Handle {
-    /// Where the object stands.
-    Foot(usize),
-    /// The knob that turns it.
-    Turn(usize),
-    /// The square above it that scales it.
-    Size(usize),
+    /// The one at its base, which moves it.
+    Move(usize),
+    /// The one beside it, which rotates it.
+    Rotate(usize),
+    /// The one above it, which scales it.
+    Scale(usize),
 }
 
 /// What a foot is moved along.
@@ -47,7 +47,7 @@ impl Along {
 impl Handle {
     fn index(self) -> usize {
         match self {
-            Self::Foot(index) | Self::Turn(index) | Self::Size(index) => index,
+            Self::Move(index) | Self::Rotate(index) | Self::Scale(index) => index,
         }
     }
 }
@@ -69,19 +69,19 @@ impl Insertions {
         let shown = self.objects.iter().enumerate().filter(|(_, o)| !o.hidden);
         for (index, object) in shown {
             if self.chosen == Some(index) {
-                let knob = self.knob(object, scene).and_then(&project);
-                let top = self.top(object, scene).and_then(&project);
-                handles.extend(knob.map(|at| (Handle::Turn(index), at)));
-                handles.extend(top.map(|at| (Handle::Size(index), at)));
+                let handle = self.rotate_handle(object, scene).and_then(&project);
+                let top = self.scale_handle(object, scene).and_then(&project);
+                handles.extend(handle.map(|at| (Handle::Rotate(index), at)));
+                handles.extend(top.map(|at| (Handle::Scale(index), at)));
             }
             let foot = foot(object, scene).and_then(&project);
-            handles.extend(foot.map(|at| (Handle::Foot(index), at)));
+            handles.extend(foot.map(|at| (Handle::Move(index), at)));
         }
         handles
     }
 
-    /// Where the knob of a placed object is, in scene coordinates: beside its file's +x side, on the ground.
-    fn knob(&self, object: &Placement, scene: &Scene) -> Option<Vec3> {
+    /// Where the handle that rotates a placed object is, in scene coordinates: beside its file's +x side, on the ground.
+    fn rotate_handle(&self, object: &Placement, scene: &Scene) -> Option<Vec3> {
         let foot = foot(object, scene)?;
         let corners = self.models.corners(object, scene)?;
         let side = (corners[1] + corners[5]) * 0.5;
@@ -89,7 +89,7 @@ impl Insertions {
     }
 
     /// Where the handle above a placed object is, in scene coordinates.
-    fn top(&self, object: &Placement, scene: &Scene) -> Option<Vec3> {
+    fn scale_handle(&self, object: &Placement, scene: &Scene) -> Option<Vec3> {
         let foot = foot(object, scene)?;
         let corners = self.models.corners(object, scene)?;
         let height = (corners[2] - corners[0]).length();
@@ -121,32 +121,32 @@ impl Insertions {
     ) -> Option<(usize, Placement)> {
         let mut object = self.objects.get(handle.index())?.clone();
         match handle {
-            Handle::Foot(_) => match along {
+            Handle::Move(_) => match along {
                 Along::Surfaces => object.at = surface.or(object.at),
                 Along::Up => object.at = raised(&object, scene, ray).or(object.at),
                 Along::Level => object.at = levelled(&object, scene, ray).or(object.at),
             },
-            Handle::Turn(_) => object.rotate = self.turned(&object, scene, ray)?,
-            Handle::Size(_) => object.scale = self.resized(&object, scene, ray)?,
+            Handle::Rotate(_) => object.rotate = self.turned(&object, scene, ray)?,
+            Handle::Scale(_) => object.scale = self.resized(&object, scene, ray)?,
         }
         Some((handle.index(), object))
     }
 
     /// The scale that brings the handle above an object to where the ray passes the axis through its foot.
     fn resized(&self, object: &Placement, scene: &Scene, ray: &Ray) -> Option<f64> {
-        let (foot, top) = (foot(object, scene)?, self.top(object, scene)?);
+        let (foot, top) = (foot(object, scene)?, self.scale_handle(object, scene)?);
         let wanted = height_of(foot, scene.up, ray)?;
         let factor = f64::from(wanted / top.distance(foot));
         let scale = (object.scale * factor).clamp(SCALES.0, SCALES.1);
         (factor.is_finite() && factor > 0.0).then(|| three_digits(scale))
     }
 
-    /// The angle that turns an object's knob to where the ray meets the ground plane that it stands on, degrees.
+    /// The angle that turns an object's handle to where the ray meets the ground plane that it stands on, degrees.
     fn turned(&self, object: &Placement, scene: &Scene, ray: &Ray) -> Option<f64> {
-        let (foot, knob) = (foot(object, scene)?, self.knob(object, scene)?);
+        let (foot, handle) = (foot(object, scene)?, self.rotate_handle(object, scene)?);
         let aim = on_plane(foot, scene.up, ray)? - foot;
         let back = Quat::from_axis_angle(scene.up, -object.rotate.to_radians() as f32);
-        let unturned = back * (knob - foot);
+        let unturned = back * (handle - foot);
         let angle = unturned.cross(aim).dot(scene.up).atan2(unturned.dot(aim));
         angle
             .is_finite()
@@ -171,20 +171,20 @@ impl Insertions {
         let handles = self.handles(scene, project);
         for (handle, at) in &handles {
             match handle {
-                Handle::Foot(index) => {
+                Handle::Move(index) => {
                     let chosen = self.chosen == Some(*index);
                     let radius = if chosen { 5.0 } else { 3.5 };
                     let outline = Stroke::new(1.0, Color32::BLACK);
                     painter.circle(*at, radius, tokens.inserted, outline);
                 }
-                Handle::Turn(index) => {
-                    let foot = |(other, _): &&(Handle, Pos2)| *other == Handle::Foot(*index);
+                Handle::Rotate(index) => {
+                    let foot = |(other, _): &&(Handle, Pos2)| *other == Handle::Move(*index);
                     if let Some((_, foot)) = handles.iter().find(foot) {
                         painter.line_segment([*foot, *at], Stroke::new(1.5, tokens.inserted));
                     }
                     painter.circle(*at, 4.5, Color32::BLACK, Stroke::new(2.0, tokens.inserted));
                 }
-                Handle::Size(_) => {
+                Handle::Scale(_) => {
                     let square = Rect::from_center_size(*at, vec2(9.0, 9.0));
                     let (stroke, inside) = (Stroke::new(2.0, tokens.inserted), StrokeKind::Inside);
                     painter.rect(square, 0.0, Color32::BLACK, stroke, inside);
@@ -251,7 +251,11 @@ mod tests {
         for _ in 0..500 {
             let read = insertions.models.update(&ctx, &insertions.objects);
             if !read.is_empty() {
-                assert!(insertions.top(&insertions.objects[0], scene).is_some());
+                assert!(
+                    insertions
+                        .scale_handle(&insertions.objects[0], scene)
+                        .is_some()
+                );
                 return insertions;
             }
             std::thread::sleep(std::time::Duration::from_millis(5));
@@ -260,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn the_knob_turns_the_object_towards_the_pointer_counter_clockwise_from_above() {
+    fn the_handle_beside_turns_the_object_towards_the_pointer_counter_clockwise_from_above() {
         let scene = scene();
         let mut insertions = inserted(&scene);
         let foot = (DVec3::ZERO - scene.origin).as_vec3();
@@ -282,7 +286,7 @@ mod tests {
         let ray = |from: DVec3, to: DVec3| Ray::new(local(from), (to - from).as_vec3());
 
         // The handle stands at 0.2 + 0.08; at twice that height the object is twice as large.
-        let size = Handle::Size(0);
+        let size = Handle::Scale(0);
         let aim = ray(DVec3::new(0.3, 0.5, 3.0), DVec3::new(0.0, 0.56, 0.0));
         let dragged = insertions.dragged(size, &scene, &aim, None, Along::Surfaces);
         insertions.objects[0] = dragged.expect("a size").1;
@@ -304,7 +308,7 @@ mod tests {
             (DVec3::new(0.0, 2.0, 3.0), level, Along::Level, level),
             (DVec3::new(0.0, 2.0, 3.0), level, Along::Surfaces, DVec3::X),
         ] {
-            let (aim, foot) = (ray(from, to), Handle::Foot(0));
+            let (aim, foot) = (ray(from, to), Handle::Move(0));
             let dragged = insertions.dragged(foot, &scene, &aim, Some(DVec3::X), along);
             insertions.objects[0] = dragged.expect("a place").1;
             let at = insertions.objects[0].at.expect("a place");

@@ -107,7 +107,7 @@ impl Insertions {
         }
     }
 
-    /// Takes up the objects that a new capture comes with, in place of those there are.
+    /// Loads the objects that a capture was opened with, in place of those before.
     pub fn take_up(&mut self, placements: &[Placement]) {
         self.objects = placements.to_vec();
         self.chosen = self.objects.len().checked_sub(1);

@@ -55,7 +55,7 @@ impl Models {
         let (ctx, path) = (ctx.clone(), file.to_owned());
         let wake = move || ctx.request_repaint();
         let read = move |_: &Progress<()>| extent(&ObjectModel::read(&path)?);
-        // Without a thread there is no box, and nothing else is lost.
+        // Without a thread the object has no box.
         if let Ok(task) = Task::begin("object", wake, read) {
             self.0.insert(file.to_owned(), Shape::Reading(task));
         }
@@ -99,7 +99,7 @@ impl Models {
     }
 }
 
-/// The least model that has the bounds of another, since those of a large one take a while.
+/// A triangle with the bounds of a model: the bounds of a large model take long to compute.
 fn extent(model: &ObjectModel) -> Result<ObjectModel> {
     let (low, high) = model.bounds();
     let corners = vec![[low, high, DVec3::new(low.x, high.y, low.z)]];

@@ -57,7 +57,7 @@ impl Coloring {
     }
 }
 
-/// A colour of an object's own: hues a golden angle apart, so that neighbours differ.
+/// A colour for an object: hues a golden angle apart, so that neighbours differ.
 pub fn of_object(object: u32) -> Vec3 {
     let hue = (object as f32 * 0.618_034).fract();
     let light = 0.45 + 0.2 * ((object as f32 * 0.754_878).fract() - 0.5);

@@ -5,9 +5,9 @@ use crate::scene::geometry::Hit;
 use egui::Pos2;
 use glam::Vec3;
 
-/// Points of the line are at least so far apart, in points of the screen.
+/// Least distance between points of the line, in points of the screen.
 const STEP: f32 = 3.0;
-/// A face is seen where the surface under its middle is no farther from there, as a fraction of the scene's diameter.
+/// A face is seen if the surface drawn at its middle lies within this distance, a fraction of the scene's diameter.
 const NEAR: f32 = 2e-3;
 
 /// A line while it is drawn.

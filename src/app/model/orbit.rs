@@ -141,7 +141,7 @@ impl Orbit {
         if corners.is_empty() {
             return;
         }
-        // A scan has stray triangles far out, which one corner in fifty may be.
+        // Scans have stray triangles far out: one corner in a hundred at each end of an axis is left out.
         let stray = (corners.len() - 1) / 100;
         let [mut low, mut high] = [Vec3::ZERO; 2];
         for axis in 0..3 {

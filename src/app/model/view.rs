@@ -14,7 +14,7 @@ use std::sync::Arc;
 /// Colours of all faces.
 pub type Colors = Arc<Vec<[f32; 4]>>;
 
-/// Faces, and the radiance that photographs saw at each once that is known.
+/// Faces, and the radiance of each in the photographs once that is known.
 type Made = (Arc<Surface>, Vec<Option<Vec3>>);
 
 /// The state of the 3D view.
@@ -50,7 +50,7 @@ impl Default for ModelView {
 }
 
 impl ModelView {
-    /// Makes faces and colours anew, for a mesh whose objects are others.
+    /// Makes faces and colours anew, after the objects of the mesh have changed.
     pub fn remake(&mut self) {
         (self.made, self.making, self.colors) = (None, None, None);
         self.lasso = Lasso::default();

@@ -1,10 +1,10 @@
-//! A well that shows a linear colour and opens a picker for it.
+//! A button that shows a linear colour and opens a picker for it.
 
 use crate::app::controls::named;
 use egui::{Role, Ui};
 use glam::Vec3;
 
-/// Draws the well of a linear colour in [0, 1]; true when it was changed.
+/// Draws a button with a linear colour in [0, 1], which opens the picker; true when it was changed.
 pub fn color_button(ui: &mut Ui, name: &str, help: &str, color: &mut Vec3) -> bool {
     let mut rgb = color.clamp(Vec3::ZERO, Vec3::ONE).to_array();
     let response = ui.color_edit_button_rgb(&mut rgb).on_hover_text(help);

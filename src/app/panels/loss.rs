@@ -18,11 +18,8 @@ pub fn pane(ui: &mut Ui, progress: &Progress) {
     }
     let train = curve(&progress.losses, |point| point.train);
     let held_out = curve(&progress.losses, |point| point.held_out);
-    let fits = progress
-        .fits
-        .iter()
-        .map(|point| [point.seconds, point.residual]);
-    let fits = logarithmic(fits);
+    let fits = progress.fits.iter();
+    let fits = logarithmic(fits.map(|point| [point.seconds, point.residual]));
     let mut marks = Vec::new();
     let mut end = 0.0;
     for stage in &progress.stages {
@@ -72,7 +69,7 @@ fn curve(losses: &[LossPoint], value: impl Fn(&LossPoint) -> Option<f64>) -> Vec
     logarithmic((losses.iter()).filter_map(|point| Some([point.seconds, value(point)?])))
 }
 
-/// Points with the logarithm of their second value, thinned out evenly; what is not positive has no place on the axis.
+/// Points with the logarithm of their second value, thinned out evenly, without values that are not positive.
 fn logarithmic(points: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
     let points: Vec<[f64; 2]> = points
         .filter(|[_, value]| *value > 0.0)

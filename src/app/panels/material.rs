@@ -186,7 +186,7 @@ fn gloss(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
     });
 }
 
-/// Radiance a point of dragging: a fraction of the light itself, or of the brightest lamp where it is dark.
+/// Radiance that a drag of one point adds: a fraction of the object's emission, or of the brightest lamp's if that is more.
 fn drag_speed(estimate: &Estimate, strength: f32) -> f64 {
     let emissions = estimate.objects.iter().map(|o| o.emission.max_element());
     let brightest = emissions.fold(0.0f32, f32::max);

@@ -3,7 +3,7 @@
 use crate::app::number::number;
 use egui_plot::{Corner, GridInput, GridMark, HoverPosition, Legend, PlotPoint, log_grid_spacer};
 
-/// Decades of an axis below and above which its lines are spaced evenly.
+/// Axes of fewer or more decades than these have evenly spaced lines.
 const NARROW: f64 = 0.5;
 const WIDE: f64 = 12.0;
 
@@ -38,7 +38,7 @@ pub fn legend() -> Legend {
     legend.background_alpha(0.6)
 }
 
-/// What is said of a point of a curve under the pointer, from its name and place; nothing elsewhere.
+/// The label of the curve's point under the pointer, made from the curve's name and the place.
 pub fn hovered(
     position: &HoverPosition<'_>,
     say: impl Fn(&str, PlotPoint) -> String,

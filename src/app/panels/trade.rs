@@ -187,7 +187,7 @@ fn plot(
     Some((curve, stop))
 }
 
-/// The logarithm of what is plotted; `None` where the point has none.
+/// The logarithm of a point's error; `None` where it has no such error.
 fn height(point: &Point, vertical: Vertical) -> Option<f64> {
     let value = match vertical {
         Vertical::Claimed => point.reported? * 100.0,

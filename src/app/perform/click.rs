@@ -1,4 +1,4 @@
-//! What a click in a view does: what was asked for beforehand, else placing, else selecting.
+//! What a click in a view does: it answers a pick, places an object, or selects.
 
 use crate::app::shell::sheet::Sheet;
 use crate::app::state::App;
@@ -9,7 +9,7 @@ use crate::session::command::{Command, OpenOptions};
 const OFF_SURFACE: f64 = 0.01;
 
 impl App {
-    /// Does what a click on a surface, or past all of them, is for; `more` adds to the selection.
+    /// Handles a click on a surface, or past all of them; `more` adds to the selection.
     pub(super) fn clicked(&mut self, clicked: Option<Clicked>, more: bool) {
         let Some(clicked) = clicked else {
             self.view.selection.select(None, more);

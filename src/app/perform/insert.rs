@@ -10,7 +10,7 @@ use std::path::PathBuf;
 const LEVEL: f64 = 0.9;
 
 impl App {
-    /// Adds an object once its file is read; one that cannot be read is said and joins nothing.
+    /// Adds an object once its file is read; the pane says why a file cannot be added.
     pub fn insert(&mut self, file: PathBuf) {
         let adding = &mut self.view.panels.adding;
         adding.problem = None;
@@ -22,7 +22,7 @@ impl App {
         }
     }
 
-    /// Where an added object stands at first: on what lies level in the shown view, as near to its middle as can be.
+    /// Where an added object is put first: on the lowest level surface of the shown view, near the picture's middle.
     fn free_place(&self) -> Option<DVec3> {
         let scene = &self.document.capture()?.scene;
         let up = scene.up.as_dvec3();
@@ -39,14 +39,14 @@ impl App {
         floor.or(seen.first()).map(|at| at.point)
     }
 
-    /// Takes in the shapes of objects' files: those that were waited for join, scaled down where larger than the scene.
+    /// Adds the objects whose files have been read, scaled down if larger than the scene.
     pub(in crate::app) fn take_models(&mut self, ctx: &egui::Context) {
         let Some(capture) = self.document.capture().cloned() else {
             return;
         };
         let (adding, insertions) = (&mut self.view.panels.adding, &mut self.document.insertions);
         for (file, read) in insertions.models.update(ctx, &insertions.objects) {
-            // Of an object that is there already the worker says why, and takes it away.
+            // For objects inserted before, the worker reports the error and removes them.
             if let Err(why) = read
                 && adding.wanted.contains(&file)
             {

@@ -259,7 +259,7 @@ impl App {
         }
     }
 
-    /// Closes what covers the panes; selects nothing where nothing does.
+    /// Closes whatever covers the panes; if nothing does, clears selection and tool.
     fn deselect(&mut self) {
         let shell = &mut self.view.shell;
         let open = !matches!(shell.sheet, Sheet::Closed) || shell.start.asked;
@@ -297,7 +297,7 @@ impl App {
         self.send(command);
     }
 
-    /// Where a probe is taken that was not clicked: at the chosen inserted object, or at the 3D view's target.
+    /// Where a light probe is taken if no point was clicked: at the chosen inserted object, or at the 3D view's target.
     fn probe_point(&self) -> DVec3 {
         let chosen = self.document.insertions.chosen();
         let target = self.view.model.orbit.target.as_dvec3();

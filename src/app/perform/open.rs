@@ -1,4 +1,4 @@
-//! Opening whatever a person has: a capture, results, an object, or a scan of another program, which is imported first.
+//! Opens captures, results, objects, and scans of other programs, which are imported first.
 
 use crate::app::insertion::is_object;
 use crate::app::layout::Pane;

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 impl App {
-    /// Whether there is anything to make of photographs: an object to put in, or light to change.
+    /// Whether photographs can be written: something is inserted or edited, and none are being written.
     pub(super) fn can_write_photographs(&self) -> bool {
         let document = &self.document;
         let changed = !document.edits.is_empty() || !document.insertions.visible().is_empty();

@@ -6,7 +6,7 @@ use crate::capture::regroup::{Regroup, regroup, same_objects};
 use crate::session::snapshot::{Level, Snapshot};
 
 impl App {
-    /// Takes in what a snapshot says of objects asked for; whether it brought the open capture with them.
+    /// Follows the worker's answer to a regrouping; true if the snapshot brought the regrouped capture.
     pub(in crate::app) fn take_regrouped(&mut self, before: &Snapshot) -> bool {
         let snapshot = self.document.snapshot.clone();
         let Some(now) = &snapshot.capture else {
@@ -33,7 +33,7 @@ impl App {
             self.view.model.remake();
             self.trade_of_capture();
         } else if refused {
-            // The capture could not be read again: what is open stays as it is.
+            // The worker could not regroup: the objects stay as they are.
             document.regroups.clone_from(&now.options.objects);
             sent.regroups.clone_from(&now.options.objects);
             document.edits = snapshot.edits.clone();

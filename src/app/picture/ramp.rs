@@ -47,8 +47,8 @@ pub fn color(shading: Shading, t: f32) -> [f32; 3] {
     std::array::from_fn(|c| stops[below][c] * (1.0 - mix) + stops[below + 1][c] * mix)
 }
 
-/// The magnitude that 98 of 100 pixels stay below, rounded up to 1, 2 or 5 times a power of ten. A picture of positive values
-/// marks what is not known by negative ones, which do not count.
+/// The 98th percentile of the magnitude, rounded up to 1, 2 or 5 times a power of ten. Negative pixels of a picture of
+/// positive values are unknown and left out.
 ///
 /// Looks at no more than about 4096 pixels. At least the smallest positive step, so that it may be divided by.
 pub fn range(picture: &Picture, shading: Shading) -> f32 {

@@ -1,4 +1,4 @@
-//! What the window offers where photographs do not show the mesh from their poses.
+//! The question that is asked where photographs do not fit the mesh at their poses.
 
 use crate::app::document::Document;
 use crate::app::number::capitalized;
@@ -8,7 +8,7 @@ use crate::session::command::Command;
 use crate::session::snapshot::Phase;
 use egui::{Align2, Context, Window};
 
-/// Shows, as long as the solve has not begun, that the capture is read wrongly and how to read it.
+/// Says, until the solve has begun, that the capture is read wrongly, and offers the reading that fits.
 pub fn show(ctx: &Context, document: &Document, requests: &mut Requests) {
     let snapshot = &document.snapshot;
     let waits = snapshot.phase == Phase::Paused && snapshot.progress.iterations == 0;

@@ -1,4 +1,4 @@
-//! Sessions that are kept: the line that says which one is gone on with, and the list of all.
+//! Saved sessions: the line that names the continued one, and the list of all.
 
 use crate::app::action::Action;
 use crate::app::controls::named;
@@ -19,14 +19,14 @@ const HEIGHT: f32 = 40.0;
 /// What the list shows beside what the worker tells.
 #[derive(Default)]
 pub struct Sessions {
-    /// Whether the line that says which session is gone on with was closed.
+    /// Whether the line that names the continued session was closed.
     pub closed: bool,
     /// The session whose button to remove it was clicked once.
     removing: Option<PathBuf>,
     pictures: HashMap<PathBuf, (SystemTime, Option<TextureHandle>)>,
 }
 
-/// Draws the line that says which session is gone on with.
+/// Draws the line that names the continued session.
 pub fn line(ui: &mut Ui, name: &str, sessions: &mut Sessions, requests: &mut Requests) {
     ui.horizontal(|ui| {
         ui.label(format!(

@@ -4,7 +4,7 @@ use egui::{Context, ViewportCommand};
 
 /// Size of the window at first, in points.
 pub const WINDOW: [f32; 2] = [1280.0, 800.0];
-/// Screens from so many pixels high on, whose own scale is not known, are taken for dense ones.
+/// A screen of this height in pixels or more, whose scale is not known, is taken for a dense one.
 const DENSE: f32 = 2000.0;
 /// How much larger everything is on those.
 const DENSE_SIZE: f32 = 1.5;

@@ -85,7 +85,7 @@ pub fn offers(trade: &Trade) -> Vec<Offer> {
     errors.chain(seconds).collect()
 }
 
-/// The stop that a point of a curve stands for, rounded up to two digits so that it is reached.
+/// The stop at a point of a curve, rounded up to two digits so that a solve reaches it.
 pub fn stop_at(point: &Point, vertical: Vertical) -> Option<Stop> {
     match vertical {
         Vertical::Claimed => point.reported.map(|e| Stop::Error(round_up(e * 100.0))),
