@@ -1,5 +1,4 @@
-//! The light of each lamp: a switch, a strength and a colour, kept as changes of the lamps' emission. A lamp stays in the list
-//! whatever is made of it.
+//! The light of each lamp: a switch, a strength and a colour, kept as edits of the lamps' emission.
 
 use crate::app::document::Document;
 use crate::scene::Scene;

@@ -1,5 +1,4 @@
-//! Draws the panes in their tiles: each borrows the parts of the window's state that it shows, and what it asks for is done
-//! as soon as it is drawn.
+//! Draws the panes in their tiles. Each borrows what it shows; what it asks for is done once it is drawn.
 
 use crate::app::layout::Pane;
 use crate::app::picture::quantity::Quantity;

@@ -27,8 +27,7 @@ impl Connection for crate::session::Session {
     }
 }
 
-/// What tells requests for a view apart: the photograph, moves of the 3D view, and what of the request differs by size
-/// or kind.
+/// Identifies a request for a view: photograph, moves of the 3D view, two sizes, and which pictures.
 pub type ViewKey = (Option<usize>, u64, u32, u32, bool, bool);
 
 /// What the worker was told last.

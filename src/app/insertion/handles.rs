@@ -1,5 +1,4 @@
-//! Handles that move, rotate and scale an inserted object: at its base, beside it and above it. The crates
-//! that draw such things are made for another egui.
+//! Handles that move, rotate and scale an inserted object: at its base, beside it and above it.
 
 use crate::app::insertion::Insertions;
 use crate::app::insertion::models::draw_box;
@@ -109,8 +108,7 @@ impl Insertions {
         handles.into_iter().find(near).map(|(handle, _)| handle)
     }
 
-    /// An object's index, and its placement once `handle` has followed the pointer's `ray`, which meets the scene at
-    /// `surface`.
+    /// An object's index and placement after `handle` is dragged to the pointer's `ray`, which hits `surface`.
     pub fn dragged(
         &self,
         handle: Handle,

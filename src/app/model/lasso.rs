@@ -26,8 +26,7 @@ impl Lasso {
         }
     }
 
-    /// Of some faces those whose middle is seen inside the line: `project` maps points of the scene to the screen, and
-    /// `under` finds the surface that is drawn there.
+    /// The faces whose middle is seen inside the line; `project` maps to the screen, `under` finds the surface there.
     pub fn enclosed(
         &self,
         scene: &Scene,

@@ -50,8 +50,7 @@ pub struct Wanted {
     pub denoise: bool,
 }
 
-/// All formats that can be exported, in the order shown: name, what reads it, and the format. A probe's point is filled in when it
-/// is exported.
+/// The formats for export, in the order shown: name, what reads it, and the format (a probe's point is set at export).
 pub const FORMATS: [(&str, &str, ExportFormat); 6] = [
     (
         "GLB",

@@ -39,8 +39,7 @@ impl Stop {
     }
 }
 
-/// Round errors that a preset reaches, each with the one that is quickest there, and round seconds, each with the one
-/// that claims least then.
+/// Round errors, each with the preset that reaches it first, and round seconds, each with the most exact preset by then.
 pub fn offers(trade: &Trade) -> Vec<Offer> {
     let presets = || {
         let all = trade.curves.iter().enumerate();

@@ -1,5 +1,4 @@
-//! The trade of speed for exactness of the open capture: read from its results or measured here, and what a person
-//! chose on it.
+//! The trade of speed for exactness of the open capture, read from its results or measured here.
 
 pub mod choice;
 pub mod measuring;
