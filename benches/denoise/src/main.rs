@@ -1,7 +1,7 @@
 //! The built-in denoiser beside Open Image Denoise, on renders of the built-in room.
 //!
 //! `RELIT_OIDN=.../libOpenImageDenoise.so.2 cargo run --release [-- REFERENCE]`: mean relative squared error (error² over reference² + 0.01)
-//! and mean relative deviation against REFERENCE samples a pixel (default 4096), and milliseconds, over three photographs.
+//! and mean relative deviation against REFERENCE samples a pixel (default 512), and milliseconds, over three photographs.
 
 use relit::math::color::luminance;
 use relit::math::picture::Picture;
@@ -18,8 +18,8 @@ const FRAMES: [usize; 3] = [0, 5, 11];
 fn main() {
     let reference = std::env::args()
         .nth(1)
-        .map_or(4096, |n| n.parse().expect("a whole number"));
-    let lit = Room::new().lit([320, 240]).expect("the room is sound");
+        .map_or(512, |n| n.parse().expect("a whole number"));
+    let lit = Room::new().lit([160, 120]).expect("the room is sound");
     let truths: Vec<Picture> = FRAMES
         .iter()
         .map(|&f| render(&lit, f, 1000, reference))
@@ -30,7 +30,7 @@ fn main() {
         let halves: Vec<[Picture; 2]> = (FRAMES.iter())
             .map(|&f| [1, 2].map(|seed| render(&lit, f, seed, samples / 2)))
             .collect();
-        let mut row = |what: &str, of: &dyn Fn(usize) -> Picture| {
+        let row = |what: &str, of: &dyn Fn(usize) -> Picture| {
             let (mut square, mut off, mut ms) = (0.0, 0.0, 0.0);
             for (index, truth) in truths.iter().enumerate() {
                 let start = Instant::now();
