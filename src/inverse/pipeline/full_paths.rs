@@ -14,7 +14,10 @@ impl Pipeline<'_, '_> {
     pub(super) fn full_paths(&mut self) -> Result<(), Termination> {
         let started = self.monitor.seconds();
         self.search_anew()?;
-        let (mut cache, mut limit) = self.fit_full_paths()?;
+        let (mut cache, mut limit) = match self.compared()? {
+            Some(stored) => stored,
+            None => self.fit_full_paths()?,
+        };
         for _ in 1..MAX_SEARCHES {
             // With albedos corrected by a new lamp, another one may become significant.
             if !self.search_unseen(false)? {
@@ -41,11 +44,16 @@ impl Pipeline<'_, '_> {
         self.monitor.phase("tracing paths to the lamps");
         let lights = self.lights();
         let (cache, limit) = self.stored(&lights, None, 1, self.budget.round_paths)?;
+        self.fit_stored(&cache)?;
+        Ok((cache, limit))
+    }
+
+    /// Fits all that is free to stored paths, and settles the roles on them.
+    pub(super) fn fit_stored(&mut self, cache: &PathCache) -> Result<(), Termination> {
         self.monitor.phase("fitting albedo and emission");
         // Roles are tested with even weights, since residuals under a wrong role are no measure of noise.
         self.robust = RobustWeights::even(self.roles.len());
-        let fitted = self.fit(&cache)?;
-        self.settle_roles(&cache, fitted)?;
-        Ok((cache, limit))
+        let fitted = self.fit(cache)?;
+        self.settle_roles(cache, fitted)
     }
 }

@@ -43,6 +43,19 @@ struct Found {
     sky: Option<MeasuredOutside>,
 }
 
+/// Full paths that were fitted to compare two kinds of light from outside.
+pub(super) struct Compared {
+    /// Roles and unknowns before the fit.
+    roles: Vec<Role>,
+    unknowns: Unknowns,
+    /// The free parameters of the fit.
+    free: Vec<usize>,
+    /// The result of the fit.
+    fitted: Found,
+    /// The paths, and a remark on their number.
+    stored: (PathCache, String),
+}
+
 /// Relative decrease of the loss: on held-out pixels, or in the fit if none is held out.
 fn fall(before: Losses, after: Losses) -> f64 {
     match (
@@ -192,11 +205,7 @@ impl Pipeline<'_, '_> {
             }
             self.go_back_to(without.clone());
         }
-        let gained = self.by_full_paths(gained)?;
-        let best = (gained.into_iter()).reduce(|best, next| match fall(best.0, next.0) > 0.0 {
-            true => next,
-            false => best,
-        });
+        let best = self.best_by_full_paths(gained)?;
         let gain = best
             .as_ref()
             .map_or(0.0, |(losses, _)| fall(closed, *losses));
@@ -243,23 +252,56 @@ impl Pipeline<'_, '_> {
         Ok(self.measure())
     }
 
-    /// If there are two results to choose from, replaces their losses by those after a fit of full paths: the losses of the light
-    /// field are biased by its blur.
-    fn by_full_paths(
+    /// The best result, with its losses. If there are two to choose from, their losses are those after a fit of full paths: the losses
+    /// of the light field are biased by its blur. The paths of the best are kept, since the next stage begins with the same.
+    fn best_by_full_paths(
         &mut self,
-        gained: Vec<(Losses, Found)>,
-    ) -> Result<Vec<(Losses, Found)>, Termination> {
+        mut gained: Vec<(Losses, Found)>,
+    ) -> Result<Option<(Losses, Found)>, Termination> {
         if gained.len() < 2 {
-            return Ok(gained);
+            return Ok(gained.pop());
         }
-        let mut compared = Vec::new();
+        let mut best: Option<(Losses, Found)> = None;
         for (_, found) in gained {
             self.go_back_to(found.clone());
             self.expect_of_albedo();
-            self.fit_full_paths()?;
-            compared.push((self.measure(), found));
+            let free = self.free();
+            let stored = self.fit_full_paths()?;
+            let losses = self.measure();
+            if (best.as_ref()).is_none_or(|(least, _)| fall(*least, losses) > 0.0) {
+                self.compared = Some(Compared {
+                    roles: found.roles.clone(),
+                    unknowns: found.unknowns.clone(),
+                    free,
+                    fitted: self.found(),
+                    stored,
+                });
+                best = Some((losses, found));
+            }
         }
-        Ok(compared)
+        Ok(best)
+    }
+
+    /// The paths of the best trial of light from outside, and their fit, if roles and unknowns are still those that they were traced
+    /// with: a second trace would give the same bits.
+    pub(super) fn compared(&mut self) -> Result<Option<(PathCache, String)>, Termination> {
+        let taken = self.compared.take();
+        let compared = taken.filter(|c| {
+            c.roles == self.roles
+                && c.unknowns == self.unknowns
+                && c.stored.0.clusters.len() == self.clusters.len()
+        });
+        let Some(compared) = compared else {
+            return Ok(None);
+        };
+        // The albedos of unseen surfaces are free from the second stage on.
+        if compared.free == self.free() {
+            self.go_back_to(compared.fitted);
+            self.describe();
+        } else {
+            self.fit_stored(&compared.stored.0)?;
+        }
+        Ok(Some(compared.stored))
     }
 
     /// The present result of a trial.

@@ -44,6 +44,7 @@ use crate::inverse::unknowns::Unknowns;
 use crate::transport::material::Lobe;
 use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
+use light_field::Compared;
 use refine::Summed;
 use textures::Detail;
 
@@ -95,6 +96,8 @@ pub struct Pipeline<'a, 'o> {
     detail: Option<Detail>,
     /// Mean of each surface's brightest channel in the photographs; zero for unseen surfaces.
     brightness: Vec<f32>,
+    /// Paths and fit of the trial of light from outside that the next stage begins with.
+    compared: Option<Compared>,
     /// Number of finished stages.
     stages: u32,
     /// The state after the last finished stage.
@@ -203,6 +206,7 @@ pub fn solve(
         estimate: Estimate::default(),
         summed: None,
         detail: None,
+        compared: None,
         stages: start.stages,
     };
     pipeline.hold();
