@@ -142,12 +142,7 @@ fn every_flaw_is_an_error_that_names_the_field() {
             "exposure",
             "impossible",
         ),
-        (
-            r#""frames""#,
-            r#""up": [0, 0, 0], "frames""#,
-            "up",
-            "length",
-        ),
+        (r#""frames""#, r#""up": [0, 0, 0], "frames""#, "up", "zero"),
         (r#""frames""#, r#""up": [0, 0], "frames""#, "up", "three"),
         (
             r#""frames""#,

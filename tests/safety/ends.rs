@@ -9,7 +9,9 @@ use std::process::{Child, ChildStderr, Command, Stdio};
 /// Solves until it is ended, and waits until it is under way.
 fn endless(place: &Place, command: &mut Command) -> (Child, BufReader<ChildStderr>) {
     let mut relit = command
-        .args(["--preset", "paper", "--time", "10m", "--views", "none"])
+        // Large batches, or the descent ends by itself in a room this small.
+        .args(["--preset", "paper", "--batch", "1000"])
+        .args(["--time", "10m", "--views", "none"])
         .current_dir(place.path(""))
         .stdout(Stdio::null())
         .stderr(Stdio::piped())

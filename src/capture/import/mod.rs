@@ -213,7 +213,7 @@ fn choose(
         (false, _) => String::new(),
         (true, true) => format!(" of {total}"),
         (true, false) => {
-            format!(" of {total}, evenly spaced; --every and --most-frames choose others")
+            format!(" of {total}, evenly spaced; --every and --max-frames choose others")
         }
     };
     remarks.push(format!("photographs: {}{how}", frames.len()));
