@@ -282,7 +282,7 @@ pub fn loss_plot(losses: &[LossPoint], fits: &[FitPoint], stages: &[Stage]) -> P
     Plot {
         title: "Loss".to_owned(),
         x: Axis::linear("seconds"),
-        y: Axis::logarithmic("mean absolute difference, radiance"),
+        y: Axis::logarithmic("mean absolute difference, radiance; residual, relative"),
         series: series
             .into_iter()
             .filter(|s| !s.points.is_empty())
