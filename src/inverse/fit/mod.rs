@@ -1,7 +1,6 @@
 //! The bounded, robust least-squares fit of all unknowns to the transport cache, with standard errors.
 
 pub mod accumulate;
-pub mod albedo_scale;
 pub mod equations;
 pub mod errors;
 pub mod gauss_newton;

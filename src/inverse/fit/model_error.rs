@@ -57,14 +57,9 @@ pub fn variance(
     quantile(&mut variances, 0.5).unwrap_or(0.0).max(0.0)
 }
 
-/// Relative model error of an albedo, given [`variance`].
-pub fn relative(variance: f64) -> f64 {
-    SHARED * variance.sqrt()
-}
-
 /// Adds the model error to the standard errors of albedos, and of the emission of unseen lamps.
 pub fn add_to(estimate: &mut Estimate, roles: &[Role], variance: f64) {
-    let relative = relative(variance) as f32;
+    let relative = (SHARED * variance.sqrt()) as f32;
     let total = |error: Vec3, value: Vec3| {
         let model = value * relative;
         (error * error + model * model).powf(0.5)

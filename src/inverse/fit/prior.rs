@@ -84,12 +84,6 @@ impl Prior {
         self
     }
 
-    /// The prior with albedos that are held fixed, by surface.
-    pub fn with_held(mut self, albedos: BTreeMap<usize, Vec3>) -> Self {
-        self.known.extend(albedos);
-        self
-    }
-
     /// The prior with the given distributions of albedos.
     pub fn with_albedo(mut self, albedo: ExpectedAlbedo) -> Self {
         self.albedo = albedo;

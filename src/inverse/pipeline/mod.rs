@@ -14,7 +14,6 @@ mod light_field;
 mod record;
 mod refine;
 mod refit;
-mod scale;
 mod state;
 mod textures;
 mod trace;
@@ -83,8 +82,6 @@ pub struct Pipeline<'a, 'o> {
     /// For each surface, the fraction of its squared residuals that is path noise.
     path_noise: Vec<f64>,
     unknowns: Unknowns,
-    /// The fit of the photographs alone, if albedos were scaled afterwards.
-    unscaled: Option<Unknowns>,
     errors: StandardErrors,
     /// Variance of the model error, relative to reflected radiance.
     model_variance: f64,
@@ -204,7 +201,6 @@ pub fn solve(
         patches: LampPatches::default(),
         path_noise: vec![1.0; surfaces],
         unknowns: start.unknowns,
-        unscaled: None,
         lobes,
         exposures: exposures.clone().filter(Exposures::needed),
         estimate: Estimate::default(),

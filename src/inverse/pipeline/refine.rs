@@ -195,9 +195,7 @@ impl Pipeline<'_, '_> {
     pub(super) fn descend(&mut self, clusters: Vec<Linearised>, about: &Unknowns) -> Descended {
         let free = roles::free(&self.roles, |k| self.has_free_albedo(k));
         let prior = lamp_albedo::beliefs(&self.prior, &self.roles);
-        let start = self.unscaled.take();
-        let start = start.as_ref().unwrap_or(&self.unknowns);
-        let found = descend(clusters, about, start, &free, &prior);
+        let found = descend(clusters, about, &self.unknowns, &free, &prior);
         let equations = jackknifed(
             found.equations.clone(),
             &found.clusters,
@@ -207,7 +205,6 @@ impl Pipeline<'_, '_> {
         let errors = standard_errors(&equations, &free, self.roles.len());
         self.unknowns.clone_from(&found.unknowns);
         self.tell_model_error(&found.clusters);
-        self.scale_albedos(&found, &free, &prior);
         lamp_albedo::leave_out(&mut self.unknowns, &self.roles);
         self.monitor.progress.iterations += 1;
         self.merge_errors(errors);
