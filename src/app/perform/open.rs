@@ -9,7 +9,7 @@ use crate::capture::read::CAMERAS;
 use crate::error::{Error, Result};
 use crate::export;
 use crate::session::command::{Command, Source};
-use crate::session::save::{CHECKPOINT, ESTIMATE};
+use crate::session::given::Given;
 use crate::session::snapshot::Level;
 use std::path::{Path, PathBuf};
 
@@ -17,36 +17,32 @@ impl App {
     /// Opens what lies at a path.
     pub fn open_path(&mut self, path: &Path, ctx: &egui::Context) {
         self.view.shell.start.problem = None;
-        let holds = |name: &str| path.join(name).exists();
         if is_object(path) && self.document.capture().is_some() {
             self.insert(path.to_owned());
             self.view.bring_forward(Pane::Insert);
-        } else if path.file_name().is_some_and(|name| name == CAMERAS) {
-            let folder = path.parent().unwrap_or(Path::new("."));
-            self.open(Source::Folder(folder.to_owned()));
-        } else if holds(CAMERAS) {
-            self.open(Source::Folder(path.to_owned()));
-        } else if holds(ESTIMATE) || holds(CHECKPOINT) {
-            self.resume(path.to_owned());
-        } else if path.is_dir() {
-            self.import(path, ctx);
-        } else {
-            let found = match (path.exists(), is_object(path)) {
-                (false, _) => "there is nothing; check the path",
-                (true, true) => "is an object; open a capture first, then insert it",
-                (true, false) => {
-                    "is no capture; choose the folder that holds transforms.json or a scan's files"
-                }
-            };
-            self.view.shell.start.problem = Some(format!("{}: {found}", path.display()));
-            self.view.shell.start.asked = true;
+            return;
+        }
+        match Given::at(path) {
+            Ok(Given::Capture(folder)) => self.open(Source::Folder(folder)),
+            Ok(Given::Results(folder)) => self.resume(folder),
+            Ok(Given::Scan(folder)) => self.import(&folder, ctx),
+            Err(_) => {
+                let found = match (path.exists(), is_object(path)) {
+                    (false, _) => "there is nothing; check the path",
+                    (true, true) => "is an object; open a capture first, then insert it",
+                    (true, false) => {
+                        "is no capture; choose the folder that holds transforms.json or a scan's files"
+                    }
+                };
+                self.view.shell.start.problem = Some(format!("{}: {found}", path.display()));
+                self.view.shell.start.asked = true;
+            }
         }
     }
 
     /// Begins to import a scan beside the results; one that was imported before is opened.
     fn import(&mut self, source: &Path, ctx: &egui::Context) {
-        let results = Source::Folder(source.to_owned()).default_out();
-        let out = results.join("capture");
+        let out = Given::imported(source);
         if out.join(CAMERAS).exists() {
             let said = format!("the scan was imported into {} before", out.display());
             self.say(Level::Info, said);
