@@ -138,7 +138,7 @@ fn detect(folder: &Folder) -> Result<Format> {
         folder.confine().folder(),
         "no known layout is recognised in this folder",
         format!(
-            "name the folder that directly holds the scan's files, or pass --format {}",
+            "name the folder that directly holds the scan's files, or a capture's transforms.json; relit import --format {} names the layout",
             words.join("|")
         ),
     ))
