@@ -162,7 +162,7 @@ mod tests {
         for c in 0..3 {
             for (found, wanted) in [
                 (&found_both.hessian[c], &wanted_both.hessian[c]),
-                (&found_both.scatter[c], &wanted_both.scatter[c]),
+                (&found_both.scatter()[c], &wanted_both.scatter()[c]),
             ] {
                 assert!(wanted.amax() > 0.0);
                 assert!((found - wanted).amax() < 1e-5 * wanted.amax());

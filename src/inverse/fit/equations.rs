@@ -14,8 +14,9 @@ use glam::DVec3;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-/// Greatest number of parameters for which dense matrices are stored.
-const MAX_DENSE: usize = 256;
+/// Greatest number of parameters for which dense matrices are stored: 48 MB, and a factorisation takes as long as some fifty
+/// products with sparse rows, of which a bounded step needs hundreds.
+const MAX_DENSE: usize = 1024;
 
 /// Sums over the clusters of the fit at one value of the unknowns. Vectors have one entry per free parameter.
 #[derive(Debug, Clone)]
@@ -49,14 +50,17 @@ pub enum Coupling {
     Sparse(Rows),
 }
 
-/// Hessian and scatter as dense matrices; only the lower triangles are set.
+/// The Hessian as dense matrices, and what its scatter is made of.
 #[derive(Debug, Clone)]
 pub struct Matrices {
-    /// Per channel: Σ w J̄ J̄ᵀ, positive semidefinite.
+    /// Per channel: Σ w J̄ J̄ᵀ, positive semidefinite; only the lower triangle is set.
     pub hessian: [DMatrix<f64>; 3],
-    /// Per channel: Σ g gᵀ, for standard errors.
-    pub scatter: [DMatrix<f64>; 3],
+    /// Each cluster's contributions to the descent.
+    scores: Vec<SparseRow>,
 }
+
+/// Entries of one cluster by increasing parameter.
+type SparseRow = Vec<(usize, DVec3)>;
 
 impl PathCache {
     /// The normal equations for the parameters in `free` (indices into albedos, then emissions).
@@ -132,79 +136,60 @@ impl NormalEquations {
 impl Matrices {
     /// From linearised clusters with `n` free parameters.
     pub fn new(linearised: &[Linearised], n: usize, robust: &RobustWeights) -> Self {
-        let all = vec![DVec3::ONE; linearised.len()];
-        Self::with_scores_over(linearised, n, robust, &all)
-    }
-
-    /// The same with each cluster's score divided by its entry of `divisors` in the scatter.
-    pub fn with_scores_over(
-        linearised: &[Linearised],
-        n: usize,
-        robust: &RobustWeights,
-        divisors: &[DVec3],
-    ) -> Self {
-        let terms: Vec<Vec<Term>> = (linearised.par_iter().zip(divisors))
-            .map(|(cluster, divisor)| Term::all(cluster, robust.weight(cluster), *divisor))
-            .collect();
-        // For each parameter, the clusters with a term of it and the index of that term.
-        let mut terms_of: Vec<Vec<(u32, u32)>> = vec![Vec::new(); n];
-        for (cluster, terms) in terms.iter().enumerate() {
-            for (index, term) in terms.iter().enumerate() {
-                terms_of[term.parameter].push((cluster as u32, index as u32));
-            }
-        }
-        // Each row of the lower triangles is summed in the order of the clusters.
-        let rows: Vec<Vec<[DVec3; 2]>> = (terms_of.par_iter().enumerate())
-            .map(|(i, own_terms)| {
-                let mut row = vec![[DVec3::ZERO; 2]; i + 1];
-                for &(cluster, index) in own_terms {
-                    let terms = &terms[cluster as usize];
-                    let own = terms[index as usize];
-                    for other in terms.iter().filter(|other| other.parameter <= i) {
-                        let [h, s] = &mut row[other.parameter];
-                        *h += own.weighted * other.derivative;
-                        *s += own.score * other.score;
-                    }
-                }
-                row
-            })
-            .collect();
-        let matrix = |which: usize, channel: usize| {
-            DMatrix::from_fn(n, n, |i, j| match rows[i].get(j) {
-                Some(entry) => entry[which][channel],
-                None => 0.0,
-            })
+        let rows = |cluster: &Linearised| -> (SparseRow, SparseRow) {
+            let weight = robust.weight(cluster);
+            let root = weight.powf(0.5);
+            let scores = cluster.rows.iter().zip(cluster.scores(weight));
+            let mut both: Vec<_> = scores
+                .map(|(&(i, a, b), score)| ((i, root * (a + b) * 0.5), (i, score)))
+                .collect();
+            both.sort_unstable_by_key(|(slope, _)| slope.0);
+            both.into_iter().unzip()
         };
+        let (slopes, scores): (Vec<_>, Vec<_>) = linearised.par_iter().map(rows).unzip();
         Self {
-            hessian: std::array::from_fn(|c| matrix(0, c)),
-            scatter: std::array::from_fn(|c| matrix(1, c)),
+            hessian: gram(&slopes, n),
+            scores,
+        }
+    }
+
+    /// Per channel: Σ g gᵀ over the clusters' contributions g to the descent; only the lower triangle is set.
+    pub fn scatter(&self) -> [DMatrix<f64>; 3] {
+        gram(&self.scores, self.hessian[0].nrows())
+    }
+
+    /// Divides each cluster's contribution to the scatter by its entry of `divisors`.
+    pub fn divide_scores(&mut self, divisors: &[DVec3]) {
+        for (scores, divisor) in self.scores.iter_mut().zip(divisors) {
+            scores.iter_mut().for_each(|(_, score)| *score /= *divisor);
         }
     }
 }
 
-/// A cluster's factors of one parameter in the matrices.
-#[derive(Debug, Clone, Copy)]
-struct Term {
-    parameter: usize,
-    /// J_A + J_B.
-    derivative: DVec3,
-    /// w (J_A + J_B) / 4, so that its product with `derivative` is w J̄ J̄.
-    weighted: DVec3,
-    /// Contribution to the descent, over the divisor.
-    score: DVec3,
-}
-
-impl Term {
-    fn all(cluster: &Linearised, weight: DVec3, divisor: DVec3) -> Vec<Self> {
-        let scores = cluster.scores(weight);
-        let terms = cluster.rows.iter().zip(scores);
-        terms
-            .map(|(&(parameter, a, b), score)| Self {
-                parameter,
-                derivative: a + b,
-                weighted: weight * (a + b) * 0.25,
-                score: score / divisor,
-            })
-            .collect()
+/// Per channel: the lower triangle of Σ v vᵀ over sparse rows v of `n` parameters.
+fn gram(rows: &[SparseRow], n: usize) -> [DMatrix<f64>; 3] {
+    // For each parameter, the rows with an entry of it and the index of that entry.
+    let mut entries_of: Vec<Vec<(u32, u32)>> = vec![Vec::new(); n];
+    for (row, entries) in rows.iter().enumerate() {
+        for (index, (parameter, _)) in entries.iter().enumerate() {
+            entries_of[*parameter].push((row as u32, index as u32));
+        }
     }
+    // Each line of the triangle is summed in the order of the rows.
+    let lines: Vec<Vec<DVec3>> = (entries_of.par_iter().enumerate())
+        .map(|(i, own)| {
+            let mut line = vec![DVec3::ZERO; i + 1];
+            for &(row, index) in own {
+                let up_to_own = &rows[row as usize][..=index as usize];
+                let factor = up_to_own[index as usize].1;
+                for &(parameter, value) in up_to_own {
+                    line[parameter] += factor * value;
+                }
+            }
+            line
+        })
+        .collect();
+    std::array::from_fn(|channel| {
+        DMatrix::from_fn(n, n, |i, j| lines[i].get(j).map_or(0.0, |v| v[channel]))
+    })
 }

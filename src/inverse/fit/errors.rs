@@ -8,7 +8,7 @@ use crate::inverse::fit::rows::Rows;
 use crate::inverse::paths::evaluate::Linearised;
 use crate::math::rng::Stream;
 use glam::{DVec3, Vec3};
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix};
 use rayon::prelude::*;
 
 /// Bootstrap draws for standard errors without dense matrices: standard errors are then accurate to 10 %.
@@ -111,7 +111,10 @@ pub fn jackknifed(
 ) -> NormalEquations {
     let prior = PriorTerms::new(&equations, free);
     if let Coupling::Dense(matrices) = &mut equations.coupling {
-        let inverses = [0, 1, 2].map(|c| inverse(&matrices.hessian[c], &prior.added, c));
+        let inverses: Vec<Option<DMatrix<f64>>> = (0..3)
+            .into_par_iter()
+            .map(|c| inverse(&matrices.hessian[c], &prior.added, c))
+            .collect();
         let kept: Vec<DVec3> = (clusters.par_iter())
             .map(|cluster| {
                 let weight = robust.weight(cluster);
@@ -121,7 +124,7 @@ pub fn jackknifed(
                 }))
             })
             .collect();
-        *matrices = Matrices::with_scores_over(clusters, free.len(), robust, &kept);
+        matrices.divide_scores(&kept);
     }
     equations
 }
@@ -201,22 +204,25 @@ fn inverse(hessian: &DMatrix<f64>, added: &[DVec3], channel: usize) -> Option<DM
 /// Variances from dense matrices; −1 in channels without an inverse.
 fn sandwich(matrices: &Matrices, prior: &PriorTerms) -> Vec<DVec3> {
     let n = prior.added.len();
-    let mut variances = vec![DVec3::NEG_ONE; n];
-    for channel in 0..3 {
+    let scatter = matrices.scatter();
+    let of_channel = |channel: usize| {
         let Some(bread) = inverse(&matrices.hessian[channel], &prior.added, channel) else {
-            continue;
+            return vec![-1.0; n];
         };
-        let scatter = &matrices.scatter[channel];
+        let scatter = &scatter[channel];
         let meat = DMatrix::from_fn(n, n, |a, b| {
             let own = prior.variance[channel] * prior.precision[a][channel];
             scatter[(a.max(b), a.min(b))] + if a == b { own } else { 0.0 }
         });
-        let covariance = &bread * meat * &bread;
-        for (a, variance) in variances.iter_mut().enumerate() {
-            variance[channel] = covariance[(a, a)];
-        }
-    }
-    variances
+        // The diagonal of the product of all three; both matrices are symmetric.
+        let product = meat * &bread;
+        (0..n)
+            .map(|a| product.column(a).dot(&bread.column(a)))
+            .collect()
+    };
+    let variances: Vec<Vec<f64>> = (0..3).into_par_iter().map(of_channel).collect();
+    let variance = |i: usize| DVec3::from_array(std::array::from_fn(|c| variances[c][i]));
+    (0..n).map(variance).collect()
 }
 
 /// The same variances by the multiplier bootstrap (Wu 1986): with random signs ε of the clusters, (H + P)⁻¹ Σ ε g has the
@@ -289,27 +295,35 @@ fn eliminate_dense(
     active: usize,
 ) -> Vec<Eliminated> {
     let n = equations.diagonal.len();
-    let zero = Eliminated {
-        curvature: DVec3::ZERO,
-        variance: DVec3::ZERO,
-    };
-    let mut tests = vec![zero; n - active];
-    for channel in 0..3 {
-        let (hessian, scatter) = (&matrices.hessian[channel], &matrices.scatter[channel]);
+    let scatter = matrices.scatter();
+    let of_channel = |channel: usize| -> Vec<[f64; 2]> {
+        let (hessian, scatter) = (&matrices.hessian[channel], &scatter[channel]);
         let Some(inverse) = inverse(hessian, &prior.added, channel) else {
-            continue;
+            return vec![[0.0; 2]; n - active];
         };
         let active_scatter = DMatrix::from_fn(active, active, |a, b| scatter[(a.max(b), a.min(b))]);
-        for (row, test) in (active..n).zip(&mut tests) {
-            let coupling = DVector::from_fn(active, |a, _| hessian[(row, a)]);
-            let u = &inverse * &coupling;
-            let shared = DVector::from_fn(active, |a, _| scatter[(row, a)]);
-            test.curvature[channel] = hessian[(row, row)] - coupling.dot(&u);
-            test.variance[channel] =
-                scatter[(row, row)] - 2.0 * u.dot(&shared) + u.dot(&(&active_scatter * &u));
-        }
-    }
-    tests
+        // The columns of the tested parameters, over the active ones.
+        let coupling = DMatrix::from_fn(active, n - active, |a, t| hessian[(active + t, a)]);
+        let u = inverse * &coupling;
+        let spread = active_scatter * &u;
+        let test = |t: usize| {
+            let (row, u) = (active + t, u.column(t));
+            let shared: f64 = (0..active).map(|a| u[a] * scatter[(row, a)]).sum();
+            let curvature = hessian[(row, row)] - coupling.column(t).dot(&u);
+            let variance = scatter[(row, row)] - 2.0 * shared + u.dot(&spread.column(t));
+            [curvature, variance]
+        };
+        (0..n - active).map(test).collect()
+    };
+    let channels: Vec<Vec<[f64; 2]>> = (0..3).into_par_iter().map(of_channel).collect();
+    let value =
+        |t: usize, which: usize| DVec3::from_array(std::array::from_fn(|c| channels[c][t][which]));
+    (0..n - active)
+        .map(|t| Eliminated {
+            curvature: value(t, 0),
+            variance: value(t, 1),
+        })
+        .collect()
 }
 
 /// As [`eliminate_dense`] for the parameters with the most significant scores; for the others nothing is eliminated.

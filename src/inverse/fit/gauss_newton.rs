@@ -10,6 +10,7 @@ use crate::inverse::paths::PathCache;
 use crate::inverse::unknowns::Unknowns;
 use glam::DVec3;
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 /// Damping relative to the diagonal; only guards the factorisation against rounding.
 pub const MIN_DAMPING: f64 = 1e-10;
@@ -206,30 +207,31 @@ fn dense_step(
     descent: &[DVec3],
     upper: &[f64],
     damping: f64,
-    added: &dyn Fn(f64) -> Vec<DVec3>,
+    added: &(dyn Fn(f64) -> Vec<DVec3> + Sync),
 ) -> Vec<DVec3> {
-    let mut steps = vec![DVec3::ZERO; x.len()];
     let lower = vec![0.0; x.len()];
-    for channel in 0..3 {
-        let of_channel = |all: &[DVec3]| -> Vec<f64> { all.iter().map(|v| v[channel]).collect() };
-        let descent = DVector::from_vec(of_channel(descent));
+    let of_channel = |channel: usize| {
+        let of = |all: &[DVec3]| -> Vec<f64> { all.iter().map(|v| v[channel]).collect() };
+        let (x, descent) = (of(x), DVector::from_vec(of(descent)));
         let mut damping = damping;
         while damping < 1e9 {
             let step = Step {
                 hessian: &matrices.hessian[channel],
                 descent: &descent,
-                damping: DVector::from_vec(of_channel(&added(damping))),
+                damping: DVector::from_vec(of(&added(damping))),
                 lower: &lower,
                 upper,
             };
-            if let Some(solution) = step.solve(&of_channel(x)) {
-                (steps.iter_mut().zip(solution.iter())).for_each(|(s, d)| s[channel] = *d);
-                break;
+            if let Some(solution) = step.solve(&x) {
+                return solution;
             }
             damping *= 10.0;
         }
-    }
-    steps
+        DVector::zeros(x.len())
+    };
+    let steps: Vec<DVector<f64>> = (0..3).into_par_iter().map(of_channel).collect();
+    let step = |i: usize| DVec3::from_array(std::array::from_fn(|c| steps[c][i]));
+    (0..x.len()).map(step).collect()
 }
 
 #[cfg(test)]

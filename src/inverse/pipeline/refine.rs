@@ -270,7 +270,7 @@ impl Pipeline<'_, '_> {
         Ok(())
     }
 
-    /// The relative standard errors of albedo over reflectors that at least [`ENOUGH_PIXELS`] pixels see.
+    /// The relative standard errors of albedo, with the model error, over reflectors that at least [`ENOUGH_PIXELS`] pixels see.
     fn reported(&self) -> Reported {
         let counted: Vec<usize> = (0..self.roles.len())
             .filter(|&k| self.roles[k].reflects())
@@ -285,11 +285,12 @@ impl Pipeline<'_, '_> {
             let mut errors: Vec<f64> = counted.iter().map(|&k| error(k)).collect();
             [0.5, 0.95].map(|q| quantile(&mut errors, q).unwrap_or(0.0))
         };
-        let relative =
-            |k: usize| relative_to_albedo(self.errors.albedo[k], self.unknowns.albedo[k]);
+        let fitted = |k: usize| relative_to_albedo(self.errors.albedo[k], self.unknowns.albedo[k]);
+        // What all objects share of the model error leaves their ratios, which more paths improve, and does not count.
+        let model = self.model_variance.sqrt();
         Reported {
-            all: quantiles(&relative),
-            of_paths: quantiles(&|k| relative(k) * self.path_noise[k].sqrt()),
+            all: quantiles(&|k| fitted(k).hypot(model)),
+            of_paths: quantiles(&|k| fitted(k) * self.path_noise[k].sqrt()),
         }
     }
 }
