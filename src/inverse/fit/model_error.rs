@@ -4,7 +4,7 @@
 //! neighbouring clusters, and shift the estimate of a whole object that is smaller than they are, which its own scatter does
 //! not show. The mean product of neighbours' residuals is free of noise and estimates the variance of the model error.
 
-use crate::inverse::estimate::Estimate;
+use crate::inverse::estimate::{ENOUGH_PIXELS, Estimate};
 use crate::inverse::paths::clusters::Cluster;
 use crate::inverse::paths::evaluate::Linearised;
 use crate::inverse::roles::Role;
@@ -74,6 +74,27 @@ pub fn add_to(estimate: &mut Estimate, roles: &[Role], variance: f64) {
     }
 }
 
+/// Adds to the standard errors of albedos the gloss that was not found. Light that a surface mirrors is taken for albedo, up to its
+/// specular reflectance. In a room where a fraction p of the objects has a lobe, of mean squared reflectance s², the others may
+/// have one too: a variance of p s².
+pub fn add_gloss(estimate: &mut Estimate, roles: &[Role]) {
+    let counted = || {
+        (estimate.objects.iter().zip(roles))
+            .filter(|(object, role)| role.reflects() && object.seen_pixels >= ENOUGH_PIXELS)
+            .map(|(object, _)| object)
+    };
+    let squares = counted()
+        .filter_map(|object| object.specular)
+        .map(|s| s * s);
+    let variance = squares.sum::<f32>() / counted().count().max(1) as f32;
+    for (object, role) in estimate.objects.iter_mut().zip(roles) {
+        if role.reflects() && object.specular.is_none() {
+            let error = object.albedo_stderr;
+            object.albedo_stderr = (error * error + variance).powf(0.5);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -115,6 +136,32 @@ mod tests {
             let sd = found(0.08, noise);
             assert!((sd - 0.08).abs() < 0.008, "{noise}: {sd}");
         }
+    }
+
+    #[test]
+    fn gloss_of_some_objects_makes_the_others_less_certain() {
+        let object = |specular| ObjectEstimate {
+            albedo_stderr: Vec3::splat(0.03),
+            seen_pixels: ENOUGH_PIXELS,
+            specular,
+            ..Default::default()
+        };
+        let after = |objects: Vec<ObjectEstimate>| -> Vec<f32> {
+            let mut estimate = Estimate {
+                objects,
+                ..Estimate::default()
+            };
+            add_gloss(&mut estimate, &[Role::Reflector; 4]);
+            (estimate.objects.iter())
+                .map(|o| o.albedo_stderr.x)
+                .collect()
+        };
+        let matte = || object(None);
+        assert_eq!(after(vec![matte(), matte(), matte(), matte()]), [0.03; 4]);
+        // One of four has a reflectance of 0.08: √(0.08² / 4) = 0.04, and 0.03 with 0.04 is 0.05.
+        let errors = after(vec![object(Some(0.08)), matte(), matte(), matte()]);
+        assert_eq!(errors[0], 0.03);
+        assert!((errors[3] - 0.05).abs() < 1e-6, "{errors:?}");
     }
 
     #[test]

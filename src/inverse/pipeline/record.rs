@@ -21,6 +21,7 @@ impl Pipeline<'_, '_> {
             &self.lobes,
         );
         model_error::add_to(&mut self.estimate, &self.roles, self.model_variance);
+        model_error::add_gloss(&mut self.estimate, &self.roles);
         let exposures = self.exposures.as_ref();
         self.estimate.exposures = (exposures.filter(|e| e.differ)).map(|e| e.factors.clone());
         self.estimate.vignetting = exposures.and_then(|e| e.vignetting);
