@@ -148,7 +148,7 @@ fn the_built_in_room() {
     let room: PathBuf = folder.path().join("room");
     relit(&["demo", "--out", room.to_str().expect("a plain name")]);
     let result = Result::of(&room);
-    result.assert_albedo(0.0024, 37.7);
+    result.assert_albedo(0.0015, 34.9);
     result.assert_textures(&["rug", "books", "poster"]);
     result.assert_lamps(1, 2, 0.01);
     result.assert_nothing_else_emits();

@@ -2,6 +2,7 @@
 
 use glam::{Vec2, Vec3};
 use relit::capture::read;
+use relit::capture::working::load_working;
 use relit::math::color::luminance;
 use relit::math::rng::Stream;
 use relit::math::stats::Moments;
@@ -89,27 +90,34 @@ fn no_triangle_is_degenerate_and_every_one_that_is_seen_shows_its_front() {
     }
 }
 
-/// Differences between the kept photographs and a fresh rendering, over 40 × 40 pixels each: their means in units of
+/// Side of the squares of pixels of a kept photograph that become one in the fresh rendering.
+const REDUCED: u32 = 4;
+
+/// Differences between the kept photographs, reduced, and a fresh rendering, over 12 blocks each: their means in units of
 /// their standard errors. Of 192 normal deviates none passes 5 with probability 1e-4.
 #[test]
 fn kept_photographs_agree_with_a_fresh_rendering() {
     let room = Room::new();
-    let kept = photographs::stored().expect("the kept photographs decode");
+    let size = STORED.size.map(|side| side / REDUCED);
+    let capture = room::capture().expect("the kept photographs decode");
+    let pixels = capture.frames.len() as u64 * u64::from(size[0] * size[1]);
+    let kept = load_working(&capture, pixels).expect("reduced").photographs;
     let rendering = Rendering {
         seed: 99,
         samples: 2,
-        size: STORED.size,
+        size,
     };
     let fresh = photographs::render(&room, &rendering).expect("rendered");
-    let width = STORED.size[0] as usize;
+    let width = size[0] as usize;
+    let side = width / 4;
     let mut total = Moments::default();
-    for (frame, (a, b)) in kept.iter().zip(&fresh).enumerate() {
-        assert_eq!([a.width, a.height], STORED.size);
+    for (frame, (kept, fresh)) in kept.iter().zip(&fresh).enumerate() {
+        assert_eq!([kept.width, kept.height], size);
         let mut blocks = vec![Moments::default(); 12];
-        for (index, (a, b)) in a.pixels.iter().zip(&b.pixels).enumerate() {
+        for (index, (a, b)) in kept.pixels.iter().zip(&fresh.pixels).enumerate() {
             assert!(a.is_finite() && a.min_element() >= 0.0);
             let (x, y) = (index % width, index / width);
-            blocks[y / 40 * 4 + x / 40].push(f64::from(luminance(*b - *a)));
+            blocks[y / side * 4 + x / side].push(f64::from(luminance(*b - *a)));
         }
         for (index, block) in blocks.iter().enumerate() {
             let z = block.mean / block.standard_error();

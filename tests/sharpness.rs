@@ -5,15 +5,17 @@ use relit::calibrate::held_out::HoldOut;
 use relit::calibrate::problem::Problem;
 use relit::calibrate::sharpness::Sharpness;
 use relit::capture::photograph::Photograph;
+use relit::capture::working::load_working;
 use relit::inverse::settings::Settings;
 use relit::math::rng::Stream;
 use relit::room;
 use relit::scene::Scene;
 use std::sync::{Arc, LazyLock};
 
-/// The built-in room and its photographs.
+/// The built-in room and its photographs at the size that is solved.
 static ROOM: LazyLock<Problem> = LazyLock::new(|| {
     let capture = room::capture().expect("it is in the program");
+    let capture = capture.at(&load_working(&capture, 4_000_000).expect("reduced"));
     let photographs = capture.frames.iter().map(|frame| frame.load());
     Problem {
         scene: Arc::new(Scene::new(&capture).expect("a scene")),

@@ -30,7 +30,7 @@ def main():
     for seed in range(1, options.seeds + 1):
         with tempfile.TemporaryDirectory() as folder:
             capture, out = pathlib.Path(folder) / "room", pathlib.Path(folder) / "out"
-            subprocess.run([options.relit, "demo", "--out", capture, "--seed", str(seed),
+            subprocess.run([options.relit, "demo", "--out", capture, "--seed", str(seed), "--width", "160",
                             "--samples", str(options.samples)], check=True, capture_output=True)
             subprocess.run([options.relit, "solve", capture, "--preset", options.preset, "--seed", str(seed),
                             "--views", "none", "--out", out, *options.set], check=True, capture_output=True)

@@ -1,6 +1,6 @@
 //! `relit export` and `relit demo`: files for other programs, and the built-in room as a capture.
 
-use crate::cli::numbers::{from_one, triple, whole};
+use crate::cli::numbers::{from_one, triple, whole, width};
 use crate::cli::options::Replace;
 use crate::cli::saved::{Loaded, SavedOptions};
 use crate::error::{Error, Result};
@@ -106,6 +106,10 @@ pub struct DemoArguments {
     #[arg(long, value_name = "N", default_value_t = STORED.samples, requires = "seed",
           value_parser = from_one::<u32>)]
     samples: u32,
+    /// Width in pixels of photographs that are rendered again; their height is three quarters of it
+    #[arg(long, value_name = "PIXELS", default_value_t = STORED.size[0], requires = "seed",
+          value_parser = width)]
+    width: u32,
 }
 
 /// Writes one file for another program.
@@ -144,7 +148,7 @@ pub fn demo(arguments: &DemoArguments) -> Result<()> {
     let rendering = arguments.seed.map(|seed| Rendering {
         seed,
         samples: arguments.samples,
-        ..STORED
+        size: [arguments.width, arguments.width * 3 / 4],
     });
     room::write(&arguments.out, rendering.as_ref())?;
     say::line(arguments.out.display());

@@ -16,6 +16,11 @@ pub fn from_one<T: TryFrom<u64>>(text: &str) -> Parsed<T> {
     within(text, 1..=u64::MAX).ok_or_else(|| "a whole number from 1 is wanted".to_owned())
 }
 
+/// A width of the built-in room's photographs.
+pub fn width(text: &str) -> Parsed<u32> {
+    within(text, 16..=4096).ok_or_else(|| "a whole number from 16 to 4096 is wanted".to_owned())
+}
+
 /// A number of threads.
 pub fn threads(text: &str) -> Parsed<u16> {
     let range = 1..=u64::from(u16::MAX);

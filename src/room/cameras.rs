@@ -3,9 +3,6 @@
 use crate::capture::camera::{Intrinsics, Pose};
 use glam::{DMat3, DVec3};
 
-/// Width and height of the embedded photographs in pixels.
-pub const SIZE: [u32; 2] = [160, 120];
-
 /// Tangent of half the horizontal field of view in the built-in and generated rooms.
 const HALF_FIELD: f64 = 0.82;
 

@@ -5,6 +5,7 @@ use crate::capture::photograph::Photograph;
 use crate::error::{Error, Result};
 use crate::export::atomic::write_bytes;
 use crate::export::exr::{Precision, write_rgb};
+use crate::math::rng::Stream;
 use crate::room::model::{Room, linear_photograph};
 use crate::transport::film::Film;
 use crate::transport::lit::Lit;
@@ -17,10 +18,11 @@ use std::path::Path;
 pub const STORED: Rendering = Rendering {
     seed: 7,
     samples: 256,
-    size: [160, 120],
+    size: [640, 480],
 };
 
-/// The stored photographs: half-float EXR files, in the order of the views.
+/// The stored photographs: half-float EXR files, in the order of the views; those of `relit demo --seed 7`, compressed anew
+/// without loss by OpenEXR, whose PIZ takes a quarter less than the crate's.
 const FILES: [&[u8]; 16] = [
     include_bytes!("../../assets/room/000.exr"),
     include_bytes!("../../assets/room/001.exr"),
@@ -39,6 +41,13 @@ const FILES: [&[u8]; 16] = [
     include_bytes!("../../assets/room/014.exr"),
     include_bytes!("../../assets/room/015.exr"),
 ];
+
+/// Significant bits of the values in written photographs: rounding is then off by 2 % in the root of the mean square, less
+/// than the noise of 256 samples (about 4 %), and makes files half as large.
+const SIGNIFICANT_BITS: u32 = 5;
+
+/// Seed of the rounding, apart from those of paths.
+const ROUNDING_SEED: u64 = 0x726f_756e_6465_6421;
 
 /// Settings of rendered photographs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -121,18 +130,49 @@ pub fn write_stored(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Writes photographs as NNN.exr in half precision, whose rounding is far smaller than their noise.
+/// Writes photographs as NNN.exr in half precision, rounded to [`SIGNIFICANT_BITS`].
 ///
 /// # Errors
 /// The folder cannot be written.
 pub fn write(folder: &Path, photographs: &[Photograph]) -> Result<()> {
     for (index, photograph) in photographs.iter().enumerate() {
-        let picture = photograph.picture();
-        write_rgb(
-            &folder.join(format!("{index:03}.exr")),
-            &picture,
-            Precision::Half,
-        )?;
+        let mut picture = photograph.picture();
+        for (pixel, value) in picture.pixels.iter_mut().enumerate() {
+            let mut stream = Stream::new(ROUNDING_SEED, index as u64, pixel as u64, 0);
+            *value = value.map(|channel| rounded(channel, &mut stream));
+        }
+        let path = folder.join(format!("{index:03}.exr"));
+        write_rgb(&path, &picture, Precision::Half)?;
     }
     Ok(())
+}
+
+/// Rounds to [`SIGNIFICANT_BITS`], up or down at random so that the mean stays. `value` ≥ 0.
+fn rounded(value: f32, stream: &mut Stream) -> f32 {
+    let dropped = (1 << (f32::MANTISSA_DIGITS - SIGNIFICANT_BITS)) - 1;
+    let bits = value.to_bits() + (stream.next_u32() & dropped);
+    f32::from_bits(bits & !dropped)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The mean of 40,000 roundings is within 4 standard errors, and none is further off than one step.
+    #[test]
+    fn rounding_keeps_the_mean() {
+        const COUNT: u32 = 40_000;
+        let step_size = 2.0f64.powi(1 - SIGNIFICANT_BITS as i32);
+        let mut stream = Stream::new(1, 0, 0, 0);
+        for value in [0.0, 1.0, 1.337, 0.024_71, 17.93] {
+            let mut sum = 0.0;
+            for _ in 0..COUNT {
+                let off = f64::from(rounded(value, &mut stream)) - f64::from(value);
+                assert!(off.abs() <= f64::from(value) * step_size, "{value} {off}");
+                sum += off;
+            }
+            let error = f64::from(value) * step_size / 2.0 / f64::from(COUNT).sqrt();
+            assert!((sum / f64::from(COUNT)).abs() <= 4.0 * error, "{value}");
+        }
+    }
 }

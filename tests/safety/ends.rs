@@ -10,7 +10,7 @@ use std::process::{Child, ChildStderr, Command, Stdio};
 fn endless(place: &Place, command: &mut Command) -> (Child, BufReader<ChildStderr>) {
     let mut relit = command
         // Large batches, or the descent ends by itself in a room this small.
-        .args(["--preset", "paper", "--batch", "1000"])
+        .args(["--preset", "paper", "--batch", "4000"])
         .args(["--time", "10m", "--views", "none"])
         .current_dir(place.path(""))
         .stdout(Stdio::null())

@@ -44,6 +44,7 @@ const LIFT: f64 = 2e-3;
 /// Photographs of the room without textures; those of the textured one are stored in the program.
 const PLAIN: Rendering = Rendering {
     samples: 64,
+    size: [320, 240],
     ..STORED
 };
 const QUICK: Rendering = Rendering {

@@ -139,14 +139,8 @@ fn run(bench: &Bench) -> Result<Findings> {
     let subject = bench.subject.map(|subject| (*subject.capture).clone());
     let mut captures = vec![in_memory(&subject.map_or_else(room::capture, Ok)?)?];
     let first = decide(&captures[0], None)?;
-    let (mut sound, mut refused, mut doubtful, mut mispaired) = (0, 0, 0, 0);
-    let mut count = |outcome: &Outcome| {
-        sound += 1;
-        refused += u64::from(outcome.detected);
-        doubtful += u64::from(outcome.alignment.decision == Decision::Doubtful);
-        mispaired += outcome.alignment.mispaired.len();
-    };
-    count(&first);
+    let mut sound = Sound::default();
+    sound.count(&first);
     row(&captures[0], "none", &first);
     let families = match bench.subject {
         Some(_) => &[],
@@ -154,10 +148,11 @@ fn run(bench: &Bench) -> Result<Findings> {
     };
     for family in families {
         for seed in bench.seeds() {
-            bench.begin(&format!("{} room {seed}, sound", family.name()))?;
+            let so_far = format!("{} of {} refused so far", sound.refused, sound.all);
+            bench.begin(&format!("{} room {seed}, sound; {so_far}", family.name()))?;
             let capture = in_memory(&family.generate(seed, rooms::SIZE)?.capture)?;
             let outcome = decide(&capture, None)?;
-            count(&outcome);
+            sound.count(&outcome);
             row(&capture, "none", &outcome);
             if *family == Family::Plain && captures.len() < MAX_CAPTURES {
                 captures.push(capture);
@@ -202,12 +197,31 @@ fn run(bench: &Bench) -> Result<Findings> {
                 "Of {made} captures with a mistake {found} were refused, {mended} with the right remedy."
             ),
             format!(
-                "Of {sound} sound captures {refused} were refused, and of {doubtful} it was said that it cannot be told. {mispaired} of \
-                their photographs were said to have another's pose."
+                "Of {} sound captures {} were refused, and of {} it was said that it cannot be told. {} of their photographs were said \
+                to have another's pose.",
+                sound.all, sound.refused, sound.doubtful, sound.mispaired
             ),
         ],
         ..Findings::default()
     })
+}
+
+/// What was said of sound captures.
+#[derive(Debug, Default)]
+struct Sound {
+    all: u64,
+    refused: u64,
+    doubtful: u64,
+    mispaired: usize,
+}
+
+impl Sound {
+    fn count(&mut self, outcome: &Outcome) {
+        self.all += 1;
+        self.refused += u64::from(outcome.detected);
+        self.doubtful += u64::from(outcome.alignment.decision == Decision::Doubtful);
+        self.mispaired += outcome.alignment.mispaired.len();
+    }
 }
 
 /// The capture with its photographs in memory, so that files are read only once.
