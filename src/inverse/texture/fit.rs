@@ -125,8 +125,16 @@ impl Measurements {
     }
 
     /// Fits the cells with the smoothing that predicts cross-validated pixels best, with at least `min_folds` folds. Lower bounds
-    /// that the fit meets lose their weight.
-    pub fn fit(&mut self, links: &Links, min_folds: usize) -> Texture {
+    /// that the fit meets lose their weight. `between` is called after each strength of smoothing.
+    ///
+    /// # Errors
+    /// The error of `between`.
+    pub fn fit<E>(
+        &mut self,
+        links: &Links,
+        min_folds: usize,
+        mut between: impl FnMut() -> Result<(), E>,
+    ) -> Result<Texture, E> {
         let unit = self.unit();
         let values: Vec<Vec3> = self.albedo.iter().map(|a| *a / unit).collect();
         let flat = vec![self.constant / unit; self.observations.cells()];
@@ -169,6 +177,7 @@ impl Measurements {
                 worse += 1;
             }
             strength *= FACTOR;
+            between()?;
         }
 
         let (_, strength, without) = best;
@@ -187,12 +196,12 @@ impl Measurements {
                 .map(|c| (*c * unit).clamp(Vec3::ZERO, Vec3::ONE));
             colors.collect()
         };
-        Texture {
+        Ok(Texture {
             colors: albedo(all),
             strength,
             without: without.into_iter().map(albedo).collect(),
             noise,
-        }
+        })
     }
 
     /// The luminance that albedos are relative to.
@@ -367,7 +376,10 @@ mod tests {
         };
         let mut measurements =
             Measurements::new(&seen, Observations::new(&rows, 2), &[Vec3::ONE; 2]);
-        let texture = measurements.fit(&links, 1);
+        let between = || Ok::<_, ()>(());
+        let texture = measurements
+            .fit(&links, 1, between)
+            .expect("nothing ends it");
         let [known, stray] = [0, 1].map(|cell: usize| texture.colors[cell].x);
         assert!((known - 0.8).abs() < 1e-3, "{known}");
         assert!((0.45..0.6).contains(&stray), "{stray}");

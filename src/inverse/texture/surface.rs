@@ -157,7 +157,7 @@ impl TexturedSurface {
         let fitted: Vec<&SeenPixel> = self.pixels.iter().filter(|p| !p.held_out).collect();
         let mut measurements = Measurements::new(&fitted, observations, &light.radiance);
         let min_folds = if self.glossy { FOLDS } else { 1 };
-        self.texture = measurements.fit(&self.links, min_folds);
+        self.texture = measurements.fit(&self.links, min_folds, || done(0, 0))?;
         self.constant = measurements.constant;
         done(0, 0)?;
         if let Some(scale_error) = errors {
