@@ -21,8 +21,8 @@ pub const STORED: Rendering = Rendering {
     size: [640, 480],
 };
 
-/// The stored photographs: half-float EXR files, in the order of the views; those of `relit demo --seed 7`, compressed anew
-/// without loss by OpenEXR, whose PIZ takes a quarter less than the crate's.
+/// The stored photographs: half-float EXR files, in the order of the views. Rendered by `relit demo --seed 7`, which makes the same
+/// but for the rounding, and compressed anew without loss by OpenEXR, whose PIZ takes a fifth less than the crate's.
 const FILES: [&[u8]; 16] = [
     include_bytes!("../../assets/room/000.exr"),
     include_bytes!("../../assets/room/001.exr"),
@@ -43,7 +43,7 @@ const FILES: [&[u8]; 16] = [
 ];
 
 /// Significant bits of the values in written photographs: rounding is then off by 2 % in the root of the mean square, less
-/// than the noise of 256 samples (about 4 %), and makes files half as large.
+/// than the noise of 256 samples (about 5 %), and makes files about half as large.
 const SIGNIFICANT_BITS: u32 = 5;
 
 /// Seed of the rounding, apart from those of paths.

@@ -62,6 +62,8 @@ fn numbers_below_zero_are_refused_for_what_they_are() {
     }
     let demo = ["demo", "--out", "demo", "--seed", "-1"];
     refused(&place.relit(&demo), 2, &["seed", "whole number from 0"]);
+    let demo = ["demo", "--out", "demo", "--seed", "1", "--width", "8"];
+    refused(&place.relit(&demo), 2, &["--width", "from 16 to 4096"]);
     let trade = ["trade", "room", "--seed", "-1"];
     refused(&place.relit(&trade), 2, &["seed", "whole number from 0"]);
 }

@@ -1,6 +1,6 @@
 //! Standard errors of fitted parameters, and score tests of parameters held fixed.
 
-use crate::inverse::fit::equations::{Coupling, Matrices, NormalEquations};
+use crate::inverse::fit::equations::{Coupling, Matrices, NormalEquations, per_channel};
 use crate::inverse::fit::gauss_newton::noise;
 use crate::inverse::fit::prior::ALBEDO_DEVIATION;
 use crate::inverse::fit::robust_weights::RobustWeights;
@@ -205,7 +205,7 @@ fn inverse(hessian: &DMatrix<f64>, added: &[DVec3], channel: usize) -> Option<DM
 fn sandwich(matrices: &Matrices, prior: &PriorTerms) -> Vec<DVec3> {
     let n = prior.added.len();
     let scatter = matrices.scatter();
-    let of_channel = |channel: usize| {
+    per_channel(|channel| {
         let Some(bread) = inverse(&matrices.hessian[channel], &prior.added, channel) else {
             return vec![-1.0; n];
         };
@@ -219,10 +219,7 @@ fn sandwich(matrices: &Matrices, prior: &PriorTerms) -> Vec<DVec3> {
         (0..n)
             .map(|a| product.column(a).dot(&bread.column(a)))
             .collect()
-    };
-    let variances: Vec<Vec<f64>> = (0..3).into_par_iter().map(of_channel).collect();
-    let variance = |i: usize| DVec3::from_array(std::array::from_fn(|c| variances[c][i]));
-    (0..n).map(variance).collect()
+    })
 }
 
 /// The same variances by the multiplier bootstrap (Wu 1986): with random signs ε of the clusters, (H + P)⁻¹ Σ ε g has the
@@ -294,34 +291,36 @@ fn eliminate_dense(
     prior: &PriorTerms,
     active: usize,
 ) -> Vec<Eliminated> {
-    let n = equations.diagonal.len();
+    let tested = equations.diagonal.len() - active;
     let scatter = matrices.scatter();
-    let of_channel = |channel: usize| -> Vec<[f64; 2]> {
+    // The curvatures of all tested parameters, then their variances.
+    let values = per_channel(|channel| {
         let (hessian, scatter) = (&matrices.hessian[channel], &scatter[channel]);
         let Some(inverse) = inverse(hessian, &prior.added, channel) else {
-            return vec![[0.0; 2]; n - active];
+            return vec![0.0; 2 * tested];
         };
         let active_scatter = DMatrix::from_fn(active, active, |a, b| scatter[(a.max(b), a.min(b))]);
         // The columns of the tested parameters, over the active ones.
-        let coupling = DMatrix::from_fn(active, n - active, |a, t| hessian[(active + t, a)]);
+        let coupling = DMatrix::from_fn(active, tested, |a, t| hessian[(active + t, a)]);
         let u = inverse * &coupling;
         let spread = active_scatter * &u;
-        let test = |t: usize| {
+        let curvature = |t: usize| {
+            let row = active + t;
+            hessian[(row, row)] - coupling.column(t).dot(&u.column(t))
+        };
+        let variance = |t: usize| {
             let (row, u) = (active + t, u.column(t));
             let shared: f64 = (0..active).map(|a| u[a] * scatter[(row, a)]).sum();
-            let curvature = hessian[(row, row)] - coupling.column(t).dot(&u);
-            let variance = scatter[(row, row)] - 2.0 * shared + u.dot(&spread.column(t));
-            [curvature, variance]
+            scatter[(row, row)] - 2.0 * shared + u.dot(&spread.column(t))
         };
-        (0..n - active).map(test).collect()
-    };
-    let channels: Vec<Vec<[f64; 2]>> = (0..3).into_par_iter().map(of_channel).collect();
-    let value =
-        |t: usize, which: usize| DVec3::from_array(std::array::from_fn(|c| channels[c][t][which]));
-    (0..n - active)
-        .map(|t| Eliminated {
-            curvature: value(t, 0),
-            variance: value(t, 1),
+        let curvatures = (0..tested).map(curvature);
+        curvatures.chain((0..tested).map(variance)).collect()
+    });
+    let (curvatures, variances) = values.split_at(tested);
+    (curvatures.iter().zip(variances))
+        .map(|(&curvature, &variance)| Eliminated {
+            curvature,
+            variance,
         })
         .collect()
 }

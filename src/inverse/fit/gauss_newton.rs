@@ -1,6 +1,6 @@
 //! Finds the zero of the unbiased descent direction within bounds by Gauss–Newton steps.
 
-use crate::inverse::fit::equations::{Coupling, Matrices, NormalEquations};
+use crate::inverse::fit::equations::{Coupling, Matrices, NormalEquations, per_channel};
 use crate::inverse::fit::errors::signal;
 use crate::inverse::fit::prior::Prior;
 use crate::inverse::fit::robust_weights::RobustWeights;
@@ -10,7 +10,6 @@ use crate::inverse::paths::PathCache;
 use crate::inverse::unknowns::Unknowns;
 use glam::DVec3;
 use nalgebra::DVector;
-use rayon::prelude::*;
 
 /// Damping relative to the diagonal; only guards the factorisation against rounding.
 pub const MIN_DAMPING: f64 = 1e-10;
@@ -210,7 +209,7 @@ fn dense_step(
     added: &(dyn Fn(f64) -> Vec<DVec3> + Sync),
 ) -> Vec<DVec3> {
     let lower = vec![0.0; x.len()];
-    let of_channel = |channel: usize| {
+    per_channel(|channel| {
         let of = |all: &[DVec3]| -> Vec<f64> { all.iter().map(|v| v[channel]).collect() };
         let (x, descent) = (of(x), DVector::from_vec(of(descent)));
         let mut damping = damping;
@@ -223,15 +222,12 @@ fn dense_step(
                 upper,
             };
             if let Some(solution) = step.solve(&x) {
-                return solution;
+                return solution.as_slice().to_vec();
             }
             damping *= 10.0;
         }
-        DVector::zeros(x.len())
-    };
-    let steps: Vec<DVector<f64>> = (0..3).into_par_iter().map(of_channel).collect();
-    let step = |i: usize| DVec3::from_array(std::array::from_fn(|c| steps[c][i]));
-    (0..x.len()).map(step).collect()
+        vec![0.0; x.len()]
+    })
 }
 
 #[cfg(test)]
