@@ -11,6 +11,7 @@ pub mod mesh;
 pub mod orientation;
 pub mod photograph;
 pub mod place;
+pub mod poses;
 pub mod read;
 pub mod reading;
 pub mod regroup;

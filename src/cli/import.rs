@@ -39,6 +39,9 @@ pub struct ImportArguments {
     /// Take at most N photographs, evenly spaced [default: 200 of a video, else all]
     #[arg(long, value_name = "N", value_parser = from_one::<u32>)]
     max_frames: Option<u32>,
+    /// Keep the scan's poses, instead of refining them on photographs and depth images
+    #[arg(long)]
+    keep_poses: bool,
     /// Up axis of the capture [default: the cameras' mean up]
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
     up: Option<DVec3>,
@@ -87,6 +90,7 @@ pub fn import(arguments: &ImportArguments) -> Result<()> {
         voxel: arguments.voxel,
         every: arguments.every.unwrap_or(0) as usize,
         max_frames: arguments.max_frames.map(|n| n as usize),
+        keep_poses: arguments.keep_poses,
         up: arguments.up,
         intrinsics: arguments.intrinsics.map(|k| k.0),
         applied_transform: match arguments.applied_transform {

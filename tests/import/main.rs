@@ -7,6 +7,7 @@ mod icl_nuim;
 mod matterport;
 mod nerfstudio;
 mod open3d;
+mod poses;
 mod scannet;
 mod seven_scenes;
 mod tum;
@@ -93,12 +94,22 @@ impl Camera {
 
     /// Depth along the axis and wall of the pixel.
     fn hit(&self, x: u32, y: u32) -> (f64, usize) {
-        let ray = DVec3::new(
-            (f64::from(x) - self.cx) / self.fx,
-            (f64::from(y) - self.cy) / self.fy,
-            1.0,
-        );
-        let d = self.rotation * ray;
+        self.hit_at(f64::from(x), f64::from(y))
+    }
+
+    /// What is seen at a pixel position, pixel centres at whole numbers: the point in the world and its wall.
+    pub fn point(&self, x: f64, y: f64) -> (DVec3, usize) {
+        let (depth, wall) = self.hit_at(x, y);
+        (self.center + self.ray(x, y) * depth, wall)
+    }
+
+    /// The direction of a pixel position in the world, of length 1 along the axis.
+    fn ray(&self, x: f64, y: f64) -> DVec3 {
+        self.rotation * DVec3::new((x - self.cx) / self.fx, (y - self.cy) / self.fy, 1.0)
+    }
+
+    fn hit_at(&self, x: f64, y: f64) -> (f64, usize) {
+        let d = self.ray(x, y);
         (0..6)
             .filter_map(|wall| {
                 let axis = wall / 2;

@@ -68,11 +68,11 @@ impl Field {
 
 /// The blocks within the truncation distance of any measured point, without duplicates, in a fixed order.
 fn blocks_near_surface(view: &View, edge: f64) -> Vec<IVec3> {
-    let k = &view.lens.pinhole;
+    let k = &view.depth.lens.pinhole;
     let reach = TRUNCATION * edge;
     let side = f64::from(SIDE) * edge;
     // Points spaced by at most half a block reach every block.
-    let deepest = f64::from(view.depth.iter().copied().fold(0.0, f32::max));
+    let deepest = f64::from(view.depth.metres.iter().copied().fold(0.0, f32::max));
     let stride = (side * 0.5 * k.fx.min(k.fy) / deepest.max(1e-9)).floor();
     let stride = stride.clamp(1.0, 64.0) as usize;
     let mut blocks: Vec<IVec3> = (0..k.height as usize)
@@ -81,12 +81,12 @@ fn blocks_near_surface(view: &View, edge: f64) -> Vec<IVec3> {
         .flat_map_iter(|y| {
             let mut row: Vec<IVec3> = Vec::new();
             for x in (0..k.width as usize).step_by(stride) {
-                let depth = f64::from(view.depth[y * k.width as usize + x]);
+                let depth = f64::from(view.depth.metres[y * k.width as usize + x]);
                 let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
                 if depth <= 0.0 {
                     continue;
                 }
-                let Some(ray) = view.lens.ray(pixel) else {
+                let Some(ray) = view.depth.lens.ray(pixel) else {
                     continue;
                 };
                 let point = view.to_world(ray.extend(1.0) * depth);
@@ -115,10 +115,10 @@ fn update(block: &mut Block, view: &View, edge: f64) {
     let reach = TRUNCATION * edge;
     for index in 0..block.voxels.len() {
         let point = view.to_camera(block.voxel(index).as_dvec3() * edge);
-        let Some(pixel) = view.lens.project(point) else {
+        let Some(pixel) = view.depth.lens.project(point) else {
             continue;
         };
-        let Some(depth) = view.depth_at(pixel) else {
+        let Some(depth) = view.depth.at(pixel) else {
             continue;
         };
         let ahead = f64::from(depth) - point.z;
@@ -153,9 +153,9 @@ fn may_be_seen(block: &Block, view: &View, edge: f64) -> bool {
     if p.z <= radius * 2.0 {
         return true;
     }
-    let k = &view.lens.pinhole;
+    let k = &view.depth.lens.pinhole;
     // At this distance a sphere's image is little larger than radius / depth; the factor 1.5 covers lens distortion.
-    let Some(pixel) = view.lens.project(p) else {
+    let Some(pixel) = view.depth.lens.project(p) else {
         return true;
     };
     let reach =

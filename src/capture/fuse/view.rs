@@ -4,22 +4,18 @@ use crate::capture::camera::Pose;
 use crate::capture::orientation::Orientation;
 use crate::capture::photograph::Photograph;
 use crate::capture::read::image;
+use crate::capture::scan::depth::DepthMap;
 use crate::capture::scan::{ImportedFrame, Lens};
 use crate::error::{Error, Result};
-use glam::{DVec2, DVec3, Vec3};
-
-/// Relative difference above which neighbouring depths lie on different surfaces.
-const JUMP: f32 = 0.05;
+use glam::{DVec3, Vec3};
 
 /// A decoded frame.
 #[derive(Debug)]
 pub struct View {
     /// Camera to world.
     pub pose: Pose,
-    /// The depth camera.
-    pub lens: Lens,
-    /// Metres along the viewing direction; 0 where nothing was measured.
-    pub depth: Vec<f32>,
+    /// The decoded depth image.
+    pub depth: DepthMap,
     color_lens: Lens,
     photograph: Photograph,
 }
@@ -41,8 +37,7 @@ impl View {
         )?;
         Ok(Self {
             pose: frame.pose,
-            lens: depth.lens,
-            depth: depth.metres()?,
+            depth: depth.map()?,
             color_lens: frame.lens,
             photograph,
         })
@@ -57,38 +52,6 @@ impl View {
     /// A point in camera coordinates in the world.
     pub fn to_world(&self, p: DVec3) -> DVec3 {
         self.pose.rotation * DVec3::new(p.x, -p.y, -p.z) + self.pose.center
-    }
-
-    /// The measured depth in metres at a pixel position. Inverse depth is interpolated bilinearly, which is exact for planes;
-    /// at depth discontinuities and next to missing depth the nearest pixel is used.
-    pub fn depth_at(&self, pixel: DVec2) -> Option<f32> {
-        let k = &self.lens.pinhole;
-        let nearest = self.depth_of_pixel(pixel.x.floor() as i64, pixel.y.floor() as i64)?;
-        let corner = pixel - DVec2::splat(0.5);
-        let (i, j) = (corner.x.floor(), corner.y.floor());
-        let (u, v) = ((corner.x - i) as f32, (corner.y - j) as f32);
-        let (i, j) = (i as i64, j as i64);
-        if i < 0 || j < 0 || i + 1 >= i64::from(k.width) || j + 1 >= i64::from(k.height) {
-            return Some(nearest);
-        }
-        let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| self.depth_of_pixel(i + x, j + y));
-        let [Some(a), Some(b), Some(c), Some(d)] = four else {
-            return Some(nearest);
-        };
-        let low = a.min(b).min(c).min(d);
-        let high = a.max(b).max(c).max(d);
-        if high - low > JUMP * low {
-            return Some(nearest);
-        }
-        let inverse = (1.0 - v) * ((1.0 - u) / a + u / b) + v * ((1.0 - u) / c + u / d);
-        Some(1.0 / inverse)
-    }
-
-    fn depth_of_pixel(&self, i: i64, j: i64) -> Option<f32> {
-        let k = &self.lens.pinhole;
-        let inside = i >= 0 && j >= 0 && i < i64::from(k.width) && j < i64::from(k.height);
-        let depth = inside.then(|| self.depth[(j * i64::from(k.width) + i) as usize])?;
-        (depth > 0.0).then_some(depth)
     }
 
     /// The photograph's linear colour at a point in camera coordinates; `None` outside it and at unusable pixels.

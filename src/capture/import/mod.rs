@@ -19,6 +19,7 @@ pub use format::Format;
 pub use reader::{AppliedTransform, ImportOptions};
 
 use crate::capture::mesh::Mesh;
+use crate::capture::poses;
 use crate::error::{Error, Result};
 use folder::Folder;
 use glam::DVec3;
@@ -88,6 +89,13 @@ pub fn read(
     remarks.append(&mut scan.remarks);
     check(source, &scan.frames)?;
 
+    let chosen = choose(scan.frames.len(), options, scan.is_video, &mut remarks);
+    if !options.keep_poses
+        && let Some(refined) = poses::refine(&mut scan.frames, &chosen, &mut |_, _| {})?
+    {
+        remarks.push(refined.to_string());
+    }
+
     // The mesh: the one that the person names, the scan's own, or one fused from the depth of all frames.
     let named = options.mesh.as_ref();
     let (mesh, has_objects) = match named.or(scan.mesh.as_ref()) {
@@ -97,9 +105,8 @@ pub fn read(
             false,
         ),
     };
-    let frames = choose(scan.frames, options, scan.is_video, &mut remarks);
     Ok(Import {
-        frames,
+        frames: chosen.into_iter().map(|i| scan.frames[i].clone()).collect(),
         mesh,
         has_objects,
         up: options.up.or(scan.up),
@@ -184,38 +191,36 @@ fn check(source: &Path, frames: &[ImportedFrame]) -> Result<()> {
     Ok(())
 }
 
-/// Selects the frames that become photographs.
+/// Selects the frames that become photographs, by index.
 fn choose(
-    frames: Vec<ImportedFrame>,
+    total: usize,
     options: &ImportOptions,
     is_video: bool,
     remarks: &mut Vec<String>,
-) -> Vec<ImportedFrame> {
-    let total = frames.len();
-    let step = options.every.max(1);
-    let mut frames: Vec<ImportedFrame> = frames.into_iter().step_by(step).collect();
+) -> Vec<usize> {
+    let mut chosen: Vec<usize> = (0..total).step_by(options.every.max(1)).collect();
     let asked = options.every > 0 || options.max_frames.is_some();
     let max = match options.max_frames {
         Some(max) => max.max(1),
         None if is_video && !asked => PHOTOGRAPHS_OF_A_VIDEO,
         None => usize::MAX,
     };
-    if frames.len() > max {
-        let count = frames.len();
-        let mut index = 0..;
-        frames.retain(|_| {
-            // Keeps the first index of each of `max` equal parts.
-            let i = index.next().unwrap_or(0);
-            i == 0 || i * max / count != (i - 1) * max / count
-        });
+    let count = chosen.len();
+    if count > max {
+        // Keep the first of each of `max` equal parts.
+        let first = |i: usize| i == 0 || i * max / count != (i - 1) * max / count;
+        chosen = (0..count)
+            .filter(|&i| first(i))
+            .map(|i| chosen[i])
+            .collect();
     }
-    let how = match (frames.len() < total, asked) {
+    let how = match (chosen.len() < total, asked) {
         (false, _) => String::new(),
         (true, true) => format!(" of {total}"),
         (true, false) => {
             format!(" of {total}, evenly spaced; --every and --max-frames choose others")
         }
     };
-    remarks.push(format!("photographs: {}{how}", frames.len()));
-    frames
+    remarks.push(format!("photographs: {}{how}", chosen.len()));
+    chosen
 }

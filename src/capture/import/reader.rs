@@ -18,6 +18,8 @@ pub struct ImportOptions {
     pub every: usize,
     /// At most so many photographs, evenly spaced.
     pub max_frames: Option<usize>,
+    /// Whether the scan's poses stay as they are, instead of being refined on photographs and depth images.
+    pub keep_poses: bool,
     /// Up direction, written into the capture.
     pub up: Option<DVec3>,
     /// fx, fy, cx, cy of the colour camera in pixels, pixel centres at whole numbers, for scans without intrinsics.

@@ -2,8 +2,12 @@
 
 use crate::capture::scan::lens::Lens;
 use crate::error::{Error, Result};
+use glam::DVec2;
 use image::{DynamicImage, ImageBuffer, ImageReader, Limits, Luma};
 use std::path::{Path, PathBuf};
+
+/// Relative difference above which neighbouring depths lie on different surfaces.
+const JUMP: f32 = 0.05;
 
 /// A depth image, its camera and its unit.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,6 +62,17 @@ impl DepthImage {
         Ok(raw.iter().map(|&v| (f64::from(v) * unit) as f32).collect())
     }
 
+    /// The decoded image.
+    ///
+    /// # Errors
+    /// As [`DepthImage::raw`].
+    pub fn map(&self) -> Result<DepthMap> {
+        Ok(DepthMap {
+            lens: self.lens,
+            metres: self.metres()?,
+        })
+    }
+
     /// Whether the depth image has the photograph's field of view and distortion, at any resolution.
     pub fn is_registered_to(&self, photograph: &Lens) -> bool {
         let k = &self.lens.pinhole;
@@ -66,6 +81,49 @@ impl DepthImage {
         let p = &scaled.pinhole;
         let same = near(k.fx, p.fx) && near(k.fy, p.fy) && near(k.cx, p.cx) && near(k.cy, p.cy);
         same && self.lens.model == photograph.model
+    }
+}
+
+/// A decoded depth image.
+#[derive(Debug)]
+pub struct DepthMap {
+    /// The depth camera.
+    pub lens: Lens,
+    /// Metres along the optical axis, row by row; 0 where nothing was measured.
+    pub metres: Vec<f32>,
+}
+
+impl DepthMap {
+    /// The measured depth in metres at a pixel position. Inverse depth is interpolated bilinearly, which is exact for planes;
+    /// at depth discontinuities and next to missing depth the nearest pixel is used.
+    pub fn at(&self, pixel: DVec2) -> Option<f32> {
+        let k = &self.lens.pinhole;
+        let nearest = self.of_pixel(pixel.x.floor() as i64, pixel.y.floor() as i64)?;
+        let corner = pixel - DVec2::splat(0.5);
+        let (i, j) = (corner.x.floor(), corner.y.floor());
+        let (u, v) = ((corner.x - i) as f32, (corner.y - j) as f32);
+        let (i, j) = (i as i64, j as i64);
+        if i < 0 || j < 0 || i + 1 >= i64::from(k.width) || j + 1 >= i64::from(k.height) {
+            return Some(nearest);
+        }
+        let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| self.of_pixel(i + x, j + y));
+        let [Some(a), Some(b), Some(c), Some(d)] = four else {
+            return Some(nearest);
+        };
+        let low = a.min(b).min(c).min(d);
+        let high = a.max(b).max(c).max(d);
+        if high - low > JUMP * low {
+            return Some(nearest);
+        }
+        let inverse = (1.0 - v) * ((1.0 - u) / a + u / b) + v * ((1.0 - u) / c + u / d);
+        Some(1.0 / inverse)
+    }
+
+    fn of_pixel(&self, i: i64, j: i64) -> Option<f32> {
+        let k = &self.lens.pinhole;
+        let inside = i >= 0 && j >= 0 && i < i64::from(k.width) && j < i64::from(k.height);
+        let depth = inside.then(|| self.metres[(j * i64::from(k.width) + i) as usize])?;
+        (depth > 0.0).then_some(depth)
     }
 }
 

@@ -23,6 +23,9 @@ use glam::{DVec3, Vec3};
 
 /// Least fraction of paths that leave the mesh for which outside light is tried.
 const ESCAPING: f64 = 1e-3;
+/// Fraction of paths that leave a scan from which outside light is fitted without a test: what was not scanned reflects light, if
+/// nothing else. Without it, walls would be given light of their own until nothing is left for outside light to improve.
+const LACKING: f64 = 0.1;
 /// Least relative decrease of the held-out loss by outside light.
 const OUTSIDE_GAIN: f64 = 0.03;
 /// Assumed relative error of albedo by the light field's limited resolution at edges, until full paths replace it.
@@ -166,7 +169,7 @@ impl Pipeline<'_, '_> {
     }
 
     /// Tries light from infinity, and for a scan also from a box around the mesh. Keeps the better one if it predicts held-out pixels
-    /// better than the model without it.
+    /// better than the model without it, or if the scan lacks much of the room.
     fn light_from_outside(
         &mut self,
         cache: &PathCache,
@@ -180,7 +183,13 @@ impl Pipeline<'_, '_> {
         let leave = format!("{:.1} % of the paths leave the mesh", escaping * 100.0);
         // A linear step estimates the gain at a small fraction of the cost of a trial.
         let gain = self.outside_gain(cache);
-        if gain < OUTSIDE_GAIN {
+        let lacks_much = self.problem.scene.scanned && escaping > LACKING;
+        let needed = if lacks_much {
+            f64::NEG_INFINITY
+        } else {
+            OUTSIDE_GAIN
+        };
+        if gain < needed {
             let why = format!(
                 "{leave}; light from there would change the squared error by {:.1} %, so it is not called for",
                 -gain * 100.0,
@@ -200,7 +209,7 @@ impl Pipeline<'_, '_> {
         let mut gained: Vec<(Losses, Found)> = Vec::new();
         for surroundings in [Some(Surroundings::Far), around].into_iter().flatten() {
             let losses = self.fit_open(surroundings, cache, lights, measured)?;
-            if fall(closed, losses) > OUTSIDE_GAIN {
+            if fall(closed, losses) > needed {
                 gained.push((losses, self.found()));
             }
             self.go_back_to(without.clone());

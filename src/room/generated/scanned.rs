@@ -4,6 +4,7 @@ use crate::capture::Segmentation;
 use crate::capture::camera::Pose;
 use crate::capture::fuse::{MAX_BYTES, fuse};
 use crate::capture::import::{DepthImage, ImportedFrame, Lens};
+use crate::capture::poses;
 use crate::error::{Error, Result};
 use crate::math::rng::Stream;
 use crate::room::cameras;
@@ -47,7 +48,8 @@ pub fn deviation(depth: f64) -> f64 {
     0.0012 + 0.0019 * (depth - 0.4).powi(2)
 }
 
-/// Scans the room: photographs and depth images from the same poses, known with an error, and a mesh fused from the depth.
+/// Scans the room as `relit import` reads scans: photographs and depth images from the same poses, known with an error that is
+/// refined, and a mesh fused from the depth.
 pub fn scan(draft: Draft) -> Result<Generated> {
     let lit = draft.lit()?;
     let files = phone::files(&draft, &lit)?;
@@ -82,6 +84,8 @@ pub fn scan(draft: Draft) -> Result<Generated> {
             depth: Some(depth),
         });
     }
+    let all: Vec<usize> = (0..frames.len()).collect();
+    poses::refine(&mut frames, &all, &mut |_, _| {})?;
     let fused = fuse(&frames, VOXEL, MAX_BYTES, &mut |_, _| {})?;
 
     let photographs = files

@@ -1,0 +1,229 @@
+//! A photograph as points are looked up in it: grey, small, smoothed, with its depth image.
+
+use crate::capture::orientation::Orientation;
+use crate::capture::read::image;
+use crate::capture::scan::depth::DepthMap;
+use crate::capture::scan::{ImportedFrame, Lens};
+use crate::error::{Error, Result};
+use glam::{DVec2, DVec3, Vec3};
+
+/// Pixels of a picture at most; more add time, not accuracy, to what depth images and tracking allow.
+const MAX_PIXELS: usize = 640 * 480;
+/// Rec. 709 luminance.
+const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
+/// Standard deviations in pixels of the two Gaussians whose difference is a band. The narrow one of a pixel makes bilinear
+/// interpolation nearly exact, that of three finds a point from five pixels away; the wide one takes away shading and
+/// vignetting, which stay with the light and the lens instead of moving with the surface.
+const BANDS: [[f32; 2]; 2] = [[1.0, 4.0], [3.0, 10.0]];
+
+/// A decoded photograph: square roots of luminance, so that noise is about the same everywhere.
+#[derive(Debug)]
+pub struct Picture {
+    /// The lens at this size.
+    pub lens: Lens,
+    /// Fine details, for accuracy.
+    pub fine: Grey,
+    /// Coarse ones, to find points far from where they are expected.
+    pub coarse: Grey,
+    depth: DepthMap,
+    /// Whether each pixel is clipped, whose edges move with the exposure, or masked.
+    spoiled: Vec<bool>,
+}
+
+/// An image of one channel.
+#[derive(Debug)]
+pub struct Grey {
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    values: Vec<f32>,
+}
+
+impl Picture {
+    /// Decodes a frame that has depth.
+    ///
+    /// # Errors
+    /// There is no depth, or an image is broken.
+    pub fn load(frame: &ImportedFrame) -> Result<Self> {
+        let Some(depth) = &frame.depth else {
+            return Err(Error::file(&frame.photograph, "has no depth image", ""));
+        };
+        let k = &frame.lens.pinhole;
+        let (photograph, _) =
+            image::read(&frame.photograph, Orientation::default(), k, frame.exposure)?;
+        let size = [k.width as usize, k.height as usize];
+        let factor = (1..).find(|f| (size[0] / f) * (size[1] / f) <= MAX_PIXELS);
+        let factor = factor.unwrap_or(1);
+        let grey = Grey::reduced(&photograph.pixels, size, factor);
+        let [fine, coarse] = BANDS.map(|[narrow, wide]| grey.band(narrow, wide));
+        let (width, height) = (fine.width, fine.height);
+        let mut spoiled = vec![false; width * height];
+        for index in 0..photograph.pixels.len() {
+            let (x, y) = (index % size[0] / factor, index / size[0] / factor);
+            if x < width && y < height {
+                let spoils = photograph.is_saturated(index) || !photograph.is_usable(index);
+                spoiled[y * width + x] |= spoils;
+            }
+        }
+        // A block cut off at the right or lower edge leaves the scale as it is.
+        let mut lens = frame.lens;
+        let scale = 1.0 / factor as f64;
+        let pinhole = &mut lens.pinhole;
+        (pinhole.width, pinhole.height) = (width as u32, height as u32);
+        pinhole.fx *= scale;
+        pinhole.fy *= scale;
+        pinhole.cx *= scale;
+        pinhole.cy *= scale;
+        Ok(Self {
+            lens,
+            fine,
+            coarse,
+            depth: depth.map()?,
+            spoiled,
+        })
+    }
+
+    /// The depth in metres, along the optical axis, of what the photograph shows at undistorted normalised coordinates.
+    pub fn depth_along(&self, ray: DVec2) -> Option<f64> {
+        let pixel = self.depth.lens.project(ray.extend(1.0))?;
+        self.depth.at(pixel).map(f64::from)
+    }
+
+    /// Whether no pixel of the patch of `radius` around a position is clipped or masked; the patch must be inside.
+    pub fn is_clear(&self, center: DVec2, radius: usize) -> bool {
+        let (x, y) = (center.x as usize, center.y as usize);
+        let mut rows = y - radius..=y + radius;
+        rows.all(|j| {
+            let row = j * self.fine.width;
+            !self.spoiled[row + x - radius..=row + x + radius].contains(&true)
+        })
+    }
+
+    /// The pixel position of a point in camera coordinates; `None` where a patch of `margin` pixels around it leaves the
+    /// picture.
+    pub fn project(&self, point: DVec3, margin: f64) -> Option<DVec2> {
+        let pixel = self.lens.project(point)?;
+        let far = DVec2::new(self.fine.width as f64, self.fine.height as f64) - margin;
+        let inside = pixel.x >= margin && pixel.y >= margin && pixel.x <= far.x && pixel.y <= far.y;
+        inside.then_some(pixel)
+    }
+}
+
+impl Grey {
+    /// Square roots of the mean luminance of blocks of `factor` × `factor` pixels.
+    fn reduced(pixels: &[Vec3], [width, height]: [usize; 2], factor: usize) -> Self {
+        let (w, h) = (width / factor, height / factor);
+        let block = |x: usize, y: usize| {
+            let rows = y * factor..(y + 1) * factor;
+            let sum: f32 = rows
+                .flat_map(|j| &pixels[j * width + x * factor..j * width + (x + 1) * factor])
+                .map(|p| p.dot(LUMINANCE))
+                .sum();
+            (sum / (factor * factor) as f32).max(0.0).sqrt()
+        };
+        Self {
+            width: w,
+            height: h,
+            values: (0..w * h).map(|i| block(i % w, i / w)).collect(),
+        }
+    }
+
+    /// The difference of two Gaussians.
+    fn band(&self, narrow: f32, wide: f32) -> Self {
+        let mut band = self.smoothed(narrow);
+        let wide = self.smoothed(wide);
+        (band.values.iter_mut().zip(&wide.values)).for_each(|(v, w)| *v -= w);
+        band
+    }
+
+    /// Convolved with a Gaussian; the edge is repeated beyond it.
+    fn smoothed(&self, deviation: f32) -> Self {
+        let reach = (3.0 * deviation).ceil() as i64;
+        let mut kernel: Vec<f32> = (-reach..=reach)
+            .map(|i| (-0.5 * (i as f32 / deviation).powi(2)).exp())
+            .collect();
+        let sum: f32 = kernel.iter().sum();
+        kernel.iter_mut().for_each(|k| *k /= sum);
+        let pass = |from: &[f32], along: [i64; 2]| -> Vec<f32> {
+            let (w, h) = (self.width as i64, self.height as i64);
+            let at = |x: i64, y: i64| from[(y.clamp(0, h - 1) * w + x.clamp(0, w - 1)) as usize];
+            (0..w * h)
+                .map(|i| {
+                    let terms = (-reach..=reach).zip(&kernel);
+                    let value = |(k, weight): (i64, &f32)| {
+                        weight * at(i % w + k * along[0], i / w + k * along[1])
+                    };
+                    terms.map(value).sum()
+                })
+                .collect()
+        };
+        let rows = pass(&self.values, [1, 0]);
+        Self {
+            width: self.width,
+            height: self.height,
+            values: pass(&rows, [0, 1]),
+        }
+    }
+
+    /// The value of a pixel, which must be inside.
+    pub fn pixel(&self, x: usize, y: usize) -> f32 {
+        self.values[y * self.width + x]
+    }
+
+    /// The value at a pixel position, interpolated bilinearly; the edge is repeated beyond it.
+    pub fn at(&self, p: DVec2) -> f32 {
+        let x = (p.x - 0.5).clamp(0.0, (self.width - 1) as f64);
+        let y = (p.y - 0.5).clamp(0.0, (self.height - 1) as f64);
+        let (i, j) = (x as usize, y as usize);
+        let (u, v) = ((x - i as f64) as f32, (y - j as f64) as f32);
+        let (right, below) = ((i + 1).min(self.width - 1), (j + 1).min(self.height - 1));
+        let upper = self.pixel(i, j) * (1.0 - u) + self.pixel(right, j) * u;
+        let lower = self.pixel(i, below) * (1.0 - u) + self.pixel(right, below) * u;
+        upper * (1.0 - v) + lower * v
+    }
+
+    /// Half the difference of the neighbours of a pixel inside the outermost ones, to the right and below.
+    pub fn gradient(&self, x: usize, y: usize) -> [f32; 2] {
+        [
+            0.5 * (self.pixel(x + 1, y) - self.pixel(x - 1, y)),
+            0.5 * (self.pixel(x, y + 1) - self.pixel(x, y - 1)),
+        ]
+    }
+}
+
+#[cfg(test)]
+impl Grey {
+    /// Values by pixel.
+    pub fn from_fn([width, height]: [usize; 2], value: impl Fn(usize, usize) -> f32) -> Self {
+        Self {
+            width,
+            height,
+            values: (0..width * height)
+                .map(|i| value(i % width, i / width))
+                .collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+impl Picture {
+    /// A picture that shows nothing, without depth.
+    pub fn blank(lens: Lens) -> Self {
+        let grey = || Grey {
+            width: lens.pinhole.width as usize,
+            height: lens.pinhole.height as usize,
+            values: Vec::new(),
+        };
+        Self {
+            lens,
+            fine: grey(),
+            coarse: grey(),
+            depth: DepthMap {
+                lens,
+                metres: Vec::new(),
+            },
+            spoiled: Vec::new(),
+        }
+    }
+}
