@@ -33,6 +33,19 @@ pub struct Pose {
     pub center: DVec3,
 }
 
+impl Pose {
+    /// A world point in OpenCV's camera coordinates: x right, y down, z forwards.
+    pub fn to_camera(&self, point: DVec3) -> DVec3 {
+        let p = self.rotation.transpose() * (point - self.center);
+        DVec3::new(p.x, -p.y, -p.z)
+    }
+
+    /// A point in OpenCV's camera coordinates in the world.
+    pub fn to_world(&self, p: DVec3) -> DVec3 {
+        self.rotation * DVec3::new(p.x, -p.y, -p.z) + self.center
+    }
+}
+
 impl Intrinsics {
     /// Distorted normalised image coordinates of undistorted ones (x right, y down, at unit depth).
     ///

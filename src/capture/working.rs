@@ -146,7 +146,7 @@ fn reduction(frames: &[Frame], max_pixels: u64) -> u32 {
 }
 
 /// Downsamples by block means. A block with an unusable pixel is unusable; a block with a saturated pixel is a lower bound.
-fn reduce(photograph: &Photograph, factor: u32) -> Photograph {
+pub fn reduce(photograph: &Photograph, factor: u32) -> Photograph {
     let (width, height) = (photograph.width / factor, photograph.height / factor);
     let count = f64::from(factor) * f64::from(factor);
     let blocks: Vec<Block> = (0..height)

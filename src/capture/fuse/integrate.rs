@@ -89,7 +89,7 @@ fn blocks_near_surface(view: &View, edge: f64) -> Vec<IVec3> {
                 let Some(ray) = view.depth.lens.ray(pixel) else {
                     continue;
                 };
-                let point = view.to_world(ray.extend(1.0) * depth);
+                let point = view.pose.to_world(ray.extend(1.0) * depth);
                 // The corners of a cube around the point reach every block that it touches, as 2 · reach ≤ the side of a block.
                 for corner in 0..8 {
                     let sign = |bit: i32| f64::from((corner >> bit & 1) * 2 - 1);
@@ -114,7 +114,7 @@ fn update(block: &mut Block, view: &View, edge: f64) {
     }
     let reach = TRUNCATION * edge;
     for index in 0..block.voxels.len() {
-        let point = view.to_camera(block.voxel(index).as_dvec3() * edge);
+        let point = view.pose.to_camera(block.voxel(index).as_dvec3() * edge);
         let Some(pixel) = view.depth.lens.project(point) else {
             continue;
         };
@@ -146,7 +146,7 @@ fn may_be_seen(block: &Block, view: &View, edge: f64) -> bool {
     let half = f64::from(SIDE) * 0.5;
     let radius = half * edge * 3f64.sqrt();
     let middle = (block.at * SIDE).as_dvec3() + DVec3::splat(half);
-    let p = view.to_camera(middle * edge);
+    let p = view.pose.to_camera(middle * edge);
     if p.z < -radius {
         return false;
     }

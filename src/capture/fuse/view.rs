@@ -43,17 +43,6 @@ impl View {
         })
     }
 
-    /// A world point in camera coordinates: x right, y down, z forwards.
-    pub fn to_camera(&self, point: DVec3) -> DVec3 {
-        let p = self.pose.rotation.transpose() * (point - self.pose.center);
-        DVec3::new(p.x, -p.y, -p.z)
-    }
-
-    /// A point in camera coordinates in the world.
-    pub fn to_world(&self, p: DVec3) -> DVec3 {
-        self.pose.rotation * DVec3::new(p.x, -p.y, -p.z) + self.pose.center
-    }
-
     /// The photograph's linear colour at a point in camera coordinates; `None` outside it and at unusable pixels.
     pub fn color_at(&self, point: DVec3) -> Option<Vec3> {
         let pixel = self.color_lens.project(point)?.floor();

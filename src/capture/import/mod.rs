@@ -91,7 +91,7 @@ pub fn read(
 
     let chosen = choose(scan.frames.len(), options, scan.is_video, &mut remarks);
     if !options.keep_poses
-        && let Some(refined) = poses::refine(&mut scan.frames, &chosen, &mut |_, _| {})?
+        && let Some(refined) = poses::refine(&mut scan.frames, &chosen)?
     {
         remarks.push(refined.to_string());
     }

@@ -4,7 +4,7 @@
 use crate::capture::camera::Pose;
 use crate::capture::poses::picture::{Grey, Picture};
 use crate::capture::poses::points::Point;
-use glam::{DMat2, DVec2, DVec3};
+use glam::{DMat2, DVec2};
 use rayon::prelude::*;
 
 /// A patch reaches so many pixels from its centre.
@@ -25,14 +25,18 @@ const MIN_CORRELATION: f64 = 0.85;
 /// Range of the area that a patch may be scaled by.
 const SCALES: [f64; 2] = [0.3, 3.0];
 /// Standard deviation in pixels below which no match is trusted: sampling, lens and plane are not known better.
-const LEAST_DEVIATION: f64 = 0.05;
+const MIN_DEVIATION: f64 = 0.05;
+
+/// Greatest distances in pixels that a search goes, with coarse details and with fine ones.
+const FAR: f64 = 12.0;
+const NEAR: f64 = 4.0;
 
 /// How far from where it is expected a point is looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reach {
-    /// Some ten pixels: poses as the scan gives them.
+    /// [`FAR`]: poses as the scan gives them.
     Far,
-    /// A few pixels: poses refined before.
+    /// [`NEAR`]: poses refined before.
     Near,
 }
 
@@ -45,17 +49,6 @@ pub struct Match {
     pub pixel: DVec2,
     /// Inverse covariance of the position in 1/px².
     pub information: DMat2,
-}
-
-/// A world point in a camera's coordinates: x right, y down, z forwards.
-pub fn to_camera(pose: &Pose, point: DVec3) -> DVec3 {
-    let p = pose.rotation.transpose() * (point - pose.center);
-    DVec3::new(p.x, -p.y, -p.z)
-}
-
-/// A point in a camera's coordinates in the world.
-pub fn to_world(pose: &Pose, p: DVec3) -> DVec3 {
-    pose.rotation * DVec3::new(p.x, -p.y, -p.z) + pose.center
 }
 
 /// The matches of every point, in the order of points.
@@ -105,8 +98,8 @@ fn expected(
     pictures: &[Picture],
     poses: &[Pose],
 ) -> Option<DVec2> {
-    let world = to_world(&poses[point.frame], point.on_plane(ray)?);
-    let there = to_camera(&poses[other], world);
+    let world = poses[point.frame].to_world(point.on_plane(ray)?);
+    let there = poses[other].to_camera(world);
     let pixel = pictures[other].project(there, RADIUS as f64 + 2.0)?;
     let measured = pictures[other].depth_along(there.truncate() / there.z);
     measured
@@ -143,15 +136,15 @@ fn look_up_one(
     }
 
     let to = &pictures[other];
-    let (guess, limit) = match reach {
+    let guess = match reach {
         Reach::Far => {
             let patch = Patch::new(&from.coarse, point.pixel, 2, warp)?;
-            (patch.find(&to.coarse, start, 12.0)?.pixel, 4.0)
+            patch.find(&to.coarse, start, FAR)?.pixel
         }
-        Reach::Near => (start, 4.0),
+        Reach::Near => start,
     };
     let patch = Patch::new(&from.fine, point.pixel, 1, warp)?;
-    let found = patch.find(&to.fine, guess, limit)?;
+    let found = patch.find(&to.fine, guess, NEAR)?;
     let far = DVec2::new(to.fine.width as f64, to.fine.height as f64) - RADIUS as f64;
     let inside = found.pixel.min_element() >= RADIUS as f64 && found.pixel.cmplt(far).all();
     (inside && found.correlation >= MIN_CORRELATION && to.is_clear(found.pixel, RADIUS)).then_some(
@@ -259,7 +252,7 @@ impl Patch {
         let variance = (2.0 * (1.0 - correlation)).max(1e-6);
         let count = 1.0 / self.weights.iter().map(|w| w * w).sum::<f64>();
         let sharpness = self.structure * (count / variance);
-        let least = DMat2::IDENTITY * (LEAST_DEVIATION * LEAST_DEVIATION);
+        let least = DMat2::IDENTITY * (MIN_DEVIATION * MIN_DEVIATION);
         let damped = sharpness + DMat2::IDENTITY * 1e-6;
         Found {
             pixel,

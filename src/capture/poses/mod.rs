@@ -13,7 +13,7 @@ mod points;
 use crate::capture::camera::Pose;
 use crate::capture::scan::ImportedFrame;
 use crate::error::Result;
-use adjust::Adjustment;
+use adjust::{Adjustment, turn_between};
 use matches::{Match, Reach};
 use picture::Picture;
 use points::Point;
@@ -59,16 +59,12 @@ impl fmt::Display for Refined {
     }
 }
 
-/// Refines the poses of the photographs `chosen` (indices, those without depth are left out). `progress` gets the number of
-/// finished rounds and of all. Returns `None`, and changes nothing, where held-out points do not gain.
+/// Refines the poses of the photographs `chosen` (indices, those without depth are left out). Returns `None`, and
+/// changes nothing, where held-out points do not gain, and with more than [`MAX_PHOTOGRAPHS`].
 ///
 /// # Errors
 /// A photograph or depth image is broken.
-pub fn refine(
-    frames: &mut [ImportedFrame],
-    chosen: &[usize],
-    progress: &mut dyn FnMut(usize, usize),
-) -> Result<Option<Refined>> {
+pub fn refine(frames: &mut [ImportedFrame], chosen: &[usize]) -> Result<Option<Refined>> {
     let chosen: Vec<usize> = (chosen.iter().copied())
         .filter(|&i| frames[i].depth.is_some())
         .collect();
@@ -90,7 +86,6 @@ pub fn refine(
         seen = matches::look_up(&points, &pictures, &poses, reach);
         let fitted = Adjustment::new(&points, &seen, &pictures, |point| point % HELD_OUT != 0);
         poses = fitted.adjust(&given, poses);
-        progress(round + 1, ROUNDS);
     }
 
     let held_out = Adjustment::new(&points, &seen, &pictures, |point| point % HELD_OUT == 0);
@@ -111,9 +106,8 @@ pub fn refine(
         turn: 0.0,
     };
     for (&frame, (given, pose)) in chosen.iter().zip(given.iter().zip(&poses)) {
-        let between = given.rotation.transpose() * pose.rotation;
-        let cosine = 0.5 * (between.x_axis.x + between.y_axis.y + between.z_axis.z - 1.0);
-        refined.turn = refined.turn.max(cosine.clamp(-1.0, 1.0).acos());
+        let turn = turn_between(&given.rotation, &pose.rotation);
+        refined.turn = refined.turn.max(turn.length());
         refined.shift = refined.shift.max(given.center.distance(pose.center));
         frames[frame].pose = *pose;
     }

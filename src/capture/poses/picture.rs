@@ -4,15 +4,15 @@ use crate::capture::orientation::Orientation;
 use crate::capture::read::image;
 use crate::capture::scan::depth::DepthMap;
 use crate::capture::scan::{ImportedFrame, Lens};
+use crate::capture::working::reduce;
 use crate::error::{Error, Result};
-use glam::{DVec2, DVec3, Vec3};
+use crate::math::color::luminance;
+use glam::{DVec2, DVec3};
 
 /// Pixels of a picture at most; more add time, not accuracy, to what depth images and tracking allow.
-const MAX_PIXELS: usize = 640 * 480;
-/// Rec. 709 luminance.
-const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
+const MAX_PIXELS: u64 = 640 * 480;
 /// Standard deviations in pixels of the two Gaussians whose difference is a band. The narrow one of a pixel makes bilinear
-/// interpolation nearly exact, that of three finds a point from five pixels away; the wide one takes away shading and
+/// interpolation nearly exact, that of three finds points from further away; the wide one takes away shading and
 /// vignetting, which stay with the light and the lens instead of moving with the surface.
 const BANDS: [[f32; 2]; 2] = [[1.0, 4.0], [3.0, 10.0]];
 
@@ -52,29 +52,29 @@ impl Picture {
         let k = &frame.lens.pinhole;
         let (photograph, _) =
             image::read(&frame.photograph, Orientation::default(), k, frame.exposure)?;
-        let size = [k.width as usize, k.height as usize];
-        let factor = (1..).find(|f| (size[0] / f) * (size[1] / f) <= MAX_PIXELS);
+        // The smallest factor that meets the limit; the remainder at the right and the bottom is cropped.
+        let pixels = |factor: &u32| u64::from(k.width / factor) * u64::from(k.height / factor);
+        let factor = (1..).find(|factor| pixels(factor) <= MAX_PIXELS);
         let factor = factor.unwrap_or(1);
-        let grey = Grey::reduced(&photograph.pixels, size, factor);
+        let photograph = match factor {
+            1 => photograph,
+            _ => reduce(&photograph, factor),
+        };
+        let grey = Grey {
+            width: photograph.width as usize,
+            height: photograph.height as usize,
+            values: (photograph.pixels.iter())
+                .map(|&p| luminance(p).max(0.0).sqrt())
+                .collect(),
+        };
         let [fine, coarse] = BANDS.map(|[narrow, wide]| grey.band(narrow, wide));
-        let (width, height) = (fine.width, fine.height);
-        let mut spoiled = vec![false; width * height];
-        for index in 0..photograph.pixels.len() {
-            let (x, y) = (index % size[0] / factor, index / size[0] / factor);
-            if x < width && y < height {
-                let spoils = photograph.is_saturated(index) || !photograph.is_usable(index);
-                spoiled[y * width + x] |= spoils;
-            }
-        }
-        // A block cut off at the right or lower edge leaves the scale as it is.
-        let mut lens = frame.lens;
-        let scale = 1.0 / factor as f64;
-        let pinhole = &mut lens.pinhole;
-        (pinhole.width, pinhole.height) = (width as u32, height as u32);
-        pinhole.fx *= scale;
-        pinhole.fy *= scale;
-        pinhole.cx *= scale;
-        pinhole.cy *= scale;
+        let spoiled = (0..photograph.pixels.len())
+            .map(|i| photograph.is_saturated(i) || !photograph.is_usable(i))
+            .collect();
+        let lens = Lens {
+            pinhole: k.reduced(factor),
+            model: frame.lens.model,
+        };
         Ok(Self {
             lens,
             fine,
@@ -111,24 +111,6 @@ impl Picture {
 }
 
 impl Grey {
-    /// Square roots of the mean luminance of blocks of `factor` × `factor` pixels.
-    fn reduced(pixels: &[Vec3], [width, height]: [usize; 2], factor: usize) -> Self {
-        let (w, h) = (width / factor, height / factor);
-        let block = |x: usize, y: usize| {
-            let rows = y * factor..(y + 1) * factor;
-            let sum: f32 = rows
-                .flat_map(|j| &pixels[j * width + x * factor..j * width + (x + 1) * factor])
-                .map(|p| p.dot(LUMINANCE))
-                .sum();
-            (sum / (factor * factor) as f32).max(0.0).sqrt()
-        };
-        Self {
-            width: w,
-            height: h,
-            values: (0..w * h).map(|i| block(i % w, i / w)).collect(),
-        }
-    }
-
     /// The difference of two Gaussians.
     fn band(&self, narrow: f32, wide: f32) -> Self {
         let mut band = self.smoothed(narrow);

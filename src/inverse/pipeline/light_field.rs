@@ -181,15 +181,10 @@ impl Pipeline<'_, '_> {
         let started = self.monitor.seconds();
         self.monitor.phase("trying light from outside");
         let leave = format!("{:.1} % of the paths leave the mesh", escaping * 100.0);
-        // A linear step estimates the gain at a small fraction of the cost of a trial.
-        let gain = self.outside_gain(cache);
         let lacks_much = self.problem.scene.scanned && escaping > LACKING;
-        let needed = if lacks_much {
-            f64::NEG_INFINITY
-        } else {
-            OUTSIDE_GAIN
-        };
-        if gain < needed {
+        // A linear step estimates the gain at a small fraction of the cost of a trial.
+        let gain = (!lacks_much).then(|| self.outside_gain(cache));
+        if let Some(gain) = gain.filter(|&gain| gain < OUTSIDE_GAIN) {
             let why = format!(
                 "{leave}; light from there would change the squared error by {:.1} %, so it is not called for",
                 -gain * 100.0,
@@ -209,7 +204,7 @@ impl Pipeline<'_, '_> {
         let mut gained: Vec<(Losses, Found)> = Vec::new();
         for surroundings in [Some(Surroundings::Far), around].into_iter().flatten() {
             let losses = self.fit_open(surroundings, cache, lights, measured)?;
-            if fall(closed, losses) > needed {
+            if lacks_much || fall(closed, losses) > OUTSIDE_GAIN {
                 gained.push((losses, self.found()));
             }
             self.go_back_to(without.clone());

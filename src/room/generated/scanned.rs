@@ -85,7 +85,7 @@ pub fn scan(draft: Draft) -> Result<Generated> {
         });
     }
     let all: Vec<usize> = (0..frames.len()).collect();
-    poses::refine(&mut frames, &all, &mut |_, _| {})?;
+    poses::refine(&mut frames, &all)?;
     let fused = fuse(&frames, VOXEL, MAX_BYTES, &mut |_, _| {})?;
 
     let photographs = files
