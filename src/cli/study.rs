@@ -12,7 +12,6 @@ use crate::session::command::Source;
 use crate::session::open::open;
 use crate::study::experiments::{Bench, STUDIES, Study};
 use crate::study::families::{Decision, Plan, composite, table};
-use crate::study::trade::rooms::SIZE;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use std::path::PathBuf;
@@ -20,6 +19,8 @@ use std::time::Duration;
 
 /// Selects all studies.
 const ALL: &str = "all";
+/// Width and height of the photographs that a chair is inserted into.
+const SIZE: [u32; 2] = [240, 180];
 /// Default number of seeds with `--quick`.
 const QUICK_SEEDS: u64 = 2;
 

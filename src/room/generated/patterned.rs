@@ -14,16 +14,23 @@ const PERIOD: [f64; 2] = [0.25, 2.0];
 /// Fraction of the objects that have a pattern.
 const FRACTION: f64 = 0.85;
 
-/// A plain room most of whose objects, except lamps, have stripes, checks, noise or a print.
+/// A plain room most of whose objects have a pattern.
 pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     f.shell();
     f.lamps();
     f.furniture();
+    paint(f, FRACTION);
+    f.look_around(6, 12);
+    f.expose(16.0, 64.0);
+}
+
+/// Gives the floor and about a fraction of the other objects, except lamps, stripes, checks, noise or a print.
+pub fn paint(f: &mut Furnisher, fraction: f64) {
     let mut chosen = Vec::new();
     for object in 0..f.materials.len() {
         let is_lamp = f.materials[object].emission != Vec3::ZERO;
         // The floor, the most visible object, always has a pattern.
-        if !is_lamp && (object == 0 || f.between(0.0, 1.0) < FRACTION) {
+        if !is_lamp && (object == 0 || f.between(0.0, 1.0) < fraction) {
             project(f, object as u32);
             chosen.push((object, pattern(f)));
         }
@@ -38,8 +45,6 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
         };
         f.materials[object].albedo = Albedo::Image(Arc::new(texture), Vec3::ONE);
     }
-    f.look_around(6, 12);
-    f.expose(16.0, 64.0);
 }
 
 /// Sets an object's texture coordinates by projecting each triangle along its dominant axis, rotated by a random angle.

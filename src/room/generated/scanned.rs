@@ -2,7 +2,7 @@
 
 use crate::capture::Segmentation;
 use crate::capture::camera::Pose;
-use crate::capture::fuse::{MAX_BYTES, fuse};
+use crate::capture::fuse::{MAX_BYTES, fuse, voxel_size};
 use crate::capture::import::{DepthImage, ImportedFrame, Lens};
 use crate::capture::poses;
 use crate::error::{Error, Result};
@@ -10,8 +10,8 @@ use crate::math::rng::Stream;
 use crate::room::cameras;
 use crate::room::generated::draft::Draft;
 use crate::room::generated::furnisher::Furnisher;
-use crate::room::generated::phone;
 use crate::room::generated::photographed::Generated;
+use crate::room::generated::{patterned, phone, window};
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use glam::{DMat3, DVec3, Vec2};
@@ -19,10 +19,12 @@ use std::path::{Path, PathBuf};
 
 /// Key of the depth camera's random numbers.
 const DEPTH_KEY: u64 = 0x7363_616e;
-/// Width of the depth images in pixels.
-const WIDTH: u32 = 160;
-/// Edge of a voxel in metres; gives meshes about as fine as phone scans of rooms.
-const VOXEL: f64 = 0.05;
+/// Width of the depth images in pixels, as phones have it.
+const WIDTH: u32 = 256;
+/// Fraction of the rooms that light from outside enters through openings.
+const OPEN: f64 = 0.4;
+/// Fraction of the objects that have a pattern.
+const PATTERNED: f64 = 0.4;
 /// Metres per unit of the depth images.
 const UNIT: f64 = 0.001;
 /// Largest measured depth in metres.
@@ -34,12 +36,20 @@ const POSITION_DEVIATION: f64 = 0.003;
 /// Standard deviation of the camera rotations about each axis, in radians.
 const ROTATION_DEVIATION: f64 = 0.12 / 180.0 * std::f64::consts::PI;
 
-/// A plain room with many views.
+/// A partly patterned room with many views, lit by lamps or through openings.
 pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
-    f.shell();
-    f.lamps();
+    let openings = match f.between(0.0, 1.0) < OPEN {
+        true => window::shell(f),
+        false => {
+            f.shell();
+            f.lamps();
+            Vec::new()
+        }
+    };
     f.furniture();
+    patterned::paint(f, PATTERNED);
     f.look_around(12, 18);
+    window::look_out(f, &openings);
     f.expose(24.0, 64.0);
 }
 
@@ -86,7 +96,8 @@ pub fn scan(draft: Draft) -> Result<Generated> {
     }
     let all: Vec<usize> = (0..frames.len()).collect();
     poses::refine(&mut frames, &all)?;
-    let fused = fuse(&frames, VOXEL, MAX_BYTES, &mut |_, _| {})?;
+    let voxel = voxel_size(&frames, None)?.edge;
+    let fused = fuse(&frames, voxel, MAX_BYTES, &mut |_, _| {})?;
 
     let photographs = files
         .iter()

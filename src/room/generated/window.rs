@@ -11,7 +11,7 @@ use std::sync::Arc;
 const MAP: [usize; 2] = [128, 64];
 
 /// An opening in a wall, in fractions of the wall's width and height.
-struct Opening {
+pub struct Opening {
     wall: usize,
     across: [f64; 2],
     up: [f64; 2],
@@ -21,6 +21,15 @@ struct Opening {
 
 /// A plain room with one or two openings; in two of five rooms with a weak lamp.
 pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
+    let openings = shell(f);
+    f.furniture();
+    f.look_around(3, 6);
+    look_out(f, &openings);
+    f.expose(48.0, 128.0);
+}
+
+/// Adds a shell with openings, the light from outside, and in two of five rooms a weak lamp.
+pub fn shell(f: &mut Furnisher) -> Vec<Opening> {
     let openings = openings(f);
     f.shell_with(
         |m, wall, sides| match openings.iter().find(|opening| opening.wall == wall) {
@@ -40,16 +49,18 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     if f.between(0.0, 1.0) < 0.4 {
         f.lamp(0, level * 0.5);
     }
-    f.furniture();
-    f.look_around(3, 6);
-    // Views towards the openings, past their centres.
-    for opening in &openings {
+    openings
+}
+
+/// Adds views towards the openings, past their centres.
+pub fn look_out(f: &mut Furnisher, openings: &[Opening]) {
+    let walls = walls(f.size);
+    for opening in openings {
         let eye = f.eye();
         let [corner, u, v] = opening_sides(opening, walls[opening.wall]);
         let [s, t] = [(); 2].map(|()| f.between(-0.3, 1.3));
         f.look(eye, corner + u * s + v * t);
     }
-    f.expose(48.0, 128.0);
 }
 
 fn openings(f: &mut Furnisher) -> Vec<Opening> {
