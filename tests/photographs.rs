@@ -154,7 +154,7 @@ fn the_screen_shows_what_the_files_hold() {
         inserting.show(1, u32::MAX);
         inserting.place(placements.to_vec());
         while inserting.is_busy() {
-            inserting.draw(&work.capture, &light, 1.0).expect("drawn");
+            inserting.draw(&work.capture, &light).expect("drawn");
         }
         inserting.shown().expect("a composite")
     };

@@ -114,8 +114,6 @@ pub struct Inserting {
     relit: Option<Relit>,
     placed: Option<Placed>,
     begun: Option<Instant>,
-    /// End and duration of the last slice of refinement.
-    slice: Option<(Instant, Duration)>,
     shown: Option<Arc<Insertion>>,
     sequence: u64,
 }
@@ -215,6 +213,11 @@ impl Inserting {
         self.long_side > 0 && more
     }
 
+    /// Whether nothing of the requested picture is rendered yet.
+    pub fn is_asked(&self) -> bool {
+        self.stale.is_some() && self.hold == 0 && self.long_side > 0
+    }
+
     /// Whether the requested picture has few samples.
     pub fn is_rough(&self) -> bool {
         self.is_busy()
@@ -231,11 +234,11 @@ impl Inserting {
         relit.into_iter().chain(placed).min()
     }
 
-    /// Renders for a moment, for at most about `fraction` of the time. Returns whether the pictures changed.
+    /// Renders a slice. Returns whether the pictures changed.
     ///
     /// # Errors
     /// An object cannot be loaded or placed, and is removed; or the frame does not exist, and all objects are removed.
-    pub fn draw(&mut self, capture: &OpenCapture, light: &Light, fraction: f32) -> Result<bool> {
+    pub fn draw(&mut self, capture: &OpenCapture, light: &Light) -> Result<bool> {
         let started = Instant::now();
         if let Some(asked) = self.stale.take() {
             self.begun = Some(asked);
@@ -251,14 +254,10 @@ impl Inserting {
                 }
             };
         }
-        let rested = self.slice.is_none_or(|(end, took)| {
-            end.elapsed().as_secs_f32() * fraction >= took.as_secs_f32() * (1.0 - fraction)
-        });
-        let Some(samples) = self.samples().filter(|&s| rested && s < MAX_SAMPLES) else {
+        let Some(samples) = self.samples().filter(|&s| s < MAX_SAMPLES) else {
             return Ok(false);
         };
         let better = self.refine(samples + 1, started);
-        self.slice = Some((Instant::now(), started.elapsed()));
         if better && self.samples() >= Some(self.hold) {
             self.hold = 0;
             self.picture();

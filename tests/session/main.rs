@@ -25,11 +25,27 @@ use std::time::{Duration, Instant};
 
 static ROOM: LazyLock<Capture> = LazyLock::new(common::room);
 
+/// How the solver of these tests behaves.
+#[derive(Clone, Copy)]
+struct Faults {
+    /// The step that panics.
+    panic_at: Option<u64>,
+    /// How long a step takes.
+    step: Duration,
+}
+
+impl Faults {
+    const NONE: Self = Self {
+        panic_at: None,
+        step: Duration::from_millis(1),
+    };
+}
+
 /// Iterates until told to stop, counting its steps; the estimate says how many.
 fn count_up(
     observer: &mut dyn Observer,
     steps: &AtomicU64,
-    panic_at: Option<u64>,
+    faults: Faults,
     resume: Option<&Checkpoint>,
     resumable: bool,
 ) -> Solution {
@@ -49,8 +65,11 @@ fn count_up(
         }];
         estimate.objects[1].seen_pixels = progress.iterations;
         steps.store(progress.iterations, Ordering::SeqCst);
-        assert!(panic_at != Some(progress.iterations), "injected fault");
-        std::thread::sleep(Duration::from_millis(1));
+        assert!(
+            faults.panic_at != Some(progress.iterations),
+            "injected fault"
+        );
+        std::thread::sleep(faults.step);
         observer.offer(&|| Checkpoint::new(&progress, &progress.iterations));
         if observer.observe(&progress, &estimate) == Control::Stop {
             return Solution {
@@ -71,36 +90,51 @@ struct Rig {
 impl Rig {
     /// A session on the tiny room whose first solve panics at a step, if one is given.
     fn new(panic_at: Option<u64>) -> Self {
-        Self::spawn(|_| Ok(ROOM.clone()), panic_at, false, None)
+        let faults = Faults {
+            panic_at,
+            ..Faults::NONE
+        };
+        Self::spawn(|_| Ok(ROOM.clone()), faults, false, None)
+    }
+
+    /// A session whose solver takes long steps.
+    fn slow(step: Duration) -> Self {
+        let faults = Faults {
+            step,
+            ..Faults::NONE
+        };
+        Self::spawn(|_| Ok(ROOM.clone()), faults, false, None)
     }
 
     /// A session whose solves can be gone on with after their end.
     fn resumable() -> Self {
-        Self::spawn(|_| Ok(ROOM.clone()), None, true, None)
+        Self::spawn(|_| Ok(ROOM.clone()), Faults::NONE, true, None)
     }
 
     /// The same, keeping its sessions under a folder.
     fn keeping(sessions: &Path) -> Self {
         let sessions = Some(sessions.to_owned());
-        Self::spawn(|_| Ok(ROOM.clone()), None, true, sessions)
+        Self::spawn(|_| Ok(ROOM.clone()), Faults::NONE, true, sessions)
     }
 
     fn spawn(
         read: impl Fn(&OpenOptions) -> Result<Capture> + Send + 'static,
-        panic_at: Option<u64>,
+        mut faults: Faults,
         resumable: bool,
         sessions: Option<PathBuf>,
     ) -> Self {
         let steps = Arc::new(AtomicU64::new(0));
         let shared = steps.clone();
-        let mut fault = panic_at;
         let backend = Backend {
             open: Box::new(move |source, options| {
                 OpenCapture::new(source.clone(), options.clone(), read(options)?)
             }),
             sessions,
             solve: Box::new(move |_: &Problem, _: &Settings, resume, observer| {
-                Ok(count_up(observer, &shared, fault.take(), resume, resumable))
+                // Only the first solve panics.
+                let panic_at = faults.panic_at.take();
+                let faults = Faults { panic_at, ..faults };
+                Ok(count_up(observer, &shared, faults, resume, resumable))
             }),
         };
         let session = Session::spawn_with(
@@ -216,6 +250,16 @@ fn views_sharpen_while_solving_while_paused_and_after_the_end() {
     };
     let (a, b) = (mean(render), mean(photograph));
     assert!((a / b - 1.0).abs() < 0.1, "{a} {b}");
+}
+
+#[test]
+fn views_have_their_share_of_a_solve_of_long_steps() {
+    let rig = Rig::slow(Duration::from_millis(400));
+    rig.look(16);
+    let sharp = rig.until("a sharp view", |s| {
+        s.view.as_ref().is_some_and(|v| v.samples >= 16)
+    });
+    assert!(iterations(&sharp) <= 4, "{}", iterations(&sharp));
 }
 
 #[test]

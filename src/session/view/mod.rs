@@ -18,8 +18,6 @@ pub use target::differs;
 
 /// Long side in pixels of the first picture after a camera move.
 const FIRST_LONG_SIDE: u32 = 96;
-/// Most rendering time, in seconds, that can be saved up while the solver is busy.
-const MAX_CREDIT: f32 = 0.05;
 /// Shortest time between two checks for a changed estimate, in seconds.
 const CHECK_INTERVAL: f32 = 0.4;
 
@@ -31,8 +29,6 @@ pub struct Views {
     target: Option<Target>,
     shown: Option<Arc<View>>,
     sequence: u64,
-    credit: f32,
-    last: Option<Instant>,
     checked: Option<Instant>,
 }
 
@@ -82,35 +78,22 @@ impl Views {
         }
     }
 
-    /// Renders for a moment: for at most about `fraction` of the time since the last call, but at once for a new
-    /// request. Returns whether the pictures changed, and whether there is more to render.
+    /// Renders a slice. Returns whether the pictures changed, and whether there is more to render.
     pub fn draw(
         &mut self,
         capture: &OpenCapture,
         estimate: &Arc<Estimate>,
         options: &PathOptions,
-        fraction: f32,
     ) -> (bool, bool) {
         let now = Instant::now();
-        let elapsed = self
-            .last
-            .replace(now)
-            .map_or(0.0, |last| (now - last).as_secs_f32());
-        self.credit = (self.credit + fraction * elapsed).min(MAX_CREDIT);
-        if self.changed {
-            self.changed = false;
+        if std::mem::take(&mut self.changed) {
             let request = self.request.as_ref();
             self.target = request.and_then(|r| Target::new(capture, estimate, r, FIRST_LONG_SIDE));
             self.checked = Some(now);
-            let drawn = self.sharpen(options);
-            return (drawn, self.target.is_some());
+        } else {
+            self.follow(estimate, now);
         }
-        if fraction < 1.0 && self.credit <= 0.0 {
-            return (false, self.target.is_some());
-        }
-        self.follow(estimate, now);
         let drawn = self.sharpen(options);
-        self.credit -= now.elapsed().as_secs_f32();
         let more = self.target.as_ref().is_some_and(|t| !t.is_done());
         (drawn, more)
     }
@@ -124,6 +107,11 @@ impl Views {
             self.checked = Some(now);
             target.follow(estimate);
         }
+    }
+
+    /// Whether nothing of the requested view is rendered yet.
+    pub fn is_asked(&self) -> bool {
+        self.changed
     }
 
     /// Whether the first complete picture of the requested view is still missing.

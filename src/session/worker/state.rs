@@ -147,29 +147,29 @@ impl Worker {
         self.changed = true;
     }
 
-    /// Renders a slice of the requested view, for at most about `fraction` of the time. Returns whether there is more to
-    /// render.
-    pub fn draw(&mut self, fraction: f32) -> bool {
+    /// Whether nothing of a requested picture is rendered yet.
+    pub fn is_asked(&self) -> bool {
+        self.views.is_asked() || self.inserting.is_asked()
+    }
+
+    /// Whether a requested picture is still missing or has few samples.
+    pub fn is_rough(&self) -> bool {
+        self.views.is_rough() || self.inserting.is_rough()
+    }
+
+    /// Renders a slice of the requested view and one of the composite. Returns whether there is more to render.
+    pub fn draw(&mut self) -> bool {
         let Some(capture) = self.capture.clone() else {
             return false;
         };
         let light = Light::new(self.estimate.clone(), self.edited(), &self.settings);
-        let estimate = &light.edited;
-        // Views and composites share the time.
         self.inserting.follow(&light);
-        let composites = self.inserting.is_busy();
-        let fraction = match composites && fraction < 1.0 {
-            true => fraction * 0.5,
-            false => fraction,
-        };
-        let (drawn, more) = self
-            .views
-            .draw(&capture, estimate, &light.options, fraction);
+        let (drawn, more) = self.views.draw(&capture, &light.edited, &light.options);
         self.changed |= drawn;
-        if !composites {
+        if !self.inserting.is_busy() {
             return more;
         }
-        match self.inserting.draw(&capture, &light, fraction) {
+        match self.inserting.draw(&capture, &light) {
             Ok(drawn) => self.changed |= drawn,
             Err(error) => self.fail(&error),
         }

@@ -15,6 +15,8 @@ use std::time::{Duration, Instant};
 const VIEW_FRACTION: f32 = 0.03;
 /// ... and for a while after a request, until the first complete picture.
 const PRIORITY_FRACTION: f32 = 0.25;
+/// Most time, in seconds, that views can save up while the solver makes a long step.
+const MAX_CREDIT: f32 = 0.5;
 /// Time between two checkpoints that are kept in case the solver fails.
 const CHECKPOINT: Duration = Duration::from_secs(8);
 
@@ -28,6 +30,10 @@ pub(super) struct Steering<'a> {
     kept: Instant,
     /// Number of commands that were waiting when a checkpoint was offered.
     seen: Option<usize>,
+    /// Time in seconds that views may take.
+    credit: f32,
+    /// When views were last rendered.
+    drawn: Instant,
 }
 
 impl<'a> Steering<'a> {
@@ -40,6 +46,8 @@ impl<'a> Steering<'a> {
             next: None,
             kept: Instant::now(),
             seen: None,
+            credit: 0.0,
+            drawn: Instant::now(),
         }
     }
 
@@ -60,6 +68,26 @@ impl<'a> Steering<'a> {
         worker.progress = Arc::new(progress.clone());
         worker.estimate = Arc::new(estimate.clone());
         worker.touch();
+    }
+
+    /// Renders views for about a fraction of the time, but at once what was just asked for.
+    fn draw(&mut self) {
+        let fresh = (self.worker.priority_until).is_some_and(|end| Instant::now() < end);
+        let fraction = match fresh || self.worker.is_rough() {
+            true => PRIORITY_FRACTION,
+            false => VIEW_FRACTION,
+        };
+        self.credit = (self.credit + fraction * self.drawn.elapsed().as_secs_f32()).min(MAX_CREDIT);
+        let mut more = true;
+        while more && self.worker.inbox.is_empty() && (self.credit > 0.0 || self.worker.is_asked())
+        {
+            let started = Instant::now();
+            more = self.worker.draw();
+            self.worker.publish(false);
+            self.credit -= started.elapsed().as_secs_f32();
+        }
+        self.worker.publish(false);
+        self.drawn = Instant::now();
     }
 
     /// Carries out a command. Returns whether the solve is to end.
@@ -102,20 +130,16 @@ impl Observer for Steering<'_> {
                 break;
             }
             if !self.worker.paused {
-                let fresh = (self.worker.priority_until).is_some_and(|end| Instant::now() < end);
-                let rough = self.worker.views.is_rough() || self.worker.inserting.is_rough();
-                let has_priority = fresh || rough;
-                self.worker.draw(if has_priority {
-                    PRIORITY_FRACTION
-                } else {
-                    VIEW_FRACTION
-                });
-                self.worker.publish(false);
-                break;
+                self.draw();
+                if self.credit <= 0.0 || self.worker.inbox.is_empty() {
+                    break;
+                }
+                ready = usize::MAX;
+                continue;
             }
 
             // Paused: render the request, then sleep until a command comes.
-            let busy = self.worker.draw(1.0);
+            let busy = self.worker.draw();
             self.worker.publish(!busy);
             self.worker.keep(false);
             if !busy {

@@ -70,7 +70,7 @@ impl Worker {
     /// Serves commands and views until there is something else to do.
     fn wait(&mut self) -> Next {
         loop {
-            let busy = self.draw(1.0);
+            let busy = self.draw();
             self.publish(!busy);
             self.keep(false);
             let mail = if busy {
