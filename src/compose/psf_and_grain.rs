@@ -5,14 +5,12 @@
 //! second differences (Immerkær 1996, "Fast noise variance estimation") where the photograph is smooth, by level of brightness.
 
 use crate::capture::photograph::{Encoding, Photograph};
+use crate::math::blur::{Blend, blurred};
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::math::stats::quantile;
 use glam::{Vec2, Vec3};
-use rayon::prelude::*;
 use std::f32::consts::TAU;
-use std::iter::Sum;
-use std::ops::{Div, Mul};
 
 /// Standard deviation in pixels of the known blur.
 const KNOWN_BLUR: f32 = 1.0;
@@ -30,8 +28,6 @@ const PIXEL_VARIANCE: f64 = 1.0 / 12.0;
 const HALVINGS: u32 = 40;
 /// A pixel is used only if all pixels within this distance are valid, as far as slopes and blurs reach.
 const MASK_MARGIN: usize = 4;
-/// Below this standard deviation a sampled Gaussian has the wrong variance; a three-tap kernel of the exact variance is used.
-const NARROW: f32 = 0.6;
 /// Range of the blur in pixels: below, photographs count as sharp; above, the blur is not the camera's.
 const BLUR_RANGE: [f32; 2] = [0.3, 4.0];
 /// Levels of brightness, with equally many pixels each.
@@ -137,46 +133,6 @@ fn eroded(valid: &[bool], width: usize) -> Vec<bool> {
             .collect()
     };
     along(&along(valid, false), true)
-}
-
-/// A type that can be blurred.
-pub trait Blend:
-    Copy + Send + Sync + Sum + Mul<f32, Output = Self> + Div<f32, Output = Self>
-{
-}
-
-impl Blend for f32 {}
-impl Blend for Vec3 {}
-
-/// Gaussian blur along rows, or along columns if `down`; the border pixel is repeated.
-fn blurred<T: Blend>(values: &[T], shape: [usize; 2], deviation: f32, down: bool) -> Vec<T> {
-    if deviation <= 0.0 || values.is_empty() {
-        return values.to_vec();
-    }
-    let variance = deviation * deviation;
-    let kernel: Vec<f32> = match deviation < NARROW {
-        true => vec![0.5 * variance, 1.0 - variance, 0.5 * variance],
-        false => {
-            let reach = (3.0 * deviation).ceil() as i32;
-            let weight = |i: i32| (-0.5 * (i * i) as f32 / variance).exp();
-            (-reach..=reach).map(weight).collect()
-        }
-    };
-    let reach = (kernel.len() / 2) as isize;
-    let sum: f32 = kernel.iter().sum();
-    let [width, height] = shape;
-    (0..values.len())
-        .into_par_iter()
-        .map(|index| {
-            let (x, y) = (index % width, index / width);
-            let at = |i: isize| match down {
-                false => y * width + (x as isize + i).clamp(0, width as isize - 1) as usize,
-                true => (y as isize + i).clamp(0, height as isize - 1) as usize * width + x,
-            };
-            let terms = (-reach..=reach).zip(&kernel);
-            terms.map(|(i, k)| values[at(i)] * *k).sum::<T>() / sum
-        })
-        .collect()
 }
 
 /// Standard deviation in pixels of the blur along rows (or columns if `down`), beyond the box filter of pixels; 0 if unknown.
@@ -409,36 +365,6 @@ mod tests {
         for level in [0.15, 0.5] {
             let ratio = found.grain_at(level) / whole.grain_at(level);
             assert!((ratio - 1.0).abs().max_element() < 0.2, "{level}: {ratio}");
-        }
-    }
-
-    #[test]
-    fn a_blur_keeps_the_sum_and_has_the_width_asked_for() {
-        let [width, height] = [41, 31];
-        let mut point = vec![Vec3::ZERO; width * height];
-        point[15 * width + 20] = Vec3::ONE;
-        let finish = PsfAndGrain {
-            blur: Vec2::new(2.0, 0.4),
-            grain: Vec::new(),
-        };
-        let soft = finish.softened(&point, [width, height]);
-        let moment = |power: i32, down: bool| -> f32 {
-            let term = |(index, value): (usize, &Vec3)| {
-                let away = match down {
-                    false => (index % width) as f32 - 20.0,
-                    true => (index / width) as f32 - 15.0,
-                };
-                value.x * away.powi(power)
-            };
-            soft.iter().enumerate().map(term).sum()
-        };
-        assert!((moment(0, false) - 1.0).abs() < 1e-5);
-        for (down, wanted) in [(false, 4.0), (true, 0.16)] {
-            assert!(
-                (moment(2, down) / wanted - 1.0).abs() < 0.05,
-                "{}",
-                moment(2, down)
-            );
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Colour, frames, sampling and statistics, independent of any scene.
 
+pub mod blur;
 pub mod color;
 pub mod frame;
 pub mod nullable;

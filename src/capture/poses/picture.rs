@@ -6,6 +6,7 @@ use crate::capture::scan::depth::DepthMap;
 use crate::capture::scan::{ImportedFrame, Lens};
 use crate::capture::working::reduce;
 use crate::error::{Error, Result};
+use crate::math::blur::blurred;
 use crate::math::color::luminance;
 use glam::{DVec2, DVec3};
 
@@ -121,30 +122,11 @@ impl Grey {
 
     /// Convolved with a Gaussian; the edge is repeated beyond it.
     fn smoothed(&self, deviation: f32) -> Self {
-        let reach = (3.0 * deviation).ceil() as i64;
-        let mut kernel: Vec<f32> = (-reach..=reach)
-            .map(|i| (-0.5 * (i as f32 / deviation).powi(2)).exp())
-            .collect();
-        let sum: f32 = kernel.iter().sum();
-        kernel.iter_mut().for_each(|k| *k /= sum);
-        let pass = |from: &[f32], along: [i64; 2]| -> Vec<f32> {
-            let (w, h) = (self.width as i64, self.height as i64);
-            let at = |x: i64, y: i64| from[(y.clamp(0, h - 1) * w + x.clamp(0, w - 1)) as usize];
-            (0..w * h)
-                .map(|i| {
-                    let terms = (-reach..=reach).zip(&kernel);
-                    let value = |(k, weight): (i64, &f32)| {
-                        weight * at(i % w + k * along[0], i / w + k * along[1])
-                    };
-                    terms.map(value).sum()
-                })
-                .collect()
-        };
-        let rows = pass(&self.values, [1, 0]);
+        let shape = [self.width, self.height];
+        let rows = blurred(&self.values, shape, deviation, false);
         Self {
-            width: self.width,
-            height: self.height,
-            values: pass(&rows, [0, 1]),
+            values: blurred(&rows, shape, deviation, true),
+            ..*self
         }
     }
 
