@@ -10,7 +10,7 @@ use relit::room::generated::{Family, Generated, generate};
 use relit::room::photographs::{self, Rendering};
 use relit::scene::Scene;
 use relit::study::families::{Plan, Quantiles, RoomEvent, Row, run, summarize};
-use relit::transport::material::Albedo;
+use relit::transport::material::{Albedo, Material};
 
 /// Size of photographs that are rendered in a moment.
 const TINY: [u32; 2] = [24, 18];
@@ -332,10 +332,7 @@ fn scans_have_no_objects_and_a_mesh_with_holes_near_the_true_one() {
         assert_eq!(frame.intrinsics.width, TINY[0]);
         for i in 0..TINY[0] * TINY[1] {
             let center = Vec2::new((i % TINY[0]) as f32, (i / TINY[0]) as f32) + 0.5;
-            let Some(surface) = room.lit.scene.intersect(&is.ray(center)) else {
-                continue;
-            };
-            let depth = surface.t;
+            let depth = room.lit.scene.intersect(&is.ray(center)).expect("closed").t;
             match fused.intersect(&is.ray(center)) {
                 Some(hit) => off.push(f64::from((hit.t - depth).abs())),
                 None => missed += 1,
@@ -352,6 +349,20 @@ fn scans_have_no_objects_and_a_mesh_with_holes_near_the_true_one() {
         "{missed} of {}",
         off.len()
     );
+}
+
+#[test]
+fn scanned_rooms_have_lamps_or_openings_and_patterns() {
+    let rooms = [1, 4].map(|seed| Family::Scanned.generate(seed, [12, 9]).expect("a room"));
+    assert_eq!(
+        rooms.each_ref().map(|room| room.lit.outside.is_some()),
+        [false, true]
+    );
+    for room in rooms {
+        let patterned = |m: &&Material| matches!(m.albedo, Albedo::Image(..));
+        let count = room.lit.materials.iter().filter(patterned).count();
+        assert!(count > 0 && count < room.lit.materials.len(), "{count}");
+    }
 }
 
 fn plan(seeds: &[u64], preset: Preset) -> Plan {

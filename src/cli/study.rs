@@ -19,7 +19,7 @@ use std::time::Duration;
 
 /// Selects all studies.
 const ALL: &str = "all";
-/// Width and height of the photographs that a chair is inserted into.
+/// Width and height of the photographs that a chair is inserted into; of those of `relit trade` it may cover 35 pixels only.
 const SIZE: [u32; 2] = [240, 180];
 /// Default number of seeds with `--quick`.
 const QUICK_SEEDS: u64 = 2;

@@ -27,14 +27,14 @@ static ROOM: LazyLock<Capture> = LazyLock::new(common::room);
 
 /// How the solver of these tests behaves.
 #[derive(Clone, Copy)]
-struct Faults {
+struct Stub {
     /// The step that panics.
     panic_at: Option<u64>,
     /// How long a step takes.
     step: Duration,
 }
 
-impl Faults {
+impl Stub {
     const NONE: Self = Self {
         panic_at: None,
         step: Duration::from_millis(1),
@@ -45,7 +45,7 @@ impl Faults {
 fn count_up(
     observer: &mut dyn Observer,
     steps: &AtomicU64,
-    faults: Faults,
+    stub: Stub,
     resume: Option<&Checkpoint>,
     resumable: bool,
 ) -> Solution {
@@ -65,11 +65,8 @@ fn count_up(
         }];
         estimate.objects[1].seen_pixels = progress.iterations;
         steps.store(progress.iterations, Ordering::SeqCst);
-        assert!(
-            faults.panic_at != Some(progress.iterations),
-            "injected fault"
-        );
-        std::thread::sleep(faults.step);
+        assert!(stub.panic_at != Some(progress.iterations), "injected fault");
+        std::thread::sleep(stub.step);
         observer.offer(&|| Checkpoint::new(&progress, &progress.iterations));
         if observer.observe(&progress, &estimate) == Control::Stop {
             return Solution {
@@ -90,36 +87,33 @@ struct Rig {
 impl Rig {
     /// A session on the tiny room whose first solve panics at a step, if one is given.
     fn new(panic_at: Option<u64>) -> Self {
-        let faults = Faults {
+        let stub = Stub {
             panic_at,
-            ..Faults::NONE
+            ..Stub::NONE
         };
-        Self::spawn(|_| Ok(ROOM.clone()), faults, false, None)
+        Self::spawn(|_| Ok(ROOM.clone()), stub, false, None)
     }
 
     /// A session whose solver takes long steps.
     fn slow(step: Duration) -> Self {
-        let faults = Faults {
-            step,
-            ..Faults::NONE
-        };
-        Self::spawn(|_| Ok(ROOM.clone()), faults, false, None)
+        let stub = Stub { step, ..Stub::NONE };
+        Self::spawn(|_| Ok(ROOM.clone()), stub, false, None)
     }
 
     /// A session whose solves can be gone on with after their end.
     fn resumable() -> Self {
-        Self::spawn(|_| Ok(ROOM.clone()), Faults::NONE, true, None)
+        Self::spawn(|_| Ok(ROOM.clone()), Stub::NONE, true, None)
     }
 
     /// The same, keeping its sessions under a folder.
     fn keeping(sessions: &Path) -> Self {
         let sessions = Some(sessions.to_owned());
-        Self::spawn(|_| Ok(ROOM.clone()), Faults::NONE, true, sessions)
+        Self::spawn(|_| Ok(ROOM.clone()), Stub::NONE, true, sessions)
     }
 
     fn spawn(
         read: impl Fn(&OpenOptions) -> Result<Capture> + Send + 'static,
-        mut faults: Faults,
+        mut stub: Stub,
         resumable: bool,
         sessions: Option<PathBuf>,
     ) -> Self {
@@ -132,9 +126,9 @@ impl Rig {
             sessions,
             solve: Box::new(move |_: &Problem, _: &Settings, resume, observer| {
                 // Only the first solve panics.
-                let panic_at = faults.panic_at.take();
-                let faults = Faults { panic_at, ..faults };
-                Ok(count_up(observer, &shared, faults, resume, resumable))
+                let panic_at = stub.panic_at.take();
+                let stub = Stub { panic_at, ..stub };
+                Ok(count_up(observer, &shared, stub, resume, resumable))
             }),
         };
         let session = Session::spawn_with(

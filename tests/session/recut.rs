@@ -1,6 +1,6 @@
 //! Segments that are cut anew where other pixels are kept out of the fits.
 
-use crate::{Faults, ROOM, Rig, common, iterations};
+use crate::{ROOM, Rig, Stub, common, iterations};
 use relit::calibrate::held_out::HoldOut;
 use relit::capture::{Capture, Segmentation};
 use relit::error::Error;
@@ -31,7 +31,7 @@ fn held_out() -> Settings {
 
 #[test]
 fn a_new_start_cuts_the_mesh_again_only_where_other_pixels_are_held_out() {
-    let rig = Rig::spawn(|_| Ok(whole()), Faults::NONE, true, None);
+    let rig = Rig::spawn(|_| Ok(whole()), Stub::NONE, true, None);
     let started = rig.until("some steps", |s| iterations(s) > 50);
     let first = started.capture.clone().expect("open");
     assert_eq!(first.options.hold_out, HoldOut::default());
@@ -73,7 +73,7 @@ fn a_capture_that_cannot_be_read_again_is_said_and_solved_with_the_segments_it_h
             0 => Ok(whole()),
             _ => Err(gone()),
         },
-        Faults::NONE,
+        Stub::NONE,
         true,
         None,
     );

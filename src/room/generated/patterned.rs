@@ -24,7 +24,7 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     f.expose(16.0, 64.0);
 }
 
-/// Gives the floor and about a fraction of the other objects, except lamps, stripes, checks, noise or a print.
+/// Gives the floor, and each other object that is no lamp with probability `fraction`, stripes, checks, noise or a print.
 pub fn paint(f: &mut Furnisher, fraction: f64) {
     let mut chosen = Vec::new();
     for object in 0..f.materials.len() {
