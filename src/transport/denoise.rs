@@ -2,7 +2,8 @@
 //!
 //! Radiance is demodulated by albedo and smoothed by an edge-avoiding à-trous wavelet filter (Dammertz et al. 2010), whose weights
 //! fall off across normals, planes, objects, and luminance differences beyond the noise (Schied et al. 2017). The noise is
-//! estimated from two independent pictures of the same view.
+//! estimated from two independent pictures of the same view, and each is smoothed by weights from the other one (Rousselle,
+//! Knaus and Zwicker 2012).
 
 use crate::math::color::luminance;
 use crate::math::picture::Picture;
@@ -17,7 +18,7 @@ const PASSES: u32 = 5;
 /// Cubic B-spline weights.
 const SPLINE: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
 /// Luminance differences are measured in units of this many standard deviations of the noise.
-const LUMINANCE_SIGMAS: f32 = 3.0;
+const LUMINANCE_SIGMAS: f32 = 1.5;
 /// Power of the cosine between normals in the weights.
 const NORMAL_POWER: i32 = 64;
 /// Distance from a pixel's tangent plane, as a fraction of depth, at which weights fall to 1/e.
@@ -89,11 +90,13 @@ pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
         Some(guide) => (value - guide.emission) / guide.albedo.max(Vec3::splat(MIN_ALBEDO)),
         None => value,
     };
-    let mut smooth: Vec<Vec3> = (0..mean.len()).map(|i| light(i, mean[i])).collect();
-    let variance: Vec<f32> = (0..mean.len())
-        .map(|i| {
-            let half = luminance(light(i, a.pixels[i]) - light(i, b.pixels[i])) * 0.5;
-            let square = half * half;
+    let mut smooth: Vec<[Vec3; 2]> = (0..mean.len())
+        .map(|i| [light(i, a.pixels[i]), light(i, b.pixels[i])])
+        .collect();
+    let variance: Vec<f32> = (smooth.iter())
+        .map(|&[a, b]| {
+            let half = luminance(a - b);
+            let square = 0.5 * half * half;
             if square.is_finite() { square } else { 0.0 }
         })
         .collect();
@@ -113,40 +116,49 @@ pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
         })
         .collect();
 
+    // Each picture is smoothed by weights from the other one: if a weight knew the value that it weighs, rare bright samples would
+    // stand alone, and their light would be missing around them.
+    let finite = |[a, b]: [Vec3; 2]| a.is_finite() && b.is_finite();
     for pass in 0..PASSES {
         let step = 1 << pass;
-        let filtered: Vec<(Vec3, f32)> = (0..mean.len())
+        let filtered: Vec<([Vec3; 2], f32)> = (0..mean.len())
             .into_par_iter()
             .map(|pixel| {
                 let here = (smooth[pixel], noise[pixel]);
                 let guide = guides[pixel].as_ref();
-                let Some(guide) = guide.filter(|g| g.emission == Vec3::ZERO && here.0.is_finite())
+                let Some(guide) = guide.filter(|g| g.emission == Vec3::ZERO && finite(here.0))
                 else {
                     return here;
                 };
+                let [level_a, level_b] = here.0.map(luminance);
                 let allowed = LUMINANCE_SIGMAS * here.1.sqrt() + f32::MIN_POSITIVE;
-                let (mut sum, mut sum_variance, mut weights) = (Vec3::ZERO, 0.0, 0.0);
+                let (mut sums, mut sum_variance, mut weights) = ([Vec3::ZERO; 2], 0.0, [0.0; 2]);
                 for (q, [dx, dy]) in around.square(pixel, 2, step) {
                     let spline = SPLINE[dx.unsigned_abs()] * SPLINE[dy.unsigned_abs()];
                     let like = similarity(Some(guide), guides[q].as_ref());
-                    if like == 0.0 || !smooth[q].is_finite() {
+                    if like == 0.0 || !finite(smooth[q]) {
                         continue;
                     }
-                    let off = luminance(smooth[q] - here.0).abs() / allowed;
-                    let weight = spline * like * (-off).exp();
-                    sum += smooth[q] * weight;
-                    sum_variance += noise[q] * weight * weight;
-                    weights += weight;
+                    let [a, b] = smooth[q];
+                    let weight = |off: f32| spline * like * (-(off.abs() / allowed)).exp();
+                    let [by_b, by_a] = [
+                        weight(luminance(b) - level_b),
+                        weight(luminance(a) - level_a),
+                    ];
+                    sums = [sums[0] + a * by_b, sums[1] + b * by_a];
+                    weights = [weights[0] + by_b, weights[1] + by_a];
+                    sum_variance += noise[q] * by_a * by_b;
                 }
-                (sum / weights, sum_variance / (weights * weights))
+                let smoothed = [sums[0] / weights[0], sums[1] / weights[1]];
+                (smoothed, sum_variance / (weights[0] * weights[1]))
             })
             .collect();
         (smooth, noise) = filtered.into_iter().unzip();
     }
 
-    let pixels = (0..mean.len()).map(|pixel| match &guides[pixel] {
-        Some(guide) if smooth[pixel].is_finite() => {
-            smooth[pixel] * guide.albedo.max(Vec3::splat(MIN_ALBEDO)) + guide.emission
+    let pixels = (0..mean.len()).map(|pixel| match (&guides[pixel], smooth[pixel]) {
+        (Some(guide), [a, b]) if finite([a, b]) => {
+            (a + b) * 0.5 * guide.albedo.max(Vec3::splat(MIN_ALBEDO)) + guide.emission
         }
         _ => mean[pixel],
     });
@@ -263,6 +275,30 @@ mod tests {
         // What has no noise stays as it is, to rounding.
         let clean = denoise(&truth, &truth, &guides);
         assert!(error(&clean, &truth) < 1e-5, "{}", error(&clean, &truth));
+    }
+
+    /// One bright sample in one of the pictures: a hundred times the light around it.
+    #[test]
+    fn a_rare_bright_sample_is_spread_and_keeps_its_light() {
+        let (guides, truth) = scene();
+        let (mut a, b) = (noisy(&truth, 1, 0.8), noisy(&truth, 2, 0.8));
+        let plain = denoise(&a, &b, &guides);
+        let bright = (36 * SIDE + 24) as usize;
+        let added = truth.pixels[bright] * 100.0;
+        a.pixels[bright] += added;
+        let smooth = denoise(&a, &b, &guides);
+        let highest = smooth.pixels[bright].x / truth.pixels[bright].x;
+        assert!(highest < 2.0, "{highest}");
+        // Light, not radiance: that of a dark colour counts as that of a light one.
+        let light = |picture: &Picture| -> f32 {
+            let pixels = picture.pixels.iter().zip(&guides);
+            pixels
+                .filter_map(|(p, g)| g.map(|g| p.x / g.albedo.x))
+                .sum()
+        };
+        let albedo = guides[bright].map_or(1.0, |g| g.albedo.x);
+        let kept = (light(&smooth) - light(&plain)) / (0.5 * added.x / albedo);
+        assert!((kept - 1.0).abs() < 0.3, "{kept}");
     }
 
     #[test]

@@ -10,7 +10,8 @@ use crate::math::rng::Stream;
 use crate::room::generated::draft::Draft;
 use crate::room::generated::furnisher::Furnisher;
 use crate::room::generated::photographed::Generated;
-use crate::room::photographs::render_lit;
+use crate::room::photographs::{Rendering, render_lit};
+use crate::transport::denoise::{denoise, guides};
 use crate::transport::lit::Lit;
 use glam::Vec3;
 use image::codecs::jpeg::JpegEncoder;
@@ -67,19 +68,30 @@ pub fn files(draft: &Draft, lit: &Lit) -> Result<Vec<Vec<u8>>> {
         quality: between(85.0, 96.0) as u8,
         noise: between(0.002, 0.01) as f32,
     };
-    let [width, height] = draft.rendering.size;
-    (render_lit(lit, &draft.rendering).into_iter())
+    (noiseless(lit, &draft.rendering).into_iter())
         .zip(&lit.scene.cameras)
-        .map(|(photograph, camera)| {
-            let picture = Picture {
-                width,
-                height,
-                pixels: photograph.pixels,
-            };
+        .map(|(picture, camera)| {
             let compensation = 2f64.powf(-0.5 + stream.uniform_f64());
             let exposed = phone.expose(&picture, &camera.intrinsics, compensation, &mut stream);
             encode(&exposed, phone.quality)
         })
+        .collect()
+}
+
+/// Denoised renderings of all views. The rare bright samples of a path tracer are no noise of a camera: they would saturate,
+/// and take their light out of the photograph.
+fn noiseless(lit: &Lit, rendering: &Rendering) -> Vec<Picture> {
+    let [a, b] = [0, 1].map(|half| {
+        let rendering = Rendering {
+            seed: rendering.seed ^ half << u32::BITS,
+            samples: rendering.samples.div_ceil(2),
+            ..*rendering
+        };
+        render_lit(lit, &rendering)
+    });
+    let pairs = a.iter().zip(&b).zip(&lit.scene.cameras);
+    pairs
+        .map(|((a, b), camera)| denoise(&a.picture(), &b.picture(), &guides(lit, camera)))
         .collect()
 }
 

@@ -50,7 +50,7 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
     patterned::paint(f, PATTERNED);
     f.look_around(12, 18);
     window::look_out(f, &openings);
-    f.expose(24.0, 64.0);
+    f.expose(32.0, 64.0);
 }
 
 /// Standard deviation in metres of a structured-light camera's depth (Nguyen, Izadi and Lovell 2012).

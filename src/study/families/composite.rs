@@ -3,7 +3,7 @@
 use crate::capture::exposure::Exposure;
 use crate::compose::backdrop::Backdrop;
 use crate::compose::denoise::denoised;
-use crate::compose::insert::Insertion;
+use crate::compose::insert::{Insertion, Layers};
 use crate::compose::naive::{Pasted, harmonics_of_photographs};
 use crate::compose::object::ObjectModel;
 use crate::compose::placement::{PlacedObject, Placement};
@@ -39,7 +39,7 @@ const LIFT: f32 = 2e-3;
 const FRAMES: usize = 2;
 /// Range of the fraction of a photograph that it covers.
 const COVERED: [f64; 2] = [0.005, 0.3];
-/// Samples per pixel of the composite, in two halves, and of the truth.
+/// Samples per pixel of the composite and of the truth, both in two halves and denoised.
 const SAMPLES: [u32; 2] = [64, 256];
 /// Shadow and bleed are the pixels beside the chair that it changes by more than this, at the photograph's exposure.
 const CHANGED: f32 = 0.025;
@@ -262,6 +262,23 @@ struct AroundScores {
     slope: f64,
 }
 
+/// The denoised composite and its layers, of two halves with their own seeds.
+fn insertion(
+    lit: &Arc<Lit>,
+    backdrop: &Backdrop,
+    objects: &[Arc<PlacedObject>],
+    seeds: [u64; 2],
+    samples: u32,
+) -> (Picture, Layers) {
+    let [a, b] = seeds.map(|seed| {
+        let (lit, objects) = (lit.clone(), objects.to_vec());
+        let mut half = Insertion::new(backdrop.clone(), lit, objects, PathOptions::default(), seed);
+        half.pass(samples / 2);
+        half
+    });
+    denoised([&a, &b], Denoiser::Builtin)
+}
+
 /// Compares the composite, the naive composite and the photograph of a frame with the truth.
 fn scores(
     solved: &Solved,
@@ -272,21 +289,12 @@ fn scores(
 ) -> Result<Scores> {
     let (problem, estimate) = (&solved.problem, &solved.solution.estimate);
     let photograph = &problem.photographs[frame];
-    let options = PathOptions::default();
 
     // The truth in the photograph's values. Its exposure is fitted to the empty room.
     let backdrop =
         |scene: &Scene, exposure| Backdrop::new(frame, &scene.cameras[frame], photograph, exposure);
     let true_backdrop = backdrop(&truth.scene, Exposure::default())?;
-    let mut with = Insertion::new(
-        true_backdrop,
-        truth.clone(),
-        true_chair.to_vec(),
-        options,
-        2,
-    );
-    with.pass(SAMPLES[1]);
-    let layers = with.layers();
+    let (_, layers) = insertion(truth, &true_backdrop, true_chair, [2, 4], SAMPLES[1]);
     let pixels = &photograph.pixels;
     let valid: Vec<bool> = (0..pixels.len())
         .map(|i| photograph.is_usable(i) && !photograph.is_saturated(i))
@@ -315,17 +323,10 @@ fn scores(
         scene,
     )?)];
     let lit = Arc::new(estimate.lit(scene));
-    let halves = [1, 3].map(|seed| {
-        let backdrop = backdrop(scene, estimate.exposure(frame))?;
-        let mut half = Insertion::new(backdrop, lit.clone(), placed.to_vec(), options, seed);
-        half.pass(SAMPLES[0] / 2);
-        Ok(half)
-    });
-    let [a, b] = halves;
-    let (ours, _) = denoised([&a?, &b?], Denoiser::Builtin);
+    let plain = backdrop(scene, estimate.exposure(frame))?;
+    let (ours, _) = insertion(&lit, &plain, &placed, [1, 3], SAMPLES[0]);
     let pictures: Vec<Picture> = (problem.photographs.iter()).map(|p| p.picture()).collect();
     let light = harmonics_of_photographs(scene.cameras.iter().zip(&pictures));
-    let plain = backdrop(scene, estimate.exposure(frame))?;
     let naive = Pasted::new(&plain, &lit, &placed, &[light], Exposure::default());
     let naive = naive.over(&plain.photograph);
 
