@@ -13,6 +13,9 @@ use rayon::prelude::*;
 const ENOUGH: usize = 4_000;
 /// The strongest smoothing that is tried, for one pixel per cell.
 const STRONGEST: f32 = 2.0;
+/// Strength at which a search begins, relative to the one found before: two steps stronger, so that light that was traced anew can
+/// ask for more.
+const MARGIN: f32 = 4.0;
 /// Ratio between consecutive strengths.
 const FACTOR: f32 = 0.5;
 /// The weakest smoothing that is tried.
@@ -125,7 +128,8 @@ impl Measurements {
     }
 
     /// Fits the cells with the smoothing that predicts cross-validated pixels best, with at least `min_folds` folds. Lower bounds
-    /// that the fit meets lose their weight. `between` is called after each strength of smoothing.
+    /// that the fit meets lose their weight. `known` is the strength that an earlier fit of the same cells chose: the search
+    /// begins [`MARGIN`] times as strong. `between` is called after each strength of smoothing.
     ///
     /// # Errors
     /// The error of `between`.
@@ -133,6 +137,7 @@ impl Measurements {
         &mut self,
         links: &Links,
         min_folds: usize,
+        known: Option<f32>,
         mut between: impl FnMut() -> Result<(), E>,
     ) -> Result<Texture, E> {
         let unit = self.unit();
@@ -156,7 +161,8 @@ impl Measurements {
         let mut colors: Vec<Vec<Vec3>> = vec![flat.clone(); folds];
         let clip = self.clip(&values, &flat);
         let mut best = (self.score(&values, &colors, clip), None, colors.clone());
-        let mut strength = STRONGEST * density;
+        let strongest = STRONGEST * density;
+        let mut strength = known.map_or(strongest, |known| (known * MARGIN).min(strongest));
         let mut worse = 0;
         while worse < PATIENCE && strength > WEAKEST * density {
             colors
@@ -378,7 +384,7 @@ mod tests {
             Measurements::new(&seen, Observations::new(&rows, 2), &[Vec3::ONE; 2]);
         let between = || Ok::<_, ()>(());
         let texture = measurements
-            .fit(&links, 1, between)
+            .fit(&links, 1, None, between)
             .expect("nothing ends it");
         let [known, stray] = [0, 1].map(|cell: usize| texture.colors[cell].x);
         assert!((known - 0.8).abs() < 1e-3, "{known}");

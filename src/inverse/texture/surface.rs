@@ -156,8 +156,11 @@ impl TexturedSurface {
         let observations = Observations::new(&self.rows(), self.cells.count());
         let fitted: Vec<&SeenPixel> = self.pixels.iter().filter(|p| !p.held_out).collect();
         let mut measurements = Measurements::new(&fitted, observations, &light.radiance);
-        let min_folds = if self.glossy { FOLDS } else { 1 };
-        self.texture = measurements.fit(&self.links, min_folds, || done(0, 0))?;
+        // A highlight is wrong in a whole photograph: whether a glossy object has a texture at all, all folds decide.
+        let decides = self.glossy && sweep == 0;
+        let min_folds = if decides { FOLDS } else { 1 };
+        let known = self.texture.strength;
+        self.texture = measurements.fit(&self.links, min_folds, known, || done(0, 0))?;
         self.constant = measurements.constant;
         done(0, 0)?;
         if let Some(scale_error) = errors {
