@@ -132,8 +132,15 @@ impl Irradiance {
         self.rejected += other.rejected;
     }
 
-    /// Smooths with the strength at which each set predicts the other best.
-    pub fn smoothed(&self, links: &Links) -> Smoothed {
+    /// Smooths with the strength at which each set predicts the other best. `between` is called after each strength.
+    ///
+    /// # Errors
+    /// The error of `between`.
+    pub fn smoothed<E>(
+        &self,
+        links: &Links,
+        mut between: impl FnMut() -> Result<(), E>,
+    ) -> Result<Smoothed, E> {
         let count = self.sets[0].len();
         let both: Vec<Vec3> = (self.sets[0].iter().zip(&self.sets[1]))
             .map(|(a, b)| (*a + *b) * 0.5)
@@ -172,6 +179,7 @@ impl Irradiance {
                     break;
                 }
             }
+            between()?;
         }
 
         // The mean of both sets has half the variance of one.
@@ -179,10 +187,10 @@ impl Irradiance {
         let start: Vec<Vec3> = (smooth[0].iter().zip(&smooth[1]))
             .map(|(a, b)| (*a + *b) * 0.5)
             .collect();
-        Smoothed {
+        Ok(Smoothed {
             radiance: fuse(&problem(&both), strength, &start),
             noise: best.2 as f32,
-        }
+        })
     }
 }
 

@@ -143,7 +143,7 @@ impl TexturedSurface {
             done(part.rays, part.rejected)?;
             irradiance.append(part);
         }
-        let light = irradiance.smoothed(&self.links);
+        let light = irradiance.smoothed(&self.links, || done(0, 0))?;
         done(0, 0)?;
         if self.glossy {
             let samples = paths / (GLOSS_COST * self.pixels.len() as u64);

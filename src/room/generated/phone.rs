@@ -10,8 +10,7 @@ use crate::math::rng::Stream;
 use crate::room::generated::draft::Draft;
 use crate::room::generated::furnisher::Furnisher;
 use crate::room::generated::photographed::Generated;
-use crate::room::photographs::{Rendering, render_lit};
-use crate::transport::denoise::{denoise, guides};
+use crate::room::photographs::render_lit;
 use crate::transport::lit::Lit;
 use glam::Vec3;
 use image::codecs::jpeg::JpegEncoder;
@@ -36,7 +35,9 @@ pub fn furnish(f: &mut Furnisher, _size: [u32; 2]) {
 /// The room, photographed by a phone.
 pub fn photograph(draft: Draft) -> Result<Generated> {
     let lit = draft.lit()?;
-    let files = files(&draft, &lit)?;
+    let rendered = render_lit(&lit, &draft.rendering);
+    let rendered: Vec<Picture> = rendered.iter().map(Photograph::picture).collect();
+    let files = files(&draft, &lit, &rendered)?;
     let photographs = files
         .iter()
         .map(|file| decode(file))
@@ -56,8 +57,8 @@ struct Phone {
     noise: f32,
 }
 
-/// The photographs as JPEG files.
-pub fn files(draft: &Draft, lit: &Lit) -> Result<Vec<Vec<u8>>> {
+/// The photographs of what the cameras see as JPEG files.
+pub fn files(draft: &Draft, lit: &Lit, rendered: &[Picture]) -> Result<Vec<Vec<u8>>> {
     let mut stream = Stream::new(draft.seed, CAMERA_KEY, draft.family as u64, 0);
     let mut between = |low: f64, high: f64| low + (high - low) * stream.uniform_f64();
     let phone = Phone {
@@ -68,30 +69,13 @@ pub fn files(draft: &Draft, lit: &Lit) -> Result<Vec<Vec<u8>>> {
         quality: between(85.0, 96.0) as u8,
         noise: between(0.002, 0.01) as f32,
     };
-    (noiseless(lit, &draft.rendering).into_iter())
+    (rendered.iter())
         .zip(&lit.scene.cameras)
         .map(|(picture, camera)| {
             let compensation = 2f64.powf(-0.5 + stream.uniform_f64());
-            let exposed = phone.expose(&picture, &camera.intrinsics, compensation, &mut stream);
+            let exposed = phone.expose(picture, &camera.intrinsics, compensation, &mut stream);
             encode(&exposed, phone.quality)
         })
-        .collect()
-}
-
-/// Denoised renderings of all views. The rare bright samples of a path tracer are no noise of a camera: they would saturate,
-/// and take their light out of the photograph.
-fn noiseless(lit: &Lit, rendering: &Rendering) -> Vec<Picture> {
-    let [a, b] = [0, 1].map(|half| {
-        let rendering = Rendering {
-            seed: rendering.seed ^ half << u32::BITS,
-            samples: rendering.samples.div_ceil(2),
-            ..*rendering
-        };
-        render_lit(lit, &rendering)
-    });
-    let pairs = a.iter().zip(&b).zip(&lit.scene.cameras);
-    pairs
-        .map(|((a, b), camera)| denoise(&a.picture(), &b.picture(), &guides(lit, camera)))
         .collect()
 }
 

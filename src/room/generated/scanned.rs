@@ -6,14 +6,18 @@ use crate::capture::fuse::{MAX_BYTES, fuse, voxel_size};
 use crate::capture::import::{DepthImage, ImportedFrame, Lens};
 use crate::capture::poses;
 use crate::error::{Error, Result};
+use crate::math::picture::Picture;
 use crate::math::rng::Stream;
 use crate::room::cameras;
 use crate::room::generated::draft::Draft;
 use crate::room::generated::furnisher::Furnisher;
 use crate::room::generated::photographed::Generated;
 use crate::room::generated::{patterned, phone, window};
+use crate::room::photographs::{Rendering, render_lit};
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
+use crate::transport::denoise::{denoise, guides};
+use crate::transport::lit::Lit;
 use glam::{DMat3, DVec3, Vec2};
 use std::path::{Path, PathBuf};
 
@@ -62,7 +66,7 @@ pub fn deviation(depth: f64) -> f64 {
 /// refined, and a mesh fused from the depth.
 pub fn scan(draft: Draft) -> Result<Generated> {
     let lit = draft.lit()?;
-    let files = phone::files(&draft, &lit)?;
+    let files = phone::files(&draft, &lit, &noiseless(&lit, &draft.rendering))?;
     let mut stream = Stream::new(draft.seed, DEPTH_KEY, 0, 0);
     let folder = tempfile::tempdir().map_err(|e| Error::io(&std::env::temp_dir(), &e))?;
     let known = cameras::cameras(&draft.room.views, draft.rendering.size);
@@ -118,6 +122,23 @@ pub fn scan(draft: Draft) -> Result<Generated> {
         capture,
         lit,
     })
+}
+
+/// Denoised renderings of all views. The rare bright samples of a path tracer are no noise of a camera: poses would follow them,
+/// and they would saturate and take their light out of the photograph.
+fn noiseless(lit: &Lit, rendering: &Rendering) -> Vec<Picture> {
+    let [a, b] = [0, 1].map(|half| {
+        let rendering = Rendering {
+            seed: rendering.seed ^ half << u32::BITS,
+            samples: rendering.samples.div_ceil(2),
+            ..*rendering
+        };
+        render_lit(lit, &rendering)
+    });
+    let pairs = a.iter().zip(&b).zip(&lit.scene.cameras);
+    pairs
+        .map(|((a, b), camera)| denoise(&a.picture(), &b.picture(), &guides(lit, camera)))
+        .collect()
 }
 
 /// Adds a tracking error to a pose.
