@@ -197,26 +197,16 @@ impl Pipeline<'_, '_> {
         let cameras = scene.cameras.iter().map(|camera| camera.center);
         let places = scene.positions.iter().copied().chain(cameras);
         // A mesh that is not a scan is assumed to lack windows only.
-        let around = match scanned {
-            false => None,
-            true => Surroundings::around(places),
-        };
+        let around = scanned.then(|| Surroundings::around(places)).flatten();
         let mut gained: Vec<(Losses, Found)> = Vec::new();
-        let hack = std::env::var("HACK_SURR").unwrap_or_default();
-        for surroundings in [
-            Some(Surroundings::Far).filter(|_| hack != "box"),
-            around.filter(|_| hack != "far"),
-        ]
-        .into_iter()
-        .flatten()
-        {
+        for surroundings in [Some(Surroundings::Far), around].into_iter().flatten() {
             let losses = self.fit_open(surroundings, cache, lights, measured)?;
             if scanned || fall(closed, losses) > OUTSIDE_GAIN {
                 gained.push((losses, self.found()));
             }
             self.go_back_to(without.clone());
         }
-        let best = self.best_by_full_paths(gained)?;
+        let best = self.best_trial(gained)?;
         let gain = best
             .as_ref()
             .map_or(0.0, |(losses, _)| fall(closed, *losses));
@@ -265,7 +255,7 @@ impl Pipeline<'_, '_> {
 
     /// The best result, with its losses. If there are two to choose from, their losses are those after a fit of full paths, if there
     /// are any: the light field is blurred. The paths of the best are kept, since the next stage begins with the same.
-    fn best_by_full_paths(
+    fn best_trial(
         &mut self,
         gained: Vec<(Losses, Found)>,
     ) -> Result<Option<(Losses, Found)>, Termination> {

@@ -155,7 +155,7 @@ impl System<'_> {
         }
     }
 
-    /// The product of the matrix and a vector. Padded vectors make its gathers twice as fast.
+    /// The product of the matrix and a vector, whose colours are padded so that each is read at once.
     fn apply(&self, x: &[Vec3A]) -> Vec<Vec3A> {
         let measured: Vec<Vec3A> = (0..self.observations.rows())
             .into_par_iter()
