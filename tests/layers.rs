@@ -169,6 +169,28 @@ fn imports_inside_a_folder_point_downwards() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// The sources that read environment variables: folders of preferences, the display, and the library of a denoiser.
+const READ_ENVIRONMENT: [&str; 3] = ["app/preferences.rs", "cli/mod.rs", "transport/oidn.rs"];
+
+#[test]
+fn no_hidden_switch_is_read_from_the_environment() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    sources(&root, &mut files);
+    let mut found: Vec<String> = (files.iter())
+        .filter(|file| {
+            let source = fs::read_to_string(file).expect("src is readable");
+            source.contains("env::var")
+        })
+        .map(|file| {
+            let inside = file.strip_prefix(&root).expect("inside src");
+            inside.to_string_lossy().replace('\\', "/")
+        })
+        .collect();
+    found.sort();
+    assert_eq!(found, READ_ENVIRONMENT);
+}
+
 #[test]
 fn the_window_library_stays_in_the_window() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
