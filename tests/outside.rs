@@ -14,10 +14,11 @@ use relit::inverse::settings::{Preset, Settings};
 use relit::inverse::solve;
 use relit::inverse::solver::{Checkpoint, Control, Observer, Progress, Solution};
 use relit::scene::Scene;
-use relit::transport::environment::Environment;
+use relit::transport::environment::{Environment, direction_of, pixel_of, row_solid_angle};
 use relit::transport::material::Material;
 use relit::transport::surroundings::Surroundings;
 use scenes::View;
+use std::f32::consts::PI;
 use std::sync::Arc;
 
 const SIZE: [u32; 2] = [64, 48];
@@ -113,6 +114,49 @@ fn a_room_lit_through_its_window_keeps_its_walls_dark() {
     let errors = relative_errors(&estimate, &materials);
     assert!(errors[errors.len() / 2] < 0.012, "{errors:?}");
     assert!(errors[errors.len() - 1] < 0.08, "{errors:?}");
+}
+
+/// A sun that no photograph shows is found by the pool of light that it throws into the room.
+#[test]
+fn a_sun_through_the_window_is_found_by_where_its_light_falls() {
+    let (width, height) = (256, 128);
+    let sun = direction_of(
+        width,
+        height,
+        pixel_of(width, height, Vec3::new(0.2, 0.8, 0.6)),
+    );
+    let solid_angle = |pixel: usize, [width, height]: [usize; 2]| {
+        row_solid_angle(pixel / width, width, height) as f32
+    };
+    let mut pixels: Vec<Vec3> = (0..width * height)
+        .map(|pixel| sky().map_radiance(direction_of(width, height, pixel)))
+        .collect();
+    let pixel = pixel_of(width, height, sun);
+    // Twice the irradiance of a uniform sky of radiance 4.
+    let irradiance = Vec3::new(1.0, 0.9, 0.7) * 8.0 * PI;
+    pixels[pixel] += irradiance / solid_angle(pixel, [width, height]);
+    let lit_by = Environment::new(width, height, pixels).map(Arc::new);
+    let (mesh, materials) = room_with_a_window();
+    let capture = scenes::capture(mesh, &views(), SIZE);
+    let problem = scenes::photographed_under(lit_by, &capture, &materials, 512, 75);
+    let estimate = run(&problem).estimate;
+
+    let outside = estimate.outside.as_ref().expect("the sky is seen");
+    let size = [outside.width, outside.height].map(|side| side as usize);
+    let brightest = (0..outside.pixels.len())
+        .max_by(|&a, &b| outside.pixels[a].y.total_cmp(&outside.pixels[b].y))
+        .expect("a map has pixels");
+    let angle = direction_of(size[0], size[1], brightest)
+        .angle_between(sun)
+        .to_degrees();
+    let found = outside.pixels[brightest] * solid_angle(brightest, size) / irradiance;
+    println!("{angle}° off, {found} of its irradiance");
+    assert!(angle < 3.0, "{angle}");
+    assert!((found - 1.0).abs().max_element() < 0.1, "{found}");
+    // 0.043 and 0.089 are seen.
+    let errors = relative_errors(&estimate, &materials);
+    assert!(errors[errors.len() / 2] < 0.06, "{errors:?}");
+    assert!(errors[errors.len() - 1] < 0.12, "{errors:?}");
 }
 
 /// The same views twice, the second time overexposed: where the first measured the sky, its bound counts for nothing.

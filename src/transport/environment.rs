@@ -170,7 +170,7 @@ pub fn row_cosines(row: usize, height: usize) -> (f64, f64) {
 }
 
 /// Solid angle of one pixel of a row.
-fn row_solid_angle(row: usize, width: usize, height: usize) -> f64 {
+pub fn row_solid_angle(row: usize, width: usize, height: usize) -> f64 {
     let (top, bottom) = row_cosines(row, height);
     2.0 * std::f64::consts::PI * (top - bottom) / width as f64
 }

@@ -9,6 +9,7 @@ pub mod derivative;
 pub mod evaluate;
 pub mod lamp_patches;
 pub mod memory;
+pub mod outside_grid;
 mod scatter;
 pub mod trace;
 

@@ -6,6 +6,7 @@ use crate::inverse::estimate::TexelEstimate;
 use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::paths::clusters::Cluster;
 use crate::inverse::paths::lamp_patches::LampPatches;
+use crate::inverse::paths::outside_grid::OutsideGrid;
 use crate::inverse::paths::scatter::{Scattered, Scattering};
 use crate::inverse::paths::{CachedCluster, NO_PATCH, NO_TEXEL, PathCache, SPECULAR, Vertex};
 use crate::inverse::settings::LightSampling;
@@ -17,13 +18,11 @@ use crate::scene::camera::Camera;
 use crate::scene::geometry::{Hit, Ray, offset_origin};
 use crate::transport::arrival::Cast;
 use crate::transport::emitters::Emitters;
-use crate::transport::environment::{direction_of, pixel_of};
 use crate::transport::material::Lobe;
 use crate::transport::path::power_heuristic;
-use crate::transport::surroundings::Surroundings;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
-use std::f32::consts::FRAC_1_PI;
+use std::f32::consts::{FRAC_1_PI, PI};
 
 /// Bounces before Russian roulette may end a path.
 const RR_DEPTH: u32 = 2;
@@ -59,7 +58,7 @@ pub struct Tracer<'a> {
     pub patches: Option<&'a LampPatches>,
     /// Outside light in directions that photographs measured; light samples are drawn from it too.
     pub sky: Option<&'a MeasuredOutside>,
-    /// Surfaces that stand for unmeasured outside light, by direction; `None` makes it zero.
+    /// Surfaces that stand for unmeasured outside light, by direction, and for the sun; `None` makes it zero.
     pub outside: Option<OutsideGrid>,
     /// Sampling strategy for direct light.
     pub sampling: LightSampling,
@@ -71,51 +70,6 @@ pub struct Tracer<'a> {
     pub stage: u64,
     /// Rounds of one stage continue the same low-discrepancy sequences.
     pub round: u32,
-}
-
-/// Outside directions as the pixels of a map; each is a surface with an emission. One more surface stands for the excess above
-/// the lower bound in directions in which all photographs are saturated.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OutsideGrid {
-    /// Index of the first pixel's surface.
-    pub first: u32,
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Distance of the outside light, for parallax.
-    pub surroundings: Surroundings,
-}
-
-impl OutsideGrid {
-    /// Number of surfaces.
-    pub fn surfaces(&self) -> usize {
-        self.width * self.height + 1
-    }
-
-    /// The surface of the excess above lower bounds.
-    pub fn excess(&self) -> u32 {
-        self.first + (self.width * self.height) as u32
-    }
-
-    /// The unit direction of the centre of a surface's pixel.
-    pub fn direction(&self, surface: u32) -> Vec3 {
-        direction_of(self.width, self.height, (surface - self.first) as usize)
-    }
-
-    /// The surface of a unit direction of the map.
-    pub fn surface(&self, map_direction: Vec3) -> u32 {
-        self.first + pixel_of(self.width, self.height, map_direction) as u32
-    }
-
-    /// The last vertex of a path that leaves the scene along a ray.
-    fn vertex(&self, ray: &Ray, weight: f32) -> Vertex {
-        let map_direction = self.surroundings.map_direction(ray.origin, ray.direction);
-        Vertex {
-            emission_weight: weight,
-            ..Vertex::on(self.surface(map_direction))
-        }
-    }
 }
 
 impl Tracer<'_> {
@@ -234,8 +188,11 @@ impl Tracer<'_> {
             let [choice, u, v, pick] = numbers.four();
             if self.sampling != LightSampling::Bsdf {
                 let choice = numbers.refine(choice);
-                rays += if pick < self.sky_fraction() {
+                let [sky, sun] = [self.sky_fraction(), self.sun_fraction()];
+                rays += if pick < sky {
                     self.sky_sample(&surface, &scattering, scale, choice, [u, v], &mut vertex)
+                } else if pick < sky + sun {
+                    self.sun_sample(&surface, &scattering, scale, &mut vertex)
                 } else {
                     self.light_sample(&surface, &scattering, scale, choice, [u, v], &mut vertex)
                 };
@@ -374,12 +331,9 @@ impl Tracer<'_> {
         else {
             return 0;
         };
-        if surface.point.normal.dot(wi) <= 0.0 {
-            return 0;
-        }
-        let from = surface.leave(wi);
-        if self.scene.occluded(&Ray::new(from, wi)) {
-            return 1;
+        let (leaves, rays) = self.leaves_mesh(surface, wi);
+        if !leaves {
+            return rays;
         }
         let sky_pdf = pdf * self.sky_fraction();
         let weight = self.sample_weight(sky_pdf, surface.value(scattering, wi)) * scale;
@@ -387,21 +341,59 @@ impl Tracer<'_> {
         if let Some(grid) = self.outside.filter(|_| sky.is_bound(point, wi)) {
             (vertex.lamp, vertex.lamp_weight) = (grid.excess(), weight);
         }
-        1
+        rays
+    }
+
+    /// Adds light of the sun to a vertex; returns the number of rays. No other sample reaches the sun, so its weight is one.
+    fn sun_sample(
+        &self,
+        surface: &Surface,
+        scattering: &Option<Scattering>,
+        scale: f32,
+        vertex: &mut Vertex,
+    ) -> u64 {
+        let Some((grid, wi)) = self.outside.and_then(|grid| Some((grid, grid.sun?))) else {
+            return 0;
+        };
+        let (leaves, rays) = self.leaves_mesh(surface, wi);
+        if leaves {
+            let (value, _) = surface.value(scattering, wi);
+            vertex.lamp = grid.sun_surface();
+            vertex.lamp_weight = PI * value / self.sun_fraction() * scale;
+        }
+        rays
+    }
+
+    /// Whether a ray in a direction leaves the mesh, and the number of rays that it took to tell.
+    fn leaves_mesh(&self, surface: &Surface, wi: Vec3) -> (bool, u64) {
+        if surface.point.normal.dot(wi) <= 0.0 {
+            return (false, 0);
+        }
+        let ray = Ray::new(surface.leave(wi), wi);
+        (!self.scene.occluded(&ray), 1)
     }
 
     /// Fraction of the light samples that are drawn from the measured outside light.
     fn sky_fraction(&self) -> f32 {
-        match (self.sky.is_some(), self.lights.is_dark()) {
-            (false, _) => 0.0,
-            (true, true) => 1.0,
-            (true, false) => 0.5,
-        }
+        self.fraction(self.sky.is_some())
+    }
+
+    /// Fraction of the light samples that are drawn from the sun.
+    fn sun_fraction(&self) -> f32 {
+        self.fraction(self.outside.is_some_and(|grid| grid.sun.is_some()))
+    }
+
+    /// Light samples are divided evenly among emitters of the mesh, the measured outside light and the sun, as far as there are any.
+    fn fraction(&self, exists: bool) -> f32 {
+        let sun = self.outside.is_some_and(|grid| grid.sun.is_some());
+        let all = [!self.lights.is_dark(), self.sky.is_some(), sun];
+        let count = all.into_iter().filter(|&exists| exists).count();
+        f32::from(exists) / count.max(1) as f32
     }
 
     /// Pdf of light samples on an object of the mesh, with respect to area in m².
     fn light_pdf(&self, object: u32) -> f32 {
-        self.lights.pdf(object) * (1.0 - self.sky_fraction())
+        self.lights.pdf(object) * (1.0 - self.sky_fraction() - self.sun_fraction())
     }
 
     /// Weight of a light sample: `value` (f cosθ / albedo) over its pdf, times its MIS weight; pdfs with respect to solid angle.

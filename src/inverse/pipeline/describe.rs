@@ -5,13 +5,15 @@ use crate::inverse::estimate::{Estimate, ObjectEstimate, Outside};
 use crate::inverse::fit::errors::StandardErrors;
 use crate::inverse::fit::prior::ALBEDO_DEVIATION;
 use crate::inverse::outside::MeasuredOutside;
-use crate::inverse::paths::trace::OutsideGrid;
+use crate::inverse::paths::outside_grid::OutsideGrid;
 use crate::inverse::roles::Role;
 use crate::inverse::unknowns::Unknowns;
 use crate::math::color::luminance;
 use crate::scene::Scene;
+use crate::transport::environment::{direction_of, pixel_of, row_solid_angle};
 use crate::transport::material::Lobe;
 use glam::{DVec3, Vec3};
+use std::f32::consts::PI;
 
 /// Standard error above which an albedo counts as undetermined.
 const UNKNOWN_ALBEDO: f32 = 0.2 * ALBEDO_DEVIATION;
@@ -19,6 +21,9 @@ const UNKNOWN_ALBEDO: f32 = 0.2 * ALBEDO_DEVIATION;
 const UNKNOWN_EMISSION: f32 = 0.5;
 /// Lamps that fewer pixels see get a remark.
 const FEW_PIXELS: u64 = 19;
+
+/// Columns and rows of a map with a sun, if no photograph measures it: a pixel of 1.4 degrees, not much wider than the sun.
+const SUN_MAP: [usize; 2] = [256, 128];
 
 /// Relative difference in radiance, and difference of an albedo from one, below which a wall may be confused with a lamp.
 const WHITE: f32 = 0.01;
@@ -99,29 +104,44 @@ pub fn estimate(
             object
         })
         .collect();
-    let surroundings = outside.surroundings;
-    let (size, pixels) = match sky {
-        Some(sky) => {
-            let elsewhere = |direction| unknowns.emission[outside.surface(direction) as usize];
-            let excess = unknowns.emission[outside.excess() as usize];
-            (sky.size(), sky.filled(excess, elsewhere))
-        }
-        None => (
-            [outside.width, outside.height],
-            unknowns.emission[outside.first as usize..outside.excess() as usize].to_vec(),
-        ),
-    };
-    let outside = pixels.iter().any(|&p| p != Vec3::ZERO).then_some(Outside {
-        width: size[0] as u32,
-        height: size[1] as u32,
-        pixels,
-        surroundings,
-    });
+    let outside = outside_light(unknowns, outside, sky);
     Estimate {
         objects,
         outside,
         ..Default::default()
     }
+}
+
+/// The light from outside as a map; `None` if it is black.
+fn outside_light(
+    unknowns: &Unknowns,
+    grid: OutsideGrid,
+    sky: Option<&MeasuredOutside>,
+) -> Option<Outside> {
+    let emission = |surface: u32| unknowns.emission[surface as usize];
+    let elsewhere = |direction| emission(grid.surface(direction));
+    let [width, height] = match (sky, grid.sun) {
+        (Some(sky), _) => sky.size(),
+        (None, Some(_)) => SUN_MAP,
+        (None, None) => [grid.width, grid.height],
+    };
+    let mut pixels: Vec<Vec3> = match sky {
+        Some(sky) => sky.filled(emission(grid.excess()), elsewhere),
+        None => (0..width * height)
+            .map(|pixel| elsewhere(direction_of(width, height, pixel)))
+            .collect(),
+    };
+    if let Some(direction) = grid.sun {
+        let pixel = pixel_of(width, height, direction);
+        let solid_angle = row_solid_angle(pixel / width, width, height) as f32;
+        pixels[pixel] += emission(grid.sun_surface()) * PI / solid_angle;
+    }
+    (pixels.iter().any(|&p| p != Vec3::ZERO)).then_some(Outside {
+        width: width as u32,
+        height: height as u32,
+        pixels,
+        surroundings: grid.surroundings,
+    })
 }
 
 /// Marks white walls and lamps of equal radiance as not identifiable. Between white surfaces all radiance approaches that of the

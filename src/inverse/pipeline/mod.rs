@@ -11,10 +11,12 @@ mod full_paths;
 mod gloss;
 mod known;
 mod light_field;
+mod outside;
 mod record;
 mod refine;
 mod refit;
 mod state;
+mod sun;
 mod textures;
 mod trace;
 mod unseen_emitters;
@@ -34,7 +36,7 @@ use crate::inverse::monitor::Monitor;
 use crate::inverse::outside::MeasuredOutside;
 use crate::inverse::paths::clusters::{Cluster, brightness, cluster, mean_radiance};
 use crate::inverse::paths::lamp_patches::LampPatches;
-use crate::inverse::paths::trace::OutsideGrid;
+use crate::inverse::paths::outside_grid::OutsideGrid;
 use crate::inverse::pipeline::budget::Budget;
 use crate::inverse::pipeline::state::SolverState;
 use crate::inverse::roles::Role;
@@ -44,7 +46,7 @@ use crate::inverse::unknowns::Unknowns;
 use crate::transport::material::Lobe;
 use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
-use light_field::Compared;
+use outside::Compared;
 use refine::Summed;
 use textures::Detail;
 
@@ -121,6 +123,7 @@ pub fn solve(
         width: OUTSIDE_WIDTH,
         height: OUTSIDE_HEIGHT,
         surroundings: Surroundings::Far,
+        sun: None,
     };
     let surfaces = objects + outside.surfaces();
     monitor.phase("looking through the pixels");
@@ -191,6 +194,7 @@ pub fn solve(
         max_bounces,
         outside: OutsideGrid {
             surroundings: start.surroundings,
+            sun: start.sun,
             ..outside
         },
         errors: start.errors(),

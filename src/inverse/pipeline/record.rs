@@ -113,6 +113,7 @@ impl Pipeline<'_, '_> {
         );
         state.model_variance = self.model_variance;
         state.surroundings = self.outside.surroundings;
+        state.sun = self.outside.sun;
         self.checkpoint = Checkpoint::new(&self.monitor.progress, &state);
     }
 

@@ -19,6 +19,9 @@ pub struct SolverState {
     /// Distance of the outside light.
     #[serde(default)]
     pub surroundings: Surroundings,
+    /// The unit direction towards the sun, if one was found.
+    #[serde(default)]
+    pub sun: Option<Vec3>,
     /// Prior of the albedos, which may come from the light field.
     #[serde(default)]
     pub expected: Option<ExpectedAlbedo>,
@@ -57,6 +60,7 @@ impl SolverState {
             stages,
             open,
             surroundings: Surroundings::Far,
+            sun: None,
             expected: Some(prior.albedo().clone()),
             directions: prior.directions().to_vec(),
             roles: roles.to_vec(),

@@ -1,0 +1,352 @@
+//! The trial of light from outside the mesh: from infinity, with and without a sun, and for a scan from a box around it.
+
+use crate::calibrate::measured_radiance::MeasuredRadiance;
+use crate::inverse::fit::equations::NormalEquations;
+use crate::inverse::fit::errors::StandardErrors;
+use crate::inverse::fit::gauss_newton::{MIN_DAMPING, propose};
+use crate::inverse::fit::prior::Prior;
+use crate::inverse::fit::robust_weights::RobustWeights;
+use crate::inverse::outside::MeasuredOutside;
+use crate::inverse::paths::clusters::mean_radiance;
+use crate::inverse::paths::evaluate::Linearised;
+use crate::inverse::paths::{CachedCluster, PathCache};
+use crate::inverse::pipeline::Pipeline;
+use crate::inverse::roles;
+use crate::inverse::roles::Role;
+use crate::inverse::solver::Termination;
+use crate::inverse::unknowns::Unknowns;
+use crate::math::color::luminance;
+use crate::transport::emitters::Emitters;
+use crate::transport::surroundings::Surroundings;
+use glam::{DVec3, Vec3};
+
+/// Least fraction of paths that leave the mesh for which outside light is tried.
+const ESCAPING: f64 = 1e-3;
+/// Least fall of the squared error by outside light, and then by a sun, relative to that without either.
+const OUTSIDE_GAIN: f64 = 0.03;
+/// Standard errors by which the squared error falls.
+const FALL_ERRORS: f64 = 4.0;
+/// Standard errors by which a sun's light exceeds zero.
+const SUN_ERRORS: f32 = 5.0;
+/// The result of a trial of outside light.
+#[derive(Clone)]
+struct Found {
+    roles: Vec<Role>,
+    unknowns: Unknowns,
+    errors: StandardErrors,
+    robust: RobustWeights,
+    prior: Prior,
+    surroundings: Surroundings,
+    sun: Option<Vec3>,
+    open: bool,
+    sky: Option<MeasuredOutside>,
+}
+
+/// A fit of the light field with outside light.
+struct Trial {
+    found: Found,
+    misfit: Misfit,
+    /// The paths, if new ones were traced.
+    paths: Option<PathCache>,
+}
+
+/// Full paths that were fitted to compare two kinds of light from outside.
+pub(super) struct Compared {
+    /// Roles and unknowns before the fit.
+    roles: Vec<Role>,
+    unknowns: Unknowns,
+    /// The free parameters of the fit.
+    free: Vec<usize>,
+    /// The result of the fit.
+    fitted: Found,
+    /// The paths, and a remark on their number.
+    stored: (PathCache, String),
+}
+
+impl Pipeline<'_, '_> {
+    /// Sets the prior of unmeasured outside directions from the measured ones.
+    pub(super) fn expect_of_outside(&mut self) {
+        if let Some(sky) = &self.sky {
+            let grid = self.outside;
+            let band = std::f64::consts::PI / grid.height as f64;
+            let expected = |surface| match grid.direction(surface) {
+                None => Vec3::ZERO,
+                Some(direction) => sky.expected(direction, band),
+            };
+            self.prior = self.prior.clone().with_sky(expected);
+        }
+    }
+
+    /// Tries light from infinity, and for a scan also from a box around the mesh. Keeps the better one if it predicts held-out pixels
+    /// better than the model without it.
+    ///
+    /// A scan gets light from outside without that test: what was not scanned reflects light, if nothing else, and the light field
+    /// without it makes walls lighter, or gives them light of their own, until nothing is left to improve.
+    pub(super) fn light_from_outside(
+        &mut self,
+        cache: &PathCache,
+        lights: &Emitters,
+        measured: &MeasuredRadiance,
+    ) -> Result<(), Termination> {
+        let escaping = cache.fraction_ending_on(self.outside.first);
+        if escaping <= ESCAPING || !self.monitor.settings.outside_light {
+            return Ok(());
+        }
+        let started = self.monitor.seconds();
+        self.monitor.phase("trying light from outside");
+        let leave = format!("{:.1} % of the paths leave the mesh", escaping * 100.0);
+        let scanned = self.problem.scene.scanned;
+        // A linear step estimates the gain at a small fraction of the cost of a trial.
+        let gain = (!scanned).then(|| self.outside_gain(cache));
+        if let Some(gain) = gain.filter(|&gain| gain < OUTSIDE_GAIN) {
+            let why = format!(
+                "{leave}; light from there would change the squared error by {:.1} %, so it is not called for",
+                -gain * 100.0,
+            );
+            self.record("outside light", started, false, why)?;
+            return Ok(());
+        }
+        let without = self.found();
+        let scene = &self.problem.scene;
+        let cameras = scene.cameras.iter().map(|camera| camera.center);
+        let places = scene.positions.iter().copied().chain(cameras);
+        // A mesh that is not a scan is assumed to lack windows only.
+        let around = scanned.then(|| Surroundings::around(places)).flatten();
+        let before = Misfit::new(cache, &without.unknowns);
+        let mut far = self.fit_open(Surroundings::Far, None, cache, lights, measured)?;
+        let sun = self.find_sun(far.paths.take().as_ref().unwrap_or(cache));
+        self.go_back_to(without.clone());
+        if sun.is_some() {
+            let sunny = self.fit_open(Surroundings::Far, sun, cache, lights, measured)?;
+            let fall = far.misfit.mean() - sunny.misfit.mean();
+            if fall > OUTSIDE_GAIN * before.mean() && self.sun_shines() {
+                far = sunny;
+            }
+            self.go_back_to(without.clone());
+        }
+        let gain = 1.0 - far.misfit.mean() / before.mean();
+        let gains = before.falls(&far.misfit, OUTSIDE_GAIN * before.mean());
+        let best = match around {
+            Some(around) => {
+                let near = self.fit_open(around, None, cache, lights, measured)?;
+                self.best_trial([far.found, near.found])?
+            }
+            None => (scanned || gains).then_some(far.found),
+        };
+        self.go_back_to(best.unwrap_or(without));
+        self.describe();
+        let comes = match (self.open, self.outside.surroundings, self.outside.sun) {
+            (false, ..) => "is not called for".to_owned(),
+            (true, Surroundings::Box { .. }, _) => "comes from a box around the mesh".to_owned(),
+            (true, Surroundings::Far, sun) => format!(
+                "changes the squared error by {:.1} % and comes from far away{}",
+                -gain * 100.0,
+                sun.map_or(String::new(), |sun| {
+                    let height = sun.dot(self.problem.scene.up).asin().to_degrees();
+                    format!(", with a sun {height:.0}° above the horizon")
+                })
+            ),
+        };
+        let why = format!("{leave}; light from there {comes}");
+        self.record("outside light", started, self.open, why)?;
+        Ok(())
+    }
+
+    /// Whether the fitted sun is brighter than nothing by its standard errors.
+    fn sun_shines(&self) -> bool {
+        let sun = self.outside.sun_surface() as usize;
+        let found = luminance(self.unknowns.emission[sun]);
+        found > SUN_ERRORS * luminance(self.errors.emission[sun])
+    }
+
+    /// Fits everything with outside light.
+    fn fit_open(
+        &mut self,
+        surroundings: Surroundings,
+        sun: Option<Vec3>,
+        cache: &PathCache,
+        lights: &Emitters,
+        measured: &MeasuredRadiance,
+    ) -> Result<Trial, Termination> {
+        self.open = true;
+        self.outside.surroundings = surroundings;
+        self.outside.sun = sun;
+        self.sky = MeasuredOutside::new(self.problem, &self.gbuffer, surroundings);
+        self.expect_of_outside();
+        let count = self.budget.light_field_paths;
+        let as_stored = self.sky.is_none() && surroundings == Surroundings::Far && sun.is_none();
+        let paths = match as_stored {
+            true => None,
+            false => Some(self.stored(lights, Some(measured), 0, count)?.0),
+        };
+        let cache = paths.as_ref().unwrap_or(cache);
+        self.tell_lamps(cache, Role::Unseen)?;
+        self.expect_colors_of_outside();
+        self.weigh(cache)?;
+        Ok(Trial {
+            misfit: Misfit::new(cache, &self.unknowns),
+            found: self.found(),
+            paths,
+        })
+    }
+
+    /// The result with the least loss on held-out pixels, or in the fit if none is held out. Full paths are fitted first, if there are
+    /// any, since the light field is blurred. Those of the best are kept, since the next stage begins with the same.
+    fn best_trial(&mut self, trials: [Found; 2]) -> Result<Option<Found>, Termination> {
+        let mut best: Option<(f64, Found)> = None;
+        for found in trials {
+            self.go_back_to(found.clone());
+            self.describe();
+            let mut compared = None;
+            if self.budget.round_paths > 0 {
+                self.expect_of_albedo();
+                let free = self.free();
+                let stored = self.fit_full_paths()?;
+                compared = Some(Compared {
+                    roles: found.roles.clone(),
+                    unknowns: found.unknowns.clone(),
+                    free,
+                    fitted: self.found(),
+                    stored,
+                });
+            }
+            let losses = self.measure();
+            let loss = losses.held_out.or(losses.train).unwrap_or(0.0);
+            if (best.as_ref()).is_none_or(|(least, _)| loss < *least) {
+                self.compared = compared;
+                best = Some((loss, found));
+            }
+        }
+        Ok(best.map(|(_, found)| found))
+    }
+
+    /// The paths of the best trial of light from outside, and their fit, if roles and unknowns are still those that they were traced
+    /// with: a second trace would give the same bits.
+    pub(super) fn compared(&mut self) -> Result<Option<(PathCache, String)>, Termination> {
+        let taken = self.compared.take();
+        let compared = taken.filter(|c| {
+            c.roles == self.roles
+                && c.unknowns == self.unknowns
+                && c.stored.0.clusters.len() == self.clusters.len()
+        });
+        let Some(compared) = compared else {
+            return Ok(None);
+        };
+        // The albedos of unseen surfaces are free from the second stage on.
+        if compared.free == self.free() {
+            self.go_back_to(compared.fitted);
+            self.describe();
+        } else {
+            self.fit_stored(&compared.stored.0)?;
+        }
+        Ok(Some(compared.stored))
+    }
+
+    /// The present result of a trial.
+    fn found(&self) -> Found {
+        Found {
+            roles: self.roles.clone(),
+            unknowns: self.unknowns.clone(),
+            errors: self.errors.clone(),
+            robust: self.robust.clone(),
+            prior: self.prior.clone(),
+            surroundings: self.outside.surroundings,
+            sun: self.outside.sun,
+            open: self.open,
+            sky: self.sky.clone(),
+        }
+    }
+
+    /// Restores the result of a trial.
+    fn go_back_to(&mut self, found: Found) {
+        self.roles = found.roles;
+        self.unknowns = found.unknowns;
+        self.errors = found.errors;
+        self.robust = found.robust;
+        self.prior = found.prior;
+        self.outside.surroundings = found.surroundings;
+        self.outside.sun = found.sun;
+        self.open = found.open;
+        self.sky = found.sky;
+    }
+
+    /// Sets the prior of outside light to its expected colours at the fitted brightness.
+    fn expect_colors_of_outside(&mut self) {
+        let photographed = mean_radiance(&self.clusters);
+        let bound = self.sky.as_ref().map(|sky| sky.mean_bound());
+        let excess = self.outside.excess();
+        let color = |surface: u32, expected: Vec3| match bound {
+            Some(bound) if surface == excess => bound,
+            Some(_) => expected,
+            None => photographed,
+        };
+        let found = |k: usize| (self.unknowns.emission[k], self.errors.emission[k]);
+        self.prior = self.prior.clone().with_outside_found(found, color);
+    }
+
+    /// Relative decrease of the clusters' squared residuals by one linear step with light from all outside directions free. It is
+    /// measured across the two sets of paths, so that fitting path noise gains nothing.
+    fn outside_gain(&self, cache: &PathCache) -> f64 {
+        let surfaces = self.roles.len();
+        let mut free = self.free();
+        free.extend(surfaces + self.outside.first as usize..2 * surfaces);
+        let linearised = cache.linearise(&self.unknowns, &roles::places(&free, surfaces), &[]);
+        let even = RobustWeights::even(surfaces);
+        let equations = NormalEquations::new(&linearised, free.len(), &even, &self.prior);
+        let (after, _) = propose(&equations, &free, &self.unknowns, MIN_DAMPING);
+        let steps: Vec<DVec3> = (free.iter())
+            .map(|&i| (after.value(i) - self.unknowns.value(i)).as_dvec3())
+            .collect();
+        let (mut fall, mut all) = (0.0, 0.0);
+        for mut cluster in linearised {
+            let square = |c: &Linearised| {
+                let [a, b] = c.residuals;
+                (c.weight_now() * a * b).element_sum()
+            };
+            let residual = cluster.residual();
+            all += (cluster.weight_now() * residual * residual).element_sum();
+            fall += square(&cluster);
+            cluster.step(&steps);
+            fall -= square(&cluster);
+        }
+        if all > 0.0 { fall / all } else { 0.0 }
+    }
+}
+
+/// The squared relative error of the model for each cluster of the fit, at most one, and the cluster's pixels. It is measured across the
+/// two sets of paths, so that their noise adds nothing: sunlight that arrives after a bounce is much noisier than a lamp that is seen.
+struct Misfit(Vec<(f64, f64)>);
+
+impl Misfit {
+    fn new(cache: &PathCache, unknowns: &Unknowns) -> Self {
+        let clusters = cache.clusters.iter().zip(cache.residuals(unknowns));
+        let of = |(cached, found): (&CachedCluster, Linearised)| {
+            let cluster = &cached.cluster;
+            let level = cluster.measured * cluster.measured + cluster.dark * cluster.dark;
+            let [a, b] = found.residuals;
+            let square = DVec3::select(found.bound_met(), DVec3::ZERO, a * b / level.as_dvec3());
+            let square = square.clamp(DVec3::NEG_ONE, DVec3::ONE).element_sum() / 3.0;
+            (square, found.pixels)
+        };
+        Self(clusters.map(of).collect())
+    }
+
+    /// Mean over all pixels.
+    fn mean(&self) -> f64 {
+        let (sum, pixels) = (self.0.iter()).fold((0.0, 0.0), |(sum, all), (square, pixels)| {
+            (sum + square * pixels, all + pixels)
+        });
+        sum / f64::max(pixels, 1.0)
+    }
+
+    /// Whether the mean of `other` is less by more than `needed` and by more than the noise of the difference.
+    fn falls(&self, other: &Self, needed: f64) -> bool {
+        let fall = self.mean() - other.mean();
+        let (mut squares, mut pixels) = (0.0, 0.0);
+        for ((before, weight), (after, _)) in self.0.iter().zip(&other.0) {
+            squares += ((before - after - fall) * weight).powi(2);
+            pixels += weight;
+        }
+        fall > needed && fall > FALL_ERRORS * squares.sqrt() / f64::max(pixels, 1.0)
+    }
+}

@@ -1,0 +1,235 @@
+//! Search for the sun: the direction from which one far, small source explains how bright the surfaces are that it reaches.
+//!
+//! Each pixel of a fine map of the sky above the horizon is a candidate. For each, shadow rays tell which clusters of pixels it
+//! reaches; its irradiance, that of the sky and the albedo of each object are then fitted together.
+
+use crate::inverse::fit::prior::{ALBEDO_MEAN, UNSEEN_DEVIATION};
+use crate::inverse::paths::PathCache;
+use crate::inverse::paths::clusters::Cluster;
+use crate::inverse::paths::evaluate::Linearised;
+use crate::inverse::pipeline::Pipeline;
+use crate::inverse::roles::Role;
+use crate::inverse::settings::LightSampling;
+use crate::inverse::unknowns::Unknowns;
+use crate::math::color::{luminance, luminance_f64};
+use crate::scene::Scene;
+use crate::scene::geometry::{Ray, offset_origin};
+use crate::transport::environment::direction_of;
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+/// Columns of the maps of candidates, from coarse to fine; twice the rows. A finest pixel has 1.4 degrees.
+const COLUMNS: [usize; 3] = [64, 128, 256];
+/// Clusters that the coarsest map is tested with.
+const COARSE_CLUSTERS: usize = 512;
+/// Candidates of one map that are refined by the next.
+const REFINED: usize = 8;
+/// Assumed relative error of a cluster's radiance, by texture, noise of paths and the light field's blur.
+const CLUSTER_ERROR: f64 = 0.2;
+/// Irradiances that are tried, over π times the mean photographed radiance: powers of two from 1/8 to 1024. Sunlight is up to a
+/// thousand times as bright as a room.
+const IRRADIANCES: std::ops::RangeInclusive<i32> = -3..=10;
+/// Radiances of the sky that are tried besides black, over the mean photographed radiance: powers of four from 1/4 to 256.
+const SKIES: std::ops::RangeInclusive<i32> = -1..=4;
+/// Least fall of χ² of a sun: five standard errors, and 2 ln of the number of candidates that it is the best of.
+const LEAST_FALL: f64 = 25.0 + 20.0;
+
+/// One cluster of pixels, reduced to what the search needs.
+struct Patch {
+    object: usize,
+    /// Its middle pixel's surface point.
+    point: Vec3,
+    normal: Vec3,
+    corners: [Vec3; 3],
+    /// Photographed luminance, and whether it is a lower bound.
+    measured: f64,
+    censored: bool,
+    /// Luminance that it would have at an albedo of one in the light of the room, and in that of a uniform sky of radiance one.
+    room: f64,
+    sky: f64,
+}
+
+impl Patch {
+    /// The patch of a cluster; `None` if nothing of the mesh is seen there.
+    fn new(
+        scene: &Scene,
+        width: u32,
+        cluster: &Cluster,
+        [dark, bright]: [&Linearised; 2],
+    ) -> Option<Self> {
+        let pixel = cluster.pixels[cluster.pixels.len() / 2];
+        let center = Vec2::new((pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5);
+        let ray = scene.cameras[cluster.frame as usize].ray(center);
+        let hit = scene.intersect(&ray)?;
+        let normal = scene.normals[hit.triangle as usize];
+        let measured = f64::from(luminance(cluster.measured));
+        (measured > 0.0).then_some(Self {
+            object: cluster.object as usize,
+            point: scene.point(&hit),
+            normal: normal * -normal.dot(ray.direction).signum(),
+            corners: scene.corners(hit.triangle),
+            measured,
+            censored: dark.censored.any(),
+            room: luminance_f64(dark.own).max(0.0),
+            sky: luminance_f64(bright.own - dark.own).max(0.0),
+        })
+    }
+
+    /// Cosine of the incidence of light from a far direction; zero in shadow.
+    fn cosine(&self, scene: &Scene, towards: Vec3) -> f64 {
+        let cosine = self.normal.dot(towards);
+        let origin = offset_origin(self.point, self.normal, &self.corners, towards);
+        match cosine > 0.0 && !scene.occluded(&Ray::new(origin, towards)) {
+            true => f64::from(cosine),
+            false => 0.0,
+        }
+    }
+
+    /// Squared residual of a predicted luminance, over its variance.
+    fn misfit(&self, predicted: f64, dark: f64) -> f64 {
+        let residual = self.measured - predicted;
+        match self.censored && residual < 0.0 {
+            true => 0.0,
+            false => residual * residual / self.variance(dark),
+        }
+    }
+
+    fn variance(&self, dark: f64) -> f64 {
+        CLUSTER_ERROR * CLUSTER_ERROR * (self.measured * self.measured + dark * dark)
+    }
+}
+
+/// The search's data.
+struct Search<'a> {
+    scene: &'a Scene,
+    /// Sorted by object.
+    patches: Vec<Patch>,
+    /// Mean photographed luminance.
+    level: f64,
+}
+
+impl Search<'_> {
+    /// Least χ² over the tried irradiances of a sun in a direction, over every `step`-th patch; and without a sun.
+    fn misfits(&self, towards: Vec3, step: usize) -> (f64, f64) {
+        let patches: Vec<(&Patch, f64)> = (self.patches.iter().step_by(step))
+            .map(|patch| (patch, patch.cosine(self.scene, towards)))
+            .collect();
+        let brightest = |sun: f64| {
+            let skies = SKIES.map(|power| self.level * 4f64.powi(power));
+            (std::iter::once(0.0).chain(skies))
+                .map(|sky| self.misfit(&patches, sky, sun))
+                .fold(f64::INFINITY, f64::min)
+        };
+        let without = brightest(0.0);
+        if patches.iter().all(|(_, cosine)| *cosine == 0.0) {
+            return (without, without);
+        }
+        let suns = IRRADIANCES.map(|power| self.level * 2f64.powi(power));
+        (suns.map(brightest).fold(f64::INFINITY, f64::min), without)
+    }
+
+    /// χ² with a sky of a radiance and a sun of an irradiance over π, where each object has the albedo that fits best.
+    fn misfit(&self, patches: &[(&Patch, f64)], sky: f64, sun: f64) -> f64 {
+        let precision = f64::from(UNSEEN_DEVIATION).powi(-2);
+        let mean = f64::from(ALBEDO_MEAN);
+        let light = |(patch, cosine): &(&Patch, f64)| patch.room + sky * patch.sky + sun * cosine;
+        (patches.chunk_by(|a, b| a.0.object == b.0.object))
+            .map(|object| {
+                let (mut top, mut bottom) = (precision * mean, precision);
+                for seen in object {
+                    let weight = light(seen) / seen.0.variance(self.level);
+                    top += weight * seen.0.measured;
+                    bottom += weight * light(seen);
+                }
+                let albedo = (top / bottom).clamp(0.0, 1.0);
+                let fit = object
+                    .iter()
+                    .map(|seen| seen.0.misfit(albedo * light(seen), self.level));
+                fit.sum::<f64>() + precision * (albedo - mean).powi(2)
+            })
+            .sum()
+    }
+
+    /// The best direction that may hold a sun, with the fall of χ².
+    fn best(&self, up: Vec3, may_hold: impl Fn(Vec3) -> bool + Sync) -> Option<(Vec3, f64)> {
+        let mut candidates: Vec<Vec3> = directions(COLUMNS[0]).collect();
+        let mut ranked = Vec::new();
+        for (level, columns) in COLUMNS.into_iter().enumerate() {
+            let step = match level {
+                0 => self.patches.len().div_ceil(COARSE_CLUSTERS).max(1),
+                _ => 1,
+            };
+            ranked = (candidates.par_iter())
+                .filter(|d| d.dot(up) > 0.0 && may_hold(**d))
+                .map(|&d| {
+                    let (with, without) = self.misfits(d, step);
+                    (d, without - with)
+                })
+                .collect();
+            ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
+            ranked.truncate(REFINED);
+            let Some(finer) = COLUMNS.get(level + 1) else {
+                break;
+            };
+            // Of the next map those pixels that lie in the kept ones or touch them.
+            let reach = (std::f32::consts::TAU / columns as f32).cos();
+            candidates = directions(*finer)
+                .filter(|d| ranked.iter().any(|(kept, _)| kept.dot(*d) >= reach))
+                .collect();
+        }
+        ranked.first().copied()
+    }
+}
+
+/// The pixels' directions of a map.
+fn directions(columns: usize) -> impl Iterator<Item = Vec3> {
+    let rows = columns / 2;
+    (0..columns * rows).map(move |pixel| direction_of(columns, rows, pixel))
+}
+
+impl Pipeline<'_, '_> {
+    /// The direction towards a sun that explains the photographs better than the present fit of the light field does; `None` if none
+    /// does.
+    pub(super) fn find_sun(&self, cache: &PathCache) -> Option<Vec3> {
+        // Without light samples, paths would hardly ever meet the sun.
+        if self.monitor.settings.light_sampling == LightSampling::Bsdf {
+            return None;
+        }
+        let scene = &*self.problem.scene;
+        let objects = scene.objects.len();
+        // All objects are reflectors of one albedo, under a black sky and under a white one.
+        let residuals = [0.0, 1.0].map(|sky| {
+            let mut assumed: Unknowns = self.unknowns.clone();
+            for k in (0..objects).filter(|&k| self.gbuffer.seen[k] > 0) {
+                assumed.albedo[k] = Vec3::splat(ALBEDO_MEAN);
+                assumed.emission[k] = Vec3::ZERO;
+            }
+            assumed.emission[objects..].fill(Vec3::splat(sky));
+            cache.residuals(&assumed)
+        });
+        let mut patches: Vec<Patch> = (cache.clusters.iter().enumerate())
+            .filter_map(|(i, cached)| {
+                let cluster = &cached.cluster;
+                if self.roles[cluster.object as usize] != Role::Reflector {
+                    return None;
+                }
+                let width = self.widths[cluster.frame as usize];
+                Patch::new(scene, width, cluster, [&residuals[0][i], &residuals[1][i]])
+            })
+            .collect();
+        patches.sort_by_key(|patch| patch.object);
+        let sum: f64 = patches.iter().map(|patch| patch.measured).sum();
+        let search = Search {
+            level: sum / patches.len().max(1) as f64,
+            scene,
+            patches,
+        };
+        // A photograph that measures a direction shows no sun there, unless it saturates.
+        let sky = self.sky.as_ref();
+        let may_hold = |d: Vec3| {
+            sky.is_none_or(|sky| sky.at(Vec3::ZERO, d).is_none() || sky.is_bound(Vec3::ZERO, d))
+        };
+        let (direction, fall) = search.best(scene.up, may_hold)?;
+        (fall >= LEAST_FALL).then_some(direction)
+    }
+}
