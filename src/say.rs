@@ -15,13 +15,13 @@ pub fn line(text: impl Display) {
 }
 
 /// Writes a line to standard error.
-pub fn aside(text: impl Display) {
+pub fn note(text: impl Display) {
     let _ = writeln!(std::io::stderr(), "{}", plain(&text.to_string()));
 }
 
 /// Writes a warning to standard error.
 pub fn warning(text: impl Display) {
-    aside(format_args!("warning: {text}"));
+    note(format_args!("warning: {text}"));
 }
 
 /// Writes the lines of a table to standard output. Names in the table must be [`plain`] already, since line ends are kept.

@@ -451,6 +451,7 @@ fn quantiles_and_pooled_figures_are_those_of_the_rows() {
         coverage_1: Some(if i == 0 { 0.5 } else { 1.0 }),
         coverage_2: Some(1.0),
         rays: 1000,
+        albedo_factor: (i > 0).then_some(if i.is_multiple_of(2) { 0.5 } else { 2.0 }),
     };
     let rows: Vec<Row> = (0..=10).map(row).collect();
     let summary = summarize(&plan, rows.iter());
@@ -458,6 +459,8 @@ fn quantiles_and_pooled_figures_are_those_of_the_rows() {
     assert_eq!((glossy.n, glossy.rooms_with_false_lamps), (11, 1));
     assert_eq!((glossy.lamps_found, glossy.lamps_true), (10, 22));
     assert_eq!((glossy.albedos, glossy.coverage), (60, Some([0.75, 1.0])));
+    let common = glossy.common_error.expect("rows have factors");
+    assert!((common - 2f64.ln()).abs() < 1e-12, "{common}");
     let near = |found: Quantiles, expected: [f64; 4]| {
         let found = [found.q10, found.q50, found.q90, found.worst];
         let pairs = found.into_iter().zip(expected);

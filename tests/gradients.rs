@@ -11,7 +11,7 @@ use relit::inverse::unknowns::Unknowns;
 use relit::math::rng::Stream;
 use relit::math::stats::Moments;
 use relit::scene::Scene;
-use relit::transport::lit::Lit;
+use relit::transport::lit::LitScene;
 use relit::transport::material::Material;
 use relit::transport::path::{PathOptions, radiance};
 use std::sync::Arc;
@@ -24,7 +24,7 @@ const PASSES: u64 = 4_000;
 const H: f32 = 0.01;
 
 /// A closed box with a lamp, where every surface also glows a little, so that all derivatives are at work.
-fn world() -> (Arc<Scene>, Unknowns, Lit) {
+fn world() -> (Arc<Scene>, Unknowns, LitScene) {
     let mut mesh = scenes::closed_box(1.0, DVec3::ZERO);
     scenes::lamp(&mut mesh, 0.4, DVec3::new(0.0, 0.8, -0.2));
     let view = (DVec3::new(0.3, -0.2, 0.8), DVec3::new(-0.1, 0.3, -0.9));
@@ -37,7 +37,7 @@ fn world() -> (Arc<Scene>, Unknowns, Lit) {
         emission: (0..7).map(|_| color() * 0.3 + 0.1).collect(),
     };
     unknowns.emission[6] = Vec3::new(6.0, 5.0, 4.0);
-    let lit = Lit::new(scene.clone(), materials(&unknowns), None);
+    let lit = LitScene::new(scene.clone(), materials(&unknowns), None);
     (scene, unknowns, lit)
 }
 
@@ -84,7 +84,7 @@ fn gradients(tracer: &Tracer, unknowns: &Unknowns, pass: u64) -> [Vec<DVec3>; 2]
 
 /// The squared loss, unbiased: the product of two independent renders' residuals. Light sampling stays that of `lit`,
 /// so that the same random numbers give the same paths for all materials.
-fn loss(lit: &Lit, pass: u64) -> DVec3 {
+fn loss(lit: &LitScene, pass: u64) -> DVec3 {
     let options = PathOptions {
         max_bounces: BOUNCES,
         rr_depth: 100,
@@ -104,13 +104,13 @@ fn loss(lit: &Lit, pass: u64) -> DVec3 {
 }
 
 /// The same loss with one parameter moved, in all channels.
-fn moved(lit: &Lit, unknowns: &Unknowns, parameter: usize, step: f32) -> Lit {
+fn moved(lit: &LitScene, unknowns: &Unknowns, parameter: usize, step: f32) -> LitScene {
     let mut unknowns = unknowns.clone();
     match parameter.checked_sub(unknowns.surfaces()) {
         None => unknowns.albedo[parameter] += step,
         Some(surface) => unknowns.emission[surface] += step,
     }
-    Lit {
+    LitScene {
         materials: materials(&unknowns),
         ..lit.clone()
     }
@@ -154,14 +154,15 @@ fn independent_samples_give_the_gradient_and_shared_samples_a_biased_one() {
     let (independent, shared): (Vec<_>, Vec<_>) = found.into_iter().map(|[a, b]| (a, b)).unzip();
 
     let parameters = 2 * unknowns.surfaces();
-    let sides: Vec<[Lit; 2]> = (0..parameters)
+    let sides: Vec<[LitScene; 2]> = (0..parameters)
         .map(|p| [H, -H].map(|step| moved(&lit, &unknowns, p, step)))
         .collect();
     let differences: Vec<Vec<DVec3>> = (0..PASSES / 2)
         .into_par_iter()
         .map(|pass| {
-            let slope =
-                |[up, down]: &[Lit; 2]| (loss(up, pass) - loss(down, pass)) / (2.0 * f64::from(H));
+            let slope = |[up, down]: &[LitScene; 2]| {
+                (loss(up, pass) - loss(down, pass)) / (2.0 * f64::from(H))
+            };
             sides.iter().map(slope).collect()
         })
         .collect();

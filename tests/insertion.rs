@@ -18,7 +18,7 @@ use relit::math::stats::Moments;
 use relit::scene::Scene;
 use relit::transport::environment::Environment;
 use relit::transport::film::Film;
-use relit::transport::lit::Lit;
+use relit::transport::lit::LitScene;
 use relit::transport::material::Material;
 use relit::transport::path::PathOptions;
 use std::sync::Arc;
@@ -116,23 +116,23 @@ fn lamp() -> Vec<[DVec3; 3]> {
     vec![[a, b, c], [a, c, d]]
 }
 
-fn lit(groups: &[(&str, Vec<[DVec3; 3]>)], materials: Vec<Material>) -> (Capture, Arc<Lit>) {
+fn lit(groups: &[(&str, Vec<[DVec3; 3]>)], materials: Vec<Material>) -> (Capture, Arc<LitScene>) {
     let capture = capture(groups);
     let scene = Arc::new(Scene::new(&capture).expect("the scene is sound"));
-    (capture, Arc::new(Lit::new(scene, materials, None)))
+    (capture, Arc::new(LitScene::new(scene, materials, None)))
 }
 
 fn gray(albedo: f32, emission: f32) -> Material {
     Material::diffuse(Vec3::splat(albedo), Vec3::splat(emission))
 }
 
-fn lamp_room() -> (Capture, Arc<Lit>) {
+fn lamp_room() -> (Capture, Arc<LitScene>) {
     let groups = [("walls", walls()), ("lamp", lamp())];
     lit(&groups, vec![gray(0.6, 0.0), gray(0.0, 10.0)])
 }
 
 fn placed(
-    lit: &Lit,
+    lit: &LitScene,
     triangles: Vec<[DVec3; 3]>,
     material: Material,
     at: DVec3,
@@ -152,12 +152,12 @@ fn block() -> Vec<[DVec3; 3]> {
     cuboid(DVec3::splat(-0.5), DVec3::splat(0.5), false)
 }
 
-fn backdrop(capture: &Capture, lit: &Lit) -> Backdrop {
+fn backdrop(capture: &Capture, lit: &LitScene) -> Backdrop {
     let photograph = capture.frames[0].load().expect("in memory");
     Backdrop::new(0, &lit.scene.cameras[0], &photograph, Exposure::default()).expect("one size")
 }
 
-fn insertion(capture: &Capture, lit: &Arc<Lit>, objects: Vec<Arc<PlacedObject>>) -> Insertion {
+fn insertion(capture: &Capture, lit: &Arc<LitScene>, objects: Vec<Arc<PlacedObject>>) -> Insertion {
     let options = PathOptions {
         max_bounces: 6,
         ..PathOptions::default()
@@ -188,7 +188,7 @@ fn a_convex_object_under_a_uniform_sky_shows_its_albedo_and_changes_nothing_else
     let capture = capture(&[("speck", speck)]);
     let scene = Arc::new(Scene::new(&capture).expect("the scene is sound"));
     let sky = Environment::new(8, 4, vec![Vec3::new(1.0, 2.0, 4.0); 32]).map(Arc::new);
-    let lit = Arc::new(Lit::new(scene, vec![gray(0.5, 0.0)], sky));
+    let lit = Arc::new(LitScene::new(scene, vec![gray(0.5, 0.0)], sky));
     let albedo = Vec3::new(0.25, 0.5, 1.0);
     let material = Material::diffuse(albedo, Vec3::ZERO);
     let object = placed(&lit, block(), material, DVec3::new(0.1, -0.4, 0.0));

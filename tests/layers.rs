@@ -122,7 +122,7 @@ const INSIDE: &[(&str, &[&[&str]])] = &[
             &["gbuffer", "sharpness", "photographs"],
             &["measured_radiance", "censored"],
             &["exposure"],
-            &["observed", "segments"],
+            &["calibrated", "segments"],
         ],
     ),
     (

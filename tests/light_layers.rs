@@ -9,7 +9,7 @@ use relit::scene::Scene;
 use relit::transport::environment::Environment;
 use relit::transport::film::Film;
 use relit::transport::layers::{LightSource, MAX_LAMPS, Split, mix};
-use relit::transport::lit::Lit;
+use relit::transport::lit::LitScene;
 use relit::transport::material::Material;
 use relit::transport::path::PathOptions;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use std::sync::Arc;
 const SIZE: [u32; 2] = [24, 18];
 
 /// The room with its lamp, a glowing block, and no front wall, so that light comes in from outside.
-fn lit() -> Lit {
+fn lit() -> LitScene {
     let (mut mesh, mut materials) = scenes::lamp_room();
     let front = mesh.objects.iter().position(|o| o == "front");
     let front = front.expect("a front") as u32;
@@ -33,10 +33,10 @@ fn lit() -> Lit {
     let scene = Arc::new(Scene::new(&capture).expect("a scene"));
     let sky = (0..8).map(|i| Vec3::new(0.5, 1.0, 2.0) * (1.0 + i as f32));
     let outside = Environment::new(4, 2, sky.collect()).expect("a sky");
-    Lit::new(scene, materials, Some(Arc::new(outside)))
+    LitScene::new(scene, materials, Some(Arc::new(outside)))
 }
 
-fn film(lit: &Lit, seed: u64, samples: u32) -> Picture {
+fn film(lit: &LitScene, seed: u64, samples: u32) -> Picture {
     let camera = &lit.scene.cameras[0];
     let mut film = Film::new(camera);
     film.add(lit, camera, &PathOptions::default(), seed, 0, samples);
@@ -47,7 +47,7 @@ fn film(lit: &Lit, seed: u64, samples: u32) -> Picture {
     }
 }
 
-fn layers(lit: &Lit, seed: u64, samples: u32) -> (Split, Vec<Picture>) {
+fn layers(lit: &LitScene, seed: u64, samples: u32) -> (Split, Vec<Picture>) {
     let split = Split::new(lit);
     let options = PathOptions::default();
     let pictures = split.render(lit, &lit.scene.cameras[0], &options, seed, 0, samples);
@@ -93,7 +93,11 @@ fn each_layer_is_what_its_source_alone_lights() {
         }
         let outside = lit.outside.clone();
         let outside = outside.filter(|_| *source == LightSource::Outside);
-        let alone = film(&Lit::new(lit.scene.clone(), materials, outside), 91, 256);
+        let alone = film(
+            &LitScene::new(lit.scene.clone(), materials, outside),
+            91,
+            256,
+        );
         // Differences a pixel are independent: their mean against its own standard error, at 4.5 sigma.
         for channel in 0..3 {
             let differences: Vec<f64> = (layer.pixels.iter().zip(&alone.pixels))
@@ -147,7 +151,7 @@ fn lamps_beyond_the_most_share_a_layer_and_a_dark_room_has_none() {
     let capture = scenes::capture(mesh, views, SIZE);
     let scene = Arc::new(Scene::new(&capture).expect("a scene"));
     let mut materials = vec![Material::diffuse(Vec3::splat(0.5), Vec3::ZERO); 6];
-    let dark = Lit::new(scene.clone(), vec![materials[0].clone(); 6 + count], None);
+    let dark = LitScene::new(scene.clone(), vec![materials[0].clone(); 6 + count], None);
     assert!(layers(&dark, 1, 1).1.is_empty());
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("dark.exr");
@@ -155,7 +159,7 @@ fn lamps_beyond_the_most_share_a_layer_and_a_dark_room_has_none() {
 
     let glow = |lamp: usize| Material::diffuse(Vec3::ZERO, Vec3::splat(1.0 + lamp as f32));
     materials.extend((0..count).map(glow));
-    let lit = Lit::new(scene, materials, None);
+    let lit = LitScene::new(scene, materials, None);
     let (split, pictures) = layers(&lit, 2, 4);
     assert_eq!(split.sources().len(), MAX_LAMPS + 1);
     assert_eq!(split.source_of(6), Some(LightSource::OtherLamps));

@@ -11,7 +11,7 @@ use relit::capture::truth::Truth;
 use relit::math::rng::Stream;
 use relit::math::stats::Moments;
 use relit::scene::Scene;
-use relit::transport::lit::Lit;
+use relit::transport::lit::LitScene;
 use relit::transport::material::Material;
 use relit::transport::path::{PathOptions, radiance};
 use std::sync::Arc;
@@ -61,7 +61,7 @@ fn the_cornell_box_is_reproduced_from_its_truth_within_its_noise() {
             truth.emission.as_vec3(),
         )
     });
-    let lit = Lit::new(scene.clone(), materials.collect(), None);
+    let lit = LitScene::new(scene.clone(), materials.collect(), None);
     for (frame, camera) in scene.cameras.iter().enumerate() {
         let photograph = capture.frames[frame]
             .load()

@@ -19,7 +19,7 @@ use relit::math::rng::Stream;
 use relit::math::stats::Moments;
 use relit::scene::Scene;
 use relit::transport::emitters::Emitters;
-use relit::transport::lit::Lit;
+use relit::transport::lit::LitScene;
 use relit::transport::material::{Lobe, Material};
 use relit::transport::path::{PathOptions, radiance};
 use std::sync::Arc;
@@ -146,7 +146,7 @@ fn cached(rounds: &[PathCache], unknowns: &Unknowns) -> Vec<[Moments; 3]> {
 }
 
 fn rendered(scene: &Arc<Scene>, unknowns: &Unknowns, lobes: &[Option<Lobe>]) -> Vec<[Moments; 3]> {
-    let lit = Lit::new(scene.clone(), materials(unknowns, lobes), None);
+    let lit = LitScene::new(scene.clone(), materials(unknowns, lobes), None);
     let row = |y: u32| {
         let mut moments = [Moments::default(); 3];
         for sample in 0..SAMPLES {
@@ -389,7 +389,7 @@ fn patches_of_a_lamp_tell_what_its_albedo_does_as_paths_beyond_it_do() {
     let scene = room();
     let mut unknowns = unknowns(scene.objects.len(), 5);
     unknowns.albedo[LAMP] = Vec3::ZERO;
-    let lit = Lit::new(scene.clone(), materials(&unknowns, &[]), None);
+    let lit = LitScene::new(scene.clone(), materials(&unknowns, &[]), None);
     let mut roles = vec![Role::Reflector; scene.objects.len()];
     roles[LAMP] = Role::Emitter;
     let mut patches = LampPatches::new(&scene, &roles);

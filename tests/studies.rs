@@ -2,7 +2,7 @@
 
 use relit::room::generated::generate;
 use relit::study::experiments::{Bench, Findings, STUDIES, Study, Subject};
-use relit::study::trade::Judge;
+use relit::study::trade::Metric;
 use std::collections::BTreeSet;
 use std::fs;
 use std::time::Duration;
@@ -100,7 +100,7 @@ fn names_differ_and_questions_are_asked() {
 fn every_study_runs_on_a_capture() {
     let (room, rendering) = generate(3, [40, 30]);
     let subject = Subject {
-        judge: Judge::HeldOut,
+        metric: Metric::HeldOut,
         ..Subject::of_room(&room, &rendering).expect("a room")
     };
     let twin = format!("twin of {}", room.name);

@@ -5,7 +5,7 @@ use relit::inverse::solver::Termination;
 use relit::room::generated::generate;
 use relit::room::truth;
 use relit::study::trade::plan::{self, Run};
-use relit::study::trade::{Curve, Judge, Measure, SolveEvent, Trade, measure, rooms};
+use relit::study::trade::{Curve, Measure, Metric, SolveEvent, Trade, measure, rooms};
 use std::cell::Cell;
 use std::time::Duration;
 
@@ -22,11 +22,11 @@ fn runs(wanted: &[Preset]) -> Vec<Run> {
     runs
 }
 
-fn measured(judge: Option<Judge>, runs: &[Run]) -> Vec<Curve> {
+fn measured(metric: Option<Metric>, runs: &[Run]) -> Vec<Curve> {
     let (problem, truth) = rooms::problem(3, TINY).expect("a room");
-    let judge = judge.unwrap_or(truth);
+    let metric = metric.unwrap_or(truth);
     let limit = Duration::from_secs(3600);
-    measure(&problem, &judge, runs, limit, &|| false, &mut |_| {}).expect("measured")
+    measure(&problem, &metric, runs, limit, &|| false, &mut |_| {}).expect("measured")
 }
 
 #[test]
@@ -102,10 +102,10 @@ fn one_solve_gives_a_course_of_falling_errors_with_what_it_cost() {
 
 #[test]
 fn no_solve_gets_more_than_its_fraction_of_the_time_or_an_estimate_after_it() {
-    let (problem, judge) = rooms::problem(3, TINY).expect("a room");
+    let (problem, metric) = rooms::problem(3, TINY).expect("a room");
     let all = runs(&[Preset::Reference]);
     let limit = Duration::from_millis(1);
-    let curves = measure(&problem, &judge, &all, limit, &|| false, &mut |_| {});
+    let curves = measure(&problem, &metric, &all, limit, &|| false, &mut |_| {});
     let curves = curves.expect("measured");
     assert_eq!(curves[0].ended, Some(Termination::Time));
     assert!(curves[0].points.is_empty());
@@ -113,7 +113,7 @@ fn no_solve_gets_more_than_its_fraction_of_the_time_or_an_estimate_after_it() {
 
 #[test]
 fn without_a_truth_the_held_out_loss_is_measured() {
-    let curves = measured(Some(Judge::HeldOut), &runs(&[Preset::Paper]));
+    let curves = measured(Some(Metric::HeldOut), &runs(&[Preset::Paper]));
     let errors: Vec<f64> = curves[0].points.iter().map(|p| p.error).collect();
     assert!(errors.len() >= 2, "{errors:?}");
     assert!(errors[errors.len() - 1] < errors[0], "{errors:?}");
@@ -121,11 +121,11 @@ fn without_a_truth_the_held_out_loss_is_measured() {
 
 #[test]
 fn a_measurement_that_is_stopped_keeps_what_it_has() {
-    let (problem, judge) = rooms::problem(3, TINY).expect("a room");
+    let (problem, metric) = rooms::problem(3, TINY).expect("a room");
     let ended = Cell::new(0);
     let curves = measure(
         &problem,
-        &judge,
+        &metric,
         &runs(&[Preset::Preview, Preset::Paper]),
         Duration::from_secs(3600),
         &|| ended.get() > 0,

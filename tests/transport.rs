@@ -6,12 +6,12 @@ use glam::{DVec3, Vec3};
 use relit::math::rng::Stream;
 use relit::math::stats::Moments;
 use relit::scene::geometry::Ray;
-use relit::transport::lit::Lit;
+use relit::transport::lit::LitScene;
 use relit::transport::material::Material;
 use relit::transport::path::{PathOptions, radiance};
 use scenes::{closed_box, lamp, scene_of};
 
-fn mean_radiance(lit: &Lit, options: &PathOptions, seed: u64, paths: u64) -> [Moments; 3] {
+fn mean_radiance(lit: &LitScene, options: &PathOptions, seed: u64, paths: u64) -> [Moments; 3] {
     let mut moments = [Moments::default(); 3];
     for index in 0..paths {
         let mut stream = Stream::new(seed, 0, 0, index);
@@ -43,7 +43,7 @@ fn closed_furnace_has_its_closed_form_radiance_at_any_size_and_place() {
         for albedo in [0.0, 0.5, 0.9, 0.99] {
             let mesh = closed_box(half, center);
             let material = Material::diffuse(Vec3::splat(albedo), Vec3::new(1.0, 2.0, 1e-6));
-            let lit = Lit::new(scene_of(mesh), vec![material; 6], None);
+            let lit = LitScene::new(scene_of(mesh), vec![material; 6], None);
             for (emitters, bsdf) in [(true, true), (true, false), (false, true)] {
                 let options = PathOptions {
                     sample_emitters: emitters,
@@ -68,7 +68,7 @@ fn closed_furnace_has_its_closed_form_radiance_at_any_size_and_place() {
 /// Truncated furnace: k bounces give Le (1 + ρ + … + ρᵏ), exactly, since every path sees the same.
 #[test]
 fn a_truncated_path_holds_exactly_its_bounces() {
-    let lit = Lit::new(
+    let lit = LitScene::new(
         scene_of(closed_box(1.0, DVec3::ZERO)),
         vec![Material::diffuse(Vec3::splat(0.5), Vec3::ONE); 6],
         None,
@@ -105,7 +105,7 @@ fn the_three_ways_of_finding_light_agree() {
         Vec3::splat(0.3),
         Vec3::new(10.0, 8.0, 5.0),
     ));
-    let lit = Lit::new(scene_of(mesh), materials, None);
+    let lit = LitScene::new(scene_of(mesh), materials, None);
     let options = |sample_emitters, sample_bsdf| PathOptions {
         sample_emitters,
         sample_bsdf,

@@ -12,10 +12,10 @@ use relit::inverse::estimate::Estimate;
 use relit::inverse::solve;
 use relit::inverse::solver::{Control, Observer, Progress};
 use relit::session::command::{OpenOptions, Source};
-use relit::session::keep;
 use relit::session::open::open;
 use relit::session::save;
 use relit::session::snapshot::OpenCapture;
+use relit::session::store;
 use std::fs;
 use std::io::Result as Io;
 use std::path::Path;
@@ -244,7 +244,7 @@ pub fn truth(bytes: &[u8]) {
 /// What a session that saved by itself holds beside its estimate.
 pub fn session(bytes: &[u8]) {
     if let Ok(folder) = results_with("session.json", bytes) {
-        let _ = keep::read_record(folder.path());
+        let _ = store::read_record(folder.path());
     }
 }
 

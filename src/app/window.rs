@@ -144,7 +144,7 @@ impl Window {
             && let Err(error) = self.saved.save(path)
         {
             let place = path.display();
-            say::aside(format_args!(
+            say::note(format_args!(
                 "{place}: {error}; the layout is not remembered"
             ));
         }

@@ -2,12 +2,12 @@
 //! photographs agree with the mesh and with each other.
 
 pub mod alignment;
+pub mod calibrated;
 pub mod censored;
 pub mod exposure;
 pub mod gbuffer;
 pub mod held_out;
 pub mod measured_radiance;
-pub mod observed;
 pub mod photographs;
 pub mod problem;
 pub mod segments;

@@ -54,7 +54,7 @@ pub fn shown(problem: &Problem, hold_out: HoldOut) -> Vec<ShownFace> {
 ///
 /// # Errors
 /// The mesh has no triangle with an area, or no photograph sees the mesh.
-pub fn cut_up(
+pub fn segment_mesh(
     capture: &mut Capture,
     cut: &Segmentation,
     working: &Working,

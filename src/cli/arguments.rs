@@ -46,7 +46,9 @@ impl Arguments {
         let negative_values = |argument: Arg| match argument.is_positional() {
             true => argument,
             false => {
-                let takes_value = argument.get_action().takes_values();
+                let values = argument.get_num_args();
+                let takes_value = argument.get_action().takes_values()
+                    && values.is_none_or(|count| count.max_values() > 0);
                 argument.allow_negative_numbers(takes_value)
             }
         };

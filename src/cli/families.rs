@@ -44,11 +44,11 @@ pub fn families(
     let mut failed: Option<Error> = None;
     let summary = run(out, &plan, &stopped, &mut |event| match event {
         RoomEvent::Begins(family, seed) => {
-            say::aside(format_args!("{} room {seed} …", family.name()))
+            say::note(format_args!("{} room {seed} …", family.name()))
         }
-        RoomEvent::Solved(row) => say::aside(line(row)),
+        RoomEvent::Solved(row) => say::note(line(row)),
         RoomEvent::Failed(error) => {
-            say::aside(error);
+            say::note(error);
             failed.get_or_insert(error.clone());
         }
     })?;

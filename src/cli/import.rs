@@ -8,7 +8,7 @@ use crate::cli::progress::bar;
 use crate::error::Result;
 use crate::export;
 use crate::say;
-use crate::session::given::Given;
+use crate::session::path_kind::PathKind;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
@@ -114,9 +114,9 @@ pub fn import(arguments: &ImportArguments) -> Result<()> {
 /// # Errors
 /// The folder holds no scan, or the capture cannot be written.
 pub fn beside_results(scan: &Path) -> Result<PathBuf> {
-    let out = Given::imported(scan);
+    let out = PathKind::imported(scan);
     if out.join(CAMERAS).exists() {
-        say::aside(format_args!(
+        say::note(format_args!(
             "{}: imported into {} before",
             scan.display(),
             out.display()
@@ -125,10 +125,10 @@ pub fn beside_results(scan: &Path) -> Result<PathBuf> {
     }
     let read = read(scan, &ImportOptions::default())?;
     for line in &read.remarks {
-        say::aside(line);
+        say::note(line);
     }
     export::import::write(&out, &read)?;
-    say::aside(format_args!(
+    say::note(format_args!(
         "{}: imported into {}",
         scan.display(),
         out.display()

@@ -26,7 +26,7 @@ use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
 use crate::say;
 use crate::session::command::{Source, Start};
-use crate::session::given::Given;
+use crate::session::path_kind::PathKind;
 use crate::session::save;
 use arguments::{Action, Arguments};
 use clap::CommandFactory;
@@ -60,7 +60,7 @@ pub fn run(window: Option<Window>) -> i32 {
     match outcome {
         Ok(code) => code,
         Err(error) => {
-            say::aside(format_args!("error: {error}"));
+            say::note(format_args!("error: {error}"));
             error.exit_code()
         }
     }
@@ -152,22 +152,22 @@ fn open(arguments: Arguments, window: Option<Window>) -> Result<i32> {
             }
         }
     };
-    say::aside(format_args!("relit: {reason}; solving without a window"));
+    say::note(format_args!("relit: {reason}; solving without a window"));
     solve::solve(&source, &options, &ObjectValues::default())
 }
 
 /// The source that a path names. A scan is imported first. For results, `options` are changed to resume them.
 fn source_of(path: &Path, options: &mut SolveOptions) -> Result<Source> {
-    match Given::at(path)? {
-        Given::Capture(folder) => Ok(Source::Folder(folder)),
-        Given::Results(folder) => {
+    match PathKind::at(path)? {
+        PathKind::Capture(folder) => Ok(Source::Folder(folder)),
+        PathKind::Results(folder) => {
             let source = save::load_checkpoint(&folder)?.source;
-            say::aside(format_args!("going on from {}", folder.display()));
+            say::note(format_args!("going on from {}", folder.display()));
             options.out.get_or_insert(folder);
             options.resume = true;
             Ok(source)
         }
-        Given::Scan(scan) => import::beside_results(&scan).map(Source::Folder),
+        PathKind::Scan(scan) => import::beside_results(&scan).map(Source::Folder),
     }
 }
 

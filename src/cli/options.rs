@@ -81,8 +81,8 @@ impl DeviceOptions {
     pub fn renderer(self) -> Result<Renderer> {
         let renderer = Renderer::find(self.device)?;
         match (renderer.card(), self.device) {
-            (Some(card), _) => say::aside(format_args!("paths traced by {card}")),
-            (None, Device::Cpu) => say::aside("paths traced by the processor"),
+            (Some(card), _) => say::note(format_args!("paths traced by {card}")),
+            (None, Device::Cpu) => say::note("paths traced by the processor"),
             (None, _) => {}
         }
         Ok(renderer)

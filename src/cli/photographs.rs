@@ -33,7 +33,7 @@ pub fn write_with_progress(
         say::warning(warning);
     }
     if written.photographs < work.frames.len() {
-        say::aside(format_args!(
+        say::note(format_args!(
             "interrupted after {} of {} photographs",
             written.photographs,
             work.frames.len()

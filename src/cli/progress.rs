@@ -69,15 +69,15 @@ impl Meter {
                 bar.set_position((done.clamp(0.0, 1.0) * LENGTH as f64) as u64);
                 bar.set_message(line);
             }
-            None => say::aside(line),
+            None => say::note(line),
         }
     }
 
     /// Prints a line without breaking the bar.
     pub fn say(&self, line: &str) {
         match &self.bar {
-            Some(bar) => bar.suspend(|| say::aside(line)),
-            None => say::aside(line),
+            Some(bar) => bar.suspend(|| say::note(line)),
+            None => say::note(line),
         }
     }
 

@@ -54,6 +54,13 @@ pub fn objects(scene: &Scene, estimate: &Estimate) -> String {
             object.seen_pixels
         );
     }
+    if estimate.common_error > 0.0 {
+        let _ = writeln!(
+            text,
+            "one factor of all albedos together is known to ±{:.0} %; their ratios are known better",
+            estimate.common_error * 100.0
+        );
+    }
     if rows.len() > shown {
         let _ = writeln!(text, "… and {} more in report.json", rows.len() - shown);
     }

@@ -52,7 +52,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
     };
     let capture = Arc::new(open(source, &read)?.aligned()?);
     let seconds_load = started.elapsed().as_secs_f64();
-    say::aside(format_args!(
+    say::note(format_args!(
         "{}: {}",
         capture.name,
         capture.summary.join(", ")
@@ -89,7 +89,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
 
     // Solve.
     if interrupt.requested() {
-        say::aside(NOTHING_TO_SAVE);
+        say::note(NOTHING_TO_SAVE);
         return Ok(interrupt.exit_code());
     }
     let problem = Problem {
@@ -127,10 +127,10 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
     if interrupt.requested() {
         // Before the first loss the estimate is the initial guess, and must not replace earlier results.
         if solution.progress.losses.is_empty() {
-            say::aside(NOTHING_TO_SAVE);
+            say::note(NOTHING_TO_SAVE);
             return Ok(interrupt.exit_code());
         }
-        say::aside("interrupted: saving what there is (again Ctrl-C to abort)");
+        say::note("interrupted: saving what there is (again Ctrl-C to abort)");
     }
     let results = Results {
         estimate: Arc::new(capture.marked_doubtful(solution.estimate)),

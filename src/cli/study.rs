@@ -106,7 +106,7 @@ pub fn study(arguments: &StudyArguments) -> Result<()> {
             time: arguments.time,
             seeds: arguments.seeds.unwrap_or(seeds),
             subject: subject.as_ref(),
-            say: &|what| say::aside(format_args!("{}: {what} …", study.name)),
+            say: &|what| say::note(format_args!("{}: {what} …", study.name)),
             show: &|_| {},
             stopped: &|| false,
         };
@@ -148,14 +148,14 @@ fn insertions(arguments: &StudyArguments, rooms: u32, family: &str) -> Result<()
         .out
         .join(format!("insertion-{}.csv", family.name()));
     for seed in seeds {
-        say::aside(format_args!("{} room {seed} …", family.name()));
+        say::note(format_args!("{} room {seed} …", family.name()));
         match composite(family, seed, &plan)? {
             Some(row) => {
-                say::aside(row.words());
+                say::note(row.words());
                 rows.push(row);
                 table(&rows).write(&file)?;
             }
-            None => say::aside("  no free place on its floor that photographs see"),
+            None => say::note("  no free place on its floor that photographs see"),
         }
     }
     say::line(Decision::of(&rows).words());

@@ -146,12 +146,12 @@ fn of_capture(
     runs: &[Run],
     interrupt: &Interrupt,
 ) -> Result<Trade> {
-    say::aside(format_args!(
+    say::note(format_args!(
         "{}: {}",
         capture.name,
         capture.summary.join(", ")
     ));
-    let judge = capture.judge()?;
+    let metric = capture.metric()?;
     let problem = Problem {
         scene: capture.scene.clone(),
         photographs: capture.photographs.clone(),
@@ -159,7 +159,7 @@ fn of_capture(
     let started = Instant::now();
     let curves = measure(
         &problem,
-        &judge,
+        &metric,
         runs,
         arguments.limit(),
         &|| interrupt.requested(),
@@ -168,7 +168,7 @@ fn of_capture(
     Ok(Trade::new(
         &capture.name,
         Some(capture.hash.clone()),
-        judge.measure(),
+        metric.measure(),
         started.elapsed(),
         curves,
     ))
@@ -183,12 +183,19 @@ fn over_rooms(
     let mut measured = Vec::new();
     let mut seconds = Duration::ZERO;
     for seed in arguments.seeds(count) {
-        say::aside(format_args!("generated room {seed}"));
-        let (problem, judge) = rooms::problem(seed, rooms::SIZE)?;
+        say::note(format_args!("generated room {seed}"));
+        let (problem, metric) = rooms::problem(seed, rooms::SIZE)?;
         let started = Instant::now();
         let limit = arguments.limit().div_f64(count as f64);
         let stopped = || interrupt.requested();
-        let curves = measure(&problem, &judge, runs, limit, &stopped, &mut print_progress)?;
+        let curves = measure(
+            &problem,
+            &metric,
+            runs,
+            limit,
+            &stopped,
+            &mut print_progress,
+        )?;
         seconds += started.elapsed();
         // Drop a room that was interrupted: its solves are incomplete.
         if interrupt.requested() {
@@ -209,8 +216,8 @@ fn over_rooms(
 /// Prints a line when a solve begins and when it ends.
 fn print_progress(event: SolveEvent) {
     match event {
-        SolveEvent::Begins(run) => say::aside(format_args!("{} …", run.name)),
-        SolveEvent::Ended(curve) => say::aside(format_args!("{}: {}", curve.name, ending(curve))),
+        SolveEvent::Begins(run) => say::note(format_args!("{} …", run.name)),
+        SolveEvent::Ended(curve) => say::note(format_args!("{}: {}", curve.name, ending(curve))),
     }
 }
 

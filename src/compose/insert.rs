@@ -11,7 +11,7 @@ use crate::gpu::{PairSums, Tracer, View};
 use crate::math::picture::Picture;
 use crate::math::rng::Stream;
 use crate::scene::geometry::Ray;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::path::{PathOptions, PathSample, radiance};
 use crate::transport::world::World;
 use glam::{BVec3, DVec3, Vec2, Vec3};
@@ -26,7 +26,7 @@ const COARSE_BLOCKS: usize = 40_000;
 #[derive(Debug)]
 pub struct Insertion {
     backdrop: Backdrop,
-    lit: Arc<Lit>,
+    lit: Arc<LitScene>,
     objects: Vec<Arc<PlacedObject>>,
     options: PathOptions,
     seed: u64,
@@ -76,7 +76,7 @@ impl Insertion {
     /// Starts an insertion with a coarse result: exact outlines, but light by blocks of pixels.
     pub fn new(
         backdrop: Backdrop,
-        lit: Arc<Lit>,
+        lit: Arc<LitScene>,
         objects: Vec<Arc<PlacedObject>>,
         options: PathOptions,
         seed: u64,
@@ -286,7 +286,7 @@ impl Insertion {
     }
 
     /// The scene and its light.
-    pub fn lit(&self) -> &Arc<Lit> {
+    pub fn lit(&self) -> &Arc<LitScene> {
         &self.lit
     }
 

@@ -11,7 +11,7 @@ use crate::math::sh::Harmonics;
 use crate::math::warp;
 use crate::scene::camera::Camera;
 use crate::scene::geometry::Ray;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::path::{PathOptions, radiance};
 use crate::transport::world::World;
 use glam::{DVec3, Vec2, Vec3};
@@ -81,7 +81,7 @@ pub fn harmonics_of_photographs<'a>(
 
 /// Spherical harmonics of the radiance that arrives at a point of the estimated scene, by path tracing.
 pub fn harmonics_of_estimate(
-    lit: &Lit,
+    lit: &LitScene,
     point: Vec3,
     options: &PathOptions,
     seed: u64,
@@ -124,7 +124,7 @@ impl Pasted {
     /// photograph's values: identity for harmonics of photographs, the backdrop's for harmonics of the estimate.
     pub fn new(
         backdrop: &Backdrop,
-        lit: &Lit,
+        lit: &LitScene,
         objects: &[Arc<PlacedObject>],
         harmonics: &[Harmonics],
         exposure: Exposure,

@@ -7,7 +7,7 @@ use crate::gpu::{Tracer, View};
 use crate::math::picture::Picture;
 use crate::transport::denoise::{Denoiser, Guide, guides};
 use crate::transport::film::Film;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
 use glam::Vec3;
 use std::sync::Arc;
@@ -63,7 +63,7 @@ fn relit_channel(photograph: f32, before: f32, after: f32, saturated: bool) -> f
 #[derive(Debug)]
 pub struct Relighting {
     backdrop: Backdrop,
-    lights: [Arc<Lit>; 2],
+    lights: [Arc<LitScene>; 2],
     options: PathOptions,
     seed: u64,
     /// Renders in both lights from the same random numbers. With denoising there are two independent pairs, to estimate
@@ -78,7 +78,7 @@ impl Relighting {
     /// Relights the photograph of `backdrop` from the first light to the second. With a denoiser both renders are denoised.
     pub fn new(
         backdrop: Backdrop,
-        lights: [Arc<Lit>; 2],
+        lights: [Arc<LitScene>; 2],
         options: PathOptions,
         seed: u64,
         denoiser: Option<Denoiser>,

@@ -3,7 +3,7 @@
 use crate::compose::placement::{PlacedObject, interpolate};
 use crate::scene::geometry::{Hit, Ray};
 use crate::transport::environment::Environment;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::world::{EmitterSample, SurfacePoint, World, towards_viewer};
 use glam::Vec3;
 use std::sync::Arc;
@@ -12,14 +12,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// A lit scene with objects in it. Only the scene emits light.
 #[derive(Debug)]
 pub struct FurnishedScene<'a> {
-    lit: &'a Lit,
+    lit: &'a LitScene,
     objects: &'a [Arc<PlacedObject>],
     touched: AtomicBool,
 }
 
 impl<'a> FurnishedScene<'a> {
     /// A scene with objects; their object indices follow the scene's.
-    pub fn new(lit: &'a Lit, objects: &'a [Arc<PlacedObject>]) -> Self {
+    pub fn new(lit: &'a LitScene, objects: &'a [Arc<PlacedObject>]) -> Self {
         Self {
             lit,
             objects,

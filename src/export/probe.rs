@@ -6,7 +6,7 @@ use crate::export::exr::{Precision, write_rgb};
 use crate::math::picture::Picture;
 use crate::math::rng::Stream;
 use crate::scene::geometry::Ray;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::path::{PathOptions, radiance};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -22,7 +22,7 @@ const SAMPLES: u32 = 64;
 ///
 /// # Errors
 /// The file cannot be written or has another extension, or the point is not finite.
-pub fn write(path: &Path, world: &Lit, at: DVec3) -> Result<()> {
+pub fn write(path: &Path, world: &LitScene, at: DVec3) -> Result<()> {
     if !at.is_finite() {
         return Err(Error::usage(
             "--at",
@@ -57,7 +57,7 @@ pub fn write(path: &Path, world: &Lit, at: DVec3) -> Result<()> {
 /// Radiance arriving at a point in scene coordinates from all directions, averaged over each pixel.
 ///
 /// Row 0 is around +y and columns turn from +x to +z, as in [`crate::transport::environment::Environment`].
-pub fn panorama(world: &Lit, point: Vec3, height: u32, samples: u32, seed: u64) -> Picture {
+pub fn panorama(world: &LitScene, point: Vec3, height: u32, samples: u32, seed: u64) -> Picture {
     let width = 2 * height;
     let options = PathOptions::default();
     let pixels = (0..width * height)

@@ -2,7 +2,7 @@
 
 use crate::gpu::layout::NONE;
 use crate::transport::environment::{Environment, row_cosines};
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 
 /// Bits of the random number that selects an object or an environment pixel.
 const CHOICE_BITS: i32 = 53;
@@ -20,7 +20,7 @@ pub(super) struct Emitters {
 
 impl Emitters {
     /// The emitters of a scene; `slot_of` is the slot of each triangle ([`NONE`] for triangles that cannot be hit).
-    pub fn new(lit: &Lit, slot_of: &[u32]) -> Self {
+    pub fn new(lit: &LitScene, slot_of: &[u32]) -> Self {
         let probability = |object: usize| lit.emitters.probability(object);
         let drawn: Vec<usize> = (0..lit.scene.objects.len())
             .filter(|&object| probability(object) > 0.0 && lit.emitters.pdf(object as u32) > 0.0)

@@ -4,7 +4,7 @@ use crate::gpu::inserted::Inserted;
 use crate::gpu::layout::Material as Shared;
 use crate::gpu::layout::{ALBEDO_CONSTANT, ALBEDO_IMAGE, ALBEDO_TEXELS, NONE};
 use crate::transport::bsdf::MIN_ROUGHNESS;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::material::{Albedo, Material};
 use glam::Vec3;
 use std::collections::HashMap;
@@ -23,7 +23,7 @@ pub(super) struct Materials {
 
 impl Materials {
     /// The materials of a scene, with the pdf of light sampling.
-    pub fn new(lit: &Lit) -> Self {
+    pub fn new(lit: &LitScene) -> Self {
         let mut all = Self::default();
         for (object, material) in lit.materials.iter().enumerate() {
             let mut packed = all.pack(material, 0);

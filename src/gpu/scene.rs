@@ -6,7 +6,7 @@ use crate::gpu::layout::Material as Shared;
 use crate::gpu::layout::{Dispatch, NONE};
 use crate::gpu::lights::{Emitters, environment};
 use crate::gpu::materials::Materials;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::path::emitter_fraction;
 use glam::Vec3;
 
@@ -26,7 +26,7 @@ pub(super) struct Packed {
 }
 
 impl Packed {
-    pub fn new(lit: &Lit, objects: &[Inserted<'_>]) -> Self {
+    pub fn new(lit: &LitScene, objects: &[Inserted<'_>]) -> Self {
         let scene = &lit.scene;
         let own = scene.triangles.len();
         let mut corners: Vec<[Vec3; 3]> = (0..own as u32).map(|t| scene.corners(t)).collect();

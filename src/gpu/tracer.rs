@@ -11,7 +11,7 @@ use crate::math::rng::splitmix64;
 use crate::scene::camera::Camera;
 use crate::scene::geometry::{Hit, Ray};
 use crate::transport::film::Film;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
 use crate::transport::surroundings::Surroundings;
 use bytemuck::Zeroable;
@@ -74,7 +74,7 @@ impl Tracer {
     ///
     /// # Errors
     /// The scene does not fit, or the card failed.
-    pub fn new(card: &Card, lit: &Lit, objects: &[Inserted<'_>]) -> Result<Self> {
+    pub fn new(card: &Card, lit: &LitScene, objects: &[Inserted<'_>]) -> Result<Self> {
         if (lit.outside.as_ref()).is_some_and(|map| map.surroundings() != Surroundings::Far) {
             return Err(card
                 .failed("an environment on a box is supported on the processor only".to_owned()));

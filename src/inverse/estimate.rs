@@ -6,7 +6,7 @@ use crate::math::nullable;
 use crate::math::stats::quantile;
 use crate::scene::Scene;
 use crate::transport::environment::Environment;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::material::{Albedo, Lobe, Material, TexelColors};
 use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
@@ -33,6 +33,9 @@ pub struct Estimate {
     pub vignetting: Option<Vignetting>,
     /// Response of the camera, if it was found to differ from the files' own curve.
     pub response: Option<Response>,
+    /// Standard error, relative, of the factor that all albedos share because the light is known no better. It is part of every
+    /// albedo's standard error; ratios of albedos are free of it. Zero if lamps and mesh leave no such factor open.
+    pub common_error: f32,
 }
 
 /// The estimate of one object; also its entry in `estimate.json` and `report.json`, where non-finite numbers are `null`.
@@ -183,11 +186,13 @@ pub fn relative_to_albedo(error: Vec3, albedo: Vec3) -> f64 {
 
 impl Estimate {
     /// The reported error: the median relative standard error of albedo, over objects whose albedo is determined and that at least
-    /// [`ENOUGH_PIXELS`] pixels see; `None` if there are none.
+    /// [`ENOUGH_PIXELS`] pixels see; `None` if there are none. It is without [`Self::common_error`], which no number of paths lowers.
     pub fn relative_error(&self) -> Option<f64> {
+        let common = f64::from(self.common_error);
         let mut relative: Vec<f64> = (self.objects.iter())
             .filter(|object| object.albedo_identifiable && object.seen_pixels >= ENOUGH_PIXELS)
             .map(|object| relative_to_albedo(object.albedo_stderr, object.albedo))
+            .map(|error| (error * error - common * common).max(0.0).sqrt())
             .collect();
         quantile(&mut relative, 0.5)
     }
@@ -203,7 +208,7 @@ impl Estimate {
     }
 
     /// The scene with the light and the materials of this estimate.
-    pub fn lit(&self, scene: &Arc<Scene>) -> Lit {
+    pub fn lit(&self, scene: &Arc<Scene>) -> LitScene {
         let mut materials = self.materials();
         materials.resize(
             scene.objects.len(),
@@ -214,7 +219,7 @@ impl Estimate {
             let map = Environment::new(width, height, outside.pixels.clone())?;
             Some(map.around(outside.surroundings))
         });
-        Lit::new(scene.clone(), materials, outside.map(Arc::new))
+        LitScene::new(scene.clone(), materials, outside.map(Arc::new))
     }
 
     /// The material of each object, for rendering.

@@ -8,8 +8,8 @@ use crate::inverse::settings::Settings;
 use crate::math::rng::{Stream, splitmix64};
 use crate::math::stats::Moments;
 use crate::scene::visibility::NOTHING;
-use crate::transport::arrival::Cast;
-use crate::transport::lit::Lit;
+use crate::transport::arrival::RayCount;
+use crate::transport::lit::LitScene;
 use crate::transport::path::{PathOptions, radiance};
 use glam::{DVec3, Vec2};
 use rayon::prelude::*;
@@ -35,7 +35,7 @@ pub struct Losses {
     /// On held-out pixels; `None` if there are none.
     pub held_out: Option<f64>,
     /// Rays cast and paths rejected; rejected samples count as black.
-    pub cast: Cast,
+    pub cast: RayCount,
 }
 
 /// The part of the photographed light that comes after a number of bounces.
@@ -46,7 +46,7 @@ pub struct LateLight {
     /// Standard error of the fraction over pixels.
     pub stderr: f64,
     /// Rays cast and paths rejected.
-    pub cast: Cast,
+    pub cast: RayCount,
 }
 
 impl LossProbe {
@@ -122,13 +122,13 @@ impl LossProbe {
     }
 
     /// Mean absolute difference on the held-out pixels alone (`None` if there are none), and the rays cast.
-    pub fn held_out(&self, problem: &Problem, estimate: &Estimate) -> (Option<f64>, Cast) {
+    pub fn held_out(&self, problem: &Problem, estimate: &Estimate) -> (Option<f64>, RayCount) {
         let (each, cast) = self.held_out_each(problem, estimate);
         (mean(&each), cast)
     }
 
     /// Mean absolute difference over the channels of each held-out pixel, in the same order for any estimate, and the rays cast.
-    pub fn held_out_each(&self, problem: &Problem, estimate: &Estimate) -> (Vec<f64>, Cast) {
+    pub fn held_out_each(&self, problem: &Problem, estimate: &Estimate) -> (Vec<f64>, RayCount) {
         let lit = estimate.lit(&problem.scene);
         self.differences(problem, &lit, &self.held_out)
     }
@@ -142,7 +142,7 @@ impl LossProbe {
         bounces: u32,
     ) -> Option<LateLight> {
         let lit = estimate.lit(&problem.scene);
-        let each: Vec<([DVec3; 2], Cast)> = (self.train.par_iter())
+        let each: Vec<([DVec3; 2], RayCount)> = (self.train.par_iter())
             .map(|&pixel| {
                 let [whole, cut] = [self.max_bounces, bounces]
                     .map(|max_bounces| self.rendered(problem, &lit, pixel, max_bounces));
@@ -172,8 +172,13 @@ impl LossProbe {
         })
     }
 
-    fn differences(&self, problem: &Problem, lit: &Lit, pixels: &[(u32, u32)]) -> (Vec<f64>, Cast) {
-        let each: Vec<(f64, Cast)> = pixels
+    fn differences(
+        &self,
+        problem: &Problem,
+        lit: &LitScene,
+        pixels: &[(u32, u32)],
+    ) -> (Vec<f64>, RayCount) {
+        let each: Vec<(f64, RayCount)> = pixels
             .par_iter()
             .map(|&(frame, pixel)| {
                 let (rendered, cast) =
@@ -194,10 +199,10 @@ impl LossProbe {
     fn rendered(
         &self,
         problem: &Problem,
-        lit: &Lit,
+        lit: &LitScene,
         (frame, pixel): (u32, u32),
         max_bounces: u32,
-    ) -> (DVec3, Cast) {
+    ) -> (DVec3, RayCount) {
         let options = PathOptions {
             max_bounces,
             ..Default::default()
@@ -206,7 +211,7 @@ impl LossProbe {
         let width = problem.photographs[frame as usize].width;
         let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
         let mut sum = DVec3::ZERO;
-        let mut cast = Cast::default();
+        let mut cast = RayCount::default();
         for sample in 0..self.samples {
             let mut stream =
                 Stream::new(self.seed, u64::from(frame), u64::from(pixel), KEY + sample);

@@ -6,7 +6,7 @@ use crate::inverse::settings::Settings;
 use crate::inverse::solver::{
     Checkpoint, Control, FitPoint, LossPoint, Observer, Progress, Stage, Termination,
 };
-use crate::transport::arrival::Cast;
+use crate::transport::arrival::RayCount;
 use std::time::{Duration, Instant};
 
 /// Measures solving time without pauses, reports to the observer, and decides when to stop.
@@ -144,7 +144,7 @@ impl<'a> Monitor<'a> {
     }
 
     /// Counts rays cast, and paths rejected because their weights were not finite.
-    pub fn cast(&mut self, cast: Cast) {
+    pub fn cast(&mut self, cast: RayCount) {
         self.progress.rays += cast.rays;
         self.rejected("path weight not finite", cast.rejected);
     }

@@ -4,19 +4,19 @@ use crate::gpu::{Tracer, View};
 use crate::render::renderer::{Renderer, warn_card_failed};
 use crate::scene::camera::Camera;
 use crate::transport::film::Film;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
 
 /// Renders views of one lit scene.
 #[derive(Debug)]
 pub struct Pictures<'a> {
-    lit: &'a Lit,
+    lit: &'a LitScene,
     tracer: Option<Tracer>,
 }
 
 impl<'a> Pictures<'a> {
     /// Renders a scene on the card if the renderer has one that accepts it.
-    pub fn new(renderer: &Renderer, lit: &'a Lit) -> Self {
+    pub fn new(renderer: &Renderer, lit: &'a LitScene) -> Self {
         Self {
             lit,
             tracer: renderer.tracer(lit, &[]),

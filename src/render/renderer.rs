@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Adapters, Card, Inserted, Tracer};
 use crate::render::device::Device;
 use crate::say;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 
 /// The graphics card to use, if any.
 #[derive(Debug, Clone, Default)]
@@ -43,7 +43,7 @@ impl Renderer {
     }
 
     /// Uploads a scene to the card; `None` without a card, or with a warning if the card refuses the scene.
-    pub fn tracer(&self, lit: &Lit, objects: &[Inserted<'_>]) -> Option<Tracer> {
+    pub fn tracer(&self, lit: &LitScene, objects: &[Inserted<'_>]) -> Option<Tracer> {
         let made = Tracer::new(self.card.as_ref()?, lit, objects);
         made.map_err(|error| warn_card_failed(&error)).ok()
     }

@@ -9,7 +9,7 @@ use crate::room::build;
 use crate::room::cameras::{self, View};
 use crate::room::truth;
 use crate::scene::Scene;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::material::Material;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
@@ -68,12 +68,12 @@ impl Room {
     ///
     /// # Errors
     /// Only if the room's mesh were invalid.
-    pub fn lit(&self, size: [u32; 2]) -> Result<Lit> {
+    pub fn lit(&self, size: [u32; 2]) -> Result<LitScene> {
         let pixels = vec![Vec3::ZERO; size[0] as usize * size[1] as usize];
         let black = Arc::new(linear_photograph(size, pixels));
         let sources = vec![PhotographSource::Memory(black); self.views.len()];
         let scene = Scene::new(&self.capture(sources, size))?;
-        Ok(Lit::new(Arc::new(scene), self.materials.clone(), None))
+        Ok(LitScene::new(Arc::new(scene), self.materials.clone(), None))
     }
 
     /// The truth of each object.

@@ -8,7 +8,7 @@ use crate::export::exr::{Precision, write_rgb};
 use crate::math::rng::Stream;
 use crate::room::model::{Room, linear_photograph};
 use crate::transport::film::Film;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
 use glam::Vec3;
 use image::ImageFormat;
@@ -87,7 +87,7 @@ pub fn render(room: &Room, rendering: &Rendering) -> Result<Vec<Photograph>> {
 }
 
 /// The same for a lit scene, which may have light from outside.
-pub fn render_lit(world: &Lit, rendering: &Rendering) -> Vec<Photograph> {
+pub fn render_lit(world: &LitScene, rendering: &Rendering) -> Vec<Photograph> {
     let options = PathOptions::default();
     let photograph = |(frame, camera)| {
         let mut film = Film::new(camera);

@@ -6,7 +6,7 @@ use crate::math::rng::Stream;
 use crate::math::warp::{cosine_hemisphere, uniform_triangle};
 use crate::scene::camera::Camera;
 use crate::scene::geometry::{Hit, Ray, offset_origin};
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::material::Albedo;
 use crate::transport::path::{PathOptions, radiance};
 use glam::{DVec3, Vec2, Vec3};
@@ -72,7 +72,7 @@ impl From<ObjectTruth> for crate::capture::truth::ObjectTruth {
 }
 
 /// The truth of each object of a lit scene.
-pub fn objects(world: &Lit) -> BTreeMap<String, ObjectTruth> {
+pub fn objects(world: &LitScene) -> BTreeMap<String, ObjectTruth> {
     let scene = &world.scene;
     let seen = seen_pixels(world);
     (0..scene.objects.len())
@@ -106,7 +106,7 @@ pub fn objects(world: &Lit) -> BTreeMap<String, ObjectTruth> {
 }
 
 /// Number of pixels of all cameras whose centre sees each object.
-pub fn seen_pixels(world: &Lit) -> Vec<u64> {
+pub fn seen_pixels(world: &LitScene) -> Vec<u64> {
     let scene = &world.scene;
     let mut seen = vec![0; scene.objects.len()];
     for camera in &scene.cameras {
@@ -123,7 +123,7 @@ pub fn seen_pixels(world: &Lit) -> Vec<u64> {
 }
 
 /// The true albedo seen by a camera, averaged over 4 × 4 points of each pixel.
-pub fn albedo_picture(world: &Lit, camera: &Camera) -> Picture {
+pub fn albedo_picture(world: &LitScene, camera: &Camera) -> Picture {
     const SIDE: u32 = 4;
     let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
     Picture::from_fn(width, height, |x, y| {
@@ -140,7 +140,7 @@ pub fn albedo_picture(world: &Lit, camera: &Camera) -> Picture {
 
 /// Mean of a quantity over an object's area, from stratified random points with fixed keys.
 fn mean_over_area(
-    world: &Lit,
+    world: &LitScene,
     object: usize,
     quantity: impl Fn(&Hit, &mut Stream) -> Vec3 + Sync,
 ) -> Vec3 {
@@ -181,7 +181,7 @@ fn mean_over_area(
 }
 
 /// Radiance arriving at the front of a hit from a cosine-distributed direction; its mean is irradiance / π.
-fn arriving_radiance(world: &Lit, hit: &Hit, stream: &mut Stream) -> Vec3 {
+fn arriving_radiance(world: &LitScene, hit: &Hit, stream: &mut Stream) -> Vec3 {
     let normal = world.scene.normals[hit.triangle as usize];
     let direction = Frame::around(normal).to_world(cosine_hemisphere(stream.uniform2()));
     let corners = world.scene.corners(hit.triangle);

@@ -3,20 +3,21 @@
 pub mod command;
 pub mod edits;
 mod full;
-pub mod given;
+
 pub mod inbox;
 pub mod insertion;
-mod judge;
-pub mod keep;
 pub mod library;
 pub mod light;
+mod metric;
 pub mod open;
 pub mod open_capture;
+pub mod path_kind;
 pub mod photographs;
 pub mod rates;
 pub mod save;
 pub mod slot;
 pub mod snapshot;
+pub mod store;
 pub mod view;
 pub mod worker;
 

@@ -2,7 +2,7 @@
 
 use crate::calibrate::alignment::{Alignment, Decision};
 use crate::calibrate::photographs::{leave_out, leave_out_mispaired, name, without_hot_pixels};
-use crate::calibrate::segments::cut_up;
+use crate::calibrate::segments::segment_mesh;
 use crate::capture::Capture;
 use crate::capture::photograph::{Photograph, PhotographSource};
 use crate::capture::read::{ReadOptions, read};
@@ -61,7 +61,7 @@ impl OpenCapture {
             leave_out_mispaired(&capture, &mut working, &alignment.mispaired);
         }
         if let Some(cut) = capture.segmentation.clone() {
-            cut_up(&mut capture, &cut, &working, options.hold_out)?;
+            segment_mesh(&mut capture, &cut, &working, options.hold_out)?;
         }
         regroup(&mut capture.mesh, &options.objects)?;
         let prepared = prepare(&capture, &working).map_err(|error| {

@@ -16,7 +16,7 @@ use crate::session::library::{Inserted, Library};
 use crate::session::light::path_options;
 use crate::session::open_capture::OpenCapture;
 use crate::transport::denoise::Denoiser;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -169,7 +169,7 @@ impl Photographs {
     fn backdrop(
         &self,
         frame: usize,
-        lights: Option<&[Arc<Lit>; 2]>,
+        lights: Option<&[Arc<LitScene>; 2]>,
         tracers: &mut Option<[Tracer; 2]>,
         go_on: &dyn Fn(f32) -> bool,
     ) -> Result<Option<Backdrop>> {

@@ -5,7 +5,7 @@ use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Progress, Termination};
 use crate::session::edits::Edits;
-use crate::session::keep::Kept;
+use crate::session::store::Kept;
 use crate::transport::layers;
 use glam::Vec3;
 use std::sync::Arc;

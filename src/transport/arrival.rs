@@ -23,21 +23,21 @@ pub struct Arrival {
 
 /// Counts of traced rays.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Cast {
+pub struct RayCount {
     /// Rays cast.
     pub rays: u64,
     /// Samples dropped because they were not finite.
     pub rejected: u64,
 }
 
-impl AddAssign for Cast {
+impl AddAssign for RayCount {
     fn add_assign(&mut self, other: Self) {
         self.rays += other.rays;
         self.rejected += other.rejected;
     }
 }
 
-impl Sum for Cast {
+impl Sum for RayCount {
     fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
         all.fold(Self::default(), |mut sum, more| {
             sum += more;
@@ -59,12 +59,12 @@ pub fn arrivals(
     stream: &mut Stream,
     options: &PathOptions,
     found: &mut Vec<Arrival>,
-) -> Cast {
+) -> RayCount {
     let density = |wi: Vec3| {
         let lobes = (roughnesses.iter()).map(|&alpha| Microfacet::new(alpha, wo, wi).pdf());
         warp::cosine_hemisphere_pdf(wi.z) + lobes.sum::<f64>() as f32
     };
-    let mut cast = Cast::default();
+    let mut cast = RayCount::default();
     let mut push = |wi: Vec3, light: Vec3| {
         if !light.is_finite() {
             return 1;

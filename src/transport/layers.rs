@@ -6,7 +6,7 @@ use crate::math::rng::Stream;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::geometry::Ray;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::path::{Origin, PathOptions, radiance_by_origin};
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
@@ -40,7 +40,7 @@ pub type Parts = Vec<(Origin, Vec3)>;
 impl Split {
     /// One layer for each of the at most [`MAX_LAMPS`] lamps with the largest area × luminance, in the scene's order, one for all other
     /// lamps, and one for the environment; empty layers are left out.
-    pub fn new(lit: &Lit) -> Self {
+    pub fn new(lit: &LitScene) -> Self {
         let emission = |object: usize| lit.materials.get(object).map_or(Vec3::ZERO, |m| m.emission);
         Self::of(&lit.scene, emission, lit.outside.is_some())
     }
@@ -93,7 +93,7 @@ impl Split {
     /// so the layers sum to that path's radiance.
     pub fn add(
         &self,
-        world: &Lit,
+        world: &LitScene,
         ray: &Ray,
         stream: &mut Stream,
         options: &PathOptions,
@@ -116,7 +116,7 @@ impl Split {
     /// film's picture.
     pub fn render(
         &self,
-        world: &Lit,
+        world: &LitScene,
         camera: &Camera,
         options: &PathOptions,
         seed: u64,

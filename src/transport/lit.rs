@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// A scene, its materials and its light.
 #[derive(Debug, Clone)]
-pub struct Lit {
+pub struct LitScene {
     /// Geometry.
     pub scene: Arc<Scene>,
     /// One per object.
@@ -22,7 +22,7 @@ pub struct Lit {
     pub outside: Option<Arc<Environment>>,
 }
 
-impl Lit {
+impl LitScene {
     /// A lit scene; `materials` has one entry per object.
     pub fn new(
         scene: Arc<Scene>,
@@ -65,7 +65,7 @@ impl Lit {
     }
 }
 
-impl World for Lit {
+impl World for LitScene {
     #[inline]
     fn intersect(&self, ray: &Ray) -> Option<SurfacePoint> {
         self.scene.intersect(ray).map(|hit| self.surface(&hit))

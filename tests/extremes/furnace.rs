@@ -10,7 +10,7 @@ use relit::math::rng::Stream;
 use relit::math::stats::Moments;
 use relit::math::warp;
 use relit::scene::geometry::Ray;
-use relit::transport::lit::Lit;
+use relit::transport::lit::LitScene;
 use relit::transport::path::{PathOptions, radiance};
 
 const ALBEDOS: [f32; 6] = [0.0, 0.5, 0.9, 0.99, 0.999, 0.9999];
@@ -20,7 +20,7 @@ const ALBEDOS: [f32; 6] = [0.0, 0.5, 0.9, 0.99, 0.999, 0.9999];
 #[test]
 fn radiance_in_a_closed_furnace_is_its_closed_form() {
     for albedo in ALBEDOS {
-        let lit = Lit::new(
+        let lit = LitScene::new(
             crate::scenes::scene_of(crate::scenes::closed_box(1.0, DVec3::ZERO)),
             vec![grey(albedo, 1.0); 6],
             None,

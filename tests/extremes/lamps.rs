@@ -9,12 +9,12 @@ use relit::math::stats::Moments;
 use relit::scene::Scene;
 use relit::scene::geometry::Ray;
 use relit::transport::emitters::{Emitters, FenwickTree};
-use relit::transport::lit::Lit;
+use relit::transport::lit::LitScene;
 use relit::transport::material::Material;
 use relit::transport::path::{PathOptions, radiance};
 
 /// Radiance seen at a point of the floor, over `paths` paths.
-fn seen(lit: &Lit, target: DVec3, options: &PathOptions, seed: u64, paths: u64) -> Moments {
+fn seen(lit: &LitScene, target: DVec3, options: &PathOptions, seed: u64, paths: u64) -> Moments {
     let origin = Vec3::new(0.2, 0.1, 0.3);
     let ray = Ray::new(origin, (target.as_vec3() - origin).normalize_or_zero());
     let samples: Vec<f64> = (0..paths)
@@ -60,7 +60,7 @@ fn a_lamp_of_a_millionth_of_the_rooms_area_is_unbiased() {
     let half = (24e-6f64).sqrt() / 2.0;
     let mut materials = vec![grey(0.6, 0.0); 6];
     materials.push(grey(0.0, 1e6));
-    let lit = Lit::new(scenes::scene_of(box_with_lamp(half)), materials, None);
+    let lit = LitScene::new(scenes::scene_of(box_with_lamp(half)), materials, None);
     let once = PathOptions {
         max_bounces: 1,
         ..Default::default()
@@ -130,7 +130,7 @@ fn a_million_emitting_triangles_are_drawn_by_their_area() {
     let scene = scenes::scene_of(mesh);
     let mut materials = vec![grey(0.6, 0.0); 6];
     materials.push(grey(0.0, 5.0));
-    let lit = Lit::new(scene.clone(), materials, None);
+    let lit = LitScene::new(scene.clone(), materials, None);
     let once = PathOptions {
         max_bounces: 1,
         ..Default::default()
@@ -234,14 +234,14 @@ fn a_lamp_a_hundred_million_times_weaker_than_another_still_lights_its_room() {
         .extend(other.objects.iter().map(|name| format!("bright {name}")));
     let mut materials: Vec<Material> = vec![grey(0.6, 0.0); 6];
     materials.push(grey(0.0, 1.0));
-    let alone = Lit::new(
+    let alone = LitScene::new(
         scenes::scene_of(box_with_lamp(0.4)),
         materials.clone(),
         None,
     );
     materials.extend(vec![grey(0.6, 0.0); 6]);
     materials.push(grey(0.0, 1e8));
-    let both = Lit::new(scenes::scene_of(pair.clone()), materials, None);
+    let both = LitScene::new(scenes::scene_of(pair.clone()), materials, None);
     // The pair's scene is recentred on the middle of both.
     let shift = both.scene.origin;
     let options = PathOptions::default();

@@ -9,7 +9,7 @@ use relit::calibrate::problem::Problem;
 use relit::inverse::settings::Preset;
 use relit::math::rng::Stream;
 use relit::scene::geometry::Ray;
-use relit::transport::lit::Lit;
+use relit::transport::lit::LitScene;
 use relit::transport::material::Material;
 use relit::transport::path::{PathOptions, radiance};
 use std::sync::Arc;
@@ -87,9 +87,9 @@ fn rendered_radiance_scales_with_emission_to_the_bit() {
             emission: m.emission * scale,
             ..m.clone()
         });
-        Lit::new(problem.scene.clone(), materials.collect(), None)
+        LitScene::new(problem.scene.clone(), materials.collect(), None)
     };
-    let trace = |lit: &Lit, index: u64| {
+    let trace = |lit: &LitScene, index: u64| {
         let mut stream = Stream::new(71, 0, 0, index);
         let camera = &problem.scene.cameras[(index % 6) as usize];
         let [x, y] = stream.uniform2();

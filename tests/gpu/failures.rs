@@ -4,7 +4,7 @@ use crate::card;
 use crate::scenes::{capture, lamp_room, room_views};
 use relit::gpu::{Adapters, Card, Tracer, View};
 use relit::scene::Scene;
-use relit::transport::lit::Lit;
+use relit::transport::lit::LitScene;
 use relit::transport::path::PathOptions;
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ fn a_lost_device_is_an_error_in_one_line_and_no_picture() {
     let (mesh, materials) = lamp_room();
     let capture = capture(mesh, &room_views(), [12, 9]);
     let scene = Arc::new(Scene::new(&capture).expect("the test scene is sound"));
-    let lit = Lit::new(scene, materials, None);
+    let lit = LitScene::new(scene, materials, None);
     let mut tracer = Tracer::new(&card, &lit, &[]).expect("the scene fits");
     let options = PathOptions::default();
     let view = View {

@@ -7,13 +7,13 @@ use relit::gpu::{Tracer, View};
 use relit::math::stats::Moments;
 use relit::scene::Scene;
 use relit::transport::environment::Environment;
-use relit::transport::lit::Lit;
+use relit::transport::lit::LitScene;
 use relit::transport::material::{Lobe, Material};
 use relit::transport::path::PathOptions;
 use std::sync::Arc;
 
 /// Radiance of all pixels of a view from within a box, red alone.
-fn seen(lit: &Lit, options: &PathOptions, samples: u32) -> Option<Moments> {
+fn seen(lit: &LitScene, options: &PathOptions, samples: u32) -> Option<Moments> {
     let mut tracer = Tracer::new(card()?, lit, &[]).expect("the scene fits");
     let view = View {
         camera: &lit.scene.cameras[0],
@@ -30,11 +30,11 @@ fn seen(lit: &Lit, options: &PathOptions, samples: u32) -> Option<Moments> {
     Some(moments)
 }
 
-fn boxed(half: f64, center: DVec3, materials: Vec<Material>) -> Lit {
+fn boxed(half: f64, center: DVec3, materials: Vec<Material>) -> LitScene {
     let views = room_views().map(|(from, to)| (from * half + center, to * half + center));
     let capture = capture(closed_box(half, center), &views, [16, 12]);
     let scene = Scene::new(&capture).expect("the test scene is sound");
-    Lit::new(Arc::new(scene), materials, None)
+    LitScene::new(Arc::new(scene), materials, None)
 }
 
 /// Inside a closed box that emits Le everywhere and reflects ρ, radiance is Le/(1 − ρ), at any size and place: four tests at 4
@@ -113,7 +113,7 @@ fn light_from_outside_is_seen_where_rays_escape_and_nowhere_else() {
     let scene = Arc::new(Scene::new(&capture).expect("the test scene is sound"));
     let map = Environment::new(8, 4, vec![Vec3::splat(2.0); 32]).expect("sizes fit");
     let material = Material::diffuse(Vec3::splat(0.5), Vec3::ZERO);
-    let lit = Lit::new(scene, vec![material], Some(Arc::new(map)));
+    let lit = LitScene::new(scene, vec![material], Some(Arc::new(map)));
     let Some(m) = seen(&lit, &PathOptions::default(), 64) else {
         return;
     };

@@ -10,7 +10,7 @@ use relit::compose::object::ObjectModel;
 use relit::compose::placement::{PlacedObject, Placement};
 use relit::gpu::{Adapters, Card, Inserted, Tracer};
 use relit::scene::Scene;
-use relit::transport::lit::Lit;
+use relit::transport::lit::LitScene;
 use relit::transport::material::{Lobe, Material};
 use relit::transport::path::PathOptions;
 use std::path::PathBuf;
@@ -69,7 +69,7 @@ fn insertion() -> (Insertion, Vec<Arc<PlacedObject>>) {
     };
     let placed = PlacedObject::new(Arc::new(gem()), &placement, &scene).expect("it fits");
     let objects = vec![Arc::new(placed)];
-    let lit = Arc::new(Lit::new(scene, materials, None));
+    let lit = Arc::new(LitScene::new(scene, materials, None));
     let options = PathOptions::default();
     (
         Insertion::new(backdrop, lit, objects.clone(), options, 5),

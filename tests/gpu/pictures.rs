@@ -10,7 +10,7 @@ use relit::scene::camera::Camera;
 use relit::scene::texels::TexelLayout;
 use relit::transport::environment::Environment;
 use relit::transport::film::Film;
-use relit::transport::lit::Lit;
+use relit::transport::lit::LitScene;
 use relit::transport::material::{Albedo, Lobe, Material, TexelColors};
 use relit::transport::path::PathOptions;
 use std::sync::Arc;
@@ -20,7 +20,7 @@ const SAMPLES: u32 = 32;
 /// Blocks a side over which means are compared.
 const BLOCKS: usize = 3;
 
-fn processor(lit: &Lit, camera: &Camera, seed: u64) -> Film {
+fn processor(lit: &LitScene, camera: &Camera, seed: u64) -> Film {
     let mut film = Film::new(camera);
     film.add(lit, camera, &PathOptions::default(), seed, 3, SAMPLES);
     film
@@ -29,7 +29,7 @@ fn processor(lit: &Lit, camera: &Camera, seed: u64) -> Film {
 /// Compares one view of a world: with other random numbers, means over 9 blocks and 3 channels within 4.5 standard errors (2e-4
 /// that any of 27 is outside), and with the same ones, 98 of 100 pixels within a thousandth, because their paths are the
 /// same but for rounding.
-fn agree(name: &str, lit: &Lit, camera: &Camera) {
+fn agree(name: &str, lit: &LitScene, camera: &Camera) {
     let Some(card) = card() else { return };
     let mut tracer = Tracer::new(card, lit, &[]).expect("the scene fits");
     let options = PathOptions::default();
@@ -79,10 +79,10 @@ fn agree(name: &str, lit: &Lit, camera: &Camera) {
     assert!(alike > 0.98, "{name}: {alike} of pixels alike");
 }
 
-fn room_of(mesh: relit::capture::mesh::Mesh, materials: Vec<Material>) -> Lit {
+fn room_of(mesh: relit::capture::mesh::Mesh, materials: Vec<Material>) -> LitScene {
     let capture = capture(mesh, &room_views(), [36, 27]);
     let scene = Scene::new(&capture).expect("the test scene is sound");
-    Lit::new(Arc::new(scene), materials, None)
+    LitScene::new(Arc::new(scene), materials, None)
 }
 
 #[test]
@@ -157,7 +157,7 @@ fn an_open_room_with_light_from_outside_is_the_processors() {
         emission: Vec3::ZERO,
         ..m
     });
-    let lit = Lit::new(lit.scene.clone(), dark.collect(), lit.outside.clone());
+    let lit = LitScene::new(lit.scene.clone(), dark.collect(), lit.outside.clone());
     agree("open room without a lamp", &lit, &lit.scene.cameras[4]);
 }
 

@@ -11,11 +11,11 @@ use relit::math::rng::Stream;
 use relit::math::warp;
 use relit::scene::Scene;
 use relit::scene::geometry::Ray;
-use relit::transport::lit::Lit;
+use relit::transport::lit::LitScene;
 use relit::transport::material::Material;
 use std::sync::Arc;
 
-fn lit(positions: Vec<DVec3>) -> Lit {
+fn lit(positions: Vec<DVec3>) -> LitScene {
     let count = positions.len() as u32 / 3;
     let mesh = Mesh {
         positions,
@@ -55,7 +55,7 @@ fn lit(positions: Vec<DVec3>) -> Lit {
         warnings: Vec::new(),
     };
     let scene = Arc::new(Scene::new(&capture).expect("the soup is sound"));
-    Lit::new(scene, vec![Material::diffuse(Vec3::ONE, Vec3::ZERO)], None)
+    LitScene::new(scene, vec![Material::diffuse(Vec3::ONE, Vec3::ZERO)], None)
 }
 
 /// Distances at which a ray meets triangles in f64, each with how far inside its edges the hit lies, in barycentric terms.
@@ -79,7 +79,7 @@ fn brute(scene: &Scene, ray: &Ray) -> Vec<(f64, u32, f64)> {
 }
 
 /// Traces rays and compares those whose answer is clear: no triangle's edge is nearer than 1e-4 of its size up to the first hit.
-fn compare(name: &str, lit: &Lit, rays: &[Ray]) {
+fn compare(name: &str, lit: &LitScene, rays: &[Ray]) {
     let Some(card) = card() else { return };
     let mut tracer = Tracer::new(card, lit, &[]).expect("the soup fits");
     let nearest = tracer.trace(rays, false).expect("the adapter works");

@@ -191,7 +191,7 @@ fn sound_seeds_are_read() {
         );
     }
     let folder = targets::results_with("session.json", &seed("session/block.json")).unwrap();
-    let held = relit::session::keep::read_record(folder.path()).unwrap();
+    let held = relit::session::store::read_record(folder.path()).unwrap();
     assert_eq!(held.unwrap().inserted.len(), 2);
 }
 

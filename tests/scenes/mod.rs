@@ -15,7 +15,7 @@ use relit::scene::Scene;
 use relit::scene::geometry::Hit;
 use relit::transport::environment::Environment;
 use relit::transport::film::Film;
-use relit::transport::lit::Lit;
+use relit::transport::lit::LitScene;
 use relit::transport::material::{Albedo, Material, Texture};
 use relit::transport::path::PathOptions;
 use std::sync::Arc;
@@ -312,7 +312,7 @@ pub fn photographed_under(
     seed: u64,
 ) -> Problem {
     let scene = Arc::new(Scene::new(capture).expect("the test scene is sound"));
-    let lit = Lit::new(scene.clone(), materials.to_vec(), outside);
+    let lit = LitScene::new(scene.clone(), materials.to_vec(), outside);
     let photographs = (0u64..)
         .zip(&scene.cameras)
         .map(|(frame, camera)| {

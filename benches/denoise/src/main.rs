@@ -8,7 +8,7 @@ use relit::math::picture::Picture;
 use relit::room::Room;
 use relit::transport::denoise::{Denoiser, guides};
 use relit::transport::film::Film;
-use relit::transport::lit::Lit;
+use relit::transport::lit::LitScene;
 use relit::transport::path::PathOptions;
 use std::time::Instant;
 
@@ -64,7 +64,7 @@ fn main() {
 }
 
 /// A view by so many samples a pixel.
-fn render(lit: &Lit, frame: usize, seed: u64, samples: u32) -> Picture {
+fn render(lit: &LitScene, frame: usize, seed: u64, samples: u32) -> Picture {
     let camera = &lit.scene.cameras[frame];
     let mut film = Film::new(camera);
     film.add(

@@ -16,7 +16,7 @@ use relit::gpu::{Adapters, Card, Tracer, View};
 use relit::room::Room;
 use relit::scene::geometry::Ray;
 use relit::transport::film::Film;
-use relit::transport::lit::Lit;
+use relit::transport::lit::LitScene;
 use relit::transport::material::Material;
 use relit::transport::path::PathOptions;
 use scenes::Scene;
@@ -160,7 +160,7 @@ fn paired(
 }
 
 /// The triangles as a scene of one grey object.
-fn lit(scene: &Scene) -> Lit {
+fn lit(scene: &Scene) -> LitScene {
     let mesh = Mesh {
         positions: scene.positions.iter().map(|p| p.as_dvec3()).collect(),
         triangles: scene.triangles.clone(),
@@ -205,5 +205,5 @@ fn lit(scene: &Scene) -> Lit {
     };
     let scene = relit::scene::Scene::new(&capture).expect("the scene is sound");
     let grey = Material::diffuse(Vec3::splat(0.5), Vec3::ZERO);
-    Lit::new(Arc::new(scene), vec![grey], None)
+    LitScene::new(Arc::new(scene), vec![grey], None)
 }

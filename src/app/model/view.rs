@@ -96,6 +96,6 @@ fn make(ctx: &egui::Context, capture: &Arc<OpenCapture>) -> Option<Task<Made, ()
         }
         Ok(())
     });
-    made.map_err(|error| say::aside(format_args!("{error}")))
+    made.map_err(|error| say::note(format_args!("{error}")))
         .ok()
 }

@@ -120,6 +120,13 @@ pub fn pane(
         ui.add(TextEdit::singleline(&mut table.filter).desired_width(120.0))
             .labelled_by(label.id);
         ui.weak(format!("{} objects", names.len()));
+        let common = document.estimate.common_error * 100.0;
+        if common > 0.0 {
+            ui.weak(format!("all albedos together ± {common:.0} %"))
+                .on_hover_text(
+                    "how well one factor of all albedos is known; their ratios are known better",
+                );
+        }
     });
     regroup(ui, document, selection, table, requests);
     let rows = table.rows(&names, &estimate.objects);

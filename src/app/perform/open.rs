@@ -9,7 +9,7 @@ use crate::capture::read::CAMERAS;
 use crate::error::{Error, Result};
 use crate::export;
 use crate::session::command::{Command, Source};
-use crate::session::given::Given;
+use crate::session::path_kind::PathKind;
 use crate::session::snapshot::Level;
 use std::path::{Path, PathBuf};
 
@@ -22,10 +22,10 @@ impl App {
             self.view.bring_forward(Pane::Insert);
             return;
         }
-        match Given::at(path) {
-            Ok(Given::Capture(folder)) => self.open(Source::Folder(folder)),
-            Ok(Given::Results(folder)) => self.resume(folder),
-            Ok(Given::Scan(folder)) => self.import(&folder, ctx),
+        match PathKind::at(path) {
+            Ok(PathKind::Capture(folder)) => self.open(Source::Folder(folder)),
+            Ok(PathKind::Results(folder)) => self.resume(folder),
+            Ok(PathKind::Scan(folder)) => self.import(&folder, ctx),
             Err(_) => {
                 let found = match (path.exists(), is_object(path)) {
                     (false, _) => "there is nothing; check the path",
@@ -42,7 +42,7 @@ impl App {
 
     /// Begins to import a scan beside the results; one that was imported before is opened.
     fn import(&mut self, source: &Path, ctx: &egui::Context) {
-        let out = Given::imported(source);
+        let out = PathKind::imported(source);
         if out.join(CAMERAS).exists() {
             let said = format!("the scan was imported into {} before", out.display());
             self.say(Level::Info, said);

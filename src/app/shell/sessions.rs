@@ -7,7 +7,7 @@ use crate::app::request::{Request, Requests};
 use crate::app::shell::status::ending;
 use crate::app::theme;
 use crate::session::command::Command;
-use crate::session::keep::{Kept, State, THUMBNAIL};
+use crate::session::store::{Kept, State, THUMBNAIL};
 use egui::{Button, Image, Role, ScrollArea, TextureHandle, TextureOptions, Ui, vec2};
 use std::collections::HashMap;
 use std::path::PathBuf;

@@ -47,18 +47,18 @@ fn run(
         seed,
         ..Settings::default()
     });
-    let (begun, hash, judge) = (Instant::now(), &capture.hash, &subject.judge);
+    let (begun, hash, metric) = (Instant::now(), &capture.hash, &subject.metric);
     let mut curves: Vec<Curve> = Vec::new();
     let mut tell = |heard: SolveEvent| match heard {
         SolveEvent::Begins(run) => progress.say(format!("measuring {}", run.name)),
         SolveEvent::Ended(curve) => {
             curves.push(curve.clone());
-            let (hash, measure, curves) = (Some(hash.clone()), judge.measure(), curves.clone());
+            let (hash, measure, curves) = (Some(hash.clone()), metric.measure(), curves.clone());
             let trade = Trade::new(&subject.name, hash, measure, begun.elapsed(), curves);
             progress.show(Arc::new(trade));
         }
     };
     let ended = || progress.is_cancelled();
-    measure(&subject.problem, judge, &runs, limit, &ended, &mut tell)?;
+    measure(&subject.problem, metric, &runs, limit, &ended, &mut tell)?;
     Ok(())
 }

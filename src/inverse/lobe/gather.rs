@@ -6,9 +6,9 @@ use crate::math::frame::Frame;
 use crate::math::rng::Stream;
 use crate::math::warp;
 use crate::scene::camera::Camera;
-use crate::transport::arrival::{Arrival, Cast, arrivals};
+use crate::transport::arrival::{Arrival, RayCount, arrivals};
 use crate::transport::bsdf::coupling;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::microfacet::Microfacet;
 use crate::transport::path::PathOptions;
 use glam::{DVec3, Vec2};
@@ -21,7 +21,7 @@ const KEY: u64 = 9 << 59;
 #[derive(Debug, Clone, Copy)]
 pub struct Gathering<'a> {
     /// The scene with its present estimate.
-    pub lit: &'a Lit,
+    pub lit: &'a LitScene,
     /// The object whose pixels are sampled.
     pub object: u32,
     /// Points per observation in each of two sets.
@@ -108,8 +108,8 @@ impl Gathering<'_> {
         &self,
         camera: &Camera,
         observation: &SpotObservation,
-    ) -> ([Gathered; 2], Cast) {
-        let mut cast = Cast::default();
+    ) -> ([Gathered; 2], RayCount) {
+        let mut cast = RayCount::default();
         let sets = [0, 1].map(|set| {
             let mut gathered = Gathered::default();
             for point in 0..self.points {
@@ -127,7 +127,7 @@ impl Gathering<'_> {
         set: u64,
         point: u32,
         gathered: &mut Gathered,
-    ) -> Cast {
+    ) -> RayCount {
         // Points are stratified over the pixels.
         let index = KEY + (self.pass << 40) + 2 * u64::from(point) + set;
         let first = u64::from(observation.pixels[0]);
@@ -142,7 +142,7 @@ impl Gathering<'_> {
         let width = camera.intrinsics.width;
         let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
         let ray = camera.ray(corner + Vec2::from_array(stream.uniform2()));
-        let mut cast = Cast {
+        let mut cast = RayCount {
             rays: 1,
             rejected: 0,
         };

@@ -15,8 +15,8 @@ use crate::calibrate::gbuffer::GBuffer;
 use crate::calibrate::problem::Problem;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::solver::Termination;
-use crate::transport::arrival::Cast;
-use crate::transport::lit::Lit;
+use crate::transport::arrival::RayCount;
+use crate::transport::lit::LitScene;
 use crate::transport::material::Lobe;
 use crate::transport::path::PathOptions;
 use gather::Gathering;
@@ -106,7 +106,7 @@ impl LobeFit {
 }
 
 /// Receives the numbers of rays cast and paths rejected; its error ends the stage.
-pub type Report<'t> = dyn FnMut(Cast) -> Result<(), Termination> + 't;
+pub type Report<'t> = dyn FnMut(RayCount) -> Result<(), Termination> + 't;
 
 /// The search for lobes over the spots of all objects.
 pub struct Lobes<'a> {
@@ -124,7 +124,12 @@ impl<'a> Lobes<'a> {
         }
     }
 
-    fn gathering<'g>(&self, lit: &'g Lit, object: usize, roughnesses: &'g [f64]) -> Gathering<'g> {
+    fn gathering<'g>(
+        &self,
+        lit: &'g LitScene,
+        object: usize,
+        roughnesses: &'g [f64],
+    ) -> Gathering<'g> {
         Gathering {
             lit,
             object: object as u32,
@@ -186,7 +191,7 @@ impl<'a> Lobes<'a> {
     /// The error of `report`.
     pub fn find(
         &self,
-        lit: &Lit,
+        lit: &LitScene,
         object: usize,
         emits: bool,
         known: Option<(Lobe, u64)>,

@@ -4,7 +4,7 @@ use crate::inverse::lobe::gather::{Components, Gathered, Gathering};
 use crate::inverse::lobe::observations::{Spot, SpotObservation, choose};
 use crate::math::stats::quantile;
 use crate::scene::Scene;
-use crate::transport::arrival::Cast;
+use crate::transport::arrival::RayCount;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -41,15 +41,15 @@ pub fn evidence(
     scene: &Scene,
     spots: &[Spot],
     albedo: DVec3,
-) -> (Option<f64>, Cast) {
+) -> (Option<f64>, RayCount) {
     let chosen = choose(spots, 2, MAX_OBSERVATIONS);
     let observations: usize = chosen.iter().map(|s| s.len()).sum();
     if observations < MIN_OBSERVATIONS {
-        return (None, Cast::default());
+        return (None, RayCount::default());
     }
-    let gathered: Vec<(Vec<(&SpotObservation, Gathered)>, Cast)> = (chosen.par_iter())
+    let gathered: Vec<(Vec<(&SpotObservation, Gathered)>, RayCount)> = (chosen.par_iter())
         .map(|spot| {
-            let mut cast = Cast::default();
+            let mut cast = RayCount::default();
             let own = (spot.iter().filter(|s| !s.held_out))
                 .map(|observation| {
                     let camera = &scene.cameras[observation.frame as usize];

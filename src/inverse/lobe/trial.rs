@@ -6,7 +6,7 @@ use crate::inverse::lobe::gather::{Components, Gathered, Gathering};
 use crate::inverse::lobe::observations::{Spot, SpotObservation, choose};
 use crate::math::stats::{Moments, quantile};
 use crate::scene::Scene;
-use crate::transport::arrival::Cast;
+use crate::transport::arrival::RayCount;
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -51,12 +51,12 @@ impl<'a> LitObservations<'a> {
         scene: &Scene,
         spots: &'a [Spot],
         max: usize,
-    ) -> (Self, Cast) {
+    ) -> (Self, RayCount) {
         let chosen: Vec<(usize, &SpotObservation)> =
             (choose(spots, 1, max).into_iter().enumerate())
                 .flat_map(|(index, spot)| spot.iter().map(move |observation| (index, observation)))
                 .collect();
-        let gathered: Vec<([Gathered; 2], Cast)> = (chosen.par_iter())
+        let gathered: Vec<([Gathered; 2], RayCount)> = (chosen.par_iter())
             .map(|(_, observation)| {
                 gathering.observation(&scene.cameras[observation.frame as usize], observation)
             })

@@ -8,7 +8,7 @@ use crate::inverse::paper::pixel::{Drawn, Path};
 use crate::inverse::settings::Settings;
 use crate::math::rng::Stream;
 use crate::scene::geometry::Hit;
-use crate::transport::arrival::Cast;
+use crate::transport::arrival::RayCount;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -81,7 +81,7 @@ impl Cover {
         settings: &Settings,
         bounces: u32,
         descent: &mut Descent,
-    ) -> (Vec<bool>, Cast) {
+    ) -> (Vec<bool>, RayCount) {
         let (errors, cast) = self.errors(problem, settings, bounces, descent);
         let Some(patches) = &descent.patches else {
             return (Vec::new(), cast);
@@ -103,12 +103,12 @@ impl Cover {
         settings: &Settings,
         bounces: u32,
         descent: &mut Descent,
-    ) -> (Vec<f64>, Cast) {
-        let each: Vec<(f64, Cast)> = descent.render(problem, settings, bounces, |rendering| {
+    ) -> (Vec<f64>, RayCount) {
+        let each: Vec<(f64, RayCount)> = descent.render(problem, settings, bounces, |rendering| {
             let error = |&(frame, pixel, _): &(u32, u32, Hit)| {
                 let (frame_key, pixel_key) = (u64::from(frame), u64::from(pixel));
                 let mut stream = Stream::new(settings.seed, frame_key, pixel_key, KEY);
-                let (mut path, mut cast) = (Path::default(), Cast::default());
+                let (mut path, mut cast) = (Path::default(), RayCount::default());
                 let drawn = Drawn {
                     frame,
                     pixel,

@@ -12,7 +12,7 @@ use crate::inverse::settings::{Loss, Settings};
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::scene::Scene;
-use crate::transport::arrival::Cast;
+use crate::transport::arrival::RayCount;
 use crate::transport::emitters::Emitters;
 use crate::transport::material::{Lobe, TexelColors};
 use glam::Vec3;
@@ -69,7 +69,7 @@ struct Caches {
 #[derive(Debug, Clone, Copy)]
 pub struct StepOutcome {
     /// Number of rays cast, and of paths rejected because a weight was not finite.
-    pub cast: Cast,
+    pub cast: RayCount,
     /// Number of pixels in the batch.
     pub pixels: u64,
     /// Number of paths traced.

@@ -9,7 +9,7 @@ use crate::inverse::paths::{NO_LAMP, NO_TEXEL, SPECULAR, Vertex};
 use crate::inverse::settings::{Loss, Settings};
 use crate::inverse::unknowns::Unknowns;
 use crate::math::rng::Stream;
-use crate::transport::arrival::Cast;
+use crate::transport::arrival::RayCount;
 use glam::{Vec2, Vec3, Vec3A};
 
 /// Attempts to draw a usable pixel.
@@ -76,7 +76,7 @@ pub struct PixelGradient {
     /// Parameter (albedos first, then emissions) and derivative; a parameter may have several entries.
     pub entries: Vec<(u32, Vec3)>,
     /// Number of rays cast and paths rejected.
-    pub cast: Cast,
+    pub cast: RayCount,
 }
 
 /// A path with local indices: the surfaces of its vertices are indices into `unknowns`, which holds only what the path meets.
@@ -156,7 +156,7 @@ impl Rendering<'_> {
         samples: u64,
         stream: &mut Stream,
         path: &mut Path,
-        cast: &mut Cast,
+        cast: &mut RayCount,
     ) -> Vec3 {
         let mut sum = Vec3::ZERO;
         for _ in 0..samples {
@@ -167,7 +167,7 @@ impl Rendering<'_> {
     }
 
     /// Traces a path and replaces its surfaces by local indices.
-    fn trace(&self, drawn: Drawn, stream: &mut Stream, path: &mut Path, cast: &mut Cast) {
+    fn trace(&self, drawn: Drawn, stream: &mut Stream, path: &mut Path, cast: &mut RayCount) {
         let width = self.problem.photographs[drawn.frame as usize].width;
         let corner = Vec2::new((drawn.pixel % width) as f32, (drawn.pixel / width) as f32);
         let camera = &self.problem.scene.cameras[drawn.frame as usize];

@@ -10,8 +10,8 @@ use crate::math::rng::Stream;
 use crate::math::warp;
 use crate::scene::Scene;
 use crate::scene::geometry::Hit;
-use crate::transport::arrival::Cast;
-use crate::transport::lit::Lit;
+use crate::transport::arrival::RayCount;
+use crate::transport::lit::LitScene;
 use crate::transport::path::{PathOptions, white_radiance};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -64,21 +64,21 @@ impl LampPatches {
     /// estimate. Paths of different rounds are independent.
     pub fn light(
         &mut self,
-        lit: &Lit,
+        lit: &LitScene,
         paths: u64,
         options: &PathOptions,
         [seed, round]: [u64; 2],
-    ) -> Cast {
+    ) -> RayCount {
         let scene = &*lit.scene;
         let area: f64 = self.triangles.iter().map(|&t| area_of(scene, t)).sum();
         let even = paths as f64 / self.triangles.len() as f64;
         let min = even.clamp(1.0, PATHS[0]);
-        let traced: Vec<(Vec3, Cast)> = (self.triangles.par_iter())
+        let traced: Vec<(Vec3, RayCount)> = (self.triangles.par_iter())
             .map(|&triangle| {
                 let fraction = paths as f64 * area_of(scene, triangle) / area;
                 // `max` ignores the NaN of lamps without any area.
                 let count = fraction.max(min).min(PATHS[1]) as u64;
-                let (mut sum, mut cast) = (DVec3::ZERO, Cast::default());
+                let (mut sum, mut cast) = (DVec3::ZERO, RayCount::default());
                 for path in 0..count {
                     let mut stream = Stream::new(seed, KEY + round, u64::from(triangle), path);
                     let [b1, b2] = warp::uniform_triangle(stream.uniform2());

@@ -13,7 +13,7 @@ pub mod outside_grid;
 mod scatter;
 pub mod trace;
 
-use crate::transport::arrival::Cast;
+use crate::transport::arrival::RayCount;
 use clusters::Cluster;
 use glam::Vec3;
 
@@ -92,7 +92,7 @@ pub struct PathCache {
     /// In the order of the traced clusters.
     pub clusters: Vec<CachedCluster>,
     /// Number of rays cast, and of paths rejected because a weight was not finite.
-    pub cast: Cast,
+    pub cast: RayCount,
 }
 
 impl PathCache {

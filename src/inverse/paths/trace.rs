@@ -16,7 +16,7 @@ use crate::math::warp;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::geometry::{Hit, Ray, offset_origin};
-use crate::transport::arrival::Cast;
+use crate::transport::arrival::RayCount;
 use crate::transport::emitters::Emitters;
 use crate::transport::material::Lobe;
 use crate::transport::path::power_heuristic;
@@ -75,7 +75,7 @@ pub struct Tracer<'a> {
 impl Tracer<'_> {
     /// Traces two independent sets of paths for every cluster. `widths` are the image widths of the frames.
     pub fn trace(&self, clusters: &[Cluster], widths: &[u32]) -> PathCache {
-        let traced: Vec<(CachedCluster, Cast)> = clusters
+        let traced: Vec<(CachedCluster, RayCount)> = clusters
             .par_iter()
             .map(|cluster| self.cluster(cluster, widths[cluster.frame as usize]))
             .collect();
@@ -87,9 +87,9 @@ impl Tracer<'_> {
         cache
     }
 
-    fn cluster(&self, cluster: &Cluster, width: u32) -> (CachedCluster, Cast) {
+    fn cluster(&self, cluster: &Cluster, width: u32) -> (CachedCluster, RayCount) {
         let (mut vertices, mut ends) = (Vec::new(), Vec::new());
-        let mut cast = Cast::default();
+        let mut cast = RayCount::default();
         let (paths, count) = (u64::from(cluster.paths), cluster.pixels.len() as u64);
         let first = cluster.pixels.first().copied().map_or(0, u64::from);
         for (position, &pixel) in cluster.pixels.iter().enumerate() {

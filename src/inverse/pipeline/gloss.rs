@@ -5,7 +5,7 @@ use crate::inverse::lobe::{Gain, LobeFit, Lobes, Task};
 use crate::inverse::pipeline::Pipeline;
 use crate::inverse::roles::Role;
 use crate::inverse::solver::Termination;
-use crate::transport::arrival::Cast;
+use crate::transport::arrival::RayCount;
 use glam::Vec3;
 
 /// Paths of a round over the paths of a trial; a refit of a known lobe takes all paths of a round.
@@ -141,7 +141,7 @@ impl<'a> Pipeline<'a, '_> {
         self.prior.forget_albedo(k);
     }
 
-    fn cast(&mut self, cast: Cast) -> Result<(), Termination> {
+    fn cast(&mut self, cast: RayCount) -> Result<(), Termination> {
         self.monitor.cast(cast);
         self.monitor
             .tick(&self.estimate, &|_| self.checkpoint.clone())

@@ -21,10 +21,10 @@ mod textures;
 mod trace;
 mod unseen_emitters;
 
+use crate::calibrate::calibrated::{Calibrated, CalibrationOptions};
 use crate::calibrate::exposure::Exposures;
 use crate::calibrate::gbuffer::GBuffer;
 use crate::calibrate::held_out::HoldOut;
-use crate::calibrate::observed::{Observed, Questions};
 use crate::calibrate::problem::Problem;
 use crate::error;
 use crate::inverse::estimate::Estimate;
@@ -128,15 +128,15 @@ pub fn solve(
     let surfaces = objects + outside.surfaces();
     monitor.phase("looking through the pixels");
     let started = monitor.seconds();
-    let Observed {
+    let Calibrated {
         problem,
         gbuffer,
         exposures,
         warnings,
         rays,
-    } = Observed::new(
+    } = Calibrated::new(
         problem,
-        Questions {
+        CalibrationOptions {
             hold_out: HoldOut::from(settings),
             seed: settings.seed,
             pixels: budget.gbuffer_pixels,

@@ -274,11 +274,13 @@ impl Pipeline<'_, '_> {
     fn expect_colors_of_outside(&mut self) {
         let photographed = mean_radiance(&self.clusters);
         let bound = self.sky.as_ref().map(|sky| sky.mean_bound());
-        let excess = self.outside.excess();
+        let grid = self.outside;
         let color = |surface: u32, expected: Vec3| match bound {
-            Some(bound) if surface == excess => bound,
-            Some(_) => expected,
-            None => photographed,
+            // Sunlight falls on what it lights directly, so that each of its channels is determined.
+            _ if surface == grid.sun_surface() => None,
+            Some(bound) if surface == grid.excess() => Some(bound),
+            Some(_) => Some(expected),
+            None => Some(photographed),
         };
         let found = |k: usize| (self.unknowns.emission[k], self.errors.emission[k]);
         self.prior = self.prior.clone().with_outside_found(found, color);

@@ -22,6 +22,11 @@ impl Pipeline<'_, '_> {
         );
         model_error::add_to(&mut self.estimate, &self.roles, self.model_variance);
         model_error::add_gloss(&mut self.estimate, &self.roles);
+        // One known albedo settles the factor.
+        let settled = (self.monitor.known.objects()).any(|(_, known)| known.albedo.is_some());
+        if self.problem.scene.scanned && !settled {
+            model_error::add_common(&mut self.estimate, &self.roles);
+        }
         let exposures = self.exposures.as_ref();
         self.estimate.exposures = (exposures.filter(|e| e.differ)).map(|e| e.factors.clone());
         self.estimate.vignetting = exposures.and_then(|e| e.vignetting);

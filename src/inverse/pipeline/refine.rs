@@ -10,6 +10,7 @@ use crate::inverse::fit::path_noise::distribute_paths;
 use crate::inverse::paths::evaluate::Linearised;
 use crate::inverse::paths::lamp_patches::LampPatches;
 use crate::inverse::pipeline::Pipeline;
+use crate::inverse::pipeline::refit::increase;
 use crate::inverse::roles;
 use crate::inverse::roles::Role;
 use crate::inverse::solver::Termination;
@@ -25,6 +26,8 @@ const NONLINEAR: f32 = 0.3;
 const WELL_KNOWN: f32 = 0.3;
 /// Fraction of an error below which the part due to path noise is negligible: without it the error would be 6 % less.
 const NEGLIGIBLE: f64 = 1.0 / 3.0;
+/// Increase of the held-out loss, in standard errors, above which the refinement is doubted: a chance of 3·10⁻⁵.
+const WORSE: f64 = 4.0;
 /// Paths of a round over the paths that predict the levels of clusters.
 const PREDICTING: u64 = 4;
 /// Least number of such paths per cluster, unless a whole round has fewer: with a dozen paths a pixel next to a lamp may seem
@@ -89,14 +92,19 @@ impl Pipeline<'_, '_> {
     /// Third stage: sums rounds of independent paths until the reported errors reach the target. Textures are fitted as soon as
     /// errors are small enough for them, or after the budget's number of rounds.
     pub(super) fn refine(&mut self) -> Result<Termination, Termination> {
+        let before = self.held_out_each();
         let mut rounds = self.begin_rounds()?;
         let textures = self.monitor.settings.textures;
         if textures && self.aim().1.median < ENOUGH_FOR_TEXTURES.median {
             self.add_rounds(&mut rounds, Leg::UntilTextures)?;
+            self.doubt_refinement(&before);
             self.detail()?;
             self.refit()?;
         }
         let ended = self.add_rounds(&mut rounds, Leg::UntilDone)?;
+        if self.detail.is_none() {
+            self.doubt_refinement(&before);
+        }
         if textures {
             if self.detail.is_none() {
                 self.detail()?;
@@ -104,6 +112,19 @@ impl Pipeline<'_, '_> {
             self.refit()?;
         }
         Ok(ended)
+    }
+
+    /// Warns if held-out pixels became clearly worse: the fit then explains the pixels in it by light or colours that are not there.
+    fn doubt_refinement(&mut self, before: &[f64]) {
+        let after = self.held_out_each();
+        let increase = increase(before, &after);
+        if increase > WORSE {
+            let warning = format!(
+                "pixels left out of the fit became worse by {increase:.0} standard errors while it was refined: light, mesh or poses may be \
+                 other than assumed"
+            );
+            self.monitor.progress.warnings.push(warning);
+        }
     }
 
     /// Sets the weights and paths of clusters, and starts empty sums.

@@ -9,6 +9,16 @@ use crate::math::stats::Moments;
 /// Increase of the held-out loss, in standard errors, above which the refit is undone.
 const SIGNIFICANT: f64 = 2.0;
 
+/// Mean increase of the loss of held-out pixels, in standard errors; zero if there are none.
+pub(super) fn increase(before: &[f64], after: &[f64]) -> f64 {
+    let mut increase = Moments::default();
+    for (before, after) in before.iter().zip(after) {
+        increase.push(after - before);
+    }
+    let errors = increase.mean / increase.standard_error();
+    if errors.is_nan() { 0.0 } else { errors }
+}
+
 impl Pipeline<'_, '_> {
     /// Fits the sum of all rounds again to the photographs minus the change by the textures, which is traced once. Textures are
     /// scaled with the mean albedo of their objects.
@@ -52,11 +62,8 @@ impl Pipeline<'_, '_> {
         self.describe();
 
         let after = self.held_out_each();
-        let mut increase = Moments::default();
-        for (before, after) in before.2.iter().zip(&after) {
-            increase.push(after - before);
-        }
-        let kept = after.is_empty() || increase.mean <= SIGNIFICANT * increase.standard_error();
+        let increase = increase(&before.2, &after);
+        let kept = increase <= SIGNIFICANT;
         if !kept {
             (self.unknowns, self.errors, self.detail) = (before.0.clone(), before.1, Some(detail));
             self.describe();
@@ -76,8 +83,7 @@ impl Pipeline<'_, '_> {
                 )
             }
             false => format!(
-                "held-out pixels get worse by {:.1} standard errors, so the refit is undone",
-                increase.mean / increase.standard_error()
+                "held-out pixels get worse by {increase:.1} standard errors, so the refit is undone"
             ),
         };
         self.record("refit", started, kept, why)?;
@@ -85,7 +91,7 @@ impl Pipeline<'_, '_> {
     }
 
     /// The loss of each held-out pixel.
-    fn held_out_each(&mut self) -> Vec<f64> {
+    pub(super) fn held_out_each(&mut self) -> Vec<f64> {
         let (each, cast) = self.losses.held_out_each(self.problem, &self.estimate);
         self.monitor.cast(cast);
         each

@@ -20,8 +20,8 @@ use rayon::prelude::*;
 
 /// Columns of the maps of candidates, from coarse to fine; twice the rows. A finest pixel has 1.4 degrees.
 const COLUMNS: [usize; 3] = [64, 128, 256];
-/// Clusters that the coarsest map is tested with.
-const COARSE_CLUSTERS: usize = 512;
+/// Clusters that each map is tested with, at most.
+const CLUSTERS: [usize; 3] = [512, 2048, 2048];
 /// Candidates of one map that are refined by the next.
 const REFINED: usize = 8;
 /// Assumed relative error of a cluster's radiance, by texture, noise of paths and the light field's blur.
@@ -155,10 +155,7 @@ impl Search<'_> {
         let mut candidates: Vec<Vec3> = directions(COLUMNS[0]).collect();
         let mut ranked = Vec::new();
         for (level, columns) in COLUMNS.into_iter().enumerate() {
-            let step = match level {
-                0 => self.patches.len().div_ceil(COARSE_CLUSTERS).max(1),
-                _ => 1,
-            };
+            let step = self.patches.len().div_ceil(CLUSTERS[level]).max(1);
             ranked = (candidates.par_iter())
                 .filter(|d| d.dot(up) > 0.0 && may_hold(**d))
                 .map(|&d| {

@@ -8,7 +8,7 @@ use crate::inverse::pipeline::Pipeline;
 use crate::inverse::roles::Role;
 use crate::inverse::solver::Termination;
 use crate::inverse::texture::{Refined, Task, refine};
-use crate::transport::arrival::Cast;
+use crate::transport::arrival::RayCount;
 use glam::{DVec3, Vec3};
 use std::cell::Cell;
 
@@ -79,7 +79,7 @@ impl Pipeline<'_, '_> {
             max_bounces: self.max_bounces,
         };
         let (losses, problem) = (&self.losses, self.problem);
-        let judged = Cell::new(Cast::default());
+        let judged = Cell::new(RayCount::default());
         let judge = |estimate: &Estimate| {
             let (loss, cast) = losses.held_out(problem, estimate);
             let mut all = judged.get();
@@ -94,7 +94,7 @@ impl Pipeline<'_, '_> {
             &objects,
             &judge,
             &mut |rays, rejected, fraction| {
-                monitor.cast(Cast { rays, rejected });
+                monitor.cast(RayCount { rays, rejected });
                 monitor.progress.fraction = Some(fraction as f32);
                 monitor.tick(estimate, &|_| checkpoint.clone())
             },

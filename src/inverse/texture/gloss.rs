@@ -3,8 +3,8 @@
 use crate::inverse::texture::look::SeenPixel;
 use crate::math::frame::Frame;
 use crate::math::rng::Stream;
-use crate::transport::arrival::{Cast, arrivals};
-use crate::transport::lit::Lit;
+use crate::transport::arrival::{RayCount, arrivals};
+use crate::transport::lit::LitScene;
 use crate::transport::path::{PathOptions, white_radiance};
 use crate::transport::world::SurfacePoint;
 use glam::{DVec3, Vec3};
@@ -15,15 +15,15 @@ const KEY: u64 = 11 << 59;
 
 /// Radiance of the base along `normal` with an albedo of one, estimated by one or two paths; irradiance / π without a lobe.
 pub fn white_base(
-    lit: &Lit,
+    lit: &LitScene,
     surface: &SurfacePoint,
     normal: Vec3,
     stream: &mut Stream,
     options: &PathOptions,
-) -> (Vec3, Cast) {
+) -> (Vec3, RayCount) {
     let Some(lobe) = surface.lobe else {
         let path = white_radiance(lit, surface, normal, stream, options);
-        let cast = Cast {
+        let cast = RayCount {
             rays: u64::from(path.rays),
             rejected: u64::from(path.rejected),
         };
@@ -48,22 +48,22 @@ pub fn white_base(
 /// Radiance of the lobe towards the camera at one of a pixel's hits (`index` modulo their number), estimated by a few paths;
 /// zero without a lobe.
 pub fn gloss(
-    lit: &Lit,
+    lit: &LitScene,
     pixel: &SeenPixel,
     index: usize,
     stream: &mut Stream,
     options: &PathOptions,
-) -> (Vec3, Cast) {
+) -> (Vec3, RayCount) {
     let hit = &pixel.hits[index % pixel.hits.len()];
     let surface = lit.surface(&hit.hit);
     let Some(lobe) = surface.lobe else {
-        return (Vec3::ZERO, Cast::default());
+        return (Vec3::ZERO, RayCount::default());
     };
     let camera = &lit.scene.cameras[pixel.frame as usize];
     let frame = Frame::around(hit.normal(lit));
     let wo = frame.to_local((camera.center - surface.point).normalize_or_zero());
     if wo.z <= 0.0 {
-        return (Vec3::ZERO, Cast::default());
+        return (Vec3::ZERO, RayCount::default());
     }
     let mut incident = Vec::new();
     let drawn = [f64::from(lobe.roughness)];
@@ -83,16 +83,16 @@ pub fn gloss(
 
 /// Sets the gloss of each pixel in the fit, from `samples` paths each.
 pub fn trace_gloss(
-    lit: &Lit,
+    lit: &LitScene,
     pixels: &mut [SeenPixel],
     samples: u32,
     options: &PathOptions,
     seed: u64,
     key: u64,
-) -> Cast {
+) -> RayCount {
     (pixels.par_iter_mut().filter(|pixel| !pixel.held_out))
         .map(|pixel| {
-            let (mut sum, mut cast) = (DVec3::ZERO, Cast::default());
+            let (mut sum, mut cast) = (DVec3::ZERO, RayCount::default());
             for sample in 0..samples {
                 let pixel_key = (u64::from(pixel.frame) << 32) + u64::from(pixel.pixel);
                 let mut stream = Stream::new(seed, key, pixel_key, KEY + u64::from(sample));

@@ -9,7 +9,7 @@ use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::math::warp;
 use crate::scene::geometry::Hit;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -49,7 +49,7 @@ pub struct Smoothed {
 
 /// Traces `samples` paths per set from random points of each cell in the range.
 pub fn trace(
-    lit: &Lit,
+    lit: &LitScene,
     cells: &Cells,
     range: Range<usize>,
     samples: u32,
@@ -90,7 +90,7 @@ pub fn trace(
 }
 
 /// A point on a cell, uniform in area, and the normal of its seen side.
-fn point_on(lit: &Lit, cells: &Cells, cell: usize, stream: &mut Stream) -> (Hit, Vec3) {
+fn point_on(lit: &LitScene, cells: &Cells, cell: usize, stream: &mut Stream) -> (Hit, Vec3) {
     let cell = &cells.cells[cell];
     let choice = stream.uniform();
     let within = warp::uniform_triangle(stream.uniform2());

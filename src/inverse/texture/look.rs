@@ -6,7 +6,7 @@ use crate::calibrate::sharpness::Sharpness;
 use crate::math::rng::{Stream, splitmix64};
 use crate::scene::geometry::Hit;
 use crate::transport::bsdf::base_by_view;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -61,7 +61,7 @@ pub struct PixelHit {
 
 impl PixelHit {
     /// The normal of the side that is hit.
-    pub fn normal(&self, lit: &Lit) -> Vec3 {
+    pub fn normal(&self, lit: &LitScene) -> Vec3 {
         let normal = lit.scene.normals[self.hit.triangle as usize];
         if self.front { normal } else { -normal }
     }

@@ -13,7 +13,7 @@ use crate::inverse::texture::look::{FOLDS, RAYS, SeenPixel, sample_pixels};
 use crate::inverse::texture::observations::Observations;
 use crate::inverse::texture::trial::{TestPixel, Trial, compare};
 use crate::scene::Scene;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
 use glam::{DVec3, Vec3};
 
@@ -127,7 +127,7 @@ impl TexturedSurface {
     /// standard errors too.
     pub fn find(
         &mut self,
-        lit: &Lit,
+        lit: &LitScene,
         options: &PathOptions,
         paths: u64,
         sweep: u32,
@@ -181,7 +181,7 @@ impl TexturedSurface {
     /// Compares the texture with one colour on pixels outside the fit.
     pub fn try_out(
         &self,
-        lit: &Lit,
+        lit: &LitScene,
         options: &PathOptions,
         done: &mut Done,
     ) -> Result<Trial, Termination> {

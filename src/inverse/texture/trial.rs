@@ -7,8 +7,8 @@ use crate::inverse::texture::look::SeenPixel;
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::math::stats::{Moments, quantile};
-use crate::transport::arrival::Cast;
-use crate::transport::lit::Lit;
+use crate::transport::arrival::RayCount;
+use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -44,7 +44,7 @@ pub struct Trial {
     /// Number of pixels.
     pub pixels: usize,
     /// Rays cast and paths rejected; rejected samples count as black in both predictions.
-    pub cast: Cast,
+    pub cast: RayCount,
 }
 
 /// A pixel, and a texture that was fitted without it.
@@ -62,7 +62,7 @@ pub struct TestPixel<'a> {
 /// path noise causes no bias. The test ends after the first pixels if these are decisive, or if all pixels together would
 /// hardly reach significance. If the surface is `glossy`, errors are correlated within each photograph.
 pub fn compare(
-    lit: &Lit,
+    lit: &LitScene,
     cells: &Cells,
     pixels: &[TestPixel],
     constant: Vec3,
@@ -113,7 +113,7 @@ fn is_hopeless(first: &Trial, count: usize) -> bool {
 
 /// The inputs of both predictions.
 struct Comparison<'a> {
-    lit: &'a Lit,
+    lit: &'a LitScene,
     cells: &'a Cells,
     constant: Vec3,
     options: &'a PathOptions,
@@ -129,7 +129,7 @@ struct Compared {
     frame: u32,
     flat: f64,
     textured: f64,
-    cast: Cast,
+    cast: RayCount,
 }
 
 impl Comparison<'_> {
@@ -142,7 +142,7 @@ impl Comparison<'_> {
             let cell = self.cells.locate(hit);
             cell.map_or(self.constant, |c| colors[c as usize])
         };
-        let mut cast = Cast::default();
+        let mut cast = RayCount::default();
         let sets = [0u64, 1].map(|set| {
             let (mut flat, mut textured) = (Vec3::ZERO, Vec3::ZERO);
             for path in 0..self.paths {

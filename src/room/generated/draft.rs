@@ -9,7 +9,7 @@ use crate::room::generated::photographed::Generated;
 use crate::room::model::Room;
 use crate::room::photographs::Rendering;
 use crate::transport::environment::Environment;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use std::sync::Arc;
 
 /// Key of the photographs' random seed.
@@ -57,16 +57,16 @@ impl Draft {
     ///
     /// # Errors
     /// As [`Room::lit`].
-    pub fn lit(&self) -> Result<Lit> {
+    pub fn lit(&self) -> Result<LitScene> {
         let lit = self.room.lit(self.rendering.size)?;
-        Ok(Lit {
+        Ok(LitScene {
             outside: self.outside.clone(),
             ..lit
         })
     }
 
     /// The room with its photographs, one a view.
-    pub fn photographed(self, lit: Lit, photographs: Vec<Photograph>) -> Generated {
+    pub fn photographed(self, lit: LitScene, photographs: Vec<Photograph>) -> Generated {
         Generated {
             family: self.family,
             seed: self.seed,

@@ -11,7 +11,7 @@ use crate::room::generated::draft::Draft;
 use crate::room::generated::furnisher::Furnisher;
 use crate::room::generated::photographed::Generated;
 use crate::room::photographs::render_lit;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use glam::Vec3;
 use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageFormat};
@@ -58,7 +58,7 @@ struct Phone {
 }
 
 /// The photographs of what the cameras see as JPEG files.
-pub fn files(draft: &Draft, lit: &Lit, rendered: &[Picture]) -> Result<Vec<Vec<u8>>> {
+pub fn files(draft: &Draft, lit: &LitScene, rendered: &[Picture]) -> Result<Vec<Vec<u8>>> {
     let mut stream = Stream::new(draft.seed, CAMERA_KEY, draft.family as u64, 0);
     let mut between = |low: f64, high: f64| low + (high - low) * stream.uniform_f64();
     let phone = Phone {

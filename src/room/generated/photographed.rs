@@ -6,7 +6,7 @@ use crate::math::picture::Picture;
 use crate::room::generated::family::Family;
 use crate::room::truth;
 use crate::scene::geometry::Hit;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use glam::{Vec2, Vec3};
 use std::collections::BTreeMap;
 
@@ -22,7 +22,7 @@ pub struct Generated {
     pub capture: Capture,
     /// The true room, of which the photographs were rendered: geometry, materials, light and cameras, in the capture's order of
     /// frames.
-    pub lit: Lit,
+    pub lit: LitScene,
 }
 
 impl Generated {

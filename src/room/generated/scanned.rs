@@ -17,7 +17,7 @@ use crate::room::photographs::{Rendering, render_lit};
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::transport::denoise::{denoise, guides};
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use glam::{DMat3, DVec3, Vec2};
 use std::path::{Path, PathBuf};
 
@@ -126,7 +126,7 @@ pub fn scan(draft: Draft) -> Result<Generated> {
 
 /// Denoised renderings of all views. The rare bright samples of a path tracer are no noise of a camera: poses would follow them,
 /// and they would saturate and take their light out of the photograph.
-fn noiseless(lit: &Lit, rendering: &Rendering) -> Vec<Picture> {
+fn noiseless(lit: &LitScene, rendering: &Rendering) -> Vec<Picture> {
     let [a, b] = [0, 1].map(|half| {
         let rendering = Rendering {
             seed: rendering.seed ^ half << u32::BITS,

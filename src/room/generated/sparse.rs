@@ -10,7 +10,7 @@ use crate::room::generated::photographed::Generated;
 use crate::room::model::linear_photograph;
 use crate::scene::camera::Camera;
 use crate::transport::film::Film;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
 use glam::Vec3;
 
@@ -61,7 +61,7 @@ pub fn photograph(draft: Draft) -> Result<Generated> {
 
 /// Renders a picture. Returns it with the standard deviation of its pixels relative to their values: below `noise`,
 /// or, where that takes too many samples, below the largest of all rooms.
-fn trace(lit: &Lit, camera: &Camera, seed: u64, frame: u64, noise: f64) -> (Vec<Vec3>, f64) {
+fn trace(lit: &LitScene, camera: &Camera, seed: u64, frame: u64, noise: f64) -> (Vec<Vec3>, f64) {
     let mut films = [Film::new(camera), Film::new(camera)];
     let options = PathOptions::default();
     loop {

@@ -48,6 +48,9 @@ pub struct EstimateFile {
     /// The terms of the camera's [`Response`].
     #[serde(default)]
     pub response: Option<[Rgb; TERMS]>,
+    /// [`Estimate::common_error`].
+    #[serde(default)]
+    pub albedo_common_stderr: f32,
     /// Edits by hand; `objects` and the maps are without them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edits: Option<EditsRecord>,
@@ -110,6 +113,7 @@ impl EstimateFile {
                 .map(|exposures| exposures.iter().map(|&e| rgb(e)).collect()),
             vignetting: estimate.vignetting.map(|v| rgb(v.power)),
             response: estimate.response.map(|r| r.terms.map(rgb)),
+            albedo_common_stderr: estimate.common_error,
             edits: edits.record(&capture.scene),
         };
         Ok((file, bytes))
@@ -150,6 +154,9 @@ impl EstimateFile {
         let exposures = self.exposures.iter().flatten().flatten().flatten();
         if !exposures.into_iter().all(|&e| e.is_finite() && e > 0.0) {
             return impossible("exposures");
+        }
+        if !(self.albedo_common_stderr.is_finite() && self.albedo_common_stderr >= 0.0) {
+            return impossible("albedo_common_stderr");
         }
         let max = Vec3::splat(MAX_POWER);
         if (self.vignetting()).is_some_and(|v| !v.power.abs().cmple(max).all()) {
@@ -230,6 +237,7 @@ impl EstimateFile {
             }),
             vignetting: self.vignetting(),
             response: self.response(),
+            common_error: self.albedo_common_stderr,
         })
     }
 

@@ -13,7 +13,7 @@ use crate::session::save::results::Results;
 use crate::session::save::staging::Staging;
 use crate::session::view::hits::Hits;
 use crate::transport::denoise::guides;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -64,7 +64,7 @@ pub fn write(staging: &mut Staging, results: &Results) -> Result<()> {
 /// What the pictures show: the estimate with the edits.
 struct Shown<'a> {
     estimate: Arc<Estimate>,
-    lit: &'a Lit,
+    lit: &'a LitScene,
     renders: Pictures<'a>,
 }
 

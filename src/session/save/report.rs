@@ -61,6 +61,8 @@ pub struct Report {
     pub vignetting: Option<Rgb>,
     /// The terms of the camera's [`Response`](crate::capture::response::Response).
     pub response: Option<[Rgb; TERMS]>,
+    /// Standard error, relative, of the factor that all albedos share.
+    pub albedo_common_stderr: f32,
     /// Rejected samples, by cause.
     pub rejected_samples: BTreeMap<String, u64>,
     /// Warnings to the user.
@@ -176,6 +178,7 @@ impl Report {
                 .map(|exposures| exposures.iter().map(|&e| rgb(e)).collect()),
             vignetting: estimate.vignetting.map(|v| rgb(v.power)),
             response: estimate.response.map(|r| r.terms.map(rgb)),
+            albedo_common_stderr: estimate.common_error,
             rejected_samples: progress.rejected.clone(),
             warnings,
         }

@@ -4,7 +4,7 @@ use crate::math::picture::Picture;
 use crate::math::rng::Stream;
 use crate::scene::camera::Camera;
 use crate::transport::layers::{Parts, Split, layer_of};
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::path::{PathOptions, radiance};
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
@@ -100,7 +100,7 @@ impl Progressive {
     }
 
     /// Renders some rows. Returns whether a pass is complete.
-    pub fn add(&mut self, world: &Lit, camera: &Camera, options: &PathOptions) -> bool {
+    pub fn add(&mut self, world: &LitScene, camera: &Camera, options: &PathOptions) -> bool {
         let started = Instant::now();
         let (width, height, layers) = (self.width, self.height, self.layers());
         let row_of = width * layers;

@@ -13,7 +13,7 @@ use crate::session::view::progressive::{MAX_SAMPLES, Progressive};
 use crate::session::view::sized::box_filter;
 use crate::transport::denoise::{Denoiser, Guide, guides};
 use crate::transport::layers::Split;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
 use glam::Vec3;
 use std::sync::Arc;
@@ -38,7 +38,7 @@ pub struct Target {
     /// The camera of the coarse first picture, until it is rendered.
     coarse: Option<Camera>,
     hits: Option<Hits>,
-    world: Lit,
+    world: LitScene,
     render: Progressive,
     /// The newest complete render, and its samples per pixel.
     rendered: Option<(Arc<Picture>, u32)>,

@@ -7,10 +7,10 @@ use crate::export::{light_layers, scene};
 use crate::math::picture::Picture;
 use crate::render::Renderer;
 use crate::session::command::{Command, ExportRequest, OpenOptions, ViewCamera};
-use crate::session::keep::{SessionRecord, State};
 use crate::session::save::pictures::Frames;
 use crate::session::save::{self, Results};
 use crate::session::snapshot::{Level, Phase};
+use crate::session::store::{SessionRecord, State};
 use crate::session::view::sized::box_filter;
 use crate::session::worker::next::{Begin, Next};
 use crate::session::worker::state::Worker;
@@ -51,13 +51,13 @@ impl Worker {
             }
             Command::Resume(folder) => return Some(Next::Resume(folder)),
             Command::Remove(folder) => {
-                if let Err(error) = self.keeper.remove(&folder) {
+                if let Err(error) = self.store.remove(&folder) {
                     self.fail(&error);
                 }
             }
             Command::Reset => {
                 self.keep(true);
-                self.keeper.begin_another();
+                self.store.begin_another();
                 self.continued = None;
                 self.paused = false;
                 self.step = false;
@@ -116,14 +116,14 @@ impl Worker {
             }
             Command::Insert(placements) => {
                 self.prioritize_views(CHANGE_PRIORITY);
-                self.keeper.touch();
+                self.store.touch();
                 self.inserting.place(placements);
             }
             Command::Match(matched) => self.inserting.match_photograph(matched),
             Command::Edit(edits) => {
                 if self.edits != edits {
                     self.prioritize_views(CHANGE_PRIORITY);
-                    self.keeper.touch();
+                    self.store.touch();
                     self.edits = edits;
                     self.views.redraw();
                     self.inserting.update();
@@ -173,7 +173,7 @@ impl Worker {
 
     /// Saves the session if it is due.
     pub(super) fn keep(&mut self, now: bool) {
-        if !self.keeper.is_due(now) || self.estimate.objects.is_empty() {
+        if !self.store.is_due(now) || self.estimate.objects.is_empty() {
             return;
         }
         let Some(results) = self.results() else {
@@ -194,7 +194,7 @@ impl Worker {
             inserted: self.inserting.placements().to_vec(),
             progress: Some(self.progress.as_ref().clone()),
         };
-        if let Err(error) = self.keeper.write(&results, held, self.thumbnail()) {
+        if let Err(error) = self.store.write(&results, held, self.thumbnail()) {
             let message = format!("the session is not kept any longer: {error}");
             self.say(Level::Warning, message);
         }

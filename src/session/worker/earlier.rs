@@ -4,10 +4,10 @@ use crate::capture::place::Coordinates;
 use crate::error::Result;
 use crate::inverse::estimate::Estimate;
 use crate::session::edits::Edits;
-use crate::session::keep::{self, SessionRecord, State};
 use crate::session::open_capture::OpenCapture;
 use crate::session::save::{self, Saved};
 use crate::session::snapshot::{Level, Phase};
+use crate::session::store::{self, SessionRecord, State};
 use crate::session::worker::next::Next;
 use crate::session::worker::state::Worker;
 use std::path::{Path, PathBuf};
@@ -32,7 +32,7 @@ impl Worker {
         capture: &OpenCapture,
         explicit_settings: bool,
     ) -> Option<Earlier> {
-        let folder = self.keeper.last(&capture.hash)?;
+        let folder = self.store.last(&capture.hash)?;
         self.session_in(&folder, capture, explicit_settings)
             .unwrap_or_else(|error| {
                 let message =
@@ -92,7 +92,7 @@ impl Worker {
     pub(super) fn go_on_with(&mut self, earlier: Earlier, capture: OpenCapture) -> Next {
         let capture = earlier.capture.unwrap_or(capture);
         let held = earlier.held.clone().unwrap_or_default();
-        self.keeper.resume(&capture.hash, &earlier.folder, &held);
+        self.store.resume(&capture.hash, &earlier.folder, &held);
         self.adopt(capture);
         self.inserting.place(held.inserted.clone());
         self.inserted = Arc::new(held.inserted);
@@ -126,7 +126,7 @@ impl Earlier {
         Ok(Self {
             estimate: saved.estimate_for(capture)?,
             edits: saved.edits_for(capture)?,
-            held: keep::read_record(folder)?,
+            held: store::read_record(folder)?,
             folder: folder.to_owned(),
             saved,
             capture: None,

@@ -8,12 +8,12 @@ use crate::inverse::solver::{Checkpoint, Progress};
 use crate::session::edits::{Edited, Edits};
 use crate::session::inbox::Inbox;
 use crate::session::insertion::Inserting;
-use crate::session::keep::Keeper;
 use crate::session::light::Light;
 use crate::session::open_capture::OpenCapture;
 use crate::session::rates::Rates;
 use crate::session::slot::Slot;
 use crate::session::snapshot::{Event, Level, Phase, Snapshot};
+use crate::session::store::SessionStore;
 use crate::session::view::Views;
 use crate::session::worker::backend::{Backend, Wake};
 use std::sync::Arc;
@@ -47,7 +47,7 @@ pub(super) struct Worker {
     pub seconds_load: f64,
     pub started: Instant,
     /// Saves the session automatically.
-    pub keeper: Keeper,
+    pub store: SessionStore,
     /// The inserted objects of the session that the open capture continues.
     pub inserted: Arc<Vec<Placement>>,
     /// The frame to show first.
@@ -93,7 +93,7 @@ impl Worker {
             step: false,
             seconds_load: 0.0,
             started: Instant::now(),
-            keeper: Keeper::new(backend.sessions.clone()),
+            store: SessionStore::new(backend.sessions.clone()),
             inserted: Arc::default(),
             frame: 0,
             continued: None,
@@ -205,7 +205,7 @@ impl Worker {
             inserted: self.inserted.clone(),
             frame: self.frame,
             continued: self.continued.clone(),
-            kept: self.keeper.kept(),
+            kept: self.store.kept(),
             view: self.views.shown(),
             insertion: self.inserting.shown(),
             events: self.events.clone(),

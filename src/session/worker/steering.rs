@@ -14,9 +14,9 @@ use std::time::{Duration, Instant};
 /// Fraction of the solver's time for views and composites while they are shown, ...
 const VIEW_FRACTION: f32 = 0.03;
 /// ... and for a while after a request, until the first complete picture.
-const PRIORITY_FRACTION: f32 = 0.25;
+const PRIORITY_FRACTION: f32 = 0.5;
 /// Most time, in seconds, that views can save up while the solver makes a long step.
-const MAX_CREDIT: f32 = 0.5;
+const MAX_CREDIT: f32 = 1.0;
 /// Time between two checkpoints that are kept in case the solver fails.
 const CHECKPOINT: Duration = Duration::from_secs(8);
 
@@ -143,7 +143,7 @@ impl Observer for Steering<'_> {
             self.worker.publish(!busy);
             self.worker.keep(false);
             if !busy {
-                let mail = self.worker.inbox.wait(self.worker.keeper.rest());
+                let mail = self.worker.inbox.wait(self.worker.store.rest());
                 if self.carry_out(mail) {
                     return Control::Stop;
                 }
@@ -173,7 +173,7 @@ impl Observer for Steering<'_> {
         let wanted = waiting.iter().any(keeps) || self.worker.paused;
         if wanted || self.kept.elapsed() >= CHECKPOINT {
             self.worker.checkpoint = Some(make());
-            self.worker.keeper.touch();
+            self.worker.store.touch();
             self.kept = Instant::now();
         }
     }

@@ -76,7 +76,7 @@ impl Worker {
             let mail = if busy {
                 self.inbox.poll()
             } else {
-                self.inbox.wait(self.keeper.rest())
+                self.inbox.wait(self.store.rest())
             };
             match mail {
                 Mail::Nothing => {}
@@ -107,7 +107,7 @@ impl Worker {
                     return self.go_on_with(earlier, capture);
                 }
                 let suspect = capture.other_reading().is_some();
-                self.keeper.begin(&capture.hash);
+                self.store.begin(&capture.hash);
                 self.adopt(capture);
                 if suspect {
                     self.phase = Phase::Paused;
@@ -197,7 +197,7 @@ impl Worker {
         self.regroupings += 1;
         self.keep(true);
         if self.reopen(&options) {
-            self.keeper.begin_another();
+            self.store.begin_another();
             self.edits = wanted.edits;
             return Next::Solve(None);
         }
@@ -229,7 +229,7 @@ impl Worker {
             placement.at = files.map(|at| to.apply(at, new_up));
         }
         if capture.hash != old.hash {
-            self.keeper.begin_another();
+            self.store.begin_another();
         }
         let frame = self.inserting.frame();
         self.adopt(capture);
@@ -237,7 +237,7 @@ impl Worker {
         self.inserting.show_frame(frame);
         self.inserting.place(inserted.clone());
         self.inserted = Arc::new(inserted);
-        self.keeper.touch();
+        self.store.touch();
         true
     }
 
@@ -291,7 +291,7 @@ impl Worker {
                         Phase::Finished(ended)
                     }
                 };
-                self.keeper.touch();
+                self.store.touch();
                 let edited = self.edited();
                 self.views.refresh(&edited);
             }

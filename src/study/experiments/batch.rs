@@ -5,7 +5,7 @@ use crate::export::plot::Plot;
 use crate::inverse::settings::Settings;
 use crate::study::experiments::box_room;
 use crate::study::experiments::course::{
-    CACHE_WITHOUT, Errors, Gauge, Mark, cache_settings, cached, descend, paper_settings,
+    CACHE_WITHOUT, Errors, Evaluator, Mark, cache_settings, cached, descend, paper_settings,
 };
 use crate::study::experiments::courses::{
     self, Kind, Spread, common_mark, comparison, plot, table, words,
@@ -53,7 +53,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     let limits = bench.limits(batches.len() * bench.seeds as usize);
 
     // The descents; the transport cache's end is measured below.
-    let gauge = Gauge::new(subject, paper_settings(1).max_bounces());
+    let gauge = Evaluator::new(subject, paper_settings(1).max_bounces());
     let course = |index: usize, seed| {
         let (batch, samples) = batches[index];
         let settings = Settings {
@@ -70,7 +70,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     let kinds = courses::run(bench, names, course, |kinds| over_rays(kinds, &[]))?;
     // The cache fits all bounces, so its estimate is rendered with all.
     bench.begin("transport cache")?;
-    let gauge = Gauge::new(subject, u32::MAX);
+    let gauge = Evaluator::new(subject, u32::MAX);
     let cache: Vec<Mark> = (bench.seeds())
         .map(|seed| cached(bench, &gauge, &cache_settings(seed, bench.quick)))
         .collect::<Result<_>>()?;

@@ -7,7 +7,7 @@ use crate::room::Room;
 use crate::room::photographs::Rendering;
 use crate::study::experiments::box_room;
 use crate::study::experiments::course::{
-    CACHE_WITHOUT, Gauge, Mark, cache_settings, cached, descend, paper_settings, rays_at,
+    CACHE_WITHOUT, Evaluator, Mark, cache_settings, cached, descend, paper_settings, rays_at,
 };
 use crate::study::experiments::courses::{
     Kind, Quantity, Spread, common_mark, comparison, plot, table, words,
@@ -82,7 +82,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     for (file, room, rendering) in &rooms {
         let subject = Subject::of_room(room, rendering)?;
         // The loss is measured with all bounces, whatever the fit has.
-        let gauge = Gauge::new(&subject, u32::MAX);
+        let gauge = Evaluator::new(&subject, u32::MAX);
         scenes.push(TestRoom {
             name: room.name.clone(),
             file,

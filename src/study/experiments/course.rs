@@ -55,14 +55,14 @@ pub struct Errors {
 }
 
 /// Measures estimates of a subject, always on the same pixels.
-pub struct Gauge<'a> {
+pub struct Evaluator<'a> {
     subject: &'a Subject,
     probe: LossProbe,
     watched: Option<&'a str>,
     lobes: Vec<Option<Lobe>>,
 }
 
-impl<'a> Gauge<'a> {
+impl<'a> Evaluator<'a> {
     /// A gauge that renders at most `bounces` bounces.
     pub fn new(subject: &'a Subject, bounces: u32) -> Self {
         let settings = Settings::default();
@@ -115,7 +115,7 @@ impl<'a> Gauge<'a> {
 ///
 /// The rays cast, and so all errors at a mark, depend only on the settings; how many marks are reached in limited
 /// time does not. Ends when a parameter is not finite, or the study is stopped.
-pub fn descend(bench: &Bench, gauge: &Gauge, settings: &Settings, limits: Limits) -> Vec<Mark> {
+pub fn descend(bench: &Bench, gauge: &Evaluator, settings: &Settings, limits: Limits) -> Vec<Mark> {
     let problem = &gauge.subject.problem;
     let mut step = |descent: &mut Descent| descent.step(problem, settings, settings.max_bounces());
     let start = Descent::new(problem).with_lobes(gauge.lobes.clone());
@@ -125,7 +125,7 @@ pub fn descend(bench: &Bench, gauge: &Gauge, settings: &Settings, limits: Limits
 /// The same from a given start and with given steps.
 pub fn descend_by(
     bench: &Bench,
-    gauge: &Gauge,
+    gauge: &Evaluator,
     start: Descent,
     limits: Limits,
     step: &mut dyn FnMut(&mut Descent) -> StepOutcome,
@@ -192,7 +192,7 @@ pub fn estimate(descent: &Descent) -> Estimate {
 ///
 /// # Errors
 /// The solver cannot start, or the study is stopped.
-pub fn cached(bench: &Bench, gauge: &Gauge, settings: &Settings) -> Result<Mark> {
+pub fn cached(bench: &Bench, gauge: &Evaluator, settings: &Settings) -> Result<Mark> {
     let solution = solved(bench, gauge.subject, settings)?;
     Ok(Mark {
         index: None,
@@ -217,7 +217,7 @@ pub fn solved(bench: &Bench, subject: &Subject, settings: &Settings) -> Result<S
     let deadline = Instant::now() + PATIENCE;
     let (_, solution) = watch(
         &subject.problem,
-        &subject.judge,
+        &subject.metric,
         &run,
         deadline,
         bench.stopped,

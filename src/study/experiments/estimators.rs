@@ -12,7 +12,7 @@ use crate::study::experiments::box_room;
 use crate::study::experiments::findings::{Findings, Summary, brief};
 use crate::study::experiments::study::{Bench, Study};
 use crate::study::experiments::twin::studied;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::path::{PathOptions, radiance};
 use glam::{DVec3, Vec2};
 use rayon::prelude::*;
@@ -191,7 +191,7 @@ fn run(bench: &Bench) -> Result<Findings> {
 
 /// Luminance of the pixels of all cameras that see no lamp, in order; if they are too many, of an evenly spread
 /// subset. The random numbers are keyed by seed and set.
-fn render(lit: &Lit, options: &PathOptions, [seed, set]: [u64; 2], samples: u32) -> Vec<f64> {
+fn render(lit: &LitScene, options: &PathOptions, [seed, set]: [u64; 2], samples: u32) -> Vec<f64> {
     let scene = &lit.scene;
     let is_lamp = |object: u32| lit.materials[object as usize].emission.max_element() > 0.0;
     let seen = &scene.ids().triangles;

@@ -13,7 +13,7 @@ use crate::study::experiments::chair::chair;
 use crate::study::experiments::standing::{Cylinder, places, up};
 use crate::study::experiments::subject::Subject;
 use crate::study::experiments::twin::Studied;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::material::{Albedo, Material};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use std::cmp::Reverse;
@@ -62,9 +62,9 @@ pub struct Furnished {
     /// The room without the chairs, with photographs.
     pub subject: Subject,
     /// Its true light.
-    pub lit: Lit,
+    pub lit: LitScene,
     /// The room with the chairs in its mesh.
-    pub furnished: Lit,
+    pub furnished: LitScene,
     /// The chairs in the room's coordinates.
     pub models: Vec<Arc<ObjectModel>>,
     /// Their placement: as modelled.

@@ -19,7 +19,7 @@ use crate::study::experiments::likeness::Likeness;
 use crate::study::experiments::study::{Bench, Limits, Study};
 use crate::study::experiments::twin::{Sizes, twin};
 use crate::transport::film::Film;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
 use std::sync::Arc;
 
@@ -153,7 +153,7 @@ fn scene(
             &problem.photographs[frame],
             Exposure::default(),
         )?;
-        let composite = |lit: &Arc<Lit>, options: PathOptions| {
+        let composite = |lit: &Arc<LitScene>, options: PathOptions| {
             let (backdrop, lit) = (backdrop.clone(), lit.clone());
             let mut insertion = Insertion::new(backdrop, lit, objects.clone(), options, 1);
             insertion.pass(samples);

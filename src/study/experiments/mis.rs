@@ -8,7 +8,7 @@ use crate::room::Room;
 use crate::room::photographs::Rendering;
 use crate::study::experiments::box_room;
 use crate::study::experiments::course::{
-    CACHE_WITHOUT, Errors, Gauge, Mark, cache_settings, cached, descend, paper_settings,
+    CACHE_WITHOUT, Errors, Evaluator, Mark, cache_settings, cached, descend, paper_settings,
 };
 use crate::study::experiments::courses::{
     self, Kind, Spread, common_mark, comparison, plot, table, words,
@@ -149,8 +149,8 @@ fn run(bench: &Bench) -> Result<Findings> {
         let truth = box_room::truth(room);
         let lobes: Vec<Option<Lobe>> = room.materials.iter().map(|m| m.lobe).collect();
         let bounces = paper_settings(1).max_bounces();
-        let gauge = Gauge::new(&subject, bounces).with_lobes(lobes.clone());
-        let all_bounces = Gauge::new(&subject, u32::MAX);
+        let gauge = Evaluator::new(&subject, bounces).with_lobes(lobes.clone());
+        let all_bounces = Evaluator::new(&subject, u32::MAX);
         let course = |index: usize, seed| {
             let settings = Settings {
                 light_sampling: SAMPLINGS[index],

@@ -7,7 +7,7 @@ use crate::inverse::paper::descent::Descent;
 use crate::inverse::settings::Settings;
 use crate::study::experiments::box_room;
 use crate::study::experiments::course::{
-    Gauge, Mark, descend, descend_by, estimate, paper_settings, rays_at,
+    Evaluator, Mark, descend, descend_by, estimate, paper_settings, rays_at,
 };
 use crate::study::experiments::courses::{
     self, Kind, Quantity, common_mark, comparison, plot, table, words,
@@ -67,7 +67,7 @@ fn run(bench: &Bench) -> Result<Findings> {
     };
     let studied = studied(bench, &words, own_room)?;
     let subject = studied.photographed()?;
-    let gauge = Gauge::new(&subject, paper_settings(1).max_bounces());
+    let gauge = Evaluator::new(&subject, paper_settings(1).max_bounces());
     let names = STRATEGIES.iter().map(|(name, _)| (*name).to_owned());
     let course = |index: usize, seed| {
         let strategy = STRATEGIES[index].1;
@@ -122,7 +122,7 @@ fn drawn(kinds: &[Kind], label: &str, quantity: Quantity) -> Plot {
 /// One course of the descent.
 fn descent(
     bench: &Bench,
-    gauge: &Gauge,
+    gauge: &Evaluator,
     strategy: Strategy,
     settings: &Settings,
     limits: Limits,

@@ -6,7 +6,7 @@ use crate::inverse::paper::pixel::Drawn;
 use crate::inverse::settings::Settings;
 use crate::math::rng::Stream;
 use crate::scene::visibility::NOTHING;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::path::{PathOptions, radiance};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -124,7 +124,13 @@ impl Groups {
 
     /// Sets each group's probability in proportion to its number of pixels times its residual, estimated by a few
     /// paths, mixed with a uniform fraction. Returns the rays cast.
-    pub fn update(&mut self, problem: &Problem, lit: &Lit, options: &PathOptions, key: u64) -> u64 {
+    pub fn update(
+        &mut self,
+        problem: &Problem,
+        lit: &LitScene,
+        options: &PathOptions,
+        key: u64,
+    ) -> u64 {
         let found: Vec<(f64, u64)> = (self.pixels.par_iter().enumerate())
             .map(|(group, pixels)| {
                 let (mut difference, mut rays) = (Vec3::ZERO, 0);

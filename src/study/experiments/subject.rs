@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::room::Room;
 use crate::room::photographs::{self, Rendering};
 use crate::study::evaluate::Reference;
-use crate::study::trade::{Judge, rooms};
+use crate::study::trade::{Metric, rooms};
 use std::sync::Arc;
 
 /// A named problem with its truth.
@@ -20,7 +20,7 @@ pub struct Subject {
     /// The scene and its photographs.
     pub problem: Problem,
     /// Measures estimates, by the truth if known.
-    pub judge: Judge,
+    pub metric: Metric,
 }
 
 impl Subject {
@@ -42,15 +42,15 @@ impl Subject {
             name: room.name.clone(),
             capture: Arc::new(capture),
             problem,
-            judge: Judge::Truth(Box::new(reference)),
+            metric: Metric::Truth(Box::new(reference)),
         })
     }
 
     /// The truth, if known.
     pub fn truth(&self) -> Option<&Reference> {
-        match &self.judge {
-            Judge::Truth(reference) => Some(reference),
-            Judge::HeldOut => None,
+        match &self.metric {
+            Metric::Truth(reference) => Some(reference),
+            Metric::HeldOut => None,
         }
     }
 }

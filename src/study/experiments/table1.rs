@@ -5,7 +5,7 @@ use crate::export::plot::{Axis, Draw, Plot, Series};
 use crate::export::table::Table;
 use crate::inverse::settings::{LightSampling, Preset, Settings};
 use crate::study::experiments::course::{
-    CACHE_WITHOUT, Gauge, Mark, cache_settings, cached, descend, paper_settings,
+    CACHE_WITHOUT, Evaluator, Mark, cache_settings, cached, descend, paper_settings,
 };
 use crate::study::experiments::findings::{Findings, Summary, brief};
 use crate::study::experiments::objects::{self, Posed};
@@ -65,7 +65,7 @@ fn run(bench: &Bench) -> Result<Findings> {
             let posed = &all[last].posed;
             let solver = if by_cache { "transport cache" } else { "paper" };
             bench.begin(&format!("{}, {solver}, seed {seed}", posed.name))?;
-            let gauge = Gauge::new(&posed.subject, u32::MAX).watch_object(&posed.object);
+            let gauge = Evaluator::new(&posed.subject, u32::MAX).watch_object(&posed.object);
             if by_cache {
                 let settings = settings(posed, seed, bench.quick, limits.seconds);
                 let end = cached(bench, &gauge, &settings)?;

@@ -16,7 +16,7 @@ use crate::study::experiments::findings::{Findings, Grid, Summary, brief};
 use crate::study::experiments::furnished::built_in;
 use crate::study::experiments::study::{Bench, Study};
 use crate::study::experiments::subject::Subject;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -204,9 +204,9 @@ fn unknowns(estimate: &Estimate) -> usize {
 }
 
 impl Measure {
-    fn new(subject: &Subject, truth: Option<&Lit>) -> Self {
+    fn new(subject: &Subject, truth: Option<&LitScene>) -> Self {
         let scene = &subject.problem.scene;
-        let pictures = |lit: &Lit| {
+        let pictures = |lit: &LitScene| {
             scene
                 .cameras
                 .iter()

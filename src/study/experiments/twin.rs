@@ -182,7 +182,7 @@ fn rendering(cameras: &[Camera], sizes: Sizes) -> Rendering {
 mod tests {
     use super::*;
     use crate::study::experiments::box_room::{box_room, photographed};
-    use crate::study::trade::Judge;
+    use crate::study::trade::Metric;
     use std::time::Duration;
 
     fn bench(subject: &Subject) -> Bench<'_> {
@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn a_twin_has_the_captures_views_and_nearly_its_photographs_and_its_truth_is_its_own() {
         let mut subject = photographed("room", 0.5, 0.25, true).expect("a room");
-        subject.judge = Judge::HeldOut;
+        subject.metric = Metric::HeldOut;
         let twin = twin(&bench(&subject), Sizes::small(true));
         let twin = twin.expect("solved").expect("on a capture");
         let original = box_room("room", 0.5, 0.25);

@@ -20,7 +20,7 @@ use crate::study::experiments::{Cylinder, chair, places, up};
 use crate::study::families::plan::Plan;
 use crate::study::families::score::{Solved, solved};
 use crate::transport::denoise::Denoiser;
-use crate::transport::lit::Lit;
+use crate::transport::lit::LitScene;
 use crate::transport::material::Material;
 use crate::transport::path::PathOptions;
 use glam::{DAffine3, DQuat, DVec3, Vec2, Vec3};
@@ -202,7 +202,7 @@ pub fn table(rows: &[CompositeRow]) -> Table {
 }
 
 /// A chair on the true floor, in the room's coordinates.
-fn standing(truth: &Lit) -> Result<Option<Arc<ObjectModel>>> {
+fn standing(truth: &LitScene) -> Result<Option<Arc<ObjectModel>>> {
     let scene = &truth.scene;
     let up = up(scene);
     let Some(&place) = places(scene, up, CHAIR, 1).first() else {
@@ -225,7 +225,7 @@ fn standing(truth: &Lit) -> Result<Option<Arc<ObjectModel>>> {
 }
 
 /// The photographs that see most of the chair, without those that it nearly fills.
-fn most_seen(truth: &Arc<Lit>, chair: &[Arc<PlacedObject>]) -> Vec<usize> {
+fn most_seen(truth: &Arc<LitScene>, chair: &[Arc<PlacedObject>]) -> Vec<usize> {
     let world = FurnishedScene::new(truth, chair);
     let seen = |frame: usize| {
         let camera = &truth.scene.cameras[frame];
@@ -264,7 +264,7 @@ struct AroundScores {
 
 /// The denoised composite and its layers, of two halves with their own seeds.
 fn insertion(
-    lit: &Arc<Lit>,
+    lit: &Arc<LitScene>,
     backdrop: &Backdrop,
     objects: &[Arc<PlacedObject>],
     seeds: [u64; 2],
@@ -283,7 +283,7 @@ fn insertion(
 fn scores(
     solved: &Solved,
     frame: usize,
-    truth: &Arc<Lit>,
+    truth: &Arc<LitScene>,
     true_chair: &[Arc<PlacedObject>],
     chair: &Arc<ObjectModel>,
 ) -> Result<Scores> {

@@ -9,7 +9,7 @@ use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-const COLUMNS: [&str; 18] = [
+const COLUMNS: [&str; 19] = [
     "relit",
     "preset",
     "width",
@@ -28,6 +28,7 @@ const COLUMNS: [&str; 18] = [
     "coverage_1",
     "coverage_2",
     "rays",
+    "albedo_factor",
 ];
 
 /// Comparison of a solved room with its truth.
@@ -67,6 +68,8 @@ pub struct Row {
     pub coverage_2: Option<f64>,
     /// Rays of the solve.
     pub rays: u64,
+    /// The factor between found and true albedos that scored objects share: their median, weighted by pixels.
+    pub albedo_factor: Option<f64>,
 }
 
 impl Row {
@@ -97,6 +100,7 @@ impl Row {
             self.coverage_1.into(),
             self.coverage_2.into(),
             self.rays.into(),
+            self.albedo_factor.into(),
         ]
     }
 
@@ -127,6 +131,7 @@ impl Row {
             coverage_1: optional(fields[15])?,
             coverage_2: optional(fields[16])?,
             rays: whole(17)?,
+            albedo_factor: optional(fields[18])?,
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
-use crate::calibrate::segments::cut_up;
+use crate::calibrate::segments::segment_mesh;
 use crate::capture::Capture;
 use crate::capture::working::load_working;
 use crate::error::Result;
@@ -47,7 +47,7 @@ pub fn solved(family: Family, seed: u64, plan: &Plan) -> Result<Solved> {
     let mut capture = room.capture.clone();
     let working = load_working(&capture, u64::MAX)?;
     if let Some(cut) = capture.segmentation.clone() {
-        cut_up(&mut capture, &cut, &working, HoldOut::from(&settings))?;
+        segment_mesh(&mut capture, &cut, &working, HoldOut::from(&settings))?;
     }
     let prepared = prepare(&capture, &working)?;
     let problem = Problem {
@@ -104,7 +104,28 @@ pub fn measure(family: Family, seed: u64, plan: &Plan) -> Result<Row> {
         coverage_1: coverage.fraction(0),
         coverage_2: coverage.fraction(1),
         rays: solution.progress.rays,
+        albedo_factor: common_factor(&errors.per_object),
     })
+}
+
+/// Median over scored objects of found over true albedo (sums over RGB), weighted by pixels.
+fn common_factor(errors: &[(String, ObjectErrors)]) -> Option<f64> {
+    let mut factors: Vec<(f64, u64)> = (errors.iter())
+        .filter(|(_, errors)| errors.scored)
+        .filter_map(|(_, errors)| {
+            let [found, known] =
+                [errors.albedo.map(f64::from), errors.albedo_true?].map(|c| c.iter().sum::<f64>());
+            (known > 0.0).then_some((found / known, errors.pixels))
+        })
+        .collect();
+    factors.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = factors.iter().map(|f| f.1).sum::<u64>().div_ceil(2);
+    let mut pixels = 0;
+    let median = factors.iter().find(|(_, seen)| {
+        pixels += seen;
+        pixels >= half
+    });
+    median.map(|(factor, _)| *factor)
 }
 
 /// An observer that never stops a solve.

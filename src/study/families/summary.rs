@@ -21,7 +21,7 @@ enum Worst {
 /// A figure of a row: name, value, and worst end.
 type Figure = (&'static str, fn(&Row) -> Option<f64>, Worst);
 
-const FIGURES: [Figure; 10] = [
+const FIGURES: [Figure; 11] = [
     ("seconds", |r| Some(r.seconds), Worst::Largest),
     ("albedo_mae", |r| r.albedo_mae, Worst::Largest),
     ("albedo_rel_median", |r| r.albedo_rel_median, Worst::Largest),
@@ -36,6 +36,7 @@ const FIGURES: [Figure; 10] = [
     ("coverage_1", |r| r.coverage_1, Worst::Smallest),
     ("coverage_2", |r| r.coverage_2, Worst::Smallest),
     ("rays", |r| Some(r.rays as f64), Worst::Largest),
+    ("albedo_factor", |r| r.albedo_factor, Worst::Largest),
 ];
 
 impl Row {
@@ -75,6 +76,8 @@ pub struct OfFamily {
     pub albedos: u64,
     /// Fractions of them within one and two standard errors.
     pub coverage: Option<[f64; 2]>,
+    /// Root mean square over rooms of the logarithm of the factor that their albedos share.
+    pub common_error: Option<f64>,
     /// Quantiles of each figure over rooms.
     pub figures: BTreeMap<&'static str, Quantiles>,
 }
@@ -121,6 +124,9 @@ impl OfFamily {
                 .map(|row| value(row).unwrap_or(0.0) * row.albedos as f64);
             counts.sum::<f64>() / albedos as f64
         };
+        let logarithms = rows.iter().filter_map(|row| row.albedo_factor).map(f64::ln);
+        let squares: Vec<f64> = logarithms.map(|l| l * l).collect();
+        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
         let figures = FIGURES.iter().filter_map(|&(name, value, worst)| {
             let mut values: Vec<f64> = rows.iter().filter_map(|row| value(row)).collect();
             Some((name, Quantiles::of(&mut values, worst)?))
@@ -132,6 +138,7 @@ impl OfFamily {
             rooms_with_false_lamps: rows.iter().filter(|row| row.lamps_false > 0).count(),
             albedos,
             coverage: (albedos > 0).then(|| [within(|r| r.coverage_1), within(|r| r.coverage_2)]),
+            common_error: (!squares.is_empty()).then(|| mean.sqrt()),
             figures: figures.collect(),
         }
     }
@@ -175,11 +182,12 @@ impl Summary {
             self.machine.words()
         );
         text += &format!(
-            "{:9}  {:>5}  {:>12}  {:>11}  {:>6}  {:>10}  {:>11}  {:>11}  {:>14}\n",
+            "{:9}  {:>5}  {:>12}  {:>11}  {:>6}  {:>6}  {:>10}  {:>11}  {:>11}  {:>14}\n",
             "family",
             "rooms",
             "albedo error",
             "worst tenth",
+            "factor",
             "PSNR",
             "lamps",
             "false lamps",
@@ -205,10 +213,12 @@ impl OfFamily {
             format!("{:.0} / {:.0} %", one * 100.0, two * 100.0)
         });
         format!(
-            "{name:9}  {:>5}  {:>12}  {:>11}  {:>6}  {:>10}  {:>11}  {coverage:>11}  {:>14}\n",
+            "{name:9}  {:>5}  {:>12}  {:>11}  {:>6}  {:>6}  {:>10}  {:>11}  {coverage:>11}  {:>14}\n",
             self.n,
             figure("albedo_mae", |f| f.q50, 4),
             figure("albedo_mae", |f| f.q90, 4),
+            self.common_error
+                .map_or("-".to_owned(), |error| format!("±{:.0} %", error * 100.0)),
             figure("albedo_psnr", |f| f.q50, 1),
             format!("{} / {}", self.lamps_found, self.lamps_true),
             self.rooms_with_false_lamps,

@@ -6,7 +6,7 @@ use crate::inverse::estimate::{Estimate, ObjectEstimate};
 use crate::inverse::solve;
 use crate::inverse::solver::{Control, Observer, Progress, Solution, Termination};
 use crate::study::trade::curve::{Curve, Point};
-use crate::study::trade::judge::{Judge, SolveJudge};
+use crate::study::trade::metric::{Metric, SolveMetric};
 use crate::study::trade::plan::Run;
 use std::time::{Duration, Instant};
 
@@ -26,7 +26,7 @@ pub enum SolveEvent<'a> {
 /// A solver cannot start.
 pub fn measure(
     problem: &Problem,
-    judge: &Judge,
+    metric: &Metric,
     runs: &[Run],
     limit: Duration,
     stopped: &dyn Fn() -> bool,
@@ -43,7 +43,7 @@ pub fn measure(
         let left = end.saturating_duration_since(now);
         let fraction = left.mul_f64((run.weight / weights).clamp(0.0, 1.0));
         report(SolveEvent::Begins(run));
-        let (curve, _) = watch(problem, judge, run, now + fraction, stopped)?;
+        let (curve, _) = watch(problem, metric, run, now + fraction, stopped)?;
         report(SolveEvent::Ended(&curve));
         curves.push(curve);
     }
@@ -56,15 +56,15 @@ pub fn measure(
 /// The solver cannot start.
 pub fn watch(
     problem: &Problem,
-    judge: &Judge,
+    metric: &Metric,
     run: &Run,
     deadline: Instant,
     stopped: &dyn Fn() -> bool,
 ) -> Result<(Curve, Solution)> {
     let mut watch = Watch {
         problem,
-        judge: judge.for_solve(problem, &run.settings),
-        spacing: judge.spacing(),
+        metric: metric.for_solve(problem, &run.settings),
+        spacing: metric.spacing(),
         deadline,
         stopped,
         late: false,
@@ -94,7 +94,7 @@ pub fn watch(
 /// Observer that measures a running solve from time to time.
 struct Watch<'a> {
     problem: &'a Problem,
-    judge: SolveJudge<'a>,
+    metric: SolveMetric<'a>,
     spacing: f64,
     deadline: Instant,
     stopped: &'a dyn Fn() -> bool,
@@ -113,7 +113,7 @@ impl Watch<'_> {
             return;
         }
         self.measured.clone_from(&estimate.objects);
-        let error = self.judge.error(self.problem, estimate);
+        let error = self.metric.error(self.problem, estimate);
         match error.filter(|error| error.is_finite()) {
             Some(error) => self.points.push(Point {
                 seconds: progress.seconds,

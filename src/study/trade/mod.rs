@@ -7,8 +7,8 @@ pub mod compare;
 mod curve;
 mod file;
 pub mod front;
-mod judge;
 mod measure;
+mod metric;
 pub mod plan;
 pub mod plot;
 mod record;
@@ -16,6 +16,6 @@ pub mod rooms;
 mod words;
 
 pub use curve::{Curve, Measure, Point};
-pub use judge::Judge;
 pub use measure::{SolveEvent, measure, watch};
+pub use metric::Metric;
 pub use record::Trade;

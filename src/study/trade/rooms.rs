@@ -10,20 +10,20 @@ use crate::room::generated::generate;
 use crate::room::photographs::{self, Rendering};
 use crate::scene::Scene;
 use crate::study::evaluate::Reference;
-use crate::study::trade::judge::Judge;
+use crate::study::trade::metric::Metric;
 use std::sync::Arc;
 
 /// Width and height of the photographs of generated rooms in pixels.
 pub const SIZE: [u32; 2] = [96, 72];
 
-/// Generated room `seed` with photographs, and a judge with its truth.
+/// Generated room `seed` with photographs, and a metric with its truth.
 ///
 /// # Errors
 /// Never for generated rooms.
-pub fn problem(seed: u64, size: [u32; 2]) -> Result<(Problem, Judge)> {
+pub fn problem(seed: u64, size: [u32; 2]) -> Result<(Problem, Metric)> {
     let (room, rendering) = generate(seed, size);
     let (problem, reference) = photographed(&room, &rendering)?;
-    Ok((problem, Judge::Truth(Box::new(reference))))
+    Ok((problem, Metric::Truth(Box::new(reference))))
 }
 
 /// A room with rendered photographs, and its truth.

@@ -75,7 +75,7 @@ pub struct Kept {
 
 /// Saves and lists sessions.
 #[derive(Debug, Default)]
-pub struct Keeper {
+pub struct SessionStore {
     base: Option<PathBuf>,
     capture: Option<PathBuf>,
     /// Folder and lock of the open session, once it has been saved.
@@ -86,15 +86,15 @@ pub struct Keeper {
     kept: Arc<Vec<Kept>>,
 }
 
-impl Keeper {
+impl SessionStore {
     /// Keeps sessions in the folder `base`; without one, none are kept.
     pub fn new(base: Option<PathBuf>) -> Self {
-        let mut keeper = Self {
+        let mut store = Self {
             base,
             ..Self::default()
         };
-        keeper.list();
-        keeper
+        store.list();
+        store
     }
 
     /// The newest session of a capture, by its hash, that no other program has open.
@@ -340,13 +340,13 @@ mod tests {
         for index in 0..MAX_UNFINISHED + 3 {
             made(base.path(), &format!("b/session {index}"), false);
         }
-        let mut keeper = Keeper::new(Some(base.path().to_owned()));
-        assert_eq!(keeper.kept().len(), MAX_UNFINISHED + 4);
-        keeper.prune();
-        assert_eq!(keeper.kept().len(), MAX_UNFINISHED + 1);
+        let mut store = SessionStore::new(Some(base.path().to_owned()));
+        assert_eq!(store.kept().len(), MAX_UNFINISHED + 4);
+        store.prune();
+        assert_eq!(store.kept().len(), MAX_UNFINISHED + 1);
         assert!(finished.exists());
         assert!(
-            keeper
+            store
                 .kept()
                 .iter()
                 .any(|kept| kept.name == "room, session 1")
@@ -357,13 +357,13 @@ mod tests {
     fn a_session_is_gone_on_with_by_one_program_and_others_begin_their_own() {
         let base = tempfile::tempdir().expect("a folder");
         let first = made(base.path(), "a/session 1", true);
-        let keeper = || Keeper::new(Some(base.path().to_owned()));
-        let mut one = keeper();
+        let store = || SessionStore::new(Some(base.path().to_owned()));
+        let mut one = store();
         assert_eq!(one.last("a"), Some(first.clone()));
         assert_eq!(one.last("b"), None);
         one.resume("a", &first, &SessionRecord::default());
         assert!(one.remove(&first).is_err());
-        let mut two = keeper();
+        let mut two = store();
         assert_eq!(two.last("a"), None);
         two.resume("a", &first, &SessionRecord::default());
         let second = two.folder().expect("made").expect("a folder");

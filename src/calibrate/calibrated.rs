@@ -6,9 +6,9 @@ use crate::calibrate::gbuffer::GBuffer;
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
 
-/// Settings of [`Observed::new`].
+/// Settings of [`Calibrated::new`].
 #[derive(Debug, Clone, Copy)]
-pub struct Questions {
+pub struct CalibrationOptions {
     /// Pixels kept out of every fit.
     pub hold_out: HoldOut,
     /// Seed of the rays inside pixels.
@@ -22,7 +22,7 @@ pub struct Questions {
 }
 
 /// The observations that a solve fits.
-pub struct Observed {
+pub struct Calibrated {
     /// The scene, with photographs at one exposure, outlier frames unusable, and saturated values as lower bounds.
     pub problem: Problem,
     /// What each pixel sees.
@@ -35,9 +35,9 @@ pub struct Observed {
     pub rays: u64,
 }
 
-impl Observed {
+impl Calibrated {
     /// Prepares the photographs of a problem.
-    pub fn new(problem: &Problem, asked: Questions) -> Self {
+    pub fn new(problem: &Problem, asked: CalibrationOptions) -> Self {
         let gbuffer_of =
             |problem: &Problem| GBuffer::new(problem, asked.hold_out, asked.seed, asked.pixels);
         let mut problem = problem.clone();

@@ -14,7 +14,7 @@ const SAMPLES: u64 = 16;
 
 /// How the error of estimates is measured.
 #[derive(Debug, Clone)]
-pub enum Judge {
+pub enum Metric {
     /// Against the truth.
     Truth(Box<Reference>),
     /// On held-out pixels, the same for all solves.
@@ -22,12 +22,12 @@ pub enum Judge {
 }
 
 /// Measures the estimates of one solve.
-pub(super) enum SolveJudge<'a> {
+pub(super) enum SolveMetric<'a> {
     Truth(&'a Reference),
     HeldOut(LossProbe),
 }
 
-impl Judge {
+impl Metric {
     /// The quantity that is measured.
     pub fn measure(&self) -> Measure {
         match self {
@@ -45,19 +45,19 @@ impl Judge {
     }
 
     /// Prepares measuring the estimates of a solve with these parameters.
-    pub(super) fn for_solve(&self, problem: &Problem, settings: &Settings) -> SolveJudge<'_> {
+    pub(super) fn for_solve(&self, problem: &Problem, settings: &Settings) -> SolveMetric<'_> {
         match self {
-            Self::Truth(reference) => SolveJudge::Truth(reference),
+            Self::Truth(reference) => SolveMetric::Truth(reference),
             Self::HeldOut => {
                 let bounces = settings.max_bounces();
                 let probe = LossProbe::new(problem, settings, PIXELS, SAMPLES, bounces);
-                SolveJudge::HeldOut(probe)
+                SolveMetric::HeldOut(probe)
             }
         }
     }
 }
 
-impl SolveJudge<'_> {
+impl SolveMetric<'_> {
     /// The error; `None` if nothing can be compared.
     pub fn error(&self, problem: &Problem, estimate: &Estimate) -> Option<f64> {
         match self {

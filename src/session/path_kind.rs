@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// The content of a path.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Given {
+pub enum PathKind {
     /// The folder of a capture.
     Capture(PathBuf),
     /// Results of a solve, to be resumed.
@@ -17,7 +17,7 @@ pub enum Given {
     Scan(PathBuf),
 }
 
-impl Given {
+impl PathKind {
     /// Identifies a path: a folder, or the `transforms.json` of a capture.
     ///
     /// # Errors
@@ -74,16 +74,16 @@ mod tests {
         let results = folder("results", "estimate.json");
         let killed = folder("killed", CHECKPOINT);
         let scan = folder("scan", "frame-000000.color.png");
-        let at = |path: &Path| Given::at(path).expect("something is there");
-        assert_eq!(at(&capture), Given::Capture(capture.clone()));
+        let at = |path: &Path| PathKind::at(path).expect("something is there");
+        assert_eq!(at(&capture), PathKind::Capture(capture.clone()));
         assert_eq!(
             at(&capture.join("transforms.json")),
-            Given::Capture(capture)
+            PathKind::Capture(capture)
         );
-        assert_eq!(at(&results), Given::Results(results.clone()));
-        assert_eq!(at(&killed), Given::Results(killed));
-        assert_eq!(at(&scan), Given::Scan(scan));
-        assert!(Given::at(&results.join("estimate.json")).is_err());
-        assert!(Given::at(&place.path().join("nowhere")).is_err());
+        assert_eq!(at(&results), PathKind::Results(results.clone()));
+        assert_eq!(at(&killed), PathKind::Results(killed));
+        assert_eq!(at(&scan), PathKind::Scan(scan));
+        assert!(PathKind::at(&results.join("estimate.json")).is_err());
+        assert!(PathKind::at(&place.path().join("nowhere")).is_err());
     }
 }

@@ -9,21 +9,21 @@ use crate::session::command::Source;
 use crate::session::open_capture::OpenCapture;
 use crate::study::evaluate::Reference;
 use crate::study::experiments::Subject;
-use crate::study::trade::Judge;
+use crate::study::trade::Metric;
 
 impl OpenCapture {
     /// Measures estimates by the truth if there is one, else by held-out pixels.
     ///
     /// # Errors
     /// The truth is broken.
-    pub fn judge(&self) -> Result<Judge> {
+    pub fn metric(&self) -> Result<Metric> {
         let truth = match &self.source {
             Source::BuiltInRoom => Room::new().truth(STORED.size)?,
             Source::Folder(folder) if folder.join("truth.json").is_file() => Truth::read(folder)?,
-            Source::Folder(_) => return Ok(Judge::HeldOut),
+            Source::Folder(_) => return Ok(Metric::HeldOut),
         };
         let reference = Reference::new(truth, &self.capture, &self.scene, &self.photographs);
-        Ok(Judge::Truth(Box::new(reference)))
+        Ok(Metric::Truth(Box::new(reference)))
     }
 
     /// The capture as a subject of studies.
@@ -38,7 +38,7 @@ impl OpenCapture {
                 scene: self.scene.clone(),
                 photographs: self.photographs.clone(),
             },
-            judge: self.judge()?,
+            metric: self.metric()?,
         })
     }
 }
