@@ -66,6 +66,18 @@ pub fn quantile(values: &mut [f64], q: f64) -> Option<f64> {
     Some(values[low] + (values[high] - values[low]) * (rank - low as f64))
 }
 
+/// The value, of those with a weight, up to which half of the weight lies; `None` without weight.
+pub fn weighted_median(mut values: Vec<(f64, f64)>) -> Option<f64> {
+    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = values.iter().map(|(_, weight)| weight).sum::<f64>() / 2.0;
+    let mut below = 0.0;
+    let middle = values.iter().find(|(_, weight)| {
+        below += weight;
+        *weight > 0.0 && below >= half
+    });
+    middle.map(|(value, _)| *value)
+}
+
 /// The upper median; `None` without values. Reorders in place.
 pub fn upper_median(values: &mut [f32]) -> Option<f32> {
     let middle = values.len() / 2;

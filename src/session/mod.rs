@@ -3,7 +3,6 @@
 pub mod command;
 pub mod edits;
 mod full;
-
 pub mod inbox;
 pub mod insertion;
 pub mod library;

@@ -269,6 +269,7 @@ fn results_name_no_files_elsewhere_and_nothing_impossible() {
         ("exposures", serde_json::json!([[0.0, 1.0, 1.0]])),
         ("vignetting", serde_json::json!([1e9, 0.0, 0.0])),
         ("vignetting", serde_json::json!([null, 0.0, 0.0])),
+        ("albedo_common_stderr", serde_json::json!(-0.1)),
         // Values that stand, or fall, as light grows.
         ("response", bent(-1.0)),
         ("response", bent(-3.0)),

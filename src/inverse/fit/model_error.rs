@@ -65,18 +65,26 @@ pub fn variance(
 /// Adds the model error to the standard errors of albedos, and of the emission of unseen lamps.
 pub fn add_to(estimate: &mut Estimate, roles: &[Role], variance: f64) {
     let relative = (SHARED * variance.sqrt()) as f32;
-    let total = |error: Vec3, value: Vec3| {
-        let model = value * relative;
-        (error * error + model * model).powf(0.5)
-    };
+    add_to_albedos(estimate, roles, relative);
     for (object, role) in estimate.objects.iter_mut().zip(roles) {
-        if role.reflects() {
-            object.albedo_stderr = total(object.albedo_stderr, object.albedo);
-        }
         if *role == Role::Unseen && object.emission_stderr.max_element() < f32::MAX {
-            object.emission_stderr = total(object.emission_stderr, object.emission);
+            object.emission_stderr = total(object.emission_stderr, object.emission * relative);
         }
     }
+}
+
+/// Adds an error relative to albedo to the standard errors of albedos.
+fn add_to_albedos(estimate: &mut Estimate, roles: &[Role], relative: f32) {
+    for (object, role) in estimate.objects.iter_mut().zip(roles) {
+        if role.reflects() {
+            object.albedo_stderr = total(object.albedo_stderr, object.albedo * relative);
+        }
+    }
+}
+
+/// The standard error of the sum of two independent errors.
+fn total(one: Vec3, other: Vec3) -> Vec3 {
+    (one * one + other * other).powf(0.5)
 }
 
 /// Adds to the standard errors of albedos the gloss that was not found. Light that a surface mirrors is taken for albedo, up to its
@@ -103,12 +111,7 @@ pub fn add_gloss(estimate: &mut Estimate, roles: &[Role]) {
 /// Adds the factor that a scan's albedos share to their standard errors.
 pub fn add_common(estimate: &mut Estimate, roles: &[Role]) {
     estimate.common_error = SCANNED;
-    for (object, role) in estimate.objects.iter_mut().zip(roles) {
-        if role.reflects() {
-            let (error, common) = (object.albedo_stderr, object.albedo * SCANNED);
-            object.albedo_stderr = (error * error + common * common).powf(0.5);
-        }
-    }
+    add_to_albedos(estimate, roles, SCANNED);
 }
 
 #[cfg(test)]
@@ -178,6 +181,28 @@ mod tests {
         let errors = after(vec![object(Some(0.08)), matte(), matte(), matte()]);
         assert_eq!(errors[0], 0.03);
         assert!((errors[3] - 0.05).abs() < 1e-6, "{errors:?}");
+    }
+
+    #[test]
+    fn the_factor_of_a_scan_is_in_each_error_and_not_in_the_reported_one() {
+        let object = ObjectEstimate {
+            albedo: Vec3::splat(0.5),
+            albedo_stderr: Vec3::splat(0.03),
+            seen_pixels: ENOUGH_PIXELS,
+            ..Default::default()
+        };
+        let mut estimate = Estimate {
+            objects: vec![object; 2],
+            ..Estimate::default()
+        };
+        let before = estimate.relative_error();
+        add_common(&mut estimate, &[Role::Reflector, Role::Emitter]);
+        let expected = 0.03f32.hypot(0.5 * SCANNED);
+        assert!((estimate.objects[0].albedo_stderr.x - expected).abs() < 1e-6);
+        assert_eq!(estimate.objects[1].albedo_stderr, Vec3::splat(0.03));
+        estimate.objects.truncate(1);
+        let [before, after] = [before, estimate.relative_error()].map(|e| e.expect("is seen"));
+        assert!((before - after).abs() < 1e-6, "{before} {after}");
     }
 
     #[test]

@@ -9,6 +9,7 @@
 //! the variances.
 
 use crate::inverse::paths::evaluate::Linearised;
+use crate::math::stats::weighted_median;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -134,22 +135,10 @@ fn own_steps(clusters: &[Linearised], objects: usize) -> Vec<DVec3> {
                 let weight = cluster.weight_now()[channel].sqrt() * own(cluster);
                 (cluster.residual()[channel] / own(cluster), weight)
             });
-            weighted_median(ratios.collect())
+            weighted_median(ratios.collect()).unwrap_or(0.0)
         }))
     };
     of_object.into_par_iter().map(step).collect()
-}
-
-/// The value below which half of the weight lies; zero without weight.
-fn weighted_median(mut values: Vec<(f64, f64)>) -> f64 {
-    values.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let half = values.iter().map(|(_, weight)| weight).sum::<f64>() / 2.0;
-    let mut below = 0.0;
-    let middle = values.iter().find(|(_, weight)| {
-        below += weight;
-        *weight > 0.0 && below >= half
-    });
-    middle.map_or(0.0, |(value, _)| *value)
 }
 
 #[cfg(test)]

@@ -28,6 +28,7 @@ const OUTSIDE_GAIN: f64 = 0.03;
 const FALL_ERRORS: f64 = 4.0;
 /// Standard errors by which a sun's light exceeds zero.
 const SUN_ERRORS: f32 = 5.0;
+
 /// The result of a trial of outside light.
 #[derive(Clone)]
 struct Found {
@@ -77,10 +78,11 @@ impl Pipeline<'_, '_> {
         }
     }
 
-    /// Tries light from infinity, and for a scan also from a box around the mesh. Keeps the better one if it predicts held-out pixels
-    /// better than the model without it.
+    /// Tries light from infinity, without a sun and with one if there is a candidate. Keeps it if the light field's squared error falls
+    /// clearly.
     ///
-    /// A scan gets light from outside without that test: what was not scanned reflects light, if nothing else, and the light field
+    /// A scan gets light from outside without that test, from infinity or from a box around the mesh, whichever predicts held-out
+    /// pixels better: what was not scanned reflects light, if nothing else, and the light field
     /// without it makes walls lighter, or gives them light of their own, until nothing is left to improve.
     pub(super) fn light_from_outside(
         &mut self,

@@ -104,11 +104,11 @@ impl Pipeline<'_, '_> {
         let ended = self.add_rounds(&mut rounds, Leg::UntilDone)?;
         if self.detail.is_none() {
             self.doubt_refinement(&before);
-        }
-        if textures {
-            if self.detail.is_none() {
+            if textures {
                 self.detail()?;
             }
+        }
+        if textures {
             self.refit()?;
         }
         Ok(ended)

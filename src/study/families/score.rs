@@ -10,6 +10,7 @@ use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::inverse::solve;
 use crate::inverse::solver::{Control, Observer, Progress, Solution};
+use crate::math::stats::weighted_median;
 use crate::room::generated::{Family, Generated};
 use crate::scene::Scene;
 use crate::scene::prepare::prepare;
@@ -110,22 +111,14 @@ pub fn measure(family: Family, seed: u64, plan: &Plan) -> Result<Row> {
 
 /// Median over scored objects of found over true albedo (sums over RGB), weighted by pixels.
 fn common_factor(errors: &[(String, ObjectErrors)]) -> Option<f64> {
-    let mut factors: Vec<(f64, u64)> = (errors.iter())
+    let factors = (errors.iter())
         .filter(|(_, errors)| errors.scored)
         .filter_map(|(_, errors)| {
             let [found, known] =
                 [errors.albedo.map(f64::from), errors.albedo_true?].map(|c| c.iter().sum::<f64>());
-            (known > 0.0).then_some((found / known, errors.pixels))
-        })
-        .collect();
-    factors.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let half = factors.iter().map(|f| f.1).sum::<u64>().div_ceil(2);
-    let mut pixels = 0;
-    let median = factors.iter().find(|(_, seen)| {
-        pixels += seen;
-        pixels >= half
-    });
-    median.map(|(factor, _)| *factor)
+            (known > 0.0).then_some((found / known, errors.pixels as f64))
+        });
+    weighted_median(factors.collect())
 }
 
 /// An observer that never stops a solve.
