@@ -138,13 +138,7 @@ fn placed(
     at: DVec3,
 ) -> Arc<PlacedObject> {
     let model = ObjectModel::from_corners("block", triangles, material).expect("a sound object");
-    let placement = Placement {
-        file: "block.obj".into(),
-        at: Some(at),
-        scale: 1.0,
-        rotate: 0.0,
-        hidden: false,
-    };
+    let placement = Placement::new("block.obj", Some(at));
     Arc::new(PlacedObject::new(Arc::new(model), &placement, &lit.scene).expect("a sound place"))
 }
 

@@ -4,7 +4,7 @@
 mod beside;
 
 use beside::beside;
-use glam::{DVec3, Vec3};
+use glam::{DQuat, DVec2, DVec3, Vec3};
 use relit::compose::object::ObjectModel;
 use relit::compose::placement::Placement;
 use relit::math::color::srgb_to_linear;
@@ -60,7 +60,7 @@ fn an_obj_has_its_colors_texture_gloss_and_normals() {
     let folder = folder(&[("o.obj", obj.as_bytes()), ("m.mtl", mtl), ("t.png", &image)]);
     let model = ObjectModel::read(&folder.path().join("o.obj")).expect("a sound file");
     assert_eq!((model.name.as_str(), model.corners.len()), ("o", 2));
-    assert_eq!(model.base(), DVec3::new(1.0, 0.0, 0.0));
+    assert_eq!(model.base(DQuat::IDENTITY), DVec3::new(1.0, 0.0, 0.0));
     assert!(model.corner_normals.iter().flatten().all(|&n| n == Vec3::Z));
     assert!(
         model.warnings.iter().any(|w| w.contains("see-through")),
@@ -182,37 +182,33 @@ fn an_object_stands_on_its_base_turned_and_scaled_about_the_up_axis() {
     let obj = "v -1 3 -2\nv 3 3 -2\nv -1 5 4\nf 1 2 3\n";
     let folder = folder(&[("o.obj", obj.as_bytes())]);
     let model = ObjectModel::read(&folder.path().join("o.obj")).expect("a sound file");
-    assert_eq!(model.base(), DVec3::new(1.0, 3.0, 1.0));
+    let base = model.base(DQuat::IDENTITY);
+    assert_eq!(base, DVec3::new(1.0, 3.0, 1.0));
     let mut placement = Placement {
-        file: "o.obj".into(),
-        at: Some(DVec3::new(10.0, 20.0, 30.0)),
         scale: 0.5,
         rotate: 90.0,
-        hidden: false,
+        ..Placement::new("o.obj", Some(DVec3::new(10.0, 20.0, 30.0)))
     };
     let near = |a: DVec3, b: DVec3| assert!((a - b).length() < 1e-12, "{a} {b}");
     // Counter-clockwise from above, +x turns towards −z where y is up.
-    let upright = placement.transform(&model, DVec3::Y).expect("sound");
+    let upright = placement.transform(base, DVec3::Y).expect("sound");
+    near(upright.transform_point3(base), DVec3::new(10.0, 20.0, 30.0));
     near(
-        upright.transform_point3(model.base()),
-        DVec3::new(10.0, 20.0, 30.0),
-    );
-    near(
-        upright.transform_point3(model.base() + DVec3::X),
+        upright.transform_point3(base + DVec3::X),
         DVec3::new(10.0, 20.0, 29.5),
     );
     near(
-        upright.transform_point3(model.base() + DVec3::Y),
+        upright.transform_point3(base + DVec3::Y),
         DVec3::new(10.0, 20.5, 30.0),
     );
     // Where z is up, the file's y goes there and +x turns towards +y.
-    let tall = placement.transform(&model, DVec3::Z).expect("sound");
+    let tall = placement.transform(base, DVec3::Z).expect("sound");
     near(
-        tall.transform_point3(model.base() + DVec3::Y),
+        tall.transform_point3(base + DVec3::Y),
         DVec3::new(10.0, 20.0, 30.5),
     );
     near(
-        tall.transform_point3(model.base() + DVec3::X),
+        tall.transform_point3(base + DVec3::X),
         DVec3::new(10.0, 20.5, 30.0),
     );
     // As modelled, nothing moves that is not asked to.
@@ -222,17 +218,28 @@ fn an_object_stands_on_its_base_turned_and_scaled_about_the_up_axis() {
         rotate: 0.0,
         ..placement
     };
-    let still = placement.transform(&model, DVec3::Z).expect("sound");
+    let still = placement.transform(base, DVec3::Z).expect("sound");
     near(
         still.transform_point3(DVec3::new(1.0, 2.0, 3.0)),
         DVec3::new(1.0, 2.0, 3.0),
     );
+    // Tilted about z by a quarter turn, +x points up, and the lowest point is where x was least.
+    let tilted = Placement {
+        at: Some(DVec3::ZERO),
+        tilt: DVec2::new(0.0, 90.0),
+        ..placement.clone()
+    };
+    let lying = tilted.transform(model.base(tilted.tilt()), DVec3::Y);
+    let points = model.corners[0].map(|p| lying.as_ref().expect("sound").transform_point3(p));
+    near(points[0], DVec3::new(1.0, 0.0, -3.0));
+    near(points[1], DVec3::new(1.0, 4.0, -3.0));
+    near(points[2], DVec3::new(-1.0, 0.0, 3.0));
     for scale in [0.0, -1.0, f64::NAN] {
         let error = Placement {
             scale,
             ..placement.clone()
         }
-        .transform(&model, DVec3::Y);
+        .transform(base, DVec3::Y);
         assert_eq!(error.expect_err("no size").exit_code(), 2);
     }
 }

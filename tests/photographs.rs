@@ -52,13 +52,7 @@ fn block(folder: &Path) -> Placement {
     let file = folder.join("block.obj");
     let text = "v -0.2 0 -0.2\nv 0.2 0 -0.2\nv 0.2 0.4 0.2\nv -0.2 0.4 0.2\nf 1 2 3\nf 1 3 4\n";
     std::fs::write(&file, text).expect("written");
-    Placement {
-        file,
-        at: Some(DVec3::new(0.0, 0.0, -0.4)),
-        scale: 1.0,
-        rotate: 0.0,
-        hidden: false,
-    }
+    Placement::new(file, Some(DVec3::new(0.0, 0.0, -0.4)))
 }
 
 fn read(path: &Path) -> Picture {

@@ -145,6 +145,7 @@ actions! {
     Smaller, Window, Nothing, "Smaller interface", "Makes everything in the window smaller", ctrl(Key::Minus);
     OwnSize, Window, Nothing, "Interface as large as the screen asks for", "Takes the size of everything in the window back to that of the screen", ctrl(Key::Num0);
     Theme, Window, Nothing, "Light / dark theme", "Changes between the light and the dark theme", ctrl(Key::L);
+    BlenderKeys, Window, Nothing, "Blender's keys on / off", "G, R and S move, rotate and scale the chosen object as in Blender; X, Y and Z hold an axis", None;
 
     Palette, Help, Nothing, "Command palette", "Finds any command by name", ctrl(Key::P);
     Keys, Help, Nothing, "Keys and mouse", "Shows what keys and mouse do", key(Key::Questionmark);

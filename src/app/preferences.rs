@@ -17,6 +17,8 @@ pub struct Preferences {
     pub tone: ToneCurve,
     /// Whether the strip of photographs is shown.
     pub thumbnails: bool,
+    /// Whether G, R and S move, rotate and scale the chosen object as in Blender.
+    pub blender_keys: bool,
     /// Captures opened before, the newest first.
     pub recent: Vec<PathBuf>,
     /// What the panes are arranged for.
@@ -34,6 +36,7 @@ impl Default for Preferences {
             size: None,
             tone: ToneCurve::None,
             thumbnails: true,
+            blender_keys: false,
             recent: Vec::new(),
             workspace: Workspace::Compose,
             compose: None,

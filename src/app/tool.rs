@@ -1,6 +1,7 @@
 //! The active tool: what the next click or drag in a view does instead of selecting.
 
 use crate::app::insertion::handles::Handle;
+use crate::app::insertion::transform::Transform;
 use crate::scene::Scene;
 use crate::scene::geometry::{Hit, Ray};
 use glam::DVec3;
@@ -40,6 +41,8 @@ pub struct Tool {
     pub placing: bool,
     /// The handle of an inserted object that is being dragged.
     pub dragged: Option<Handle>,
+    /// What the pointer does to the chosen inserted object until a click.
+    pub transform: Option<Transform>,
 }
 
 impl Tool {
@@ -51,7 +54,7 @@ impl Tool {
 
     /// Whether the next click does something else than select.
     pub fn is_active(&self) -> bool {
-        self.placing || self.dragged.is_some() || self.pick.is_some()
+        self.placing || self.dragged.is_some() || self.pick.is_some() || self.transform.is_some()
     }
 }
 

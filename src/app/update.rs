@@ -23,7 +23,8 @@ impl App {
         while let Some((ask, answer)) = self.jobs.dialogs.take() {
             self.answered(ask, answer, ctx);
         }
-        if !ctx.input(|input| input.pointer.any_down()) {
+        let held = ctx.input(|input| input.pointer.any_down());
+        if !held && self.view.tool.transform.is_none() {
             self.document.record();
         }
         let (derived, shown) = (&mut self.view.derived, &self.view.shown);

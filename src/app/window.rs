@@ -183,6 +183,7 @@ impl eframe::App for Window {
         let ctx = ui.ctx().clone();
         let app = &mut self.app;
         if app.view.shell.palette.is_none() {
+            app.transform_by_keys(&ctx);
             for action in action::pressed(&ctx, app.shows_start_page()) {
                 app.perform(action, &ctx);
             }

@@ -120,7 +120,7 @@ pub fn edit(arguments: &EditArguments) -> Result<i32> {
     if let Some(photographs) = &photographs {
         let folder = arguments.out.join("photographs");
         std::fs::create_dir_all(&folder).map_err(|error| Error::io(&folder, &error))?;
-        code = write_with_progress(photographs, &renderer, &[], &|frame| {
+        code = write_with_progress(photographs, &renderer, &|frame| {
             folder.join(format!("{frame:03}"))
         })?;
     }

@@ -1,18 +1,17 @@
 //! `relit insert`: objects in photographs, by differential rendering and naively.
 
-use crate::cli::numbers::{above_zero, degrees, from_one, triple};
+use crate::cli::numbers::{above_zero, degrees, from_one, pair, triple};
 use crate::cli::options::{DenoiseOptions, DeviceOptions, Replace};
 use crate::cli::photographs::write_with_progress;
 use crate::cli::saved::{Loaded, SavedOptions};
-use crate::compose::object::surface::ObjectSurface;
+use crate::compose::object::surface::MaterialOverride;
 use crate::compose::placement::Placement;
 use crate::error::Result;
 use crate::session::photographs::Photographs;
-use crate::transport::material::DIELECTRIC;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// `relit insert`.
 #[derive(Debug, Args)]
@@ -55,7 +54,6 @@ pub fn insert(arguments: &InsertArguments) -> Result<i32> {
         edits,
         estimate,
     } = arguments.saved.load()?;
-    let (placements, materials): (_, Vec<_>) = arguments.objects.0.iter().cloned().unzip();
     let work = Photographs {
         frames: match arguments.frame {
             FrameChoice::One(frame) => vec![frame],
@@ -65,25 +63,20 @@ pub fn insert(arguments: &InsertArguments) -> Result<i32> {
         found,
         edited: estimate,
         settings: saved.settings,
-        placements,
+        placements: arguments.objects.0.clone(),
         relight: !edits.is_empty(),
         samples: arguments.spp,
         denoise: arguments.denoise.denoiser(true)?,
         finish: arguments.finish,
     };
-    write_with_progress(
-        &work,
-        &renderer,
-        &materials,
-        &|frame| match arguments.frame {
-            FrameChoice::One(_) => arguments.out.clone(),
-            FrameChoice::All => {
-                let mut name = OsString::from(&arguments.out);
-                name.push(format!(".{frame:03}"));
-                PathBuf::from(name)
-            }
-        },
-    )
+    write_with_progress(&work, &renderer, &|frame| match arguments.frame {
+        FrameChoice::One(_) => arguments.out.clone(),
+        FrameChoice::All => {
+            let mut name = OsString::from(&arguments.out);
+            name.push(format!(".{frame:03}"));
+            PathBuf::from(name)
+        }
+    })
 }
 
 /// FrameChoice photographs to insert into.
@@ -103,12 +96,12 @@ fn frame_choice(text: &str) -> std::result::Result<FrameChoice, String> {
     }
 }
 
-/// The objects in the order of the command line: placement, and the material that replaces those of the file.
+/// The objects in the order of the command line.
 #[derive(Debug, Clone, Default)]
-struct Objects(Vec<(Placement, Option<ObjectSurface>)>);
+struct Objects(Vec<Placement>);
 
 /// Parses KIND:R,G,B or KIND:R,G,B,ROUGHNESS: linear base colour and GGX roughness α, all from 0 to 1.
-fn material(text: &str) -> std::result::Result<ObjectSurface, String> {
+fn material(text: &str) -> std::result::Result<MaterialOverride, String> {
     const WANTED: &str = "diffuse:R,G,B, plastic:R,G,B,ROUGHNESS or metal:R,G,B,ROUGHNESS is wanted, with numbers from 0 to 1";
     let (kind, numbers) = text.split_once(':').ok_or(WANTED)?;
     let numbers: Vec<f32> = numbers
@@ -116,16 +109,16 @@ fn material(text: &str) -> std::result::Result<ObjectSurface, String> {
         .map(|part| part.trim().parse().ok().filter(|v| (0.0..=1.0).contains(v)))
         .collect::<Option<_>>()
         .ok_or(WANTED)?;
-    match (kind, &numbers[..]) {
-        ("diffuse", &[r, g, b]) => Ok(ObjectSurface::diffuse(Vec3::new(r, g, b))),
-        ("plastic" | "metal", &[r, g, b, roughness]) => Ok(ObjectSurface {
-            metallic: if kind == "metal" { 1.0 } else { 0.0 },
-            alpha: Some(roughness),
-            dielectric: DIELECTRIC,
-            ..ObjectSurface::diffuse(Vec3::new(r, g, b))
-        }),
-        _ => Err(WANTED.to_owned()),
-    }
+    let (roughness, rgb) = match (kind, &numbers[..]) {
+        ("diffuse", &[r, g, b]) => (None, [r, g, b]),
+        ("plastic" | "metal", &[r, g, b, roughness]) => (Some(roughness), [r, g, b]),
+        _ => return Err(WANTED.to_owned()),
+    };
+    Ok(MaterialOverride {
+        base_color: Vec3::from_array(rgb),
+        metallic: if kind == "metal" { 1.0 } else { 0.0 },
+        roughness,
+    })
 }
 
 impl Args for Objects {
@@ -178,6 +171,15 @@ impl Args for Objects {
             )
             .arg(
                 option(
+                    "tilt",
+                    "X,Z",
+                    "Rotation about the file's x and z axes in degrees, z first, before --rotate [default: 0,0]",
+                )
+                .allow_hyphen_values(true)
+                .value_parser(pair),
+            )
+            .arg(
+                option(
                     "material",
                     "KIND:R,G,B[,ROUGHNESS]",
                     "Replaces the file's materials: diffuse:R,G,B, plastic:R,G,B,ROUGHNESS or metal:R,G,B,ROUGHNESS",
@@ -188,17 +190,6 @@ impl Args for Objects {
 
     fn augment_args_for_update(command: Command) -> Command {
         Self::augment_args(command)
-    }
-}
-
-/// An object with the placement of its file.
-fn unplaced(file: &Path) -> Placement {
-    Placement {
-        file: file.to_owned(),
-        at: None,
-        scale: 1.0,
-        rotate: 0.0,
-        hidden: false,
     }
 }
 
@@ -227,26 +218,29 @@ impl FromArgMatches for Objects {
         let mut objects = Self(
             files
                 .iter()
-                .map(|(_, file)| (unplaced(file), None))
+                .map(|(_, file)| Placement::new(file, None))
                 .collect(),
         );
         let mut as_modelled = vec![false; files.len()];
         for (index, at) in indexed_values::<DVec3>(matches, "at") {
-            objects.0[owner(index, "at")?].0.at = Some(at);
+            objects.0[owner(index, "at")?].at = Some(at);
         }
         for (index, flag) in indexed_values::<bool>(matches, "as-modelled") {
             as_modelled[owner(index, "as-modelled")?] = flag;
         }
         for (index, scale) in indexed_values::<f64>(matches, "scale") {
-            objects.0[owner(index, "scale")?].0.scale = scale;
+            objects.0[owner(index, "scale")?].scale = scale;
         }
         for (index, rotate) in indexed_values::<f64>(matches, "rotate") {
-            objects.0[owner(index, "rotate")?].0.rotate = rotate;
+            objects.0[owner(index, "rotate")?].rotate = rotate;
         }
-        for (index, surface) in indexed_values::<ObjectSurface>(matches, "material") {
-            objects.0[owner(index, "material")?].1 = Some(surface);
+        for (index, tilt) in indexed_values::<DVec2>(matches, "tilt") {
+            objects.0[owner(index, "tilt")?].tilt = tilt;
         }
-        for ((placement, _), as_modelled) in objects.0.iter().zip(as_modelled) {
+        for (index, material) in indexed_values::<MaterialOverride>(matches, "material") {
+            objects.0[owner(index, "material")?].material = Some(material);
+        }
+        for (placement, as_modelled) in objects.0.iter().zip(as_modelled) {
             if placement.at.is_some() == as_modelled {
                 return Err(wrong(format!(
                     "--object {} needs either --at x,y,z or --as-modelled",
@@ -270,9 +264,7 @@ impl FromArgMatches for Objects {
 mod tests {
     use super::*;
 
-    fn parse(
-        arguments: &[&str],
-    ) -> std::result::Result<Vec<(Placement, Option<ObjectSurface>)>, String> {
+    fn parse(arguments: &[&str]) -> std::result::Result<Vec<Placement>, String> {
         let command = Objects::augment_args(Command::new("insert"));
         let all = std::iter::once(&"insert").chain(arguments);
         let matches = command
@@ -292,6 +284,8 @@ mod tests {
             "-1,0,2",
             "--rotate",
             "-90",
+            "--tilt",
+            "-30,15",
             "--object",
             "b.glb",
             "--scale",
@@ -302,17 +296,20 @@ mod tests {
         ])
         .expect("valid");
         assert_eq!(parsed.len(), 2);
-        assert!(parsed[0].1.is_none());
-        let made = parsed[1].1.as_ref().expect("a material").material(None);
+        assert!(parsed[0].material.is_none());
+        let made = parsed[1].material.expect("a material");
+        let made = made.surface().material(None);
         let lobe = made.lobe.expect("a metal shines");
         assert_eq!(
             (lobe.roughness, lobe.specular),
             (0.25, Vec3::new(0.9, 0.6, 0.3))
         );
-        assert_eq!(parsed[0].0.at, Some(DVec3::new(-1.0, 0.0, 2.0)));
-        assert_eq!((parsed[0].0.scale, parsed[0].0.rotate), (1.0, -90.0));
-        assert_eq!(parsed[1].0.at, None);
-        assert_eq!((parsed[1].0.scale, parsed[1].0.rotate), (0.01, 0.0));
+        assert_eq!(parsed[0].at, Some(DVec3::new(-1.0, 0.0, 2.0)));
+        assert_eq!((parsed[0].scale, parsed[0].rotate), (1.0, -90.0));
+        assert_eq!(parsed[0].tilt, DVec2::new(-30.0, 15.0));
+        assert_eq!(parsed[1].at, None);
+        assert_eq!((parsed[1].scale, parsed[1].rotate), (0.01, 0.0));
+        assert_eq!(parsed[1].tilt, DVec2::ZERO);
     }
 
     #[test]
@@ -326,14 +323,14 @@ mod tests {
 
     #[test]
     fn materials_are_what_they_are_called_and_others_are_refused() {
-        let made = |text| material(text).expect("valid").material(None);
+        let made = |text| material(text).expect("valid").surface().material(None);
         assert!(made("diffuse:0.1,0.2,0.3").lobe.is_none());
         let lobe = made("plastic:0.1,0.2,0.3,0.5")
             .lobe
             .expect("plastic shines");
         assert_eq!(
             (lobe.roughness, lobe.specular),
-            (0.5, Vec3::splat(DIELECTRIC))
+            (0.5, Vec3::splat(crate::transport::material::DIELECTRIC))
         );
         for text in [
             "",

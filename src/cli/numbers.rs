@@ -1,6 +1,6 @@
 //! Parsers of numbers on the command line. The error of each says what is expected.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use std::ops::RangeInclusive;
 
 /// A parsed value, or what is expected instead.
@@ -63,13 +63,24 @@ pub fn quarters(text: &str) -> Parsed<u8> {
     }
 }
 
+/// Two numbers separated by a comma.
+pub fn pair(text: &str) -> Parsed<DVec2> {
+    match numbers(text).as_deref() {
+        Some(&[x, y]) => Ok(DVec2::new(x, y)),
+        _ => Err("two numbers are wanted, e.g. 90,0".to_owned()),
+    }
+}
+
 /// Three numbers separated by commas.
 pub fn triple(text: &str) -> Parsed<DVec3> {
-    let numbers: Option<Vec<f64>> = text.split(',').map(|part| finite(part.trim())).collect();
-    match numbers.as_deref() {
+    match numbers(text).as_deref() {
         Some(&[x, y, z]) => Ok(DVec3::new(x, y, z)),
         _ => Err("three numbers are wanted, e.g. 0,1,0".to_owned()),
     }
+}
+
+fn numbers(text: &str) -> Option<Vec<f64>> {
+    text.split(',').map(|part| finite(part.trim())).collect()
 }
 
 fn finite(text: &str) -> Option<f64> {

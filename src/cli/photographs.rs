@@ -2,27 +2,24 @@
 
 use crate::cli::interrupt::Interrupt;
 use crate::cli::progress::{LENGTH, bar};
-use crate::compose::object::surface::ObjectSurface;
 use crate::error::Result;
 use crate::render::Renderer;
 use crate::say;
 use crate::session::photographs::Photographs;
 use std::path::PathBuf;
 
-/// Writes photographs and prints the paths of their files. Returns the exit code. `materials` is as in
-/// [`Photographs::write_with`].
+/// Writes photographs and prints the paths of their files. Returns the exit code.
 ///
 /// # Errors
 /// A file cannot be read or written.
 pub fn write_with_progress(
     work: &Photographs,
     renderer: &Renderer,
-    materials: &[Option<ObjectSurface>],
     prefix: &dyn Fn(usize) -> PathBuf,
 ) -> Result<i32> {
     let interrupt = Interrupt::listen()?;
     let bar = bar("{bar:24} photograph {msg}, {eta} left");
-    let written = work.write_with(renderer, materials, prefix, &|doing| {
+    let written = work.write_with(renderer, prefix, &|doing| {
         bar.set_position((f64::from(doing.fraction) * LENGTH as f64) as u64);
         bar.set_message(format!("{:03}", doing.frame));
         !interrupt.requested()

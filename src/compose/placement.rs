@@ -1,14 +1,15 @@
 //! Placement of an inserted object, and its triangles in scene coordinates.
 
 use crate::compose::object::ObjectModel;
+use crate::compose::object::surface::MaterialOverride;
 use crate::error::{Error, Result};
 use crate::gpu::Inserted;
 use crate::scene::Scene;
 use crate::scene::bvh::Bvh;
 use crate::scene::geometry::{Hit, Ray};
-use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// An object inserted into the scene.
@@ -23,31 +24,50 @@ pub struct Placement {
     pub scale: f64,
     /// Rotation about the up axis in degrees, counter-clockwise seen from above.
     pub rotate: f64,
+    /// Rotation about the file's x and z axes in degrees, z first, before `rotate`.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub tilt: DVec2,
+    /// The material of the whole object in place of those of its file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub material: Option<MaterialOverride>,
     /// Whether the object is left out of all pictures.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub hidden: bool,
 }
 
+fn is_zero(tilt: &DVec2) -> bool {
+    *tilt == DVec2::ZERO
+}
+
 impl Placement {
-    /// An object placed by its file's own coordinates.
-    pub fn as_modelled(file: &str) -> Self {
+    /// An object as its file has it, with its base at `at`, or by the file's own coordinates.
+    pub fn new(file: impl AsRef<Path>, at: Option<DVec3>) -> Self {
         Self {
-            file: PathBuf::from(file),
-            at: None,
+            file: file.as_ref().to_owned(),
+            at,
             scale: 1.0,
             rotate: 0.0,
+            tilt: DVec2::ZERO,
+            material: None,
             hidden: false,
         }
     }
 
-    /// The transform from the file's to the capture's coordinates; `up` is the capture's unit up vector.
+    /// The rotation that comes before all others.
+    pub fn tilt(&self) -> DQuat {
+        let about_z = DQuat::from_rotation_z(self.tilt.y.to_radians());
+        DQuat::from_rotation_x(self.tilt.x.to_radians()) * about_z
+    }
+
+    /// The transform from the file's to the capture's coordinates; `base` is [`ObjectModel::base`] of the tilted model,
+    /// `up` the capture's unit up vector.
     ///
-    /// With `at`, the file's +y axis is first rotated to `up` along the shortest arc. Without it, only `scale` and
-    /// `rotate` apply, about the file's origin.
+    /// With `at`, the tilted object's base is put there after the file's +y axis was rotated to `up` along the shortest
+    /// arc. Without it, only `scale`, `tilt` and `rotate` apply, about the file's origin.
     ///
     /// # Errors
     /// The scale is not positive, or a number is not finite.
-    pub fn transform(&self, model: &ObjectModel, up: DVec3) -> Result<DAffine3> {
+    pub fn transform(&self, base: DVec3, up: DVec3) -> Result<DAffine3> {
         if !(self.scale.is_finite() && self.scale > 0.0) {
             return Err(Error::usage(
                 "--scale",
@@ -55,21 +75,23 @@ impl Placement {
                 "give a number above 0",
             ));
         }
-        if !self.rotate.is_finite() || !self.at.is_none_or(DVec3::is_finite) {
+        let turned = self.rotate.is_finite() && self.tilt.is_finite();
+        if !turned || !self.at.is_none_or(DVec3::is_finite) {
             return Err(Error::usage(
-                "--at, --rotate",
+                "--at, --rotate, --tilt",
                 "a number is not finite",
                 "give finite numbers",
             ));
         }
         let turn = DQuat::from_axis_angle(up, self.rotate.to_radians());
+        let tilt = self.tilt();
         let linear = |rotation: DQuat| DMat3::from_quat(rotation) * self.scale;
         Ok(match self.at {
-            None => DAffine3::from_mat3(linear(turn)),
+            None => DAffine3::from_mat3(linear(turn * tilt)),
             Some(at) => {
                 let upright = DQuat::from_rotation_arc(DVec3::Y, up);
-                let linear = linear(turn * upright);
-                DAffine3::from_mat3_translation(linear, at - linear * model.base())
+                let offset = at - linear(turn * upright) * base;
+                DAffine3::from_mat3_translation(linear(turn * upright * tilt), offset)
             }
         })
     }
@@ -100,8 +122,13 @@ impl PlacedObject {
     /// # Errors
     /// The scale is not positive, a number is not finite, or a coordinate is too large for f32.
     pub fn new(model: Arc<ObjectModel>, placement: &Placement, scene: &Scene) -> Result<Self> {
-        let transform = placement.transform(&model, scene.up.as_dvec3().normalize_or(DVec3::Y))?;
+        let up = scene.up.as_dvec3().normalize_or(DVec3::Y);
+        let transform = placement.transform(model.base(placement.tilt()), up)?;
         let rotation = transform.matrix3 * placement.scale.recip();
+        let model = match &placement.material {
+            Some(material) => Arc::new(model.as_ref().clone().with_material(material)),
+            None => model,
+        };
         let corners: Vec<[Vec3; 3]> = model
             .corners
             .iter()

@@ -2,7 +2,6 @@
 
 use crate::compose::backdrop::Backdrop;
 use crate::compose::denoise::denoised;
-use crate::compose::object::surface::ObjectSurface;
 use crate::compose::placement::{PlacedObject, Placement};
 use crate::compose::psf_and_grain::PsfAndGrain;
 use crate::compose::relight::Relighting;
@@ -76,30 +75,25 @@ impl Photographs {
         prefix: &dyn Fn(usize) -> PathBuf,
         report: &dyn Fn(WriteProgress) -> bool,
     ) -> Result<Written> {
-        self.write_with(&Renderer::processor(), &[], prefix, report)
+        self.write_with(&Renderer::processor(), prefix, report)
     }
 
-    /// [`Photographs::write`] with a renderer, and with materials that replace those of object files: one for each
-    /// placement, `None` to keep the file's; empty to keep all.
+    /// [`Photographs::write`] with a renderer.
     ///
     /// # Errors
     /// As [`Photographs::write`].
     pub fn write_with(
         &self,
         renderer: &Renderer,
-        materials: &[Option<ObjectSurface>],
         prefix: &dyn Fn(usize) -> PathBuf,
         report: &dyn Fn(WriteProgress) -> bool,
     ) -> Result<Written> {
         let mut library = Library::default();
         let mut written = Written::default();
         let mut objects = Vec::new();
-        for (index, placement) in self.placements.iter().enumerate() {
-            let mut model = library.model(&placement.file)?;
+        for placement in &self.placements {
+            let model = library.model(&placement.file)?;
             written.warnings.extend(model.warnings.iter().cloned());
-            if let Some(Some(surface)) = materials.get(index) {
-                model = Arc::new(model.as_ref().clone().with_material(surface));
-            }
             let placed = PlacedObject::new(model, placement, &self.capture.scene)?;
             objects.push(Arc::new(placed));
         }

@@ -13,7 +13,6 @@ use relit::scene::Scene;
 use relit::transport::lit::LitScene;
 use relit::transport::material::{Lobe, Material};
 use relit::transport::path::PathOptions;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Samples a pixel.
@@ -61,11 +60,9 @@ fn insertion() -> (Insertion, Vec<Arc<PlacedObject>>) {
     let camera = scene.cameras[1].clone();
     let backdrop = Backdrop::new(1, &camera, &photograph, Exposure::default()).expect("sound");
     let placement = Placement {
-        file: PathBuf::from("gem"),
-        at: Some(DVec3::new(0.35, -0.99, 0.1)),
         scale: 0.3,
         rotate: 20.0,
-        hidden: false,
+        ..Placement::new("gem", Some(DVec3::new(0.35, -0.99, 0.1)))
     };
     let placed = PlacedObject::new(Arc::new(gem()), &placement, &scene).expect("it fits");
     let objects = vec![Arc::new(placed)];

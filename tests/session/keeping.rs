@@ -15,11 +15,9 @@ fn objects(folder: &Path) -> Vec<Placement> {
     let file = folder.join("block.obj");
     std::fs::write(&file, "v 0 0 0\nv 0.2 0 0\nv 0 0.2 0.2\nf 1 2 3\n").expect("written");
     let block = Placement {
-        file,
-        at: Some(glam::DVec3::new(0.1, 0.0, -0.3)),
         scale: 1.5,
         rotate: 30.0,
-        hidden: false,
+        ..Placement::new(file, Some(glam::DVec3::new(0.1, 0.0, -0.3)))
     };
     let hidden = Placement {
         hidden: true,

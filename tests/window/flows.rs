@@ -366,6 +366,72 @@ fn objects_are_inserted_moved_duplicated_deleted_and_brought_back() {
 }
 
 #[test]
+fn an_object_takes_a_material_and_a_tilt_that_undo_takes_back() {
+    let (mut harness, recorder) = solving(Harness::builder());
+    let folder = tempfile::tempdir().expect("a folder");
+    insert(&mut harness, &block(folder.path()));
+    let object =
+        |harness: &Harness<'_, Window>| harness.state().app.document.insertions.objects[0].clone();
+    assert_eq!(object(&harness).material, None);
+    click(&mut harness, "Own material");
+    let own = object(&harness).material.expect("the material of the file");
+    assert_eq!((own.metallic, own.roughness), (0.0, None));
+    click(&mut harness, "Object gloss");
+    let glossy = object(&harness).material.and_then(|own| own.roughness);
+    assert!(glossy.is_some());
+    retype(&mut harness, "Object metallic", "1");
+    assert_eq!(object(&harness).material.map(|own| own.metallic), Some(1.0));
+    retype(&mut harness, "Tilt z", "90");
+    assert_eq!(object(&harness).tilt, glam::DVec2::new(0.0, 90.0));
+    for _ in 0..4 {
+        press(&mut harness, Modifiers::COMMAND, Key::Z);
+    }
+    assert_eq!(
+        (object(&harness).material, object(&harness).tilt),
+        (None, glam::DVec2::ZERO)
+    );
+    assert_eq!(placements(&recorder), Some(1));
+}
+
+#[test]
+fn keys_of_blender_scale_an_object_until_a_click_or_escape() {
+    let (mut harness, recorder) = solving(Harness::builder());
+    let folder = tempfile::tempdir().expect("a folder");
+    insert(&mut harness, &block(folder.path()));
+    press(&mut harness, Modifiers::NONE, Key::Escape);
+    let scale =
+        |harness: &Harness<'_, Window>| harness.state().app.document.insertions.objects[0].scale;
+    let pane = harness.get_by_label("Photograph picture").rect();
+    let placement = harness.state().app.view.look.placement(pane, [64, 48]);
+    let at = |x, y| placement.min + placement.size() * egui::vec2(x, y);
+    // Without the choice, S scales nothing.
+    harness.hover_at(at(0.2, 0.2));
+    press(&mut harness, Modifiers::NONE, Key::S);
+    assert!(harness.state().app.view.tool.transform.is_none());
+    harness.state_mut().app.preferences.blender_keys = true;
+    for (key, kept) in [(Key::Escape, false), (Key::Enter, true)] {
+        let before = scale(&harness);
+        press(&mut harness, Modifiers::NONE, Key::S);
+        harness.hover_at(at(0.2, 0.2));
+        harness.run_steps(2);
+        harness.hover_at(at(0.05, 0.05));
+        harness.run_steps(2);
+        assert!(
+            scale(&harness) > before,
+            "{} from {before}",
+            scale(&harness)
+        );
+        press(&mut harness, Modifiers::NONE, key);
+        harness.hover_at(at(0.9, 0.9));
+        harness.run_steps(2);
+        assert_eq!(scale(&harness) > before, kept);
+    }
+    press(&mut harness, Modifiers::COMMAND, Key::Z);
+    assert_eq!(scale(&harness), 1.0);
+    assert_eq!(placements(&recorder), Some(1));
+}
+
+#[test]
 fn a_drag_is_one_step_of_undo() {
     let (mut harness, recorder) = solving(Harness::builder());
     let folder = tempfile::tempdir().expect("a folder");

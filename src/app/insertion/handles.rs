@@ -193,7 +193,7 @@ impl Insertions {
 }
 
 /// Where an object stands, in scene coordinates.
-fn foot(object: &Placement, scene: &Scene) -> Option<Vec3> {
+pub(super) fn foot(object: &Placement, scene: &Scene) -> Option<Vec3> {
     Some((object.at? - scene.origin).as_vec3())
 }
 
@@ -216,7 +216,7 @@ fn on_plane(point: Vec3, up: Vec3, ray: &Ray) -> Option<Vec3> {
 }
 
 /// Height above `point`, along the unit vector `up`, of that axis's point that is nearest to a ray.
-fn height_of(point: Vec3, up: Vec3, ray: &Ray) -> Option<f32> {
+pub(super) fn height_of(point: Vec3, up: Vec3, ray: &Ray) -> Option<f32> {
     let (to, direction) = (point - ray.origin, ray.direction);
     let (slope, square) = (up.dot(direction), direction.length_squared());
     let height = (slope * to.dot(direction) - square * to.dot(up)) / (square - slope * slope);
@@ -224,7 +224,7 @@ fn height_of(point: Vec3, up: Vec3, ray: &Ray) -> Option<f32> {
 }
 
 /// A number rounded to three digits.
-fn three_digits(value: f64) -> f64 {
+pub(super) fn three_digits(value: f64) -> f64 {
     let unit = 10f64.powf(value.abs().log10().floor() - 2.0);
     (value / unit).round() * unit
 }

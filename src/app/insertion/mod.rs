@@ -2,6 +2,7 @@
 
 pub mod handles;
 pub mod models;
+pub mod transform;
 
 use crate::compose::placement::Placement;
 use glam::DVec3;
@@ -67,11 +68,8 @@ impl Insertions {
     /// Adds an object at `at` and chooses it.
     pub fn add(&mut self, file: PathBuf, at: Option<DVec3>, scale: f64) {
         self.objects.push(Placement {
-            file,
-            at,
             scale,
-            rotate: 0.0,
-            hidden: false,
+            ..Placement::new(file, at)
         });
         self.chosen = self.objects.len().checked_sub(1);
     }

@@ -1,10 +1,9 @@
 //! The shapes of inserted objects, read on threads of their own, for boxes in the views.
 
 use crate::app::task::{Progress, Task};
-use crate::compose::object::ObjectModel;
-use crate::compose::object::surface::ObjectSurface;
+use crate::compose::object::surface::MaterialOverride;
+use crate::compose::object::{ObjectModel, base};
 use crate::compose::placement::Placement;
-use crate::error::Result;
 use crate::scene::Scene;
 use egui::{Color32, Painter, Pos2, Stroke};
 use glam::{DVec3, Vec3};
@@ -16,8 +15,8 @@ pub type Read = (PathBuf, std::result::Result<(), String>);
 
 /// What is known of an object's file.
 enum Shape {
-    Reading(Task<(), ObjectModel>),
-    Read(ObjectModel),
+    Reading(Task<(), Outline>),
+    Read(Outline),
 }
 
 /// Shapes by file.
@@ -54,7 +53,7 @@ impl Models {
         }
         let (ctx, path) = (ctx.clone(), file.to_owned());
         let wake = move || ctx.request_repaint();
-        let read = move |_: &Progress<()>| extent(&ObjectModel::read(&path)?);
+        let read = move |_: &Progress<()>| Ok(Outline::new(&ObjectModel::read(&path)?));
         // Without a thread the object has no box.
         if let Ok(task) = Task::begin("object", wake, read) {
             self.0.insert(file.to_owned(), Shape::Reading(task));
@@ -64,11 +63,16 @@ impl Models {
 
     /// Width, height and depth of an object as modelled.
     pub fn size(&self, file: &Path) -> Option<DVec3> {
-        let (low, high) = self.shape(file)?.bounds();
+        let (low, high) = self.shape(file)?.bounds;
         Some(high - low)
     }
 
-    fn shape(&self, file: &Path) -> Option<&ObjectModel> {
+    /// An object's material with the largest area.
+    pub fn material(&self, file: &Path) -> Option<MaterialOverride> {
+        Some(self.shape(file)?.material)
+    }
+
+    fn shape(&self, file: &Path) -> Option<&Outline> {
         match self.0.get(file)? {
             Shape::Read(model) => Some(model),
             Shape::Reading(_) => None,
@@ -77,7 +81,7 @@ impl Models {
 
     /// A power of ten that makes an object at most a third of the scene, where it is larger than that as modelled.
     pub fn fitting_scale(&self, file: &Path, scene: &Scene) -> Option<f64> {
-        let (low, high) = self.shape(file)?.bounds();
+        let (low, high) = self.shape(file)?.bounds;
         let size = (high - low).max_element();
         let diameter = f64::from(scene.diameter);
         if size <= diameter || !size.is_finite() {
@@ -88,9 +92,11 @@ impl Models {
 
     /// The corners of the box around a placed object, in scene coordinates; bit 0 of the index is x, 1 is y, 2 is z.
     pub fn corners(&self, placement: &Placement, scene: &Scene) -> Option<[Vec3; 8]> {
-        let model = self.shape(&placement.file)?;
-        let (low, high) = model.bounds();
-        let transform = placement.transform(model, scene.up.as_dvec3()).ok()?;
+        let shape = self.shape(&placement.file)?;
+        let (low, high) = shape.bounds;
+        let tilt = placement.tilt();
+        let base = base(shape.points.iter().map(|&point| tilt * point));
+        let transform = placement.transform(base, scene.up.as_dvec3()).ok()?;
         Some(std::array::from_fn(|index| {
             let high_along = glam::BVec3::new(index & 1 != 0, index & 2 != 0, index & 4 != 0);
             let corner = DVec3::select(high_along, high, low);
@@ -99,12 +105,40 @@ impl Models {
     }
 }
 
-/// A triangle with the bounds of a model: the bounds of a large model take long to compute.
-fn extent(model: &ObjectModel) -> Result<ObjectModel> {
-    let (low, high) = model.bounds();
-    let corners = vec![[low, high, DVec3::new(low.x, high.y, low.z)]];
-    let material = ObjectSurface::diffuse(Vec3::ZERO).material(None);
-    ObjectModel::from_corners(&model.name, corners, material)
+/// What the window keeps of an object's file.
+struct Outline {
+    /// Lowest and highest coordinates.
+    bounds: (DVec3, DVec3),
+    /// The outermost points along [`DIRECTIONS`] directions: bounds of a large model that is tilted take long to compute.
+    points: Vec<DVec3>,
+    /// The material with the largest area.
+    material: MaterialOverride,
+}
+
+/// Number of directions that outermost points are found for; they are about 14° apart.
+const DIRECTIONS: u32 = 200;
+
+impl Outline {
+    fn new(model: &ObjectModel) -> Self {
+        let bounds = model.bounds();
+        let spread = (0..DIRECTIONS).map(|index| {
+            // A spiral of points with equal areas around them.
+            let height = 1.0 - (2.0 * f64::from(index) + 1.0) / f64::from(DIRECTIONS);
+            let (sin, cos) = (f64::from(index) * 2.399_963_229_728_653).sin_cos();
+            let radius = (1.0 - height * height).sqrt();
+            DVec3::new(radius * cos, height, radius * sin)
+        });
+        let axes = DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]);
+        let outermost = |direction: DVec3| {
+            let points = model.corners.iter().flatten().copied();
+            points.max_by(|a, b| direction.dot(*a).total_cmp(&direction.dot(*b)))
+        };
+        Self {
+            bounds,
+            points: axes.chain(spread).filter_map(outermost).collect(),
+            material: model.main_material(),
+        }
+    }
 }
 
 /// Draws the edges of a box.
@@ -137,11 +171,12 @@ mod tests {
             DVec3::new(size, 0.0, size),
             DVec3::new(0.0, size, 0.0),
         ]];
-        let material = ObjectSurface::diffuse(Vec3::splat(0.5)).material(None);
+        let material = MaterialOverride::default().surface().material(None);
         let model = ObjectModel::from_corners("cube", corners, material).expect("a model");
-        let model = extent(&model).expect("it has a size");
         let mut models = Models::default();
-        models.0.insert("cube.obj".into(), Shape::Read(model));
+        models
+            .0
+            .insert("cube.obj".into(), Shape::Read(Outline::new(&model)));
         models
     }
 
@@ -149,11 +184,8 @@ mod tests {
     fn boxes_stand_where_the_object_was_placed() {
         let scene = scene();
         let placement = Placement {
-            file: "cube.obj".into(),
-            at: Some(DVec3::new(0.5, 0.0, -0.2)),
             scale: 2.0,
-            rotate: 0.0,
-            hidden: false,
+            ..Placement::new("cube.obj", Some(DVec3::new(0.5, 0.0, -0.2)))
         };
         let corners = models(0.1).corners(&placement, &scene).expect("known");
         let points = corners.map(|p| p.as_dvec3() + scene.origin);

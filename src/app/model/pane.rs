@@ -42,13 +42,15 @@ pub fn pane(ui: &mut Ui, document: &Document, view: &mut ViewState, requests: &m
     let response = named(response, Role::Image, "3D view picture");
     let before = view.model.orbit.clone();
     let cuts = cut_out(ui, view, requests, scene, &response);
-    if !move_object(ui, document, view, requests, scene, &response) {
-        if !cuts {
-            drag(ui, &mut view.model, &response);
+    if !transform_object(ui, view, requests, scene, &response) {
+        if !move_object(ui, document, view, requests, scene, &response) {
+            if !cuts {
+                drag(ui, &mut view.model, &response);
+            }
+            zoom_and_fly(ui, &mut view.model, scene, &response);
         }
-        zoom_and_fly(ui, &mut view.model, scene, &response);
+        click(ui, view, requests, scene, &response);
     }
-    click(ui, view, requests, scene, &response);
     if let Some((camera, moves)) = &mut view.shown.free
         && before != view.model.orbit
     {
@@ -199,6 +201,32 @@ fn cut_out(
     if let Some(pointer) = response.interact_pointer_pos() {
         view.model.lasso.draw(pointer);
     }
+    true
+}
+
+/// Moves, rotates or scales an inserted object by the pointer, as the keys asked; false where they did not.
+fn transform_object(
+    ui: &Ui,
+    view: &mut ViewState,
+    requests: &mut Requests,
+    scene: &Scene,
+    response: &Response,
+) -> bool {
+    let clicked = response.clicked();
+    if view.tool.transform.take_if(|_| clicked).is_some() {
+        return true;
+    }
+    let Some((pointer, transform)) = response.hover_pos().zip(view.tool.transform.as_mut()) else {
+        return false;
+    };
+    let at = pixel(ui, response.rect, pointer);
+    let ray = view.model.orbit.camera().ray(at);
+    let hit = under(&view.model, scene, at);
+    let surface = hit.map(|hit| scene.point(&hit).as_dvec3() + scene.origin);
+    let projection = Projection::new(&view.model.orbit, scene, response.rect);
+    let project = |point| projection.at(point);
+    let placed = transform.placed(scene, pointer, &ray, surface, project);
+    requests.ask_all(placed.map(|(index, to)| Request::Place(index, to)));
     true
 }
 

@@ -5,10 +5,12 @@ use crate::app::controls::{named, path_field, point, switched};
 use crate::app::document::Document;
 use crate::app::insertion::handles::SCALES;
 use crate::app::insertion::{Adding, Insertions, name};
+use crate::app::panels::color::color_button;
 use crate::app::request::{Request, Requests};
 use crate::app::shell::dialogs::Ask;
 use crate::app::theme;
 use crate::app::tool::Tool;
+use crate::compose::object::surface::MaterialOverride;
 use crate::compose::placement::Placement;
 use egui::{Button, Checkbox, DragValue, Grid, Role, ScrollArea, Ui};
 use glam::DVec3;
@@ -44,6 +46,8 @@ pub fn pane(
         if let Some((index, object)) = insertions.chosen() {
             let mut edited = object.clone();
             edit(ui, &mut edited, f64::from(capture.scene.diameter));
+            let found = insertions.models.material(&edited.file);
+            material(ui, found.unwrap_or_default(), &mut edited.material);
             if let Some(size) = insertions.models.size(&edited.file) {
                 let [width, height, depth] = (size * edited.scale).to_array();
                 ui.weak(format!("{width:.2} m wide, {height:.2} m high, {depth:.2} m deep"));
@@ -152,6 +156,17 @@ fn edit(ui: &mut Ui, object: &mut Placement, diameter: f64) {
         let turn = turn.range(-360.0..=360.0).speed(1.0).suffix(" °");
         named(ui.add(turn.max_decimals(4)), Role::SpinButton, "Turn");
         ui.end_row();
+        ui.label("Tilt").on_hover_text(
+            "About the object's own x and z axes, before the turn; it stands on its lowest point",
+        );
+        ui.horizontal(|ui| {
+            for (axis, tilt) in ["x", "z"].into_iter().zip(object.tilt.as_mut()) {
+                let tilt = DragValue::new(tilt).range(-360.0..=360.0).speed(1.0);
+                let tilt = tilt.max_decimals(4).prefix(format!("{axis} ")).suffix(" °");
+                named(ui.add(tilt), Role::SpinButton, &format!("Tilt {axis}"));
+            }
+        });
+        ui.end_row();
         ui.label("Scale")
             .on_hover_text("Factor on the file's size; 0.01 for files in centimetres");
         let speed = object.scale.abs() * 0.01;
@@ -159,6 +174,52 @@ fn edit(ui: &mut Ui, object: &mut Placement, diameter: f64) {
         let scale = scale.range(SCALES.0..=SCALES.1).speed(speed).suffix(" ×");
         named(ui.add(scale.max_decimals(4)), Role::SpinButton, "Scale");
         ui.end_row();
+    });
+}
+
+/// The material in place of those of the file; `found` is the file's main one.
+fn material(ui: &mut Ui, found: MaterialOverride, material: &mut Option<MaterialOverride>) {
+    let help = "One material for the whole object, in place of those of its file";
+    let mut own = material.is_some();
+    let response = ui.checkbox(&mut own, "Own material").on_hover_text(help);
+    if switched(response, Role::CheckBox, own, "Own material").changed() {
+        *material = own.then_some(found);
+    }
+    let Some(material) = material else {
+        return;
+    };
+    ui.horizontal_wrapped(|ui| {
+        let help = "Base colour (no unit), linear";
+        color_button(ui, "Object colour", help, &mut material.base_color);
+        let mut glossy = material.roughness.is_some();
+        let response = ui.checkbox(&mut glossy, "Gloss");
+        if switched(response, Role::CheckBox, glossy, "Object gloss").changed() {
+            material.roughness = glossy.then_some(MaterialOverride::GLOSS);
+        }
+        let Some(roughness) = &mut material.roughness else {
+            material.metallic = 0.0;
+            return;
+        };
+        for (name, value, help) in [
+            (
+                "roughness",
+                roughness,
+                "GGX roughness α (no unit): near 0 a mirror, 1 as dull as gloss can be",
+            ),
+            (
+                "metallic",
+                &mut material.metallic,
+                "0 for plastic, paint and wood, 1 for metal (no unit)",
+            ),
+        ] {
+            let drag = DragValue::new(value).range(0.0..=1.0).speed(0.005);
+            let drag = ui.add(drag.max_decimals(3).prefix(format!("{name} ")));
+            named(
+                drag.on_hover_text(help),
+                Role::SpinButton,
+                &format!("Object {name}"),
+            );
+        }
     });
 }
 

@@ -1,6 +1,8 @@
 //! Objects that are added: read first, then put on the floor in view.
 
+use crate::app::insertion::transform::{Asked, Transform};
 use crate::app::insertion::{is_object, name};
+use crate::app::request::Request;
 use crate::app::state::App;
 use crate::session::snapshot::Level;
 use glam::DVec3;
@@ -19,6 +21,18 @@ impl App {
         } else {
             let problem = "is no object that can be inserted; save it as GLB, glTF or OBJ";
             adding.problem = Some(format!("{}: {problem}", file.display()));
+        }
+    }
+
+    /// Follows Blender's keys, while they are on and no field takes letters.
+    pub(in crate::app) fn transform_by_keys(&mut self, ctx: &egui::Context) {
+        let open = self.document.capture().is_some() && !self.shows_start_page();
+        if self.preferences.blender_keys && open && !ctx.text_edit_focused() {
+            let transform = &mut self.view.tool.transform;
+            let asked = Transform::follow_keys(transform, &self.document.insertions, ctx);
+            if let Some(Asked::Cancel(index, before)) = asked {
+                self.perform(Request::Place(index, before), ctx);
+            }
         }
     }
 

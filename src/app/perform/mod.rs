@@ -241,6 +241,7 @@ impl App {
                 self.preferences.light = !self.preferences.light;
                 self.apply_theme(ctx);
             }
+            Action::BlenderKeys => self.preferences.blender_keys ^= true,
             Action::Palette => self.view.shell.palette = Some(Palette::default()),
             Action::Keys => self.view.shell.keys ^= true,
         }

@@ -81,7 +81,14 @@ pub fn interact(
         }
     }
     drag(ui, document, view, requests, rect, size, &response);
-    if response.double_clicked() {
+    if view
+        .tool
+        .transform
+        .take_if(|_| response.clicked())
+        .is_some()
+    {
+        // The click kept what the keys began.
+    } else if response.double_clicked() {
         view.look.fit();
     } else if response.clicked()
         && let Some(pointer) = response.interact_pointer_pos()
@@ -118,6 +125,16 @@ fn drag(
     }
     if response.drag_stopped() {
         view.tool.dragged = None;
+    }
+    if let Some(pointer) = response.hover_pos()
+        && let Some(transform) = &mut view.tool.transform
+    {
+        let at = fraction(placement, pointer);
+        let surface = view.shown.surface_at(document, at).map(|at| at.point);
+        let project = |point| on_screen(camera, placement, point);
+        let placed = transform.placed(scene, pointer, &ray(camera, at), surface, project);
+        requests.ask_all(placed.map(|(index, to)| Request::Place(index, to)));
+        return;
     }
     let pointer = response.interact_pointer_pos();
     match (pointer.filter(|_| response.dragged()), view.tool.dragged) {

@@ -21,6 +21,10 @@ pub fn bar(ui: &mut Ui, document: &Document, view: &ViewState) {
         });
         return;
     }
+    if let Some(transform) = &view.tool.transform {
+        ui.colored_label(tokens.accent, transform.words());
+        return;
+    }
     let Some(cursor) = view.look.cursor else {
         ui.label(RichText::new("Point at a picture to read its values").color(tokens.weak));
         return;

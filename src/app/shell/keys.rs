@@ -12,6 +12,7 @@ Picture: double click | Fit
 Inserted object: drag its foot | Move it over surfaces; with Shift up and down, with Ctrl on its level
 Inserted object: drag the ring beside it | Turn
 Inserted object: drag the square above it | Scale
+With Blender's keys: G, R, S | Move, rotate, scale; X, Y, Z hold an axis, Esc takes it back
 3D view: drag | Orbit
 3D view: right drag, middle drag, Shift + drag | Pan
 3D view: wheel | Zoom to the pointer

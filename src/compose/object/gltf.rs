@@ -189,7 +189,7 @@ fn surface(
     let (mut roughness, mut metallic) = (pbr.roughness_factor(), pbr.metallic_factor());
     if let Some(info) = pbr.metallic_roughness_texture() {
         let data = image(info.texture(), TextureKind::Data)?;
-        let values = mean(&data);
+        let values = mean(&data.pixels);
         roughness *= values.y;
         metallic *= values.z;
         warnings.push(format!(

@@ -7,10 +7,10 @@ pub mod surface;
 
 use crate::error::{Error, Result};
 use crate::transport::material::Material;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DQuat, DVec3, Vec2, Vec3};
 use std::path::Path;
 use std::sync::Arc;
-use surface::ObjectSurface;
+use surface::{MaterialOverride, ObjectSurface};
 
 /// Most triangles of an object.
 const MAX_TRIANGLES: usize = 20_000_000;
@@ -78,8 +78,8 @@ impl ObjectModel {
     }
 
     /// Replaces all materials by one, and drops textures and vertex colours.
-    pub fn with_material(mut self, surface: &ObjectSurface) -> Self {
-        self.materials = vec![surface.material(None)];
+    pub fn with_material(mut self, material: &MaterialOverride) -> Self {
+        self.materials = vec![material.surface().material(None)];
         self.material_of.fill(0);
         self.corner_colors.clear();
         self
@@ -87,19 +87,40 @@ impl ObjectModel {
 
     /// Lowest and highest coordinates.
     pub fn bounds(&self) -> (DVec3, DVec3) {
-        self.corners
-            .iter()
-            .flatten()
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &p| {
-                (low.min(p), high.max(p))
-            })
+        bounds(self.corners.iter().flatten().copied())
     }
 
-    /// Centre of the base: lowest height, centre of the bounding box.
-    pub fn base(&self) -> DVec3 {
-        let (low, high) = self.bounds();
-        DVec3::new((low.x + high.x) * 0.5, low.y, (low.z + high.z) * 0.5)
+    /// The material with the largest area, as one that could replace them all.
+    pub fn main_material(&self) -> MaterialOverride {
+        let mut areas = vec![0.0; self.materials.len()];
+        for ([a, b, c], &material) in self.corners.iter().zip(&self.material_of) {
+            areas[material as usize] += (*b - *a).cross(*c - *a).length();
+        }
+        let largest = |a: &&(f64, &Material), b: &&(f64, &Material)| a.0.total_cmp(&b.0);
+        let materials: Vec<(f64, &Material)> = areas.into_iter().zip(&self.materials).collect();
+        let main = materials.iter().max_by(largest);
+        main.map_or_else(MaterialOverride::default, |(_, material)| {
+            MaterialOverride::like(material)
+        })
     }
+
+    /// Centre of the base of the model rotated by `tilt`: lowest height, centre of the bounding box.
+    pub fn base(&self, tilt: DQuat) -> DVec3 {
+        base(self.corners.iter().flatten().map(|&p| tilt * p))
+    }
+}
+
+/// Centre of the base of points: lowest height, centre of their bounding box.
+pub fn base(points: impl Iterator<Item = DVec3>) -> DVec3 {
+    let (low, high) = bounds(points);
+    DVec3::new((low.x + high.x) * 0.5, low.y, (low.z + high.z) * 0.5)
+}
+
+/// Lowest and highest coordinates of points.
+fn bounds(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
+    points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+        (low.min(p), high.max(p))
+    })
 }
 
 /// A triangle as it was read.

@@ -1,8 +1,9 @@
 //! Materials as object files describe them, converted to those of light transport.
 
 use crate::math::picture::Picture;
-use crate::transport::material::{Albedo, Lobe, Material, Texture};
+use crate::transport::material::{Albedo, DIELECTRIC, Lobe, Material, Texture};
 use glam::{Vec2, Vec3};
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Metallic-roughness material.
@@ -20,13 +21,64 @@ pub struct ObjectSurface {
     pub dielectric: f32,
 }
 
-/// Mean colour of a picture.
-pub fn mean(image: &Picture) -> Vec3 {
-    let sum = image
-        .pixels
+/// One material for a whole object, in place of those of its file.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MaterialOverride {
+    /// Linear base colour, 0 to 1.
+    pub base_color: Vec3,
+    /// 0 for a dielectric, 1 for a metal; in between, a blend.
+    pub metallic: f32,
+    /// GGX roughness α, 0 to 1; `None` for a purely diffuse surface.
+    pub roughness: Option<f32>,
+}
+
+impl Default for MaterialOverride {
+    /// A grey diffuse surface.
+    fn default() -> Self {
+        Self {
+            base_color: Vec3::splat(0.5),
+            metallic: 0.0,
+            roughness: None,
+        }
+    }
+}
+
+impl MaterialOverride {
+    /// Roughness of a surface that is made glossy: semi-gloss paint.
+    pub const GLOSS: f32 = 0.3;
+
+    /// The override that is most like a material: one colour, and a metal where nothing is reflected diffusely.
+    pub fn like(material: &Material) -> Self {
+        let diffuse = match &material.albedo {
+            Albedo::Constant(albedo) => *albedo,
+            Albedo::Texels(texels) => mean(&texels.colors),
+            Albedo::Image(texture, factor) => mean(&texture.pixels) * *factor,
+        };
+        let metal = material.lobe.filter(|_| diffuse.max_element() <= 0.0);
+        Self {
+            base_color: metal.map_or(diffuse, |lobe| lobe.specular),
+            metallic: if metal.is_some() { 1.0 } else { 0.0 },
+            roughness: material.lobe.map(|lobe| lobe.roughness),
+        }
+    }
+
+    /// The surface.
+    pub fn surface(&self) -> ObjectSurface {
+        ObjectSurface {
+            metallic: self.metallic,
+            alpha: self.roughness,
+            dielectric: DIELECTRIC,
+            ..ObjectSurface::diffuse(self.base_color)
+        }
+    }
+}
+
+/// Mean of linear colours.
+pub fn mean(colors: &[Vec3]) -> Vec3 {
+    let sum = colors
         .iter()
         .fold(glam::DVec3::ZERO, |sum, c| sum + c.as_dvec3());
-    (sum / image.pixels.len().max(1) as f64).as_vec3()
+    (sum / colors.len().max(1) as f64).as_vec3()
 }
 
 impl ObjectSurface {
@@ -70,7 +122,7 @@ impl ObjectSurface {
                     pixels: image.pixels.clone(),
                     corner_uvs: corner_uvs.clone(),
                 };
-                let mean = mean(image) * self.base_color;
+                let mean = mean(&image.pixels) * self.base_color;
                 (Albedo::Image(Arc::new(texture), diffuse), mean)
             }
             _ => (Albedo::Constant(diffuse), self.base_color),

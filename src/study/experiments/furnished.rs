@@ -203,7 +203,7 @@ fn furnish(
         lit,
         furnished: room.lit(size)?,
         models,
-        placement: Placement::as_modelled("chairs"),
+        placement: Placement::new("chairs", None),
     })
 }
 

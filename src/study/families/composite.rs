@@ -80,7 +80,7 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
     };
     let true_chair = [Arc::new(PlacedObject::new(
         chair.clone(),
-        &Placement::as_modelled("chair"),
+        &Placement::new("chair", None),
         &truth.scene,
     )?)];
     let frames = most_seen(&truth, &true_chair);
@@ -319,7 +319,7 @@ fn scores(
     let scene = &problem.scene;
     let placed = [Arc::new(PlacedObject::new(
         chair.clone(),
-        &Placement::as_modelled("chair"),
+        &Placement::new("chair", None),
         scene,
     )?)];
     let lit = Arc::new(estimate.lit(scene));
