@@ -11,8 +11,11 @@ pub const ALBEDO_DEVIATION: f32 = 0.5;
 pub const UNSEEN_DEVIATION: f32 = 0.25;
 /// Mean of an unknown albedo.
 pub const ALBEDO_MEAN: f32 = 0.5;
-/// Standard deviation of outside radiance in an unseen direction, in mean radiances of the photographs.
+/// Standard deviation of outside radiance in a direction before a fit, in mean radiances of the photographs: what shines through the
+/// windows of a modelled room.
 const OUTSIDE_DEVIATION: f32 = 4.0;
+/// The same for a scan. Its holes lead to the rest of the room, which is about as bright as what the photographs show.
+const SCAN_DEVIATION: f32 = 1.0;
 
 /// Standard deviation of each channel of outside radiance about its expected colour, relative to its fitted brightness. Of 0.03,
 /// 0.1 and 0.3 it gives the least albedo error in `relit trade --rooms 12 --family window --preset preview`.
@@ -53,8 +56,10 @@ pub struct Prior {
     outside: usize,
     /// Mean and standard deviation of the radiance of each outside direction.
     directions: Vec<(Vec3, Vec3)>,
-    /// Standard deviation of the radiance of an outside direction before a fit.
-    deviation: Vec3,
+    /// Mean radiance of all photographs.
+    photographed: Vec3,
+    /// Whether the mesh is a scan.
+    scanned: bool,
     /// Known parameters and their values.
     known: BTreeMap<usize, Vec3>,
 }
@@ -68,7 +73,8 @@ impl Prior {
             albedo: ExpectedAlbedo::unknown(surfaces, &[]),
             outside,
             directions: vec![(Vec3::ZERO, photographed * OUTSIDE_DEVIATION); surfaces - outside],
-            deviation: photographed * OUTSIDE_DEVIATION,
+            photographed,
+            scanned: false,
             known: BTreeMap::new(),
         }
     }
@@ -102,14 +108,27 @@ impl Prior {
         &self.albedo
     }
 
-    /// The prior with the given means of the outside directions, by surface.
+    /// The prior of a scan: outside directions are about as bright as the rest of the room.
+    pub fn of_scan(mut self) -> Self {
+        self.scanned = true;
+        let deviation = self.photographed * SCAN_DEVIATION;
+        self.directions.fill((Vec3::ZERO, deviation));
+        self
+    }
+
+    /// The prior with the given means of the outside directions, by surface. A direction may be off by as much as its mean, and in a
+    /// modelled room by as much as the brightest of them: one sky shines through all windows.
     pub fn with_sky(mut self, expected: impl Fn(u32) -> Vec3) -> Self {
-        for (surface, (mean, _)) in (self.outside as u32..).zip(&mut self.directions) {
+        let mut brightest = Vec3::ZERO;
+        for (surface, (mean, deviation)) in (self.outside as u32..).zip(&mut self.directions) {
             *mean = expected(surface);
-            self.deviation = self.deviation.max(*mean);
+            *deviation = deviation.max(*mean);
+            brightest = brightest.max(*deviation);
         }
-        for (_, deviation) in &mut self.directions {
-            *deviation = self.deviation;
+        if !self.scanned {
+            for (_, deviation) in &mut self.directions {
+                *deviation = brightest;
+            }
         }
         self
     }
@@ -142,7 +161,7 @@ impl Prior {
             let (radiance, error) = found(surface);
             let brightness = brightness(color, radiance, error);
             *mean = color * brightness;
-            let least = self.deviation * OUTSIDE_TINT / OUTSIDE_DEVIATION;
+            let least = self.photographed * OUTSIDE_TINT;
             *deviation = (*mean * OUTSIDE_TINT).max(least);
         }
         self
@@ -155,7 +174,7 @@ impl Prior {
             // The scale of the parameter, for known values of zero.
             let unit = match parameter < self.surfaces {
                 true => Vec3::ONE,
-                false => self.deviation,
+                false => self.photographed,
             };
             let deviation = value.max(unit).as_dvec3() * KNOWN;
             let precision = (noise / (deviation * deviation)).min(DVec3::splat(f64::MAX));

@@ -14,10 +14,7 @@ impl Pipeline<'_, '_> {
     pub(super) fn full_paths(&mut self) -> Result<(), Termination> {
         let started = self.monitor.seconds();
         self.search_anew()?;
-        let (mut cache, mut limit) = match self.compared()? {
-            Some(stored) => stored,
-            None => self.fit_full_paths()?,
-        };
+        let (mut cache, mut limit) = self.fit_full_paths()?;
         for _ in 1..MAX_SEARCHES {
             // With albedos corrected by a new lamp, another one may become significant.
             if !self.search_unseen(false)? {
@@ -40,7 +37,7 @@ impl Pipeline<'_, '_> {
 
     /// Stores full paths to the present lamps and settles all roles on them. Also returns the remark of
     /// [`Self::stored`] on their number.
-    pub(super) fn fit_full_paths(&mut self) -> Result<(PathCache, String), Termination> {
+    fn fit_full_paths(&mut self) -> Result<(PathCache, String), Termination> {
         self.monitor.phase("tracing paths to the lamps");
         let lights = self.lights();
         let (cache, limit) = self.stored(&lights, None, 1, self.budget.round_paths)?;
@@ -49,7 +46,7 @@ impl Pipeline<'_, '_> {
     }
 
     /// Fits all that is free to stored paths, and settles the roles on them.
-    pub(super) fn fit_stored(&mut self, cache: &PathCache) -> Result<(), Termination> {
+    fn fit_stored(&mut self, cache: &PathCache) -> Result<(), Termination> {
         self.monitor.phase("fitting albedo and emission");
         // Roles are tested with even weights, since residuals under a wrong role are no measure of noise.
         self.robust = RobustWeights::even(self.roles.len());

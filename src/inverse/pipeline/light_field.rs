@@ -80,13 +80,14 @@ impl Pipeline<'_, '_> {
     ) -> Result<(), Termination> {
         self.unknowns = Unknowns::new(self.roles.len());
         self.robust = RobustWeights::even(self.roles.len());
-        // Seen lamps first: while they are fitted as white walls, unseen objects would be given light to explain them.
+        // Seen lamps first: while they are fitted as white walls, unseen objects and the outside would be given light to explain them.
         for out_of_sight in [Role::Dark, Role::Unseen] {
             for (k, role) in self.roles.iter_mut().enumerate() {
                 match self.gbuffer.seen.get(k) {
                     Some(0) => *role = out_of_sight,
                     Some(_) if out_of_sight == Role::Dark => *role = Role::Reflector,
                     Some(_) => {}
+                    None if out_of_sight == Role::Dark => *role = Role::Dark,
                     None => *role = outside,
                 }
             }

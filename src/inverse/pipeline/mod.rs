@@ -46,7 +46,6 @@ use crate::inverse::unknowns::Unknowns;
 use crate::transport::material::Lobe;
 use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
-use outside::Compared;
 use refine::Summed;
 use textures::Detail;
 
@@ -98,8 +97,6 @@ pub struct Pipeline<'a, 'o> {
     detail: Option<Detail>,
     /// Mean of each surface's brightest channel in the photographs; zero for unseen surfaces.
     brightness: Vec<f32>,
-    /// Paths and fit of the trial of light from outside that the next stage begins with.
-    compared: Option<Compared>,
     /// Number of finished stages.
     stages: u32,
     /// The state after the last finished stage.
@@ -151,7 +148,13 @@ pub fn solve(
     }
     let max_bounces = settings.max_bounces().min(MAX_DEPTH);
     let clusters = cluster(problem, &gbuffer, budget.pixels);
-    let prior = Prior::new(surfaces, objects, mean_radiance(&clusters))
+    let prior = Prior::new(surfaces, objects, mean_radiance(&clusters));
+    let prior = if problem.scene.scanned {
+        prior.of_scan()
+    } else {
+        prior
+    };
+    let prior = prior
         .with_known(&monitor.known)
         .with_albedo(ExpectedAlbedo::unknown(surfaces, &gbuffer.seen));
     let start = match resume {
@@ -210,7 +213,6 @@ pub fn solve(
         estimate: Estimate::default(),
         summed: None,
         detail: None,
-        compared: None,
         stages: start.stages,
     };
     pipeline.hold();

@@ -1,4 +1,4 @@
-//! The trial of light from outside the mesh: from infinity, with and without a sun, and for a scan from a box around it.
+//! Light from outside the mesh: from infinity, with and without a sun, or from a box around a scan.
 
 use crate::calibrate::measured_radiance::MeasuredRadiance;
 use crate::inverse::fit::equations::NormalEquations;
@@ -37,7 +37,6 @@ struct Found {
     errors: StandardErrors,
     robust: RobustWeights,
     prior: Prior,
-    surroundings: Surroundings,
     sun: Option<Vec3>,
     open: bool,
     sky: Option<MeasuredOutside>,
@@ -49,19 +48,6 @@ struct Trial {
     misfit: Misfit,
     /// The paths, if new ones were traced.
     paths: Option<PathCache>,
-}
-
-/// Full paths that were fitted to compare two kinds of light from outside.
-pub(super) struct Compared {
-    /// Roles and unknowns before the fit.
-    roles: Vec<Role>,
-    unknowns: Unknowns,
-    /// The free parameters of the fit.
-    free: Vec<usize>,
-    /// The result of the fit.
-    fitted: Found,
-    /// The paths, and a remark on their number.
-    stored: (PathCache, String),
 }
 
 impl Pipeline<'_, '_> {
@@ -78,12 +64,9 @@ impl Pipeline<'_, '_> {
         }
     }
 
-    /// Tries light from infinity, without a sun and with one if there is a candidate. Keeps it if the light field's squared error falls
-    /// clearly.
-    ///
-    /// A scan gets light from outside without that test, from infinity or from a box around the mesh, whichever predicts held-out
-    /// pixels better: what was not scanned reflects light, if nothing else, and the light field
-    /// without it makes walls lighter, or gives them light of their own, until nothing is left to improve.
+    /// Tries light from outside the mesh, where paths leave it. A scan gets it without a test: what was not scanned reflects light, if
+    /// nothing else, and the light field without it makes walls lighter, or gives them light of their own, until nothing is left to
+    /// improve.
     pub(super) fn light_from_outside(
         &mut self,
         cache: &PathCache,
@@ -97,61 +80,67 @@ impl Pipeline<'_, '_> {
         let started = self.monitor.seconds();
         self.monitor.phase("trying light from outside");
         let leave = format!("{:.1} % of the paths leave the mesh", escaping * 100.0);
-        let scanned = self.problem.scene.scanned;
-        // A linear step estimates the gain at a small fraction of the cost of a trial.
-        let gain = (!scanned).then(|| self.outside_gain(cache));
-        if let Some(gain) = gain.filter(|&gain| gain < OUTSIDE_GAIN) {
-            let why = format!(
-                "{leave}; light from there would change the squared error by {:.1} %, so it is not called for",
-                -gain * 100.0,
-            );
-            self.record("outside light", started, false, why)?;
-            return Ok(());
-        }
-        let without = self.found();
         let scene = &self.problem.scene;
-        let cameras = scene.cameras.iter().map(|camera| camera.center);
-        let places = scene.positions.iter().copied().chain(cameras);
-        // A mesh that is not a scan is assumed to lack windows only.
-        let around = scanned.then(|| Surroundings::around(places)).flatten();
-        let before = Misfit::new(cache, &without.unknowns);
-        let mut far = self.fit_open(Surroundings::Far, None, cache, lights, measured)?;
-        let sun = self.find_sun(far.paths.take().as_ref().unwrap_or(cache));
-        self.go_back_to(without.clone());
-        if sun.is_some() {
-            let sunny = self.fit_open(Surroundings::Far, sun, cache, lights, measured)?;
-            let fall = far.misfit.mean() - sunny.misfit.mean();
-            if fall > OUTSIDE_GAIN * before.mean() && self.sun_shines() {
-                far = sunny;
+        let what = if scene.scanned {
+            let cameras = scene.cameras.iter().map(|camera| camera.center);
+            let around = Surroundings::around(scene.positions.iter().copied().chain(cameras));
+            let around = around.unwrap_or(Surroundings::Far);
+            self.fit_open(around, None, cache, lights, measured)?;
+            match around {
+                Surroundings::Far => "comes from far away".to_owned(),
+                Surroundings::Box { .. } => "comes from a box around the mesh".to_owned(),
             }
-            self.go_back_to(without.clone());
-        }
-        let gain = 1.0 - far.misfit.mean() / before.mean();
-        let gains = before.falls(&far.misfit, OUTSIDE_GAIN * before.mean());
-        let best = match around {
-            Some(around) => {
-                let near = self.fit_open(around, None, cache, lights, measured)?;
-                self.best_trial([far.found, near.found])?
-            }
-            None => (scanned || gains).then_some(far.found),
+        } else {
+            self.light_through_windows(cache, lights, measured)?
         };
-        self.go_back_to(best.unwrap_or(without));
         self.describe();
-        let comes = match (self.open, self.outside.surroundings, self.outside.sun) {
-            (false, ..) => "is not called for".to_owned(),
-            (true, Surroundings::Box { .. }, _) => "comes from a box around the mesh".to_owned(),
-            (true, Surroundings::Far, sun) => format!(
-                "changes the squared error by {:.1} % and comes from far away{}",
-                -gain * 100.0,
-                sun.map_or(String::new(), |sun| {
-                    let height = sun.dot(self.problem.scene.up).asin().to_degrees();
-                    format!(", with a sun {height:.0}° above the horizon")
-                })
-            ),
-        };
-        let why = format!("{leave}; light from there {comes}");
+        let why = format!("{leave}; light from there {what}");
         self.record("outside light", started, self.open, why)?;
         Ok(())
+    }
+
+    /// Tries light from infinity, without a sun and with one if there is a candidate. Keeps it if the light field's squared error falls
+    /// clearly. A mesh that is not a scan is assumed to lack windows only. Returns in words what the light does.
+    fn light_through_windows(
+        &mut self,
+        cache: &PathCache,
+        lights: &Emitters,
+        measured: &MeasuredRadiance,
+    ) -> Result<String, Termination> {
+        // A linear step estimates the gain at a small fraction of the cost of a trial.
+        let gain = self.outside_gain(cache);
+        if gain < OUTSIDE_GAIN {
+            return Ok(format!(
+                "would change the squared error by {:.1} %, so it is not called for",
+                -gain * 100.0
+            ));
+        }
+        let without = self.found();
+        let before = Misfit::new(cache, &without.unknowns);
+        let mut best = self.fit_open(Surroundings::Far, None, cache, lights, measured)?;
+        let sun = self.find_sun(best.paths.take().as_ref().unwrap_or(cache));
+        if sun.is_some() {
+            self.go_back_to(without.clone());
+            let sunny = self.fit_open(Surroundings::Far, sun, cache, lights, measured)?;
+            let fall = best.misfit.mean() - sunny.misfit.mean();
+            if fall > OUTSIDE_GAIN * before.mean() && self.sun_shines() {
+                best = sunny;
+            }
+        }
+        if !before.falls(&best.misfit, OUTSIDE_GAIN * before.mean()) {
+            self.go_back_to(without);
+            return Ok("is not called for".to_owned());
+        }
+        let gain = 1.0 - best.misfit.mean() / before.mean();
+        self.go_back_to(best.found);
+        let sun = self.outside.sun.map_or(String::new(), |sun| {
+            let height = sun.dot(self.problem.scene.up).asin().to_degrees();
+            format!(", with a sun {height:.0}° above the horizon")
+        });
+        Ok(format!(
+            "changes the squared error by {:.1} % and comes from far away{sun}",
+            -gain * 100.0
+        ))
     }
 
     /// Whether the fitted sun is brighter than nothing by its standard errors.
@@ -192,58 +181,6 @@ impl Pipeline<'_, '_> {
         })
     }
 
-    /// The result with the least loss on held-out pixels, or in the fit if none is held out. Full paths are fitted first, if there are
-    /// any, since the light field is blurred. Those of the best are kept, since the next stage begins with the same.
-    fn best_trial(&mut self, trials: [Found; 2]) -> Result<Option<Found>, Termination> {
-        let mut best: Option<(f64, Found)> = None;
-        for found in trials {
-            self.go_back_to(found.clone());
-            self.describe();
-            let mut compared = None;
-            if self.budget.round_paths > 0 {
-                self.expect_of_albedo();
-                let free = self.free();
-                let stored = self.fit_full_paths()?;
-                compared = Some(Compared {
-                    roles: found.roles.clone(),
-                    unknowns: found.unknowns.clone(),
-                    free,
-                    fitted: self.found(),
-                    stored,
-                });
-            }
-            let losses = self.measure();
-            let loss = losses.held_out.or(losses.train).unwrap_or(0.0);
-            if (best.as_ref()).is_none_or(|(least, _)| loss < *least) {
-                self.compared = compared;
-                best = Some((loss, found));
-            }
-        }
-        Ok(best.map(|(_, found)| found))
-    }
-
-    /// The paths of the best trial of light from outside, and their fit, if roles and unknowns are still those that they were traced
-    /// with: a second trace would give the same bits.
-    pub(super) fn compared(&mut self) -> Result<Option<(PathCache, String)>, Termination> {
-        let taken = self.compared.take();
-        let compared = taken.filter(|c| {
-            c.roles == self.roles
-                && c.unknowns == self.unknowns
-                && c.stored.0.clusters.len() == self.clusters.len()
-        });
-        let Some(compared) = compared else {
-            return Ok(None);
-        };
-        // The albedos of unseen surfaces are free from the second stage on.
-        if compared.free == self.free() {
-            self.go_back_to(compared.fitted);
-            self.describe();
-        } else {
-            self.fit_stored(&compared.stored.0)?;
-        }
-        Ok(Some(compared.stored))
-    }
-
     /// The present result of a trial.
     fn found(&self) -> Found {
         Found {
@@ -252,7 +189,6 @@ impl Pipeline<'_, '_> {
             errors: self.errors.clone(),
             robust: self.robust.clone(),
             prior: self.prior.clone(),
-            surroundings: self.outside.surroundings,
             sun: self.outside.sun,
             open: self.open,
             sky: self.sky.clone(),
@@ -266,7 +202,6 @@ impl Pipeline<'_, '_> {
         self.errors = found.errors;
         self.robust = found.robust;
         self.prior = found.prior;
-        self.outside.surroundings = found.surroundings;
         self.outside.sun = found.sun;
         self.open = found.open;
         self.sky = found.sky;
