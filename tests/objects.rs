@@ -229,7 +229,7 @@ fn an_object_stands_on_its_base_turned_and_scaled_about_the_up_axis() {
         tilt: DVec2::new(0.0, 90.0),
         ..placement.clone()
     };
-    let lying = tilted.transform(model.base(tilted.tilt()), DVec3::Y);
+    let lying = tilted.transform(model.base(tilted.tilt_rotation()), DVec3::Y);
     let points = model.corners[0].map(|p| lying.as_ref().expect("sound").transform_point3(p));
     near(points[0], DVec3::new(1.0, 0.0, -3.0));
     near(points[1], DVec3::new(1.0, 4.0, -3.0));

@@ -79,7 +79,7 @@ pub fn insert(arguments: &InsertArguments) -> Result<i32> {
     })
 }
 
-/// FrameChoice photographs to insert into.
+/// The photographs to insert into.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum FrameChoice {
     One(usize),
@@ -263,6 +263,7 @@ impl FromArgMatches for Objects {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::transport::material::DIELECTRIC;
 
     fn parse(arguments: &[&str]) -> std::result::Result<Vec<Placement>, String> {
         let command = Objects::augment_args(Command::new("insert"));
@@ -330,7 +331,7 @@ mod tests {
             .expect("plastic shines");
         assert_eq!(
             (lobe.roughness, lobe.specular),
-            (0.5, Vec3::splat(crate::transport::material::DIELECTRIC))
+            (0.5, Vec3::splat(DIELECTRIC))
         );
         for text in [
             "",

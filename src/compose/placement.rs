@@ -54,7 +54,7 @@ impl Placement {
     }
 
     /// The rotation that comes before all others.
-    pub fn tilt(&self) -> DQuat {
+    pub fn tilt_rotation(&self) -> DQuat {
         let about_z = DQuat::from_rotation_z(self.tilt.y.to_radians());
         DQuat::from_rotation_x(self.tilt.x.to_radians()) * about_z
     }
@@ -84,7 +84,7 @@ impl Placement {
             ));
         }
         let turn = DQuat::from_axis_angle(up, self.rotate.to_radians());
-        let tilt = self.tilt();
+        let tilt = self.tilt_rotation();
         let linear = |rotation: DQuat| DMat3::from_quat(rotation) * self.scale;
         Ok(match self.at {
             None => DAffine3::from_mat3(linear(turn * tilt)),
@@ -123,7 +123,7 @@ impl PlacedObject {
     /// The scale is not positive, a number is not finite, or a coordinate is too large for f32.
     pub fn new(model: Arc<ObjectModel>, placement: &Placement, scene: &Scene) -> Result<Self> {
         let up = scene.up.as_dvec3().normalize_or(DVec3::Y);
-        let transform = placement.transform(model.base(placement.tilt()), up)?;
+        let transform = placement.transform(model.base(placement.tilt_rotation()), up)?;
         let rotation = transform.matrix3 * placement.scale.recip();
         let model = match &placement.material {
             Some(material) => Arc::new(model.as_ref().clone().with_material(material)),

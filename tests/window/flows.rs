@@ -432,6 +432,27 @@ fn keys_of_blender_scale_an_object_until_a_click_or_escape() {
 }
 
 #[test]
+fn an_object_that_is_deleted_while_the_pointer_scales_it_leaves_the_others_alone() {
+    let (mut harness, _recorder) = solving(Harness::builder());
+    let folder = tempfile::tempdir().expect("a folder");
+    insert(&mut harness, &block(folder.path()));
+    click(&mut harness, "Duplicate");
+    press(&mut harness, Modifiers::NONE, Key::Escape);
+    harness.state_mut().app.preferences.blender_keys = true;
+    harness.state_mut().app.document.insertions.chosen = Some(0);
+    let others = harness.state().app.document.insertions.objects[1..].to_vec();
+    let pane = harness.get_by_label("Photograph picture").rect();
+    harness.hover_at(pane.center());
+    press(&mut harness, Modifiers::NONE, Key::S);
+    harness.hover_at(pane.center() - pane.size() * 0.2);
+    harness.run_steps(2);
+    press(&mut harness, Modifiers::NONE, Key::Delete);
+    harness.hover_at(pane.center() - pane.size() * 0.4);
+    harness.run_steps(2);
+    assert_eq!(harness.state().app.document.insertions.objects, others);
+}
+
+#[test]
 fn a_drag_is_one_step_of_undo() {
     let (mut harness, recorder) = solving(Harness::builder());
     let folder = tempfile::tempdir().expect("a folder");

@@ -94,7 +94,7 @@ impl Models {
     pub fn corners(&self, placement: &Placement, scene: &Scene) -> Option<[Vec3; 8]> {
         let shape = self.shape(&placement.file)?;
         let (low, high) = shape.bounds;
-        let tilt = placement.tilt();
+        let tilt = placement.tilt_rotation();
         let base = base(shape.points.iter().map(|&point| tilt * point));
         let transform = placement.transform(base, scene.up.as_dvec3()).ok()?;
         Some(std::array::from_fn(|index| {
@@ -115,6 +115,8 @@ struct Outline {
     material: MaterialOverride,
 }
 
+/// The golden angle in radians.
+const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 /// Number of directions that outermost points are found for; they are about 14° apart.
 const DIRECTIONS: u32 = 200;
 
@@ -124,7 +126,7 @@ impl Outline {
         let spread = (0..DIRECTIONS).map(|index| {
             // A spiral of points with equal areas around them.
             let height = 1.0 - (2.0 * f64::from(index) + 1.0) / f64::from(DIRECTIONS);
-            let (sin, cos) = (f64::from(index) * 2.399_963_229_728_653).sin_cos();
+            let (sin, cos) = (f64::from(index) * GOLDEN_ANGLE).sin_cos();
             let radius = (1.0 - height * height).sqrt();
             DVec3::new(radius * cos, height, radius * sin)
         });

@@ -35,22 +35,14 @@ pub struct Transform {
     start: Option<Pos2>,
 }
 
-/// What the keys of this frame ask for.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Asked {
-    /// The object goes back to where it was.
-    Cancel(usize, Placement),
-    /// The object stays where it is.
-    Keep,
-}
-
 impl Transform {
-    /// Begins, changes or ends a transform by the keys that were pressed, and takes those out of the input.
+    /// Begins, changes or ends a transform by the keys that were pressed, and takes those out of the input. Returns the object's
+    /// index and its placement at the start if it is to be taken back.
     pub fn follow_keys(
         transform: &mut Option<Self>,
         insertions: &Insertions,
         ctx: &Context,
-    ) -> Option<Asked> {
+    ) -> Option<(usize, Placement)> {
         let pressed = |key| ctx.input_mut(|input| input.consume_key(Modifiers::NONE, key));
         for (key, kind) in [
             (Key::G, Kind::Grab),
@@ -80,15 +72,11 @@ impl Transform {
                 under_way.axis = (under_way.axis != Some(axis)).then_some(axis);
             }
         }
-        let asked = if pressed(Key::Escape) {
-            Asked::Cancel(under_way.index, under_way.before.clone())
-        } else if pressed(Key::Enter) {
-            Asked::Keep
-        } else {
-            return None;
-        };
-        *transform = None;
-        Some(asked)
+        if pressed(Key::Enter) {
+            *transform = None;
+        }
+        let cancelled = transform.take_if(|_| pressed(Key::Escape))?;
+        Some((cancelled.index, cancelled.before))
     }
 
     /// The object's index and placement for the pointer at `pointer` of a view, whose `ray` hits `surface`; `project` gives
@@ -158,7 +146,8 @@ impl Transform {
 /// Rotates a placement about an axis through its foot, by degrees counter-clockwise as seen from the axis's tip.
 fn rotate(object: &mut Placement, scene: &Scene, axis: DVec3, degrees: f64) {
     let upright = DQuat::from_rotation_arc(DVec3::Y, scene.up.as_dvec3());
-    let before = upright * DQuat::from_rotation_y(object.rotate.to_radians()) * object.tilt();
+    let before =
+        upright * DQuat::from_rotation_y(object.rotate.to_radians()) * object.tilt_rotation();
     let after = DQuat::from_axis_angle(axis, degrees.to_radians()) * before;
     let (y, x, z) = (upright.inverse() * after).to_euler(EulerRot::YXZ);
     let rounded = |angle: f64| (angle.to_degrees() * 1e3).round() * 1e-3;

@@ -15,7 +15,7 @@ use crate::app::view::ViewState;
 use crate::scene::Scene;
 use crate::scene::geometry::{Hit, Ray};
 use egui::{Key, PointerButton, Rect, Response, Role, Sense, Ui};
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, document: &Document, view: &mut ViewState, requests: &mut Requests) {
@@ -119,6 +119,13 @@ fn under(model: &ModelView, scene: &Scene, pixel: Vec2) -> Option<Hit> {
     }
 }
 
+/// The ray through a pixel, and where it meets a surface in the capture's coordinates.
+fn aimed_at(model: &ModelView, scene: &Scene, pixel: Vec2) -> (Ray, Option<DVec3>) {
+    let hit = under(model, scene, pixel);
+    let surface = hit.map(|hit| scene.point(&hit).as_dvec3() + scene.origin);
+    (model.orbit.camera().ray(pixel), surface)
+}
+
 /// Orbits or pans.
 fn drag(ui: &Ui, model: &mut ModelView, response: &Response) {
     let drag = response.drag_delta() * ui.pixels_per_point();
@@ -219,10 +226,7 @@ fn transform_object(
     let Some((pointer, transform)) = response.hover_pos().zip(view.tool.transform.as_mut()) else {
         return false;
     };
-    let at = pixel(ui, response.rect, pointer);
-    let ray = view.model.orbit.camera().ray(at);
-    let hit = under(&view.model, scene, at);
-    let surface = hit.map(|hit| scene.point(&hit).as_dvec3() + scene.origin);
+    let (ray, surface) = aimed_at(&view.model, scene, pixel(ui, response.rect, pointer));
     let projection = Projection::new(&view.model.orbit, scene, response.rect);
     let project = |point| projection.at(point);
     let placed = transform.placed(scene, pointer, &ray, surface, project);
@@ -259,10 +263,7 @@ fn move_object(
     let Some((pointer, handle)) = held else {
         return false;
     };
-    let at = pixel(ui, response.rect, pointer);
-    let ray = view.model.orbit.camera().ray(at);
-    let hit = under(&view.model, scene, at);
-    let surface = hit.map(|hit| scene.point(&hit).as_dvec3() + scene.origin);
+    let (ray, surface) = aimed_at(&view.model, scene, pixel(ui, response.rect, pointer));
     let along = Along::of(ui.input(|input| input.modifiers));
     let dragged = (document.insertions).dragged(handle, scene, &ray, surface, along);
     requests.ask_all(dragged.map(|(index, to)| Request::Place(index, to)));

@@ -152,18 +152,14 @@ fn edit(ui: &mut Ui, object: &mut Placement, diameter: f64) {
         ui.end_row();
         ui.label("Turn")
             .on_hover_text("Counter-clockwise from above");
-        let turn = DragValue::new(&mut object.rotate);
-        let turn = turn.range(-360.0..=360.0).speed(1.0).suffix(" °");
-        named(ui.add(turn.max_decimals(4)), Role::SpinButton, "Turn");
+        degrees(ui, "Turn", "", &mut object.rotate);
         ui.end_row();
         ui.label("Tilt").on_hover_text(
             "About the object's own x and z axes, before the turn; it stands on its lowest point",
         );
         ui.horizontal(|ui| {
             for (axis, tilt) in ["x", "z"].into_iter().zip(object.tilt.as_mut()) {
-                let tilt = DragValue::new(tilt).range(-360.0..=360.0).speed(1.0);
-                let tilt = tilt.max_decimals(4).prefix(format!("{axis} ")).suffix(" °");
-                named(ui.add(tilt), Role::SpinButton, &format!("Tilt {axis}"));
+                degrees(ui, &format!("Tilt {axis}"), &format!("{axis} "), tilt);
             }
         });
         ui.end_row();
@@ -175,6 +171,13 @@ fn edit(ui: &mut Ui, object: &mut Placement, diameter: f64) {
         named(ui.add(scale.max_decimals(4)), Role::SpinButton, "Scale");
         ui.end_row();
     });
+}
+
+/// An angle in degrees.
+fn degrees(ui: &mut Ui, name: &str, prefix: &str, angle: &mut f64) {
+    let drag = DragValue::new(angle).range(-360.0..=360.0).speed(1.0);
+    let drag = drag.max_decimals(4).prefix(prefix).suffix(" °");
+    named(ui.add(drag), Role::SpinButton, name);
 }
 
 /// The material in place of those of the file; `found` is the file's main one.

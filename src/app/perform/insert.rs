@@ -1,6 +1,6 @@
 //! Objects that are added: read first, then put on the floor in view.
 
-use crate::app::insertion::transform::{Asked, Transform};
+use crate::app::insertion::transform::Transform;
 use crate::app::insertion::{is_object, name};
 use crate::app::request::Request;
 use crate::app::state::App;
@@ -29,8 +29,8 @@ impl App {
         let open = self.document.capture().is_some() && !self.shows_start_page();
         if self.preferences.blender_keys && open && !ctx.text_edit_focused() {
             let transform = &mut self.view.tool.transform;
-            let asked = Transform::follow_keys(transform, &self.document.insertions, ctx);
-            if let Some(Asked::Cancel(index, before)) = asked {
+            let taken_back = Transform::follow_keys(transform, &self.document.insertions, ctx);
+            if let Some((index, before)) = taken_back {
                 self.perform(Request::Place(index, before), ctx);
             }
         }

@@ -83,7 +83,12 @@ impl App {
 
     /// Does what was asked.
     pub fn perform(&mut self, request: impl Into<Request>, ctx: &Context) {
-        match request.into() {
+        let request = request.into();
+        if !matches!(request, Request::Place(..)) {
+            // It may remove or replace the object that the pointer moves.
+            self.view.tool.transform = None;
+        }
+        match request {
             Request::Act(action) => self.act(action, ctx),
             Request::Click(clicked, more) => self.clicked(clicked, more),
             Request::Select(object, more) => self.view.selection.select(object, more),

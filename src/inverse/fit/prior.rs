@@ -267,6 +267,13 @@ mod tests {
             assert!((mean / unit - DVec3::splat(3.0)).length() < 1e-5);
             assert!((precision * unit.powi(2) - noise / 64.0).length() < 1e-8);
         }
+        // In a scan each direction is held to its own mean, and no tighter than to the photographs.
+        let scan = Prior::new(5, 3, Vec3::splat(2.0)).of_scan();
+        let scan = scan.with_sky(|surface| Vec3::splat([0.5, 5.0][surface as usize - 3]));
+        for (surface, deviation) in [(3, 2.0f64), (4, 5.0)] {
+            let (_, precision) = scan.of(5 + surface, DVec3::ONE);
+            assert!((precision * deviation.powi(2) - DVec3::ONE).length() < 1e-6);
+        }
         // All photographs black: nothing to hold on to.
         let black = Prior::new(2, 1, Vec3::ZERO).of(3, DVec3::splat(0.1));
         assert_eq!(black, (DVec3::ZERO, DVec3::ZERO));
