@@ -1,5 +1,6 @@
 //! The error type of the whole program: place, problem and remedy.
 
+use std::any::Any;
 use std::fmt;
 use std::path::Path;
 
@@ -20,6 +21,13 @@ pub struct Error {
 
 /// Result with [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
+
+/// The message of a caught panic.
+pub fn panic_message(payload: &(dyn Any + Send)) -> &str {
+    let text = payload.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| payload.downcast_ref::<&str>().copied())
+        .unwrap_or("no message")
+}
 
 impl Error {
     /// An error at `place` with a `problem` and a `remedy`.

@@ -5,7 +5,7 @@ use crate::app::preferences::{self, Preferences};
 use crate::app::shell::size::WINDOW;
 use crate::app::state::App;
 use crate::app::window::Window;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, panic_message};
 use crate::inverse::settings::Settings;
 use crate::session::Session;
 use crate::session::command::{Source, Start};
@@ -65,11 +65,7 @@ pub fn run(start: Option<Start>, settings: Settings) -> Result<()> {
         )),
         Ok(Err(error)) => Err(no_window(&error.to_string())),
         Err(panic) if opened.load(Ordering::Relaxed) => resume_unwind(panic),
-        Err(panic) => {
-            let text = panic.downcast_ref::<String>().map(String::as_str);
-            let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
-            Err(no_window(text.unwrap_or("the window library failed")))
-        }
+        Err(panic) => Err(no_window(panic_message(panic.as_ref()))),
     }
 }
 

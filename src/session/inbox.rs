@@ -1,26 +1,25 @@
 //! The worker's inbox: a bounded queue of commands whose sender never blocks.
 
-use crate::session::command::{Command, Placement, ViewRequest};
+use crate::session::command::{Command, Placement};
 use crate::session::edits::Edits;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, TryRecvError, TrySendError, bounded};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Capacity of the queue. Views, insertions and edits do not count: only the newest of each is kept.
+/// Capacity of the queue. Insertions and edits do not count: only the newest of each is kept.
 pub const CAPACITY: usize = 256;
 
 /// An entry of the queue.
 enum Message {
     Command(Command),
-    /// There may be a view, an insertion or an edit in [`Latest`].
+    /// There may be an insertion or an edit in [`Latest`].
     Look,
 }
 
 /// Commands of which only the newest counts.
 #[derive(Default)]
 struct Latest {
-    view: Option<ViewRequest>,
     insert: Option<Vec<Placement>>,
     edit: Option<Edits>,
 }
@@ -72,10 +71,6 @@ impl Outbox {
         let message = {
             let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
             match command {
-                Command::View(request) => {
-                    latest.view = Some(request);
-                    Message::Look
-                }
                 Command::Insert(placements) => {
                     latest.insert = Some(placements);
                     Message::Look
@@ -171,7 +166,6 @@ impl Inbox {
     fn newest(&self) -> Option<Command> {
         let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
         let next = latest.edit.take().map(Command::Edit);
-        let next = next.or_else(|| latest.view.take().map(Command::View));
         next.or_else(|| latest.insert.take().map(Command::Insert))
     }
 }
@@ -179,30 +173,34 @@ impl Inbox {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::session::command::ViewCamera;
-
-    fn view(frame: usize) -> Command {
-        Command::View(ViewRequest {
-            camera: ViewCamera::Frame(frame),
-            long_side: 64,
-            composite: 0,
-            render: true,
-            layers: false,
-        })
-    }
+    use crate::session::edits::ObjectEdit;
 
     #[test]
-    fn a_flood_of_views_leaves_room_for_commands_and_only_the_newest_arrives() {
+    fn a_flood_of_edits_leaves_room_for_commands_and_only_the_newest_arrives() {
         let (outbox, mut inbox) = queue();
-        for frame in 0..10 * CAPACITY {
-            assert!(outbox.send(view(frame)));
+        for _ in 0..10 * CAPACITY {
+            assert!(outbox.send(Command::Insert(Vec::new())));
+        }
+        let mut last = Edits::default();
+        for object in 0..10 * CAPACITY {
+            last = Edits::default();
+            last.set(
+                object,
+                ObjectEdit {
+                    off: true,
+                    ..ObjectEdit::default()
+                },
+            );
+            assert!(outbox.send(Command::Edit(last.clone())));
         }
         let mut seen = Vec::new();
-        while let Mail::Command(Command::View(request)) = inbox.poll() {
-            seen.push(request.camera);
+        while let Mail::Command(command) = inbox.poll() {
+            seen.push(command);
         }
-        let last = 10 * CAPACITY - 1;
-        assert!(matches!(seen[..], [ViewCamera::Frame(frame)] if frame == last));
+        let [Command::Edit(edits), Command::Insert(_)] = &seen[..] else {
+            panic!("{seen:?}");
+        };
+        assert_eq!(*edits, last);
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! The worker thread: it takes commands, publishes snapshots, saves and resumes. It wakes the window by a callback.
+//! A session: the worker's thread, which takes commands, solves, saves and resumes, and the painter's, which renders
+//! pictures. Both publish snapshots and wake the window by a callback.
 
 pub mod command;
 pub mod edits;
@@ -10,6 +11,7 @@ pub mod light;
 mod metric;
 pub mod open;
 pub mod open_capture;
+pub mod painter;
 pub mod path_kind;
 pub mod photographs;
 pub mod rates;

@@ -1,25 +1,79 @@
-//! Holds the newest snapshot. Neither writer nor readers wait.
+//! Holds the newest snapshot: the worker's state with the painter's pictures. Neither writers nor readers wait.
 
-use crate::session::snapshot::Snapshot;
-use std::sync::{Arc, Mutex, PoisonError};
+use crate::session::open_capture::OpenCapture;
+use crate::session::snapshot::{Event, Insertion, Level, Snapshot, View};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The newest snapshot, shared between the worker and its readers.
+/// The newest snapshot, shared between worker, painter and readers.
 #[derive(Debug, Default)]
 pub struct Slot {
-    latest: Mutex<Arc<Snapshot>>,
+    parts: Mutex<Parts>,
+}
+
+#[derive(Debug, Default)]
+struct Parts {
+    snapshot: Arc<Snapshot>,
+    pictures: Pictures,
+    events: Arc<Vec<Event>>,
+}
+
+/// The painter's pictures.
+#[derive(Debug, Clone, Default)]
+pub struct Pictures {
+    /// The capture that they show.
+    pub capture: Option<Arc<OpenCapture>>,
+    /// Pictures of the requested view.
+    pub view: Option<Arc<View>>,
+    /// Composites of the requested frame.
+    pub insertion: Option<Arc<Insertion>>,
 }
 
 impl Slot {
-    /// Replaces the snapshot.
-    pub fn put(&self, snapshot: Arc<Snapshot>) {
-        *self.latest.lock().unwrap_or_else(PoisonError::into_inner) = snapshot;
+    /// Replaces the worker's state. Sequence, pictures and events of `state` are not used.
+    pub fn put(&self, state: Snapshot) {
+        self.lock().compose(state);
     }
 
-    /// The newest snapshot. The lock is only held to copy a pointer.
+    /// Replaces the pictures. They are shown while their capture is the open one.
+    pub fn put_pictures(&self, pictures: Pictures) {
+        let mut parts = self.lock();
+        parts.pictures = pictures;
+        let state = parts.snapshot.as_ref().clone();
+        parts.compose(state);
+    }
+
+    /// Adds an event, which the next snapshot holds.
+    pub fn say(&self, level: Level, message: String) {
+        Arc::make_mut(&mut self.lock().events).push(Event { level, message });
+    }
+
+    /// The newest pictures.
+    pub fn pictures(&self) -> Pictures {
+        self.lock().pictures.clone()
+    }
+
+    /// The newest snapshot. The lock is only held to copy pointers.
     pub fn latest(&self) -> Arc<Snapshot> {
-        self.latest
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clone()
+        self.lock().snapshot.clone()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Parts> {
+        self.parts.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Parts {
+    fn compose(&mut self, state: Snapshot) {
+        let pictures = match (&state.capture, &self.pictures.capture) {
+            (Some(open), Some(shown)) if Arc::ptr_eq(open, shown) => self.pictures.clone(),
+            _ => Pictures::default(),
+        };
+        self.snapshot = Arc::new(Snapshot {
+            sequence: self.snapshot.sequence + 1,
+            view: pictures.view,
+            insertion: pictures.insertion,
+            events: self.events.clone(),
+            ..state
+        });
     }
 }

@@ -257,6 +257,22 @@ fn views_have_their_share_of_a_solve_of_long_steps() {
 }
 
 #[test]
+fn edits_show_while_the_solver_makes_one_long_step() {
+    let rig = Rig::slow(Duration::from_secs(3));
+    rig.look(16);
+    let composite = |s: &Snapshot| Some(mean(&s.insertion.as_ref()?.composite));
+    let before = rig.until("an estimate and a composite", |s| {
+        iterations(s) == 1 && composite(s).is_some()
+    });
+    assert!(composite(&before) > Some(0.0));
+    assert!(rig.session.send(Command::Edit(lamp_off())));
+    let dark = rig.until("the photograph without the lamp", |s| {
+        composite(s) == Some(0.0)
+    });
+    assert_eq!(iterations(&dark), 1);
+}
+
+#[test]
 fn a_panic_becomes_an_event_the_estimate_stays_and_the_session_goes_on() {
     let rig = Rig::new(Some(200));
     let failed = rig.until("the failure", |s| s.phase == Phase::Failed);
@@ -402,6 +418,22 @@ fn what_cannot_be_opened_is_an_event_and_what_was_open_stays() {
     rig.session.join();
 }
 
+/// The room's lamp.
+fn lamp() -> usize {
+    let mut objects = common::OBJECTS.iter();
+    objects.position(|o| o.0 == "lamp").expect("a lamp")
+}
+
+fn lamp_off() -> Edits {
+    let off = ObjectEdit {
+        off: true,
+        ..ObjectEdit::default()
+    };
+    let mut edits = Edits::default();
+    edits.set(lamp(), off);
+    edits
+}
+
 /// The mean over a picture.
 fn mean(picture: &Picture) -> f32 {
     let sum: glam::Vec3 = picture.pixels.iter().sum();
@@ -413,16 +445,10 @@ fn edits_show_at_once_are_saved_and_come_back_while_the_estimate_stays() {
     let rig = Rig::new(None);
     rig.until("some steps", |s| iterations(s) > 3);
     rig.look(32);
-    let lamp = common::OBJECTS.iter().position(|o| o.0 == "lamp");
-    let lamp = lamp.expect("a lamp");
+    let lamp = lamp();
     let light = |s: &Snapshot| Some(mean(s.view.as_ref()?.render.as_ref()?));
     rig.until("light", |s| light(s).is_some_and(|l| l > 0.0));
-    let mut edits = Edits::default();
-    let off = ObjectEdit {
-        off: true,
-        ..ObjectEdit::default()
-    };
-    edits.set(lamp, off);
+    let edits = lamp_off();
     let asked = Instant::now();
     assert!(rig.session.send(Command::Edit(edits.clone())));
     let dark = rig.until("the lamp off", |s| light(s) == Some(0.0));

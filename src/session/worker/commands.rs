@@ -6,7 +6,7 @@ use crate::export::picture::shown_at;
 use crate::export::{light_layers, scene};
 use crate::math::picture::Picture;
 use crate::render::Renderer;
-use crate::session::command::{Command, ExportRequest, OpenOptions, ViewCamera};
+use crate::session::command::{Command, ExportRequest, OpenOptions};
 use crate::session::save::pictures::Frames;
 use crate::session::save::{self, Results};
 use crate::session::snapshot::{Level, Phase};
@@ -16,12 +16,7 @@ use crate::session::worker::next::{Begin, Next};
 use crate::session::worker::state::Worker;
 use crate::transport::denoise::Denoiser;
 use std::path::Path;
-use std::time::Duration;
 
-/// How long views get more of the solver's time after a new view is requested, ...
-const VIEW_PRIORITY: Duration = Duration::from_secs(2);
-/// ... and after a change of lamps, materials or inserted objects, whose result the user is waiting for.
-const CHANGE_PRIORITY: Duration = Duration::from_secs(15);
 /// Long side of a session's thumbnail in pixels.
 const THUMBNAIL: u32 = 120;
 
@@ -105,28 +100,13 @@ impl Worker {
                 return self.capture.is_some().then_some(Next::Solve(checkpoint));
             }
             Command::Set(settings) => self.settings = *settings,
-            Command::View(request) => {
-                self.prioritize_views(VIEW_PRIORITY);
-                let frame = match request.camera {
-                    ViewCamera::Frame(frame) => frame,
-                    ViewCamera::Free(_) => self.inserting.frame(),
-                };
-                self.inserting.show(frame, request.composite);
-                self.views.request(request);
-            }
-            Command::Insert(placements) => {
-                self.prioritize_views(CHANGE_PRIORITY);
-                self.store.touch();
-                self.inserting.place(placements);
-            }
-            Command::Match(matched) => self.inserting.match_photograph(matched),
+            // The painter has these already.
+            Command::View(_) | Command::Match(_) => {}
+            Command::Insert(_) => self.store.touch(),
             Command::Edit(edits) => {
                 if self.edits != edits {
-                    self.prioritize_views(CHANGE_PRIORITY);
                     self.store.touch();
                     self.edits = edits;
-                    self.views.redraw();
-                    self.inserting.update();
                 }
             }
             Command::Save(folder) => self.save(&folder),
@@ -179,6 +159,7 @@ impl Worker {
         let Some(results) = self.results() else {
             return;
         };
+        let (frame, inserted) = self.requests.shown();
         let held = SessionRecord {
             capture: results.capture.name.clone(),
             state: match self.phase {
@@ -188,24 +169,24 @@ impl Worker {
             },
             precious: matches!(self.phase, Phase::Finished(_))
                 || !self.edits.is_empty()
-                || !self.inserting.placements().is_empty()
+                || !inserted.is_empty()
                 || !results.capture.options.objects.is_empty(),
-            frame: self.inserting.frame(),
-            inserted: self.inserting.placements().to_vec(),
+            frame,
+            inserted,
             progress: Some(self.progress.as_ref().clone()),
         };
-        if let Err(error) = self.store.write(&results, held, self.thumbnail()) {
+        if let Err(error) = self.store.write(&results, held, self.thumbnail(frame)) {
             let message = format!("the session is not kept any longer: {error}");
             self.say(Level::Warning, message);
         }
     }
 
     /// A small version of the shown composite, and the exposure for its display.
-    fn thumbnail(&self) -> Option<(Picture, f32)> {
+    fn thumbnail(&self, frame: usize) -> Option<(Picture, f32)> {
         let capture = self.capture.as_ref()?;
-        let frame = self.inserting.frame();
         let (_, taken) = capture.frame(frame).ok()?;
-        let composite = self.inserting.shown().filter(|shown| shown.frame == frame);
+        let composite = self.slot.pictures().insertion;
+        let composite = composite.filter(|shown| shown.frame == frame);
         let picture = composite.map_or_else(
             || Picture {
                 width: taken.width,
@@ -256,7 +237,7 @@ impl Worker {
     }
 
     fn save_layers(&mut self, path: &Path) {
-        let view = self.views.shown();
+        let view = self.slot.latest().view.clone();
         let layers = view.and_then(|view| view.layers.clone());
         let Some((capture, layers)) = self.capture.clone().zip(layers) else {
             self.say(

@@ -94,11 +94,11 @@ impl Worker {
         let held = earlier.held.clone().unwrap_or_default();
         self.store.resume(&capture.hash, &earlier.folder, &held);
         self.adopt(capture);
-        self.inserting.place(held.inserted.clone());
+        self.requests.insert(held.inserted.clone());
         self.inserted = Arc::new(held.inserted);
         self.frame = held.frame;
-        self.inserting.show_frame(held.frame);
-        self.edits = earlier.edits;
+        self.requests.show_frame(held.frame);
+        self.set_edits(earlier.edits);
         self.estimate = Arc::new(earlier.estimate);
         self.settings = earlier.saved.settings;
         self.checkpoint = earlier.saved.checkpoint;

@@ -1,4 +1,4 @@
-//! The worker: a thread that owns the estimate, solves, and serves views, saves and exports at any time.
+//! The worker: a thread that owns the estimate, solves, saves and exports.
 
 mod backend;
 mod commands;
@@ -14,6 +14,7 @@ use crate::error::{Error, Result};
 use crate::inverse::settings::Settings;
 use crate::session::command::{Command, Start};
 use crate::session::inbox::{self, Outbox};
+use crate::session::painter::{Painter, Requests};
 use crate::session::slot::Slot;
 use crate::session::snapshot::Snapshot;
 use next::{Begin, Next};
@@ -21,26 +22,28 @@ use state::Worker;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
-/// A handle to a worker. Dropping it ends the worker.
+/// A handle to a worker and a painter. Dropping it ends both.
 pub struct Session {
     outbox: Option<Outbox>,
+    requests: Arc<Requests>,
     slot: Arc<Slot>,
-    thread: Option<JoinHandle<()>>,
+    worker: Option<JoinHandle<()>>,
+    painter: Option<JoinHandle<()>>,
 }
 
 impl Session {
-    /// Starts a worker with what to open first.
+    /// Starts both with what to open first.
     ///
     /// # Errors
-    /// The thread cannot be started.
+    /// The threads cannot be started.
     pub fn spawn(start: Option<Start>, settings: Settings, wake: Wake) -> Result<Self> {
         Self::spawn_with(start, settings, wake, Backend::default())
     }
 
-    /// Starts a worker with other functions for opening and solving.
+    /// Starts both with other functions for opening and solving.
     ///
     /// # Errors
-    /// The thread cannot be started.
+    /// The threads cannot be started.
     pub fn spawn_with(
         start: Option<Start>,
         settings: Settings,
@@ -49,32 +52,30 @@ impl Session {
     ) -> Result<Self> {
         let (outbox, inbox) = inbox::queue();
         let slot = Arc::new(Slot::default());
-        let shared = slot.clone();
+        let requests = Arc::new(Requests::default());
         let first = match start {
             None => Next::Wait,
             Some(Start::Capture(source, options)) => Next::Open(source, options, Begin::GoingOn),
             Some(Start::Results(folder)) => Next::Resume(folder),
         };
-        let thread = std::thread::Builder::new()
-            .name("relit-worker".to_owned())
-            .spawn(move || Worker::new(inbox, shared, settings, wake, backend).run(first))
-            .map_err(|error| {
-                Error::new(
-                    "worker thread",
-                    error,
-                    "close other programs and start again",
-                )
-            })?;
+        let painter = Painter::new(requests.clone(), slot.clone(), wake.clone())?;
+        let shared = (slot.clone(), requests.clone());
+        let worker = move || Worker::new(inbox, shared, settings, wake, backend).run(first);
         Ok(Self {
             outbox: Some(outbox),
+            requests,
             slot,
-            thread: Some(thread),
+            worker: Some(thread("relit-worker", worker)?),
+            painter: Some(thread("relit-painter", || painter.run())?),
         })
     }
 
     /// Sends a command without blocking. False if the queue is full ([`inbox::CAPACITY`]) or the worker has ended. Of
     /// views, insertions and edits only the newest is kept, so they never fill the queue.
     pub fn send(&self, command: Command) -> bool {
+        if self.requests.take(&command) {
+            return true;
+        }
         self.outbox
             .as_ref()
             .is_some_and(|outbox| outbox.send(command))
@@ -85,7 +86,7 @@ impl Session {
         self.slot.latest()
     }
 
-    /// Ends the worker after the commands sent so far, and waits for it.
+    /// Ends the worker after the commands sent so far, and the painter, and waits for both.
     pub fn join(self) {
         drop(self);
     }
@@ -95,9 +96,14 @@ impl Drop for Session {
     fn drop(&mut self) {
         // Closing the queue ends the worker.
         self.outbox = None;
-        if let Some(thread) = self.thread.take() {
-            // The worker catches its own panics; if it died anyway, nothing is left to save.
-            let _ = thread.join();
-        }
+        // The worker catches its own panics; if it died anyway, nothing is left to save.
+        let _ = self.worker.take().map(JoinHandle::join);
+        self.requests.quit();
+        let _ = self.painter.take().map(JoinHandle::join);
     }
+}
+
+fn thread(name: &str, run: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>> {
+    let thread = std::thread::Builder::new().name(name.to_owned()).spawn(run);
+    thread.map_err(|error| Error::new(name, error, "close other programs and start again"))
 }

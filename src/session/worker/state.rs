@@ -7,40 +7,34 @@ use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Progress};
 use crate::session::edits::{Edited, Edits};
 use crate::session::inbox::Inbox;
-use crate::session::insertion::Inserting;
-use crate::session::light::Light;
 use crate::session::open_capture::OpenCapture;
+use crate::session::painter::{FRAME, Requests};
 use crate::session::rates::Rates;
 use crate::session::slot::Slot;
-use crate::session::snapshot::{Event, Level, Phase, Snapshot};
+use crate::session::snapshot::{Level, Phase, Snapshot};
 use crate::session::store::SessionStore;
-use crate::session::view::Views;
 use crate::session::worker::backend::{Backend, Wake};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
-
-/// Shortest time between two snapshots, unless one is requested.
-pub(super) const FRAME: Duration = Duration::from_millis(33);
+use std::time::Instant;
 
 /// Everything the worker owns.
 pub(super) struct Worker {
     pub inbox: Inbox,
     pub slot: Arc<Slot>,
+    /// What the painter is to draw.
+    pub requests: Arc<Requests>,
     pub wake: Wake,
     pub backend: Backend,
     pub settings: Settings,
     pub capture: Option<Arc<OpenCapture>>,
     /// The estimate of the solver.
     pub estimate: Arc<Estimate>,
-    /// Edits of the estimate.
+    /// Edits of the estimate; changed by [`Worker::set_edits`], so that the pictures follow.
     pub edits: Edits,
     pub progress: Arc<Progress>,
     pub checkpoint: Option<Checkpoint>,
     pub phase: Phase,
-    pub events: Arc<Vec<Event>>,
     pub rates: Rates,
-    pub views: Views,
-    pub inserting: Inserting,
     pub solving: bool,
     pub paused: bool,
     pub step: bool,
@@ -56,12 +50,9 @@ pub(super) struct Worker {
     pub continued: Option<String>,
     /// Whether the parameters were given explicitly at the start of the program, and so take precedence over a session's.
     pub explicit_settings: bool,
-    /// Until when views get more of the solver's time.
-    pub priority_until: Option<Instant>,
     /// Number of answered commands to change objects.
     pub regroupings: u64,
     edited: Edited,
-    sequence: u64,
     changed: bool,
     published: Instant,
 }
@@ -69,7 +60,7 @@ pub(super) struct Worker {
 impl Worker {
     pub fn new(
         inbox: Inbox,
-        slot: Arc<Slot>,
+        (slot, requests): (Arc<Slot>, Arc<Requests>),
         settings: Settings,
         wake: Wake,
         backend: Backend,
@@ -77,6 +68,7 @@ impl Worker {
         Self {
             inbox,
             slot,
+            requests,
             wake,
             capture: None,
             estimate: Arc::default(),
@@ -84,10 +76,7 @@ impl Worker {
             progress: Arc::default(),
             checkpoint: None,
             phase: Phase::Idle,
-            events: Arc::default(),
             rates: Rates::default(),
-            views: Views::default(),
-            inserting: Inserting::default(),
             solving: false,
             paused: false,
             step: false,
@@ -98,10 +87,8 @@ impl Worker {
             frame: 0,
             continued: None,
             explicit_settings: settings != Settings::default(),
-            priority_until: None,
             regroupings: 0,
             edited: Edited::default(),
-            sequence: 0,
             changed: true,
             published: Instant::now(),
             backend,
@@ -129,51 +116,19 @@ impl Worker {
 
     /// Records an event.
     pub fn say(&mut self, level: Level, message: impl Into<String>) {
-        Arc::make_mut(&mut self.events).push(Event {
-            level,
-            message: message.into(),
-        });
+        self.slot.say(level, message.into());
         self.changed = true;
     }
 
-    /// Gives views more of the solver's time for a while.
-    pub fn prioritize_views(&mut self, time: Duration) {
-        let end = Instant::now() + time;
-        self.priority_until = self.priority_until.max(Some(end));
+    /// Replaces the edits.
+    pub fn set_edits(&mut self, edits: Edits) {
+        self.requests.edit(&edits);
+        self.edits = edits;
     }
 
     /// Marks the state as changed.
     pub fn touch(&mut self) {
         self.changed = true;
-    }
-
-    /// Whether nothing of a requested picture is rendered yet.
-    pub fn is_asked(&self) -> bool {
-        self.views.is_asked() || self.inserting.is_asked()
-    }
-
-    /// Whether a requested picture is still missing or has few samples.
-    pub fn is_rough(&self) -> bool {
-        self.views.is_rough() || self.inserting.is_rough()
-    }
-
-    /// Renders a slice of the requested view and one of the composite. Returns whether there is more to render.
-    pub fn draw(&mut self) -> bool {
-        let Some(capture) = self.capture.clone() else {
-            return false;
-        };
-        let light = Light::new(self.estimate.clone(), self.edited(), &self.settings);
-        self.inserting.follow(&light);
-        let (drawn, more) = self.views.draw(&capture, &light.edited, &light.options);
-        self.changed |= drawn;
-        if !self.inserting.is_busy() {
-            return more;
-        }
-        match self.inserting.draw(&capture, &light) {
-            Ok(drawn) => self.changed |= drawn,
-            Err(error) => self.fail(&error),
-        }
-        true
     }
 
     /// Publishes a snapshot if the state has changed: at once if `now`, else at most about 30 times a second.
@@ -186,9 +141,10 @@ impl Worker {
         }
         self.changed = false;
         self.published = Instant::now();
-        self.sequence += 1;
-        self.slot.put(Arc::new(Snapshot {
-            sequence: self.sequence,
+        let solving = self.solving && !self.paused;
+        self.requests
+            .follow(&self.estimate, &self.settings, solving);
+        self.slot.put(Snapshot {
             phase: self.phase.clone(),
             capture: self.capture.clone(),
             settings: self.settings.clone(),
@@ -206,10 +162,8 @@ impl Worker {
             frame: self.frame,
             continued: self.continued.clone(),
             kept: self.store.kept(),
-            view: self.views.shown(),
-            insertion: self.inserting.shown(),
-            events: self.events.clone(),
-        }));
+            ..Snapshot::default()
+        });
         (self.wake)();
     }
 }

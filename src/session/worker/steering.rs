@@ -6,17 +6,12 @@ use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Control, Observer, Progress};
 use crate::session::command::Command;
 use crate::session::inbox::Mail;
+use crate::session::painter::FRAME;
 use crate::session::worker::next::Next;
-use crate::session::worker::state::{FRAME, Worker};
+use crate::session::worker::state::Worker;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Fraction of the solver's time for views and composites while they are shown, ...
-const VIEW_FRACTION: f32 = 0.03;
-/// ... and for a while after a request, until the first complete picture.
-const PRIORITY_FRACTION: f32 = 0.5;
-/// Most time, in seconds, that views can save up while the solver makes a long step.
-const MAX_CREDIT: f32 = 1.0;
 /// Time between two checkpoints that are kept in case the solver fails.
 const CHECKPOINT: Duration = Duration::from_secs(8);
 
@@ -30,10 +25,6 @@ pub(super) struct Steering<'a> {
     kept: Instant,
     /// Number of commands that were waiting when a checkpoint was offered.
     seen: Option<usize>,
-    /// Time in seconds that views may take.
-    credit: f32,
-    /// When views were last rendered.
-    drawn: Instant,
 }
 
 impl<'a> Steering<'a> {
@@ -46,8 +37,6 @@ impl<'a> Steering<'a> {
             next: None,
             kept: Instant::now(),
             seen: None,
-            credit: 0.0,
-            drawn: Instant::now(),
         }
     }
 
@@ -68,26 +57,6 @@ impl<'a> Steering<'a> {
         worker.progress = Arc::new(progress.clone());
         worker.estimate = Arc::new(estimate.clone());
         worker.touch();
-    }
-
-    /// Renders views for about a fraction of the time, but at once what was just asked for.
-    fn draw(&mut self) {
-        let fresh = (self.worker.priority_until).is_some_and(|end| Instant::now() < end);
-        let fraction = match fresh || self.worker.is_rough() {
-            true => PRIORITY_FRACTION,
-            false => VIEW_FRACTION,
-        };
-        self.credit = (self.credit + fraction * self.drawn.elapsed().as_secs_f32()).min(MAX_CREDIT);
-        let mut more = true;
-        while more && self.worker.inbox.is_empty() && (self.credit > 0.0 || self.worker.is_asked())
-        {
-            let started = Instant::now();
-            more = self.worker.draw();
-            self.worker.publish(false);
-            self.credit -= started.elapsed().as_secs_f32();
-        }
-        self.worker.publish(false);
-        self.drawn = Instant::now();
     }
 
     /// Carries out a command. Returns whether the solve is to end.
@@ -130,23 +99,16 @@ impl Observer for Steering<'_> {
                 break;
             }
             if !self.worker.paused {
-                self.draw();
-                if self.credit <= 0.0 || self.worker.inbox.is_empty() {
-                    break;
-                }
-                ready = usize::MAX;
-                continue;
+                self.worker.publish(false);
+                break;
             }
 
-            // Paused: render the request, then sleep until a command comes.
-            let busy = self.worker.draw();
-            self.worker.publish(!busy);
+            // Paused: sleep until a command comes.
+            self.worker.publish(true);
             self.worker.keep(false);
-            if !busy {
-                let mail = self.worker.inbox.wait(self.worker.store.rest());
-                if self.carry_out(mail) {
-                    return Control::Stop;
-                }
+            let mail = self.worker.inbox.wait(self.worker.store.rest());
+            if self.carry_out(mail) {
+                return Control::Stop;
             }
             ready = usize::MAX;
         }

@@ -2,7 +2,7 @@
 
 use crate::calibrate::held_out::HoldOut;
 use crate::calibrate::problem::Problem;
-use crate::error::Error;
+use crate::error::{Error, panic_message};
 use crate::inverse::solver::{Checkpoint, Termination};
 use crate::session::command::{OpenOptions, Regrouping, Source};
 use crate::session::edits::Edits;
@@ -49,36 +49,23 @@ impl Worker {
 
     /// Reports a panic; the last estimate is kept.
     fn contain(&mut self, payload: &(dyn Any + Send)) {
-        let message = payload
-            .downcast_ref::<String>()
-            .map(String::as_str)
-            .or_else(|| payload.downcast_ref::<&str>().copied())
-            .unwrap_or("no message");
         self.solving = false;
         self.paused = false;
         self.step = false;
-        self.views.stop();
-        self.inserting.reset();
         self.phase = Phase::Failed;
         self.fail(&Error::new(
             "worker",
-            format!("internal error: {message}"),
+            format!("internal error: {}", panic_message(payload)),
             "the last estimate is kept: save it, then reset",
         ));
     }
 
-    /// Serves commands and views until there is something else to do.
+    /// Serves commands until there is something else to do.
     fn wait(&mut self) -> Next {
         loop {
-            let busy = self.draw();
-            self.publish(!busy);
+            self.publish(true);
             self.keep(false);
-            let mail = if busy {
-                self.inbox.poll()
-            } else {
-                self.inbox.wait(self.store.rest())
-            };
-            match mail {
+            match self.inbox.wait(self.store.rest()) {
                 Mail::Nothing => {}
                 Mail::Closed => return Next::Quit,
                 Mail::Command(command) => {
@@ -140,15 +127,15 @@ impl Worker {
         for warning in &capture.warnings {
             self.say(Level::Warning, warning.clone());
         }
-        self.capture = Some(Arc::new(capture));
+        let capture = Arc::new(capture);
+        self.requests.open(capture.clone());
+        self.capture = Some(capture);
         self.inserted = Arc::default();
         self.continued = None;
         self.frame = 0;
         self.inbox.forget_changes();
         self.forget();
         self.edits = Edits::default();
-        self.views.reset();
-        self.inserting.reset();
     }
 
     /// Reads the open capture with other options, keeping estimate and edits.
@@ -159,7 +146,8 @@ impl Worker {
         let (checkpoint, edits) = (self.checkpoint.clone(), self.edits.clone());
         if self.reopen(options) {
             (self.estimate, self.progress) = kept;
-            (self.checkpoint, self.edits) = (checkpoint, edits);
+            self.checkpoint = checkpoint;
+            self.set_edits(edits);
         }
         self.phase = before;
         match go_on {
@@ -198,7 +186,7 @@ impl Worker {
         self.keep(true);
         if self.reopen(&options) {
             self.store.begin_another();
-            self.edits = wanted.edits;
+            self.set_edits(wanted.edits);
             return Next::Solve(None);
         }
         self.phase = before;
@@ -223,7 +211,7 @@ impl Worker {
         };
         let (from, to) = (old.options.coordinates, options.coordinates);
         let (up, new_up) = (old.capture.up, capture.capture.up);
-        let mut inserted = self.inserting.placements().to_vec();
+        let (frame, mut inserted) = self.requests.shown();
         for placement in &mut inserted {
             let files = placement.at.map(|at| from.undo(at, up));
             placement.at = files.map(|at| to.apply(at, new_up));
@@ -231,11 +219,10 @@ impl Worker {
         if capture.hash != old.hash {
             self.store.begin_another();
         }
-        let frame = self.inserting.frame();
         self.adopt(capture);
         self.frame = frame;
-        self.inserting.show_frame(frame);
-        self.inserting.place(inserted.clone());
+        self.requests.show_frame(frame);
+        self.requests.insert(inserted.clone());
         self.inserted = Arc::new(inserted);
         self.store.touch();
         true
@@ -292,8 +279,8 @@ impl Worker {
                     }
                 };
                 self.store.touch();
-                let edited = self.edited();
-                self.views.refresh(&edited);
+                self.publish(true);
+                self.requests.end();
             }
             Ok(Err(error)) => {
                 self.phase = Phase::Failed;
