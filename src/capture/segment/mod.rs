@@ -6,9 +6,11 @@
 //!
 //! Illumination varies smoothly, and in brightness more than in hue. So the colour difference of two segments is at most the
 //! difference across their border, and brightness has half weight. Saturated patches (lamps and windows) are never merged with
-//! others. All quantities are relative to the mesh's area and mean colour, so scale and exposure do not matter.
+//! others. Last, neighbours of which most pixels are saturated are joined: they are pieces of one lamp. All quantities are relative
+//! to the mesh's area and mean colour, so scale and exposure do not matter.
 
 mod graph;
+mod joined;
 mod sets;
 mod shown;
 mod ward;
@@ -28,7 +30,9 @@ const FINE_CONTRAST: f64 = 0.2;
 pub fn segment(mesh: &mut Mesh, shown: &[ShownFace], wanted: Option<usize>) -> usize {
     let graph = FaceGraph::new(mesh, shown);
     let fine = fine_segments(&graph);
-    let (segment_of, count) = ward::merge(&graph, &fine, wanted);
+    let mut segment_of = ward::merge(&graph, &fine, wanted);
+    joined::join_saturated(&graph, shown, &mut segment_of);
+    let (segment_of, count) = joined::number_by_area(&graph, &segment_of);
     mesh.object_of = segment_of;
     mesh.objects = (0..count).map(|i| format!("segment {i:03}")).collect();
     let mut saturated = vec![false; count];
@@ -155,6 +159,24 @@ mod tests {
                 areas[object as usize] += area;
             }
             assert!(areas.is_sorted_by(|a, b| a >= b), "{areas:?}");
+        }
+    }
+
+    /// Two squares that meet at a right angle, as bright as what lies beside them, so that no edge tells a lamp.
+    #[test]
+    fn neighbours_of_which_most_pixels_are_saturated_are_one_lamp() {
+        for (saturated, count) in [(0.6, 1), (0.4, 2)] {
+            let mut mesh = room(20, 1.0, 1.0);
+            mesh.triangles.truncate(1600);
+            mesh.vertex_colors.clear();
+            mesh.object_of.truncate(1600);
+            let face = ShownFace {
+                radiance: Vec3::ONE,
+                saturated,
+                pixels: 10,
+            };
+            segment(&mut mesh, &[face; 1600], Some(2));
+            assert_eq!(mesh.objects.len(), count, "{saturated}");
         }
     }
 

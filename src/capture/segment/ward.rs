@@ -105,8 +105,8 @@ fn borders(graph: &FaceGraph, region_of: &[u32], regions: &[Region]) -> Vec<BTre
 
 /// Merges the segments of `fine` (the representative of each face's segment) until `wanted` are left.
 ///
-/// Returns each face's segment, numbered by descending area, and the number of segments.
-pub fn merge(graph: &FaceGraph, fine: &[u32], wanted: Option<usize>) -> (Vec<u32>, usize) {
+/// Returns a representative of each face's segment, below the number of faces.
+pub fn merge(graph: &FaceGraph, fine: &[u32], wanted: Option<usize>) -> Vec<u32> {
     let (region_of, mut regions) = regions_of(graph, fine);
     let mut neighbors = borders(graph, &region_of, &regions);
     link_islands(&regions, &mut neighbors);
@@ -168,7 +168,7 @@ pub fn merge(graph: &FaceGraph, fine: &[u32], wanted: Option<usize>) -> (Vec<u32
             purged_size = heap.len().max(MIN_CANDIDATES);
         }
     }
-    number_by_area(&region_of, &regions, &mut sets)
+    region_of.iter().map(|&region| sets.find(region)).collect()
 }
 
 /// Each face's region, and the regions in the order of their first faces.
@@ -238,23 +238,4 @@ fn link_islands(regions: &[Region], neighbors: &mut [BTreeMap<u32, Border>]) {
             larger.insert(GeomWithData::new(place(x), x));
         }
     }
-}
-
-/// Numbers the merged regions by descending area, ties by the first face.
-fn number_by_area(region_of: &[u32], regions: &[Region], sets: &mut Sets) -> (Vec<u32>, usize) {
-    let roots: Vec<u32> = (0..regions.len() as u32).map(|a| sets.find(a)).collect();
-    let mut order = roots.clone();
-    order.sort_unstable();
-    order.dedup();
-    let area = |root: u32| regions[root as usize].area;
-    order.sort_by(|&a, &b| area(b).total_cmp(&area(a)).then(a.cmp(&b)));
-    let mut number = vec![0; regions.len()];
-    for (rank, &root) in (0..).zip(&order) {
-        number[root as usize] = rank;
-    }
-    let segment_of = region_of
-        .iter()
-        .map(|&region| number[roots[region as usize] as usize])
-        .collect();
-    (segment_of, order.len())
 }
