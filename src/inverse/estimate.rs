@@ -175,8 +175,22 @@ pub struct Outside {
     pub height: u32,
     /// Incoming radiance, row by row.
     pub pixels: Vec<Vec3>,
+    /// For a box, radiance that comes from above the horizon, if it differs: each point of a window shows the sky from below and
+    /// the ground from above.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub above: Option<Vec<Vec3>>,
     /// Distance of the light: infinite, or a box.
     pub surroundings: Surroundings,
+}
+
+impl Outside {
+    /// The radiance of each pixel; the mean where light from above and from below the horizon differs.
+    pub fn means(&self) -> impl Iterator<Item = Vec3> {
+        (self.pixels.iter().enumerate()).map(|(pixel, &below)| {
+            let above = self.above.as_ref().and_then(|above| above.get(pixel));
+            above.map_or(below, |&above| (below + above) * 0.5)
+        })
+    }
 }
 
 /// Norm over RGB of an albedo's error, relative to the norm of the albedo.
@@ -217,7 +231,11 @@ impl Estimate {
         let outside = self.outside.as_ref().and_then(|outside| {
             let (width, height) = (outside.width as usize, outside.height as usize);
             let map = Environment::new(width, height, outside.pixels.clone())?;
-            Some(map.around(outside.surroundings))
+            let map = map.around(outside.surroundings);
+            match outside.above.clone() {
+                Some(above) => map.with_above(above, scene.up),
+                None => Some(map),
+            }
         });
         LitScene::new(scene.clone(), materials, outside.map(Arc::new))
     }

@@ -1,6 +1,7 @@
 //! Light from outside the mesh as measured by the photographs: the radiance of pixels that see past the mesh, by direction.
 //!
-//! Its source is either infinitely far, like a sky, or on a box around the mesh, like the parts that a scan lacks.
+//! Its source is either infinitely far, like a sky, or on a box around the mesh, like the parts that a scan lacks. Light from above
+//! the horizon and from below it is measured apart: each point of a window shows the sky from below and the ground from above.
 
 use crate::calibrate::gbuffer::GBuffer;
 use crate::calibrate::problem::Problem;
@@ -21,14 +22,26 @@ const LEVELS: usize = 3;
 pub struct MeasuredOutside {
     width: usize,
     height: usize,
-    /// Whether each cell is measured.
-    known: Vec<bool>,
-    /// Whether each cell has only saturated pixels, so that its radiance is a lower bound.
-    censored: Vec<bool>,
+    /// Cells of light from below the horizon and from above it.
+    halves: [Half; 2],
     map: Environment,
     /// Unit up vector.
     up: Vec3,
 }
+
+/// Cells of light from one side of the horizon.
+#[derive(Debug, Clone, Default)]
+struct Half {
+    /// Whether each cell is measured.
+    known: Vec<bool>,
+    /// Whether each cell has only saturated pixels, so that its radiance is a lower bound.
+    censored: Vec<bool>,
+    /// Radiance, or its lower bound.
+    pixels: Vec<Vec3>,
+}
+
+/// Sum of radiance and number of pixels of a cell, unsaturated and saturated ones.
+type Sums = [(DVec3, u32); 2];
 
 impl MeasuredOutside {
     /// Accumulates the pixels in the fit that see nothing of the mesh; `None` if there are none.
@@ -41,7 +54,7 @@ impl MeasuredOutside {
         let width = 2 * height;
 
         // Sum radiance in the finest cells, separately for unsaturated and saturated pixels.
-        let mut sums = vec![[(DVec3::ZERO, 0u32); 2]; width * height];
+        let mut sums: [Vec<Sums>; 2] = [(); 2].map(|()| vec![Sums::default(); width * height]);
         let past_the_mesh = (gbuffer.pixels.iter()).filter(|p| {
             !p.held_out && p.object == u32::MAX && p.points.iter().all(Option::is_none)
         });
@@ -56,15 +69,121 @@ impl MeasuredOutside {
             let direction = ray.direction.normalize_or_zero();
             let map_direction = surroundings.map_direction(ray.origin, direction);
             let saturated = usize::from(photograph.is_saturated(pixel.pixel as usize));
-            let sum = &mut sums[pixel_of(width, height, map_direction)][saturated];
+            let half = &mut sums[usize::from(direction.dot(scene.up) > 0.0)];
+            let sum = &mut half[pixel_of(width, height, map_direction)][saturated];
             sum.0 += photograph.pixels[pixel.pixel as usize].as_dvec3();
             sum.1 += 1;
         }
-        if sums.iter().flatten().all(|s| s.1 == 0) {
+        if sums.iter().flatten().flatten().all(|s| s.1 == 0) {
             return None;
         }
+        let halves = sums.map(|sums| Half::new(width, height, &sums));
+        let [below, above] = halves.each_ref().map(|half| half.pixels.clone());
+        let map = Environment::new(width, height, below)?.around(surroundings);
+        Some(Self {
+            width,
+            height,
+            map: map.with_above(above, scene.up)?,
+            halves,
+            up: scene.up,
+        })
+    }
 
-        // Fill gaps from coarser blocks. Saturated pixels count only in blocks without unsaturated ones.
+    /// Radiance along a ray, or its lower bound; `None` in unmeasured directions.
+    #[inline]
+    pub fn at(&self, origin: Vec3, direction: Vec3) -> Option<Vec3> {
+        let (half, cell) = self.cell(origin, direction);
+        half.known[cell].then(|| half.pixels[cell])
+    }
+
+    /// Whether the radiance along a ray is a lower bound, since all photographs are saturated there.
+    #[inline]
+    pub fn is_bound(&self, origin: Vec3, direction: Vec3) -> bool {
+        let (half, cell) = self.cell(origin, direction);
+        half.censored[cell]
+    }
+
+    fn cell(&self, origin: Vec3, direction: Vec3) -> (&Half, usize) {
+        let map_direction = self.map.surroundings().map_direction(origin, direction);
+        let cell = pixel_of(self.width, self.height, map_direction);
+        (self.half(direction), cell)
+    }
+
+    /// The cells of a direction's side of the horizon.
+    fn half(&self, direction: Vec3) -> &Half {
+        &self.halves[usize::from(direction.dot(self.up) > 0.0)]
+    }
+
+    /// Cells with a flag and their radiances, on both sides of the horizon.
+    fn cells_with(&self, flags: fn(&Half) -> &[bool]) -> impl Iterator<Item = (usize, Vec3)> {
+        self.halves.iter().flat_map(move |half| {
+            let cells = half.pixels.iter().copied().enumerate();
+            cells.filter(move |(cell, _)| flags(half)[*cell])
+        })
+    }
+
+    /// The map, for sampling directions.
+    pub fn map(&self) -> &Environment {
+        &self.map
+    }
+
+    /// Expected radiance of an unmeasured direction: the mean over measured directions within ± `band` / 2 radians of its elevation,
+    /// or over all measured directions.
+    pub fn expected(&self, direction: Vec3, band: f64) -> Vec3 {
+        let elevation_of = |d: Vec3| f64::from(d.dot(self.up).clamp(-1.0, 1.0)).asin();
+        let elevation = elevation_of(direction);
+        let (mut near, mut all) = ((DVec3::ZERO, 0.0), (DVec3::ZERO, 0.0));
+        for (cell, radiance) in self.cells_with(|half| &half.known) {
+            let seen = direction_of(self.width, self.height, cell);
+            let solid_angle = f64::from(1.0 - seen.y * seen.y).max(0.0).sqrt();
+            let radiance = radiance.as_dvec3() * solid_angle;
+            all = (all.0 + radiance, all.1 + solid_angle);
+            if (elevation_of(seen) - elevation).abs() < 0.5 * band {
+                near = (near.0 + radiance, near.1 + solid_angle);
+            }
+        }
+        let (sum, weight) = if near.1 > 0.0 { near } else { all };
+        (sum / f64::max(weight, f64::MIN_POSITIVE)).as_vec3()
+    }
+
+    /// Mean of the lower bounds; black if there are none.
+    pub fn mean_bound(&self) -> Vec3 {
+        let bounds = || self.cells_with(|half| &half.censored);
+        let sum: DVec3 = bounds().map(|(_, bound)| bound.as_dvec3()).sum();
+        (sum / bounds().count().max(1) as f64).as_vec3()
+    }
+
+    /// Columns and rows.
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+
+    /// The completed map of light that comes from `towards`, or of each cell's own direction: measured radiance, plus `excess` where it
+    /// is a lower bound, and `elsewhere` in unmeasured directions.
+    pub fn filled(
+        &self,
+        towards: Option<Vec3>,
+        excess: impl Fn(Vec3) -> Vec3,
+        elsewhere: impl Fn(Vec3) -> Vec3,
+    ) -> Vec<Vec3> {
+        (0..self.width * self.height)
+            .map(|cell| {
+                let direction = direction_of(self.width, self.height, cell);
+                let from = towards.unwrap_or(direction);
+                let half = self.half(from);
+                match (half.known[cell], half.censored[cell]) {
+                    (true, true) => half.pixels[cell] + excess(from),
+                    (true, false) => half.pixels[cell],
+                    (false, _) => elsewhere(direction),
+                }
+            })
+            .collect()
+    }
+}
+
+impl Half {
+    /// The cells' means. Gaps are filled from coarser blocks. Saturated pixels count only in blocks without unsaturated ones.
+    fn new(width: usize, height: usize, sums: &[Sums]) -> Self {
         let mut known = vec![false; width * height];
         let mut censored = vec![false; width * height];
         let mut pixels = vec![Vec3::ZERO; width * height];
@@ -92,87 +211,11 @@ impl MeasuredOutside {
                 }
             }
         }
-        let map = Environment::new(width, height, pixels)?.around(surroundings);
-        Some(Self {
-            width,
-            height,
+        Self {
             known,
             censored,
-            map,
-            up: scene.up,
-        })
-    }
-
-    /// Radiance along a ray, or its lower bound; `None` in unmeasured directions.
-    #[inline]
-    pub fn at(&self, origin: Vec3, direction: Vec3) -> Option<Vec3> {
-        self.known[self.cell(origin, direction)].then(|| self.map.radiance(origin, direction))
-    }
-
-    /// Whether the radiance along a ray is a lower bound, since all photographs are saturated there.
-    #[inline]
-    pub fn is_bound(&self, origin: Vec3, direction: Vec3) -> bool {
-        self.censored[self.cell(origin, direction)]
-    }
-
-    fn cell(&self, origin: Vec3, direction: Vec3) -> usize {
-        let map_direction = self.map.surroundings().map_direction(origin, direction);
-        pixel_of(self.width, self.height, map_direction)
-    }
-
-    /// The map, for sampling directions.
-    pub fn map(&self) -> &Environment {
-        &self.map
-    }
-
-    /// Expected radiance of an unmeasured direction: the mean over measured directions within ± `band` / 2 radians of its elevation,
-    /// or over all measured directions.
-    pub fn expected(&self, direction: Vec3, band: f64) -> Vec3 {
-        let elevation_of = |d: Vec3| f64::from(d.dot(self.up).clamp(-1.0, 1.0)).asin();
-        let elevation = elevation_of(direction);
-        let (mut near, mut all) = ((DVec3::ZERO, 0.0), (DVec3::ZERO, 0.0));
-        for cell in (0..self.known.len()).filter(|&cell| self.known[cell]) {
-            let seen = direction_of(self.width, self.height, cell);
-            let solid_angle = f64::from(1.0 - seen.y * seen.y).max(0.0).sqrt();
-            let radiance = self.map.map_radiance(seen).as_dvec3() * solid_angle;
-            all = (all.0 + radiance, all.1 + solid_angle);
-            if (elevation_of(seen) - elevation).abs() < 0.5 * band {
-                near = (near.0 + radiance, near.1 + solid_angle);
-            }
+            pixels,
         }
-        let (sum, weight) = if near.1 > 0.0 { near } else { all };
-        (sum / f64::max(weight, f64::MIN_POSITIVE)).as_vec3()
-    }
-
-    /// Mean of the lower bounds; black if there are none.
-    pub fn mean_bound(&self) -> Vec3 {
-        let cells = || (0..self.known.len()).filter(|&cell| self.censored[cell]);
-        let sum: DVec3 = cells()
-            .map(|cell| {
-                let direction = direction_of(self.width, self.height, cell);
-                self.map.map_radiance(direction).as_dvec3()
-            })
-            .sum();
-        (sum / cells().count().max(1) as f64).as_vec3()
-    }
-
-    /// Columns and rows.
-    pub fn size(&self) -> [usize; 2] {
-        [self.width, self.height]
-    }
-
-    /// The completed map: measured radiance, plus `excess` where it is a lower bound, and `elsewhere` in unmeasured directions.
-    pub fn filled(&self, excess: Vec3, elsewhere: impl Fn(Vec3) -> Vec3) -> Vec<Vec3> {
-        (0..self.width * self.height)
-            .map(|cell| {
-                let direction = direction_of(self.width, self.height, cell);
-                match (self.known[cell], self.censored[cell]) {
-                    (true, true) => self.map.map_radiance(direction) + excess,
-                    (true, false) => self.map.map_radiance(direction),
-                    (false, _) => elsewhere(direction),
-                }
-            })
-            .collect()
     }
 }
 
@@ -198,11 +241,19 @@ mod tests {
         let (above, below) = (16 * 2 + 3, 16 * 5 + 9);
         let mut pixels = vec![Vec3::ZERO; 128];
         (pixels[above], pixels[below]) = (Vec3::splat(4.0), Vec3::splat(1.0));
+        let half = Half {
+            known: (0..128).map(|c| c == above || c == below).collect(),
+            censored: vec![false; 128],
+            pixels: pixels.clone(),
+        };
+        let none = Half {
+            known: vec![false; 128],
+            ..half.clone()
+        };
         let measured = MeasuredOutside {
             width,
             height,
-            known: (0..128).map(|c| c == above || c == below).collect(),
-            censored: vec![false; 128],
+            halves: [half, none],
             map: Environment::new(width, height, pixels).expect("sizes fit"),
             up: Vec3::Y,
         };
@@ -223,6 +274,36 @@ mod tests {
         assert!(
             (at_zenith - Vec3::splat(4.0)).length() < 1e-5,
             "{at_zenith}"
+        );
+    }
+
+    #[test]
+    fn light_from_above_and_from_below_the_horizon_is_told_apart() {
+        let half = |radiance: f32, censored: bool| Half {
+            known: vec![true, false],
+            censored: vec![censored, false],
+            pixels: vec![Vec3::splat(radiance), Vec3::ZERO],
+        };
+        let map = Environment::new(2, 1, vec![Vec3::ZERO; 2]).expect("sizes fit");
+        let measured = MeasuredOutside {
+            width: 2,
+            height: 1,
+            halves: [half(0.5, false), half(3.0, true)],
+            map,
+            up: Vec3::Y,
+        };
+        let seen = direction_of(2, 1, 0);
+        let at = |rise: f32| (seen + Vec3::Y * rise).normalize();
+        assert_eq!(measured.at(Vec3::ZERO, at(-0.1)), Some(Vec3::splat(0.5)));
+        assert_eq!(measured.at(Vec3::ZERO, at(0.1)), Some(Vec3::splat(3.0)));
+        assert!(measured.is_bound(Vec3::ZERO, at(0.1)));
+        assert!(!measured.is_bound(Vec3::ZERO, at(-0.1)));
+        assert_eq!(measured.mean_bound(), Vec3::splat(3.0));
+        let filled = |towards| measured.filled(Some(towards), |d| d.abs(), |_| Vec3::splat(7.0));
+        assert_eq!(filled(Vec3::NEG_Y), [Vec3::splat(0.5), Vec3::splat(7.0)]);
+        assert_eq!(
+            filled(Vec3::Y),
+            [Vec3::splat(3.0) + Vec3::Y, Vec3::splat(7.0)]
         );
     }
 

@@ -158,7 +158,11 @@ impl Edits {
         }
         if let (Some(factor), Some(outside)) = (self.outside, &mut edited.outside) {
             let factor = factor.max(Vec3::ZERO);
-            outside.pixels.iter_mut().for_each(|p| *p *= factor);
+            let pixels = outside
+                .pixels
+                .iter_mut()
+                .chain(outside.above.iter_mut().flatten());
+            pixels.for_each(|p| *p *= factor);
         }
         edited
     }
@@ -266,6 +270,7 @@ mod tests {
                 width: 1,
                 height: 1,
                 pixels: vec![Vec3::splat(2.0)],
+                above: None,
                 surroundings: Surroundings::Far,
             }),
             ..Estimate::default()

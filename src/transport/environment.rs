@@ -18,6 +18,8 @@ pub struct Environment {
     cumulative: Vec<f64>,
     /// The distance of the light.
     surroundings: Surroundings,
+    /// Radiance from above the horizon, if it differs, and the up vector.
+    above: Option<(Vec<Vec3>, Vec3)>,
 }
 
 impl Environment {
@@ -26,27 +28,26 @@ impl Environment {
         if width == 0 || height == 0 || pixels.len() != width * height {
             return None;
         }
-        let mut sum = 0.0;
-        let cumulative = pixels
-            .iter()
-            .enumerate()
-            .map(|(i, &radiance)| {
-                let weight =
-                    f64::from(luminance(radiance)) * row_solid_angle(i / width, width, height);
-                sum += if weight.is_finite() {
-                    weight.max(0.0)
-                } else {
-                    0.0
-                };
-                sum
-            })
-            .collect();
         Some(Self {
             width,
             height,
+            cumulative: cumulative(width, height, pixels.iter().copied()),
             pixels,
-            cumulative,
             surroundings: Surroundings::Far,
+            above: None,
+        })
+    }
+
+    /// The map with other radiances for light from above the horizon. `None` if their number differs.
+    pub fn with_above(self, above: Vec<Vec3>, up: Vec3) -> Option<Self> {
+        if above.len() != self.pixels.len() {
+            return None;
+        }
+        let mean = (self.pixels.iter().zip(&above)).map(|(below, above)| (*below + *above) * 0.5);
+        Some(Self {
+            cumulative: cumulative(self.width, self.height, mean),
+            above: Some((above, up)),
+            ..self
         })
     }
 
@@ -65,7 +66,11 @@ impl Environment {
 
     /// Radiance along a ray that leaves the mesh.
     pub fn radiance(&self, origin: Vec3, direction: Vec3) -> Vec3 {
-        self.pixels[self.pixel(origin, direction)]
+        let pixel = self.pixel(origin, direction);
+        match &self.above {
+            Some((above, up)) if direction.dot(*up) > 0.0 => above[pixel],
+            _ => self.pixels[pixel],
+        }
     }
 
     /// Radiance of the map in a direction.
@@ -143,6 +148,21 @@ impl Environment {
     }
 }
 
+/// Cumulative luminance × solid angle over a map's pixels.
+fn cumulative(width: usize, height: usize, pixels: impl Iterator<Item = Vec3>) -> Vec<f64> {
+    let mut sum = 0.0;
+    let added = pixels.enumerate().map(|(i, radiance)| {
+        let weight = f64::from(luminance(radiance)) * row_solid_angle(i / width, width, height);
+        sum += if weight.is_finite() {
+            weight.max(0.0)
+        } else {
+            0.0
+        };
+        sum
+    });
+    added.collect()
+}
+
 /// The pixel index of a unit direction in a `width` × `height` map, row by row.
 pub fn pixel_of(width: usize, height: usize, direction: Vec3) -> usize {
     let theta = direction.y.clamp(-1.0, 1.0).acos();
@@ -185,6 +205,33 @@ mod tests {
         for pixel in 0..128 {
             assert_eq!(pixel_of(16, 8, direction_of(16, 8, pixel)), pixel);
         }
+    }
+
+    /// The irradiance of a surface that faces up and sees a bright upper half, and of one that faces down.
+    #[test]
+    fn light_from_above_the_horizon_may_differ_from_that_from_below() {
+        let dim = Environment::new(8, 4, vec![Vec3::splat(0.5); 32]).expect("sizes fit");
+        let map = dim.with_above(vec![Vec3::splat(3.0); 32], Vec3::X);
+        let map = map.expect("sizes fit");
+        let mut stream = Stream::new(3, 0, 0, 0);
+        let n = 40_000;
+        let mut sums = [0.0f64; 2];
+        for _ in 0..n {
+            let drawn = map.sample(Vec3::ONE, stream.uniform_f64(), stream.uniform2());
+            let (direction, pdf) = drawn.expect("not black");
+            let side = usize::from(direction.x > 0.0);
+            let radiance = map.radiance(Vec3::ONE, direction).x;
+            assert_eq!(radiance, [0.5, 3.0][side]);
+            sums[side] += f64::from(radiance * direction.x.abs() / pdf) / f64::from(n);
+        }
+        // π times the radiance, within 2 %: about five standard errors.
+        for (sum, radiance) in sums.iter().zip([0.5, 3.0]) {
+            assert!(
+                (sum / (std::f64::consts::PI * radiance) - 1.0).abs() < 0.02,
+                "{sums:?}"
+            );
+        }
+        assert!(map.with_above(vec![Vec3::ONE; 3], Vec3::X).is_none());
     }
 
     #[test]

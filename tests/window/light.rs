@@ -72,6 +72,7 @@ fn light_from_outside_is_switched_off_and_on() {
             width: 1,
             height: 1,
             pixels: vec![Vec3::ONE],
+            above: None,
             surroundings: Surroundings::Far,
         });
     });

@@ -232,7 +232,7 @@ impl Tracer<'_> {
                     let excess = self.outside.filter(|_| sky.is_bound(origin, wi));
                     vertices.extend(excess.map(|grid| Vertex {
                         emission_weight: weight * scale,
-                        ..Vertex::on(grid.excess())
+                        ..Vertex::on(grid.excess(wi))
                     }));
                 } else {
                     vertices.push(vertex);
@@ -339,7 +339,7 @@ impl Tracer<'_> {
         let weight = self.sample_weight(sky_pdf, surface.value(scattering, wi)) * scale;
         vertex.known += sky.map().radiance(point, wi) * weight;
         if let Some(grid) = self.outside.filter(|_| sky.is_bound(point, wi)) {
-            (vertex.lamp, vertex.lamp_weight) = (grid.excess(), weight);
+            (vertex.lamp, vertex.lamp_weight) = (grid.excess(wi), weight);
         }
         rays
     }

@@ -12,6 +12,7 @@ use crate::math::color::luminance;
 use crate::scene::Scene;
 use crate::transport::environment::{direction_of, pixel_of, row_solid_angle};
 use crate::transport::material::Lobe;
+use crate::transport::surroundings::Surroundings;
 use glam::{DVec3, Vec3};
 use std::f32::consts::PI;
 
@@ -125,21 +126,29 @@ fn outside_light(
         (None, Some(_)) => SUN_MAP,
         (None, None) => [grid.width, grid.height],
     };
-    let mut pixels: Vec<Vec3> = match sky {
-        Some(sky) => sky.filled(emission(grid.excess()), elsewhere),
-        None => (0..width * height)
-            .map(|pixel| elsewhere(direction_of(width, height, pixel)))
-            .collect(),
+    // On a box, light of one point is not that of one direction: a window sends the sky's light down and the ground's up.
+    let boxed = grid.surroundings != Surroundings::Far;
+    let filled = |towards: Option<Vec3>| -> Vec<Vec3> {
+        match sky {
+            Some(sky) => sky.filled(towards, |from| emission(grid.excess(from)), elsewhere),
+            None => (0..width * height)
+                .map(|pixel| elsewhere(direction_of(width, height, pixel)))
+                .collect(),
+        }
     };
+    let mut pixels = filled(boxed.then_some(-grid.up));
+    let above = (boxed && sky.is_some()).then(|| filled(Some(grid.up)));
     if let Some(direction) = grid.sun {
         let pixel = pixel_of(width, height, direction);
         let solid_angle = row_solid_angle(pixel / width, width, height) as f32;
         pixels[pixel] += emission(grid.sun_surface()) * PI / solid_angle;
     }
-    (pixels.iter().any(|&p| p != Vec3::ZERO)).then_some(Outside {
+    let shines = |pixels: &[Vec3]| pixels.iter().any(|&p| p != Vec3::ZERO);
+    (shines(&pixels) || above.as_deref().is_some_and(shines)).then_some(Outside {
         width: width as u32,
         height: height as u32,
         pixels,
+        above,
         surroundings: grid.surroundings,
     })
 }

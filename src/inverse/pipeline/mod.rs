@@ -119,6 +119,7 @@ pub fn solve(
         first: objects as u32,
         width: OUTSIDE_WIDTH,
         height: OUTSIDE_HEIGHT,
+        up: problem.scene.up,
         surroundings: Surroundings::Far,
         sun: None,
     };

@@ -215,7 +215,7 @@ impl Pipeline<'_, '_> {
         let color = |surface: u32, expected: Vec3| match bound {
             // Sunlight falls on what it lights directly, so that each of its channels is determined.
             _ if surface == grid.sun_surface() => None,
-            Some(bound) if surface == grid.excess() => Some(bound),
+            Some(bound) if grid.is_excess(surface) => Some(bound),
             Some(_) => Some(expected),
             None => Some(photographed),
         };

@@ -59,6 +59,10 @@ pub fn encode(estimate: &Estimate) -> Result<Option<Vec<u8>>> {
     if let Some(outside) = &estimate.outside {
         let shape = vec![outside.height as usize, outside.width as usize, 3];
         tensors.push(("outside", Dtype::F32, shape, color_bytes(&outside.pixels)));
+        if let Some(above) = &outside.above {
+            let shape = vec![outside.height as usize, outside.width as usize, 3];
+            tensors.push(("outside_above", Dtype::F32, shape, color_bytes(above)));
+        }
         if let Surroundings::Box { min, max } = outside.surroundings {
             tensors.push((
                 "outside_box",
@@ -108,6 +112,11 @@ pub fn decode(path: &Path, bytes: &[u8]) -> Result<Maps> {
                 width: width as u32,
                 height: height as u32,
                 pixels: colors(map.data()),
+                above: match read.optional("outside_above", Dtype::F32)? {
+                    None => None,
+                    Some(above) if above.shape() == map.shape() => Some(colors(above.data())),
+                    Some(_) => return Err(read.misfit("outside_above")),
+                },
                 surroundings: match read.optional("outside_box", Dtype::F32)? {
                     None => Surroundings::Far,
                     Some(corners) => match *colors(corners.data()) {
@@ -232,6 +241,7 @@ mod tests {
                 width: 2,
                 height: 1,
                 pixels: vec![Vec3::ONE, Vec3::new(1e-20, 1e20, 3.0)],
+                above: Some(vec![Vec3::splat(2.0), Vec3::new(5.0, 1e-30, 0.0)]),
                 surroundings: Surroundings::Box {
                     min: Vec3::new(-1.0, -2.0, -3.0),
                     max: Vec3::new(1.0, 2.0, 3.5),

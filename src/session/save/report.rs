@@ -156,10 +156,10 @@ impl Report {
                     };
                     (edge(row) - edge(row + 1)) / (2.0 * f64::from(outside.width))
                 };
-                let mean = (outside.pixels.iter().enumerate())
+                let mean = (outside.means().enumerate())
                     .map(|(i, p)| p.as_dvec3() * row_angle(i / outside.width.max(1) as usize))
                     .sum::<glam::DVec3>();
-                let brightest = outside.pixels.iter().map(|&p| luminance(p));
+                let brightest = outside.means().map(luminance);
                 OutsideSummary {
                     width: outside.width,
                     height: outside.height,
