@@ -147,7 +147,7 @@ fn rays_leave_rooms_with_windows_for_light_that_the_truth_holds() {
             (0..64 * 128).map(|i| relit::transport::environment::direction_of(128, 64, i));
         let mean = outside.power() / (4.0 * std::f64::consts::PI);
         let peak = brightest
-            .map(|d| outside.map_radiance(d).max_element())
+            .map(|d| outside.radiance(Vec3::ZERO, d).max_element())
             .fold(0.0, f32::max);
         suns += u32::from(f64::from(peak) > 20.0 * mean);
     }

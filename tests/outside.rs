@@ -107,7 +107,8 @@ fn a_room_lit_through_its_window_keeps_its_walls_dark() {
     let [width, height] = [outside.width, outside.height].map(|side| side as usize);
     let found = Environment::new(width, height, outside.pixels.clone());
     let upwards = Vec3::new(0.1, 0.3, 1.0).normalize();
-    let ratio = found.expect("a map").map_radiance(upwards) / sky().map_radiance(upwards);
+    let ratio =
+        found.expect("a map").radiance(Vec3::ZERO, upwards) / sky().radiance(Vec3::ZERO, upwards);
     println!("the sky is found at {ratio} of its radiance");
     assert!((ratio - 1.0).abs().max_element() < 0.1, "{ratio}");
     // 0.0076 and 0.065 are seen.
@@ -129,7 +130,7 @@ fn a_sun_through_the_window_is_found_by_where_its_light_falls() {
         row_solid_angle(pixel / width, width, height) as f32
     };
     let mut pixels: Vec<Vec3> = (0..width * height)
-        .map(|pixel| sky().map_radiance(direction_of(width, height, pixel)))
+        .map(|pixel| sky().radiance(Vec3::ZERO, direction_of(width, height, pixel)))
         .collect();
     let pixel = pixel_of(width, height, sun);
     // Twice the irradiance of a uniform sky of radiance 4.

@@ -24,6 +24,7 @@ pub struct MeasuredOutside {
     height: usize,
     /// Cells of light from below the horizon and from above it.
     halves: [Half; 2],
+    /// Radiance of each cell, or its lower bound, on both sides of the horizon.
     map: Environment,
     /// Unit up vector.
     up: Vec3,
@@ -36,8 +37,6 @@ struct Half {
     known: Vec<bool>,
     /// Whether each cell has only saturated pixels, so that its radiance is a lower bound.
     censored: Vec<bool>,
-    /// Radiance, or its lower bound.
-    pixels: Vec<Vec3>,
 }
 
 /// Sum of radiance and number of pixels of a cell, unsaturated and saturated ones.
@@ -77,14 +76,13 @@ impl MeasuredOutside {
         if sums.iter().flatten().flatten().all(|s| s.1 == 0) {
             return None;
         }
-        let halves = sums.map(|sums| Half::new(width, height, &sums));
-        let [below, above] = halves.each_ref().map(|half| half.pixels.clone());
-        let map = Environment::new(width, height, below)?.around(surroundings);
+        let [(below, dark), (above, bright)] = sums.map(|sums| Half::new(width, height, &sums));
+        let map = Environment::new(width, height, dark)?.around(surroundings);
         Some(Self {
             width,
             height,
-            map: map.with_above(above, scene.up)?,
-            halves,
+            map: map.with_above(bright, scene.up)?,
+            halves: [below, above],
             up: scene.up,
         })
     }
@@ -93,7 +91,7 @@ impl MeasuredOutside {
     #[inline]
     pub fn at(&self, origin: Vec3, direction: Vec3) -> Option<Vec3> {
         let (half, cell) = self.cell(origin, direction);
-        half.known[cell].then(|| half.pixels[cell])
+        half.known[cell].then(|| self.map.pixels_from(direction)[cell])
     }
 
     /// Whether the radiance along a ray is a lower bound, since all photographs are saturated there.
@@ -116,9 +114,10 @@ impl MeasuredOutside {
 
     /// Cells with a flag and their radiances, on both sides of the horizon.
     fn cells_with(&self, flags: fn(&Half) -> &[bool]) -> impl Iterator<Item = (usize, Vec3)> {
-        self.halves.iter().flat_map(move |half| {
-            let cells = half.pixels.iter().copied().enumerate();
-            cells.filter(move |(cell, _)| flags(half)[*cell])
+        [-self.up, self.up].into_iter().flat_map(move |side| {
+            let flags = flags(self.half(side));
+            let cells = self.map.pixels_from(side).iter().copied().enumerate();
+            cells.filter(move |(cell, _)| flags[*cell])
         })
     }
 
@@ -171,9 +170,10 @@ impl MeasuredOutside {
                 let direction = direction_of(self.width, self.height, cell);
                 let from = towards.unwrap_or(direction);
                 let half = self.half(from);
+                let radiance = self.map.pixels_from(from)[cell];
                 match (half.known[cell], half.censored[cell]) {
-                    (true, true) => half.pixels[cell] + excess(from),
-                    (true, false) => half.pixels[cell],
+                    (true, true) => radiance + excess(from),
+                    (true, false) => radiance,
                     (false, _) => elsewhere(direction),
                 }
             })
@@ -182,8 +182,8 @@ impl MeasuredOutside {
 }
 
 impl Half {
-    /// The cells' means. Gaps are filled from coarser blocks. Saturated pixels count only in blocks without unsaturated ones.
-    fn new(width: usize, height: usize, sums: &[Sums]) -> Self {
+    /// The cells, and their mean radiances. Gaps are filled from coarser blocks. Saturated pixels count only in blocks without unsaturated ones.
+    fn new(width: usize, height: usize, sums: &[Sums]) -> (Self, Vec<Vec3>) {
         let mut known = vec![false; width * height];
         let mut censored = vec![false; width * height];
         let mut pixels = vec![Vec3::ZERO; width * height];
@@ -211,11 +211,7 @@ impl Half {
                 }
             }
         }
-        Self {
-            known,
-            censored,
-            pixels,
-        }
+        (Self { known, censored }, pixels)
     }
 }
 
@@ -244,7 +240,6 @@ mod tests {
         let half = Half {
             known: (0..128).map(|c| c == above || c == below).collect(),
             censored: vec![false; 128],
-            pixels: pixels.clone(),
         };
         let none = Half {
             known: vec![false; 128],
@@ -279,17 +274,17 @@ mod tests {
 
     #[test]
     fn light_from_above_and_from_below_the_horizon_is_told_apart() {
-        let half = |radiance: f32, censored: bool| Half {
+        let half = |censored: bool| Half {
             known: vec![true, false],
             censored: vec![censored, false],
-            pixels: vec![Vec3::splat(radiance), Vec3::ZERO],
         };
-        let map = Environment::new(2, 1, vec![Vec3::ZERO; 2]).expect("sizes fit");
+        let pixels = |radiance: f32| vec![Vec3::splat(radiance), Vec3::ZERO];
+        let map = Environment::new(2, 1, pixels(0.5)).expect("sizes fit");
         let measured = MeasuredOutside {
             width: 2,
             height: 1,
-            halves: [half(0.5, false), half(3.0, true)],
-            map,
+            halves: [half(false), half(true)],
+            map: map.with_above(pixels(3.0), Vec3::Y).expect("sizes fit"),
             up: Vec3::Y,
         };
         let seen = direction_of(2, 1, 0);

@@ -56,7 +56,7 @@ fn named(folder: &Path) -> Option<&std::ffi::OsStr> {
     Some(imported().unwrap_or(name))
 }
 
-/// A command to the worker, carried out between iterations.
+/// A command to the worker, carried out between iterations. The painter gets what decides the pictures at once.
 #[derive(Debug, Clone)]
 pub enum Command {
     /// Open a capture and continue its last session; without one, solve it.

@@ -213,11 +213,6 @@ impl Inserting {
         self.long_side > 0 && more
     }
 
-    /// Whether nothing of the requested picture is rendered yet.
-    pub fn is_asked(&self) -> bool {
-        self.stale.is_some() && self.hold == 0 && self.long_side > 0
-    }
-
     /// Whether the requested picture has few samples.
     pub fn is_rough(&self) -> bool {
         self.is_busy()

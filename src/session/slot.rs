@@ -3,6 +3,10 @@
 use crate::session::open_capture::OpenCapture;
 use crate::session::snapshot::{Event, Insertion, Level, Snapshot, View};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// Shortest time between two snapshots of one writer, unless one is needed at once.
+pub const FRAME: Duration = Duration::from_millis(33);
 
 /// The newest snapshot, shared between worker, painter and readers.
 #[derive(Debug, Default)]

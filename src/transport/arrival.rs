@@ -200,7 +200,7 @@ mod tests {
                 );
                 let drawn = bsdf.sample(wo, stream.uniform(), stream.uniform2());
                 wanted.push(drawn.map_or(0.0, |s| {
-                    f64::from((s.weight * sky.0.map_radiance(frame.to_world(s.wi))).x)
+                    f64::from((s.weight * sky.0.radiance(Vec3::ZERO, frame.to_world(s.wi))).x)
                 }));
             }
             let error = found.standard_error().hypot(wanted.standard_error());

@@ -66,16 +66,15 @@ impl Environment {
 
     /// Radiance along a ray that leaves the mesh.
     pub fn radiance(&self, origin: Vec3, direction: Vec3) -> Vec3 {
-        let pixel = self.pixel(origin, direction);
-        match &self.above {
-            Some((above, up)) if direction.dot(*up) > 0.0 => above[pixel],
-            _ => self.pixels[pixel],
-        }
+        self.pixels_from(direction)[self.pixel(origin, direction)]
     }
 
-    /// Radiance of the map in a direction.
-    pub fn map_radiance(&self, direction: Vec3) -> Vec3 {
-        self.pixels[pixel_of(self.width, self.height, direction)]
+    /// The pixels for light from a direction: from above the horizon or from below it.
+    pub fn pixels_from(&self, direction: Vec3) -> &[Vec3] {
+        match &self.above {
+            Some((above, up)) if direction.dot(*up) > 0.0 => above,
+            _ => &self.pixels,
+        }
     }
 
     /// Samples a direction at a point; returns it with its pdf per solid angle. `None` if the map is black.
@@ -247,7 +246,7 @@ mod tests {
                 .expect("not black");
             assert!((direction.length() - 1.0).abs() < 1e-5);
             missing += u32::from((map.pdf(Vec3::ONE, direction) - pdf).abs() > 1e-4 * pdf);
-            sum += f64::from(luminance(map.map_radiance(direction)) / pdf);
+            sum += f64::from(luminance(map.radiance(Vec3::ONE, direction)) / pdf);
         }
         // Directions on a pixel's edge may round into its neighbour.
         assert!(missing < 5, "{missing}");

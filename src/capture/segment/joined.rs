@@ -2,10 +2,7 @@
 
 use crate::capture::segment::graph::FaceGraph;
 use crate::capture::segment::sets::Sets;
-use crate::capture::segment::shown::ShownFace;
-
-/// A segment is saturated if more than this fraction of its pixels is: more than half.
-const MOSTLY: f64 = 0.5;
+use crate::capture::segment::shown::{MOSTLY, ShownFace};
 
 /// Joins neighbouring segments that are saturated. `segment_of` holds a representative of each face's segment.
 ///

@@ -6,6 +6,8 @@ use glam::{DVec3, DVec4, Vec3};
 
 /// Weight, in pixels, of the neighbours' colour: faces seen by many more pixels are hardly smoothed.
 const SMOOTHING_PIXELS: f64 = 4.0;
+/// A face or a segment is saturated if more than this fraction of its pixels is: more than half.
+pub const MOSTLY: f64 = 0.5;
 /// Patches seen by a smaller fraction of all pixels are neither lamps nor holes in lamps.
 const MIN_FRACTION: f64 = 1e-4;
 /// A saturated patch whose surroundings exceed this fraction of its level (square root of the brightest channel) has no edge: it
@@ -40,7 +42,7 @@ pub fn filled(
     }
     smooth(&mut known, edges);
     while fill_from_neighbors(&mut known, edges) {}
-    let saturated: Vec<bool> = known.iter().map(|k| k.features.w > 0.5).collect();
+    let saturated: Vec<bool> = known.iter().map(|k| k.features.w > MOSTLY).collect();
     let pixels: Vec<f64> = shown.iter().map(|face| f64::from(face.pixels)).collect();
     let saturated = without_specks(saturated, &pixels, edges, true);
     let saturated = without_specks(saturated, &pixels, edges, false);

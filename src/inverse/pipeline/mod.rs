@@ -149,12 +149,10 @@ pub fn solve(
     }
     let max_bounces = settings.max_bounces().min(MAX_DEPTH);
     let clusters = cluster(problem, &gbuffer, budget.pixels);
-    let prior = Prior::new(surfaces, objects, mean_radiance(&clusters));
-    let prior = if problem.scene.scanned {
-        prior.of_scan()
-    } else {
-        prior
-    };
+    let mut prior = Prior::new(surfaces, objects, mean_radiance(&clusters));
+    if problem.scene.scanned {
+        prior = prior.of_scan();
+    }
     let prior = prior
         .with_known(&monitor.known)
         .with_albedo(ExpectedAlbedo::unknown(surfaces, &gbuffer.seen));

@@ -7,7 +7,7 @@ use crate::session::edits::Edited;
 use crate::session::insertion::Inserting;
 use crate::session::light::Light;
 use crate::session::open_capture::OpenCapture;
-use crate::session::slot::{Pictures, Slot};
+use crate::session::slot::{FRAME, Pictures, Slot};
 use crate::session::snapshot::Level;
 use crate::session::view::Views;
 use crate::session::worker::Wake;
@@ -18,8 +18,6 @@ use std::time::{Duration, Instant};
 
 pub use requests::{Requests, Wanted};
 
-/// Shortest time between two snapshots.
-pub const FRAME: Duration = Duration::from_millis(33);
 /// How long pictures get as much of the processor's time as a solve after a new view is requested, ...
 const VIEW_PRIORITY: Duration = Duration::from_secs(2);
 /// ... and after a change of lamps, materials or inserted objects, whose result the user is waiting for.

@@ -92,15 +92,22 @@ impl Requests {
         matches!(command, Command::View(_) | Command::Match(_))
     }
 
-    /// Another capture is open: without edits and objects, at its first frame. A requested view of a frame is kept.
+    /// Another capture is open: without edits and objects, at its first frame, or at that of a requested view, which is kept.
     pub fn open(&self, capture: Arc<OpenCapture>) {
         self.change(|wanted| {
-            let of_frame = |view: &ViewRequest| matches!(view.camera, ViewCamera::Frame(_));
+            let (view, frame) = match wanted.view.take() {
+                Some(view) => match view.camera {
+                    ViewCamera::Frame(frame) => (Some(view), frame),
+                    ViewCamera::Free(_) => (None, 0),
+                },
+                None => (None, 0),
+            };
             *wanted = Wanted {
                 capture: Some(capture),
                 settings: wanted.settings.clone(),
                 exact: wanted.exact,
-                view: wanted.view.take().filter(of_frame),
+                frame,
+                view,
                 new: New {
                     capture: true,
                     exact: wanted.new.exact,

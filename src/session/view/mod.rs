@@ -109,11 +109,6 @@ impl Views {
         }
     }
 
-    /// Whether nothing of the requested view is rendered yet.
-    pub fn is_asked(&self) -> bool {
-        self.changed
-    }
-
     /// Whether the first complete picture of the requested view is still missing.
     pub fn is_rough(&self) -> bool {
         self.target.as_ref().is_some_and(Target::is_rough)

@@ -6,7 +6,7 @@ use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Control, Observer, Progress};
 use crate::session::command::Command;
 use crate::session::inbox::Mail;
-use crate::session::painter::FRAME;
+use crate::session::slot::FRAME;
 use crate::session::worker::next::Next;
 use crate::session::worker::state::Worker;
 use std::sync::Arc;
