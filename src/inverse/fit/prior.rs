@@ -154,15 +154,20 @@ impl Prior {
         found: impl Fn(usize) -> (Vec3, Vec3),
         color: impl Fn(u32, Vec3) -> Option<Vec3>,
     ) -> Self {
-        for (surface, (mean, deviation)) in (self.outside..).zip(&mut self.directions) {
-            let Some(color) = color(surface as u32, *mean) else {
-                continue;
-            };
-            let (radiance, error) = found(surface);
-            let brightness = brightness(color, radiance, error);
-            *mean = color * brightness;
-            let least = self.photographed * OUTSIDE_TINT;
-            *deviation = (*mean * OUTSIDE_TINT).max(least);
+        let surfaces = (self.outside..).zip(&mut self.directions);
+        let mut expected: Vec<_> = surfaces
+            .filter_map(|(surface, direction)| {
+                let color = color(surface as u32, direction.0)?;
+                let (radiance, error) = found(surface);
+                direction.0 = color * brightness(color, radiance, error);
+                Some(direction)
+            })
+            .collect();
+        // A direction that was fitted black may still be as bright as a part of what shines elsewhere.
+        let sum: Vec3 = expected.iter().map(|(mean, _)| *mean).sum();
+        let least = self.photographed.max(sum / expected.len().max(1) as f32);
+        for (mean, deviation) in &mut expected {
+            *deviation = mean.max(least) * OUTSIDE_TINT;
         }
         self
     }
@@ -252,6 +257,14 @@ mod tests {
         let (mean, precision) = dark.of(3, DVec3::ONE);
         assert!(mean == DVec3::ZERO && precision.is_finite() && precision.x > 0.0);
         assert_eq!(brightness(color, Vec3::ONE, Vec3::INFINITY), 0.0);
+        // ... and more where light that is much brighter than the photographs shines beside them: 8, 0 and 16, whose mean is 8.
+        let bright = |surface| Vec3::splat([8.0, 0.0, 16.0][surface - 1]);
+        let beside = Prior::new(4, 1, Vec3::ONE)
+            .with_outside_found(|k| (bright(k), Vec3::ONE), |_, _| Some(Vec3::ONE));
+        for (parameter, expected) in [(5, 8.0), (6, 8.0), (7, 16.0)] {
+            let deviation = beside.of(parameter, DVec3::ONE).1.x.powf(-0.5);
+            assert!((deviation / (expected * f64::from(OUTSIDE_TINT)) - 1.0).abs() < 1e-5);
+        }
     }
 
     #[test]
