@@ -12,6 +12,9 @@ use glam::Vec3;
 use rayon::prelude::*;
 use std::sync::Arc;
 
+/// Largest ratio by which a photograph is multiplied.
+const MAX_RATIO: Vec3 = Vec3::splat(4.0);
+
 /// A photograph with its camera.
 #[derive(Debug, Clone)]
 pub struct Backdrop {
@@ -38,6 +41,8 @@ pub struct LayeredPixel {
     pub alpha: f32,
     /// Radiance with the objects.
     pub with: Vec3,
+    /// The same of the part of the pixel that they do not cover.
+    pub uncovered: Vec3,
     /// Radiance without them.
     pub without: Vec3,
     /// Whether the objects change the pixel.
@@ -102,12 +107,7 @@ impl Backdrop {
         if self.finish.is_none() {
             return self.each(|pixel| match layers[pixel] {
                 LayeredPixel { changed: false, .. } => self.photograph.pixels[pixel],
-                LayeredPixel {
-                    alpha,
-                    with,
-                    without,
-                    ..
-                } => self.blend(pixel, alpha, with, without),
+                layer => self.blend(pixel, &layer),
             });
         }
 
@@ -122,7 +122,7 @@ impl Backdrop {
         };
         let covers = soft(&|pixel, layer| layer.with * layer.alpha * self.exposure_at(pixel));
         let changes = soft(&|pixel, layer| match layer.changed {
-            true => (layer.with - layer.without) * (1.0 - layer.alpha) * self.exposure_at(pixel),
+            true => self.change(pixel, layer) * (1.0 - layer.alpha),
             false => Vec3::ZERO,
         });
         self.each(|pixel| {
@@ -130,8 +130,7 @@ impl Backdrop {
             if alpha == 0.0 && change == Vec3::ZERO {
                 return self.photograph.pixels[pixel];
             }
-            let behind =
-                self.background_light(pixel, layers[pixel].without * self.exposure_at(pixel));
+            let behind = self.background_light(pixel, layers[pixel].without);
             let exact = self.value(cover + behind * (1.0 - alpha) + change);
             let place = [self.frame, pixel as u64];
             let grain = self.finish.grain(place, luminance(exact), alpha);
@@ -148,25 +147,47 @@ impl Backdrop {
         }
     }
 
-    /// The photograph's exposed light at a pixel. `without` (exposed light without the objects) is a lower bound where it
-    /// saturates.
-    fn background_light(&self, pixel: usize, without: Vec3) -> Vec3 {
+    /// The photograph's exposed light at a pixel; radiance `before` is a lower bound of it where it saturates.
+    fn background_light(&self, pixel: usize, before: Vec3) -> Vec3 {
         let saturated = self.photograph.pixels[pixel].cmpge(self.saturation);
         let light = self.light(pixel);
-        Vec3::select(saturated, light.max(without), light)
+        let bound = light.max(before * self.exposure_at(pixel));
+        Vec3::select(saturated, bound, light)
     }
 
-    /// Composites one pixel: α · with + (1 − α) · (photograph + with − without), in exposed light, where `with` and
-    /// `without` are the radiances with and without the objects.
-    ///
-    /// `without` is a lower bound of the light in saturated channels. The composite saturates like the photograph.
-    pub fn blend(&self, pixel: usize, alpha: f32, with: Vec3, without: Vec3) -> Vec3 {
+    /// The photograph's exposed light at a pixel if its radiance changed from `before` to `after` in the estimate: multiplied by their
+    /// ratio, so that the photograph's own albedo and detail count (Marschner and Greenberg 1997). Beyond [`MAX_RATIO`] light is added,
+    /// since dark pixels hold no detail to amplify.
+    pub fn changed_light(&self, pixel: usize, before: Vec3, after: Vec3) -> Vec3 {
+        let light = self.background_light(pixel, before);
+        let lit = before.cmpgt(Vec3::ZERO);
+        let ratio = Vec3::select(lit, (after / before).min(MAX_RATIO), Vec3::ONE);
+        let added = (after - before * ratio).max(Vec3::ZERO) * self.exposure_at(pixel);
+        light * ratio + added
+    }
+
+    /// Change of the exposed light of a pixel beside what covers it: α · with + (1 − α) · (photograph + change) is the composite. With
+    /// `with` as the mean of object and uncovered part, that is α · object + (1 − α) · [`Backdrop::changed_light`].
+    fn change(&self, pixel: usize, layer: &LayeredPixel) -> Vec3 {
+        let outline = (layer.with - layer.uncovered) * self.exposure_at(pixel);
+        let [without, uncovered] = [layer.without, layer.uncovered];
+        let changed = self.changed_light(pixel, without, uncovered);
+        outline + changed - self.background_light(pixel, without)
+    }
+
+    /// What the objects add to a pixel's light beside what they cover and take from it, as radiance of the estimate: α · with +
+    /// (1 − α) · (photograph + delta) is the composite.
+    pub fn delta(&self, pixel: usize, layer: &LayeredPixel) -> Vec3 {
         let exposure = self.exposure_at(pixel);
-        let (with, without) = (with * exposure, without * exposure);
-        let behind = self.background_light(pixel, without);
-        // The estimated shadow may exceed the photograph's light; light is never negative.
-        let uncovered = (behind + with - without).max(Vec3::ZERO);
-        let light = with * alpha + uncovered * (1.0 - alpha);
+        let exposed = exposure.cmpgt(Vec3::ZERO);
+        Vec3::select(exposed, self.change(pixel, layer) / exposure, Vec3::ZERO)
+    }
+
+    /// Composites one pixel. It saturates like the photograph.
+    fn blend(&self, pixel: usize, layer: &LayeredPixel) -> Vec3 {
+        let with = layer.with * self.exposure_at(pixel);
+        let beside = self.background_light(pixel, layer.without) + self.change(pixel, layer);
+        let light = (with * layer.alpha + beside * (1.0 - layer.alpha)).max(Vec3::ZERO);
         if !self.saturation.is_finite() {
             return light;
         }
@@ -196,6 +217,7 @@ mod tests {
                 LayeredPixel {
                     alpha: f32::from(u8::from(inside)),
                     with: Vec3::splat(with),
+                    uncovered: Vec3::splat(if shadow { 0.1 } else { LEVEL }),
                     without: Vec3::splat(LEVEL),
                     changed: inside || shadow,
                 }
@@ -256,11 +278,28 @@ mod tests {
     }
 
     #[test]
-    fn a_shadow_is_never_darker_than_black() {
-        let shadow = backdrop(PsfAndGrain::default(), Vec3::INFINITY);
-        let [with, without] = [0.0, LEVEL * 2.0].map(Vec3::splat);
-        assert_eq!(shadow.blend(0, 0.0, with, without), Vec3::ZERO);
-        assert_eq!(shadow.blend(0, 0.0, without, without), Vec3::splat(LEVEL));
+    fn a_shadow_takes_its_share_of_the_light_that_the_photograph_shows() {
+        let linear = backdrop(PsfAndGrain::default(), Vec3::INFINITY);
+        let shown = |without: f32, uncovered: f32| {
+            let [without, uncovered] = [without, uncovered].map(Vec3::splat);
+            let layer = LayeredPixel {
+                with: uncovered,
+                uncovered,
+                without,
+                changed: true,
+                ..LayeredPixel::default()
+            };
+            let after = linear.blend(0, &layer).x;
+            assert!((linear.delta(0, &layer).x - (after - LEVEL)).abs() < 1e-6);
+            after
+        };
+        assert_eq!(shown(0.1, 0.1), LEVEL);
+        assert_eq!(shown(2.0 * LEVEL, 0.0), 0.0);
+        // Half of the light, whatever albedo the estimate gave the surface.
+        assert!([0.1, 1.0].map(|e| shown(e, 0.5 * e)) == [0.5 * LEVEL; 2]);
+        // Light on black, and a mirror image in a surface estimated dark, are added beyond four times the photograph.
+        assert!((shown(0.0, 0.2) - (LEVEL + 0.2)).abs() < 1e-6);
+        assert!((shown(0.01, 0.21) - (4.0 * LEVEL + 0.17)).abs() < 1e-6);
     }
 
     #[test]

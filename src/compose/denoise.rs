@@ -51,20 +51,19 @@ pub fn denoised(halves: [&Insertion; 2], denoiser: Denoiser) -> (Picture, Layers
         pixels: (0..alpha.len()).map(value).collect(),
         ..*backdrop.photograph
     };
-    let with = picture(&|pixel| {
-        let free = without.pixels[pixel] + change.pixels[pixel];
-        free.lerp(object.pixels[pixel], alpha[pixel])
-    });
-    let delta = picture(&|pixel| with.pixels[pixel] - without.pixels[pixel]);
+    let uncovered = picture(&|pixel| without.pixels[pixel] + change.pixels[pixel]);
+    let with = picture(&|pixel| uncovered.pixels[pixel].lerp(object.pixels[pixel], alpha[pixel]));
     let mixed: Vec<LayeredPixel> = (alpha.iter().enumerate())
         .map(|(pixel, &alpha)| LayeredPixel {
             alpha,
             with: with.pixels[pixel],
+            uncovered: uncovered.pixels[pixel],
             without: without.pixels[pixel],
             changed: alpha != 0.0 || change.pixels[pixel] != Vec3::ZERO,
         })
         .collect();
     let composite = backdrop.composite(&mixed);
+    let delta = picture(&|pixel| backdrop.delta(pixel, &mixed[pixel]));
     let layers = Layers {
         shadow: Layers::shadow_of(&with, &without, &alpha),
         with,

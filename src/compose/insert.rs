@@ -1,4 +1,5 @@
-//! Differential rendering (Debevec 1998): adds to the photograph the difference between renders with and without the objects.
+//! Differential rendering (Debevec 1998): changes the photograph by the ratio of renders with and without the objects, and covers it
+//! with the objects.
 //!
 //! Both renders use the same random numbers. Paths that meet no object cancel to the bit, so the photograph is unchanged
 //! wherever the objects have no effect.
@@ -45,7 +46,7 @@ pub struct Layers {
     pub with: Picture,
     /// Radiance without.
     pub without: Picture,
-    /// Difference in radiance, with − without.
+    /// What the objects add to the photograph's light and take from it where they do not cover it, as radiance.
     pub delta: Picture,
     /// Ratio of radiance with to without the objects where they darken it, 0 to 1; 1 where they cover the pixel or brighten it.
     pub shadow: Picture,
@@ -210,17 +211,20 @@ impl Insertion {
     /// Pixels that no object changes, not even within the reach of the blur, keep the photograph's value to the bit; without
     /// objects, all do.
     pub fn composite(&self) -> Picture {
-        let mixed = |pixel: usize| {
-            let (with, without, alpha) = self.means(pixel);
-            LayeredPixel {
-                alpha,
-                with,
-                without,
-                changed: self.pixels[pixel].changed,
-            }
-        };
-        let layers: Vec<LayeredPixel> = (0..self.pixels.len()).into_par_iter().map(mixed).collect();
+        let pixels = (0..self.pixels.len()).into_par_iter();
+        let layers: Vec<LayeredPixel> = pixels.map(|pixel| self.layered(pixel)).collect();
         self.backdrop.composite(&layers)
+    }
+
+    fn layered(&self, pixel: usize) -> LayeredPixel {
+        let (with, without, alpha) = self.means(pixel);
+        LayeredPixel {
+            alpha,
+            with,
+            uncovered: without + self.uncovered_change_at(pixel),
+            without,
+            changed: self.pixels[pixel].changed,
+        }
     }
 
     /// Mean radiance of the objects where they cover a pixel; black where none does.
@@ -231,15 +235,17 @@ impl Insertion {
         })
     }
 
-    /// Change in radiance in the part of each pixel that no object object_radiance; black where they cover all of it.
+    /// Change in radiance in the part of each pixel that no object covers; black where they cover all of it.
     pub fn uncovered_change(&self) -> Picture {
-        self.picture(|pixel| {
-            let sums = &self.pixels[pixel];
-            let free = self.row_samples[pixel / self.width()].max(1) - sums.covered;
-            let with = sums.with - sums.covered_with;
-            let without = sums.without - sums.covered_without;
-            ((with - without) / f64::from(free.max(1))).as_vec3()
-        })
+        self.picture(|pixel| self.uncovered_change_at(pixel))
+    }
+
+    fn uncovered_change_at(&self, pixel: usize) -> Vec3 {
+        let sums = &self.pixels[pixel];
+        let free = self.row_samples[pixel / self.width()].max(1) - sums.covered;
+        let with = sums.with - sums.covered_with;
+        let without = sums.without - sums.covered_without;
+        ((with - without) / f64::from(free.max(1))).as_vec3()
     }
 
     /// The layers of the composite.
@@ -262,10 +268,7 @@ impl Insertion {
         let without = self.picture(|pixel| self.means(pixel).1);
         let alpha: Vec<f32> = (0..self.pixels.len()).map(|p| self.means(p).2).collect();
         Layers {
-            delta: self.picture(|pixel| {
-                let (with, without, _) = self.means(pixel);
-                with - without
-            }),
+            delta: self.picture(|pixel| self.backdrop.delta(pixel, &self.layered(pixel))),
             shadow: Layers::shadow_of(&with, &without, &alpha),
             with,
             without,

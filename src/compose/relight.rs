@@ -5,38 +5,32 @@ use crate::compose::backdrop::Backdrop;
 use crate::error::Result;
 use crate::gpu::{Tracer, View};
 use crate::math::picture::Picture;
-use crate::transport::denoise::{Denoiser, Guide, guides};
+use crate::scene::camera::Camera;
+use crate::transport::denoise::{Denoiser, Guide, guides, guides_at_centers};
 use crate::transport::film::Film;
 use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
+use crate::transport::upsample::upsample;
 use glam::Vec3;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-/// Largest ratio. Light beyond it is added, since dark pixels hold no detail to amplify.
-const MAX_RATIO: f32 = 4.0;
 /// Fewest rows between two calls of `go_on`.
 const BAND: u32 = 16;
-/// Long side and samples per pixel of the renders for a preview.
-const COARSE_LONG_SIDE: u32 = 128;
-const COARSE_SAMPLES: u32 = 4;
+
+/// What the pixels see in both lights; their albedos may differ.
+type Guides = [Vec<Option<Guide>>; 2];
 
 /// The photograph's values if its view were lit by `after` instead of `before` (radiances, one a pixel).
 ///
 /// A pixel with equal radiances keeps its value to the bit. `before` is a lower bound of the light in saturated channels.
-pub fn relit(backdrop: &Backdrop, before: &[Vec3], after: &[Vec3]) -> Picture {
+fn relit(backdrop: &Backdrop, before: &[Vec3], after: &[Vec3]) -> Picture {
     let photograph = &backdrop.photograph;
     let pixels = photograph.pixels.iter().zip(before).zip(after).enumerate();
     Picture {
         pixels: pixels
-            .map(|(pixel, ((photograph, before), after))| {
-                let exposure = backdrop.exposure_at(pixel);
-                let (before, after) = (*before * exposure, *after * exposure);
-                let light = backdrop.light(pixel);
-                let saturated = photograph.cmpge(backdrop.saturation);
-                let channel =
-                    |c: usize| relit_channel(light[c], before[c], after[c], saturated.test(c));
-                let relit = Vec3::new(channel(0), channel(1), channel(2));
-                let value = backdrop.value(relit).clamp(Vec3::ZERO, backdrop.saturation);
+            .map(|(pixel, ((photograph, &before), &after))| {
+                let light = backdrop.changed_light(pixel, before, after);
+                let value = backdrop.value(light).clamp(Vec3::ZERO, backdrop.saturation);
                 Vec3::select(before.cmpeq(after), *photograph, value)
             })
             .collect(),
@@ -44,25 +38,12 @@ pub fn relit(backdrop: &Backdrop, before: &[Vec3], after: &[Vec3]) -> Picture {
     }
 }
 
-/// Exposed light of one channel, from two renders of it.
-fn relit_channel(photograph: f32, before: f32, after: f32, saturated: bool) -> f32 {
-    let light = if saturated {
-        photograph.max(before)
-    } else {
-        photograph
-    };
-    let ratio = if before > 0.0 {
-        (after / before).min(MAX_RATIO)
-    } else {
-        1.0
-    };
-    light * ratio + (after - before * ratio).max(0.0)
-}
-
 /// A photograph being relit, refined progressively by bands of rows.
 #[derive(Debug)]
 pub struct Relighting {
     backdrop: Backdrop,
+    /// The renders' camera: that of the photograph, or a smaller one of the same view.
+    camera: Camera,
     lights: [Arc<LitScene>; 2],
     options: PathOptions,
     seed: u64,
@@ -71,7 +52,9 @@ pub struct Relighting {
     pairs: Vec<[Film; 2]>,
     next_row: u32,
     denoiser: Option<Denoiser>,
-    guides: Option<[Vec<Option<Guide>>; 2]>,
+    guides: Option<Guides>,
+    /// What the photograph's pixels see, if smaller renders were enlarged to its size.
+    guides_at_centers: Arc<OnceLock<Guides>>,
 }
 
 impl Relighting {
@@ -83,11 +66,9 @@ impl Relighting {
         seed: u64,
         denoiser: Option<Denoiser>,
     ) -> Self {
-        let pair = || [0; 2].map(|_| Film::new(&backdrop.camera));
         Self {
-            pairs: (0..1 + u8::from(denoiser.is_some()))
-                .map(|_| pair())
-                .collect(),
+            pairs: pairs(&backdrop.camera, denoiser),
+            camera: backdrop.camera.clone(),
             backdrop,
             lights,
             options,
@@ -95,6 +76,22 @@ impl Relighting {
             next_row: 0,
             denoiser,
             guides: None,
+            guides_at_centers: Arc::default(),
+        }
+    }
+
+    /// The same relighting from smaller renders without samples yet; the photograph keeps its size.
+    pub fn smaller(&self, long_side: u32) -> Self {
+        let camera = self.backdrop.camera.shrunk(long_side);
+        Self {
+            pairs: pairs(&camera, self.denoiser),
+            camera,
+            backdrop: self.backdrop.clone(),
+            lights: self.lights.clone(),
+            next_row: 0,
+            guides: None,
+            guides_at_centers: self.guides_at_centers.clone(),
+            ..*self
         }
     }
 
@@ -111,7 +108,7 @@ impl Relighting {
     /// Samples every pixel up to `samples` paths. Stops between two bands of rows once `go_on` returns false; the
     /// next call continues there. Returns whether all samples are done.
     pub fn refine_to(&mut self, samples: u32, go_on: impl Fn() -> bool) -> bool {
-        let height = self.backdrop.camera.intrinsics.height;
+        let height = self.camera.intrinsics.height;
         let band = BAND.max(2 * rayon::current_num_threads() as u32);
         while self.samples() < samples {
             if !go_on() {
@@ -124,7 +121,7 @@ impl Relighting {
             let part = part.unwrap_or(0);
             let key = (self.seed.wrapping_add(part as u64), self.backdrop.frame);
             for (film, lit) in self.pairs[part].iter_mut().zip(&self.lights) {
-                let camera = &self.backdrop.camera;
+                let camera = &self.camera;
                 film.add_rows(&**lit, camera, &self.options, key, rows.clone());
             }
             self.next_row = rows.end % height.max(1);
@@ -152,7 +149,7 @@ impl Relighting {
             let wanted = (samples + parts - 1 - part) / parts;
             let missing = wanted.saturating_sub(pair[1].samples);
             let view = View {
-                camera: &self.backdrop.camera,
+                camera: &self.camera,
                 options: &self.options,
                 seed: self.seed.wrapping_add(u64::from(part)),
                 frame: self.backdrop.frame,
@@ -172,45 +169,42 @@ impl Relighting {
         relit(&self.backdrop, &before.pixels, &after.pixels)
     }
 
-    /// A preview from small renders.
-    pub fn coarse(&self) -> Picture {
-        let (width, height) = (
-            self.backdrop.photograph.width,
-            self.backdrop.photograph.height,
-        );
-        let small = Backdrop {
-            camera: self.backdrop.camera.shrunk(COARSE_LONG_SIDE),
-            ..self.backdrop.clone()
-        };
-        let mut rough = Self::new(
-            small,
-            self.lights.clone(),
-            self.options,
-            self.seed,
-            self.denoiser,
-        );
-        rough.refine_to(COARSE_SAMPLES, || true);
-        let [before, after] = rough.renders().map(|render| render.enlarged(width, height));
-        relit(&self.backdrop, &before.pixels, &after.pixels)
-    }
-
-    /// Renders in both lights, denoised if there are two pairs.
+    /// Renders in both lights at the photograph's size, denoised if there are two pairs.
     fn renders(&mut self) -> [Picture; 2] {
         let mean = |film: &Film| Picture {
             width: film.width,
             height: film.height,
             pixels: film.mean(),
         };
-        let ([first, second], Some(denoiser)) = (&self.pairs[..], self.denoiser) else {
-            return [0, 1].map(|light| mean(&self.pairs[0][light]));
-        };
-        let camera = &self.backdrop.camera;
-        let seen = || self.lights.each_ref().map(|lit| guides(&**lit, camera));
+        let size = |camera: &Camera| [camera.intrinsics.width, camera.intrinsics.height];
+        let whole = &self.backdrop.camera;
+        let is_small = size(&self.camera) != size(whole);
+        if !is_small && self.denoiser.is_none() {
+            return self.pairs[0].each_ref().map(mean);
+        }
+        let lights = self.lights.each_ref();
+        let seen = || lights.map(|lit| guides(&**lit, &self.camera));
         let guides = self.guides.get_or_insert_with(seen);
-        [0, 1].map(|light| {
-            denoiser.denoise(&mean(&first[light]), &mean(&second[light]), &guides[light])
-        })
+        let render = |light: usize| match (&self.pairs[..], self.denoiser) {
+            ([first, second], Some(denoiser)) => {
+                denoiser.denoise(&mean(&first[light]), &mean(&second[light]), &guides[light])
+            }
+            (pairs, _) => mean(&pairs[0][light]),
+        };
+        let renders = [0, 1].map(render);
+        if !is_small {
+            return renders;
+        }
+        let seen = || lights.map(|lit| guides_at_centers(&**lit, whole));
+        let at_centers = self.guides_at_centers.get_or_init(seen);
+        [0, 1].map(|i| upsample(&renders[i], &guides[i], size(whole), &at_centers[i]))
     }
+}
+
+/// Empty renders: one pair, or two with denoising.
+fn pairs(camera: &Camera, denoiser: Option<Denoiser>) -> Vec<[Film; 2]> {
+    let pair = |_| [(); 2].map(|()| Film::new(camera));
+    (0..1 + u8::from(denoiser.is_some())).map(pair).collect()
 }
 
 #[cfg(test)]

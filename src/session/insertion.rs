@@ -28,16 +28,58 @@ const MIN_REPLACEMENT_SAMPLES: u32 = 8;
 /// Below this number of samples a picture is rough, and gets more of the solver's time.
 const ROUGH_SAMPLES: u32 = 4;
 
+/// Long side of the renders that relight a photograph at first, and their samples per pixel.
+const FIRST_RELIT: (u32, u32) = (160, 4);
+/// Long side of the renders that follow, before those of the photograph's own size, and their samples per pixel.
+const SMALL_RELIT: (u32, u32) = (400, 4);
+
 /// The shown photograph, being relit.
 #[derive(Debug)]
 struct Relit {
     relighting: Relighting,
+    /// Smaller renders, which come first.
+    small: Option<Relighting>,
     light: Light,
     /// Frame and long side.
     size: (usize, u32),
     /// Samples of `photograph`.
     samples: u32,
     photograph: Arc<Picture>,
+}
+
+impl Relit {
+    fn new(relighting: Relighting, light: &Light, size: (usize, u32)) -> Self {
+        let mut first = relighting.smaller(FIRST_RELIT.0);
+        first.refine_to(FIRST_RELIT.1, || true);
+        Self {
+            photograph: Arc::new(first.photograph()),
+            small: Some(relighting.smaller(SMALL_RELIT.0)),
+            relighting,
+            light: light.clone(),
+            size,
+            samples: 1,
+        }
+    }
+
+    /// Samples the renders for a slice, up to `samples` per pixel of the photograph. Returns whether the photograph changed.
+    fn refine_to(&mut self, samples: u32, go_on: impl Fn() -> bool) -> bool {
+        if let Some(small) = &mut self.small {
+            let done = small.refine_to(SMALL_RELIT.1, go_on);
+            if done {
+                self.photograph = Arc::new(small.photograph());
+                self.small = None;
+            }
+            return done;
+        }
+        // Denoising takes longer than a sample, so it is done when the samples have doubled.
+        let done = self.relighting.refine_to(samples, go_on);
+        let better = done && self.relighting.is_begun() && samples >= 2 * self.samples;
+        if better {
+            self.samples = samples;
+            self.photograph = Arc::new(self.relighting.photograph());
+        }
+        better
+    }
 }
 
 /// The inserted objects, being rendered into the photograph.
@@ -267,15 +309,9 @@ impl Inserting {
         if let Some(relit) = &mut self.relit
             && relit.relighting.samples() < samples
         {
-            // Denoising takes longer than a sample, so it is done when the samples have doubled.
-            let done = relit.relighting.refine_to(samples, go_on);
-            let better = done && relit.relighting.is_begun() && samples >= 2 * relit.samples;
-            if better {
-                relit.samples = samples;
-                relit.photograph = Arc::new(relit.relighting.photograph());
-                if let Some(placed) = &mut self.placed {
-                    placed.set_photograph(&relit.photograph);
-                }
+            let better = relit.refine_to(samples, go_on);
+            if let Some(placed) = self.placed.as_mut().filter(|_| better) {
+                placed.set_photograph(&relit.photograph);
             }
             return better;
         }
@@ -342,13 +378,7 @@ impl Inserting {
             light.seed,
             Some(Denoiser::best()),
         );
-        self.relit = Some(Relit {
-            photograph: Arc::new(relighting.coarse()),
-            relighting,
-            light: light.clone(),
-            size,
-            samples: 1,
-        });
+        self.relit = Some(Relit::new(relighting, light, size));
     }
 
     fn picture(&mut self) {

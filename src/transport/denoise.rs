@@ -8,7 +8,7 @@
 use crate::math::color::luminance;
 use crate::math::picture::Picture;
 use crate::say;
-pub use crate::transport::guide::{Guide, guides, guides_where};
+pub use crate::transport::guide::{Guide, guides, guides_at_centers, guides_where};
 use crate::transport::oidn;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -30,7 +30,7 @@ const NOISE_RADIUS: isize = 3;
 const NORMAL_RADIUS: isize = 3;
 const STEADY_POWER: i32 = 16;
 /// Lower limit of the albedo in the demodulation.
-const MIN_ALBEDO: f32 = 0.02;
+pub(super) const MIN_ALBEDO: f32 = 0.02;
 
 /// The denoiser of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -189,7 +189,7 @@ fn steadied(guides: &[Option<Guide>], around: Around) -> Vec<Option<Guide>> {
 }
 
 /// Weight for two pixels seeing the same surface, 0 to 1.
-fn similarity(a: Option<&Guide>, b: Option<&Guide>) -> f32 {
+pub(super) fn similarity(a: Option<&Guide>, b: Option<&Guide>) -> f32 {
     match (a, b) {
         (Some(a), Some(b)) if a.object == b.object => {
             let turned = a.normal.dot(b.normal).max(0.0).powi(NORMAL_POWER);

@@ -36,10 +36,17 @@ const OFFSETS: [[f32; 2]; 9] = [
     [0.9, 0.5],
 ];
 
+/// Positions in a pixel that its albedo is averaged over, besides the chosen one.
+const AROUND: [[f32; 2]; 4] = [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]];
+
 /// The features of all pixels of a camera at their centres. Albedo is averaged over the part of the pixel on the same object.
 pub fn guides(world: &impl World, camera: &Camera) -> Vec<Option<Guide>> {
-    let center = OFFSETS[0];
-    guides_of(world, camera, |_, ray_at| Some(ray_at(center)))
+    guides_of(world, camera, AROUND, |_, ray_at| Some(ray_at(OFFSETS[0])))
+}
+
+/// [`guides`] with the albedo at each pixel's centre: a fifth of the rays.
+pub fn guides_at_centers(world: &impl World, camera: &Camera) -> Vec<Option<Guide>> {
+    guides_of(world, camera, [], |_, ray_at| Some(ray_at(OFFSETS[0])))
 }
 
 /// [`guides`] at the first of a few points of each pixel whose ray satisfies `wanted`.
@@ -48,16 +55,17 @@ pub fn guides_where(
     camera: &Camera,
     wanted: impl Fn(usize, &Ray) -> bool + Sync,
 ) -> Vec<Option<Guide>> {
-    guides_of(world, camera, |pixel, ray_at| {
+    guides_of(world, camera, AROUND, |pixel, ray_at| {
         let mut rays = OFFSETS.into_iter().map(ray_at);
         rays.find(|ray| wanted(pixel, ray))
     })
 }
 
 /// The features of all pixels along the ray that `choose` returns for each.
-fn guides_of(
+fn guides_of<const N: usize>(
     world: &impl World,
     camera: &Camera,
+    around: [[f32; 2]; N],
     choose: impl Fn(usize, &dyn Fn([f32; 2]) -> Ray) -> Option<Ray> + Sync,
 ) -> Vec<Option<Guide>> {
     let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
@@ -68,7 +76,6 @@ fn guides_of(
         let seen = world.intersect(&ray)?;
         let towards = -ray.direction.normalize_or_zero();
         let front = seen.normal.dot(towards) > 0.0;
-        let around = [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]];
         let (mut albedo, mut taps) = (seen.albedo, 1.0);
         for offset in around.map(Vec2::from_array) {
             let beside = world.intersect(&camera.ray(corner + offset));

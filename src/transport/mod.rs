@@ -14,4 +14,5 @@ pub mod microfacet;
 pub mod oidn;
 pub mod path;
 pub mod surroundings;
+pub mod upsample;
 pub mod world;

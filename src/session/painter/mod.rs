@@ -120,9 +120,14 @@ impl Painter {
         let light = Light::new(wanted.found.clone(), edited, &wanted.settings);
         self.inserting.follow(&light);
         let (views, inserting) = (&mut self.views, &mut self.inserting);
-        let (drawn, more) =
-            (self.threads).install(|| views.draw(&capture, &light.edited, &light.options));
-        self.changed |= drawn;
+        // The composite that a user waits for comes before the re-render, which few look at then.
+        let mut more = true;
+        if !inserting.is_rough() || views.shown().is_none() {
+            let drawn = self
+                .threads
+                .install(|| views.draw(&capture, &light.edited, &light.options));
+            (self.changed, more) = (self.changed | drawn.0, drawn.1);
+        }
         if !inserting.is_busy() {
             return more;
         }

@@ -63,7 +63,7 @@ pub struct CompositeRow {
     pub shadow: Option<f64>,
     /// The same of the photograph without the chair.
     pub untouched: Option<f64>,
-    /// Least-squares slope of the composite's change there over the true change; 1 is right.
+    /// Least-squares slope of the composite's change there over the true change, over all its photographs; 1 is right.
     pub slope: Option<f64>,
 }
 
@@ -90,9 +90,9 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
     let count = scores.len() as f64;
     let mean = |score: fn(&Scores) -> f64| scores.iter().map(score).sum::<f64>() / count;
     let changed: Vec<AroundScores> = scores.iter().filter_map(|s| s.around).collect();
-    let around = |score: fn(&AroundScores) -> f64| {
-        let sum: f64 = changed.iter().map(score).sum();
-        (!changed.is_empty()).then(|| sum / changed.len() as f64)
+    let around = |score: fn(&AroundScores) -> f64, weight: fn(&AroundScores) -> f64| {
+        let sum = |of: fn(&AroundScores) -> f64| changed.iter().map(of).sum::<f64>();
+        (!changed.is_empty()).then(|| sum(score) / sum(weight))
     };
     Ok((!scores.is_empty()).then(|| CompositeRow {
         family,
@@ -101,9 +101,9 @@ pub fn composite(family: Family, seed: u64, plan: &Plan) -> Result<Option<Compos
         chair: mean(|s| s.chair),
         naive: mean(|s| s.naive),
         brightness: mean(|s| s.brightness),
-        shadow: around(|b| b.shadow),
-        untouched: around(|b| b.untouched),
-        slope: around(|b| b.slope),
+        shadow: around(|b| b.shadow, |_| 1.0),
+        untouched: around(|b| b.untouched, |_| 1.0),
+        slope: around(|b| b.slope[0], |b| b.slope[1]),
     }))
 }
 
@@ -259,7 +259,8 @@ struct Scores {
 struct AroundScores {
     shadow: f64,
     untouched: f64,
-    slope: f64,
+    /// Sums of the composite's change times the true change, and of the squared true change.
+    slope: [f64; 2],
 }
 
 /// The denoised composite and its layers, of two halves with their own seeds.
@@ -358,7 +359,10 @@ fn scores(
     let ours_at = |i: usize| ours.pixels[i];
     let slope = || {
         let ours = |i: usize| (ours_at(i) - pixels[i]).dot(change_at(i));
-        sum(&ours, &around) / sum(&|i| change_at(i).length_squared(), &around)
+        [
+            sum(&ours, &around),
+            sum(&|i| change_at(i).length_squared(), &around),
+        ]
     };
     let bright =
         |picture: &dyn Fn(usize) -> Vec3| sum(&|i| shown(picture(i)).element_sum(), &covered);
