@@ -1,6 +1,6 @@
 //! Composites of a chair in photographs of a generated room, compared with the chair truly in the room.
 
-use crate::capture::exposure::Exposure;
+use crate::capture::exposure::{Exposure, Vignetting};
 use crate::compose::backdrop::Backdrop;
 use crate::compose::denoise::denoised;
 use crate::compose::insert::{Insertion, Layers};
@@ -43,6 +43,9 @@ const COVERED: [f64; 2] = [0.005, 0.3];
 const SAMPLES: [u32; 2] = [64, 256];
 /// Shadow and bleed are the pixels beside the chair that it changes by more than this, at the photograph's exposure.
 const CHANGED: f32 = 0.025;
+
+/// Greatest power of the cosine by which the photographs of generated rooms are dimmed off the axis, with a margin.
+const MAX_POWER: u32 = 6;
 
 /// Comparison of the composites in a room with the truth; means over its photographs.
 #[derive(Debug, Clone)]
@@ -280,6 +283,37 @@ fn insertion(
     denoised([&a, &b], Denoiser::Builtin)
 }
 
+/// The exposure and vignetting that bring a render of the empty room nearest to its photograph, by least squares over valid pixels.
+fn true_exposure(backdrop: &Backdrop, empty: &Picture, valid: &[bool]) -> Result<Exposure> {
+    let of_power = |power: f32| {
+        let vignetting = Exposure {
+            vignetting: Some(Vignetting {
+                power: Vec3::splat(power),
+            }),
+            ..Exposure::default()
+        };
+        let (mut product, mut square, mut photographed) = (0.0, 0.0, 0.0);
+        for i in (0..valid.len()).filter(|&i| valid[i]) {
+            let size = [empty.width, empty.height];
+            let light = empty.pixels[i] * vignetting.at(&backdrop.camera.intrinsics, size, i);
+            let pixel = backdrop.photograph.pixels[i];
+            product += f64::from(light.dot(pixel));
+            square += f64::from(light.length_squared());
+            photographed += f64::from(pixel.length_squared());
+        }
+        let exposure = Exposure {
+            factor: Vec3::splat((product / square) as f32),
+            ..vignetting
+        };
+        (photographed - product * product / square, exposure)
+    };
+    let powers = (0..=MAX_POWER * 10).map(|tenths| of_power(tenths as f32 * 0.1));
+    let best = powers.filter(|(squares, _)| squares.is_finite());
+    let best = best.min_by(|a, b| a.0.total_cmp(&b.0));
+    let (_, exposure) = best.ok_or_else(|| Error::new("the photograph", "shows nothing", ""))?;
+    Ok(exposure)
+}
+
 /// Compares the composite, the naive composite and the photograph of a frame with the truth.
 fn scores(
     solved: &Solved,
@@ -291,7 +325,7 @@ fn scores(
     let (problem, estimate) = (&solved.problem, &solved.solution.estimate);
     let photograph = &problem.photographs[frame];
 
-    // The truth in the photograph's values. Its exposure is fitted to the empty room.
+    // The truth in the photograph's values.
     let backdrop =
         |scene: &Scene, exposure| Backdrop::new(frame, &scene.cameras[frame], photograph, exposure);
     let true_backdrop = backdrop(&truth.scene, Exposure::default())?;
@@ -300,21 +334,14 @@ fn scores(
     let valid: Vec<bool> = (0..pixels.len())
         .map(|i| photograph.is_usable(i) && !photograph.is_saturated(i))
         .collect();
-    let fitted = (0..pixels.len()).filter(|&i| valid[i]);
-    let (numerator, denominator) = fitted.fold((0.0, 0.0), |(numerator, denominator), i| {
-        let without = layers.without.pixels[i];
-        (
-            numerator + f64::from(without.dot(pixels[i])),
-            denominator + f64::from(without.length_squared()),
-        )
-    });
-    if denominator <= 0.0 {
-        return Err(Error::new("the photograph", "shows nothing", ""));
-    }
-    let exposure = (numerator / denominator) as f32;
+    let exposure = true_exposure(&true_backdrop, &layers.without, &valid)?;
+    let exposed = |i: usize, radiance: &Picture| {
+        let size = [radiance.width, radiance.height];
+        radiance.pixels[i] * exposure.at(&true_backdrop.camera.intrinsics, size, i)
+    };
     let shown = |v: Vec3| v.clamp(Vec3::ZERO, Vec3::ONE);
-    let truth_at = |i: usize| shown(layers.with.pixels[i] * exposure);
-    let change_at = |i: usize| truth_at(i) - shown(layers.without.pixels[i] * exposure);
+    let truth_at = |i: usize| shown(exposed(i, &layers.with));
+    let change_at = |i: usize| truth_at(i) - shown(exposed(i, &layers.without));
 
     // The composites.
     let scene = &problem.scene;

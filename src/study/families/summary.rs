@@ -16,6 +16,8 @@ use std::path::Path;
 enum Worst {
     Largest,
     Smallest,
+    /// The factor farthest from 1.
+    Farthest,
 }
 
 /// A figure of a row: name, value, and worst end.
@@ -36,7 +38,7 @@ const FIGURES: [Figure; 11] = [
     ("coverage_1", |r| r.coverage_1, Worst::Smallest),
     ("coverage_2", |r| r.coverage_2, Worst::Smallest),
     ("rays", |r| Some(r.rays as f64), Worst::Largest),
-    ("albedo_factor", |r| r.albedo_factor, Worst::Largest),
+    ("albedo_factor", |r| r.albedo_factor, Worst::Farthest),
 ];
 
 impl Row {
@@ -57,7 +59,7 @@ pub struct Quantiles {
     pub q50: f64,
     /// 90 % quantile.
     pub q90: f64,
-    /// The worst value: the largest error, time or number of false lamps; otherwise the smallest.
+    /// The worst value: the largest error, time or number of false lamps; the factor farthest from 1; otherwise the smallest.
     pub worst: f64,
 }
 
@@ -147,16 +149,18 @@ impl OfFamily {
 impl Quantiles {
     fn of(values: &mut [f64], worst: Worst) -> Option<Self> {
         let [q10, q50, q90] = [0.1, 0.5, 0.9].map(|q| quantile(values, q));
-        let end = match worst {
-            Worst::Largest => 1.0,
-            Worst::Smallest => 0.0,
-        };
+        let [smallest, largest] = [0.0, 1.0].map(|q| quantile(values, q));
+        let [smallest, largest] = [smallest?, largest?];
         Some(Self {
             n: values.len(),
             q10: q10?,
             q50: q50?,
             q90: q90?,
-            worst: quantile(values, end)?,
+            worst: match worst {
+                Worst::Smallest => smallest,
+                Worst::Farthest if smallest * largest < 1.0 => smallest,
+                Worst::Largest | Worst::Farthest => largest,
+            },
         })
     }
 }
@@ -228,5 +232,22 @@ impl OfFamily {
                 figure("seconds", |f| f.worst, 1)
             ),
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_worst_factor_is_the_one_farthest_from_one() {
+        let worst = |values: &[f64], worst| {
+            let quantiles = Quantiles::of(&mut values.to_vec(), worst);
+            quantiles.map(|q| q.worst)
+        };
+        assert_eq!(worst(&[0.5, 1.1, 1.6], Worst::Farthest), Some(0.5));
+        assert_eq!(worst(&[0.7, 1.1, 1.6], Worst::Farthest), Some(1.6));
+        assert_eq!(worst(&[0.5, 1.1, 1.6], Worst::Largest), Some(1.6));
+        assert_eq!(worst(&[], Worst::Farthest), None);
     }
 }
