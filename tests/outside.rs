@@ -117,40 +117,38 @@ fn a_room_lit_through_its_window_keeps_its_walls_dark() {
     assert!(errors[errors.len() - 1] < 0.08, "{errors:?}");
 }
 
-/// A sun that no photograph shows is found by the pool of light that it throws into the room.
-#[test]
-fn a_sun_through_the_window_is_found_by_where_its_light_falls() {
+/// A sun that no photograph shows, through the window: the photographed room, its materials, the direction towards the sun, and its
+/// irradiance, twice that of a uniform sky of radiance 4.
+fn sunny_room() -> (Problem, Vec<Material>, Vec3, Vec3) {
     let (width, height) = (256, 128);
-    let sun = direction_of(
-        width,
-        height,
-        pixel_of(width, height, Vec3::new(0.2, 0.8, 0.6)),
-    );
-    let solid_angle = |pixel: usize, [width, height]: [usize; 2]| {
-        row_solid_angle(pixel / width, width, height) as f32
-    };
+    let pixel = pixel_of(width, height, Vec3::new(0.2, 0.8, 0.6));
     let mut pixels: Vec<Vec3> = (0..width * height)
         .map(|pixel| sky().radiance(Vec3::ZERO, direction_of(width, height, pixel)))
         .collect();
-    let pixel = pixel_of(width, height, sun);
-    // Twice the irradiance of a uniform sky of radiance 4.
     let irradiance = Vec3::new(1.0, 0.9, 0.7) * 8.0 * PI;
-    pixels[pixel] += irradiance / solid_angle(pixel, [width, height]);
+    pixels[pixel] += irradiance / row_solid_angle(pixel / width, width, height) as f32;
     let lit_by = Environment::new(width, height, pixels).map(Arc::new);
     let (mesh, materials) = room_with_a_window();
     let capture = scenes::capture(mesh, &views(), SIZE);
     let problem = scenes::photographed_under(lit_by, &capture, &materials, 512, 75);
-    let estimate = run(&problem).estimate;
+    let sun = direction_of(width, height, pixel);
+    (problem, materials, sun, irradiance)
+}
 
+/// It is found by the pool of light that it throws into the room.
+#[test]
+fn a_sun_through_the_window_is_found_by_where_its_light_falls() {
+    let (problem, materials, sun, irradiance) = sunny_room();
+    let estimate = run(&problem).estimate;
     let outside = estimate.outside.as_ref().expect("the sky is seen");
-    let size = [outside.width, outside.height].map(|side| side as usize);
+    let [width, height] = [outside.width, outside.height].map(|side| side as usize);
     let brightest = (0..outside.pixels.len())
         .max_by(|&a, &b| outside.pixels[a].y.total_cmp(&outside.pixels[b].y))
         .expect("a map has pixels");
-    let angle = direction_of(size[0], size[1], brightest)
-        .angle_between(sun)
-        .to_degrees();
-    let found = outside.pixels[brightest] * solid_angle(brightest, size) / irradiance;
+    let angle = direction_of(width, height, brightest).angle_between(sun);
+    let angle = angle.to_degrees();
+    let solid_angle = row_solid_angle(brightest / width, width, height) as f32;
+    let found = outside.pixels[brightest] * solid_angle / irradiance;
     println!("{angle}° off, {found} of its irradiance");
     assert!(angle < 3.0, "{angle}");
     assert!((found - 1.0).abs().max_element() < 0.1, "{found}");
@@ -158,6 +156,27 @@ fn a_sun_through_the_window_is_found_by_where_its_light_falls() {
     let errors = relative_errors(&estimate, &materials);
     assert!(errors[errors.len() / 2] < 0.06, "{errors:?}");
     assert!(errors[errors.len() - 1] < 0.12, "{errors:?}");
+}
+
+/// Beyond the box around a scan it is a disc of its own.
+#[test]
+fn a_sun_is_found_beyond_the_box_around_a_scan() {
+    let (mut problem, materials, sun, irradiance) = sunny_room();
+    let scene = Arc::get_mut(&mut problem.scene).expect("nothing else holds it");
+    scene.scanned = true;
+    let estimate = run(&problem).estimate;
+    let outside = estimate.outside.as_ref().expect("the sky is seen");
+    assert!(matches!(outside.surroundings, Surroundings::Box { .. }));
+    let found = outside.sun.expect("a sun");
+    let angle = found.direction.angle_between(sun).to_degrees();
+    let ratio = found.irradiance / irradiance;
+    println!("{angle}° off, {ratio} of its irradiance");
+    assert!(angle < 3.0, "{angle}");
+    // 0.88 to 0.92 are seen.
+    assert!((ratio - 1.0).abs().max_element() < 0.2, "{ratio}");
+    // 0.020 is seen.
+    let errors = relative_errors(&estimate, &materials);
+    assert!(errors[errors.len() / 2] < 0.04, "{errors:?}");
 }
 
 /// The same views twice, the second time overexposed: where the first measured the sky, its bound counts for nothing.

@@ -8,6 +8,7 @@ use crate::scene::Scene;
 use crate::transport::environment::Environment;
 use crate::transport::lit::LitScene;
 use crate::transport::material::{Albedo, Lobe, Material, TexelColors};
+use crate::transport::sun::Sun;
 use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -181,6 +182,9 @@ pub struct Outside {
     pub above: Option<Vec<Vec3>>,
     /// Distance of the light: infinite, or a box.
     pub surroundings: Surroundings,
+    /// For a box, the sun beyond it. Far away, the sun is a pixel of the map.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sun: Option<Sun>,
 }
 
 impl Outside {
@@ -231,7 +235,7 @@ impl Estimate {
         let outside = self.outside.as_ref().and_then(|outside| {
             let (width, height) = (outside.width as usize, outside.height as usize);
             let map = Environment::new(width, height, outside.pixels.clone())?;
-            let map = map.around(outside.surroundings);
+            let map = map.around(outside.surroundings).with_sun(outside.sun);
             match outside.above.clone() {
                 Some(above) => map.with_above(above, scene.up),
                 None => Some(map),

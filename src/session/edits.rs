@@ -162,7 +162,8 @@ impl Edits {
                 .pixels
                 .iter_mut()
                 .chain(outside.above.iter_mut().flatten());
-            pixels.for_each(|p| *p *= factor);
+            let sun = outside.sun.iter_mut().map(|sun| &mut sun.irradiance);
+            pixels.chain(sun).for_each(|p| *p *= factor);
         }
         edited
     }
@@ -256,6 +257,7 @@ impl Edited {
 mod tests {
     use super::*;
     use crate::inverse::estimate::{ObjectEstimate, Outside};
+    use crate::transport::sun::Sun;
     use crate::transport::surroundings::Surroundings;
 
     fn estimate() -> Arc<Estimate> {
@@ -272,6 +274,10 @@ mod tests {
                 pixels: vec![Vec3::splat(2.0)],
                 above: None,
                 surroundings: Surroundings::Far,
+                sun: Some(Sun {
+                    direction: Vec3::Y,
+                    irradiance: Vec3::splat(3.0),
+                }),
             }),
             ..Estimate::default()
         })
@@ -309,6 +315,8 @@ mod tests {
         assert_eq!(changed.objects[1].emission, Vec3::splat(3.0));
         let outside = changed.outside.as_ref().expect("outside");
         assert_eq!(outside.pixels, [Vec3::new(0.0, 1.0, 2.0)]);
+        let sun = outside.sun.map(|sun| sun.irradiance);
+        assert_eq!(sun, Some(Vec3::new(0.0, 1.5, 3.0)));
         assert!(Arc::ptr_eq(&edited.of(&found, &edits), &changed));
 
         // `off` takes precedence over any emission, which comes back without it.

@@ -13,6 +13,7 @@ pub mod material;
 pub mod microfacet;
 pub mod oidn;
 pub mod path;
+pub mod sun;
 pub mod surroundings;
 pub mod upsample;
 pub mod world;

@@ -74,6 +74,7 @@ fn light_from_outside_is_switched_off_and_on() {
             pixels: vec![Vec3::ONE],
             above: None,
             surroundings: Surroundings::Far,
+            sun: None,
         });
     });
     press(&mut harness, Modifiers::NONE, Key::L);

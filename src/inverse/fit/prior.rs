@@ -16,6 +16,8 @@ pub const ALBEDO_MEAN: f32 = 0.5;
 const OUTSIDE_DEVIATION: f32 = 4.0;
 /// The same for a scan. Its holes lead to the rest of the room, which is about as bright as what the photographs show.
 const SCAN_DEVIATION: f32 = 1.0;
+/// The same for a scan's sun, whose light is up to a thousand times that of a room: it is determined by what it falls on.
+const SUN_DEVIATION: f32 = 1e3;
 
 /// Standard deviation of each channel of outside radiance about its expected colour, relative to its fitted brightness. Of 0.03,
 /// 0.1 and 0.3 it gives the least albedo error in `relit trade --rooms 12 --family window --preset preview`.
@@ -108,11 +110,14 @@ impl Prior {
         &self.albedo
     }
 
-    /// The prior of a scan: outside directions are about as bright as the rest of the room.
+    /// The prior of a scan: outside directions are about as bright as the rest of the room. The last surface is the sun's.
     pub fn of_scan(mut self) -> Self {
         self.scanned = true;
         let deviation = self.photographed * SCAN_DEVIATION;
         self.directions.fill((Vec3::ZERO, deviation));
+        if let Some(sun) = self.directions.last_mut() {
+            sun.1 = self.photographed * SUN_DEVIATION;
+        }
         self
     }
 
@@ -280,11 +285,11 @@ mod tests {
             assert!((mean / unit - DVec3::splat(3.0)).length() < 1e-5);
             assert!((precision * unit.powi(2) - noise / 64.0).length() < 1e-8);
         }
-        // In a scan each direction is held to its own mean, and no tighter than to the photographs.
-        let scan = Prior::new(5, 3, Vec3::splat(2.0)).of_scan();
-        let scan = scan.with_sky(|surface| Vec3::splat([0.5, 5.0][surface as usize - 3]));
-        for (surface, deviation) in [(3, 2.0f64), (4, 5.0)] {
-            let (_, precision) = scan.of(5 + surface, DVec3::ONE);
+        // In a scan each direction is held to its own mean, and no tighter than to the photographs; the sun is as good as free.
+        let scan = Prior::new(6, 3, Vec3::splat(2.0)).of_scan();
+        let scan = scan.with_sky(|surface| Vec3::splat([0.5, 5.0, 0.0][surface as usize - 3]));
+        for (surface, deviation) in [(3, 2.0f64), (4, 5.0), (5, 2000.0)] {
+            let (_, precision) = scan.of(6 + surface, DVec3::ONE);
             assert!((precision * deviation.powi(2) - DVec3::ONE).length() < 1e-6);
         }
         // All photographs black: nothing to hold on to.

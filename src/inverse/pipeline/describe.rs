@@ -12,6 +12,7 @@ use crate::math::color::luminance;
 use crate::scene::Scene;
 use crate::transport::environment::{direction_of, pixel_of, row_solid_angle};
 use crate::transport::material::Lobe;
+use crate::transport::sun::Sun;
 use crate::transport::surroundings::Surroundings;
 use glam::{DVec3, Vec3};
 use std::f32::consts::PI;
@@ -138,18 +139,30 @@ fn outside_light(
     };
     let mut pixels = filled(boxed.then_some(-grid.up));
     let above = (boxed && sky.is_some()).then(|| filled(Some(grid.up)));
-    if let Some(direction) = grid.sun {
+    let sun = grid.sun.map(|direction| Sun {
+        direction,
+        irradiance: emission(grid.sun_surface()) * PI,
+    });
+    let sun = sun.filter(|sun| sun.irradiance != Vec3::ZERO);
+    if let Some(Sun {
+        direction,
+        irradiance,
+    }) = sun.filter(|_| !boxed)
+    {
         let pixel = pixel_of(width, height, direction);
         let solid_angle = row_solid_angle(pixel / width, width, height) as f32;
-        pixels[pixel] += emission(grid.sun_surface()) * PI / solid_angle;
+        pixels[pixel] += irradiance / solid_angle;
     }
     let shines = |pixels: &[Vec3]| pixels.iter().any(|&p| p != Vec3::ZERO);
-    (shines(&pixels) || above.as_deref().is_some_and(shines)).then_some(Outside {
+    let beyond = sun.filter(|_| boxed);
+    let any = shines(&pixels) || above.as_deref().is_some_and(shines) || beyond.is_some();
+    any.then_some(Outside {
         width: width as u32,
         height: height as u32,
         pixels,
         above,
         surroundings: grid.surroundings,
+        sun: beyond,
     })
 }
 

@@ -82,14 +82,7 @@ impl Pipeline<'_, '_> {
         let leave = format!("{:.1} % of the paths leave the mesh", escaping * 100.0);
         let scene = &self.problem.scene;
         let what = if scene.scanned {
-            let cameras = scene.cameras.iter().map(|camera| camera.center);
-            let around = Surroundings::around(scene.positions.iter().copied().chain(cameras));
-            let around = around.unwrap_or(Surroundings::Far);
-            self.fit_open(around, None, cache, lights, measured)?;
-            match around {
-                Surroundings::Far => "comes from far away".to_owned(),
-                Surroundings::Box { .. } => "comes from a box around the mesh".to_owned(),
-            }
+            self.light_around_scan(cache, lights, measured)?
         } else {
             self.light_through_windows(cache, lights, measured)?
         };
@@ -117,30 +110,75 @@ impl Pipeline<'_, '_> {
         }
         let without = self.found();
         let before = Misfit::new(cache, &without.unknowns);
-        let mut best = self.fit_open(Surroundings::Far, None, cache, lights, measured)?;
-        let sun = self.find_sun(best.paths.take().as_ref().unwrap_or(cache));
-        if sun.is_some() {
-            self.go_back_to(without.clone());
-            let sunny = self.fit_open(Surroundings::Far, sun, cache, lights, measured)?;
-            let fall = best.misfit.mean() - sunny.misfit.mean();
-            if fall > OUTSIDE_GAIN * before.mean() && self.sun_shines() {
-                best = sunny;
-            }
-        }
+        let plain = self.fit_open(Surroundings::Far, None, cache, lights, measured)?;
+        let needed = OUTSIDE_GAIN * before.mean();
+        let best = self.with_sun(&without, plain, needed, cache, lights, measured)?;
         if !before.falls(&best.misfit, OUTSIDE_GAIN * before.mean()) {
             self.go_back_to(without);
             return Ok("is not called for".to_owned());
         }
         let gain = 1.0 - best.misfit.mean() / before.mean();
         self.go_back_to(best.found);
-        let sun = self.outside.sun.map_or(String::new(), |sun| {
+        Ok(format!(
+            "changes the squared error by {:.1} % and comes from far away{}",
+            -gain * 100.0,
+            self.sun_in_words()
+        ))
+    }
+
+    /// Fits light from a box around a scan, and tries a sun beyond it. Returns in words what the light does.
+    fn light_around_scan(
+        &mut self,
+        cache: &PathCache,
+        lights: &Emitters,
+        measured: &MeasuredRadiance,
+    ) -> Result<String, Termination> {
+        let scene = &self.problem.scene;
+        let cameras = scene.cameras.iter().map(|camera| camera.center);
+        let around = Surroundings::around(scene.positions.iter().copied().chain(cameras));
+        let around = around.unwrap_or(Surroundings::Far);
+        let without = self.found();
+        let plain = self.fit_open(around, None, cache, lights, measured)?;
+        let needed = OUTSIDE_GAIN * plain.misfit.mean();
+        let best = self.with_sun(&without, plain, needed, cache, lights, measured)?;
+        self.go_back_to(best.found);
+        let from = match around {
+            Surroundings::Far => "far away",
+            Surroundings::Box { .. } => "a box around the mesh",
+        };
+        Ok(format!("comes from {from}{}", self.sun_in_words()))
+    }
+
+    /// Searches for a sun after a fit of outside light without one, and fits again with the best candidate, starting from `without`.
+    /// Returns the fit with the sun if it lowers the squared error by `needed` and the sun shines, else that without.
+    fn with_sun(
+        &mut self,
+        without: &Found,
+        mut plain: Trial,
+        needed: f64,
+        cache: &PathCache,
+        lights: &Emitters,
+        measured: &MeasuredRadiance,
+    ) -> Result<Trial, Termination> {
+        let sun = self.find_sun(plain.paths.take().as_ref().unwrap_or(cache));
+        if sun.is_none() {
+            return Ok(plain);
+        }
+        self.go_back_to(without.clone());
+        let sunny = self.fit_open(self.outside.surroundings, sun, cache, lights, measured)?;
+        let fall = plain.misfit.mean() - sunny.misfit.mean();
+        Ok(match fall > needed && self.sun_shines() {
+            true => sunny,
+            false => plain,
+        })
+    }
+
+    /// Where the sun stands, for reports; empty without one.
+    fn sun_in_words(&self) -> String {
+        self.outside.sun.map_or(String::new(), |sun| {
             let height = sun.dot(self.problem.scene.up).asin().to_degrees();
             format!(", with a sun {height:.0}° above the horizon")
-        });
-        Ok(format!(
-            "changes the squared error by {:.1} % and comes from far away{sun}",
-            -gain * 100.0
-        ))
+        })
     }
 
     /// Whether the fitted sun is brighter than nothing by its standard errors.

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::inverse::estimate::{Estimate, Outside, TexelEstimate};
 use crate::scene::texels::TexelLayout;
 use crate::transport::material::TexelColors;
+use crate::transport::sun::Sun;
 use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
@@ -63,6 +64,10 @@ pub fn encode(estimate: &Estimate) -> Result<Option<Vec<u8>>> {
             let shape = vec![outside.height as usize, outside.width as usize, 3];
             tensors.push(("outside_above", Dtype::F32, shape, color_bytes(above)));
         }
+        if let Some(sun) = outside.sun {
+            let bytes = color_bytes(&[sun.direction, sun.irradiance]);
+            tensors.push(("outside_sun", Dtype::F32, vec![2, 3], bytes));
+        }
         if let Surroundings::Box { min, max } = outside.surroundings {
             tensors.push((
                 "outside_box",
@@ -94,6 +99,11 @@ pub fn encode(estimate: &Estimate) -> Result<Option<Vec<u8>>> {
         .map_err(misfit)
 }
 
+/// Whether a sun has a unit direction and gives light.
+fn is_sun(direction: Vec3, irradiance: Vec3) -> bool {
+    direction.is_normalized() && irradiance.is_finite() && irradiance.cmpge(Vec3::ZERO).all()
+}
+
 /// Reads a maps file.
 ///
 /// # Errors
@@ -116,6 +126,16 @@ pub fn decode(path: &Path, bytes: &[u8]) -> Result<Maps> {
                     None => None,
                     Some(above) if above.shape() == map.shape() => Some(colors(above.data())),
                     Some(_) => return Err(read.misfit("outside_above")),
+                },
+                sun: match read.optional("outside_sun", Dtype::F32)? {
+                    None => None,
+                    Some(sun) => match *colors(sun.data()) {
+                        [direction, irradiance] if is_sun(direction, irradiance) => Some(Sun {
+                            direction,
+                            irradiance,
+                        }),
+                        _ => return Err(read.misfit("outside_sun")),
+                    },
                 },
                 surroundings: match read.optional("outside_box", Dtype::F32)? {
                     None => Surroundings::Far,
@@ -246,6 +266,10 @@ mod tests {
                     min: Vec3::new(-1.0, -2.0, -3.0),
                     max: Vec3::new(1.0, 2.0, 3.5),
                 },
+                sun: Some(Sun {
+                    direction: Vec3::new(0.6, 0.0, -0.8),
+                    irradiance: Vec3::new(7.0, 6.0, 5.5),
+                }),
             }),
             ..Default::default()
         }
