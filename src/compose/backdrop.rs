@@ -166,13 +166,16 @@ impl Backdrop {
         light * ratio + added
     }
 
-    /// Change of the exposed light of a pixel beside what covers it: α · with + (1 − α) · (photograph + change) is the composite. With
-    /// `with` as the mean of object and uncovered part, that is α · object + (1 − α) · [`Backdrop::changed_light`].
-    fn change(&self, pixel: usize, layer: &LayeredPixel) -> Vec3 {
+    /// Exposed light of a pixel beside what covers it: α · with + (1 − α) · beside is the composite. With `with` as the mean of object
+    /// and uncovered part, that is α · object + (1 − α) · [`Backdrop::changed_light`].
+    fn beside(&self, pixel: usize, layer: &LayeredPixel) -> Vec3 {
         let outline = (layer.with - layer.uncovered) * self.exposure_at(pixel);
-        let [without, uncovered] = [layer.without, layer.uncovered];
-        let changed = self.changed_light(pixel, without, uncovered);
-        outline + changed - self.background_light(pixel, without)
+        outline + self.changed_light(pixel, layer.without, layer.uncovered)
+    }
+
+    /// Its change from the photograph.
+    fn change(&self, pixel: usize, layer: &LayeredPixel) -> Vec3 {
+        self.beside(pixel, layer) - self.background_light(pixel, layer.without)
     }
 
     /// What the objects add to a pixel's light beside what they cover and take from it, as radiance of the estimate: α · with +
@@ -186,8 +189,8 @@ impl Backdrop {
     /// Composites one pixel. It saturates like the photograph.
     fn blend(&self, pixel: usize, layer: &LayeredPixel) -> Vec3 {
         let with = layer.with * self.exposure_at(pixel);
-        let beside = self.background_light(pixel, layer.without) + self.change(pixel, layer);
-        let light = (with * layer.alpha + beside * (1.0 - layer.alpha)).max(Vec3::ZERO);
+        let beside = self.beside(pixel, layer) * (1.0 - layer.alpha);
+        let light = (with * layer.alpha + beside).max(Vec3::ZERO);
         if !self.saturation.is_finite() {
             return light;
         }

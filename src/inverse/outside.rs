@@ -31,7 +31,7 @@ pub struct MeasuredOutside {
 }
 
 /// Cells of light from one side of the horizon.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 struct Half {
     /// Whether each cell is measured.
     known: Vec<bool>,

@@ -29,8 +29,6 @@ const NOISE_RADIUS: isize = 3;
 /// triangles differ by ten degrees and more, and the weights of the filter would find nothing like a pixel.
 const NORMAL_RADIUS: isize = 3;
 const STEADY_POWER: i32 = 16;
-/// Lower limit of the albedo in the demodulation.
-pub(super) const MIN_ALBEDO: f32 = 0.02;
 
 /// The denoiser of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,7 +89,7 @@ pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
 
     // Demodulate, and estimate the variance of luminance from the two pictures, averaged over similar pixels.
     let light = |pixel: usize, value: Vec3| match &guides[pixel] {
-        Some(guide) => (value - guide.emission) / guide.albedo.max(Vec3::splat(MIN_ALBEDO)),
+        Some(guide) => guide.demodulated(value),
         None => value,
     };
     let mut smooth: Vec<[Vec3; 2]> = (0..mean.len())
@@ -162,9 +160,7 @@ pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
     }
 
     let pixels = (0..mean.len()).map(|pixel| match (&guides[pixel], smooth[pixel]) {
-        (Some(guide), [a, b]) if finite([a, b]) => {
-            (a + b) * 0.5 * guide.albedo.max(Vec3::splat(MIN_ALBEDO)) + guide.emission
-        }
+        (Some(guide), [a, b]) if finite([a, b]) => guide.modulated((a + b) * 0.5),
         _ => mean[pixel],
     });
     Picture {

@@ -23,6 +23,21 @@ pub struct Guide {
     pub object: u32,
 }
 
+/// Lower limit of the albedo in the demodulation.
+const MIN_ALBEDO: f32 = 0.02;
+
+impl Guide {
+    /// Light of a radiance: what is not emitted, over the albedo.
+    pub fn demodulated(&self, radiance: Vec3) -> Vec3 {
+        (radiance - self.emission) / self.albedo.max(Vec3::splat(MIN_ALBEDO))
+    }
+
+    /// Radiance of a light: the inverse of [`Guide::demodulated`].
+    pub fn modulated(&self, light: Vec3) -> Vec3 {
+        light * self.albedo.max(Vec3::splat(MIN_ALBEDO)) + self.emission
+    }
+}
+
 /// Candidate positions in a pixel: its centre, then a ring.
 const OFFSETS: [[f32; 2]; 9] = [
     [0.5, 0.5],
@@ -41,12 +56,12 @@ const AROUND: [[f32; 2]; 4] = [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 
 
 /// The features of all pixels of a camera at their centres. Albedo is averaged over the part of the pixel on the same object.
 pub fn guides(world: &impl World, camera: &Camera) -> Vec<Option<Guide>> {
-    guides_of(world, camera, AROUND, |_, ray_at| Some(ray_at(OFFSETS[0])))
+    guides_of(world, camera, &AROUND, |_, ray_at| Some(ray_at(OFFSETS[0])))
 }
 
 /// [`guides`] with the albedo at each pixel's centre: a fifth of the rays.
 pub fn guides_at_centers(world: &impl World, camera: &Camera) -> Vec<Option<Guide>> {
-    guides_of(world, camera, [], |_, ray_at| Some(ray_at(OFFSETS[0])))
+    guides_of(world, camera, &[], |_, ray_at| Some(ray_at(OFFSETS[0])))
 }
 
 /// [`guides`] at the first of a few points of each pixel whose ray satisfies `wanted`.
@@ -55,17 +70,17 @@ pub fn guides_where(
     camera: &Camera,
     wanted: impl Fn(usize, &Ray) -> bool + Sync,
 ) -> Vec<Option<Guide>> {
-    guides_of(world, camera, AROUND, |pixel, ray_at| {
+    guides_of(world, camera, &AROUND, |pixel, ray_at| {
         let mut rays = OFFSETS.into_iter().map(ray_at);
         rays.find(|ray| wanted(pixel, ray))
     })
 }
 
 /// The features of all pixels along the ray that `choose` returns for each.
-fn guides_of<const N: usize>(
+fn guides_of(
     world: &impl World,
     camera: &Camera,
-    around: [[f32; 2]; N],
+    around: &[[f32; 2]],
     choose: impl Fn(usize, &dyn Fn([f32; 2]) -> Ray) -> Option<Ray> + Sync,
 ) -> Vec<Option<Guide>> {
     let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
@@ -77,8 +92,8 @@ fn guides_of<const N: usize>(
         let towards = -ray.direction.normalize_or_zero();
         let front = seen.normal.dot(towards) > 0.0;
         let (mut albedo, mut taps) = (seen.albedo, 1.0);
-        for offset in around.map(Vec2::from_array) {
-            let beside = world.intersect(&camera.ray(corner + offset));
+        for &offset in around {
+            let beside = world.intersect(&camera.ray(corner + Vec2::from(offset)));
             if let Some(beside) = beside.filter(|b| b.object == seen.object) {
                 albedo += beside.albedo;
                 taps += 1.0;

@@ -1,7 +1,7 @@
 //! Enlarges a small render to the size of its view, guided by what each pixel sees (joint bilateral upsampling, Kopf et al. 2007).
 
 use crate::math::picture::Picture;
-use crate::transport::denoise::{MIN_ALBEDO, similarity};
+use crate::transport::denoise::similarity;
 use crate::transport::guide::Guide;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -22,7 +22,7 @@ pub fn upsample(
     let [width, height] = size;
     let light: Vec<Vec3> = (small.pixels.iter().zip(seen_small))
         .map(|(&radiance, guide)| match guide {
-            Some(guide) => (radiance - guide.emission) / albedo_of(guide),
+            Some(guide) => guide.demodulated(radiance),
             None => radiance,
         })
         .collect();
@@ -49,7 +49,7 @@ pub fn upsample(
             }
         }
         let light = sum / weights.max(f32::MIN_POSITIVE);
-        guide.map_or(light, |guide| light * albedo_of(guide) + guide.emission)
+        guide.map_or(light, |guide| guide.modulated(light))
     };
     Picture {
         width,
@@ -59,10 +59,6 @@ pub fn upsample(
             .map(pixel)
             .collect(),
     }
-}
-
-fn albedo_of(guide: &Guide) -> Vec3 {
-    guide.albedo.max(Vec3::splat(MIN_ALBEDO))
 }
 
 /// The three pixels of a small row or column that one pixel is interpolated from.

@@ -276,6 +276,24 @@ mod tests {
     }
 
     #[test]
+    fn a_sun_without_a_direction_or_with_light_below_zero_is_refused() {
+        let [far, dark] = [Vec3::new(3.0, 0.0, 0.0), Vec3::NEG_ONE];
+        for (direction, irradiance) in [(far, Vec3::ONE), (Vec3::NAN, Vec3::ONE), (Vec3::Y, dark)] {
+            let mut estimate = estimate();
+            let sun = Sun {
+                direction,
+                irradiance,
+            };
+            estimate.outside.as_mut().expect("outside").sun = Some(sun);
+            let bytes = encode(&estimate).expect("encodes").expect("has maps");
+            let error = decode(Path::new("maps"), &bytes)
+                .map(drop)
+                .expect_err("no sun");
+            assert!(error.to_string().contains("outside_sun"), "{error}");
+        }
+    }
+
+    #[test]
     fn maps_round_trip_to_the_bit() {
         let estimate = estimate();
         let bytes = encode(&estimate).expect("fits").expect("has maps");
