@@ -185,6 +185,9 @@ pub struct Outside {
     /// For a box, the sun beyond it. Far away, the sun is a pixel of the map.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sun: Option<Sun>,
+    /// The pixels of the box that the sun shines through: those that photographs show bright. `None` if all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub openings: Option<Vec<bool>>,
 }
 
 impl Outside {
@@ -235,7 +238,8 @@ impl Estimate {
         let outside = self.outside.as_ref().and_then(|outside| {
             let (width, height) = (outside.width as usize, outside.height as usize);
             let map = Environment::new(width, height, outside.pixels.clone())?;
-            let map = map.around(outside.surroundings).with_sun(outside.sun);
+            let map = map.around(outside.surroundings);
+            let map = map.with_sun(outside.sun, outside.openings.clone())?;
             match outside.above.clone() {
                 Some(above) => map.with_above(above, scene.up),
                 None => Some(map),

@@ -5,6 +5,7 @@
 
 use crate::calibrate::gbuffer::GBuffer;
 use crate::calibrate::problem::Problem;
+use crate::math::color::luminance;
 use crate::transport::environment::{Environment, direction_of, pixel_of};
 use crate::transport::surroundings::Surroundings;
 use glam::{DVec3, Vec2, Vec3};
@@ -28,6 +29,8 @@ pub struct MeasuredOutside {
     map: Environment,
     /// Unit up vector.
     up: Vec3,
+    /// Mean luminance of the mesh in the photographs.
+    room: f32,
 }
 
 /// Cells of light from one side of the horizon.
@@ -73,6 +76,12 @@ impl MeasuredOutside {
             sum.0 += photograph.pixels[pixel.pixel as usize].as_dvec3();
             sum.1 += 1;
         }
+        let (mut room, mut pixels) = (0.0, 0);
+        for p in (gbuffer.pixels.iter()).filter(|p| !p.held_out && p.object != u32::MAX) {
+            let pixel = problem.photographs[p.frame as usize].pixels[p.pixel as usize];
+            room += f64::from(luminance(pixel));
+            pixels += 1;
+        }
         if sums.iter().flatten().flatten().all(|s| s.1 == 0) {
             return None;
         }
@@ -84,6 +93,7 @@ impl MeasuredOutside {
             map: map.with_above(bright, scene.up)?,
             halves: [below, above],
             up: scene.up,
+            room: (room / f64::from(pixels.max(1))) as f32,
         })
     }
 
@@ -99,6 +109,23 @@ impl MeasuredOutside {
     pub fn is_bound(&self, origin: Vec3, direction: Vec3) -> bool {
         let (half, cell) = self.cell(origin, direction);
         half.censored[cell]
+    }
+
+    /// Whether a sun may shine in along a ray. From far away it may. Through a box it may where photographs show light from above the
+    /// horizon that is brighter than the room: elsewhere the scan lacks a wall, or nobody looked.
+    #[inline]
+    pub fn is_open(&self, origin: Vec3, direction: Vec3) -> bool {
+        let (half, cell) = self.cell(origin, direction);
+        self.map.surroundings() == Surroundings::Far
+            || half.is_brighter(cell, self.map.pixels_from(direction), self.room)
+    }
+
+    /// [`Self::is_open`] of each cell for light from above the horizon.
+    pub fn openings(&self) -> Vec<bool> {
+        let (half, pixels) = (self.half(self.up), self.map.pixels_from(self.up));
+        (0..pixels.len())
+            .map(|cell| half.is_brighter(cell, pixels, self.room))
+            .collect()
     }
 
     fn cell(&self, origin: Vec3, direction: Vec3) -> (&Half, usize) {
@@ -182,6 +209,11 @@ impl MeasuredOutside {
 }
 
 impl Half {
+    /// Whether a cell is measured and brighter than `least`, or saturated.
+    fn is_brighter(&self, cell: usize, pixels: &[Vec3], least: f32) -> bool {
+        self.known[cell] && (self.censored[cell] || luminance(pixels[cell]) > least)
+    }
+
     /// The cells, and their mean radiances. Gaps are filled from coarser blocks. Saturated pixels count only in blocks without unsaturated ones.
     fn new(width: usize, height: usize, sums: &[Sums]) -> (Self, Vec<Vec3>) {
         let mut known = vec![false; width * height];
@@ -251,6 +283,7 @@ mod tests {
             halves: [half, none],
             map: Environment::new(width, height, pixels).expect("sizes fit"),
             up: Vec3::Y,
+            room: 1.0,
         };
         let at = |row: usize| {
             let direction = direction_of(width, height, row * 16 + 12);
@@ -286,6 +319,7 @@ mod tests {
             halves: [half(false), half(true)],
             map: map.with_above(pixels(3.0), Vec3::Y).expect("sizes fit"),
             up: Vec3::Y,
+            room: 1.0,
         };
         let seen = direction_of(2, 1, 0);
         let at = |rise: f32| (seen + Vec3::Y * rise).normalize();
@@ -294,6 +328,9 @@ mod tests {
         assert!(measured.is_bound(Vec3::ZERO, at(0.1)));
         assert!(!measured.is_bound(Vec3::ZERO, at(-0.1)));
         assert_eq!(measured.mean_bound(), Vec3::splat(3.0));
+        // Far away a sun may stand anywhere; through a box it shines where the photographs are saturated.
+        assert!(measured.is_open(Vec3::ZERO, at(-0.1)));
+        assert_eq!(measured.openings(), [true, false]);
         let filled = |towards| measured.filled(Some(towards), |d| d.abs(), |_| Vec3::splat(7.0));
         assert_eq!(filled(Vec3::NEG_Y), [Vec3::splat(0.5), Vec3::splat(7.0)]);
         assert_eq!(

@@ -278,6 +278,7 @@ mod tests {
                     direction: Vec3::Y,
                     irradiance: Vec3::splat(3.0),
                 }),
+                openings: None,
             }),
             ..Estimate::default()
         })

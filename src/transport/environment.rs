@@ -23,6 +23,8 @@ pub struct Environment {
     above: Option<(Vec<Vec3>, Vec3)>,
     /// The sun beside the map.
     sun: Option<Sun>,
+    /// The pixels that the sun shines through; `None` if all.
+    openings: Option<Vec<bool>>,
 }
 
 impl Environment {
@@ -39,12 +41,18 @@ impl Environment {
             surroundings: Surroundings::Far,
             above: None,
             sun: None,
+            openings: None,
         })
     }
 
-    /// The map with a sun beside it.
-    pub fn with_sun(self, sun: Option<Sun>) -> Self {
-        Self { sun, ..self }
+    /// The map with a sun beyond it that shines through some of its pixels, or through all. `None` if the number of `openings` differs.
+    pub fn with_sun(self, sun: Option<Sun>, openings: Option<Vec<bool>>) -> Option<Self> {
+        let fit = (openings.as_ref()).is_none_or(|open| open.len() == self.pixels.len());
+        fit.then_some(Self {
+            sun,
+            openings,
+            ..self
+        })
     }
 
     /// The map with other radiances for light from above the horizon. `None` if their number differs.
@@ -75,8 +83,10 @@ impl Environment {
 
     /// Radiance along a ray that leaves the mesh.
     pub fn radiance(&self, origin: Vec3, direction: Vec3) -> Vec3 {
-        let sun = self.sun.map_or(Vec3::ZERO, |sun| sun.radiance(direction));
-        self.pixels_from(direction)[self.pixel(origin, direction)] + sun
+        let pixel = self.pixel(origin, direction);
+        let is_open = (self.openings.as_ref()).is_none_or(|open| open[pixel]);
+        let sun = self.sun.filter(|_| is_open);
+        self.pixels_from(direction)[pixel] + sun.map_or(Vec3::ZERO, |sun| sun.radiance(direction))
     }
 
     /// The pixels for light from a direction: from above the horizon or from below it.
@@ -281,7 +291,8 @@ mod tests {
         };
         let around = Surroundings::around([Vec3::splat(-2.0), Vec3::splat(3.0)].into_iter());
         let map = Environment::new(8, 4, vec![Vec3::splat(0.5); 32]).expect("sizes fit");
-        let map = map.around(around.expect("points")).with_sun(Some(sun));
+        let map = map.around(around.expect("points"));
+        let map = map.with_sun(Some(sun), None).expect("all pixels");
         let mut stream = Stream::new(4, 0, 0, 0);
         let (n, origin) = (40_000, Vec3::new(0.3, -0.2, 1.0));
         let (mut sum, mut in_sun) = (0.0f64, 0);
@@ -300,10 +311,31 @@ mod tests {
         assert!((f64::from(in_sun) / f64::from(n) - share).abs() < 0.015);
         // The sun alone is drawn from as well.
         let black = Environment::new(2, 1, vec![Vec3::ZERO; 2]).expect("sizes fit");
-        let alone = black.with_sun(Some(sun)).sample(origin, 0.99, [0.3, 0.7]);
+        let alone = black.with_sun(Some(sun), None).expect("all pixels");
+        let alone = alone.sample(origin, 0.99, [0.3, 0.7]);
         let (direction, pdf) = alone.expect("not black");
         let irradiance = sun.radiance(direction) / pdf;
         assert!((irradiance.x / 5.0 - 1.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_sun_shines_through_open_pixels_alone() {
+        let sun = Sun {
+            direction: Vec3::Y,
+            irradiance: Vec3::ONE,
+        };
+        let around = Surroundings::around([Vec3::NEG_ONE, Vec3::ONE].into_iter()).expect("points");
+        let map = Environment::new(2, 1, vec![Vec3::splat(0.5); 2]).expect("sizes fit");
+        let map = map.around(around);
+        // The top of the box left and right of its middle is in one pixel each.
+        let [left, right] = [-0.5, 0.5].map(|z| Vec3::new(0.0, 0.0, z));
+        let open = [left, right].map(|at| pixel_of(2, 1, around.map_direction(at, Vec3::Y)));
+        assert_ne!(open[0], open[1]);
+        let openings = (0..2).map(|pixel| pixel == open[1]).collect();
+        let map = map.with_sun(Some(sun), Some(openings)).expect("two pixels");
+        assert_eq!(map.radiance(left, Vec3::Y), Vec3::splat(0.5));
+        assert!(map.radiance(right, Vec3::Y).x > 1e3);
+        assert_eq!(map.with_sun(Some(sun), Some(vec![true])), None);
     }
 
     #[test]

@@ -75,6 +75,7 @@ fn light_from_outside_is_switched_off_and_on() {
             above: None,
             surroundings: Surroundings::Far,
             sun: None,
+            openings: None,
         });
     });
     press(&mut harness, Modifiers::NONE, Key::L);

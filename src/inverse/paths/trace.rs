@@ -355,8 +355,9 @@ impl Tracer<'_> {
         let Some((grid, wi)) = self.outside.and_then(|grid| Some((grid, grid.sun?))) else {
             return 0;
         };
+        let is_open = (self.sky).is_none_or(|sky| sky.is_open(surface.leave(wi), wi));
         let (leaves, rays) = self.leaves_mesh(surface, wi);
-        if leaves {
+        if leaves && is_open {
             let (value, _) = surface.value(scattering, wi);
             vertex.lamp = grid.sun_surface();
             vertex.lamp_weight = PI * value / self.sun_fraction() * scale;

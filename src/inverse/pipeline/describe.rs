@@ -163,6 +163,7 @@ fn outside_light(
         above,
         surroundings: grid.surroundings,
         sun: beyond,
+        openings: beyond.and(sky).map(MeasuredOutside::openings),
     })
 }
 

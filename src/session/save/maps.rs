@@ -68,6 +68,11 @@ pub fn encode(estimate: &Estimate) -> Result<Option<Vec<u8>>> {
             let bytes = color_bytes(&[sun.direction, sun.irradiance]);
             tensors.push(("outside_sun", Dtype::F32, vec![2, 3], bytes));
         }
+        if let Some(openings) = &outside.openings {
+            let shape = vec![outside.height as usize, outside.width as usize];
+            let bytes = openings.iter().map(|&open| u8::from(open)).collect();
+            tensors.push(("outside_openings", Dtype::U8, shape, bytes));
+        }
         if let Surroundings::Box { min, max } = outside.surroundings {
             tensors.push((
                 "outside_box",
@@ -136,6 +141,13 @@ pub fn decode(path: &Path, bytes: &[u8]) -> Result<Maps> {
                         }),
                         _ => return Err(read.misfit("outside_sun")),
                     },
+                },
+                openings: match read.optional("outside_openings", Dtype::U8)? {
+                    None => None,
+                    Some(open) if *open.shape() == [height, width] => {
+                        Some(open.data().iter().map(|&open| open != 0).collect())
+                    }
+                    Some(_) => return Err(read.misfit("outside_openings")),
                 },
                 surroundings: match read.optional("outside_box", Dtype::F32)? {
                     None => Surroundings::Far,
@@ -270,6 +282,7 @@ mod tests {
                     direction: Vec3::new(0.6, 0.0, -0.8),
                     irradiance: Vec3::new(7.0, 6.0, 5.5),
                 }),
+                openings: Some(vec![true, false]),
             }),
             ..Default::default()
         }
