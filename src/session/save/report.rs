@@ -10,6 +10,7 @@ use crate::session::save::memory::peak_memory_bytes;
 use crate::session::save::named::Named;
 use crate::session::save::results::Results;
 use crate::transport::denoise::Denoiser;
+use crate::transport::sun::Sun;
 use crate::transport::surroundings::Surroundings;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -96,6 +97,9 @@ pub struct OutsideSummary {
     /// Its distance.
     #[serde(default)]
     pub from: String,
+    /// The sun beyond a box. Far away, the sun is a pixel of the map.
+    #[serde(default)]
+    pub sun: Option<Sun>,
 }
 
 /// Durations in seconds.
@@ -170,6 +174,7 @@ impl Report {
                         Surroundings::Box { .. } => "a box around the mesh",
                     }
                     .to_owned(),
+                    sun: outside.sun,
                 }
             }),
             exposures: estimate
