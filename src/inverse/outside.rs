@@ -76,14 +76,14 @@ impl MeasuredOutside {
             sum.0 += photograph.pixels[pixel.pixel as usize].as_dvec3();
             sum.1 += 1;
         }
+        if sums.iter().flatten().flatten().all(|s| s.1 == 0) {
+            return None;
+        }
         let (mut room, mut pixels) = (0.0, 0);
         for p in (gbuffer.pixels.iter()).filter(|p| !p.held_out && p.object != u32::MAX) {
             let pixel = problem.photographs[p.frame as usize].pixels[p.pixel as usize];
             room += f64::from(luminance(pixel));
             pixels += 1;
-        }
-        if sums.iter().flatten().flatten().all(|s| s.1 == 0) {
-            return None;
         }
         let [(below, dark), (above, bright)] = sums.map(|sums| Half::new(width, height, &sums));
         let map = Environment::new(width, height, dark)?.around(surroundings);
@@ -331,6 +331,13 @@ mod tests {
         // Far away a sun may stand anywhere; through a box it shines where the photographs are saturated.
         assert!(measured.is_open(Vec3::ZERO, at(-0.1)));
         assert_eq!(measured.openings(), [true, false]);
+        let around = Surroundings::around([Vec3::NEG_ONE, Vec3::ONE].into_iter()).expect("points");
+        let boxed = MeasuredOutside {
+            map: measured.map.clone().around(around),
+            ..measured.clone()
+        };
+        assert!(!boxed.is_open(Vec3::ZERO, at(-0.1)));
+        assert!(boxed.is_open(Vec3::ZERO, at(0.1)));
         let filled = |towards| measured.filled(Some(towards), |d| d.abs(), |_| Vec3::splat(7.0));
         assert_eq!(filled(Vec3::NEG_Y), [Vec3::splat(0.5), Vec3::splat(7.0)]);
         assert_eq!(

@@ -355,9 +355,11 @@ impl Tracer<'_> {
         let Some((grid, wi)) = self.outside.and_then(|grid| Some((grid, grid.sun?))) else {
             return 0;
         };
-        let is_open = (self.sky).is_none_or(|sky| sky.is_open(surface.leave(wi), wi));
+        if (self.sky).is_some_and(|sky| !sky.is_open(surface.leave(wi), wi)) {
+            return 0;
+        }
         let (leaves, rays) = self.leaves_mesh(surface, wi);
-        if leaves && is_open {
+        if leaves {
             let (value, _) = surface.value(scattering, wi);
             vertex.lamp = grid.sun_surface();
             vertex.lamp_weight = PI * value / self.sun_fraction() * scale;

@@ -26,8 +26,7 @@ const ESCAPING: f64 = 1e-3;
 const OUTSIDE_GAIN: f64 = 0.03;
 /// Standard errors by which the squared error falls.
 const FALL_ERRORS: f64 = 4.0;
-/// Standard errors by which a sun's light exceeds zero. In rooms 7, 11 and 15 of the family `scanned` true suns do so by 3.5 to 25, wrong
-/// ones in rooms 17 and 20 by less than one.
+/// Standard errors by which a sun's light exceeds zero: the usual bound for one unknown, since the squared error decides about its direction.
 const SUN_ERRORS: f32 = 3.0;
 
 /// The result of a trial of outside light.

@@ -34,7 +34,7 @@ const IRRADIANCES: std::ops::RangeInclusive<i32> = -3..=10;
 /// Radiances of the sky that are tried besides black, over the mean photographed radiance: powers of four from 1/4 to 256.
 const SKIES: std::ops::RangeInclusive<i32> = -1..=4;
 /// Least fall of χ² of a sun: five standard errors, and 2 ln of the number of candidates that it is the best of.
-const LEAST_FALL: f64 = 25.0 + 20.0;
+const MIN_FALL: f64 = 25.0 + 20.0;
 
 /// One cluster of pixels, reduced to what the search needs.
 struct Patch {
@@ -237,6 +237,6 @@ impl Pipeline<'_, '_> {
             far.is_none_or(|sky| sky.at(Vec3::ZERO, d).is_none() || sky.is_bound(Vec3::ZERO, d))
         };
         let (direction, fall) = search.best(scene.up, may_hold)?;
-        (fall >= LEAST_FALL).then_some(direction)
+        (fall >= MIN_FALL).then_some(direction)
     }
 }
