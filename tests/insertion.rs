@@ -8,6 +8,7 @@ use relit::capture::photograph::{Encoding, Photograph, PhotographSource};
 use relit::capture::response::Response;
 use relit::capture::{Capture, Frame};
 use relit::compose::backdrop::{Backdrop, LayeredPixel};
+use relit::compose::first_look::first_look;
 use relit::compose::insert::Insertion;
 use relit::compose::naive;
 use relit::compose::object::ObjectModel;
@@ -327,6 +328,48 @@ fn an_object_darkens_the_floor_beside_it() {
     assert!(changed.count() > 50);
 }
 
+/// A first look of a photograph three times as large as its render, against the converged composite.
+#[test]
+fn the_first_look_has_exact_outlines_and_light_better_than_a_sample_of_each_pixel() {
+    const LARGE: u32 = 600;
+    let mut capture = lamp_room().0;
+    let frame = &mut capture.frames[0];
+    let factor = f64::from(LARGE) / f64::from(SIDE);
+    let k = &mut frame.intrinsics;
+    (k.width, k.height) = (LARGE, LARGE);
+    (k.fx, k.fy, k.cx, k.cy) = (k.fx * factor, k.fy * factor, k.cx * factor, k.cy * factor);
+    frame.photograph = PhotographSource::Memory(Arc::new(Photograph {
+        width: LARGE,
+        height: LARGE,
+        pixels: vec![Vec3::splat(0.3); (LARGE * LARGE) as usize],
+        ..(*frame.load().expect("in memory")).clone()
+    }));
+    let scene = Arc::new(Scene::new(&capture).expect("the scene is sound"));
+    let materials = vec![gray(0.6, 0.0), gray(0.0, 10.0)];
+    let lit = Arc::new(LitScene::new(scene, materials, None));
+    let object = placed(&lit, block(), gray(0.3, 0.0), DVec3::new(0.0, -3.0, -1.0));
+    let mut insertion = insertion(&capture, &lit, vec![object]);
+    let first = first_look(&insertion);
+    insertion.pass(1);
+    let sample = insertion.composite();
+    insertion.pass(63);
+    let (truth, alpha) = (insertion.composite(), insertion.layers().alpha);
+    let inside = |pixel: usize| alpha[pixel] == 0.0 || alpha[pixel] == 1.0;
+    let pixels: Vec<usize> = (0..alpha.len()).filter(|&p| inside(p)).collect();
+    assert!(
+        pixels
+            .iter()
+            .all(|&pixel| first[pixel].alpha == alpha[pixel])
+    );
+    let picture = insertion.backdrop().composite(&first);
+    let error = |picture: &Picture| -> f64 {
+        let off = |p: &usize| f64::from((picture.pixels[*p] - truth.pixels[*p]).length_squared());
+        (pixels.iter().map(off).sum::<f64>() / pixels.len() as f64).sqrt()
+    };
+    let (first, sample) = (error(&picture), error(&sample));
+    assert!(first < 0.2 * sample, "{first} {sample}");
+}
+
 #[test]
 fn passes_give_the_same_bits_however_they_are_split_and_on_any_number_of_threads() {
     let (capture, lit) = lamp_room();
@@ -338,7 +381,7 @@ fn passes_give_the_same_bits_however_they_are_split_and_on_any_number_of_threads
             .expect("threads");
         pool.install(|| {
             let mut insertion = insertion(&capture, &lit, vec![object.clone()]);
-            let coarse = insertion.composite();
+            let first = insertion.backdrop().composite(&first_look(&insertion));
             if threads == 1 {
                 insertion.pass(3);
             } else {
@@ -350,10 +393,10 @@ fn passes_give_the_same_bits_however_they_are_split_and_on_any_number_of_threads
                 insertion.pass(1);
             }
             assert_eq!(insertion.samples(), 3);
-            (coarse, insertion.composite())
+            (first, insertion.composite())
         })
     });
-    assert!(results[0].0 == results[1].0, "the coarse results differ");
+    assert!(results[0].0 == results[1].0, "the first looks differ");
     assert!(results[0].1 == results[1].1, "the composites differ");
 }
 

@@ -7,71 +7,109 @@ use crate::math::picture::Picture;
 use crate::transport::denoise::{Denoiser, Guide, denoise, guides, guides_where};
 use glam::Vec3;
 
-/// The denoised composite and its layers, from two independent renderings of the same insertion.
-///
-/// Pixels that no object changes in either, nor within the reach of the filter, keep the photograph's value to the bit.
-pub fn denoised(halves: [&Insertion; 2], denoiser: Denoiser) -> (Picture, Layers) {
-    let [a, b] = halves.map(Insertion::layers);
-    let (backdrop, lit) = (halves[0].backdrop(), halves[0].lit());
-    let camera = &backdrop.camera;
-    let average = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a + b) * 0.5).collect();
-    let alpha: Vec<f32> = average(&a.alpha, &b.alpha);
+/// The denoised light of an insertion, with what its pixels see.
+pub(super) struct DenoisedLight {
+    /// Fraction of each pixel that the objects cover.
+    pub alpha: Vec<f32>,
+    /// Radiance of the objects, up to their outlines.
+    pub object: Picture,
+    pub object_guides: Vec<Option<Guide>>,
+    /// Radiance without the objects.
+    pub without: Picture,
+    pub without_guides: Vec<Option<Guide>>,
+    /// What they change where they do not cover a pixel.
+    pub change: Picture,
+}
 
-    // Radiance of the objects, up to their outlines.
-    let world = FurnishedScene::new(lit, halves[0].objects());
-    let objects = guides_where(&world, camera, |pixel, ray| {
-        alpha[pixel] > 0.0 && world.sees_object(ray)
-    });
-    let [mut object_a, mut object_b] = halves.map(Insertion::object_radiance);
-    for pixel in 0..alpha.len() {
-        // Where only one half has hit the object, its value is used for both.
-        match (a.alpha[pixel] > 0.0, b.alpha[pixel] > 0.0) {
-            (true, false) => object_b.pixels[pixel] = object_a.pixels[pixel],
-            (false, true) => object_a.pixels[pixel] = object_b.pixels[pixel],
-            _ => {}
+impl DenoisedLight {
+    /// From two independent renderings of the same insertion.
+    pub fn new(halves: [&Insertion; 2], denoiser: Denoiser) -> Self {
+        let [a, b] = halves.map(Insertion::alpha);
+        let alpha: Vec<f32> = a.iter().zip(&b).map(|(a, b)| (a + b) * 0.5).collect();
+        let (lit, camera) = (halves[0].lit(), &halves[0].backdrop().camera);
+
+        let world = FurnishedScene::new(lit, halves[0].objects());
+        let object_guides = guides_where(&world, camera, |pixel, ray| {
+            alpha[pixel] > 0.0 && world.sees_object(ray)
+        });
+        let [mut object_a, mut object_b] = halves.map(Insertion::object_radiance);
+        for pixel in 0..alpha.len() {
+            // Where only one half has hit the object, its value is used for both.
+            match (a[pixel] > 0.0, b[pixel] > 0.0) {
+                (true, false) => object_b.pixels[pixel] = object_a.pixels[pixel],
+                (false, true) => object_a.pixels[pixel] = object_b.pixels[pixel],
+                _ => {}
+            }
+        }
+
+        // Emission cancels in a difference. A difference has both signs, which only the built-in filter supports.
+        let without_guides = guides(&**lit, camera);
+        let [change_a, change_b] = halves.map(Insertion::uncovered_change);
+        let [without_a, without_b] = halves.map(Insertion::without);
+        Self {
+            object: denoiser.denoise(&object_a, &object_b, &object_guides),
+            without: denoiser.denoise(&without_a, &without_b, &without_guides),
+            change: denoise(&change_a, &change_b, &unlit(&without_guides)),
+            object_guides,
+            without_guides,
+            alpha,
         }
     }
-    let object = denoiser.denoise(&object_a, &object_b, &objects);
 
-    // The background and its change. Emission cancels in a difference, so its guides have none. A difference has both signs,
-    // which only the built-in filter supports.
-    let behind = guides(&**lit, camera);
-    let dark: Vec<Option<Guide>> = (behind.iter())
-        .map(|guide| {
-            guide.map(|guide| Guide {
-                emission: Vec3::ZERO,
-                ..guide
-            })
-        })
-        .collect();
-    let [change_a, change_b] = halves.map(Insertion::uncovered_change);
-    let change = denoise(&change_a, &change_b, &dark);
-    let without = denoiser.denoise(&a.without, &b.without, &behind);
+    fn layered(&self) -> Vec<LayeredPixel> {
+        let layered = |pixel: usize| {
+            let (alpha, change) = (self.alpha[pixel], self.change.pixels[pixel]);
+            let without = self.without.pixels[pixel];
+            let uncovered = without + change;
+            LayeredPixel {
+                alpha,
+                with: uncovered.lerp(self.object.pixels[pixel], alpha),
+                uncovered,
+                without,
+                changed: alpha != 0.0 || change != Vec3::ZERO,
+            }
+        };
+        (0..self.alpha.len()).map(layered).collect()
+    }
+}
+
+/// The same features of surfaces that emit nothing.
+pub(super) fn unlit(guides: &[Option<Guide>]) -> Vec<Option<Guide>> {
+    let unlit = |guide: &Guide| Guide {
+        emission: Vec3::ZERO,
+        ..*guide
+    };
+    guides.iter().map(|g| g.as_ref().map(unlit)).collect()
+}
+
+/// The denoised composite, from two independent renderings of the same insertion.
+///
+/// Pixels that no object changes in either, nor within the reach of the filter, keep the photograph's value to the bit.
+pub fn denoised_composite(halves: [&Insertion; 2], denoiser: Denoiser) -> Picture {
+    let layered = DenoisedLight::new(halves, denoiser).layered();
+    halves[0].backdrop().composite(&layered)
+}
+
+/// [`denoised_composite`] and its layers.
+pub fn denoised(halves: [&Insertion; 2], denoiser: Denoiser) -> (Picture, Layers) {
+    let layered = DenoisedLight::new(halves, denoiser).layered();
+    let backdrop = halves[0].backdrop();
+    let (depth, object) = halves[0].at_centers();
     let picture = |value: &dyn Fn(usize) -> Vec3| Picture {
-        pixels: (0..alpha.len()).map(value).collect(),
+        pixels: (0..layered.len()).map(value).collect(),
         ..*backdrop.photograph
     };
-    let uncovered = picture(&|pixel| without.pixels[pixel] + change.pixels[pixel]);
-    let with = picture(&|pixel| uncovered.pixels[pixel].lerp(object.pixels[pixel], alpha[pixel]));
-    let mixed: Vec<LayeredPixel> = (alpha.iter().enumerate())
-        .map(|(pixel, &alpha)| LayeredPixel {
-            alpha,
-            with: with.pixels[pixel],
-            uncovered: uncovered.pixels[pixel],
-            without: without.pixels[pixel],
-            changed: alpha != 0.0 || change.pixels[pixel] != Vec3::ZERO,
-        })
-        .collect();
-    let composite = backdrop.composite(&mixed);
-    let delta = picture(&|pixel| backdrop.delta(pixel, &mixed[pixel]));
+    let with = picture(&|pixel| layered[pixel].with);
+    let without = picture(&|pixel| layered[pixel].without);
+    let alpha: Vec<f32> = layered.iter().map(|layer| layer.alpha).collect();
     let layers = Layers {
         shadow: Layers::shadow_of(&with, &without, &alpha),
         with,
         without,
-        delta,
+        delta: picture(&|pixel| backdrop.delta(pixel, &layered[pixel])),
         alpha,
-        depth: a.depth,
-        object: a.object,
+        depth,
+        object,
     };
-    (composite, layers)
+    (backdrop.composite(&layered), layers)
 }

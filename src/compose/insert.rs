@@ -20,9 +20,6 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Most pixel blocks of the first, coarse result.
-const COARSE_BLOCKS: usize = 40_000;
-
 /// An insertion of objects into a photograph, refined progressively.
 #[derive(Debug)]
 pub struct Insertion {
@@ -74,7 +71,7 @@ impl Layers {
 }
 
 impl Insertion {
-    /// Starts an insertion with a coarse result: exact outlines, but light by blocks of pixels.
+    /// Starts an insertion; without samples, its composite is the photograph.
     pub fn new(
         backdrop: Backdrop,
         lit: Arc<LitScene>,
@@ -83,7 +80,7 @@ impl Insertion {
         seed: u64,
     ) -> Self {
         let (width, height) = (backdrop.photograph.width, backdrop.photograph.height);
-        let mut insertion = Self {
+        Self {
             backdrop,
             lit,
             objects,
@@ -94,27 +91,27 @@ impl Insertion {
             next_row: 0,
             rays: 0,
             rejected: 0,
-        };
-        if !insertion.objects.is_empty() {
-            insertion.coarse();
         }
-        insertion
     }
 
     /// The same insertion with other random numbers and no samples yet.
     pub fn with_seed(&self, seed: u64) -> Self {
-        Self {
-            backdrop: self.backdrop.clone(),
-            lit: self.lit.clone(),
-            objects: self.objects.clone(),
-            options: self.options,
-            seed,
-            pixels: vec![PairSums::default(); self.pixels.len()],
-            row_samples: vec![0; self.row_samples.len()],
-            next_row: 0,
-            rays: 0,
-            rejected: 0,
-        }
+        let (lit, objects) = (self.lit.clone(), self.objects.clone());
+        Self::new(self.backdrop.clone(), lit, objects, self.options, seed)
+    }
+
+    /// The light of the same insertion at a smaller size: the photograph is black. No samples yet.
+    pub fn smaller(&self, long_side: u32, seed: u64) -> Self {
+        let (lit, objects) = (self.lit.clone(), self.objects.clone());
+        let camera = self.backdrop.camera.shrunk(long_side);
+        let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
+        let photograph = Arc::new(Picture::from_fn(width, height, |_, _| Vec3::ZERO));
+        let backdrop = Backdrop {
+            camera,
+            photograph,
+            ..self.backdrop.clone()
+        };
+        Self::new(backdrop, lit, objects, self.options, seed)
     }
 
     /// Adds `samples` paths to every pixel, in parallel. The result is the same to the bit for any split into calls
@@ -189,10 +186,6 @@ impl Insertion {
         let width = self.width();
         for (row, added) in rows.zip(added.chunks(width)) {
             for (sums, pair) in self.pixels[row * width..].iter_mut().zip(added) {
-                // The first sample replaces the coarse result.
-                if self.row_samples[row] == 0 {
-                    *sums = PairSums::default();
-                }
                 sums.with += pair.with;
                 sums.without += pair.without;
                 sums.covered_with += pair.covered_with;
@@ -248,12 +241,22 @@ impl Insertion {
         ((with - without) / f64::from(free.max(1))).as_vec3()
     }
 
-    /// The layers of the composite.
-    pub fn layers(&self) -> Layers {
+    /// Mean radiance without the objects.
+    pub fn without(&self) -> Picture {
+        self.picture(|pixel| self.means(pixel).1)
+    }
+
+    /// Fraction of each pixel that the objects cover.
+    pub fn alpha(&self) -> Vec<f32> {
+        (0..self.pixels.len()).map(|p| self.means(p).2).collect()
+    }
+
+    /// Depth along the viewing direction and object index of each pixel, as [`Layers`] has them.
+    pub(super) fn at_centers(&self) -> (Vec<f32>, Vec<u32>) {
         let world = FurnishedScene::new(&self.lit, &self.objects);
         let camera = &self.backdrop.camera;
         let forward = camera.forward();
-        let (depth, object) = (0..self.pixels.len())
+        (0..self.pixels.len())
             .into_par_iter()
             .map(|pixel| {
                 let ray = self.ray(pixel, [0.5; 2]);
@@ -263,10 +266,14 @@ impl Insertion {
                         ((s.point - camera.center).dot(forward), s.object)
                     })
             })
-            .unzip();
+            .unzip()
+    }
+
+    /// The layers of the composite.
+    pub fn layers(&self) -> Layers {
+        let (depth, object) = self.at_centers();
         let with = self.picture(|pixel| self.means(pixel).0);
-        let without = self.picture(|pixel| self.means(pixel).1);
-        let alpha: Vec<f32> = (0..self.pixels.len()).map(|p| self.means(p).2).collect();
+        let (without, alpha) = (self.without(), self.alpha());
         Layers {
             delta: self.picture(|pixel| self.backdrop.delta(pixel, &self.layered(pixel))),
             shadow: Layers::shadow_of(&with, &without, &alpha),
@@ -276,6 +283,11 @@ impl Insertion {
             depth,
             object,
         }
+    }
+
+    /// Keys the random numbers.
+    pub fn seed(&self) -> u64 {
+        self.seed
     }
 
     /// The photograph that is inserted into.
@@ -298,7 +310,7 @@ impl Insertion {
         &self.objects
     }
 
-    /// Fewest samples of any pixel; 0 while the result is coarse.
+    /// Fewest samples of any pixel.
     pub fn samples(&self) -> u32 {
         self.row_samples.iter().copied().min().unwrap_or(0)
     }
@@ -328,7 +340,6 @@ impl Insertion {
     /// Mean radiance with and without the objects, and coverage.
     fn means(&self, pixel: usize) -> (Vec3, Vec3, f32) {
         let sums = &self.pixels[pixel];
-        // The coarse result counts as one sample.
         let n = f64::from(self.row_samples[pixel / self.width()].max(1));
         (
             (sums.with / n).as_vec3(),
@@ -399,78 +410,4 @@ impl Insertion {
             .collect();
         self.accumulate(first..first + rows, 1, &added.concat());
     }
-
-    /// The coarse result: in each block one pair of paths where an object is visible and one where none is. The differences
-    /// outside of the objects are then averaged over neighbouring blocks.
-    fn coarse(&mut self) {
-        let (width, height) = (self.width(), self.row_samples.len());
-        let side = (1..)
-            .find(|side| width.div_ceil(*side) * height.div_ceil(*side) <= COARSE_BLOCKS)
-            .unwrap_or(1);
-        let bands: Vec<(Vec<PairSums>, Vec<Option<DVec3>>)> = (0..height.div_ceil(side))
-            .into_par_iter()
-            .map(|band| self.coarse_band(band * side, side))
-            .collect();
-        let (pixels, deltas): (Vec<_>, Vec<_>) = bands.into_iter().unzip();
-        self.pixels = pixels.concat();
-        self.rays = self.pixels.iter().map(|p| u64::from(p.rays)).sum();
-        for (band, row) in self.pixels.chunks_mut(side * width).zip(smooth(&deltas)) {
-            for (index, sums) in band.iter_mut().enumerate().filter(|(_, s)| s.covered == 0) {
-                let delta = row[index % width / side];
-                sums.with = sums.without + delta;
-                sums.changed = delta != DVec3::ZERO;
-            }
-        }
-    }
-
-    /// A band of the coarse result from row `top`, and for each block the difference where no object is visible.
-    fn coarse_band(&self, top: usize, side: usize) -> (Vec<PairSums>, Vec<Option<DVec3>>) {
-        let (width, height) = (self.width(), self.row_samples.len());
-        let rows = side.min(height - top);
-        let world = FurnishedScene::new(&self.lit, &self.objects);
-        let mut band = vec![PairSums::default(); rows * width];
-        let mut deltas = Vec::with_capacity(width.div_ceil(side));
-        for left in (0..width).step_by(side) {
-            // Indexed by whether an object is visible.
-            let mut found: [Option<PairSums>; 2] = [None; 2];
-            let columns = side.min(width - left);
-            for index in 0..rows * columns {
-                let (row, column) = (index / columns, left + index % columns);
-                let pixel = (top + row) * width + column;
-                let offset = self.stream(pixel, 0).uniform2();
-                let covered = world.sees_object(&self.ray(pixel, offset));
-                let sums = &mut found[usize::from(covered)];
-                band[row * width + column] = match *sums {
-                    Some(known) => PairSums { rays: 0, ..known },
-                    None => *sums.insert(self.pair(&world, pixel, 0)),
-                };
-            }
-            deltas.push(found[0].map(|sums| sums.with - sums.without));
-        }
-        (band, deltas)
-    }
-}
-
-/// Box filter over neighbouring blocks; ignores blocks without a value.
-fn smooth(deltas: &[Vec<Option<DVec3>>]) -> Vec<Vec<DVec3>> {
-    /// Radius in blocks.
-    const REACH: usize = 3;
-    let around = |i: usize, len: usize| i.saturating_sub(REACH)..len.min(i + REACH + 1);
-    (0..deltas.len())
-        .into_par_iter()
-        .map(|y| {
-            let near = &deltas[around(y, deltas.len())];
-            let columns = deltas[y].len();
-            (0..columns)
-                .map(|x| {
-                    let values = || {
-                        near.iter()
-                            .flat_map(|row| &row[around(x, columns)])
-                            .flatten()
-                    };
-                    values().sum::<DVec3>() / values().count().max(1) as f64
-                })
-                .collect()
-        })
-        .collect()
 }

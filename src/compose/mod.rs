@@ -2,6 +2,7 @@
 
 pub mod backdrop;
 pub mod denoise;
+pub mod first_look;
 pub mod insert;
 pub mod naive;
 pub mod object;

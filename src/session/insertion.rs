@@ -1,8 +1,9 @@
-//! Composites of the shown photograph: relit by the edits and with inserted objects, coarse at first and refined in slices of
+//! Composites of the shown photograph: relit by the edits and with inserted objects, quickly at first and refined in slices of
 //! time.
 
-use crate::compose::backdrop::Backdrop;
-use crate::compose::denoise::denoised;
+use crate::compose::backdrop::{Backdrop, LayeredPixel};
+use crate::compose::denoise::denoised_composite;
+use crate::compose::first_look::first_look;
 use crate::compose::insert::Insertion as Composite;
 use crate::compose::placement::{PlacedObject, Placement};
 use crate::compose::relight::Relighting;
@@ -88,19 +89,28 @@ struct Placed {
     inserted: Inserted,
     /// An independent insertion; the denoiser estimates the noise from both.
     independent: Composite,
-    /// Samples of `picture`; 0 while it is coarse.
+    /// Shown before there are samples.
+    first_look: Vec<LayeredPixel>,
+    /// Samples of `picture`; 0 while it is the first look.
     samples: u32,
     picture: Arc<Picture>,
 }
 
 impl Placed {
     fn new(inserted: Inserted, seed: u64) -> Self {
-        Self {
+        let first_look = match inserted.composite.objects().is_empty() {
+            true => Vec::new(),
+            false => first_look(&inserted.composite),
+        };
+        let mut placed = Self {
             independent: inserted.composite.with_seed(seed),
+            first_look,
             samples: 0,
-            picture: Arc::new(inserted.composite.composite()),
+            picture: inserted.composite.backdrop().photograph.clone(),
             inserted,
-        }
+        };
+        placed.update_picture();
+        placed
     }
 
     /// Samples per pixel of both insertions together.
@@ -116,12 +126,16 @@ impl Placed {
 
     fn update_picture(&mut self) {
         let halves = [&self.inserted.composite, &self.independent];
-        let none = halves[0].objects().is_empty();
-        let sampled = !none && halves.iter().all(|half| half.samples() > 0);
+        let backdrop = halves[0].backdrop();
+        if halves[0].objects().is_empty() {
+            self.picture = backdrop.photograph.clone();
+            return;
+        }
+        let sampled = halves.iter().all(|half| half.samples() > 0);
         self.samples = if sampled { self.samples() } else { 0 };
         self.picture = Arc::new(match sampled {
-            true => denoised(halves, Denoiser::best()).0,
-            false => halves[0].composite(),
+            true => denoised_composite(halves, Denoiser::best()),
+            false => backdrop.composite(&self.first_look),
         });
     }
 
@@ -198,7 +212,7 @@ impl Inserting {
         self.show(frame, self.long_side);
     }
 
-    /// Starts over with a coarse picture.
+    /// Starts over with a quick picture.
     pub fn update(&mut self) {
         self.stale = Some(Instant::now());
         self.hold = 0;

@@ -107,7 +107,7 @@ impl Library {
         Ok(backdrop)
     }
 
-    /// Inserts objects into a backdrop; the composite is coarse at first.
+    /// Inserts objects into a backdrop; the composite has no samples yet.
     pub fn insert(
         &mut self,
         capture: &OpenCapture,
