@@ -17,8 +17,8 @@ use rayon::prelude::*;
 const PASSES: u32 = 5;
 /// Cubic B-spline weights.
 const SPLINE: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
-/// Luminance differences are measured in units of this many standard deviations of the noise.
-const LUMINANCE_SIGMAS: f32 = 1.5;
+/// Luminance differences between averages of 3 × 3 pixels are measured in units of this many standard deviations of a pixel's noise.
+const LUMINANCE_SIGMAS: f32 = 0.7;
 /// Power of the cosine between normals in the weights.
 const NORMAL_POWER: i32 = 64;
 /// Distance from a pixel's tangent plane, as a fraction of depth, at which weights fall to 1/e.
@@ -95,6 +95,11 @@ pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
     let mut smooth: Vec<[Vec3; 2]> = (0..mean.len())
         .map(|i| [light(i, a.pixels[i]), light(i, b.pixels[i])])
         .collect();
+    let around = Around {
+        width,
+        height: a.height as usize,
+    };
+    let guides = &steadied(guides, around);
     let variance: Vec<f32> = (smooth.iter())
         .map(|&[a, b]| {
             let half = luminance(a - b);
@@ -102,11 +107,6 @@ pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
             if square.is_finite() { square } else { 0.0 }
         })
         .collect();
-    let around = Around {
-        width,
-        height: a.height as usize,
-    };
-    let guides = &steadied(guides, around);
     let mut noise: Vec<f32> = (0..mean.len())
         .into_par_iter()
         .map(|pixel| {
@@ -115,7 +115,8 @@ pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
                 let weight = similarity(guides[pixel].as_ref(), guides[q].as_ref());
                 (sum + weight * variance[q], weights + weight)
             });
-            if weights > 0.0 { sum / weights } else { 0.0 }
+            let alone = beyond_neighbours(&smooth, guides, around, pixel);
+            (sum / f32::max(weights, f32::MIN_POSITIVE)).max(alone * alone)
         })
         .collect();
 
@@ -124,6 +125,7 @@ pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
     let finite = |[a, b]: [Vec3; 2]| a.is_finite() && b.is_finite();
     for pass in 0..PASSES {
         let step = 1 << pass;
+        let levels = levels(&smooth, guides, around);
         let filtered: Vec<([Vec3; 2], f32)> = (0..mean.len())
             .into_par_iter()
             .map(|pixel| {
@@ -133,7 +135,7 @@ pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
                 else {
                     return here;
                 };
-                let [level_a, level_b] = here.0.map(luminance);
+                let [level_a, level_b] = levels[pixel];
                 let allowed = LUMINANCE_SIGMAS * here.1.sqrt() + f32::MIN_POSITIVE;
                 let (mut sums, mut sum_variance, mut weights) = ([Vec3::ZERO; 2], 0.0, [0.0; 2]);
                 for (q, [dx, dy]) in around.square(pixel, 2, step) {
@@ -142,12 +144,9 @@ pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
                     if like == 0.0 || !finite(smooth[q]) {
                         continue;
                     }
-                    let [a, b] = smooth[q];
+                    let ([a, b], [a_there, b_there]) = (smooth[q], levels[q]);
                     let weight = |off: f32| spline * like * (-(off.abs() / allowed)).exp();
-                    let [by_b, by_a] = [
-                        weight(luminance(b) - level_b),
-                        weight(luminance(a) - level_a),
-                    ];
+                    let [by_b, by_a] = [weight(b_there - level_b), weight(a_there - level_a)];
                     sums = [sums[0] + a * by_b, sums[1] + b * by_a];
                     weights = [weights[0] + by_b, weights[1] + by_a];
                     sum_variance += noise[q] * by_a * by_b;
@@ -167,6 +166,49 @@ pub fn denoise(a: &Picture, b: &Picture, guides: &[Option<Guide>]) -> Picture {
         pixels: pixels.collect(),
         ..*a
     }
+}
+
+/// Luminance of both pictures averaged over 3 × 3 pixels of the same object. Weights from single pixels would keep a rare sample that both
+/// pictures happen to have at one pixel.
+fn levels(light: &[[Vec3; 2]], guides: &[Option<Guide>], around: Around) -> Vec<[f32; 2]> {
+    let level = |pixel: usize| {
+        let (mut sums, mut weights) = ([0.0; 2], 0.0);
+        for (q, [dx, dy]) in around.square(pixel, 1, 1) {
+            let [a, b] = light[q].map(luminance);
+            if same_object(guides, pixel, q) && (a + b).is_finite() {
+                let weight = SPLINE[dx.unsigned_abs()] * SPLINE[dy.unsigned_abs()];
+                sums = [sums[0] + weight * a, sums[1] + weight * b];
+                weights += weight;
+            }
+        }
+        sums.map(|sum| sum / f32::max(weights, f32::MIN_POSITIVE))
+    };
+    (0..light.len()).into_par_iter().map(level).collect()
+}
+
+/// How far the luminance of a pixel lies outside of the range of its neighbours on the same object; 0 if less than that range, or without
+/// neighbours.
+fn beyond_neighbours(
+    light: &[[Vec3; 2]],
+    guides: &[Option<Guide>],
+    around: Around,
+    pixel: usize,
+) -> f32 {
+    let level = |q: usize| 0.5 * luminance(light[q][0] + light[q][1]);
+    let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+    for (q, _) in around.square(pixel, 1, 1) {
+        if q != pixel && same_object(guides, pixel, q) {
+            (low, high) = (low.min(level(q)), high.max(level(q)));
+        }
+    }
+    let beyond = (level(pixel) - high).max(low - level(pixel));
+    if beyond > high - low { beyond } else { 0.0 }
+}
+
+/// Whether two pixels see the same object, or are one.
+fn same_object(guides: &[Option<Guide>], a: usize, b: usize) -> bool {
+    let object = |pixel: usize| guides[pixel].map(|guide| guide.object);
+    a == b || object(a).is_some_and(|here| object(b) == Some(here))
 }
 
 /// The guides with normals averaged over their neighbourhoods; edges stay, since normals across them hardly count.
@@ -330,6 +372,20 @@ mod tests {
         let albedo = guides[bright].map_or(1.0, |g| g.albedo.x);
         let kept = (light(&smooth) - light(&plain)) / (0.5 * added.x / albedo);
         assert!((kept - 1.0).abs() < 0.3, "{kept}");
+    }
+
+    /// The same rare bright sample in both pictures, which their difference does not tell from light.
+    #[test]
+    fn a_bright_pixel_that_both_pictures_share_is_spread() {
+        let (guides, truth) = scene();
+        let (mut a, mut b) = (noisy(&truth, 1, 0.1), noisy(&truth, 2, 0.1));
+        let bright = (36 * SIDE + 24) as usize;
+        for picture in [&mut a, &mut b] {
+            picture.pixels[bright] += truth.pixels[bright] * 10.0;
+        }
+        let smooth = denoise(&a, &b, &guides);
+        let highest = smooth.pixels[bright].x / truth.pixels[bright].x;
+        assert!(highest < 2.0, "{highest}");
     }
 
     #[test]
