@@ -56,21 +56,31 @@ impl DenoisedLight {
         }
     }
 
+    /// The pixels of the composite.
     fn layered(&self) -> Vec<LayeredPixel> {
-        let layered = |pixel: usize| {
-            let (alpha, change) = (self.alpha[pixel], self.change.pixels[pixel]);
-            let without = self.without.pixels[pixel];
-            let uncovered = without + change;
-            LayeredPixel {
-                alpha,
-                with: uncovered.lerp(self.object.pixels[pixel], alpha),
-                uncovered,
-                without,
-                changed: alpha != 0.0 || change != Vec3::ZERO,
-            }
-        };
-        (0..self.alpha.len()).map(layered).collect()
+        layered(&self.alpha, &self.object, &self.without, &self.change)
     }
+}
+
+/// Pixels of which objects cover a fraction `alpha`, from the objects' radiance, that without them, and what they change beside them.
+pub(super) fn layered(
+    alpha: &[f32],
+    object: &Picture,
+    without: &Picture,
+    change: &Picture,
+) -> Vec<LayeredPixel> {
+    let layered = |(pixel, &alpha): (usize, &f32)| {
+        let (without, change) = (without.pixels[pixel], change.pixels[pixel]);
+        let uncovered = without + change;
+        LayeredPixel {
+            alpha,
+            with: uncovered.lerp(object.pixels[pixel], alpha),
+            uncovered,
+            without,
+            changed: alpha != 0.0 || change != Vec3::ZERO,
+        }
+    };
+    alpha.iter().enumerate().map(layered).collect()
 }
 
 /// The same features of surfaces that emit nothing.

@@ -1,7 +1,7 @@
 //! The first look at inserted objects: exact outlines, and light from a small render that is denoised and enlarged.
 
 use crate::compose::backdrop::LayeredPixel;
-use crate::compose::denoise::{DenoisedLight, unlit};
+use crate::compose::denoise::{DenoisedLight, layered, unlit};
 use crate::compose::insert::Insertion;
 use crate::compose::world::FurnishedScene;
 use crate::math::picture::Picture;
@@ -35,28 +35,10 @@ pub fn first_look(insertion: &Insertion) -> Vec<LayeredPixel> {
 
     let first_object = lit.scene.objects.len();
     let covered = |guide: &Option<Guide>| guide.is_some_and(|g| g.object as usize >= first_object);
-    (seen.iter().enumerate())
-        .map(|(pixel, guide)| {
-            let without = without.pixels[pixel];
-            if covered(guide) {
-                return LayeredPixel {
-                    alpha: 1.0,
-                    with: object.pixels[pixel],
-                    uncovered: without,
-                    without,
-                    changed: true,
-                };
-            }
-            let change = change.pixels[pixel];
-            LayeredPixel {
-                alpha: 0.0,
-                with: without + change,
-                uncovered: without + change,
-                without,
-                changed: change != Vec3::ZERO,
-            }
-        })
-        .collect()
+    let alpha: Vec<f32> = (seen.iter())
+        .map(|guide| f32::from(u8::from(covered(guide))))
+        .collect();
+    layered(&alpha, &object, &without, &change)
 }
 
 /// Gives the mean light of the objects to the pixels that see none: the render may have missed thin parts, which take it from there.

@@ -89,7 +89,7 @@ struct Placed {
     inserted: Inserted,
     /// An independent insertion; the denoiser estimates the noise from both.
     independent: Composite,
-    /// Shown before there are samples.
+    /// Shown before there are samples; empty without objects, or if another picture is shown until then.
     first_look: Vec<LayeredPixel>,
     /// Samples of `picture`; 0 while it is the first look.
     samples: u32,
@@ -97,10 +97,11 @@ struct Placed {
 }
 
 impl Placed {
-    fn new(inserted: Inserted, seed: u64) -> Self {
-        let first_look = match inserted.composite.objects().is_empty() {
-            true => Vec::new(),
-            false => first_look(&inserted.composite),
+    /// `shown` unless another picture stays until this one has samples.
+    fn new(inserted: Inserted, seed: u64, shown: bool) -> Self {
+        let first_look = match shown && !inserted.composite.objects().is_empty() {
+            true => first_look(&inserted.composite),
+            false => Vec::new(),
         };
         let mut placed = Self {
             independent: inserted.composite.with_seed(seed),
@@ -127,16 +128,13 @@ impl Placed {
     fn update_picture(&mut self) {
         let halves = [&self.inserted.composite, &self.independent];
         let backdrop = halves[0].backdrop();
-        if halves[0].objects().is_empty() {
-            self.picture = backdrop.photograph.clone();
-            return;
-        }
         let sampled = halves.iter().all(|half| half.samples() > 0);
+        self.picture = match (sampled, self.first_look.is_empty()) {
+            (true, _) => Arc::new(denoised_composite(halves, Denoiser::best())),
+            (false, false) => Arc::new(backdrop.composite(&self.first_look)),
+            (false, true) => backdrop.photograph.clone(),
+        };
         self.samples = if sampled { self.samples() } else { 0 };
-        self.picture = Arc::new(match sampled {
-            true => denoised_composite(halves, Denoiser::best()),
-            false => backdrop.composite(&self.first_look),
-        });
     }
 
     /// Samples both insertions up to `samples` together. Returns whether the picture changed.
@@ -366,7 +364,9 @@ impl Inserting {
             &light.options,
             light.seed,
         );
-        self.placed = Some(Placed::new(inserted, light.seed.wrapping_add(1)));
+        // With two samples both halves are begun.
+        let shown = self.hold < 2;
+        self.placed = Some(Placed::new(inserted, light.seed.wrapping_add(1), shown));
         if self.hold == 0 {
             self.picture();
         }
