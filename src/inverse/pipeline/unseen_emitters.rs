@@ -91,22 +91,15 @@ impl Pipeline<'_, '_> {
         let lights = Emitters::new(&self.problem.scene, &weights);
         let (explored, _) = self.stored(&lights, None, 5, paths)?;
         self.robust = RobustWeights::even(self.roles.len());
-        let is_dark = self.unknowns.emission.iter().all(|&e| e == Vec3::ZERO);
         let mut found = false;
         for iteration in 0..MAX_LAMPS {
             let promising = self.promising(&explored, &candidates, anew && iteration == 0);
             if promising.is_empty() {
                 break;
             }
-            let start = self.unknowns.clone();
             let present = self.hypothesis(paths)?;
-            // The fit of a room without lamps has absurd albedos; those of the light field are better start values.
-            self.unknowns = match is_dark && iteration == 0 {
-                true => start.clone(),
-                false => present.fitted.unknowns.clone(),
-            };
+            // Each trial starts where the search stands. Without the lamp, the fit to full paths may have absurd albedos.
             let Some((k, best)) = self.best_of(&promising, &present, paths)? else {
-                self.unknowns = start;
                 break;
             };
             found = true;
