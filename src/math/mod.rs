@@ -1,6 +1,7 @@
 //! Colour, frames, sampling and statistics, independent of any scene.
 
 pub mod blur;
+pub mod cholesky;
 pub mod color;
 pub mod frame;
 pub mod nullable;

@@ -6,9 +6,10 @@ use crate::inverse::fit::prior::ALBEDO_DEVIATION;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::fit::rows::Rows;
 use crate::inverse::paths::evaluate::Linearised;
+use crate::math::cholesky;
 use crate::math::rng::Stream;
 use glam::{DVec3, Vec3};
-use nalgebra::{Cholesky, DMatrix};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 /// Bootstrap draws for standard errors without dense matrices: standard errors are then accurate to 10 %.
@@ -193,8 +194,8 @@ fn inverse(hessian: &DMatrix<f64>, added: &[DVec3], channel: usize) -> Option<DM
                 0.0
             }
         });
-        if let Some(cholesky) = Cholesky::new(matrix) {
-            return Some(cholesky.inverse());
+        if let Some(factored) = cholesky::factor(matrix) {
+            return Some(cholesky::inverse(&factored));
         }
         damping = (damping * 10.0).max(1e-9);
     }
