@@ -90,6 +90,13 @@ impl LobeFit {
         self.gain.is_significant() && self.by_view.is_significant()
     }
 
+    /// Whether both gains are at least half of what is significant, so that more paths may decide.
+    pub fn is_likely(&self) -> bool {
+        [self.gain, self.by_view]
+            .iter()
+            .all(|gain| gain.mean > 0.5 * SIGNIFICANT * gain.noise)
+    }
+
     /// The lobe of a material.
     pub fn lobe(&self) -> Lobe {
         Lobe {
