@@ -25,7 +25,7 @@ pub use crate::session::save::frames::Frames;
 pub const KINDS: [&str; 6] = ["render", "albedo", "emission", "error", "stderr", "seen"];
 
 /// Total number of paths of all pictures, ...
-const PATHS: u64 = 8_000_000;
+const PATHS: u64 = 4_000_000;
 /// ... within this range of samples per pixel.
 const SAMPLES: (u64, u64) = (4, 64);
 
