@@ -151,7 +151,7 @@ impl Observer for Onwards {
             self.found_at = Some(progress.iterations);
         }
         match self.found_at {
-            Some(found) if progress.iterations >= found + 2 => Control::Stop,
+            Some(found) if progress.iterations >= found + 4 => Control::Stop,
             _ => Control::Continue,
         }
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, Dyn};
 
-/// Columns of a block: three blocks of this size fit into the first-level cache.
+/// Columns of a block: a square one takes 18 KiB, which fits into the first-level cache.
 const BLOCK: usize = 48;
 
 /// The factorisation of a symmetric matrix, of which only the lower triangle is read; `None` unless it is positive definite.

@@ -1,4 +1,4 @@
-//! Colour, frames, sampling and statistics, independent of any scene.
+//! Colour, frames, matrices, sampling and statistics, independent of any scene.
 
 pub mod blur;
 pub mod cholesky;

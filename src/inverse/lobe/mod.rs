@@ -44,6 +44,10 @@ const SECOND_POINTS: (u64, u64) = (12, 96);
 /// ... and if a known lobe is fitted again.
 const REFIT_POINTS: (u64, u64) = (12, 384);
 
+/// Paths of a second trial over those of the first.
+const SECOND_TRIAL_PATHS: u64 = 4;
+/// Key of the paths of a second trial; those of refits are 0 and 1.
+const SECOND_TRIAL: u64 = 2;
 /// Greatest ratio between the roughness of the last fit and the sampled one.
 const NEAR: f64 = 2.0;
 
@@ -189,6 +193,31 @@ impl<'a> Lobes<'a> {
     /// Whether the evidence suffices for a trial.
     pub fn is_promising(evidence: Option<f64>) -> bool {
         evidence.is_some_and(|t| t > MIN_EVIDENCE)
+    }
+
+    /// Fits an object's lobe from scratch. One that just misses significance is fitted again with more paths.
+    ///
+    /// # Errors
+    /// The error of `report`.
+    pub fn try_lobe(
+        &mut self,
+        lit: &LitScene,
+        object: usize,
+        emits: bool,
+        report: &mut Report,
+    ) -> Result<Option<LobeFit>, Termination> {
+        let first = self.find(lit, object, emits, None, report)?;
+        match first {
+            Some(found) if found.is_likely() && !found.is_significant() => {
+                let paths = self.task.paths;
+                self.task.paths = paths * SECOND_TRIAL_PATHS;
+                let second = Some((found.lobe(), SECOND_TRIAL));
+                let found = self.find(lit, object, emits, second, report);
+                self.task.paths = paths;
+                found
+            }
+            _ => Ok(first),
+        }
     }
 
     /// Fits an object's lobe, from scratch or near a known one; `None` if the observations do not determine it. `known` holds the

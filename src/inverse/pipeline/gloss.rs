@@ -10,8 +10,6 @@ use glam::Vec3;
 
 /// Paths of a round over the paths of a trial; a refit of a known lobe takes all paths of a round.
 const TRIAL_DIVISOR: u64 = 4;
-/// Key of the paths of a second trial; those of refits are 0 and 1.
-const SECOND_TRIAL: u64 = 2;
 /// Number of objects above which they share the paths of this many.
 const MAX_FULL_TRIALS: u64 = 4;
 
@@ -48,14 +46,7 @@ impl<'a> Pipeline<'a, '_> {
         for &k in &promising {
             self.monitor.phase("trying a rough lobe");
             let emits = self.roles[k].emits();
-            let mut found = lobes.find(&lit, k, emits, None, &mut |cast| self.cast(cast))?;
-            if let Some(first) = found.filter(|found| !found.is_significant() && found.is_likely())
-            {
-                let known = Some((first.lobe(), SECOND_TRIAL));
-                lobes.task.paths *= TRIAL_DIVISOR;
-                found = lobes.find(&lit, k, emits, known, &mut |cast| self.cast(cast))?;
-                lobes.task.paths /= TRIAL_DIVISOR;
-            }
+            let found = lobes.try_lobe(&lit, k, emits, &mut |cast| self.cast(cast))?;
             match found {
                 Some(found) if found.is_significant() => kept.push((k, found)),
                 Some(found) => refused.push(self.words(k, &found, true)),

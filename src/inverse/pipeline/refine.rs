@@ -10,6 +10,7 @@ use crate::inverse::fit::path_noise::distribute_paths;
 use crate::inverse::paths::evaluate::Linearised;
 use crate::inverse::paths::lamp_patches::LampPatches;
 use crate::inverse::pipeline::Pipeline;
+use crate::inverse::pipeline::budget::ACCURATE;
 use crate::inverse::pipeline::refit::increase;
 use crate::inverse::roles;
 use crate::inverse::roles::Role;
@@ -24,8 +25,6 @@ use glam::Vec3;
 const NONLINEAR: f32 = 0.3;
 /// Relative standard error below which an emission counts as well determined.
 const WELL_KNOWN: f32 = 0.3;
-/// Fraction of an error below which the part due to path noise is negligible: without it the error would be 13 % less.
-const NEGLIGIBLE: f64 = 0.5;
 /// Least number of rounds that show how noisy their own sum is.
 const TELLING_ROUNDS: u32 = 4;
 /// Increase of the held-out loss, in standard errors, above which the refinement is doubted: a chance of 3·10⁻⁵.
@@ -37,12 +36,9 @@ const PREDICTING: u64 = 4;
 const MIN_PREDICTING: u64 = 256;
 /// Paths of a round over the paths that light the patches of lamps.
 const LIGHTING_LAMPS: u64 = 32;
-/// Accuracy of the light that suffices for textures, since a single pixel determines a texel to some per cent. Small objects that
+/// Median error of albedo at which the light suffices for textures, since a single pixel determines a texel to some per cent. Small objects that
 /// are less accurate are not waited for.
-const ENOUGH_FOR_TEXTURES: Aim = Aim {
-    median: 5e-3,
-    tail: f64::INFINITY,
-};
+const ENOUGH_FOR_TEXTURES: f64 = 5e-3;
 
 /// The linearised clusters over all rounds.
 #[derive(Debug)]
@@ -88,6 +84,8 @@ pub(super) struct Aim {
     pub median: f64,
     /// 95th percentile over objects.
     pub tail: f64,
+    /// Fraction of these below which the part due to path noise is negligible.
+    pub path_noise: f64,
 }
 
 impl Pipeline<'_, '_> {
@@ -97,7 +95,7 @@ impl Pipeline<'_, '_> {
         let before = self.held_out_each();
         let mut rounds = self.begin_rounds()?;
         let textures = self.monitor.settings.textures;
-        if textures && self.aim().1.median < ENOUGH_FOR_TEXTURES.median {
+        if textures && self.aim().1.median < ENOUGH_FOR_TEXTURES {
             self.add_rounds(&mut rounds, Leg::UntilTextures)?;
             self.doubt_refinement(&before);
             self.detail()?;
@@ -191,7 +189,7 @@ impl Pipeline<'_, '_> {
             let reported = self.reported();
             let fraction = (aim.median / reported.all[0]).powi(2);
             self.monitor.progress.fraction = Some(fraction.min(1.0) as f32);
-            if reported.is_enough([aim.median, aim.tail], rounds.sums.rounds()) {
+            if reported.is_enough(aim, rounds.sums.rounds()) {
                 outcome = Termination::Converged;
                 break;
             }
@@ -244,7 +242,15 @@ impl Pipeline<'_, '_> {
     fn aim_of(&self, leg: Leg) -> (u32, Aim) {
         let (most, aim) = self.aim();
         match leg {
-            Leg::UntilTextures => (self.budget.texture_rounds.min(most), ENOUGH_FOR_TEXTURES),
+            Leg::UntilTextures => {
+                let (median, tail) = (ENOUGH_FOR_TEXTURES, f64::INFINITY);
+                let aim = Aim {
+                    median,
+                    tail,
+                    ..aim
+                };
+                (self.budget.texture_rounds.min(most), aim)
+            }
             Leg::UntilDone => (most, aim),
         }
     }
@@ -252,13 +258,18 @@ impl Pipeline<'_, '_> {
     /// Greatest number of rounds and the target errors of the preset; a smaller median in the settings has no limit of rounds.
     fn aim(&self) -> (u32, Aim) {
         let asked = self.monitor.settings.target_error * 0.01;
-        let (most, median) = if asked > 0.0 && asked < self.budget.median_error {
-            (u32::MAX, asked)
+        let budget = &self.budget;
+        let (most, median, path_noise) = if asked > 0.0 && asked < budget.median_error {
+            (u32::MAX, asked, ACCURATE)
         } else {
-            (self.budget.rounds, self.budget.median_error)
+            (budget.rounds, budget.median_error, budget.path_noise)
         };
-        let tail = self.budget.tail_error;
-        (most, Aim { median, tail })
+        let aim = Aim {
+            median,
+            tail: budget.tail_error,
+            path_noise,
+        };
+        (most, aim)
     }
 
     /// Traces the reflected light of lamp patches with the present estimate.
@@ -328,8 +339,9 @@ struct Reported {
 impl Reported {
     /// Whether more paths would gain little after some rounds: the error is below its target, or the part due to path noise is
     /// negligible.
-    fn is_enough(&self, targets: [f64; 2], rounds: u32) -> bool {
-        let negligible = |i: usize| self.of_paths[i] < self.all[i] * NEGLIGIBLE;
+    fn is_enough(&self, aim: Aim, rounds: u32) -> bool {
+        let targets = [aim.median, aim.tail];
+        let negligible = |i: usize| self.of_paths[i] < self.all[i] * aim.path_noise;
         (0..2).all(|i| self.all[i] < targets[i] || rounds >= TELLING_ROUNDS && negligible(i))
     }
 }
