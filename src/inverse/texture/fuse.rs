@@ -1,7 +1,7 @@
 //! Colours of cells from noisy measurements: least squares with a total-variation penalty on the graph of neighbours, which
 //! smooths but keeps edges (the fused lasso on a graph).
 //!
-//! Minimises ½ Σ ω ‖y − Σ w x‖² + λ Σ b φ(‖xᵢ − xⱼ‖ / l) + ½ τ Σ ‖x − p‖², with the second sum over pairs of neighbours with common border b and mean level l,
+//! Minimises ½ Σ ω ‖y − Σ w x‖² + λ Σ b φ(‖xᵢ − xⱼ‖ / l) over pairs of neighbours with common border b and mean level l,
 //! where φ is Huber's: quadratic up to [`FLAT`], linear beyond. The norm couples the channels, so that edges coincide in all of
 //! them. Solved by iteratively reweighted least squares with preconditioned conjugate gradients.
 
@@ -12,14 +12,14 @@ use rayon::prelude::*;
 
 /// Relative differences below this are penalised quadratically, as gradients instead of edges.
 pub const FLAT: f32 = 0.02;
-/// Greatest number of reweighted solves of a final fit.
-pub const REWEIGHTINGS: u32 = 5;
-/// The same while strengths are compared: each fit starts from the one before it.
-pub const SEARCH_REWEIGHTINGS: u32 = 3;
+/// Greatest number of reweighted solves.
+const MAX_REWEIGHTINGS: u32 = 5;
 /// Greatest number of conjugate gradient iterations in each.
 const MAX_STEPS: u32 = 12;
 /// Root mean square change of the colours below which the iteration ends.
 const CONVERGED: f64 = 1e-3;
+/// Weight of the start values, relative to the mean weight of the observations; it makes the system definite.
+const TETHER: f32 = 1e-5;
 /// Terms added up by one thread.
 const CHUNK: usize = 4096;
 
@@ -36,36 +36,31 @@ pub struct Problem<'a> {
     pub links: &'a Links,
     /// The level l of each cell, to which differences are relative.
     pub levels: &'a [f32],
-    /// Prior mean of each cell.
-    pub prior: &'a [Vec3],
-    /// Weight τ of the prior.
-    pub prior_weight: f32,
 }
 
-/// Finds the colours for the strength λ of the penalty, starting from `start`, in at most the given number of reweighted solves.
-pub fn fuse(problem: &Problem, strength: f32, start: &[Vec3], reweightings: u32) -> Vec<Vec3> {
+/// Finds the colours for the strength λ of the penalty, starting from `start`.
+pub fn fuse(problem: &Problem, strength: f32, start: &[Vec3]) -> Vec<Vec3> {
     let Problem {
         observations,
         weights: row_weights,
         values,
         links,
         levels,
-        prior,
-        prior_weight,
     } = *problem;
     let data = observations.diagonal(row_weights);
+    let tether = TETHER * mean_channel(&data).max(f32::MIN_POSITIVE);
     let mut right = observations.transpose_times(row_weights, values);
-    for (r, mean) in right.iter_mut().zip(prior) {
-        *r += *mean * prior_weight;
+    for (r, s) in right.iter_mut().zip(start) {
+        *r += *s * tether;
     }
     let mut colors = start.to_vec();
-    for _ in 0..reweightings {
+    for _ in 0..MAX_REWEIGHTINGS {
         let system = System {
             observations,
             row_weights,
             links,
             penalties: penalties(links, levels, strength, &colors),
-            prior_weight,
+            tether,
         };
         let before = colors.clone();
         system.solve(&data, &right, &mut colors);
@@ -105,8 +100,8 @@ pub struct System<'a> {
     pub links: &'a Links,
     /// The weight of each link's squared difference.
     pub penalties: Vec<f32>,
-    /// The weight of the prior.
-    pub prior_weight: f32,
+    /// The weight of the start values.
+    pub tether: f32,
 }
 
 impl System<'_> {
@@ -116,7 +111,7 @@ impl System<'_> {
             .into_par_iter()
             .map(|cell| {
                 let penalty: f32 = self.penalties[self.links.row(cell)].iter().sum();
-                Vec3A::from(data[cell] + penalty + self.prior_weight).recip()
+                Vec3A::from(data[cell] + penalty + self.tether).recip()
             })
             .collect();
         let mut found: Vec<Vec3A> = colors.iter().map(|&c| c.into()).collect();
@@ -179,7 +174,7 @@ impl System<'_> {
                 let smooth: Vec3A = (self.links.neighbours(cell))
                     .map(|(at, other)| (x[cell] - x[other]) * self.penalties[at])
                     .sum();
-                data + smooth + x[cell] * self.prior_weight
+                data + smooth + x[cell] * self.tether
             })
             .collect()
     }

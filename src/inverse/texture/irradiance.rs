@@ -1,18 +1,14 @@
 //! The irradiance of cells: traced in two independent sets, then smoothed as much as each set predicts the other best.
 
 use crate::inverse::texture::cells::Cells;
-use crate::inverse::texture::fuse::{
-    Problem, REWEIGHTINGS, SEARCH_REWEIGHTINGS, fuse, mean, mean_channel,
-};
+use crate::inverse::texture::fuse::{Problem, fuse, mean};
 use crate::inverse::texture::gloss::white_base;
 use crate::inverse::texture::links::Links;
-use crate::inverse::texture::look::SeenPixel;
-use crate::inverse::texture::observations::{Observations, row_range};
+use crate::inverse::texture::observations::Observations;
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::math::warp;
 use crate::scene::geometry::Hit;
-use crate::transport::arrival::RayCount;
 use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
 use glam::{DVec3, Vec3};
@@ -21,64 +17,25 @@ use std::ops::Range;
 
 /// First of the sample keys of these paths, disjoint from those of the fit.
 const KEY: u64 = 5 << 59;
-/// Samples of direct light for each path: then both take about as many rays, with paths of some eight rays.
-const DIRECT_SAMPLES: u32 = 4;
 /// Averages over neighbours that give the level of a cell.
 const AVERAGES: u32 = 40;
 /// Least level of a cell, relative to the mean over the object.
 const MIN_LEVEL: f32 = 1e-2;
-/// Weight of the local mean as a prior, relative to the mean weight of the cells; it makes the system definite.
-const PRIOR_WEIGHT: f32 = 1e-5;
 /// Strengths of smoothing that are tried, strongest first.
 const STRENGTHS: [f32; 9] = [8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.12, 0.06, 0.03];
 /// Consecutive worse strengths that end the search.
 const PATIENCE: u32 = 2;
 
-/// Radiance of cells along their normals with an albedo of one (irradiance / π; of the base only below a lobe). Direct light has
-/// sharp shadows and costs two rays a sample; indirect light is smooth and costs whole paths. So they are traced with different
-/// numbers of samples, and smoothed each by itself.
+/// Radiance of cells along their normals with an albedo of one (irradiance / π; of the base only below a lobe), from two
+/// independent sets of paths.
 #[derive(Debug, Clone, Default)]
 pub struct Irradiance {
-    /// Light of emitters and from outside.
-    direct: Part,
-    /// Light by way of other surfaces.
-    indirect: Part,
-    /// Rays cast, and paths rejected because they were not finite.
-    pub cast: RayCount,
-}
-
-/// One value per cell from each of two independent sets of paths.
-type Part = [Vec<Vec3>; 2];
-
-/// The points of each cell that pixels see.
-#[derive(Debug, Clone)]
-pub struct SeenPoints {
-    /// End of each cell's points.
-    ends: Vec<u32>,
-    points: Vec<Hit>,
-}
-
-impl SeenPoints {
-    /// The hits of the pixels, by cell.
-    pub fn new(cells: &Cells, pixels: &[SeenPixel]) -> Self {
-        let hits = pixels.iter().flat_map(|pixel| &pixel.hits);
-        let mut located: Vec<(u32, Hit)> = hits
-            .filter_map(|l| Some((cells.locate(&l.hit)?, l.hit)))
-            .collect();
-        located.sort_by_key(|&(cell, _)| cell);
-        let ends = (0..cells.count() as u32)
-            .map(|cell| located.partition_point(|&(other, _)| other <= cell) as u32)
-            .collect();
-        Self {
-            ends,
-            points: located.into_iter().map(|(_, hit)| hit).collect(),
-        }
-    }
-
-    /// The points of a cell.
-    fn of(&self, cell: usize) -> &[Hit] {
-        &self.points[row_range(&self.ends, cell)]
-    }
+    /// One value per cell in each set.
+    pub sets: [Vec<Vec3>; 2],
+    /// Number of rays cast.
+    pub rays: u64,
+    /// Number of paths rejected because they were not finite.
+    pub rejected: u64,
 }
 
 /// Smoothed irradiance.
@@ -90,85 +47,54 @@ pub struct Smoothed {
     pub noise: f32,
 }
 
-/// Traces `samples` paths per set from random points of each cell in the range: from the points that pixels see, so that the
-/// hidden part of a cell counts for nothing, and from all of it if no pixel sees it.
+/// Traces `samples` paths per set from random points of each cell in the range.
 pub fn trace(
     lit: &LitScene,
     cells: &Cells,
-    seen: &SeenPoints,
     range: Range<usize>,
     samples: u32,
     options: &PathOptions,
-    [seed, key]: [u64; 2],
+    seed: u64,
+    key: u64,
 ) -> Irradiance {
-    let first_hit = PathOptions {
-        max_bounces: options.max_bounces.min(1),
-        ..*options
-    };
-    let traced: Vec<([[Vec3; 2]; 2], RayCount)> = range
+    let traced: Vec<([Vec3; 2], u64, u64)> = range
         .into_par_iter()
         .map(|cell| {
-            let mut cast = RayCount::default();
+            let (mut rays, mut rejected) = (0, 0);
             let sets = [0, 1].map(|set| {
-                let (mut direct, mut indirect) = (DVec3::ZERO, DVec3::ZERO);
-                for sample in 0..samples * DIRECT_SAMPLES {
+                let mut sum = DVec3::ZERO;
+                for sample in 0..samples {
                     let index = KEY + 2 * u64::from(sample) + set;
                     let mut stream = Stream::new(seed, key, cell as u64, index);
-                    let (hit, normal) = point_on(lit, cells, seen, cell, &mut stream);
+                    let (hit, normal) = point_on(lit, cells, cell, &mut stream);
                     let surface = lit.surface(&hit);
-                    let mut light = |options| {
-                        let mut stream = stream.clone();
-                        let (light, more) = white_base(lit, &surface, normal, &mut stream, options);
-                        cast += more;
-                        light.as_dvec3()
-                    };
-                    let own = light(&first_hit);
-                    direct += own;
-                    if sample < samples {
-                        // The same random numbers give the same first ray: the difference is the light of later ones.
-                        indirect += light(options) - own;
-                    }
+                    let (light, cast) = white_base(lit, &surface, normal, &mut stream, options);
+                    sum += light.as_dvec3();
+                    rays += cast.rays;
+                    rejected += cast.rejected;
                 }
-                let count = f64::from(samples.max(1));
-                let direct = direct / (count * f64::from(DIRECT_SAMPLES));
-                [direct, indirect / count].map(|light| light.as_vec3())
+                (sum / f64::from(samples.max(1))).as_vec3()
             });
-            (sets, cast)
+            (sets, rays, rejected)
         })
         .collect();
     let mut irradiance = Irradiance::default();
-    for (sets, cast) in traced {
-        for (set, [direct, indirect]) in sets.into_iter().enumerate() {
-            irradiance.direct[set].push(direct);
-            irradiance.indirect[set].push(indirect);
+    for (sets, rays, rejected) in traced {
+        for (all, value) in irradiance.sets.iter_mut().zip(sets) {
+            all.push(value);
         }
-        irradiance.cast += cast;
+        irradiance.rays += rays;
+        irradiance.rejected += rejected;
     }
     irradiance
 }
 
-/// A seen point of a cell, or a point uniform in area if none is seen, and the normal of its seen side.
-fn point_on(
-    lit: &LitScene,
-    cells: &Cells,
-    seen: &SeenPoints,
-    cell: usize,
-    stream: &mut Stream,
-) -> (Hit, Vec3) {
+/// A point on a cell, uniform in area, and the normal of its seen side.
+fn point_on(lit: &LitScene, cells: &Cells, cell: usize, stream: &mut Stream) -> (Hit, Vec3) {
+    let cell = &cells.cells[cell];
     let choice = stream.uniform();
     let within = warp::uniform_triangle(stream.uniform2());
     let scene = &lit.scene;
-    let oriented = |hit: Hit| {
-        let normal = scene.normals[hit.triangle as usize];
-        let front = cells.front(hit.triangle).unwrap_or(true);
-        (hit, if front { normal } else { -normal })
-    };
-    let points = seen.of(cell);
-    if !points.is_empty() {
-        let index = (choice * points.len() as f32) as usize;
-        return oriented(points[index.min(points.len() - 1)]);
-    }
-    let cell = &cells.cells[cell];
     let piece = match cell.pieces.as_slice() {
         [piece] => piece,
         pieces => {
@@ -191,26 +117,22 @@ fn point_on(
         b1,
         b2,
     };
-    oriented(hit)
+    let normal = scene.normals[piece.triangle as usize];
+    let front = cells.front(piece.triangle).unwrap_or(true);
+    (hit, if front { normal } else { -normal })
 }
 
 impl Irradiance {
     /// Appends the following cells.
     pub fn append(&mut self, other: Self) {
-        let parts = [
-            (&mut self.direct, other.direct),
-            (&mut self.indirect, other.indirect),
-        ];
-        for (own, more) in parts {
-            for (all, more) in own.iter_mut().zip(more) {
-                all.extend(more);
-            }
+        for (all, more) in self.sets.iter_mut().zip(other.sets) {
+            all.extend(more);
         }
-        self.cast += other.cast;
+        self.rays += other.rays;
+        self.rejected += other.rejected;
     }
 
-    /// Smooths direct and indirect light, each with the strength at which each of its sets predicts the other best. `between` is
-    /// called after each strength.
+    /// Smooths with the strength at which each set predicts the other best. `between` is called after each strength.
     ///
     /// # Errors
     /// The error of `between`.
@@ -219,88 +141,57 @@ impl Irradiance {
         links: &Links,
         mut between: impl FnMut() -> Result<(), E>,
     ) -> Result<Smoothed, E> {
-        let all: Vec<Vec3> = (mean_of(&self.direct).iter().zip(mean_of(&self.indirect)))
-            .map(|(direct, indirect)| *direct + indirect)
+        let count = self.sets[0].len();
+        let both: Vec<Vec3> = (self.sets[0].iter().zip(&self.sets[1]))
+            .map(|(a, b)| (*a + *b) * 0.5)
             .collect();
-        let levels = levels(&all, links);
-        let direct = smooth(&self.direct, links, &levels, &mut between)?;
-        let indirect = smooth(&self.indirect, links, &levels, &mut between)?;
+        let levels = levels(&both, links);
+        let each = Observations::one_per_cell(count);
+        let weights: Vec<Vec3> = levels.iter().map(|l| Vec3::splat(1.0 / (l * l))).collect();
+        let problem = |values| Problem {
+            observations: &each,
+            weights: &weights,
+            values,
+            links,
+            levels: &levels,
+        };
+        let squares = |a: &[Vec3], b: &[Vec3]| -> f64 {
+            let pairs = a.iter().zip(b).zip(&weights);
+            pairs
+                .map(|((a, b), w)| f64::from(((*a - *b) * (*a - *b)).dot(*w)))
+                .sum()
+        };
+
+        // From strong to weak, until the prediction gets worse.
+        let mut smooth = [0, 1].map(|s| local_mean(&self.sets[s], links));
+        let mut best = (f64::INFINITY, STRENGTHS[0], 0.0);
+        let mut worse = 0;
+        for strength in STRENGTHS {
+            smooth = [0, 1].map(|s| fuse(&problem(&self.sets[s]), strength, &smooth[s]));
+            let error = squares(&smooth[0], &self.sets[1]) + squares(&smooth[1], &self.sets[0]);
+            let noise = squares(&smooth[0], &smooth[1]) / (3 * count.max(1)) as f64;
+            if error < best.0 {
+                best = (error, strength, 0.5 * noise.sqrt());
+                worse = 0;
+            } else {
+                worse += 1;
+                if worse == PATIENCE {
+                    break;
+                }
+            }
+            between()?;
+        }
+
+        // The mean of both sets has half the variance of one.
+        let strength = best.1 * std::f32::consts::FRAC_1_SQRT_2;
+        let start: Vec<Vec3> = (smooth[0].iter().zip(&smooth[1]))
+            .map(|(a, b)| (*a + *b) * 0.5)
+            .collect();
         Ok(Smoothed {
-            radiance: (direct.radiance.iter().zip(&indirect.radiance))
-                .map(|(direct, indirect)| *direct + *indirect)
-                .collect(),
-            noise: direct.noise.hypot(indirect.noise),
+            radiance: fuse(&problem(&both), strength, &start),
+            noise: best.2 as f32,
         })
     }
-}
-
-/// Smooths one part of the light, in units of the `levels` of all light.
-fn smooth<E>(
-    part: &Part,
-    links: &Links,
-    levels: &[f32],
-    between: &mut impl FnMut() -> Result<(), E>,
-) -> Result<Smoothed, E> {
-    let count = levels.len();
-    let both = mean_of(part);
-    let each = Observations::one_per_cell(count);
-    let weights: Vec<Vec3> = levels.iter().map(|l| Vec3::splat(1.0 / (l * l))).collect();
-    let local = local_mean(&both, links);
-    let problem = |values| Problem {
-        observations: &each,
-        weights: &weights,
-        values,
-        links,
-        levels,
-        prior: &local,
-        prior_weight: PRIOR_WEIGHT * mean_channel(&weights),
-    };
-    let squares = |a: &[Vec3], b: &[Vec3]| -> f64 {
-        let pairs = a.iter().zip(b).zip(&weights);
-        pairs
-            .map(|((a, b), w)| f64::from(((*a - *b) * (*a - *b)).dot(*w)))
-            .sum()
-    };
-
-    // From strong to weak, until the prediction gets worse.
-    let mut smooth = [0, 1].map(|s| local_mean(&part[s], links));
-    let mut best = (f64::INFINITY, STRENGTHS[0], 0.0);
-    let mut worse = 0;
-    for strength in STRENGTHS {
-        smooth = [0, 1].map(|s| {
-            fuse(
-                &problem(&part[s]),
-                strength,
-                &smooth[s],
-                SEARCH_REWEIGHTINGS,
-            )
-        });
-        let error = squares(&smooth[0], &part[1]) + squares(&smooth[1], &part[0]);
-        let noise = squares(&smooth[0], &smooth[1]) / (3 * count.max(1)) as f64;
-        if error < best.0 {
-            best = (error, strength, 0.5 * noise.sqrt());
-            worse = 0;
-        } else {
-            worse += 1;
-            if worse == PATIENCE {
-                break;
-            }
-        }
-        between()?;
-    }
-
-    // The mean of both sets has half the variance of one.
-    let strength = best.1 * std::f32::consts::FRAC_1_SQRT_2;
-    let start = mean_of(&smooth);
-    Ok(Smoothed {
-        radiance: fuse(&problem(&both), strength, &start, REWEIGHTINGS),
-        noise: best.2 as f32,
-    })
-}
-
-/// The mean of both sets.
-fn mean_of([a, b]: &Part) -> Vec<Vec3> {
-    a.iter().zip(b).map(|(a, b)| (*a + *b) * 0.5).collect()
 }
 
 /// A wide local mean by repeated averages over neighbours.

@@ -10,9 +10,8 @@ use crate::math::stats::{Moments, quantile};
 use crate::transport::arrival::RayCount;
 use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
-use glam::{UVec2, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 
 /// First of the sample keys of these paths, disjoint from those of the fits.
 const KEY: u64 = 7 << 59;
@@ -26,11 +25,8 @@ const MAX_PIXELS: usize = 2_000;
 const FIRST_PIXELS: usize = 250;
 /// A gain of this many standard errors on the first pixels is decisive.
 const DECISIVE: f64 = 2.0 * SIGNIFICANT;
-/// Blocks along a side of the picture of a glossy object in each photograph.
-const BLOCKS: u32 = 4;
-/// Least number of photographs, and of blocks, for a standard error over blocks.
-const MIN_PHOTOGRAPHS: usize = 2;
-const MIN_BLOCKS: f64 = 8.0;
+/// Least number of photographs for a standard error over photographs.
+const MIN_PHOTOGRAPHS: f64 = 5.0;
 /// The gain of a pixel is clamped to this multiple of the 68th percentile.
 const CLIP: f64 = 5.0;
 
@@ -131,8 +127,6 @@ struct Comparison<'a> {
 /// Squared relative errors of one pixel.
 struct Compared {
     frame: u32,
-    /// Column and row in the photograph.
-    at: UVec2,
     flat: f64,
     textured: f64,
     cast: RayCount,
@@ -180,12 +174,8 @@ impl Comparison<'_> {
                 0.0
             }
         };
-        let width = self.lit.scene.cameras[pixel.frame as usize]
-            .intrinsics
-            .width;
         Compared {
             frame: pixel.frame,
-            at: UVec2::new(pixel.pixel % width, pixel.pixel / width),
             flat: error(flat),
             textured: error(sets.map(|set| set[1])),
             cast,
@@ -206,10 +196,10 @@ impl Trial {
         let clip = CLIP * quantile(&mut sizes, 0.68).unwrap_or(0.0);
         let (mut before, mut after) = (Moments::default(), Moments::default());
         let mut gain = Moments::default();
-        let gains: Vec<f64> = (pixels.iter())
-            .map(|p| (p.flat - p.textured).clamp(-clip, clip))
+        let gains: Vec<(u32, f64)> = (pixels.iter())
+            .map(|p| (p.frame, (p.flat - p.textured).clamp(-clip, clip)))
             .collect();
-        for (pixel, &gained) in pixels.iter().zip(&gains) {
+        for (pixel, &(_, gained)) in pixels.iter().zip(&gains) {
             before.push(pixel.flat);
             after.push(pixel.textured);
             gain.push(gained);
@@ -219,8 +209,7 @@ impl Trial {
             after: after.mean,
             gain: gain.mean,
             noise: if glossy {
-                let seen: Vec<(u32, UVec2)> = pixels.iter().map(|p| (p.frame, p.at)).collect();
-                error_by_block(&seen, &gains, gain.mean)
+                error_by_frame(gains, gain.mean)
             } else {
                 gain.standard_error()
             },
@@ -230,51 +219,32 @@ impl Trial {
     }
 }
 
-/// Standard error of the mean of gains that are correlated within each block of a photograph, as the errors of a highlight are;
-/// infinite with fewer than [`MIN_PHOTOGRAPHS`] photographs or [`MIN_BLOCKS`] blocks.
-fn error_by_block(pixels: &[(u32, UVec2)], gains: &[f64], mean: f64) -> f64 {
-    let mut frames: BTreeMap<u32, (UVec2, UVec2)> = BTreeMap::new();
-    for &(frame, at) in pixels {
-        let bounds = frames.entry(frame).or_insert((at, at));
-        *bounds = (bounds.0.min(at), bounds.1.max(at));
-    }
-    let mut sums: BTreeMap<(u32, [u32; 2]), f64> = BTreeMap::new();
-    for (&(frame, at), gain) in pixels.iter().zip(gains) {
-        let (least, greatest) = frames[&frame];
-        let block = (at - least) * BLOCKS / (greatest - least + 1);
-        *sums.entry((frame, block.to_array())).or_default() += gain - mean;
-    }
-    let blocks = sums.len() as f64;
-    if frames.len() < MIN_PHOTOGRAPHS || blocks < MIN_BLOCKS {
+/// Standard error of the mean of gains that are correlated within each photograph, as the errors of a highlight are; infinite
+/// with fewer than [`MIN_PHOTOGRAPHS`] photographs.
+fn error_by_frame(mut gains: Vec<(u32, f64)>, mean: f64) -> f64 {
+    gains.sort_by_key(|&(frame, _)| frame);
+    let sums = (gains.chunk_by(|a, b| a.0 == b.0))
+        .map(|frame| frame.iter().map(|(_, gain)| gain - mean).sum::<f64>());
+    let (frames, squares) = sums.fold((0.0, 0.0), |(n, s), sum| (n + 1.0, s + sum * sum));
+    if frames < MIN_PHOTOGRAPHS {
         return f64::INFINITY;
     }
-    let squares: f64 = sums.values().map(|sum| sum * sum).sum();
-    (squares * blocks / (blocks - 1.0)).sqrt() / gains.len() as f64
+    (squares * frames / (frames - 1.0)).sqrt() / gains.len() as f64
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Two photographs of 8 × 8 pixels, whose gains are equal within blocks of 2 × 2, count as 32 measurements; one photograph
-    /// counts as none.
+    /// Ten photographs of fifty pixels each, whose gains are equal within each photograph, count as ten measurements.
     #[test]
-    fn what_pixels_of_a_block_share_counts_once() {
-        let photograph = |frame: u32| {
-            (0..64u32).map(move |i| {
-                let at = UVec2::new(5 + i % 8, 9 + i / 8);
-                ((frame, at), f64::from((i % 8 / 2 + i / 16) % 2) - 0.5)
-            })
-        };
-        let (pixels, gains): (Vec<(u32, UVec2)>, Vec<f64>) =
-            photograph(3).chain(photograph(4)).unzip();
-        let error = error_by_block(&pixels, &gains, 0.0);
-        // The unbiased variance of a block is 1/4 · 32/31; of the mean of 32, a 32th of it.
-        assert!((error - (0.25 / 31.0f64).sqrt()).abs() < 1e-12, "{error}");
-        assert_eq!(
-            error_by_block(&pixels[..64], &gains[..64], 0.0),
-            f64::INFINITY
-        );
+    fn what_pixels_of_a_photograph_share_counts_once() {
+        let of_frame = |frame: u32| f64::from(frame % 5) - 2.0;
+        let gains: Vec<(u32, f64)> = (0..500).map(|i| (i % 10, of_frame(i % 10))).collect();
+        let error = error_by_frame(gains, 0.0);
+        // The variance is 2, the unbiased estimate 20/9; of the mean of ten, 2/9.
+        assert!((error - (20.0f64 / 90.0).sqrt()).abs() < 1e-12, "{error}");
+        assert_eq!(error_by_frame(vec![(3, 1.0), (3, 2.0)], 1.5), f64::INFINITY);
     }
 
     #[test]
