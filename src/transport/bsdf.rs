@@ -157,6 +157,12 @@ impl Lobe {
     }
 }
 
+/// Fraction of the light from all directions alike that a lobe with this specular reflectance reflects: the cosine-weighted mean of
+/// Schlick's curve, with [`COUPLING_SLOPE`].
+pub fn hemispherical_reflectance(specular: f32) -> f32 {
+    specular + (1.0 - specular) * (1.0 - unreflected_mean()) as f32
+}
+
 /// Slope of the fit (1 − slope · cosθ)⁵ to a rough lobe's reflectance; 1 is Schlick's curve.
 pub const COUPLING_SLOPE: f64 = 0.85;
 

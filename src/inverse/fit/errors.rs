@@ -72,7 +72,7 @@ impl ScoreTest {
 /// 1967).
 ///
 /// H contains the squared noise of the derivatives, which the descent does not. It would make parameters that few paths meet
-/// seem too certain, so errors are multiplied by the ratio of both curvatures.
+/// seem too certain, so errors are multiplied by the ratio of both curvatures, up to the prior's standard deviation.
 pub fn standard_errors(
     equations: &NormalEquations,
     free: &[usize],
@@ -87,10 +87,16 @@ pub fn standard_errors(
         albedo: vec![Vec3::splat(ALBEDO_DEVIATION); objects],
         emission: vec![Vec3::INFINITY; objects],
     };
-    let curvatures = equations.diagonal.iter().zip(&equations.across);
-    for ((&index, variance), (diagonal, across)) in free.iter().zip(variances).zip(curvatures) {
-        let inflation = (*diagonal / signal(*diagonal, *across)).max(DVec3::ONE);
-        let error = (variance.max(DVec3::ZERO).powf(0.5) * inflation).as_vec3();
+    for (row, (&index, variance)) in free.iter().zip(variances).enumerate() {
+        let diagonal = equations.diagonal[row];
+        let inflation = (diagonal / signal(diagonal, equations.across[row])).max(DVec3::ONE);
+        let own = variance.max(DVec3::ZERO).powf(0.5);
+        let of_prior = DVec3::select(
+            prior.precision[row].cmpgt(DVec3::ZERO),
+            (prior.variance / prior.precision[row]).powf(0.5),
+            DVec3::INFINITY,
+        );
+        let error = (own * inflation).min(of_prior).max(own).as_vec3();
         let target = match index.checked_sub(objects) {
             None => &mut errors.albedo[index],
             Some(emitter) => &mut errors.emission[emitter],

@@ -10,6 +10,7 @@ use crate::inverse::paths::evaluate::Linearised;
 use crate::inverse::roles::Role;
 use crate::inverse::unknowns::Unknowns;
 use crate::math::stats::quantile;
+use crate::transport::bsdf::hemispherical_reflectance;
 use glam::{DVec3, Vec3};
 
 /// Residuals are clamped to this fraction of the reflected radiance.
@@ -87,9 +88,9 @@ fn total(one: Vec3, other: Vec3) -> Vec3 {
     (one * one + other * other).powf(0.5)
 }
 
-/// Adds to the standard errors of albedos the gloss that was not found. Light that a surface mirrors is taken for albedo, up to its
-/// specular reflectance. In a room where a fraction p of the objects has a lobe, of mean squared reflectance s², the others may
-/// have one too: a variance of p s².
+/// Adds to the standard errors of albedos the gloss that was not found. Light that a surface mirrors is taken for albedo, or is
+/// missing in it, up to the reflectance of its lobe for light from all directions. In a room where a fraction p of the objects has
+/// a lobe, of mean squared reflectance s², the others may have one too: a variance of p s².
 pub fn add_gloss(estimate: &mut Estimate, roles: &[Role]) {
     let counted = || {
         (estimate.objects.iter().zip(roles))
@@ -97,7 +98,7 @@ pub fn add_gloss(estimate: &mut Estimate, roles: &[Role]) {
             .map(|(object, _)| object)
     };
     let squares = counted()
-        .filter_map(|object| object.specular)
+        .filter_map(|object| object.specular.map(hemispherical_reflectance))
         .map(|s| s * s);
     let variance = squares.sum::<f32>() / counted().count().max(1) as f32;
     for (object, role) in estimate.objects.iter_mut().zip(roles) {
@@ -177,10 +178,14 @@ mod tests {
         };
         let matte = || object(None);
         assert_eq!(after(vec![matte(), matte(), matte(), matte()]), [0.03; 4]);
-        // One of four has a reflectance of 0.08: √(0.08² / 4) = 0.04, and 0.03 with 0.04 is 0.05.
+        // One of four has a lobe that reflects 0.08 along the normal and 0.14 of light from all directions; half of that is added.
         let errors = after(vec![object(Some(0.08)), matte(), matte(), matte()]);
         assert_eq!(errors[0], 0.03);
-        assert!((errors[3] - 0.05).abs() < 1e-6, "{errors:?}");
+        let mirrored = 0.08 + 0.92 * 0.0658;
+        assert!(
+            (errors[3] - 0.03f32.hypot(mirrored / 2.0)).abs() < 1e-4,
+            "{errors:?}"
+        );
     }
 
     #[test]
