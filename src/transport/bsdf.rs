@@ -157,8 +157,8 @@ impl Lobe {
     }
 }
 
-/// Fraction of the light from all directions alike that a lobe with this specular reflectance reflects: the cosine-weighted mean of
-/// Schlick's curve, with [`COUPLING_SLOPE`].
+/// Upper bound over all roughnesses of the fraction of light from all directions that a lobe with this reflectance along the normal
+/// reflects: F0 + (1 − F0) times the cosine-weighted mean of `reflected`.
 pub fn hemispherical_reflectance(specular: f32) -> f32 {
     specular + (1.0 - specular) * (1.0 - unreflected_mean()) as f32
 }

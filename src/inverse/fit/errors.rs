@@ -415,4 +415,20 @@ mod tests {
             assert!((error - n.sqrt() / (n - 1.0)).abs() < 1e-4, "{error}");
         }
     }
+
+    /// Both path sets disagree about every derivative: the error is multiplied by 1 / [`MIN_SIGNAL`], but not beyond the prior's.
+    #[test]
+    fn noisy_derivatives_say_no_less_than_the_prior() {
+        let clusters: Vec<Linearised> = (0..40)
+            .map(|i| Linearised {
+                own: DVec3::ONE,
+                rows: vec![(0, DVec3::splat(4.0), DVec3::ZERO)],
+                ..Linearised::unit(0, DVec3::splat([1.0, -1.0][i % 2]))
+            })
+            .collect();
+        let prior = Prior::new(1, 1, Vec3::ONE);
+        let equations = NormalEquations::new(&clusters, 1, &RobustWeights::even(1), &prior);
+        let error = standard_errors(&equations, &[0], 1).albedo[0].x;
+        assert!((error - ALBEDO_DEVIATION).abs() < 1e-4, "{error}");
+    }
 }
