@@ -1,7 +1,7 @@
 //! Standard errors of a fitted texture, from samples of its posterior.
 //!
-//! Linearised at the solution, the posterior is a Gaussian with the precision (Σ ω wwᵀ + penalties) / ν², where ν² is the
-//! variance of cross-validated pixels about the fit. Perturbing every measurement and every difference by its noise and solving
+//! Linearised at the solution, the posterior is a Gaussian with the precision (Σ ω wwᵀ + penalties + τ) / ν², where ν² is the
+//! variance of cross-validated pixels about the fit. Perturbing every measurement, difference and prior by its noise and solving
 //! again samples that Gaussian without an inverse (Papandreou and Yuille 2010).
 
 use crate::inverse::texture::fit::{Measurements, Texture};
@@ -34,7 +34,7 @@ pub fn standard_errors(
         row_weights: &measurements.weights,
         links,
         penalties: penalties(links, &vec![1.0; count], strength, &colors),
-        tether: 1e-5,
+        prior_weight: texture.prior_weight,
     };
     let data = measurements.observations.diagonal(&measurements.weights);
     let mut squares = vec![Vec3::ZERO; count];
@@ -64,10 +64,10 @@ pub fn standard_errors(
         .collect()
 }
 
-/// Noise of unit variance on every measurement and every difference, as a right-hand side.
+/// Noise of unit variance on every measurement, difference and prior, as a right-hand side.
 fn perturbation(system: &System, seed: u64, object: usize, draw: u64) -> Vec<Vec3> {
     let normal = |kind: u64, index: usize| {
-        let mut stream = Stream::new(seed, 2 * object as u64 + kind, index as u64, KEY + draw);
+        let mut stream = Stream::new(seed, 3 * object as u64 + kind, index as u64, KEY + draw);
         Vec3::new(stream.normal(), stream.normal(), stream.normal())
     };
     let measured: Vec<Vec3> = (system.row_weights.par_iter().enumerate())
@@ -86,6 +86,7 @@ fn perturbation(system: &System, seed: u64, object: usize, draw: u64) -> Vec<Vec
             right[cell] += noise;
             right[other] -= noise;
         }
+        right[cell] += normal(2, cell) * system.prior_weight.sqrt();
     }
     right
 }

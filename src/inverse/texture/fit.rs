@@ -22,6 +22,9 @@ const FACTOR: f32 = 0.5;
 const WEAKEST: f32 = 1e-3;
 /// Consecutive worse strengths that end the search.
 const PATIENCE: u32 = 3;
+/// Prior standard deviation of a cell about the object's constant albedo, in units of that albedo's luminance. It matters where
+/// pixels say little: in the dark, and where a pixel sees only the edge of a cell.
+const PRIOR_DEVIATION: f64 = 2.0;
 /// Albedos are relative to the luminance of the object's mean albedo, or to this if it is larger.
 const MIN_UNIT: f32 = 1e-4;
 /// Fraction of the object's median level below which weights stop growing.
@@ -62,6 +65,8 @@ pub struct Texture {
     pub without: Vec<Vec<Vec3>>,
     /// Standard deviation of cross-validated pixels of weight 1 about the fit, in units of the mean albedo.
     pub noise: Vec3,
+    /// Weight of the prior, in the units of the pixels' weights.
+    pub prior_weight: f32,
 }
 
 impl Measurements {
@@ -146,13 +151,15 @@ impl Measurements {
         let levels = vec![1.0; flat.len()];
         let density = mean_channel(&self.observations.diagonal(&self.weights));
         let folds = (ENOUGH * FOLDS / self.albedo.len().max(1)).clamp(min_folds, FOLDS);
-        let fitted = |weights: &[Vec3], strength: f32, start: &[Vec3]| {
+        let fitted = |weights: &[Vec3], strength, start: &[Vec3], prior_weight| {
             let problem = Problem {
                 observations: &self.observations,
                 weights,
                 values: &values,
                 links,
                 levels: &levels,
+                prior: &flat,
+                prior_weight,
             };
             fuse(&problem, strength, start)
         };
@@ -165,6 +172,7 @@ impl Measurements {
         let mut strength = known.map_or(strongest, |known| (known * MARGIN).min(strongest));
         let mut worse = 0;
         while worse < PATIENCE && strength > WEAKEST * density {
+            let prior_weight = prior_weight(best.0);
             colors
                 .par_iter_mut()
                 .enumerate()
@@ -173,6 +181,7 @@ impl Measurements {
                         &self.weights_at(colors, &values, Some(fold)),
                         strength,
                         colors,
+                        prior_weight,
                     );
                 });
             let score = self.score(&values, &colors, clip);
@@ -186,14 +195,15 @@ impl Measurements {
             between()?;
         }
 
-        let (_, strength, without) = best;
+        let (score, strength, without) = best;
+        let prior_weight = prior_weight(score);
         let noise = self.noise(&values, &without);
         let all = match strength {
             Some(strength) => {
                 let weights = self.weights_at(&without[0], &values, None);
-                fitted(&weights, strength, &without[0])
+                fitted(&weights, strength, &without[0], prior_weight)
             }
-            None => flat,
+            None => flat.clone(),
         };
         self.weights = self.weights_at(&all, &values, None);
         let albedo = |colors: Vec<Vec3>| -> Vec<Vec3> {
@@ -207,6 +217,7 @@ impl Measurements {
             strength,
             without: without.into_iter().map(albedo).collect(),
             noise,
+            prior_weight,
         })
     }
 
@@ -276,6 +287,11 @@ impl Measurements {
             .collect();
         quantile(&mut squares, 0.5).unwrap_or(0.0) * CLIP
     }
+}
+
+/// Weight of the prior, given the mean squared residual of a pixel over its three channels: the ratio of both variances.
+fn prior_weight(score: f64) -> f32 {
+    (score / 3.0 / (PRIOR_DEVIATION * PRIOR_DEVIATION)) as f32
 }
 
 /// Whether the luminance of a surface is at least a lower bound; both are given as albedos.
@@ -389,5 +405,33 @@ mod tests {
         let [known, stray] = [0, 1].map(|cell: usize| texture.colors[cell].x);
         assert!((known - 0.8).abs() < 1e-3, "{known}");
         assert!((0.45..0.6).contains(&stray), "{stray}");
+    }
+
+    /// One pixel sees a hundredth of a cell, and is off by a fifth of its level: the cell would be twenty times as bright as that
+    /// pixel says.
+    #[test]
+    fn a_cell_that_pixels_hardly_see_stays_near_the_colour_of_the_object() {
+        let textured = |i: u32| [0.3, 0.5][(i / 4 % 2) as usize];
+        let noise = |i: u32| 0.02 * [1.0, -1.0][(i % 2) as usize];
+        let mut pixels: Vec<SeenPixel> = (0..160)
+            .map(|i| pixel(i, Vec3::splat(textured(i) + noise(i)), false))
+            .collect();
+        let mut rows: Vec<Vec<(u32, f32)>> = (0..160).map(|i| vec![(i / 4, 1.0)]).collect();
+        pixels.push(pixel(160, Vec3::splat(0.36), false));
+        rows.push(vec![(0, 0.99), (40, 0.01)]);
+        let seen: Vec<&SeenPixel> = pixels.iter().collect();
+        let links = Links {
+            ends: vec![0; 41],
+            ..Links::default()
+        };
+        let mut measurements =
+            Measurements::new(&seen, Observations::new(&rows, 41), &[Vec3::ONE; 41]);
+        let between = || Ok::<_, ()>(());
+        let texture = measurements
+            .fit(&links, 1, None, between)
+            .expect("nothing ends it");
+        let [seen, hidden] = [0, 40].map(|cell: usize| texture.colors[cell].x);
+        assert!((seen - 0.3).abs() < 0.03, "{seen}");
+        assert!((0.3..0.9).contains(&hidden), "{hidden}");
     }
 }

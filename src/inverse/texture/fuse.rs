@@ -1,9 +1,9 @@
 //! Colours of cells from noisy measurements: least squares with a total-variation penalty on the graph of neighbours, which
 //! smooths but keeps edges (the fused lasso on a graph).
 //!
-//! Minimises ½ Σ ω ‖y − Σ w x‖² + λ Σ b φ(‖xᵢ − xⱼ‖ / l) over pairs of neighbours with common border b and mean level l,
-//! where φ is Huber's: quadratic up to [`FLAT`], linear beyond. The norm couples the channels, so that edges coincide in all of
-//! them. Solved by iteratively reweighted least squares with preconditioned conjugate gradients.
+//! Minimises ½ Σ ω ‖y − Σ w x‖² + λ Σ b φ(‖xᵢ − xⱼ‖ / l) + ½ τ Σ ‖x − p‖². The second sum is over pairs of neighbours with common
+//! border b and mean level l, where φ is Huber's: quadratic up to [`FLAT`], linear beyond. The norm couples the channels, so that
+//! edges coincide in all of them. The third sum is the prior about the mean p. Solved by iteratively reweighted least squares with preconditioned conjugate gradients.
 
 use crate::inverse::texture::links::Links;
 use crate::inverse::texture::observations::Observations;
@@ -18,8 +18,6 @@ const MAX_REWEIGHTINGS: u32 = 5;
 const MAX_STEPS: u32 = 12;
 /// Root mean square change of the colours below which the iteration ends.
 const CONVERGED: f64 = 1e-3;
-/// Weight of the start values, relative to the mean weight of the observations; it makes the system definite.
-const TETHER: f32 = 1e-5;
 /// Terms added up by one thread.
 const CHUNK: usize = 4096;
 
@@ -36,6 +34,10 @@ pub struct Problem<'a> {
     pub links: &'a Links,
     /// The level l of each cell, to which differences are relative.
     pub levels: &'a [f32],
+    /// Prior mean of each cell.
+    pub prior: &'a [Vec3],
+    /// Weight τ of the prior.
+    pub prior_weight: f32,
 }
 
 /// Finds the colours for the strength λ of the penalty, starting from `start`.
@@ -46,12 +48,13 @@ pub fn fuse(problem: &Problem, strength: f32, start: &[Vec3]) -> Vec<Vec3> {
         values,
         links,
         levels,
+        prior,
+        prior_weight,
     } = *problem;
     let data = observations.diagonal(row_weights);
-    let tether = TETHER * mean_channel(&data).max(f32::MIN_POSITIVE);
     let mut right = observations.transpose_times(row_weights, values);
-    for (r, s) in right.iter_mut().zip(start) {
-        *r += *s * tether;
+    for (r, mean) in right.iter_mut().zip(prior) {
+        *r += *mean * prior_weight;
     }
     let mut colors = start.to_vec();
     for _ in 0..MAX_REWEIGHTINGS {
@@ -60,7 +63,7 @@ pub fn fuse(problem: &Problem, strength: f32, start: &[Vec3]) -> Vec<Vec3> {
             row_weights,
             links,
             penalties: penalties(links, levels, strength, &colors),
-            tether,
+            prior_weight,
         };
         let before = colors.clone();
         system.solve(&data, &right, &mut colors);
@@ -100,8 +103,8 @@ pub struct System<'a> {
     pub links: &'a Links,
     /// The weight of each link's squared difference.
     pub penalties: Vec<f32>,
-    /// The weight of the start values.
-    pub tether: f32,
+    /// The weight of the prior.
+    pub prior_weight: f32,
 }
 
 impl System<'_> {
@@ -111,7 +114,7 @@ impl System<'_> {
             .into_par_iter()
             .map(|cell| {
                 let penalty: f32 = self.penalties[self.links.row(cell)].iter().sum();
-                Vec3A::from(data[cell] + penalty + self.tether).recip()
+                Vec3A::from(data[cell] + penalty + self.prior_weight).recip()
             })
             .collect();
         let mut found: Vec<Vec3A> = colors.iter().map(|&c| c.into()).collect();
@@ -174,7 +177,7 @@ impl System<'_> {
                 let smooth: Vec3A = (self.links.neighbours(cell))
                     .map(|(at, other)| (x[cell] - x[other]) * self.penalties[at])
                     .sum();
-                data + smooth + x[cell] * self.tether
+                data + smooth + x[cell] * self.prior_weight
             })
             .collect()
     }

@@ -1,10 +1,11 @@
 //! The irradiance of cells: traced in two independent sets, then smoothed as much as each set predicts the other best.
 
 use crate::inverse::texture::cells::Cells;
-use crate::inverse::texture::fuse::{Problem, fuse, mean};
+use crate::inverse::texture::fuse::{Problem, fuse, mean, mean_channel};
 use crate::inverse::texture::gloss::white_base;
 use crate::inverse::texture::links::Links;
-use crate::inverse::texture::observations::Observations;
+use crate::inverse::texture::look::SeenPixel;
+use crate::inverse::texture::observations::{Observations, row_range};
 use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::math::warp;
@@ -21,6 +22,8 @@ const KEY: u64 = 5 << 59;
 const AVERAGES: u32 = 40;
 /// Least level of a cell, relative to the mean over the object.
 const MIN_LEVEL: f32 = 1e-2;
+/// Weight of the local mean as a prior, relative to the mean weight of the cells; it makes the system definite.
+const PRIOR_WEIGHT: f32 = 1e-5;
 /// Strengths of smoothing that are tried, strongest first.
 const STRENGTHS: [f32; 9] = [8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.12, 0.06, 0.03];
 /// Consecutive worse strengths that end the search.
@@ -38,6 +41,37 @@ pub struct Irradiance {
     pub rejected: u64,
 }
 
+/// The points of each cell that pixels see.
+#[derive(Debug, Clone)]
+pub struct SeenPoints {
+    /// End of each cell's points.
+    ends: Vec<u32>,
+    points: Vec<Hit>,
+}
+
+impl SeenPoints {
+    /// The hits of the pixels, by cell.
+    pub fn new(cells: &Cells, pixels: &[SeenPixel]) -> Self {
+        let hits = pixels.iter().flat_map(|pixel| &pixel.hits);
+        let mut located: Vec<(u32, Hit)> = hits
+            .filter_map(|l| Some((cells.locate(&l.hit)?, l.hit)))
+            .collect();
+        located.sort_by_key(|&(cell, _)| cell);
+        let ends = (0..cells.count() as u32)
+            .map(|cell| located.partition_point(|&(other, _)| other <= cell) as u32)
+            .collect();
+        Self {
+            ends,
+            points: located.into_iter().map(|(_, hit)| hit).collect(),
+        }
+    }
+
+    /// The points of a cell.
+    fn of(&self, cell: usize) -> &[Hit] {
+        &self.points[row_range(&self.ends, cell)]
+    }
+}
+
 /// Smoothed irradiance.
 #[derive(Debug, Clone)]
 pub struct Smoothed {
@@ -47,15 +81,16 @@ pub struct Smoothed {
     pub noise: f32,
 }
 
-/// Traces `samples` paths per set from random points of each cell in the range.
+/// Traces `samples` paths per set from random points of each cell in the range: from the points that pixels see, so that the
+/// hidden part of a cell counts for nothing, and from all of it if no pixel sees it.
 pub fn trace(
     lit: &LitScene,
     cells: &Cells,
+    seen: &SeenPoints,
     range: Range<usize>,
     samples: u32,
     options: &PathOptions,
-    seed: u64,
-    key: u64,
+    [seed, key]: [u64; 2],
 ) -> Irradiance {
     let traced: Vec<([Vec3; 2], u64, u64)> = range
         .into_par_iter()
@@ -66,7 +101,7 @@ pub fn trace(
                 for sample in 0..samples {
                     let index = KEY + 2 * u64::from(sample) + set;
                     let mut stream = Stream::new(seed, key, cell as u64, index);
-                    let (hit, normal) = point_on(lit, cells, cell, &mut stream);
+                    let (hit, normal) = point_on(lit, cells, seen, cell, &mut stream);
                     let surface = lit.surface(&hit);
                     let (light, cast) = white_base(lit, &surface, normal, &mut stream, options);
                     sum += light.as_dvec3();
@@ -89,12 +124,28 @@ pub fn trace(
     irradiance
 }
 
-/// A point on a cell, uniform in area, and the normal of its seen side.
-fn point_on(lit: &LitScene, cells: &Cells, cell: usize, stream: &mut Stream) -> (Hit, Vec3) {
-    let cell = &cells.cells[cell];
+/// A seen point of a cell, or a point uniform in area if none is seen, and the normal of its seen side.
+fn point_on(
+    lit: &LitScene,
+    cells: &Cells,
+    seen: &SeenPoints,
+    cell: usize,
+    stream: &mut Stream,
+) -> (Hit, Vec3) {
     let choice = stream.uniform();
     let within = warp::uniform_triangle(stream.uniform2());
     let scene = &lit.scene;
+    let oriented = |hit: Hit| {
+        let normal = scene.normals[hit.triangle as usize];
+        let front = cells.front(hit.triangle).unwrap_or(true);
+        (hit, if front { normal } else { -normal })
+    };
+    let points = seen.of(cell);
+    if !points.is_empty() {
+        let index = (choice * points.len() as f32) as usize;
+        return oriented(points[index.min(points.len() - 1)]);
+    }
+    let cell = &cells.cells[cell];
     let piece = match cell.pieces.as_slice() {
         [piece] => piece,
         pieces => {
@@ -117,9 +168,7 @@ fn point_on(lit: &LitScene, cells: &Cells, cell: usize, stream: &mut Stream) -> 
         b1,
         b2,
     };
-    let normal = scene.normals[piece.triangle as usize];
-    let front = cells.front(piece.triangle).unwrap_or(true);
-    (hit, if front { normal } else { -normal })
+    oriented(hit)
 }
 
 impl Irradiance {
@@ -148,12 +197,15 @@ impl Irradiance {
         let levels = levels(&both, links);
         let each = Observations::one_per_cell(count);
         let weights: Vec<Vec3> = levels.iter().map(|l| Vec3::splat(1.0 / (l * l))).collect();
+        let local = local_mean(&both, links);
         let problem = |values| Problem {
             observations: &each,
             weights: &weights,
             values,
             links,
             levels: &levels,
+            prior: &local,
+            prior_weight: PRIOR_WEIGHT * mean_channel(&weights),
         };
         let squares = |a: &[Vec3], b: &[Vec3]| -> f64 {
             let pairs = a.iter().zip(b).zip(&weights);

@@ -7,7 +7,7 @@ use crate::inverse::texture::cells::Cells;
 use crate::inverse::texture::errors::{standard_errors, with_light};
 use crate::inverse::texture::fit::{Measurements, Texture};
 use crate::inverse::texture::gloss::trace_gloss;
-use crate::inverse::texture::irradiance::{Irradiance, trace};
+use crate::inverse::texture::irradiance::{Irradiance, SeenPoints, trace};
 use crate::inverse::texture::links::Links;
 use crate::inverse::texture::look::{FOLDS, RAYS, SeenPixel, sample_pixels};
 use crate::inverse::texture::observations::Observations;
@@ -44,6 +44,8 @@ pub struct TexturedSurface {
     pub links: Links,
     /// Number of pixels in the fit that see each cell.
     pub seen: Vec<u32>,
+    /// Area of each cell that pixels in the fit see, in square metres.
+    seen_area: Vec<f32>,
     /// The latest texture.
     pub texture: Texture,
     /// The best single albedo for the same pixels and irradiance.
@@ -103,11 +105,13 @@ impl TexturedSurface {
             glossy,
             seed,
             seen: vec![0; cells.count()],
+            seen_area: Vec::new(),
             texture: Texture {
                 colors: vec![Vec3::ZERO; cells.count()],
                 strength: None,
                 without: Vec::new(),
                 noise: Vec3::ZERO,
+                prior_weight: 0.0,
             },
             constant: Vec3::ZERO,
             stderr: Vec::new(),
@@ -120,6 +124,7 @@ impl TexturedSurface {
                 surface.seen[cell as usize] += 1;
             }
         }
+        surface.seen_area = surface.seen_areas();
         Some(surface)
     }
 
@@ -136,10 +141,19 @@ impl TexturedSurface {
     ) -> Result<(), Termination> {
         let samples = (paths / (2 * self.cells.count() as u64)).clamp(1, MAX_SAMPLES) as u32;
         let key = (u64::from(sweep) << 32) + self.object as u64;
+        let seen = SeenPoints::new(&self.cells, &self.pixels);
         let mut irradiance = Irradiance::default();
         for start in (0..self.cells.count()).step_by(SLICE) {
             let range = start..(start + SLICE).min(self.cells.count());
-            let part = trace(lit, &self.cells, range, samples, options, self.seed, key);
+            let part = trace(
+                lit,
+                &self.cells,
+                &seen,
+                range,
+                samples,
+                options,
+                [self.seed, key],
+            );
             done(part.rays, part.rejected)?;
             irradiance.append(part);
         }
@@ -227,23 +241,32 @@ impl TexturedSurface {
         self.pixels.iter().filter(|p| !p.held_out).count()
     }
 
-    /// Area-weighted mean albedo over the cells that pixels see.
+    /// Mean albedo over the area that pixels see.
     pub fn mean(&self) -> Vec3 {
         let (mut sum, mut area) = (DVec3::ZERO, 0.0);
-        for ((cell, color), seen) in
-            (self.cells.cells.iter().zip(&self.texture.colors)).zip(&self.seen)
-        {
-            if *seen > 0 {
-                let own = f64::from(cell.size * cell.size);
-                sum += color.as_dvec3() * own;
-                area += own;
-            }
+        for (color, seen) in self.texture.colors.iter().zip(&self.seen_area) {
+            sum += color.as_dvec3() * f64::from(*seen);
+            area += f64::from(*seen);
         }
         if area > 0.0 {
             (sum / area).as_vec3()
         } else {
             self.constant
         }
+    }
+
+    /// The area of each cell below the rays of the pixels in the fit, at most all of it.
+    fn seen_areas(&self) -> Vec<f32> {
+        let mut areas = vec![0.0; self.cells.count()];
+        for hit in (self.pixels.iter().filter(|p| !p.held_out)).flat_map(|p| &p.hits) {
+            if let Some(cell) = self.cells.locate(&hit.hit) {
+                areas[cell as usize] += hit.footprint * hit.footprint / RAYS as f32;
+            }
+        }
+        let cells = self.cells.cells.iter();
+        (areas.iter().zip(cells))
+            .map(|(area, cell)| area.min(cell.size * cell.size))
+            .collect()
     }
 
     /// For each pixel in the fit, the cells that it sees and the fraction of its rays on each.

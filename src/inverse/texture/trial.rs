@@ -10,8 +10,9 @@ use crate::math::stats::{Moments, quantile};
 use crate::transport::arrival::RayCount;
 use crate::transport::lit::LitScene;
 use crate::transport::path::PathOptions;
-use glam::Vec3;
+use glam::{DVec3, UVec2, Vec3};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// First of the sample keys of these paths, disjoint from those of the fits.
 const KEY: u64 = 7 << 59;
@@ -25,15 +26,18 @@ const MAX_PIXELS: usize = 2_000;
 const FIRST_PIXELS: usize = 250;
 /// A gain of this many standard errors on the first pixels is decisive.
 const DECISIVE: f64 = 2.0 * SIGNIFICANT;
-/// Least number of photographs for a standard error over photographs.
-const MIN_PHOTOGRAPHS: f64 = 5.0;
+/// Blocks along a side of the picture of a glossy object in each photograph.
+const BLOCKS: u32 = 4;
+/// Least number of photographs, and of blocks, for a standard error over blocks.
+const MIN_PHOTOGRAPHS: usize = 2;
+const MIN_BLOCKS: f64 = 8.0;
 /// The gain of a pixel is clamped to this multiple of the 68th percentile.
 const CLIP: f64 = 5.0;
 
 /// The outcome. Errors are squared, relative to the squared level, and averaged over pixels; they include photograph noise.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Trial {
-    /// Error of one colour.
+    /// Error of the best single colour.
     pub before: f64,
     /// Error of the texture.
     pub after: f64,
@@ -56,8 +60,9 @@ pub struct TestPixel<'a> {
     pub colors: &'a [Vec3],
 }
 
-/// Compares one colour with a texture on pixels that the texture was fitted without.
+/// Compares a texture with one colour on pixels that the texture was fitted without.
 ///
+/// The one colour is the best for these pixels, so that a texture gains nothing by being brighter or darker as a whole.
 /// Both are lit by the same full paths from the pixel's hits, in two independent sets whose residuals are multiplied, so that
 /// path noise causes no bias. The test ends after the first pixels if these are decisive, or if all pixels together would
 /// hardly reach significance. If the surface is `glossy`, errors are correlated within each photograph.
@@ -90,14 +95,14 @@ pub fn compare(
     let part = |first: bool| {
         let indices = (0..count).filter(|i| (i % every == 0) == first);
         let pixels: Vec<TestPixel> = indices.map(|i| chosen[i]).collect();
-        comparison.compare(&pixels)
+        comparison.predict(&pixels)
     };
-    let mut compared = part(true);
-    let first = Trial::new(&compared, glossy);
+    let mut predicted = part(true);
+    let first = Trial::new(&predicted, glossy);
     if !is_decisive(&first) && !is_hopeless(&first, count) {
-        compared.extend(part(false));
+        predicted.extend(part(false));
     }
-    Trial::new(&compared, glossy)
+    Trial::new(&predicted, glossy)
 }
 
 /// Whether the first pixels decide for the texture.
@@ -124,27 +129,36 @@ struct Comparison<'a> {
     floor: f32,
 }
 
-/// Squared relative errors of one pixel.
-struct Compared {
+/// One pixel, and radiance that was predicted for it by two independent sets of paths.
+struct Predicted {
     frame: u32,
-    flat: f64,
-    textured: f64,
+    /// Column and row in the photograph.
+    at: UVec2,
+    measured: Vec3,
+    /// Of a white base without the lobe.
+    white: [Vec3; 2],
+    /// Of the lobe.
+    lobe: [Vec3; 2],
+    /// With the texture.
+    textured: [Vec3; 2],
+    /// Inverse of the squared level; zero if everything is black.
+    weight: f32,
     cast: RayCount,
 }
 
 impl Comparison<'_> {
-    fn compare(&self, pixels: &[TestPixel]) -> Vec<Compared> {
+    fn predict(&self, pixels: &[TestPixel]) -> Vec<Predicted> {
         pixels.par_iter().map(|pixel| self.pixel(pixel)).collect()
     }
 
-    fn pixel(&self, &TestPixel { pixel, colors }: &TestPixel) -> Compared {
+    fn pixel(&self, &TestPixel { pixel, colors }: &TestPixel) -> Predicted {
         let texture = |hit| {
             let cell = self.cells.locate(hit);
             cell.map_or(self.constant, |c| colors[c as usize])
         };
         let mut cast = RayCount::default();
         let sets = [0u64, 1].map(|set| {
-            let (mut flat, mut textured) = (Vec3::ZERO, Vec3::ZERO);
+            let [mut bright, mut mirrored, mut textured] = [Vec3::ZERO; 3];
             for path in 0..self.paths {
                 let hit = &pixel.hits[path % pixel.hits.len()];
                 let sample = KEY + 2 * path as u64 + set;
@@ -157,30 +171,53 @@ impl Comparison<'_> {
                 let (lobe, gloss_cast) = gloss(self.lit, pixel, path, &mut stream, self.options);
                 cast += base_cast;
                 cast += gloss_cast;
-                flat += white * pixel.base * self.constant + lobe;
+                bright += white * pixel.base;
+                mirrored += lobe;
                 textured += white * pixel.base * texture(&hit.hit) + lobe;
             }
-            [flat, textured].map(|sum| sum / self.paths as f32)
+            [bright, mirrored, textured].map(|sum| sum / self.paths as f32)
         });
-        let flat = sets.map(|set| set[0]);
-        let level = luminance((flat[0] + flat[1]) * 0.5);
-        let square = f64::from(level * level + self.floor * self.floor);
-        let error = |[a, b]: [Vec3; 2]| {
-            let product = (pixel.measured - a) * (pixel.measured - b);
-            // The level is zero if everything is black.
-            if square > 0.0 {
-                f64::from(product.element_sum() / 3.0) / square
-            } else {
-                0.0
-            }
-        };
-        Compared {
+        let [white, lobe, textured] = [0, 1, 2].map(|of| sets.map(|set| set[of]));
+        let level = luminance(white[0] + white[1]) * 0.5 * luminance(self.constant)
+            + luminance(lobe[0] + lobe[1]) * 0.5;
+        let square = level * level + self.floor * self.floor;
+        let camera = &self.lit.scene.cameras[pixel.frame as usize];
+        let width = camera.intrinsics.width;
+        Predicted {
             frame: pixel.frame,
-            flat: error(flat),
-            textured: error(sets.map(|set| set[1])),
+            at: UVec2::new(pixel.pixel % width, pixel.pixel / width),
+            measured: pixel.measured,
+            white,
+            lobe,
+            textured,
+            weight: if square > 0.0 { square.recip() } else { 0.0 },
             cast,
         }
     }
+}
+
+impl Predicted {
+    /// Squared relative error of a prediction.
+    fn error(&self, [a, b]: [Vec3; 2]) -> f64 {
+        let product = (self.measured - a) * (self.measured - b) * self.weight;
+        f64::from(product.element_sum() / 3.0)
+    }
+
+    /// The prediction with one albedo.
+    fn with(&self, albedo: Vec3) -> [Vec3; 2] {
+        [0, 1].map(|set| self.white[set] * albedo + self.lobe[set])
+    }
+}
+
+/// The albedo with the least squared relative error; zero in channels without light.
+fn best_constant(pixels: &[Predicted]) -> Vec3 {
+    let (mut lit, mut white) = (DVec3::ZERO, DVec3::ZERO);
+    for pixel in pixels {
+        let [a, b] = [0, 1].map(|set| (pixel.measured - pixel.lobe[set]) * pixel.white[1 - set]);
+        lit += (0.5 * pixel.weight * (a + b)).as_dvec3();
+        white += (pixel.weight * pixel.white[0] * pixel.white[1]).as_dvec3();
+    }
+    DVec3::select(white.cmpgt(DVec3::ZERO), lit / white, DVec3::ZERO).as_vec3()
 }
 
 impl Trial {
@@ -189,27 +226,30 @@ impl Trial {
         self.gain > SIGNIFICANT * self.noise
     }
 
-    fn new(pixels: &[Compared], glossy: bool) -> Self {
-        let mut sizes: Vec<f64> = (pixels.iter())
-            .map(|p| (p.flat - p.textured).abs())
+    fn new(pixels: &[Predicted], glossy: bool) -> Self {
+        let constant = best_constant(pixels);
+        let errors: Vec<[f64; 2]> = (pixels.iter())
+            .map(|p| [p.with(constant), p.textured].map(|prediction| p.error(prediction)))
             .collect();
+        let mut sizes: Vec<f64> = errors.iter().map(|[a, b]| (a - b).abs()).collect();
         let clip = CLIP * quantile(&mut sizes, 0.68).unwrap_or(0.0);
-        let (mut before, mut after) = (Moments::default(), Moments::default());
-        let mut gain = Moments::default();
-        let gains: Vec<(u32, f64)> = (pixels.iter())
-            .map(|p| (p.frame, (p.flat - p.textured).clamp(-clip, clip)))
+        let gains: Vec<f64> = (errors.iter())
+            .map(|[flat, textured]| (flat - textured).clamp(-clip, clip))
             .collect();
-        for (pixel, &(_, gained)) in pixels.iter().zip(&gains) {
-            before.push(pixel.flat);
-            after.push(pixel.textured);
-            gain.push(gained);
+        let mut moments = [Moments::default(); 3];
+        for ([flat, textured], &gain) in errors.iter().zip(&gains) {
+            moments[0].push(*flat);
+            moments[1].push(*textured);
+            moments[2].push(gain);
         }
+        let [before, after, gain] = moments;
         Self {
             before: before.mean,
             after: after.mean,
             gain: gain.mean,
             noise: if glossy {
-                error_by_frame(gains, gain.mean)
+                let seen: Vec<(u32, UVec2)> = pixels.iter().map(|p| (p.frame, p.at)).collect();
+                error_by_block(&seen, &gains, gain.mean)
             } else {
                 gain.standard_error()
             },
@@ -219,32 +259,75 @@ impl Trial {
     }
 }
 
-/// Standard error of the mean of gains that are correlated within each photograph, as the errors of a highlight are; infinite
-/// with fewer than [`MIN_PHOTOGRAPHS`] photographs.
-fn error_by_frame(mut gains: Vec<(u32, f64)>, mean: f64) -> f64 {
-    gains.sort_by_key(|&(frame, _)| frame);
-    let sums = (gains.chunk_by(|a, b| a.0 == b.0))
-        .map(|frame| frame.iter().map(|(_, gain)| gain - mean).sum::<f64>());
-    let (frames, squares) = sums.fold((0.0, 0.0), |(n, s), sum| (n + 1.0, s + sum * sum));
-    if frames < MIN_PHOTOGRAPHS {
+/// Standard error of the mean of gains that are correlated within each block of a photograph, as the errors of a highlight are;
+/// infinite with fewer than [`MIN_PHOTOGRAPHS`] photographs or [`MIN_BLOCKS`] blocks.
+fn error_by_block(pixels: &[(u32, UVec2)], gains: &[f64], mean: f64) -> f64 {
+    let mut frames: BTreeMap<u32, (UVec2, UVec2)> = BTreeMap::new();
+    for &(frame, at) in pixels {
+        let bounds = frames.entry(frame).or_insert((at, at));
+        *bounds = (bounds.0.min(at), bounds.1.max(at));
+    }
+    let mut sums: BTreeMap<(u32, [u32; 2]), f64> = BTreeMap::new();
+    for (&(frame, at), gain) in pixels.iter().zip(gains) {
+        let (least, greatest) = frames[&frame];
+        let block = (at - least) * BLOCKS / (greatest - least + 1);
+        *sums.entry((frame, block.to_array())).or_default() += gain - mean;
+    }
+    let blocks = sums.len() as f64;
+    if frames.len() < MIN_PHOTOGRAPHS || blocks < MIN_BLOCKS {
         return f64::INFINITY;
     }
-    (squares * frames / (frames - 1.0)).sqrt() / gains.len() as f64
+    let squares: f64 = sums.values().map(|sum| sum * sum).sum();
+    (squares * blocks / (blocks - 1.0)).sqrt() / gains.len() as f64
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Ten photographs of fifty pixels each, whose gains are equal within each photograph, count as ten measurements.
+    /// A texture that is the right colour everywhere gains nothing over a fit that was off by a fifth.
     #[test]
-    fn what_pixels_of_a_photograph_share_counts_once() {
-        let of_frame = |frame: u32| f64::from(frame % 5) - 2.0;
-        let gains: Vec<(u32, f64)> = (0..500).map(|i| (i % 10, of_frame(i % 10))).collect();
-        let error = error_by_frame(gains, 0.0);
-        // The variance is 2, the unbiased estimate 20/9; of the mean of ten, 2/9.
-        assert!((error - (20.0f64 / 90.0).sqrt()).abs() < 1e-12, "{error}");
-        assert_eq!(error_by_frame(vec![(3, 1.0), (3, 2.0)], 1.5), f64::INFINITY);
+    fn a_texture_is_compared_with_the_best_single_colour() {
+        let pixels: Vec<Predicted> = (1..101u32)
+            .map(|i| {
+                let white = Vec3::splat(i as f32);
+                Predicted {
+                    frame: i % 4,
+                    at: UVec2::new(i % 10, i / 10),
+                    measured: 0.5 * white + 0.1,
+                    white: [1.1 * white, white / 1.1],
+                    lobe: [Vec3::splat(0.1); 2],
+                    textured: [0.5 * 1.1 * white + 0.1, 0.5 / 1.1 * white + 0.1],
+                    weight: 1.0 / (white.x * white.x),
+                    cast: RayCount::default(),
+                }
+            })
+            .collect();
+        let found = best_constant(&pixels);
+        let expected = 0.5 * 0.5 * (1.1 + 1.0 / 1.1);
+        assert!((found - expected).abs().max_element() < 1e-6, "{found}");
+        assert!(!Trial::new(&pixels, false).is_gain());
+    }
+
+    /// Two photographs of 8 × 8 pixels, whose gains are equal within blocks of 2 × 2, count as 32 measurements; one photograph
+    /// counts as none.
+    #[test]
+    fn what_pixels_of_a_block_share_counts_once() {
+        let photograph = |frame: u32| {
+            (0..64u32).map(move |i| {
+                let at = UVec2::new(5 + i % 8, 9 + i / 8);
+                ((frame, at), f64::from((i % 8 / 2 + i / 16) % 2) - 0.5)
+            })
+        };
+        let (pixels, gains): (Vec<(u32, UVec2)>, Vec<f64>) =
+            photograph(3).chain(photograph(4)).unzip();
+        let error = error_by_block(&pixels, &gains, 0.0);
+        // The unbiased variance of a block is 1/4 · 32/31; of the mean of 32, a 32th of it.
+        assert!((error - (0.25 / 31.0f64).sqrt()).abs() < 1e-12, "{error}");
+        assert_eq!(
+            error_by_block(&pixels[..64], &gains[..64], 0.0),
+            f64::INFINITY
+        );
     }
 
     #[test]
