@@ -99,8 +99,6 @@ pub enum Command {
     Reframe(Box<OpenOptions>),
     /// Change the objects of the open capture, drop the estimate, and solve from the start.
     Regroup(Box<Regrouping>),
-    /// End the worker.
-    Quit,
 }
 
 /// A change of a capture's objects.

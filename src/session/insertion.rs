@@ -224,20 +224,14 @@ impl Inserting {
         };
         let first = last.found.objects.is_empty() && !light.found.objects.is_empty();
         let waited = self.begun.map_or(Duration::MAX, |at| at.elapsed());
-        let refined = self
-            .samples()
-            .is_none_or(|samples| samples >= ROUGH_SAMPLES);
-        let rested = self.hold == 0
-            && waited
-                >= if refined {
-                    UPDATE_INTERVAL
-                } else {
-                    5 * UPDATE_INTERVAL
-                };
+        let samples = self.samples();
+        let refined = samples.is_none_or(|samples| samples >= ROUGH_SAMPLES);
+        let pause = UPDATE_INTERVAL * if refined { 1 } else { 5 };
+        let rested = self.hold == 0 && waited >= pause;
         if first {
             self.update();
         } else if rested && !last.is_same(light) && differs(&last.edited, &light.edited) {
-            self.hold = self.samples().unwrap_or(0).min(MIN_REPLACEMENT_SAMPLES);
+            self.hold = samples.unwrap_or(0).min(MIN_REPLACEMENT_SAMPLES);
             self.stale = Some(Instant::now());
         }
     }

@@ -11,6 +11,7 @@ use crate::scene::camera::Camera;
 use crate::session::light::path_options;
 use crate::session::save::results::Results;
 use crate::session::save::staging::Staging;
+use crate::session::view::difference;
 use crate::session::view::hits::Hits;
 use crate::transport::denoise::guides;
 use crate::transport::lit::LitScene;
@@ -20,7 +21,7 @@ use std::sync::Arc;
 
 /// Folder of the pictures within the results.
 pub use crate::export::overwrite::VIEWS as FOLDER;
-pub use crate::session::save::frames::Frames;
+pub use crate::session::save::results::Frames;
 /// Kinds of pictures of each frame.
 pub const KINDS: [&str; 6] = ["render", "albedo", "emission", "error", "stderr", "seen"];
 
@@ -107,12 +108,7 @@ fn frame(
     for picture in [&mut render, &mut clean] {
         exposure.apply(&camera.intrinsics, saturation, picture);
     }
-    let error = Picture {
-        pixels: (render.pixels.iter().zip(&photograph.pixels))
-            .map(|(r, p)| *r - *p)
-            .collect(),
-        ..photograph
-    };
+    let error = difference(&render, &photograph);
     let hits = Hits::new(scene, camera);
     let albedo = hits.albedo(scene, &lit.materials);
     let emission = hits.emission(scene, camera, estimate);

@@ -14,6 +14,7 @@ use crate::transport::sun::Sun;
 use crate::transport::surroundings::Surroundings;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 
 /// The content of `report.json`. Times in seconds, linear radiance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -102,20 +103,9 @@ pub struct OutsideSummary {
     pub sun: Option<Sun>,
 }
 
-/// Durations in seconds.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Seconds {
-    /// Total.
-    pub total: f64,
-    /// Reading the capture.
-    pub load: f64,
-    /// Writing the results.
-    pub write: f64,
-}
-
 impl Report {
-    /// The report of a solve.
-    pub fn new(results: &Results, seconds: Seconds) -> Self {
+    /// The report of a solve, whose results were written in `seconds_write`.
+    pub fn new(results: &Results, seconds_write: f64) -> Self {
         let (capture, settings, estimate) =
             (&results.capture, &results.settings, &results.estimate);
         let (progress, stopped_because) = (&results.progress, results.stopped_because);
@@ -126,10 +116,10 @@ impl Report {
             seed: settings.seed,
             preset: settings.preset,
             threads: rayon::current_num_threads(),
-            seconds: seconds.total,
-            seconds_load: seconds.load,
+            seconds: results.started.elapsed().as_secs_f64(),
+            seconds_load: results.seconds_load,
             seconds_solve: progress.seconds,
-            seconds_write: seconds.write,
+            seconds_write,
             seconds_to_first_estimate: progress.seconds_to_first_estimate,
             capture: Counts {
                 triangles: capture.scene.triangles.len(),
@@ -144,22 +134,18 @@ impl Report {
             device: results.renderer.card().unwrap_or("cpu").to_owned(),
             denoiser: results.denoiser.map_or("none", Denoiser::name),
             rays: progress.rays,
-            rays_per_second: if progress.seconds > 0.0 {
-                progress.rays as f64 / progress.seconds
-            } else {
-                0.0
+            rays_per_second: match progress.seconds > 0.0 {
+                true => progress.rays as f64 / progress.seconds,
+                false => 0.0,
             },
             peak_memory_bytes: peak_memory_bytes(),
             stopped_because,
             stages: progress.stages.clone(),
             objects: Named::objects(&capture.scene, estimate),
             outside_light: estimate.outside.as_ref().map(|outside| {
-                let row_angle = |row: usize| {
-                    let edge = |r: usize| {
-                        (std::f64::consts::PI * r as f64 / f64::from(outside.height)).cos()
-                    };
-                    (edge(row) - edge(row + 1)) / (2.0 * f64::from(outside.width))
-                };
+                let edge = |row: usize| (PI * row as f64 / f64::from(outside.height)).cos();
+                let row_angle =
+                    |row| (edge(row) - edge(row + 1)) / (2.0 * f64::from(outside.width));
                 let mean = (outside.means().enumerate())
                     .map(|(i, p)| p.as_dvec3() * row_angle(i / outside.width.max(1) as usize))
                     .sum::<glam::DVec3>();

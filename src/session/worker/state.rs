@@ -133,17 +133,13 @@ impl Worker {
 
     /// Publishes a snapshot if the state has changed: at once if `now`, else at most about 30 times a second.
     pub fn publish(&mut self, now: bool) {
-        if !self.changed && !now {
-            return;
-        }
-        if !now && self.published.elapsed() < FRAME {
+        if !now && (!self.changed || self.published.elapsed() < FRAME) {
             return;
         }
         self.changed = false;
         self.published = Instant::now();
-        let solving = self.solving && !self.paused;
-        self.requests
-            .follow(&self.estimate, &self.settings, solving);
+        let (requests, solving) = (&self.requests, self.solving && !self.paused);
+        requests.follow(&self.estimate, &self.settings, solving);
         self.slot.put(Snapshot {
             phase: self.phase.clone(),
             capture: self.capture.clone(),

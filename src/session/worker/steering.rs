@@ -122,13 +122,8 @@ impl Observer for Steering<'_> {
     /// Takes a checkpoint from time to time, and before a command that may save it.
     fn offer(&mut self, make: &dyn Fn() -> Checkpoint) {
         let keeps = |mail: &Mail| {
-            let Mail::Command(command) = mail else {
-                return false;
-            };
-            matches!(
-                command,
-                Command::Save(_) | Command::Pause | Command::SolveOn
-            )
+            use Command::{Pause, Save, SolveOn};
+            matches!(mail, Mail::Command(Save(_) | Pause | SolveOn))
         };
         let waiting = self.worker.inbox.look_ahead();
         self.seen = Some(waiting.len());
