@@ -64,7 +64,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
         }
     }
     let checkpoint = earlier.as_ref().and_then(|e| e.checkpoint.as_ref());
-    known.hold(&capture.scene, &mut edits)?;
+    known.add(&capture.scene, &mut edits, true)?;
 
     if let Some(checkpoint) = checkpoint
         && settings.time > 0.0
