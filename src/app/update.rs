@@ -84,10 +84,8 @@ impl App {
         self.view.look.fit();
         self.document.start();
         self.jobs.worker.has(&self.document);
-        let opening = self
-            .document
-            .opening
-            .take_if(|_| self.document.snapshot.capture.is_some());
+        let (opening, open) = (&mut self.document.opening, &self.document.snapshot.capture);
+        let opening = opening.take_if(|_| open.is_some());
         if let Some(Source::Folder(folder)) = opening {
             self.preferences.opened(&folder);
         }
@@ -117,27 +115,16 @@ impl App {
             .and_then(|open| open.capture.frames.get(shown.frame));
         let file = file.filter(|_| needed.composite);
         let composite = file.map_or(0, |frame| size(&frame.intrinsics));
-        let (render, layers) = (needed.render, needed.layers);
-        let moves = shown.free.as_ref().map_or(0, |(_, moves)| *moves);
-        let key = (
-            shown.photograph(),
-            moves,
-            long_side,
-            composite,
-            render,
-            layers,
-        );
-        let request = ViewRequest {
+        self.jobs.worker.send_view(&ViewRequest {
             camera: match &shown.free {
-                Some((camera, _)) => ViewCamera::Free(camera.clone()),
+                Some(camera) => ViewCamera::Free(camera.clone()),
                 None => ViewCamera::Frame(shown.frame),
             },
             long_side,
             composite,
-            render,
-            layers,
-        };
-        self.jobs.worker.send_view(key, request);
+            render: needed.render,
+            layers: needed.layers,
+        });
     }
 
     fn answered(&mut self, ask: Ask, answer: Option<PathBuf>, ctx: &egui::Context) {

@@ -47,11 +47,8 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
     };
     let capture = Arc::new(open(source, &read)?.aligned()?);
     let seconds_load = started.elapsed().as_secs_f64();
-    say::note(format_args!(
-        "{}: {}",
-        capture.name,
-        capture.summary.join(", ")
-    ));
+    let summary = capture.summary.join(", ");
+    say::note(format_args!("{}: {summary}", capture.name));
     for warning in &capture.warnings {
         say::warning(warning);
     }

@@ -145,11 +145,8 @@ fn of_capture(
     runs: &[Run],
     interrupt: &Interrupt,
 ) -> Result<Trade> {
-    say::note(format_args!(
-        "{}: {}",
-        capture.name,
-        capture.summary.join(", ")
-    ));
+    let summary = capture.summary.join(", ");
+    say::note(format_args!("{}: {summary}", capture.name));
     let (problem, metric) = (capture.problem(), capture.metric()?);
     let started = Instant::now();
     let (limit, stopped) = (arguments.limit(), || interrupt.requested());

@@ -51,11 +51,10 @@ pub fn pane(ui: &mut Ui, document: &Document, view: &mut ViewState, requests: &m
         }
         click(ui, view, requests, scene, &response);
     }
-    if let Some((camera, moves)) = &mut view.shown.free
+    if let Some(camera) = &mut view.shown.free
         && before != view.model.orbit
     {
         **camera = view.model.orbit.camera();
-        *moves += 1;
     }
 
     let faces = view.model.faces(ui.ctx(), capture, &document.estimate);
@@ -256,11 +255,8 @@ fn move_object(
     if response.drag_stopped() {
         view.tool.dragged = None;
     }
-    let pointer = response.interact_pointer_pos();
-    let held = pointer
-        .filter(|_| response.dragged())
-        .zip(view.tool.dragged);
-    let Some((pointer, handle)) = held else {
+    let pointer = (response.interact_pointer_pos()).filter(|_| response.dragged());
+    let Some((pointer, handle)) = pointer.zip(view.tool.dragged) else {
         return false;
     };
     let (ray, surface) = aimed_at(&view.model, scene, pixel(ui, response.rect, pointer));

@@ -1,11 +1,10 @@
 //! Putting objects into the photographs: adding, placing, moving, turning, scaling, and the two results.
 
 use crate::app::action::Action;
-use crate::app::controls::{named, path_field, point, switched};
+use crate::app::controls::{color_button, named, path_field, point, switched};
 use crate::app::document::Document;
 use crate::app::insertion::handles::SCALES;
 use crate::app::insertion::{Adding, Insertions, name};
-use crate::app::panels::color::color_button;
 use crate::app::request::{Request, Requests};
 use crate::app::shell::dialogs::Ask;
 use crate::app::theme;
@@ -91,13 +90,8 @@ fn list(ui: &mut Ui, insertions: &Insertions, requests: &mut Requests) {
             let shown = ui
                 .add(Checkbox::without_text(&mut visible))
                 .on_hover_text("Shows or hides the object");
-            let shown = switched(
-                shown,
-                Role::CheckBox,
-                visible,
-                &format!("Show {name} {number}"),
-            );
-            if shown.changed() {
+            let show = format!("Show {name} {number}");
+            if switched(shown, Role::CheckBox, visible, &show).changed() {
                 requests.ask(Request::Hide(index, !visible));
             }
             let chosen = insertions.chosen == Some(index);
@@ -217,11 +211,8 @@ fn material(ui: &mut Ui, found: MaterialOverride, material: &mut Option<Material
         ] {
             let drag = DragValue::new(value).range(0.0..=1.0).speed(0.005);
             let drag = ui.add(drag.max_decimals(3).prefix(format!("{name} ")));
-            named(
-                drag.on_hover_text(help),
-                Role::SpinButton,
-                &format!("Object {name}"),
-            );
+            let name = format!("Object {name}");
+            named(drag.on_hover_text(help), Role::SpinButton, &name);
         }
     });
 }
@@ -238,10 +229,9 @@ fn results(ui: &mut Ui, finish: bool, requests: &mut Requests) {
         }
     });
     let mut wanted = finish;
+    let help = "Makes objects as soft and as grainy as the 8-bit photograph that they are put into";
     ui.checkbox(&mut wanted, "Blur and grain of the photograph")
-        .on_hover_text(
-            "Makes objects as soft and as grainy as the 8-bit photograph that they are put into",
-        );
+        .on_hover_text(help);
     if wanted != finish {
         requests.ask(Request::Finish(wanted));
     }

@@ -81,12 +81,8 @@ pub fn interact(
         }
     }
     drag(ui, document, view, requests, rect, size, &response);
-    if view
-        .tool
-        .transform
-        .take_if(|_| response.clicked())
-        .is_some()
-    {
+    let kept = view.tool.transform.take_if(|_| response.clicked());
+    if kept.is_some() {
         // The click kept what the keys began.
     } else if response.double_clicked() {
         view.look.fit();
@@ -188,12 +184,10 @@ pub fn overlay(ui: &Ui, document: &Document, view: &ViewState, rect: Rect, drawn
         let at = placement.min + cursor.at.to_vec2() * placement.size();
         for (color, width) in [(Color32::from_black_alpha(160), 3.0), (tokens.strong, 1.0)] {
             let stroke = egui::Stroke::new(width, color);
-            for arm in [
-                vec2(1.0, 0.0),
-                vec2(-1.0, 0.0),
-                vec2(0.0, 1.0),
-                vec2(0.0, -1.0),
-            ] {
+            for arm in [vec2(1.0, 0.0), vec2(0.0, 1.0)]
+                .into_iter()
+                .flat_map(|a| [a, -a])
+            {
                 painter.line_segment([at + arm * 3.0, at + arm * 9.0], stroke);
             }
         }

@@ -109,6 +109,7 @@ impl Report {
         let (capture, settings, estimate) =
             (&results.capture, &results.settings, &results.estimate);
         let (progress, stopped_because) = (&results.progress, results.stopped_because);
+        let exposures = estimate.exposures.as_ref();
         let mut warnings = capture.warnings.clone();
         warnings.extend(progress.warnings.iter().cloned());
         Self {
@@ -163,10 +164,7 @@ impl Report {
                     sun: outside.sun,
                 }
             }),
-            exposures: estimate
-                .exposures
-                .as_ref()
-                .map(|exposures| exposures.iter().map(|&e| rgb(e)).collect()),
+            exposures: exposures.map(|all| all.iter().copied().map(rgb).collect()),
             vignetting: estimate.vignetting.map(|v| rgb(v.power)),
             response: estimate.response.map(|r| r.terms.map(rgb)),
             albedo_common_stderr: estimate.common_error,

@@ -237,16 +237,11 @@ impl Worker {
             return;
         };
         let pictures = (layers.layers.iter()).map(|(source, picture)| (*source, &**picture));
-        match light_layers::write(path, &capture.scene, pictures) {
-            Ok(()) => self.say(
-                Level::Info,
-                format!(
-                    "layers at {} samples a pixel saved to {}",
-                    layers.samples,
-                    path.display()
-                ),
-            ),
-            Err(error) => self.fail(&error),
+        if let Err(error) = light_layers::write(path, &capture.scene, pictures) {
+            return self.fail(&error);
         }
+        let (samples, path) = (layers.samples, path.display());
+        let message = format!("layers at {samples} samples a pixel saved to {path}");
+        self.say(Level::Info, message);
     }
 }
