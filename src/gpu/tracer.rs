@@ -333,13 +333,12 @@ impl Tracer {
                 resource: buffer.as_entire_binding(),
             })
             .collect();
-        self.card
-            .device
-            .create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("scene"),
-                layout: &self.layout,
-                entries: &entries,
-            })
+        let device = &self.card.device;
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("scene"),
+            layout: &self.layout,
+            entries: &entries,
+        })
     }
 
     /// The pipeline of a kernel, compiled at first use.
@@ -429,10 +428,8 @@ fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let mut entries = vec![entry(0, wgpu::BufferBindingType::Uniform)];
     for (binding, (name, _)) in (1..).zip(BINDINGS) {
         let read_only = name != FILM;
-        entries.push(entry(
-            binding,
-            wgpu::BufferBindingType::Storage { read_only },
-        ));
+        let storage = wgpu::BufferBindingType::Storage { read_only };
+        entries.push(entry(binding, storage));
     }
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("scene"),

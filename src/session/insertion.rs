@@ -350,14 +350,8 @@ impl Inserting {
         if let Some(relit) = &self.relit {
             backdrop.photograph = relit.photograph.clone();
         }
-        let inserted = self.library.insert(
-            capture,
-            &light.edited,
-            backdrop,
-            objects,
-            &light.options,
-            light.seed,
-        );
+        let (library, edited, options) = (&mut self.library, &light.edited, &light.options);
+        let inserted = library.insert(capture, edited, backdrop, objects, options, light.seed);
         // With two samples both halves are begun.
         let shown = self.hold < 2;
         self.placed = Some(Placed::new(inserted, light.seed.wrapping_add(1), shown));
@@ -379,13 +373,8 @@ impl Inserting {
             return;
         }
         let lights = [&light.found, &light.edited].map(|e| Arc::new(e.lit(&capture.scene)));
-        let relighting = Relighting::new(
-            taken.clone(),
-            lights,
-            light.options,
-            light.seed,
-            Some(Denoiser::best()),
-        );
+        let (taken, denoiser) = (taken.clone(), Some(Denoiser::best()));
+        let relighting = Relighting::new(taken, lights, light.options, light.seed, denoiser);
         self.relit = Some(Relit::new(relighting, light, size));
     }
 

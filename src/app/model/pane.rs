@@ -19,10 +19,7 @@ use glam::{DVec3, Vec2, Vec3};
 
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, document: &Document, view: &mut ViewState, requests: &mut Requests) {
-    theme::strip(ui).show(ui, |ui| {
-        ui.set_min_width(ui.available_width());
-        controls(ui, &mut view.model);
-    });
+    theme::strip(ui, |ui| controls(ui, &mut view.model));
     let rect = ui.available_rect_before_wrap();
     let tokens = theme::tokens(ui);
     let Some(capture) = document.capture() else {

@@ -128,7 +128,7 @@ impl App {
             Request::Stop(curve, stop) => self.choose_stop(curve, stop),
             Request::KeepTrade => self.keep_trade(),
             Request::Photographs(wanted) => self.write_photographs(&wanted, ctx),
-            Request::Length { found, metres } => self.set_length(found, metres),
+            Request::Length(found, metres) => self.set_length(found, metres),
             Request::Send(command) => self.send(command),
             Request::Say(level, message) => self.say(level, message),
         }

@@ -122,23 +122,26 @@ fn drag(
     if response.drag_stopped() {
         view.tool.dragged = None;
     }
+    let aim = |pointer| {
+        let at = fraction(placement, pointer);
+        let surface = view.shown.surface_at(document, at);
+        (ray(camera, at), surface.map(|at| at.point))
+    };
     if let Some(pointer) = response.hover_pos()
         && let Some(transform) = &mut view.tool.transform
     {
-        let at = fraction(placement, pointer);
-        let surface = view.shown.surface_at(document, at).map(|at| at.point);
+        let (ray, surface) = aim(pointer);
         let project = |point| on_screen(camera, placement, point);
-        let placed = transform.placed(scene, pointer, &ray(camera, at), surface, project);
+        let placed = transform.placed(scene, pointer, &ray, surface, project);
         requests.ask_all(placed.map(|(index, to)| Request::Place(index, to)));
         return;
     }
     let pointer = response.interact_pointer_pos();
     match (pointer.filter(|_| response.dragged()), view.tool.dragged) {
         (Some(pointer), Some(handle)) => {
-            let at = fraction(placement, pointer);
-            let surface = view.shown.surface_at(document, at).map(|at| at.point);
+            let (ray, surface) = aim(pointer);
             let along = Along::of(ui.input(|input| input.modifiers));
-            let dragged = insertions.dragged(handle, scene, &ray(camera, at), surface, along);
+            let dragged = insertions.dragged(handle, scene, &ray, surface, along);
             requests.ask_all(dragged.map(|(index, to)| Request::Place(index, to)));
         }
         (Some(_), None) => view.look.pan(rect, size, response.drag_delta()),

@@ -37,16 +37,14 @@ const SAMPLES: (u64, u64) = (4, 64);
 pub fn write(staging: &mut Staging, results: &Results) -> Result<()> {
     let capture = &results.capture;
     let chosen = results.views.chosen(capture.scene.cameras.len());
-    let cameras: Vec<(usize, Camera)> = chosen
-        .into_iter()
-        .map(|index| {
-            let camera = capture.full_camera(index)?;
-            Ok((index, camera.shrunk(results.views.long_side())))
-        })
-        .collect::<Result<_>>()?;
-    let pixels: u64 = cameras
-        .iter()
-        .map(|(_, c)| u64::from(c.intrinsics.width) * u64::from(c.intrinsics.height))
+    let cameras = chosen.into_iter().map(|index| {
+        let camera = capture.full_camera(index)?;
+        Ok((index, camera.shrunk(results.views.long_side())))
+    });
+    let cameras: Vec<(usize, Camera)> = cameras.collect::<Result<_>>()?;
+    let sizes = cameras.iter().map(|(_, camera)| &camera.intrinsics);
+    let pixels: u64 = sizes
+        .map(|k| u64::from(k.width) * u64::from(k.height))
         .sum();
     let samples = (PATHS / pixels.max(1)).clamp(SAMPLES.0, SAMPLES.1) as u32;
     let estimate = results.edited();
@@ -117,14 +115,8 @@ fn frame(
 
     let mut path =
         |kind: &str, ending: &str| staging.file(format!("{FOLDER}/{index:03}.{kind}.{ending}"));
-    for (kind, picture) in [
-        ("render", &render),
-        ("albedo", &albedo),
-        ("emission", &emission),
-        ("error", &error),
-        ("stderr", &stderr),
-        ("seen", &seen),
-    ] {
+    let pictures = [&render, &albedo, &emission, &error, &stderr, &seen];
+    for (kind, picture) in KINDS.into_iter().zip(pictures) {
         write_rgb(&path(kind, "exr")?, picture, Precision::Float)?;
     }
     write_png(&path("render", "png")?, &clean, shown_at)?;

@@ -110,6 +110,8 @@ impl Report {
             (&results.capture, &results.settings, &results.estimate);
         let (progress, stopped_because) = (&results.progress, results.stopped_because);
         let exposures = estimate.exposures.as_ref();
+        let photographs = capture.photographs.iter();
+        let sizes = photographs.map(|p| u64::from(p.width) * u64::from(p.height));
         let mut warnings = capture.warnings.clone();
         warnings.extend(progress.warnings.iter().cloned());
         Self {
@@ -126,11 +128,7 @@ impl Report {
                 triangles: capture.scene.triangles.len(),
                 objects: capture.scene.objects.len(),
                 frames: capture.photographs.len(),
-                pixels: capture
-                    .photographs
-                    .iter()
-                    .map(|p| u64::from(p.width) * u64::from(p.height))
-                    .sum(),
+                pixels: sizes.sum(),
             },
             device: results.renderer.card().unwrap_or("cpu").to_owned(),
             denoiser: results.denoiser.map_or("none", Denoiser::name),

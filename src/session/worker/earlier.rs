@@ -62,12 +62,9 @@ impl Worker {
         let differs = *then != *now;
         let reread = differs.then(|| (self.backend.open)(&capture.source, then));
         let reread = reread.transpose()?;
-        Earlier::new(folder, saved, reread.as_ref().unwrap_or(capture)).map(|earlier| {
-            Some(Earlier {
-                capture: reread,
-                ..earlier
-            })
-        })
+        let mut earlier = Earlier::new(folder, saved, reread.as_ref().unwrap_or(capture))?;
+        earlier.capture = reread;
+        Ok(Some(earlier))
     }
 
     /// Opens a folder of results or of a session.

@@ -76,9 +76,8 @@ impl Session {
         if self.requests.take(&command) {
             return true;
         }
-        self.outbox
-            .as_ref()
-            .is_some_and(|outbox| outbox.send(command))
+        let outbox = self.outbox.as_ref();
+        outbox.is_some_and(|outbox| outbox.send(command))
     }
 
     /// The newest snapshot, without waiting.
