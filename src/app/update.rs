@@ -51,10 +51,8 @@ impl App {
     fn take(&mut self, snapshot: Arc<Snapshot>) {
         let before = std::mem::replace(&mut self.document.snapshot, snapshot);
         let now = self.document.snapshot.clone();
-        let other_capture = match (&before.capture, &now.capture) {
-            (Some(old), Some(new)) => !Arc::ptr_eq(old, new),
-            (old, new) => old.is_some() != new.is_some(),
-        };
+        let open = |snapshot: &Snapshot| snapshot.capture.as_ref().map(Arc::as_ptr);
+        let other_capture = open(&before) != open(&now);
         self.jobs.notices.take(&now.events);
         if before.settings != now.settings || before.sequence == 0 {
             self.document.settings = now.settings.clone();

@@ -20,7 +20,13 @@ impl Hierarchy {
     pub fn new(corners: &[[Vec3; 3]]) -> Self {
         let tree = Tree::new(corners);
         let Some(root) = tree.nodes.first() else {
-            return Self::empty();
+            // One box that no ray hits.
+            let (low, high) = (Vec3::splat(f32::MAX), Vec3::splat(-f32::MAX));
+            return Self {
+                nodes: vec![word(low, 0), word(high, 1)],
+                order: Vec::new(),
+                stack_size: 1,
+            };
         };
         // Enlarge boxes by the rounding error of the largest coordinate, so that rays within their faces hit them.
         let margin = root.low.abs().max(root.high.abs()).max_element() * 2.0 * f32::EPSILON;
@@ -34,16 +40,6 @@ impl Hierarchy {
             nodes: nodes.collect(),
             stack_size: tree.depth().max(1),
             order: tree.order,
-        }
-    }
-
-    /// One box that no ray hits.
-    fn empty() -> Self {
-        let (low, high) = (Vec3::splat(f32::MAX), Vec3::splat(-f32::MAX));
-        Self {
-            nodes: vec![word(low, 0), word(high, 1)],
-            order: Vec::new(),
-            stack_size: 1,
         }
     }
 }

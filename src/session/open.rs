@@ -153,15 +153,11 @@ fn hash(capture: &Capture) -> Result<String> {
     let mut hasher = blake3::Hasher::new();
     let mesh = &capture.mesh;
     hasher.update(&(mesh.positions.len() as u64).to_le_bytes());
-    for position in &mesh.positions {
-        for v in position.to_array() {
-            hasher.update(&v.to_le_bytes());
-        }
+    for v in mesh.positions.iter().flat_map(|p| p.to_array()) {
+        hasher.update(&v.to_le_bytes());
     }
-    for triangle in &mesh.triangles {
-        for i in triangle {
-            hasher.update(&i.to_le_bytes());
-        }
+    for i in mesh.triangles.iter().flatten() {
+        hasher.update(&i.to_le_bytes());
     }
     for frame in &capture.frames {
         let k = &frame.intrinsics;
@@ -172,10 +168,8 @@ fn hash(capture: &Capture) -> Result<String> {
                 hasher.update(blake3::hash(&bytes).as_bytes());
             }
             PhotographSource::Memory(photograph) => {
-                for pixel in &photograph.pixels {
-                    for v in pixel.to_array() {
-                        hasher.update(&v.to_le_bytes());
-                    }
+                for v in photograph.pixels.iter().flat_map(|p| p.to_array()) {
+                    hasher.update(&v.to_le_bytes());
                 }
             }
         }

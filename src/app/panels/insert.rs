@@ -128,9 +128,8 @@ fn actions(ui: &mut Ui, placing: bool, requests: &mut Requests) {
 /// Place, turn and size of an object.
 fn edit(ui: &mut Ui, object: &mut Placement, diameter: f64) {
     Grid::new("placement").num_columns(2).show(ui, |ui| {
-        ui.label("Place").on_hover_text(
-            "Where the middle of the object's base stands, in the capture's coordinates",
-        );
+        let help = "Where the middle of the object's base stands, in the capture's coordinates";
+        ui.label("Place").on_hover_text(help);
         ui.horizontal(|ui| {
             let mut at = object.at.unwrap_or(DVec3::ZERO);
             if point(ui, "Place", &mut at, diameter * 1e-3) {
@@ -148,9 +147,9 @@ fn edit(ui: &mut Ui, object: &mut Placement, diameter: f64) {
             .on_hover_text("Counter-clockwise from above");
         degrees(ui, "Turn", "", &mut object.rotate);
         ui.end_row();
-        ui.label("Tilt").on_hover_text(
-            "About the object's own x and z axes, before the turn; it stands on its lowest point",
-        );
+        let help =
+            "About the object's own x and z axes, before the turn; it stands on its lowest point";
+        ui.label("Tilt").on_hover_text(help);
         ui.horizontal(|ui| {
             for (axis, tilt) in ["x", "z"].into_iter().zip(object.tilt.as_mut()) {
                 degrees(ui, &format!("Tilt {axis}"), &format!("{axis} "), tilt);

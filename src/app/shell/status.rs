@@ -68,11 +68,9 @@ pub fn bar(
     let snapshot = &document.snapshot;
     let color = match snapshot.phase {
         Phase::Solving | Phase::Loading => tokens.accent,
-        Phase::Finished(Termination::Cancelled) => tokens.weak,
-        Phase::Finished(Termination::Diverged) => tokens.error,
+        Phase::Paused | Phase::Idle | Phase::Finished(Termination::Cancelled) => tokens.weak,
+        Phase::Failed | Phase::Finished(Termination::Diverged) => tokens.error,
         Phase::Finished(_) => tokens.good,
-        Phase::Failed => tokens.error,
-        Phase::Paused | Phase::Idle => tokens.weak,
     };
     ui.horizontal_centered(|ui| {
         let phase = RichText::new(phase_word(&snapshot.phase));

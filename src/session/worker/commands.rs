@@ -12,8 +12,7 @@ use crate::session::save::{self, Results};
 use crate::session::snapshot::{Level, Phase};
 use crate::session::store::{SessionRecord, State};
 use crate::session::view::sized::box_filter;
-use crate::session::worker::next::{Begin, Next};
-use crate::session::worker::state::Worker;
+use crate::session::worker::state::{Begin, Next, Worker};
 use crate::transport::denoise::Denoiser;
 use std::path::Path;
 

@@ -8,8 +8,7 @@ use crate::session::open_capture::OpenCapture;
 use crate::session::save::{self, Saved};
 use crate::session::snapshot::{Level, Phase};
 use crate::session::store::{self, SessionRecord, State};
-use crate::session::worker::next::Next;
-use crate::session::worker::state::Worker;
+use crate::session::worker::state::{Next, Worker};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

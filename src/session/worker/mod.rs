@@ -3,7 +3,6 @@
 mod backend;
 mod commands;
 mod earlier;
-mod next;
 mod state;
 mod steering;
 mod work;
@@ -17,8 +16,7 @@ use crate::session::inbox::{self, Outbox};
 use crate::session::painter::{Painter, Requests};
 use crate::session::slot::Slot;
 use crate::session::snapshot::Snapshot;
-use next::{Begin, Next};
-use state::Worker;
+use state::{Begin, Next, Worker};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 

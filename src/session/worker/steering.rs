@@ -7,8 +7,7 @@ use crate::inverse::solver::{Checkpoint, Control, Observer, Progress};
 use crate::session::command::Command;
 use crate::session::inbox::Mail;
 use crate::session::slot::FRAME;
-use crate::session::worker::next::Next;
-use crate::session::worker::state::Worker;
+use crate::session::worker::state::{Next, Worker};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
