@@ -193,17 +193,12 @@ impl Tracer {
     /// # Errors
     /// The rays do not fit, or the card failed.
     pub fn trace(&mut self, rays: &[Ray], any: bool) -> Result<Vec<Option<Hit>>> {
-        let words: Vec<[f32; 4]> = rays
-            .iter()
-            .flat_map(|ray| {
-                let flag = f32::from(u8::from(any));
-                let end = ray.t_max.min(f32::MAX);
-                [
-                    ray.origin.extend(end).to_array(),
-                    ray.direction.extend(flag).to_array(),
-                ]
-            })
-            .collect();
+        let flag = f32::from(u8::from(any));
+        let words = rays.iter().flat_map(|ray| {
+            let end = ray.t_max.min(f32::MAX);
+            [ray.origin.extend(end), ray.direction.extend(flag)]
+        });
+        let words: Vec<[f32; 4]> = words.map(|v| v.to_array()).collect();
         let bytes: &[u8] = bytemuck::cast_slice(&words);
         if bytes.len() as u64 > self.card.max_buffer() {
             return Err(self.card.failed("too many rays at once".to_owned()));

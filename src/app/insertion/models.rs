@@ -175,11 +175,8 @@ mod tests {
         ]];
         let material = MaterialOverride::default().surface().material(None);
         let model = ObjectModel::from_corners("cube", corners, material).expect("a model");
-        let mut models = Models::default();
-        models
-            .0
-            .insert("cube.obj".into(), Shape::Read(Outline::new(&model)));
-        models
+        let shape = Shape::Read(Outline::new(&model));
+        Models([("cube.obj".into(), shape)].into())
     }
 
     #[test]

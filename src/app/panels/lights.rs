@@ -99,13 +99,10 @@ fn light(ui: &mut Ui, document: &Document, objects: &[usize], name: &str, reques
     let strength = ui.add(slider).on_hover_text(help);
     let named_strength = format!("Strength of {name}");
     strength.widget_info(|| WidgetInfo::slider(true, f64::from(gain.strength), &named_strength));
-    let number = DragValue::new(&mut gain.strength)
-        .range(0.0..=f32::MAX)
-        .speed(0.01)
-        .max_decimals(2)
-        .suffix(" ×")
-        .update_while_editing(false);
-    let typed = ui.add(number).on_hover_text(help);
+    let number = DragValue::new(&mut gain.strength).range(0.0..=f32::MAX);
+    let number = number.speed(0.01).max_decimals(2).suffix(" ×");
+    let typed = ui.add(number.update_while_editing(false));
+    let typed = typed.on_hover_text(help);
     named(typed, Role::SpinButton, &format!("{named_strength}, typed"));
     if gain != before {
         requests.ask(Request::Light(objects.to_vec(), gain));

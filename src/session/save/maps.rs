@@ -245,10 +245,11 @@ mod tests {
 
     fn estimate() -> Estimate {
         let layout = TexelLayout::new(vec![0, 1, 2]);
-        let ramp = |scale: f32| {
-            (0..layout.len())
+        let ramp = |scale: f32| -> Vec<Vec3> {
+            let texels = 0..layout.len();
+            texels
                 .map(|i| Vec3::new(i as f32, 0.5, -1.0) * scale)
-                .collect::<Vec<_>>()
+                .collect()
         };
         Estimate {
             texels: Some(Arc::new(TexelEstimate {
