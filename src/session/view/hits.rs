@@ -121,6 +121,6 @@ fn textured<'a>(
     hit: &Hit,
 ) -> Option<(&'a TexelEstimate, usize)> {
     let texels = estimate.texels.as_deref()?;
-    let texel = texels.colors.layout.texel(hit) as usize;
-    (texels.textured.get(object) == Some(&true)).then_some((texels, texel))
+    (texels.textured.get(object)).filter(|&&textured| textured)?;
+    Some((texels, texels.colors.layout.texel(hit) as usize))
 }
