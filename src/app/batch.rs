@@ -33,7 +33,11 @@ impl Batch {
         let task = Task::begin("photographs", wake, move |progress| {
             let shown = Cell::new(None);
             let tell = |doing: WriteProgress| {
-                if is_news(shown.get(), doing) {
+                // Another photograph, or half a percent.
+                let is_news = |last: WriteProgress| {
+                    last.frame != doing.frame || doing.fraction - last.fraction >= 0.005
+                };
+                if shown.get().is_none_or(is_news) {
                     shown.set(Some(doing));
                     progress.show(doing);
                 }
@@ -48,9 +52,4 @@ impl Batch {
             task,
         })
     }
-}
-
-/// Whether progress is worth a look: another photograph, or half a percent.
-fn is_news(last: Option<WriteProgress>, doing: WriteProgress) -> bool {
-    last.is_none_or(|last| last.frame != doing.frame || doing.fraction - last.fraction >= 0.005)
 }

@@ -1,7 +1,7 @@
 //! Controls that several panes share, each with a name for those who do not see it.
 
 use egui::{Button, ComboBox, DragValue, Key, Response, Role, TextEdit, Ui, WidgetInfo};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// A response with a name that is read out.
 pub fn named(response: Response, role: Role, name: &str) -> Response {
@@ -23,6 +23,18 @@ pub fn point(ui: &mut Ui, name: &str, at: &mut DVec3, speed: f64) -> bool {
         let response = ui.add(drag.prefix(format!("{axis} ")));
         let name = format!("{name} {axis}");
         changed |= named(response, Role::SpinButton, &name).changed();
+    }
+    changed
+}
+
+/// A button with a linear colour in [0, 1], which opens a picker for it; true when it was changed.
+pub fn color_button(ui: &mut Ui, name: &str, help: &str, color: &mut Vec3) -> bool {
+    let mut rgb = color.clamp(Vec3::ZERO, Vec3::ONE).to_array();
+    let response = ui.color_edit_button_rgb(&mut rgb).on_hover_text(help);
+    // The picker rounds; only what a hand changed is taken over.
+    let changed = named(response, Role::ColorWell, name).changed();
+    if changed {
+        *color = Vec3::from_array(rgb).clamp(Vec3::ZERO, Vec3::ONE);
     }
     changed
 }

@@ -82,9 +82,7 @@ mod tests {
             "segment 041, blue"
         );
         assert_eq!(of("wall", 20.0, [0.8; 3]), "wall");
-        assert_eq!(
-            described(&object("segment 9", 1.0), 100.0, None),
-            "segment 9"
-        );
+        let unknown = described(&object("segment 9", 1.0), 100.0, None);
+        assert_eq!(unknown, "segment 9");
     }
 }

@@ -69,42 +69,29 @@ choices! {
 impl Workspace {
     /// Its layout of the first start; made for 1280 × 800 and up.
     pub fn first_layout(self) -> Tree<Pane> {
-        use Quantity::*;
+        use {Pane::*, Quantity::*};
         let mut tiles = Tiles::default();
         let mut tabs = |pictures: &[Quantity], others: &[Pane]| {
-            let pictures = pictures.iter().map(|&quantity| Pane::Picture(quantity));
+            let pictures = pictures.iter().map(|&quantity| Picture(quantity));
             let panes = pictures.chain(others.iter().copied());
             let children: Vec<TileId> = panes.map(|pane| tiles.insert_pane(pane)).collect();
             tiles.insert_tab_tile(children)
         };
-        let side = [Pane::Objects, Pane::Lights, Pane::Insert];
+        let side = [Objects, Lights, Insert];
         let (views, side, below, heights) = match self {
             Self::Compose => {
-                let views = tabs(&[Composite], &[Pane::Model, Pane::Compare]);
-                let below = [
-                    Pane::Material,
-                    Pane::Loss,
-                    Pane::Stages,
-                    Pane::Settings,
-                    Pane::Log,
-                ];
+                let views = tabs(&[Composite], &[Model, Compare]);
+                let below = [Material, Loss, Stages, Settings, Log];
                 (views, tabs(&[], &side), tabs(&[], &below), [0.6, 0.4])
             }
             Self::Inspect => {
-                let photograph = tabs(&[Photograph], &[Pane::Compare]);
+                let photograph = tabs(&[Photograph], &[Compare]);
                 let render = tabs(&[Render, Composite], &[]);
-                let model = tabs(&[], &[Pane::Model]);
+                let model = tabs(&[], &[Model]);
                 let albedo = tabs(&[Albedo, Emission, Irradiance], &[]);
                 let error = tabs(&[Error, StandardError], &[]);
-                let side = tabs(&[], &[&side[..], &[Pane::Settings, Pane::Trade]].concat());
-                let below = [
-                    Pane::Loss,
-                    Pane::Material,
-                    Pane::Stages,
-                    Pane::Capture,
-                    Pane::Log,
-                ];
-                let below = tabs(&[], &below);
+                let side = tabs(&[], &[&side[..], &[Settings, Trade]].concat());
+                let below = tabs(&[], &[Loss, Material, Stages, Capture, Log]);
                 let upper = tiles.insert_horizontal_tile(vec![photograph, render]);
                 let lower = tiles.insert_horizontal_tile(vec![model, albedo, error]);
                 let views = tiles.insert_vertical_tile(vec![upper, lower]);

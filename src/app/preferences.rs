@@ -51,10 +51,8 @@ const RECENT: usize = 8;
 impl Preferences {
     /// Reads the file; what is missing or cannot be read keeps its default.
     pub fn load(path: &Path) -> Self {
-        std::fs::read(path)
-            .ok()
-            .and_then(|bytes| serde_json::from_slice(&bytes).ok())
-            .unwrap_or_default()
+        let bytes = std::fs::read(path).unwrap_or_default();
+        serde_json::from_slice(&bytes).unwrap_or_default()
     }
 
     /// The layout of a workspace.

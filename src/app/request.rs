@@ -69,12 +69,7 @@ pub enum Request {
     /// Writes photographs.
     Photographs(Wanted),
     /// Makes a length in the capture's coordinates so many metres.
-    Length {
-        /// The length now.
-        found: f64,
-        /// What it is.
-        metres: f64,
-    },
+    Length(f64, f64),
     /// Hands a command to the worker.
     Send(Command),
     /// Says something.

@@ -12,8 +12,8 @@ use std::sync::Arc;
 pub struct Shown {
     /// The chosen photograph.
     pub frame: usize,
-    /// The 3D view's camera where pictures are rendered from it, and how often it was moved.
-    pub free: Option<(Box<Camera>, u64)>,
+    /// The 3D view's camera where pictures are rendered from it.
+    pub free: Option<Box<Camera>>,
 }
 
 impl Shown {
@@ -37,7 +37,7 @@ impl Shown {
     /// The camera of the shown view.
     pub fn camera<'a>(&'a self, document: &'a Document) -> Option<&'a Camera> {
         match &self.free {
-            Some((camera, _)) => Some(camera),
+            Some(camera) => Some(camera),
             None => document.capture()?.scene.cameras.get(self.frame),
         }
     }

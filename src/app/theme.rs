@@ -60,11 +60,14 @@ pub fn of(visuals: &Visuals) -> &'static Tokens {
     if visuals.dark_mode { &DARK } else { &LIGHT }
 }
 
-/// The strip of controls above a picture.
-pub fn strip(ui: &Ui) -> egui::Frame {
-    egui::Frame::NONE
-        .fill(tokens(ui).panel)
-        .inner_margin(egui::Margin::symmetric(6, 3))
+/// Draws the strip of controls above a picture.
+pub fn strip(ui: &mut Ui, controls: impl FnOnce(&mut Ui)) {
+    let frame = egui::Frame::NONE.fill(tokens(ui).panel);
+    let frame = frame.inner_margin(egui::Margin::symmetric(6, 3));
+    frame.show(ui, |ui| {
+        ui.set_min_width(ui.available_width());
+        controls(ui);
+    });
 }
 
 /// Installs both themes in a context.

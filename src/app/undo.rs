@@ -48,23 +48,15 @@ impl<T: Clone + PartialEq> History<T> {
     /// Takes the last step back; false where there is none.
     pub fn undo(&mut self, value: &mut T) -> bool {
         self.record(value);
-        let Self {
-            current,
-            past,
-            future,
-        } = self;
-        step(value, current, past, future)
+        let (past, future) = (&mut self.past, &mut self.future);
+        step(value, &mut self.current, past, future)
     }
 
     /// Makes the last step that was taken back again; false where there is none.
     pub fn redo(&mut self, value: &mut T) -> bool {
         self.record(value);
-        let Self {
-            current,
-            past,
-            future,
-        } = self;
-        step(value, current, future, past)
+        let (past, future) = (&mut self.past, &mut self.future);
+        step(value, &mut self.current, future, past)
     }
 }
 

@@ -51,10 +51,8 @@ impl App {
     fn take(&mut self, snapshot: Arc<Snapshot>) {
         let before = std::mem::replace(&mut self.document.snapshot, snapshot);
         let now = self.document.snapshot.clone();
-        let other_capture = match (&before.capture, &now.capture) {
-            (Some(old), Some(new)) => !Arc::ptr_eq(old, new),
-            (old, new) => old.is_some() != new.is_some(),
-        };
+        let open = |snapshot: &Snapshot| snapshot.capture.as_ref().map(Arc::as_ptr);
+        let other_capture = open(&before) != open(&now);
         self.jobs.notices.take(&now.events);
         if before.settings != now.settings || before.sequence == 0 {
             self.document.settings = now.settings.clone();
@@ -84,10 +82,8 @@ impl App {
         self.view.look.fit();
         self.document.start();
         self.jobs.worker.has(&self.document);
-        let opening = self
-            .document
-            .opening
-            .take_if(|_| self.document.snapshot.capture.is_some());
+        let (opening, open) = (&mut self.document.opening, &self.document.snapshot.capture);
+        let opening = opening.take_if(|_| open.is_some());
         if let Some(Source::Folder(folder)) = opening {
             self.preferences.opened(&folder);
         }
@@ -117,27 +113,16 @@ impl App {
             .and_then(|open| open.capture.frames.get(shown.frame));
         let file = file.filter(|_| needed.composite);
         let composite = file.map_or(0, |frame| size(&frame.intrinsics));
-        let (render, layers) = (needed.render, needed.layers);
-        let moves = shown.free.as_ref().map_or(0, |(_, moves)| *moves);
-        let key = (
-            shown.photograph(),
-            moves,
-            long_side,
-            composite,
-            render,
-            layers,
-        );
-        let request = ViewRequest {
+        self.jobs.worker.send_view(&ViewRequest {
             camera: match &shown.free {
-                Some((camera, _)) => ViewCamera::Free(camera.clone()),
+                Some(camera) => ViewCamera::Free(camera.clone()),
                 None => ViewCamera::Frame(shown.frame),
             },
             long_side,
             composite,
-            render,
-            layers,
-        };
-        self.jobs.worker.send_view(key, request);
+            render: needed.render,
+            layers: needed.layers,
+        });
     }
 
     fn answered(&mut self, ask: Ask, answer: Option<PathBuf>, ctx: &egui::Context) {

@@ -171,11 +171,8 @@ impl eframe::App for Window {
         if let Some(pace) = &self.pace {
             let size = ctx.viewport_rect().size() * ctx.pixels_per_point();
             let touched = ctx.input(|input| !input.raw.events.is_empty());
-            pace.note(
-                (size.x * size.y) as u64,
-                touched,
-                self.app.document.is_running(),
-            );
+            let (pixels, running) = (size.x * size.y, self.app.document.is_running());
+            pace.note(pixels as u64, touched, running);
         }
     }
 

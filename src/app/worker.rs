@@ -27,14 +27,11 @@ impl Connection for crate::session::Session {
     }
 }
 
-/// Identifies a request for a view: photograph, moves of the 3D view, two sizes, and which pictures.
-pub type ViewKey = (Option<usize>, u64, u32, u32, bool, bool);
-
 /// What the worker was told last.
 #[derive(Debug)]
 pub struct Sent {
     /// The view; `None` asks again.
-    pub view: Option<ViewKey>,
+    pub view: Option<ViewRequest>,
     /// The inserted objects.
     pub insertions: Vec<Placement>,
     /// Whether they take blur and grain.
@@ -100,20 +97,16 @@ impl Worker {
     }
 
     /// Asks for a view where it differs from the last.
-    pub fn send_view(&mut self, key: ViewKey, request: ViewRequest) {
-        let Self {
-            connection, sent, ..
-        } = self;
-        told(&mut sent.view, &Some(key), || {
-            connection.send(Command::View(request))
+    pub fn send_view(&mut self, request: &ViewRequest) {
+        let connection = &self.connection;
+        told(&mut self.sent.view, &Some(request.clone()), || {
+            connection.send(Command::View(request.clone()))
         });
     }
 
     /// Sends the inserted objects where they differ.
     pub fn send_insertions(&mut self, document: &Document) {
-        let Self {
-            connection, sent, ..
-        } = self;
+        let (connection, sent) = (&self.connection, &mut self.sent);
         let (objects, finish) = (&document.insertions.objects, document.insertions.finish);
         told(&mut sent.finish, &finish, || {
             connection.send(Command::Match(finish))
@@ -142,10 +135,8 @@ impl Worker {
 
     /// Sends the edits where they differ.
     pub fn send_edits(&mut self, document: &Document) {
-        let Self {
-            connection, sent, ..
-        } = self;
-        told(&mut sent.edits, &document.edits, || {
+        let connection = &self.connection;
+        told(&mut self.sent.edits, &document.edits, || {
             connection.send(Command::Edit(document.edits.clone()))
         });
     }

@@ -1,7 +1,7 @@
 //! `relit edit`: changes the emission and materials of objects in an estimate.
 
 use crate::cli::numbers::from_one;
-use crate::cli::object_values::{ObjectValues, named_color, named_number};
+use crate::cli::object_values::ObjectValues;
 use crate::cli::options::{DenoiseOptions, DeviceOptions, Replace};
 use crate::cli::photographs::write_with_progress;
 use crate::cli::saved::{Loaded, SavedOptions};
@@ -13,7 +13,6 @@ use crate::session::photographs::Photographs;
 use crate::session::save::pictures::Frames;
 use crate::session::save::{self, Results};
 use clap::Args;
-use glam::Vec3;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
@@ -23,18 +22,8 @@ use std::time::Instant;
 pub struct EditArguments {
     #[command(flatten)]
     saved: SavedOptions,
-    /// Radiance that an object emits
-    #[arg(long, value_name = "NAME=R,G,B", value_parser = named_color)]
-    emission: Vec<(String, Vec3)>,
-    /// Diffuse reflectance of an object, 0 to 1
-    #[arg(long, value_name = "NAME=R,G,B", value_parser = named_color)]
-    albedo: Vec<(String, Vec3)>,
-    /// GGX roughness of an object's specular lobe, above 0 (mirror-like) to 1; adds a lobe if there is none
-    #[arg(long, value_name = "NAME=V", value_parser = named_number)]
-    roughness: Vec<(String, f32)>,
-    /// Specular reflectance of an object at normal incidence, 0 to 1; adds a lobe if there is none, and 0 removes it
-    #[arg(long, value_name = "NAME=V", value_parser = named_number)]
-    specular: Vec<(String, f32)>,
+    #[command(flatten)]
+    values: ObjectValues,
     /// Pictures to write: all frames at full size, N frames, or none [default: 16, long side 1024]
     #[arg(long, value_name = "all|N|none", value_parser = crate::cli::options::frames)]
     views: Option<Frames>,
@@ -80,13 +69,7 @@ pub fn edit(arguments: &EditArguments) -> Result<i32> {
         mut edits,
         ..
     } = arguments.saved.load()?;
-    let values = ObjectValues {
-        emission: arguments.emission.clone(),
-        albedo: arguments.albedo.clone(),
-        roughness: arguments.roughness.clone(),
-        specular: arguments.specular.clone(),
-    };
-    values.change(&capture.scene, &mut edits)?;
+    arguments.values.add(&capture.scene, &mut edits, false)?;
     let edited = Arc::new(edits.apply(&found));
     let denoiser = arguments.denoise.denoiser(true)?;
     let photographs = arguments.photographs.then(|| Photographs {

@@ -58,37 +58,28 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<()> {
     }
 }
 
-fn table(evaluation: &Evaluation) -> String {
+fn table(e: &Evaluation) -> String {
     let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.4}"));
     let rows = [
-        ("objects scored", Some(evaluation.objects as f64)),
-        ("albedo, mean absolute error", evaluation.albedo_mae),
-        (
-            "albedo, median relative error",
-            evaluation.albedo_rel_median,
-        ),
-        ("albedo, 95th percentile", evaluation.albedo_rel_p95),
-        ("albedo pictures, PSNR in dB", evaluation.albedo_psnr),
+        ("objects scored", Some(e.objects as f64)),
+        ("albedo, mean absolute error", e.albedo_mae),
+        ("albedo, median relative error", e.albedo_rel_median),
+        ("albedo, 95th percentile", e.albedo_rel_p95),
+        ("albedo pictures, PSNR in dB", e.albedo_psnr),
         (
             "  at best with one colour an object",
-            evaluation.albedo_psnr_constant_per_object,
+            e.albedo_psnr_constant_per_object,
         ),
-        ("emitters, intersection over union", evaluation.emission_iou),
-        (
-            "emission, mean squared log error",
-            evaluation.emission_log_mse,
-        ),
-        (
-            "emission, median relative error",
-            evaluation.emission_rel_median,
-        ),
-        ("scale fitted to the light", Some(evaluation.emission_scale)),
+        ("emitters, intersection over union", e.emission_iou),
+        ("emission, mean squared log error", e.emission_log_mse),
+        ("emission, median relative error", e.emission_rel_median),
+        ("scale fitted to the light", Some(e.emission_scale)),
     ];
     let mut text = String::new();
     for (name, value) in rows {
         text += &format!("{name:38} {:>10}\n", number(value));
     }
-    let per_object = evaluation.per_object.iter();
+    let per_object = e.per_object.iter();
     let per_object: Vec<_> = per_object.map(|(name, e)| (say::plain(name), e)).collect();
     let names = per_object.iter().map(|(n, _)| n.chars().count());
     let width = names.max().unwrap_or(0).max(6);

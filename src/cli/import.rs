@@ -115,12 +115,9 @@ pub fn import(arguments: &ImportArguments) -> Result<()> {
 /// The folder holds no scan, or the capture cannot be written.
 pub fn beside_results(scan: &Path) -> Result<PathBuf> {
     let out = PathKind::imported(scan);
+    let said = format!("{}: imported into {}", scan.display(), out.display());
     if out.join(CAMERAS).exists() {
-        say::note(format_args!(
-            "{}: imported into {} before",
-            scan.display(),
-            out.display()
-        ));
+        say::note(format_args!("{said} before"));
         return Ok(out);
     }
     let read = read(scan, &ImportOptions::default())?;
@@ -128,11 +125,7 @@ pub fn beside_results(scan: &Path) -> Result<PathBuf> {
         say::note(line);
     }
     export::import::write(&out, &read)?;
-    say::note(format_args!(
-        "{}: imported into {}",
-        scan.display(),
-        out.display()
-    ));
+    say::note(said);
     Ok(out)
 }
 

@@ -265,37 +265,19 @@ mod tests {
     use super::*;
     use crate::transport::material::DIELECTRIC;
 
-    fn parse(arguments: &[&str]) -> std::result::Result<Vec<Placement>, String> {
+    fn parse(line: &str) -> std::result::Result<Vec<Placement>, String> {
         let command = Objects::augment_args(Command::new("insert"));
-        let all = std::iter::once(&"insert").chain(arguments);
-        let matches = command
-            .try_get_matches_from(all)
-            .map_err(|e| e.to_string())?;
-        Objects::from_arg_matches(&matches)
-            .map(|objects| objects.0)
-            .map_err(|e| e.to_string())
+        let words = std::iter::once("insert").chain(line.split_whitespace());
+        let parsed = command.try_get_matches_from(words);
+        let objects = parsed.and_then(|matches| Objects::from_arg_matches(&matches));
+        objects.map(|objects| objects.0).map_err(|e| e.to_string())
     }
 
     #[test]
     fn each_option_belongs_to_the_object_before_it() {
-        let parsed = parse(&[
-            "--object",
-            "a.obj",
-            "--at",
-            "-1,0,2",
-            "--rotate",
-            "-90",
-            "--tilt",
-            "-30,15",
-            "--object",
-            "b.glb",
-            "--scale",
-            "0.01",
-            "--as-modelled",
-            "--material",
-            "metal:0.9,0.6,0.3,0.25",
-        ])
-        .expect("valid");
+        let line = "--object a.obj --at -1,0,2 --rotate -90 --tilt -30,15 \
+                    --object b.glb --scale 0.01 --as-modelled --material metal:0.9,0.6,0.3,0.25";
+        let parsed = parse(line).expect("valid");
         assert_eq!(parsed.len(), 2);
         assert!(parsed[0].material.is_none());
         let made = parsed[1].material.expect("a material");
@@ -315,10 +297,10 @@ mod tests {
 
     #[test]
     fn an_object_without_a_place_and_an_option_without_an_object_are_refused() {
-        assert!(parse(&["--object", "a.obj"]).is_err_and(|e| e.contains("a.obj needs either")));
-        let both = parse(&["--object", "a.obj", "--as-modelled", "--at", "0,0,0"]);
+        assert!(parse("--object a.obj").is_err_and(|e| e.contains("a.obj needs either")));
+        let both = parse("--object a.obj --as-modelled --at 0,0,0");
         assert!(both.is_err_and(|e| e.contains("needs either")));
-        let early = parse(&["--scale", "2", "--object", "a.obj", "--as-modelled"]);
+        let early = parse("--scale 2 --object a.obj --as-modelled");
         assert!(early.is_err_and(|e| e.contains("before any")));
     }
 

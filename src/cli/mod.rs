@@ -141,7 +141,7 @@ fn open(arguments: Arguments, window: Option<Window>) -> Result<i32> {
         Some(_) if !has_display() => "no display".to_owned(),
         Some(window) => {
             solve::use_threads(options.threads)?;
-            let settings = options.settings();
+            let settings = options.parameters.over(&Settings::default());
             let start = match options.out.clone().filter(|_| options.resume) {
                 Some(results) => Start::Results(results),
                 None => Start::Capture(source.clone(), options.read.open(&settings)),

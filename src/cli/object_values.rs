@@ -4,92 +4,71 @@ use crate::cli::numbers::triple;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::session::edits::{Edits, ObjectEdit};
+use clap::Args;
 use glam::Vec3;
 
 /// Emission and material of named objects.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Args)]
 pub struct ObjectValues {
-    /// Radiance, W·sr⁻¹·m⁻².
+    /// Radiance that an object emits
+    #[arg(long, value_name = "NAME=R,G,B", value_parser = named_color)]
     pub emission: Vec<(String, Vec3)>,
-    /// Diffuse reflectance, 0 to 1.
+    /// Diffuse reflectance of an object, 0 to 1
+    #[arg(long, value_name = "NAME=R,G,B", value_parser = named_color)]
     pub albedo: Vec<(String, Vec3)>,
-    /// GGX roughness α, above 0 and up to 1.
+    /// GGX roughness of an object's specular lobe, above 0 (mirror-like) to 1; adds a lobe if there is none
+    #[arg(long, value_name = "NAME=V", value_parser = named_number)]
     pub roughness: Vec<(String, f32)>,
-    /// Specular reflectance at normal incidence, 0 to 1; 0 removes the lobe.
+    /// Specular reflectance of an object at normal incidence, 0 to 1; adds a lobe if there is none, and 0 removes it
+    #[arg(long, value_name = "NAME=V", value_parser = named_number)]
     pub specular: Vec<(String, f32)>,
 }
 
+/// What is wrong with a reflectance out of range.
+const REFLECTANCE: &str = "a surface reflects between none and all of the light";
+
 impl ObjectValues {
-    /// Adds the values to `edits` as changes of an estimate.
+    /// Adds the values to `edits` as changes of an estimate; where `known`, as values that a solve holds fixed.
     ///
     /// # Errors
     /// An object does not exist, or a value is out of range.
-    pub fn change(&self, scene: &Scene, edits: &mut Edits) -> Result<()> {
-        self.apply(scene, edits, |_| {})
-    }
-
-    /// Adds the values to `edits` as known values, which a solve holds fixed.
-    ///
-    /// # Errors
-    /// As [`ObjectValues::change`].
-    pub fn hold(&self, scene: &Scene, edits: &mut Edits) -> Result<()> {
-        self.apply(scene, edits, |edit| {
-            edit.emission_known |= edit.emission.is_some();
-            edit.albedo_known |= edit.albedo.is_some();
-        })
-    }
-
-    fn apply(
-        &self,
-        scene: &Scene,
-        edits: &mut Edits,
-        then: impl Fn(&mut ObjectEdit),
-    ) -> Result<()> {
+    pub fn add(&self, scene: &Scene, edits: &mut Edits, known: bool) -> Result<()> {
         let mut set = |name: &str, set: &dyn Fn(&mut ObjectEdit)| {
             let object = find(scene, name)?;
             let mut edit = edits.object(object);
             set(&mut edit);
-            then(&mut edit);
+            edit.emission_known |= known && edit.emission.is_some();
+            edit.albedo_known |= known && edit.albedo.is_some();
             edits.set(object, edit);
             Ok(())
         };
+        let refused = |what: &str, name: &str, problem: &str, remedy: &str| {
+            Err(Error::usage(format!("{what} of {name}"), problem, remedy))
+        };
         for (name, emission) in &self.emission {
             if emission.min_element() < 0.0 {
-                return Err(Error::usage(
-                    format!("emission of {name}"),
-                    "light cannot be negative",
-                    "give values of 0 or more",
-                ));
+                let problem = "light cannot be negative";
+                return refused("emission", name, problem, "give values of 0 or more");
             }
             set(name, &|edit| edit.emission = Some(*emission))?;
         }
         for (name, albedo) in &self.albedo {
             if albedo.min_element() < 0.0 || albedo.max_element() > 1.0 {
-                return Err(Error::usage(
-                    format!("albedo of {name}"),
-                    "a surface reflects between none and all of the light",
-                    "give values from 0 to 1",
-                ));
+                return refused("albedo", name, REFLECTANCE, "give values from 0 to 1");
             }
             set(name, &|edit| edit.albedo = Some(*albedo))?;
         }
         for (name, roughness) in &self.roughness {
             if !(*roughness > 0.0 && *roughness <= 1.0) {
-                return Err(Error::usage(
-                    format!("roughness of {name}"),
-                    "a GGX roughness is above 0 and at most 1",
-                    "give a value like 0.3",
-                ));
+                let problem = "a GGX roughness is above 0 and at most 1";
+                return refused("roughness", name, problem, "give a value like 0.3");
             }
             set(name, &|edit| edit.roughness = Some(*roughness))?;
         }
         for (name, specular) in &self.specular {
             if !(0.0..=1.0).contains(specular) {
-                return Err(Error::usage(
-                    format!("specular reflectance of {name}"),
-                    "a surface reflects between none and all of the light",
-                    "give a value from 0 (no lobe) to 1",
-                ));
+                let remedy = "give a value from 0 (no lobe) to 1";
+                return refused("specular reflectance", name, REFLECTANCE, remedy);
             }
             set(name, &|edit| edit.specular = Some(*specular))?;
         }

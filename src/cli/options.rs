@@ -139,28 +139,6 @@ impl Replace {
 /// Options for reading a capture.
 #[derive(Debug, Args)]
 pub struct ReadOptions {
-    #[command(flatten)]
-    pub reading: ReadingOptions,
-    /// Solve even if the photographs do not seem to show the mesh from their poses
-    #[arg(long)]
-    pub trust_poses: bool,
-    /// Up axis of the capture [default: the cameras' mean up]
-    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
-    pub up: Option<DVec3>,
-    /// Metres per unit of the capture's files [default: 1]
-    #[arg(long, value_name = "METRES", value_parser = above_zero)]
-    pub scale: Option<f64>,
-    /// About how many segments to cut a mesh without objects into; what photographs show saturated gets segments of its own
-    #[arg(long, value_name = "N", value_parser = from_one::<u64>)]
-    pub segments: Option<u64>,
-    /// Let paths in the capture lead out of its folder; only for captures that you trust
-    #[arg(long)]
-    pub allow_outside: bool,
-}
-
-/// Conventions of a capture's files, where they differ from the format's.
-#[derive(Debug, Args)]
-pub struct ReadingOptions {
     /// Axes of the poses: x right, y up, looking down -z (opengl), or x right, y down, looking down +z (opencv)
     #[arg(long, value_name = "AXES", value_parser = ["opengl", "opencv"])]
     pub axes: Option<String>,
@@ -185,11 +163,26 @@ pub struct ReadingOptions {
     /// Use for each pose the photograph of the frame N later
     #[arg(long, value_name = "N", value_parser = shift)]
     pub shift: Option<i32>,
+    /// Solve even if the photographs do not seem to show the mesh from their poses
+    #[arg(long)]
+    pub trust_poses: bool,
+    /// Up axis of the capture [default: the cameras' mean up]
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
+    pub up: Option<DVec3>,
+    /// Metres per unit of the capture's files [default: 1]
+    #[arg(long, value_name = "METRES", value_parser = above_zero)]
+    pub scale: Option<f64>,
+    /// About how many segments to cut a mesh without objects into; what photographs show saturated gets segments of its own
+    #[arg(long, value_name = "N", value_parser = from_one::<u64>)]
+    pub segments: Option<u64>,
+    /// Let paths in the capture lead out of its folder; only for captures that you trust
+    #[arg(long)]
+    pub allow_outside: bool,
 }
 
-impl ReadingOptions {
-    /// These options over `before`: what is not given keeps its value.
-    fn over(&self, before: Reading) -> Reading {
+impl ReadOptions {
+    /// The conventions of a capture's files over `before`: what is not given keeps its value.
+    fn reading(&self, before: Reading) -> Reading {
         let axes = match self.axes.as_deref() {
             Some("opencv") => Axes::OpenCv,
             Some(_) => Axes::OpenGl,
@@ -212,16 +205,7 @@ impl ReadingOptions {
             shift: self.shift.unwrap_or(before.shift),
         }
     }
-}
 
-impl SolveOptions {
-    /// The given parameters over the defaults.
-    pub fn settings(&self) -> Settings {
-        self.parameters.over(&Settings::default())
-    }
-}
-
-impl ReadOptions {
     /// Options for opening a capture that is solved with `settings`, which hold pixels out of the fit.
     pub fn open(&self, settings: &Settings) -> OpenOptions {
         self.over(OpenOptions {
@@ -235,7 +219,7 @@ impl ReadOptions {
     pub fn over(&self, before: OpenOptions) -> OpenOptions {
         OpenOptions {
             up: self.up.or(before.up),
-            reading: self.reading.over(before.reading),
+            reading: self.reading(before.reading),
             coordinates: Coordinates {
                 scale: self.scale.or(before.coordinates.scale),
                 ..before.coordinates

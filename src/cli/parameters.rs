@@ -57,14 +57,19 @@ pub fn duration(text: &str) -> Option<f64> {
     (seconds.is_finite() && seconds >= 0.0).then_some(seconds)
 }
 
+/// A value as it is typed.
+fn text(value: Value) -> String {
+    match value {
+        Value::Flag(flag) => flag.to_string(),
+        Value::Whole(n) => n.to_string(),
+        Value::Real(x) => x.to_string(),
+        Value::Choice(word) => word,
+    }
+}
+
 fn option(parameter: &'static Parameter) -> Arg {
-    let mut help = parameter.help.to_owned();
-    help += &match parameter.get(&Settings::default()) {
-        Value::Flag(flag) => format!(" [default: {flag}]"),
-        Value::Whole(n) => format!(" [default: {n}]"),
-        Value::Real(x) => format!(" [default: {x}]"),
-        Value::Choice(word) => format!(" [default: {word}]"),
-    };
+    let default = text(parameter.get(&Settings::default()));
+    let help = format!("{} [default: {default}]", parameter.help);
     let value_name = match parameter.kind {
         Kind::Flag => "true|false".to_owned(),
         Kind::Choice(words) => words.join("|"),
@@ -128,14 +133,9 @@ mod tests {
             };
             let option = format!("--{}", parameter.name.replace('_', "-"));
             let mut reached = Vec::new();
-            for text in &values {
-                let settings = given(&[&option, text]).expect("the value is allowed");
-                reached.push(match parameter.get(&settings) {
-                    Value::Flag(flag) => flag.to_string(),
-                    Value::Whole(n) => n.to_string(),
-                    Value::Real(x) => x.to_string(),
-                    Value::Choice(word) => word,
-                });
+            for value in &values {
+                let settings = given(&[&option, value]).expect("the value is allowed");
+                reached.push(text(parameter.get(&settings)));
             }
             assert_eq!(reached, values, "{option}");
         }
@@ -155,20 +155,14 @@ mod tests {
         assert_eq!(bounces("auto"), Some(0));
         assert_eq!(bounces("3"), Some(3));
         assert_eq!(bounces("many"), None);
-        let target = |text| {
-            given(&["--target-error", text])
-                .map(|s| s.target_error)
-                .ok()
-        };
+        let target = |text| Some(given(&["--target-error", text]).ok()?.target_error);
         assert_eq!(target("1%"), Some(1.0));
         assert_eq!(target("0.5"), Some(0.5));
         assert_eq!(target("101"), None);
         let held_out = |arguments: &[&str]| given(arguments).map(|s| s.held_out).ok();
         assert_eq!(held_out(&[]), Some(Settings::default().held_out));
         assert_eq!(held_out(&["--hold-out", "0"]), Some(0.0));
-        assert_eq!(
-            held_out(&["--hold-out", "4"]),
-            Some(Settings::default().held_out)
-        );
+        let some = held_out(&["--hold-out", "4"]);
+        assert_eq!(some, Some(Settings::default().held_out));
     }
 }

@@ -29,11 +29,10 @@ pub fn write_with_progress(
     for warning in &written.warnings {
         say::warning(warning);
     }
-    if written.photographs < work.frames.len() {
+    let (done, all) = (written.photographs, work.frames.len());
+    if done < all {
         say::note(format_args!(
-            "interrupted after {} of {} photographs",
-            written.photographs,
-            work.frames.len()
+            "interrupted after {done} of {all} photographs"
         ));
     }
     for path in &written.files {

@@ -274,12 +274,4 @@ mod tests {
         assert!(check(&["solve"]).is_err());
         assert!(check(&["solve", "room", "--nonsense"]).is_err());
     }
-
-    #[test]
-    fn cells_keep_bars_and_angles_inside() {
-        assert_eq!(
-            row(&["`all|N`", "in <capture>"]),
-            "| `all\\|N` | in \\<capture> |\n"
-        );
-    }
 }

@@ -54,21 +54,15 @@ pub struct RenderArguments {
     replace: Replace,
 }
 
-/// File format of the picture.
-enum Format {
-    Exr,
-    Png,
-}
-
 /// Renders one picture.
 ///
 /// # Errors
 /// The results or the camera cannot be read, or the picture cannot be written.
 pub fn render(arguments: &RenderArguments) -> Result<()> {
     let ending = arguments.out.extension().and_then(|e| e.to_str());
-    let format = match ending.map(str::to_ascii_lowercase).as_deref() {
-        Some("exr") => Format::Exr,
-        Some("png") => Format::Png,
+    let is_png = match ending.map(str::to_ascii_lowercase).as_deref() {
+        Some("exr") => false,
+        Some("png") => true,
         _ => {
             return Err(Error::usage(
                 arguments.out.display(),
@@ -77,7 +71,7 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
             ));
         }
     };
-    if arguments.layers && matches!(format, Format::Png) {
+    if arguments.layers && is_png {
         return Err(Error::usage(
             arguments.out.display(),
             "a .png has no layers",
@@ -135,7 +129,7 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
             pixels: film.mean(),
         }
     };
-    let denoiser = arguments.denoise.denoiser(matches!(format, Format::Png))?;
+    let denoiser = arguments.denoise.denoiser(is_png)?;
     let mut picture = if let Some(denoiser) = denoiser {
         // The denoiser estimates the noise from two independent halves.
         let half = spp.div_ceil(2);
@@ -144,23 +138,18 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
     } else {
         rendered(seed, spp)
     };
-    match format {
-        Format::Exr => write_rgb(&arguments.out, &picture, Precision::Float),
-        Format::Png => {
-            // Exposed like the photograph where it saturates.
-            let saturation = match arguments.camera {
-                None => capture.frame(frame as usize)?.1.saturation,
-                Some(_) => Vec3::INFINITY,
-            };
-            if saturation.is_finite() {
-                let exposure = estimate.exposure(frame as usize);
-                exposure.apply(&camera.intrinsics, saturation, &mut picture);
-            }
-            write_png(
-                &arguments.out,
-                &picture,
-                shown_at(saturation, &picture.pixels),
-            )
-        }
+    if !is_png {
+        return write_rgb(&arguments.out, &picture, Precision::Float);
     }
+    // Exposed like the photograph where it saturates.
+    let saturation = match arguments.camera {
+        None => capture.frame(frame as usize)?.1.saturation,
+        Some(_) => Vec3::INFINITY,
+    };
+    if saturation.is_finite() {
+        let exposure = estimate.exposure(frame as usize);
+        exposure.apply(&camera.intrinsics, saturation, &mut picture);
+    }
+    let shown_at = shown_at(saturation, &picture.pixels);
+    write_png(&arguments.out, &picture, shown_at)
 }

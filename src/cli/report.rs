@@ -13,12 +13,8 @@ const ROWS: usize = 24;
 
 /// Table of objects with standard errors, sorted by emission, then by the number of pixels that see them.
 pub fn objects(scene: &Scene, estimate: &Estimate) -> String {
-    let mut rows: Vec<(Cow<str>, &ObjectEstimate)> = scene
-        .objects
-        .iter()
-        .map(|o| say::plain(&o.name))
-        .zip(&estimate.objects)
-        .collect();
+    let names = scene.objects.iter().map(|o| say::plain(&o.name));
+    let mut rows: Vec<(Cow<str>, &ObjectEstimate)> = names.zip(&estimate.objects).collect();
     rows.sort_by(|(_, a), (_, b)| {
         let brightness = |o: &ObjectEstimate| o.emission.element_sum();
         brightness(b)
@@ -26,12 +22,8 @@ pub fn objects(scene: &Scene, estimate: &Estimate) -> String {
             .then(b.seen_pixels.cmp(&a.seen_pixels))
     });
     let shown = rows.len().min(ROWS);
-    let width = rows[..shown]
-        .iter()
-        .map(|(name, _)| name.chars().count())
-        .max()
-        .unwrap_or(0)
-        .max(6);
+    let widths = rows[..shown].iter().map(|(name, _)| name.chars().count());
+    let width = widths.max().unwrap_or(0).max(6);
     let mut text = format!(
         "{:width$}  {:>24}  {:>9}  {:>17}  {:>7}  {:>8}\n",
         "object", "emission", "±", "albedo", "±", "pixels"
@@ -40,10 +32,9 @@ pub fn objects(scene: &Scene, estimate: &Estimate) -> String {
         let [r, g, b] = object.emission.to_array();
         let emission = format!("{r:.4} {g:.4} {b:.4}");
         let [r, g, b] = object.albedo.to_array();
-        let albedo = if object.albedo_identifiable {
-            format!("{r:.3} {g:.3} {b:.3}")
-        } else {
-            "not determined".to_owned()
+        let albedo = match object.albedo_identifiable {
+            true => format!("{r:.3} {g:.3} {b:.3}"),
+            false => "not determined".to_owned(),
         };
         // Writing to a string cannot fail.
         let _ = writeln!(
@@ -70,10 +61,9 @@ pub fn objects(scene: &Scene, estimate: &Estimate) -> String {
 fn error(stderr: Vec3, digits: usize) -> String {
     let worst = stderr.max_element();
     // f32::MAX stands for an unknown error.
-    if worst < f32::MAX {
-        format!("{worst:.digits$}")
-    } else {
-        "?".to_owned()
+    match worst < f32::MAX {
+        true => format!("{worst:.digits$}"),
+        false => "?".to_owned(),
     }
 }
 

@@ -1,6 +1,5 @@
 //! `relit solve`: a headless solve with progress; an interrupt saves the estimate reached so far.
 
-use crate::calibrate::problem::Problem;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::object_values::ObjectValues;
 use crate::cli::options::SolveOptions;
@@ -37,11 +36,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
 
     // Load the earlier solve.
     let folder = options.out.clone().unwrap_or_else(|| source.default_out());
-    let earlier = if options.resume {
-        Some(save::load_checkpoint(&folder)?)
-    } else {
-        None
-    };
+    let earlier = (options.resume.then(|| save::load_checkpoint(&folder))).transpose()?;
     let base = earlier.as_ref().map(|e| e.settings.clone());
     let settings = options.parameters.over(&base.unwrap_or_default());
 
@@ -52,27 +47,21 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
     };
     let capture = Arc::new(open(source, &read)?.aligned()?);
     let seconds_load = started.elapsed().as_secs_f64();
-    say::note(format_args!(
-        "{}: {}",
-        capture.name,
-        capture.summary.join(", ")
-    ));
+    let summary = capture.summary.join(", ");
+    say::note(format_args!("{}: {summary}", capture.name));
     for warning in &capture.warnings {
         say::warning(warning);
     }
     let mut edits = Edits::default();
-    let checkpoint = match &earlier {
-        Some(earlier) => {
-            earlier.estimate_for(&capture)?;
-            edits = earlier.edits_for(&capture)?;
-            if earlier.checkpoint.is_none() {
-                say::warning("the earlier solve left no checkpoint; starting over");
-            }
-            earlier.checkpoint.as_ref()
+    if let Some(earlier) = &earlier {
+        earlier.estimate_for(&capture)?;
+        edits = earlier.edits_for(&capture)?;
+        if earlier.checkpoint.is_none() {
+            say::warning("the earlier solve left no checkpoint; starting over");
         }
-        None => None,
-    };
-    known.hold(&capture.scene, &mut edits)?;
+    }
+    let checkpoint = earlier.as_ref().and_then(|e| e.checkpoint.as_ref());
+    known.add(&capture.scene, &mut edits, true)?;
 
     if let Some(checkpoint) = checkpoint
         && settings.time > 0.0
@@ -92,10 +81,7 @@ pub fn solve(source: &Source, options: &SolveOptions, known: &ObjectValues) -> R
         say::note(NOTHING_TO_SAVE);
         return Ok(interrupt.exit_code());
     }
-    let problem = Problem {
-        scene: capture.scene.clone(),
-        photographs: capture.photographs.clone(),
-    };
+    let problem = capture.problem();
     let mut watch = Watch {
         results: Results {
             capture: capture.clone(),

@@ -86,23 +86,15 @@ pub fn study(arguments: &StudyArguments) -> Result<()> {
         .iter()
         .filter(|study| arguments.name == ALL || study.name == arguments.name)
         .collect();
-    let subject = arguments.capture.clone().map(|folder| {
-        open(
-            &Source::Folder(folder),
-            &arguments.read.open(&Settings::default()),
-        )?
-        .aligned()?
-        .subject()
-    });
+    let options = arguments.read.open(&Settings::default());
+    let source = arguments.capture.clone().map(Source::Folder);
+    let subject = source.map(|source| open(&source, &options)?.aligned()?.subject());
     let subject = subject.transpose()?;
+    let quick = arguments.quick;
     for study in wanted {
-        let seeds = if arguments.quick {
-            QUICK_SEEDS
-        } else {
-            study.seeds
-        };
+        let seeds = if quick { QUICK_SEEDS } else { study.seeds };
         let bench = Bench {
-            quick: arguments.quick,
+            quick,
             time: arguments.time,
             seeds: arguments.seeds.unwrap_or(seeds),
             subject: subject.as_ref(),
@@ -126,12 +118,9 @@ pub fn study(arguments: &StudyArguments) -> Result<()> {
 /// # Errors
 /// A room cannot be generated or solved, or the table cannot be written.
 fn insertions(arguments: &StudyArguments, rooms: u32, family: &str) -> Result<()> {
-    let known = Family::of_name(family).zip(
-        Preset::ALL
-            .iter()
-            .copied()
-            .find(|p| p.word() == arguments.preset),
-    );
+    let mut presets = Preset::ALL.iter().copied();
+    let preset = presets.find(|preset| preset.word() == arguments.preset);
+    let known = Family::of_name(family).zip(preset);
     let Some((family, preset)) = known.filter(|_| arguments.name == "insertion") else {
         let problem = format!("`{}` is not run over generated rooms", arguments.name);
         return Err(Error::usage("--rooms", problem, "name the study insertion"));
@@ -144,9 +133,8 @@ fn insertions(arguments: &StudyArguments, rooms: u32, family: &str) -> Result<()
         preset,
     };
     let mut rows = Vec::new();
-    let file = arguments
-        .out
-        .join(format!("insertion-{}.csv", family.name()));
+    let name = format!("insertion-{}.csv", family.name());
+    let file = arguments.out.join(name);
     for seed in seeds {
         say::note(format_args!("{} room {seed} …", family.name()));
         match composite(family, seed, &plan)? {

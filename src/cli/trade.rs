@@ -1,6 +1,5 @@
 //! `relit trade`: error over time of presets and settings, on a capture or on generated rooms.
 
-use crate::calibrate::problem::Problem;
 use crate::cli::families;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::numbers::{from_one, threads, whole};
@@ -146,32 +145,16 @@ fn of_capture(
     runs: &[Run],
     interrupt: &Interrupt,
 ) -> Result<Trade> {
-    say::note(format_args!(
-        "{}: {}",
-        capture.name,
-        capture.summary.join(", ")
-    ));
-    let metric = capture.metric()?;
-    let problem = Problem {
-        scene: capture.scene.clone(),
-        photographs: capture.photographs.clone(),
-    };
+    let summary = capture.summary.join(", ");
+    say::note(format_args!("{}: {summary}", capture.name));
+    let (problem, metric) = (capture.problem(), capture.metric()?);
     let started = Instant::now();
-    let curves = measure(
-        &problem,
-        &metric,
-        runs,
-        arguments.limit(),
-        &|| interrupt.requested(),
-        &mut print_progress,
-    )?;
-    Ok(Trade::new(
-        &capture.name,
-        Some(capture.hash.clone()),
-        metric.measure(),
-        started.elapsed(),
-        curves,
-    ))
+    let (limit, stopped) = (arguments.limit(), || interrupt.requested());
+    let tell = &mut print_progress;
+    let curves = measure(&problem, &metric, runs, limit, &stopped, tell)?;
+    let (hash, seconds) = (Some(capture.hash.clone()), started.elapsed());
+    let measure = metric.measure();
+    Ok(Trade::new(&capture.name, hash, measure, seconds, curves))
 }
 
 fn over_rooms(
@@ -187,15 +170,8 @@ fn over_rooms(
         let (problem, metric) = rooms::problem(seed, rooms::SIZE)?;
         let started = Instant::now();
         let limit = arguments.limit().div_f64(count as f64);
-        let stopped = || interrupt.requested();
-        let curves = measure(
-            &problem,
-            &metric,
-            runs,
-            limit,
-            &stopped,
-            &mut print_progress,
-        )?;
+        let (stopped, tell) = (|| interrupt.requested(), &mut print_progress);
+        let curves = measure(&problem, &metric, runs, limit, &stopped, tell)?;
         seconds += started.elapsed();
         // Drop a room that was interrupted: its solves are incomplete.
         if interrupt.requested() {
@@ -206,11 +182,9 @@ fn over_rooms(
     let name = format!("generated rooms from {}", arguments.seed);
     let measure = crate::study::trade::Measure::Albedo;
     let curves = combine::combine(&measured);
-    let trade = Trade::new(&name, None, measure, seconds, curves);
-    Ok(Trade {
-        captures: measured.len() as u64,
-        ..trade
-    })
+    let mut trade = Trade::new(&name, None, measure, seconds, curves);
+    trade.captures = measured.len() as u64;
+    Ok(trade)
 }
 
 /// Prints a line when a solve begins and when it ends.

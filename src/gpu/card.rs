@@ -111,10 +111,8 @@ impl Card {
             timeout: Some(TIMEOUT),
         });
         self.check()?;
-        match polled {
-            Ok(_) => Ok(()),
-            Err(error) => Err(self.failed(one_line(&error.to_string()))),
-        }
+        let failed = |error: wgpu::PollError| self.failed(one_line(&error.to_string()));
+        polled.map(drop).map_err(failed)
     }
 
     /// Fails if an error was recorded.

@@ -20,14 +20,20 @@ impl Hierarchy {
     pub fn new(corners: &[[Vec3; 3]]) -> Self {
         let tree = Tree::new(corners);
         let Some(root) = tree.nodes.first() else {
-            return Self::empty();
+            // One box that no ray hits.
+            let (low, high) = (Vec3::splat(f32::MAX), Vec3::splat(-f32::MAX));
+            return Self {
+                nodes: vec![word(low, 0), word(high, 1)],
+                order: Vec::new(),
+                stack_size: 1,
+            };
         };
         // Enlarge boxes by the rounding error of the largest coordinate, so that rays within their faces hit them.
         let margin = root.low.abs().max(root.high.abs()).max_element() * 2.0 * f32::EPSILON;
         let nodes = tree.nodes.iter().flat_map(|node| {
             [
-                entry(node.low - margin, node.first),
-                entry(node.high + margin, node.count),
+                word(node.low - margin, node.first),
+                word(node.high + margin, node.count),
             ]
         });
         Self {
@@ -36,21 +42,12 @@ impl Hierarchy {
             order: tree.order,
         }
     }
-
-    /// One box that no ray hits.
-    fn empty() -> Self {
-        let (low, high) = (Vec3::splat(f32::MAX), Vec3::splat(-f32::MAX));
-        Self {
-            nodes: vec![entry(low, 0), entry(high, 1)],
-            order: Vec::new(),
-            stack_size: 1,
-        }
-    }
 }
 
-fn entry(corner: Vec3, word: u32) -> [u32; 4] {
-    let [x, y, z] = corner.to_array().map(f32::to_bits);
-    [x, y, z, word]
+/// A vector and a number in one word of the shader.
+pub(super) fn word(v: Vec3, w: u32) -> [u32; 4] {
+    let [x, y, z] = v.to_array().map(f32::to_bits);
+    [x, y, z, w]
 }
 
 #[cfg(test)]

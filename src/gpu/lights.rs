@@ -30,16 +30,10 @@ impl Emitters {
         let mut entries = vec![[0; 4]; drawn.len()];
         for (index, (&object, threshold)) in drawn.iter().zip(chosen).enumerate() {
             let first = entries.len() as u32;
-            let triangles: Vec<u32> = lit.scene.objects[object]
-                .triangles
-                .iter()
-                .copied()
-                .filter(|&t| slot_of[t as usize] != NONE)
-                .collect();
-            let areas: Vec<f64> = triangles
-                .iter()
-                .map(|&t| f64::from(lit.scene.areas[t as usize]))
-                .collect();
+            let all = lit.scene.objects[object].triangles.iter().copied();
+            let triangles: Vec<u32> = all.filter(|&t| slot_of[t as usize] != NONE).collect();
+            let area = |&t: &u32| f64::from(lit.scene.areas[t as usize]);
+            let areas: Vec<f64> = triangles.iter().map(area).collect();
             let drawn = thresholds(&areas, TRIANGLE_BITS);
             for (threshold, &t) in drawn.into_iter().zip(&triangles) {
                 entries.push(entry(threshold, slot_of[t as usize], 0));

@@ -1,6 +1,5 @@
 //! Materials and their tables in the shader's layout.
 
-use crate::gpu::inserted::Inserted;
 use crate::gpu::layout::Material as Shared;
 use crate::gpu::layout::{ALBEDO_CONSTANT, ALBEDO_IMAGE, ALBEDO_TEXELS, NONE};
 use crate::transport::bsdf::MIN_ROUGHNESS;
@@ -9,6 +8,23 @@ use crate::transport::material::{Albedo, Material};
 use glam::Vec3;
 use std::collections::HashMap;
 use std::sync::Arc;
+
+/// An inserted object in scene coordinates.
+#[derive(Debug, Clone, Copy)]
+pub struct Inserted<'a> {
+    /// Corners of each triangle.
+    pub corners: &'a [[Vec3; 3]],
+    /// Unit geometric normal of each triangle's front.
+    pub normals: &'a [Vec3],
+    /// Unit shading normals at the corners; empty where there are none.
+    pub corner_normals: &'a [[Vec3; 3]],
+    /// Factors on the albedo at the corners; empty where there are none.
+    pub corner_colors: &'a [[Vec3; 3]],
+    /// For each triangle, an index into `materials`.
+    pub material_of: &'a [u32],
+    /// Materials; emission is ignored.
+    pub materials: &'a [Material],
+}
 
 /// Materials and the data that they refer to.
 #[derive(Debug, Default)]

@@ -16,7 +16,6 @@
 
 mod card;
 mod hierarchy;
-mod inserted;
 mod layout;
 mod lights;
 mod materials;
@@ -26,5 +25,5 @@ mod shader;
 mod tracer;
 
 pub use card::{Adapters, Card};
-pub use inserted::Inserted;
+pub use materials::Inserted;
 pub use tracer::{PairSums, Tracer, View};

@@ -1,11 +1,10 @@
 //! A lit scene with inserted objects in the shader's layout: triangles in the order of the hierarchy, materials, lights.
 
-use crate::gpu::hierarchy::Hierarchy;
-use crate::gpu::inserted::Inserted;
+use crate::gpu::hierarchy::{Hierarchy, word};
 use crate::gpu::layout::Material as Shared;
 use crate::gpu::layout::{Dispatch, NONE};
 use crate::gpu::lights::{Emitters, environment};
-use crate::gpu::materials::Materials;
+use crate::gpu::materials::{Inserted, Materials};
 use crate::transport::lit::LitScene;
 use crate::transport::path::emitter_fraction;
 use glam::Vec3;
@@ -72,9 +71,4 @@ impl Packed {
             dispatch,
         }
     }
-}
-
-fn word(v: Vec3, w: u32) -> [u32; 4] {
-    let [x, y, z] = v.to_array().map(f32::to_bits);
-    [x, y, z, w]
 }

@@ -3,7 +3,7 @@
 use crate::gpu::layout::head;
 
 /// The modules; their order does not matter.
-const MODULES: [&str; 10] = [
+const MODULES: [&str; 11] = [
     include_str!("shaders/random.wgsl"),
     include_str!("shaders/hierarchy.wgsl"),
     include_str!("shaders/texels.wgsl"),
@@ -13,34 +13,16 @@ const MODULES: [&str; 10] = [
     include_str!("shaders/emitters.wgsl"),
     include_str!("shaders/environment.wgsl"),
     include_str!("shaders/path.wgsl"),
-    concat!(
-        include_str!("shaders/film.wgsl"),
-        "\n",
-        include_str!("shaders/queries.wgsl")
-    ),
+    include_str!("shaders/film.wgsl"),
+    include_str!("shaders/queries.wgsl"),
 ];
 
-/// The entry points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kernel {
-    /// Accumulates radiance of a pixel.
-    Render,
-    /// Accumulates radiance of a pixel with and without inserted objects.
-    Insert,
-    /// Intersects a ray.
-    Trace,
-}
-
-impl Kernel {
-    /// The entry point's name.
-    pub fn entry(self) -> &'static str {
-        match self {
-            Self::Render => "render",
-            Self::Insert => "insert",
-            Self::Trace => "trace",
-        }
-    }
-}
+/// The entry point that accumulates radiance of a pixel.
+pub(super) const RENDER: &str = "render";
+/// The entry point that accumulates radiance of a pixel with and without inserted objects.
+pub(super) const INSERT: &str = "insert";
+/// The entry point that intersects a ray.
+pub(super) const TRACE: &str = "trace";
 
 /// The source for traversals with a stack of `stack_size` entries.
 pub(super) fn source(stack_size: u32) -> String {
@@ -66,9 +48,9 @@ mod tests {
         let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
         let valid = validator.validate(&module);
         assert!(valid.is_ok(), "{valid:?}");
-        for kernel in [Kernel::Render, Kernel::Insert, Kernel::Trace] {
+        for kernel in [RENDER, INSERT, TRACE] {
             let mut entries = module.entry_points.iter();
-            assert!(entries.any(|entry| entry.name == kernel.entry()));
+            assert!(entries.any(|entry| entry.name == kernel));
         }
     }
 }

@@ -2,11 +2,11 @@
 
 use crate::error::Result;
 use crate::gpu::card::Card;
-use crate::gpu::inserted::Inserted;
-use crate::gpu::layout::{BINDINGS, Dispatch, FILM, Pixel, WORKGROUP};
+use crate::gpu::layout::{BINDINGS, Dispatch, FILM, Material, NONE, Pixel, WORKGROUP};
+use crate::gpu::materials::Inserted;
 use crate::gpu::pace::Pace;
 use crate::gpu::scene::Packed;
-use crate::gpu::shader::{Kernel, source};
+use crate::gpu::shader::{INSERT, RENDER, TRACE, source};
 use crate::math::rng::splitmix64;
 use crate::scene::camera::Camera;
 use crate::scene::geometry::{Hit, Ray};
@@ -18,6 +18,7 @@ use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 use std::ops::Range;
 use std::time::Instant;
+use wgpu::BufferUsages as Usage;
 
 /// Samples summed in f32 on the card before the sums are added in f64.
 const CHUNK: u32 = 16;
@@ -65,7 +66,7 @@ pub struct Tracer {
     description: Dispatch,
     layout: wgpu::BindGroupLayout,
     shader: wgpu::ShaderModule,
-    pipelines: Vec<(Kernel, wgpu::ComputePipeline)>,
+    pipelines: Vec<(&'static str, wgpu::ComputePipeline)>,
     pace: Pace,
 }
 
@@ -112,18 +113,11 @@ impl Tracer {
             });
             (bind_group_layout(device), shader)
         })?;
-        let dispatch = card.attempt(|| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("dispatch"),
-                size: size_of::<Dispatch>() as u64,
-                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
-        })?;
+        let size = size_of::<Dispatch>() as u64;
         Ok(Self {
             card: card.clone(),
             scene,
-            dispatch,
+            dispatch: buffer(card, "dispatch", size, Usage::UNIFORM | Usage::COPY_DST)?,
             description: packed.dispatch,
             layout,
             shader,
@@ -140,7 +134,8 @@ impl Tracer {
         let mut added = Film::new(view.camera);
         let pixels = 0..added.sums.len() as u32;
         let range = film.samples..film.samples + samples;
-        self.accumulate(Kernel::Render, view, pixels, range, |pixel, found| {
+        let description = with_view(self.description, view);
+        self.dispatch_all(RENDER, description, pixels, range, |pixel, found| {
             let [r, g, b, _] = found.over;
             added.sums[pixel as usize] += Vec3::new(r, g, b).as_dvec3();
             added.rays += u64::from(found.counts[0]);
@@ -177,7 +172,8 @@ impl Tracer {
     ) -> Result<Vec<PairSums>> {
         let first = pixels.start;
         let mut sums = vec![PairSums::default(); pixels.len()];
-        self.accumulate(Kernel::Insert, view, pixels, samples, |pixel, found| {
+        let description = with_view(self.description, view);
+        self.dispatch_all(INSERT, description, pixels, samples, |pixel, found| {
             let sum = &mut sums[(pixel - first) as usize];
             let color = |[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b).as_dvec3();
             sum.with += color(found.over);
@@ -197,17 +193,12 @@ impl Tracer {
     /// # Errors
     /// The rays do not fit, or the card failed.
     pub fn trace(&mut self, rays: &[Ray], any: bool) -> Result<Vec<Option<Hit>>> {
-        let words: Vec<[f32; 4]> = rays
-            .iter()
-            .flat_map(|ray| {
-                let flag = f32::from(u8::from(any));
-                let end = ray.t_max.min(f32::MAX);
-                [
-                    ray.origin.extend(end).to_array(),
-                    ray.direction.extend(flag).to_array(),
-                ]
-            })
-            .collect();
+        let flag = f32::from(u8::from(any));
+        let words = rays.iter().flat_map(|ray| {
+            let end = ray.t_max.min(f32::MAX);
+            [ray.origin.extend(end), ray.direction.extend(flag)]
+        });
+        let words: Vec<[f32; 4]> = words.map(|v| v.to_array()).collect();
         let bytes: &[u8] = bytemuck::cast_slice(&words);
         if bytes.len() as u64 > self.card.max_buffer() {
             return Err(self.card.failed("too many rays at once".to_owned()));
@@ -220,10 +211,10 @@ impl Tracer {
         let mut description = self.description;
         description.slice[0] = rays.len().max(1) as u32;
         let all = 0..rays.len() as u32;
-        self.dispatch_all(Kernel::Trace, description, all, 0..1, |ray, found| {
+        self.dispatch_all(TRACE, description, all, 0..1, |ray, found| {
             let [t, b1, b2, _] = found.over;
             let triangle = found.counts[0];
-            hits[ray as usize] = (triangle != super::layout::NONE).then_some(Hit {
+            hits[ray as usize] = (triangle != NONE).then_some(Hit {
                 t,
                 triangle,
                 b1,
@@ -233,22 +224,10 @@ impl Tracer {
         Ok(hits)
     }
 
-    fn accumulate(
-        &mut self,
-        kernel: Kernel,
-        view: &View<'_>,
-        pixels: Range<u32>,
-        samples: Range<u32>,
-        add: impl FnMut(u32, &Pixel),
-    ) -> Result<()> {
-        let description = with_view(self.description, view);
-        self.dispatch_all(kernel, description, pixels, samples, add)
-    }
-
     /// Traces samples of pixels in bands and chunks; `add` gets the sums of up to [`CHUNK`] samples of each pixel.
     fn dispatch_all(
         &mut self,
-        kernel: Kernel,
+        kernel: &'static str,
         mut description: Dispatch,
         pixels: Range<u32>,
         samples: Range<u32>,
@@ -258,7 +237,10 @@ impl Tracer {
         let fit = (self.card.max_buffer() / size_of::<Pixel>() as u64).min(u64::from(u32::MAX));
         let band = (fit as u32).min(pixels.len() as u32).max(1);
         let card = self.card.clone();
-        let (film, read) = card.attempt(|| film_buffers(&card.device, band))?;
+        let size = u64::from(band) * size_of::<Pixel>() as u64;
+        let film = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST;
+        let film = buffer(&card, FILM, size, film)?;
+        let read = buffer(&card, FILM, size, Usage::MAP_READ | Usage::COPY_DST)?;
         let group = card.attempt(|| self.bind_group(&film))?;
         for first in pixels.clone().step_by(band as usize) {
             let band = first..first.saturating_add(band).min(pixels.end);
@@ -287,11 +269,8 @@ impl Tracer {
         let (mut pixel, mut sample) = (band.start, samples.start);
         while sample < samples.end && !band.is_empty() {
             let left = samples.end - sample;
-            let [count, taken] = if pixel == band.start {
-                self.pace.slice(band.len() as u32, left)
-            } else {
-                [self.pace.slice(band.len() as u32, left)[0], 1]
-            };
+            let [count, fit] = self.pace.slice(band.len() as u32, left);
+            let taken = if pixel == band.start { fit } else { 1 };
             let end = pixel.saturating_add(count).min(band.end);
             (description.slice[1], description.slice[2]) = (pixel, end);
             (description.slice[3], description.paths[0]) = (sample, taken);
@@ -349,17 +328,16 @@ impl Tracer {
                 resource: buffer.as_entire_binding(),
             })
             .collect();
-        self.card
-            .device
-            .create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("scene"),
-                layout: &self.layout,
-                entries: &entries,
-            })
+        let device = &self.card.device;
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("scene"),
+            layout: &self.layout,
+            entries: &entries,
+        })
     }
 
     /// The pipeline of a kernel, compiled at first use.
-    fn pipeline(&mut self, kernel: Kernel) -> Result<wgpu::ComputePipeline> {
+    fn pipeline(&mut self, kernel: &'static str) -> Result<wgpu::ComputePipeline> {
         if let Some((_, pipeline)) = self.pipelines.iter().find(|(k, _)| *k == kernel) {
             return Ok(pipeline.clone());
         }
@@ -371,10 +349,10 @@ impl Tracer {
                 ..Default::default()
             });
             device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(kernel.entry()),
+                label: Some(kernel),
                 layout: Some(&layout),
                 module: &self.shader,
-                entry_point: Some(kernel.entry()),
+                entry_point: Some(kernel),
                 compilation_options: Default::default(),
                 cache: None,
             })
@@ -406,34 +384,23 @@ fn with_view(scene: Dispatch, view: &View<'_>) -> Dispatch {
 /// Creates a read-only storage buffer.
 fn storage(card: &Card, bytes: &[u8]) -> Result<wgpu::Buffer> {
     /// Content of empty buffers: a binding must hold at least one element.
-    const NOTHING: [u8; size_of::<super::layout::Material>()] =
-        [0; size_of::<super::layout::Material>()];
+    const NOTHING: [u8; size_of::<Material>()] = [0; size_of::<Material>()];
     let bytes = if bytes.is_empty() { &NOTHING } else { bytes };
-    let buffer = card.attempt(|| {
-        card.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("scene"),
-            size: bytes.len() as u64,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        })
-    })?;
+    let usage = Usage::STORAGE | Usage::COPY_DST;
+    let buffer = buffer(card, "scene", bytes.len() as u64, usage)?;
     card.attempt(|| card.queue.write_buffer(&buffer, 0, bytes))?;
     Ok(buffer)
 }
 
-/// The film buffer of the shader, and the buffer to read it back.
-fn film_buffers(device: &wgpu::Device, pixels: u32) -> (wgpu::Buffer, wgpu::Buffer) {
-    let buffer = |usage| {
-        device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(FILM),
-            size: u64::from(pixels) * size_of::<Pixel>() as u64,
+fn buffer(card: &Card, label: &str, size: u64, usage: Usage) -> Result<wgpu::Buffer> {
+    card.attempt(|| {
+        card.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size,
             usage,
             mapped_at_creation: false,
         })
-    };
-    use wgpu::BufferUsages as Usage;
-    let film = buffer(Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST);
-    (film, buffer(Usage::MAP_READ | Usage::COPY_DST))
+    })
 }
 
 fn clear(card: &Card, film: &wgpu::Buffer) {
@@ -456,10 +423,8 @@ fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let mut entries = vec![entry(0, wgpu::BufferBindingType::Uniform)];
     for (binding, (name, _)) in (1..).zip(BINDINGS) {
         let read_only = name != FILM;
-        entries.push(entry(
-            binding,
-            wgpu::BufferBindingType::Storage { read_only },
-        ));
+        let storage = wgpu::BufferBindingType::Storage { read_only };
+        entries.push(entry(binding, storage));
     }
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("scene"),

@@ -5,7 +5,7 @@ use crate::scene::geometry::Ray;
 use glam::{DVec2, DVec3, Mat3, Vec2, Vec3};
 
 /// A posed camera relative to the scene's origin.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
     /// Lens and sensor.
     pub intrinsics: Intrinsics,

@@ -99,8 +99,6 @@ pub enum Command {
     Reframe(Box<OpenOptions>),
     /// Change the objects of the open capture, drop the estimate, and solve from the start.
     Regroup(Box<Regrouping>),
-    /// End the worker.
-    Quit,
 }
 
 /// A change of a capture's objects.
@@ -115,7 +113,7 @@ pub struct Regrouping {
 }
 
 /// A view to render.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ViewRequest {
     /// The camera.
     pub camera: ViewCamera,
@@ -130,7 +128,7 @@ pub struct ViewRequest {
 }
 
 /// A camera to render from.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum ViewCamera {
     /// A photograph's camera.
     Frame(usize),
@@ -181,16 +179,14 @@ mod tests {
 
     #[test]
     fn results_of_imported_scans_lie_apart() {
-        let out = |folder: &str| Source::Folder(folder.into()).default_out();
-        assert_eq!(
-            out("/a/relit-out/flat/capture"),
-            Path::new("relit-out/flat")
-        );
-        assert_eq!(
-            out("/a/relit-out/attic/capture"),
-            Path::new("relit-out/attic")
-        );
-        assert_eq!(out("/a/scans/capture"), Path::new("relit-out/capture"));
-        assert_eq!(out("/a/room"), Path::new("relit-out/room"));
+        for (folder, name) in [
+            ("/a/relit-out/flat/capture", "flat"),
+            ("/a/relit-out/attic/capture", "attic"),
+            ("/a/scans/capture", "capture"),
+            ("/a/room", "room"),
+        ] {
+            let out = Source::Folder(folder.into()).default_out();
+            assert_eq!(out, Path::new("relit-out").join(name));
+        }
     }
 }

@@ -292,21 +292,12 @@ mod tests {
         assert!(Arc::ptr_eq(&edited.of(&found, &edits), &found));
 
         let red = Vec3::new(0.9, 0.1, 0.1);
-        edits.set(
-            0,
-            ObjectEdit {
-                albedo: Some(red),
-                ..ObjectEdit::default()
-            },
-        );
-        let dim = Some(Vec3::splat(3.0));
-        edits.set(
-            1,
-            ObjectEdit {
-                emission: dim,
-                ..ObjectEdit::default()
-            },
-        );
+        let mut paint = edits.object(0);
+        paint.albedo = Some(red);
+        edits.set(0, paint);
+        let mut dim = edits.object(1);
+        dim.emission = Some(Vec3::splat(3.0));
+        edits.set(1, dim);
         edits.set_outside(Vec3::new(0.0, 0.5, 1.0));
         let changed = edited.of(&found, &edits);
         assert_eq!(
@@ -321,14 +312,8 @@ mod tests {
         assert!(Arc::ptr_eq(&edited.of(&found, &edits), &changed));
 
         // `off` takes precedence over any emission, which comes back without it.
-        edits.set(
-            1,
-            ObjectEdit {
-                emission: dim,
-                off: true,
-                ..ObjectEdit::default()
-            },
-        );
+        dim.off = true;
+        edits.set(1, dim);
         assert_eq!(edited.of(&found, &edits).objects[1].emission, Vec3::ZERO);
         edits.set(0, ObjectEdit::default());
         edits.set(1, ObjectEdit::default());
@@ -367,14 +352,10 @@ mod tests {
     #[test]
     fn values_that_no_surface_has_are_brought_into_range() {
         let mut edits = Edits::default();
-        edits.set(
-            0,
-            ObjectEdit {
-                albedo: Some(Vec3::new(-1.0, 0.5, 7.0)),
-                emission: Some(Vec3::new(-2.0, 0.0, 1.0)),
-                ..ObjectEdit::default()
-            },
-        );
+        let mut odd = edits.object(0);
+        odd.albedo = Some(Vec3::new(-1.0, 0.5, 7.0));
+        odd.emission = Some(Vec3::new(-2.0, 0.0, 1.0));
+        edits.set(0, odd);
         let object = &edits.apply(&estimate()).objects[0];
         assert_eq!(object.albedo, Vec3::new(0.0, 0.5, 1.0));
         assert_eq!(object.emission, Vec3::new(0.0, 0.0, 1.0));

@@ -173,7 +173,6 @@ impl Inbox {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::session::edits::ObjectEdit;
 
     #[test]
     fn a_flood_of_edits_leaves_room_for_commands_and_only_the_newest_arrives() {
@@ -184,13 +183,9 @@ mod tests {
         let mut last = Edits::default();
         for object in 0..10 * CAPACITY {
             last = Edits::default();
-            last.set(
-                object,
-                ObjectEdit {
-                    off: true,
-                    ..ObjectEdit::default()
-                },
-            );
+            let mut off = last.object(object);
+            off.off = true;
+            last.set(object, off);
             assert!(outbox.send(Command::Edit(last.clone())));
         }
         let mut seen = Vec::new();

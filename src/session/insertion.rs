@@ -224,20 +224,14 @@ impl Inserting {
         };
         let first = last.found.objects.is_empty() && !light.found.objects.is_empty();
         let waited = self.begun.map_or(Duration::MAX, |at| at.elapsed());
-        let refined = self
-            .samples()
-            .is_none_or(|samples| samples >= ROUGH_SAMPLES);
-        let rested = self.hold == 0
-            && waited
-                >= if refined {
-                    UPDATE_INTERVAL
-                } else {
-                    5 * UPDATE_INTERVAL
-                };
+        let samples = self.samples();
+        let refined = samples.is_none_or(|samples| samples >= ROUGH_SAMPLES);
+        let pause = UPDATE_INTERVAL * if refined { 1 } else { 5 };
+        let rested = self.hold == 0 && waited >= pause;
         if first {
             self.update();
         } else if rested && !last.is_same(light) && differs(&last.edited, &light.edited) {
-            self.hold = self.samples().unwrap_or(0).min(MIN_REPLACEMENT_SAMPLES);
+            self.hold = samples.unwrap_or(0).min(MIN_REPLACEMENT_SAMPLES);
             self.stale = Some(Instant::now());
         }
     }
@@ -356,14 +350,8 @@ impl Inserting {
         if let Some(relit) = &self.relit {
             backdrop.photograph = relit.photograph.clone();
         }
-        let inserted = self.library.insert(
-            capture,
-            &light.edited,
-            backdrop,
-            objects,
-            &light.options,
-            light.seed,
-        );
+        let (library, edited, options) = (&mut self.library, &light.edited, &light.options);
+        let inserted = library.insert(capture, edited, backdrop, objects, options, light.seed);
         // With two samples both halves are begun.
         let shown = self.hold < 2;
         self.placed = Some(Placed::new(inserted, light.seed.wrapping_add(1), shown));
@@ -385,13 +373,8 @@ impl Inserting {
             return;
         }
         let lights = [&light.found, &light.edited].map(|e| Arc::new(e.lit(&capture.scene)));
-        let relighting = Relighting::new(
-            taken.clone(),
-            lights,
-            light.options,
-            light.seed,
-            Some(Denoiser::best()),
-        );
+        let (taken, denoiser) = (taken.clone(), Some(Denoiser::best()));
+        let relighting = Relighting::new(taken, lights, light.options, light.seed, denoiser);
         self.relit = Some(Relit::new(relighting, light, size));
     }
 

@@ -98,10 +98,8 @@ impl Library {
         };
         let mut backdrop = taken.backdrop.clone();
         if soft {
-            let finish = taken
-                .finish
-                .get_or_insert_with(|| PsfAndGrain::of(&taken.photograph));
-            backdrop.finish = finish.clone();
+            let of_photograph = || PsfAndGrain::of(&taken.photograph);
+            backdrop.finish = (taken.finish.get_or_insert_with(of_photograph)).clone();
         }
         self.taken = Some(taken);
         Ok(backdrop)
@@ -125,13 +123,8 @@ impl Library {
                 .get_or_insert_with(|| light_of_photographs(capture)),
         };
         let photographed = vec![photographed; objects.len()];
-        let naive = Pasted::new(
-            &backdrop,
-            &lit,
-            &objects,
-            &photographed,
-            Exposure::default(),
-        );
+        let as_taken = Exposure::default();
+        let naive = Pasted::new(&backdrop, &lit, &objects, &photographed, as_taken);
         let estimated: Vec<Harmonics> = objects
             .iter()
             .map(|object| harmonics_of_estimate(&lit, object.center, options, seed))
@@ -146,10 +139,7 @@ impl Library {
 }
 
 fn light_of_photographs(capture: &OpenCapture) -> Harmonics {
-    let pictures: Vec<Picture> = capture
-        .photographs
-        .iter()
-        .map(|photograph| photograph.picture())
-        .collect();
+    let photographs = capture.photographs.iter();
+    let pictures: Vec<Picture> = photographs.map(|taken| taken.picture()).collect();
     harmonics_of_photographs(capture.scene.cameras.iter().zip(&pictures))
 }

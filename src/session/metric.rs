@@ -12,6 +12,14 @@ use crate::study::experiments::Subject;
 use crate::study::trade::Metric;
 
 impl OpenCapture {
+    /// What a solver is given.
+    pub fn problem(&self) -> Problem {
+        Problem {
+            scene: self.scene.clone(),
+            photographs: self.photographs.clone(),
+        }
+    }
+
     /// Measures estimates by the truth if there is one, else by held-out pixels.
     ///
     /// # Errors
@@ -34,10 +42,7 @@ impl OpenCapture {
         Ok(Subject {
             name: self.name.clone(),
             capture: self.capture.clone(),
-            problem: Problem {
-                scene: self.scene.clone(),
-                photographs: self.photographs.clone(),
-            },
+            problem: self.problem(),
             metric: self.metric()?,
         })
     }

@@ -53,10 +53,8 @@ impl OpenCapture {
         let mut capture = capture.placed(options.up, &options.coordinates)?;
         let mut working = load_working(&capture, WORKING_PIXELS)?;
         leave_out(&capture, &mut working)?;
-        let alignment = options
-            .check_alignment
-            .then(|| alignment(&capture, &working))
-            .transpose()?;
+        let check = options.check_alignment;
+        let alignment = check.then(|| alignment(&capture, &working)).transpose()?;
         if let Some(alignment) = &alignment {
             leave_out_mispaired(&capture, &mut working, &alignment.mispaired);
         }
@@ -65,9 +63,8 @@ impl OpenCapture {
         }
         regroup(&mut capture.mesh, &options.objects)?;
         let prepared = prepare(&capture, &working).map_err(|error| {
-            let read_wrongly = alignment
-                .as_ref()
-                .and_then(|a| a.error(&capture.name, &options.reading));
+            let alignment = alignment.as_ref();
+            let read_wrongly = alignment.and_then(|a| a.error(&capture.name, &options.reading));
             read_wrongly.unwrap_or(error)
         })?;
         let mut warnings = prepared.warnings.clone();
@@ -117,10 +114,8 @@ impl OpenCapture {
     /// # Errors
     /// The capture is read wrongly; the remedy says how to read it.
     pub fn aligned(self) -> Result<Self> {
-        let error = self
-            .alignment
-            .as_ref()
-            .and_then(|alignment| alignment.error(&self.name, &self.options.reading));
+        let alignment = self.alignment.as_ref();
+        let error = alignment.and_then(|a| a.error(&self.name, &self.options.reading));
         error.map_or(Ok(self), Err)
     }
 }
@@ -158,15 +153,11 @@ fn hash(capture: &Capture) -> Result<String> {
     let mut hasher = blake3::Hasher::new();
     let mesh = &capture.mesh;
     hasher.update(&(mesh.positions.len() as u64).to_le_bytes());
-    for position in &mesh.positions {
-        for v in position.to_array() {
-            hasher.update(&v.to_le_bytes());
-        }
+    for v in mesh.positions.iter().flat_map(|p| p.to_array()) {
+        hasher.update(&v.to_le_bytes());
     }
-    for triangle in &mesh.triangles {
-        for i in triangle {
-            hasher.update(&i.to_le_bytes());
-        }
+    for i in mesh.triangles.iter().flatten() {
+        hasher.update(&i.to_le_bytes());
     }
     for frame in &capture.frames {
         let k = &frame.intrinsics;
@@ -177,10 +168,8 @@ fn hash(capture: &Capture) -> Result<String> {
                 hasher.update(blake3::hash(&bytes).as_bytes());
             }
             PhotographSource::Memory(photograph) => {
-                for pixel in &photograph.pixels {
-                    for v in pixel.to_array() {
-                        hasher.update(&v.to_le_bytes());
-                    }
+                for v in photograph.pixels.iter().flat_map(|p| p.to_array()) {
+                    hasher.update(&v.to_le_bytes());
                 }
             }
         }

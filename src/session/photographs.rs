@@ -100,11 +100,8 @@ impl Photographs {
         let scene = &self.capture.scene;
         let lights =
             (self.relight).then(|| [&self.found, &self.edited].map(|e| Arc::new(e.lit(scene))));
-        let mut tracer = if objects.is_empty() {
-            None
-        } else {
-            self.tracer(renderer, &objects)
-        };
+        let placed = Some(&objects).filter(|objects| !objects.is_empty());
+        let mut tracer = placed.and_then(|objects| self.tracer(renderer, objects));
         let mut relighters = lights.as_ref().and_then(|[before, after]| {
             Some([renderer.tracer(before, &[])?, renderer.tracer(after, &[])?])
         });
@@ -130,15 +127,9 @@ impl Photographs {
                 if !go_on(0.0) {
                     return Ok(written);
                 }
-                let Some((files, is_seen)) = self.composite(
-                    &mut library,
-                    backdrop,
-                    &objects,
-                    &mut tracer,
-                    &prefix,
-                    &go_on,
-                )?
-                else {
+                let (library, card) = (&mut library, &mut tracer);
+                let made = self.composite(library, backdrop, &objects, card, &prefix, &go_on)?;
+                let Some((files, is_seen)) = made else {
                     return Ok(written);
                 };
                 written.files.extend(files);
@@ -243,11 +234,9 @@ impl Photographs {
             }
             made.push(inserted);
         }
+        let denoiser = self.denoise.unwrap_or(Denoiser::Builtin);
         let (composite, layers) = match &made[..] {
-            [a, b] => denoised(
-                [&a.composite, &b.composite],
-                self.denoise.unwrap_or(Denoiser::Builtin),
-            ),
+            [a, b] => denoised([&a.composite, &b.composite], denoiser),
             made => (made[0].composite.composite(), made[0].composite.layers()),
         };
         let behind = &backdrop.photograph;

@@ -36,11 +36,8 @@ impl Rates {
             }
         }
         self.marks.push_back(mark);
-        while self
-            .marks
-            .get(1)
-            .is_some_and(|second| mark.seconds - second.seconds >= WINDOW)
-        {
+        let is_old = |second: &Mark| mark.seconds - second.seconds >= WINDOW;
+        while self.marks.get(1).is_some_and(is_old) {
             self.marks.pop_front();
         }
     }
@@ -70,10 +67,7 @@ impl Rates {
         let rate = self.iterations();
         let by_steps = (settings.steps > 0 && rate > 0.0)
             .then(|| settings.steps.saturating_sub(progress.iterations) as f64 / rate);
-        match (by_time, by_steps) {
-            (Some(time), Some(steps)) => Some(time.min(steps)),
-            (time, steps) => time.or(steps),
-        }
+        by_time.into_iter().chain(by_steps).reduce(f64::min)
     }
 }
 

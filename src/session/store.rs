@@ -324,11 +324,8 @@ mod tests {
             precious,
             ..SessionRecord::default()
         };
-        fs::write(
-            folder.join(SESSION),
-            serde_json::to_vec(&held).expect("json"),
-        )
-        .expect("written");
+        let record = serde_json::to_vec(&held).expect("json");
+        fs::write(folder.join(SESSION), record).expect("written");
         fs::write(folder.join(CHECKPOINT), "{}").expect("written");
         folder
     }
@@ -345,12 +342,8 @@ mod tests {
         store.prune();
         assert_eq!(store.kept().len(), MAX_UNFINISHED + 1);
         assert!(finished.exists());
-        assert!(
-            store
-                .kept()
-                .iter()
-                .any(|kept| kept.name == "room, session 1")
-        );
+        let kept = store.kept();
+        assert!(kept.iter().any(|kept| kept.name == "room, session 1"));
     }
 
     #[test]
@@ -370,10 +363,8 @@ mod tests {
         assert_eq!(second, base.path().join("a/session 2"));
         // Starting over leaves the session as it is.
         one.begin_another();
-        assert_eq!(
-            one.folder().expect("made"),
-            Some(base.path().join("a/session 3"))
-        );
+        let third = one.folder().expect("made").expect("a folder");
+        assert_eq!(third, base.path().join("a/session 3"));
         assert!(first.join(CHECKPOINT).exists() && one.remove(&first).is_ok() && !first.exists());
     }
 }

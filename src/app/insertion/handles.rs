@@ -146,9 +146,8 @@ impl Insertions {
         let back = Quat::from_axis_angle(scene.up, -object.rotate.to_radians() as f32);
         let unturned = back * (handle - foot);
         let angle = unturned.cross(aim).dot(scene.up).atan2(unturned.dot(aim));
-        angle
-            .is_finite()
-            .then(|| f64::from(angle.to_degrees()).round())
+        let degrees = f64::from(angle.to_degrees()).round();
+        angle.is_finite().then_some(degrees)
     }
 
     /// Draws the handles, and a box around the chosen object where `boxed`.
@@ -249,11 +248,8 @@ mod tests {
         for _ in 0..500 {
             let read = insertions.models.update(&ctx, &insertions.objects);
             if !read.is_empty() {
-                assert!(
-                    insertions
-                        .scale_handle(&insertions.objects[0], scene)
-                        .is_some()
-                );
+                let handle = insertions.scale_handle(&insertions.objects[0], scene);
+                assert!(handle.is_some());
                 return insertions;
             }
             std::thread::sleep(std::time::Duration::from_millis(5));
@@ -296,17 +292,14 @@ mod tests {
         assert!(dragged.is_none());
 
         let level = DVec3::new(0.4, 0.7, 0.1);
-        for (from, to, along, expected) in [
-            (
-                DVec3::new(0.0, 1.0, 3.0),
-                DVec3::Y * 0.7,
-                Along::Up,
-                DVec3::Y * 0.7,
-            ),
-            (DVec3::new(0.0, 2.0, 3.0), level, Along::Level, level),
-            (DVec3::new(0.0, 2.0, 3.0), level, Along::Surfaces, DVec3::X),
+        let raised = DVec3::Y * 0.7;
+        for (height, to, along, expected) in [
+            (1.0, raised, Along::Up, raised),
+            (2.0, level, Along::Level, level),
+            (2.0, level, Along::Surfaces, DVec3::X),
         ] {
-            let (aim, foot) = (ray(from, to), Handle::Move(0));
+            let aim = ray(DVec3::new(0.0, height, 3.0), to);
+            let foot = Handle::Move(0);
             let dragged = insertions.dragged(foot, &scene, &aim, Some(DVec3::X), along);
             insertions.objects[0] = dragged.expect("a place").1;
             let at = insertions.objects[0].at.expect("a place");

@@ -57,11 +57,8 @@ pub fn is_object(path: &Path) -> bool {
 
 /// The name of an object's file, without its ending.
 pub fn name(placement: &Placement) -> String {
-    let stem = placement.file.file_stem();
-    stem.map_or_else(
-        || "object".into(),
-        |stem| stem.to_string_lossy().into_owned(),
-    )
+    let stem = placement.file.file_stem().unwrap_or("object".as_ref());
+    stem.to_string_lossy().into_owned()
 }
 
 impl Insertions {
@@ -83,11 +80,8 @@ impl Insertions {
     /// Copies the chosen object, a little aside along `aside`.
     pub fn duplicate(&mut self, aside: DVec3) {
         if let Some((_, object)) = self.chosen() {
-            let at = object.at.map(|at| at + aside);
-            let copy = Placement {
-                at,
-                ..object.clone()
-            };
+            let mut copy = object.clone();
+            copy.at = copy.at.map(|at| at + aside);
             self.objects.push(copy);
             self.chosen = self.objects.len().checked_sub(1);
         }
@@ -97,11 +91,8 @@ impl Insertions {
     pub fn delete(&mut self) {
         if let Some((index, _)) = self.chosen() {
             self.objects.remove(index);
-            self.chosen = self
-                .objects
-                .len()
-                .checked_sub(1)
-                .map(|last| index.min(last));
+            let last = self.objects.len().checked_sub(1);
+            self.chosen = last.map(|last| index.min(last));
         }
     }
 

@@ -175,11 +175,8 @@ mod tests {
         ]];
         let material = MaterialOverride::default().surface().material(None);
         let model = ObjectModel::from_corners("cube", corners, material).expect("a model");
-        let mut models = Models::default();
-        models
-            .0
-            .insert("cube.obj".into(), Shape::Read(Outline::new(&model)));
-        models
+        let shape = Shape::Read(Outline::new(&model));
+        Models([("cube.obj".into(), shape)].into())
     }
 
     #[test]
@@ -191,10 +188,8 @@ mod tests {
         };
         let corners = models(0.1).corners(&placement, &scene).expect("known");
         let points = corners.map(|p| p.as_dvec3() + scene.origin);
-        let low = points.iter().fold(DVec3::INFINITY, |low, p| low.min(*p));
-        let high = points
-            .iter()
-            .fold(DVec3::NEG_INFINITY, |high, p| high.max(*p));
+        let low = points.into_iter().fold(DVec3::INFINITY, DVec3::min);
+        let high = points.into_iter().fold(DVec3::NEG_INFINITY, DVec3::max);
         assert!(low.distance(DVec3::new(0.4, 0.0, -0.3)) < 1e-5, "{low}");
         assert!(high.distance(DVec3::new(0.6, 0.2, -0.1)) < 1e-5, "{high}");
     }

@@ -49,14 +49,10 @@ impl Transform {
             (Key::R, Kind::Rotate),
             (Key::S, Kind::Scale),
         ] {
-            let placed = insertions
-                .chosen()
-                .filter(|(_, object)| object.at.is_some());
+            let placed = insertions.chosen().filter(|(_, o)| o.at.is_some());
             if let Some((index, object)) = placed.filter(|_| pressed(key)) {
-                let before = match transform.take() {
-                    Some(under_way) => under_way.before,
-                    None => object.clone(),
-                };
+                let under_way = transform.take();
+                let before = under_way.map_or_else(|| object.clone(), |known| known.before);
                 *transform = Some(Self {
                     kind,
                     axis: None,
@@ -107,12 +103,8 @@ impl Transform {
                 let axis = axis.map_or(scene.up, |axis| Vec3::AXES[axis]).as_dvec3();
                 let towards_eye = axis.dot(ray.direction.as_dvec3()) < 0.0;
                 let degrees = f64::from(clockwise.to_degrees()).round();
-                rotate(
-                    &mut object,
-                    scene,
-                    axis,
-                    if towards_eye { -degrees } else { degrees },
-                );
+                let degrees = if towards_eye { -degrees } else { degrees };
+                rotate(&mut object, scene, axis, degrees);
             }
             (Kind::Scale, _) => {
                 let middle = project(foot)?;
@@ -131,14 +123,13 @@ impl Transform {
             Kind::Rotate => "Rotate",
             Kind::Scale => "Scale",
         };
-        let axis = self
-            .axis
-            .map_or("", |axis| [" along X", " along Y", " along Z"][axis]);
-        let axis = if self.kind == Kind::Rotate {
-            axis.replace("along", "about")
+        let way = if self.kind == Kind::Rotate {
+            "about"
         } else {
-            axis.into()
+            "along"
         };
+        let held = |axis| format!(" {way} {}", ["X", "Y", "Z"][axis]);
+        let axis = self.axis.map_or_else(String::new, held);
         format!("{kind}{axis}: click or Enter keeps it, Esc takes it back")
     }
 }
@@ -184,17 +175,11 @@ mod tests {
 
     #[test]
     fn an_object_follows_the_pointer_over_surfaces_or_along_an_axis() {
-        let pointer = Pos2::new(30.0, 20.0);
-        let free = placed(&mut begun(Kind::Grab, None), pointer);
-        assert!(
-            free.at
-                .is_some_and(|at| at.distance(DVec3::new(0.8, 0.0, 0.7)) < 1e-5)
-        );
-        let held = placed(&mut begun(Kind::Grab, Some(0)), pointer);
-        assert!(
-            held.at
-                .is_some_and(|at| at.distance(DVec3::new(0.8, 0.0, 0.5)) < 1e-5)
-        );
+        for (axis, z) in [(None, 0.7), (Some(0), 0.5)] {
+            let moved = placed(&mut begun(Kind::Grab, axis), Pos2::new(30.0, 20.0));
+            let at = moved.at.expect("a place");
+            assert!(at.distance(DVec3::new(0.8, 0.0, z)) < 1e-5, "{at}");
+        }
     }
 
     #[test]

@@ -33,10 +33,7 @@ impl Coloring {
         estimate: &Estimate,
         photographed: &[Option<Vec3>],
     ) -> Vec<[f32; 4]> {
-        surface
-            .middles
-            .iter()
-            .enumerate()
+        (surface.middles.iter().enumerate())
             .map(|(face, middle)| {
                 let object = scene.object_of[middle.triangle as usize];
                 let found = estimate.objects.get(object as usize);

@@ -2,7 +2,7 @@
 
 use crate::app::model::surface::Surface;
 use crate::app::model::view::Colors;
-use crate::app::picture::gpu::{bind, over_screen};
+use crate::app::picture::gpu::{bind, fill, float_texture, pipeline, texture};
 use eframe::egui_wgpu::{CallbackResources, CallbackTrait, RenderState, ScreenDescriptor};
 use egui::PaintCallbackInfo;
 use std::sync::Arc;
@@ -72,58 +72,40 @@ const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 pub fn install(render_state: &RenderState) {
     let device = &render_state.device;
     let shader = device.create_shader_module(wgpu::include_wgsl!("mesh.wgsl"));
-    let options = wgpu::PipelineCompilationOptions::default;
-    let mesh_pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("mesh"),
-        layout: None,
-        vertex: wgpu::VertexState {
-            module: &shader,
-            entry_point: Some("vertex"),
-            compilation_options: options(),
-            buffers: &[Some(wgpu::VertexBufferLayout {
-                array_stride: 12,
-                step_mode: wgpu::VertexStepMode::Vertex,
-                attributes: &wgpu::vertex_attr_array![0 => Float32x3],
-            })],
-        },
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: DEPTH,
-            depth_write_enabled: Some(true),
-            depth_compare: Some(wgpu::CompareFunction::Greater),
-            stencil: wgpu::StencilState::default(),
-            bias: wgpu::DepthBiasState::default(),
-        }),
-        multisample: wgpu::MultisampleState::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &shader,
-            entry_point: Some("fragment"),
-            compilation_options: options(),
-            targets: &[Some(COLOR.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    });
-    let entry_points = ["screen_vertex", "screen_fragment"];
-    let screen_pipeline = over_screen(render_state, &shader, entry_points);
+    let corners = wgpu::VertexBufferLayout {
+        array_stride: 12,
+        step_mode: wgpu::VertexStepMode::Vertex,
+        attributes: &wgpu::vertex_attr_array![0 => Float32x3],
+    };
+    let depth = wgpu::DepthStencilState {
+        format: DEPTH,
+        depth_write_enabled: Some(true),
+        depth_compare: Some(wgpu::CompareFunction::Greater),
+        stencil: wgpu::StencilState::default(),
+        bias: wgpu::DepthBiasState::default(),
+    };
+    let (names, corners) = (["vertex", "fragment"], [Some(corners)]);
+    let mesh_pipeline = pipeline(device, &shader, names, &corners, Some(depth), COLOR);
+    let (names, format) = (
+        ["screen_vertex", "screen_fragment"],
+        render_state.target_format,
+    );
+    let screen_pipeline = pipeline(device, &shader, names, &[], None, format);
     let uniform = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("3D view"),
         size: size_of::<SceneUniform>() as u64,
         usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     });
-    render_state
-        .renderer
-        .write()
-        .callback_resources
-        .insert(Meshes {
-            mesh_pipeline,
-            screen_pipeline,
-            uniform,
-            corners: None,
-            colors: None,
-            target: None,
-        });
+    let mut renderer = render_state.renderer.write();
+    renderer.callback_resources.insert(Meshes {
+        mesh_pipeline,
+        screen_pipeline,
+        uniform,
+        corners: None,
+        colors: None,
+        target: None,
+    });
 }
 
 impl CallbackTrait for MeshPaint {
@@ -193,25 +175,8 @@ impl Meshes {
         let rows = (colors.len() as u32).div_ceil(COLUMNS).max(1);
         let mut texels = colors.to_vec();
         texels.resize((rows * COLUMNS) as usize, [0.0; 4]);
-        let texture = device.create_texture_with_data(
-            queue,
-            &wgpu::TextureDescriptor {
-                label: Some("face colours"),
-                size: wgpu::Extent3d {
-                    width: COLUMNS,
-                    height: rows,
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format: wgpu::TextureFormat::Rgba32Float,
-                usage: wgpu::TextureUsages::TEXTURE_BINDING,
-                view_formats: &[],
-            },
-            wgpu::util::TextureDataOrder::LayerMajor,
-            bytemuck::cast_slice(&texels),
-        );
+        let texture = float_texture(device, "face colours", [COLUMNS, rows]);
+        fill(queue, &texture, &texels);
         bind(device, &self.mesh_pipeline, &self.uniform, &texture)
     }
 
@@ -266,22 +231,8 @@ impl Meshes {
 
     fn new_target(&self, device: &wgpu::Device, size: [u32; 2]) -> Target {
         let view = |format, usage| {
-            device
-                .create_texture(&wgpu::TextureDescriptor {
-                    label: Some("3D view"),
-                    size: wgpu::Extent3d {
-                        width: size[0].max(1),
-                        height: size[1].max(1),
-                        depth_or_array_layers: 1,
-                    },
-                    mip_level_count: 1,
-                    sample_count: 1,
-                    dimension: wgpu::TextureDimension::D2,
-                    format,
-                    usage,
-                    view_formats: &[],
-                })
-                .create_view(&wgpu::TextureViewDescriptor::default())
+            let texture = texture(device, "3D view", size, format, usage);
+            texture.create_view(&wgpu::TextureViewDescriptor::default())
         };
         let attachment = wgpu::TextureUsages::RENDER_ATTACHMENT;
         let color = view(COLOR, attachment | wgpu::TextureUsages::TEXTURE_BINDING);

@@ -214,10 +214,8 @@ mod tests {
     fn zooming_keeps_the_point_and_halves_its_distance() {
         let (scene, mut orbit) = framed();
         let point = scene.positions[0];
-        let (before, distance) = (
-            on_screen(&orbit, &scene, point),
-            point.distance(orbit.eye()),
-        );
+        let before = on_screen(&orbit, &scene, point);
+        let distance = point.distance(orbit.eye());
         orbit.zoom_to(point, 0.5, &scene);
         assert!((on_screen(&orbit, &scene, point) - before).length() < 0.05);
         assert!((point.distance(orbit.eye()) / distance - 0.5).abs() < 1e-4);

@@ -75,17 +75,7 @@ pub fn draw(ui: &Ui, insertions: &Insertions, view: &ViewState, scene: &Scene, r
     }
 }
 
-/// The corners of the far end of a camera's pyramid.
-fn corners(camera: &Camera, depth: f32) -> [Vec3; 4] {
-    let k = &camera.intrinsics;
-    let (w, h) = (k.width as f32, k.height as f32);
-    [(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)].map(|(x, y)| {
-        let ray = camera.ray(Vec2::new(x, y));
-        let along = ray.direction.dot(camera.forward()).max(1e-3);
-        camera.center + ray.direction * (depth / along)
-    })
-}
-
+/// Draws a camera's pyramid, which is so deep.
 fn frustum(
     projection: &Projection,
     painter: &Painter,
@@ -93,7 +83,13 @@ fn frustum(
     depth: f32,
     stroke: Stroke,
 ) {
-    let far = corners(camera, depth);
+    let k = &camera.intrinsics;
+    let (w, h) = (k.width as f32, k.height as f32);
+    let far = [(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)].map(|(x, y)| {
+        let ray = camera.ray(Vec2::new(x, y));
+        let along = ray.direction.dot(camera.forward()).max(1e-3);
+        camera.center + ray.direction * (depth / along)
+    });
     for i in 0..4 {
         projection.line(painter, camera.center, far[i], stroke);
         projection.line(painter, far[i], far[(i + 1) % 4], stroke);

@@ -19,10 +19,7 @@ use glam::{DVec3, Vec2, Vec3};
 
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, document: &Document, view: &mut ViewState, requests: &mut Requests) {
-    theme::strip(ui).show(ui, |ui| {
-        ui.set_min_width(ui.available_width());
-        controls(ui, &mut view.model);
-    });
+    theme::strip(ui, |ui| controls(ui, &mut view.model));
     let rect = ui.available_rect_before_wrap();
     let tokens = theme::tokens(ui);
     let Some(capture) = document.capture() else {
@@ -51,11 +48,10 @@ pub fn pane(ui: &mut Ui, document: &Document, view: &mut ViewState, requests: &m
         }
         click(ui, view, requests, scene, &response);
     }
-    if let Some((camera, moves)) = &mut view.shown.free
+    if let Some(camera) = &mut view.shown.free
         && before != view.model.orbit
     {
         **camera = view.model.orbit.camera();
-        *moves += 1;
     }
 
     let faces = view.model.faces(ui.ctx(), capture, &document.estimate);
@@ -256,11 +252,8 @@ fn move_object(
     if response.drag_stopped() {
         view.tool.dragged = None;
     }
-    let pointer = response.interact_pointer_pos();
-    let held = pointer
-        .filter(|_| response.dragged())
-        .zip(view.tool.dragged);
-    let Some((pointer, handle)) = held else {
+    let pointer = (response.interact_pointer_pos()).filter(|_| response.dragged());
+    let Some((pointer, handle)) = pointer.zip(view.tool.dragged) else {
         return false;
     };
     let (ray, surface) = aimed_at(&view.model, scene, pixel(ui, response.rect, pointer));

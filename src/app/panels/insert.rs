@@ -1,11 +1,10 @@
 //! Putting objects into the photographs: adding, placing, moving, turning, scaling, and the two results.
 
 use crate::app::action::Action;
-use crate::app::controls::{named, path_field, point, switched};
+use crate::app::controls::{color_button, named, path_field, point, switched};
 use crate::app::document::Document;
 use crate::app::insertion::handles::SCALES;
 use crate::app::insertion::{Adding, Insertions, name};
-use crate::app::panels::color::color_button;
 use crate::app::request::{Request, Requests};
 use crate::app::shell::dialogs::Ask;
 use crate::app::theme;
@@ -91,13 +90,8 @@ fn list(ui: &mut Ui, insertions: &Insertions, requests: &mut Requests) {
             let shown = ui
                 .add(Checkbox::without_text(&mut visible))
                 .on_hover_text("Shows or hides the object");
-            let shown = switched(
-                shown,
-                Role::CheckBox,
-                visible,
-                &format!("Show {name} {number}"),
-            );
-            if shown.changed() {
+            let show = format!("Show {name} {number}");
+            if switched(shown, Role::CheckBox, visible, &show).changed() {
                 requests.ask(Request::Hide(index, !visible));
             }
             let chosen = insertions.chosen == Some(index);
@@ -134,9 +128,8 @@ fn actions(ui: &mut Ui, placing: bool, requests: &mut Requests) {
 /// Place, turn and size of an object.
 fn edit(ui: &mut Ui, object: &mut Placement, diameter: f64) {
     Grid::new("placement").num_columns(2).show(ui, |ui| {
-        ui.label("Place").on_hover_text(
-            "Where the middle of the object's base stands, in the capture's coordinates",
-        );
+        let help = "Where the middle of the object's base stands, in the capture's coordinates";
+        ui.label("Place").on_hover_text(help);
         ui.horizontal(|ui| {
             let mut at = object.at.unwrap_or(DVec3::ZERO);
             if point(ui, "Place", &mut at, diameter * 1e-3) {
@@ -154,9 +147,9 @@ fn edit(ui: &mut Ui, object: &mut Placement, diameter: f64) {
             .on_hover_text("Counter-clockwise from above");
         degrees(ui, "Turn", "", &mut object.rotate);
         ui.end_row();
-        ui.label("Tilt").on_hover_text(
-            "About the object's own x and z axes, before the turn; it stands on its lowest point",
-        );
+        let help =
+            "About the object's own x and z axes, before the turn; it stands on its lowest point";
+        ui.label("Tilt").on_hover_text(help);
         ui.horizontal(|ui| {
             for (axis, tilt) in ["x", "z"].into_iter().zip(object.tilt.as_mut()) {
                 degrees(ui, &format!("Tilt {axis}"), &format!("{axis} "), tilt);
@@ -217,11 +210,8 @@ fn material(ui: &mut Ui, found: MaterialOverride, material: &mut Option<Material
         ] {
             let drag = DragValue::new(value).range(0.0..=1.0).speed(0.005);
             let drag = ui.add(drag.max_decimals(3).prefix(format!("{name} ")));
-            named(
-                drag.on_hover_text(help),
-                Role::SpinButton,
-                &format!("Object {name}"),
-            );
+            let name = format!("Object {name}");
+            named(drag.on_hover_text(help), Role::SpinButton, &name);
         }
     });
 }
@@ -238,10 +228,9 @@ fn results(ui: &mut Ui, finish: bool, requests: &mut Requests) {
         }
     });
     let mut wanted = finish;
+    let help = "Makes objects as soft and as grainy as the 8-bit photograph that they are put into";
     ui.checkbox(&mut wanted, "Blur and grain of the photograph")
-        .on_hover_text(
-            "Makes objects as soft and as grainy as the 8-bit photograph that they are put into",
-        );
+        .on_hover_text(help);
     if wanted != finish {
         requests.ask(Request::Finish(wanted));
     }

@@ -1,10 +1,9 @@
 //! A switch, a strength and a colour for every lamp.
 
 use crate::app::action::Action;
-use crate::app::controls::{named, switched};
+use crate::app::controls::{color_button, named, switched};
 use crate::app::document::Document;
 use crate::app::lights::place;
-use crate::app::panels::color;
 use crate::app::request::{Request, Requests};
 use crate::export::light_layers;
 use crate::scene::Scene;
@@ -90,12 +89,9 @@ fn light(ui: &mut Ui, document: &Document, objects: &[usize], name: &str, reques
         .add(Checkbox::without_text(&mut gain.on))
         .on_hover_text("Switches this light off and on");
     switched(on, Role::CheckBox, gain.on, &format!("{name} is lit"));
-    color::color_button(
-        ui,
-        &format!("Colour of {name}"),
-        "Factor on red, green and blue of this light (no unit); white leaves its colour as it is",
-        &mut gain.color,
-    );
+    let help =
+        "Factor on red, green and blue of this light (no unit); white leaves its colour as it is";
+    color_button(ui, &format!("Colour of {name}"), help, &mut gain.color);
     let help = "Factor on this light: 0 takes it away, 1 × is what was found";
     let slider = Slider::new(&mut gain.strength, 0.0..=MAX)
         .clamping(SliderClamping::Never)
@@ -103,13 +99,10 @@ fn light(ui: &mut Ui, document: &Document, objects: &[usize], name: &str, reques
     let strength = ui.add(slider).on_hover_text(help);
     let named_strength = format!("Strength of {name}");
     strength.widget_info(|| WidgetInfo::slider(true, f64::from(gain.strength), &named_strength));
-    let number = DragValue::new(&mut gain.strength)
-        .range(0.0..=f32::MAX)
-        .speed(0.01)
-        .max_decimals(2)
-        .suffix(" ×")
-        .update_while_editing(false);
-    let typed = ui.add(number).on_hover_text(help);
+    let number = DragValue::new(&mut gain.strength).range(0.0..=f32::MAX);
+    let number = number.speed(0.01).max_decimals(2).suffix(" ×");
+    let typed = ui.add(number.update_while_editing(false));
+    let typed = typed.on_hover_text(help);
     named(typed, Role::SpinButton, &format!("{named_strength}, typed"));
     if gain != before {
         requests.ask(Request::Light(objects.to_vec(), gain));

@@ -39,11 +39,8 @@ pub fn pane(ui: &mut Ui, progress: &Progress) {
         .y_axis_min_width(36.0)
         .show(ui, |plot| {
             for (end, name) in marks {
-                plot.vline(
-                    VLine::new(name, end)
-                        .color(tokens.outline)
-                        .style(LineStyle::dashed_loose()),
-                );
+                let line = VLine::new(name, end).color(tokens.outline);
+                plot.vline(line.style(LineStyle::dashed_loose()));
             }
             // A single point has no line.
             for (name, points, color) in [
@@ -54,11 +51,8 @@ pub fn pane(ui: &mut Ui, progress: &Progress) {
                 if points.len() == 1 {
                     plot.points(Points::new(name, points).color(color).radius(3.0));
                 } else {
-                    plot.line(
-                        Line::new(name, PlotPoints::from(points))
-                            .color(color)
-                            .width(1.8),
-                    );
+                    let line = Line::new(name, PlotPoints::from(points));
+                    plot.line(line.color(color).width(1.8));
                 }
             }
         });

@@ -1,10 +1,9 @@
 //! The selected object's colour, light and gloss, changed by hand.
 
 use crate::app::action::Action;
-use crate::app::controls::{named, switched};
+use crate::app::controls::{color_button, named, switched};
 use crate::app::document::Document;
 use crate::app::number::{number, triple};
-use crate::app::panels::color;
 use crate::app::request::{Request, Requests};
 use crate::app::theme;
 use crate::inverse::estimate::{Estimate, ObjectEstimate};
@@ -91,7 +90,7 @@ fn albedo(ui: &mut Ui, found: &ObjectEstimate, edit: &mut ObjectEdit) {
     ui.label("Albedo").on_hover_text(help);
     ui.horizontal(|ui| {
         let mut albedo = edit.albedo(found.albedo);
-        let mut changed = color::color_button(ui, "Albedo colour", help, &mut albedo);
+        let mut changed = color_button(ui, "Albedo colour", help, &mut albedo);
         for (channel, value) in CHANNELS.into_iter().zip(albedo.as_mut()) {
             let value = DragValue::new(value).range(0.0..=1.0).speed(0.005);
             let value = value.max_decimals(3).prefix(format!("{} ", &channel[..1]));
@@ -120,17 +119,15 @@ fn emission(ui: &mut Ui, document: &Document, found: &ObjectEstimate, edit: &mut
     ui.horizontal(|ui| {
         let mut strength = edit.emission(found.emission).max_element();
         // A lamp that is off keeps the colour that it has when on.
-        let lit = ObjectEdit {
-            off: false,
-            ..*edit
-        }
-        .emission(found.emission);
+        let mut on = *edit;
+        on.off = false;
+        let lit = on.emission(found.emission);
         let peak = lit.max_element();
         let mut color = if peak > 0.0 { lit / peak } else { Vec3::ONE };
         let mut changed = ui
             .add_enabled_ui(strength > 0.0, |ui| {
                 let help = "Colour of the light at its strength (no unit), linear";
-                color::color_button(ui, "Emission colour", help, &mut color)
+                color_button(ui, "Emission colour", help, &mut color)
             })
             .inner;
         let speed = drag_speed(&document.snapshot.estimate, strength);

@@ -1,7 +1,6 @@
 //! Panes of words and numbers.
 
 pub mod capture;
-pub mod color;
 pub mod insert;
 pub mod lights;
 pub mod log;

@@ -122,17 +122,15 @@ pub fn pane(
         ui.weak(format!("{} objects", names.len()));
         let common = document.estimate.common_error * 100.0;
         if common > 0.0 {
+            let help = "how well one factor of all albedos is known; their ratios are known better";
             ui.weak(format!("all albedos together ± {common:.0} %"))
-                .on_hover_text(
-                    "how well one factor of all albedos is known; their ratios are known better",
-                );
+                .on_hover_text(help);
         }
     });
     regroup(ui, document, selection, table, requests);
     let rows = table.rows(&names, &estimate.objects);
-    let selected_row = selection
-        .object
-        .and_then(|object| rows.iter().position(|&row| row == object as usize));
+    let place = |object: u32| rows.iter().position(|&row| row == object as usize);
+    let selected_row = selection.object.and_then(place);
     let mut drawn = TableBuilder::new(ui)
         .id_salt("objects")
         .striped(true)

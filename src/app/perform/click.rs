@@ -16,12 +16,11 @@ impl App {
             return;
         };
         let chosen = self.document.insertions.chosen();
-        let chosen = chosen
-            .map(|(index, _)| index)
-            .filter(|_| self.view.tool.placing);
+        let placed = chosen.filter(|_| self.view.tool.placing);
+        let placed = placed.map(|(index, _)| index);
         if let Some(pick) = self.view.tool.pick.take() {
             self.picked(pick, clicked);
-        } else if let Some(index) = chosen {
+        } else if let Some(index) = placed {
             self.document.insertions.objects[index].at = Some(clicked.point);
             self.view.tool.placing = false;
         } else {
@@ -44,8 +43,7 @@ impl App {
             }
             Pick::Length(None) => self.view.tool.pick(Pick::Length(Some(clicked.point))),
             Pick::Length(Some(first)) => {
-                let found = first.distance(clicked.point);
-                let metres = found;
+                let [found, metres] = [first.distance(clicked.point); 2];
                 if found > 0.0 {
                     self.view.shell.sheet = Sheet::Length { found, metres };
                 }

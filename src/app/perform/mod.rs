@@ -128,7 +128,7 @@ impl App {
             Request::Stop(curve, stop) => self.choose_stop(curve, stop),
             Request::KeepTrade => self.keep_trade(),
             Request::Photographs(wanted) => self.write_photographs(&wanted, ctx),
-            Request::Length { found, metres } => self.set_length(found, metres),
+            Request::Length(found, metres) => self.set_length(found, metres),
             Request::Send(command) => self.send(command),
             Request::Say(level, message) => self.say(level, message),
         }
@@ -174,7 +174,12 @@ impl App {
                 self.document.insertions.delete();
                 self.view.tool.placing = false;
             }
-            Action::NaiveBesideOurs => self.naive_beside_ours(),
+            Action::NaiveBesideOurs => {
+                let compare = &mut self.view.compare;
+                compare.mode = Mode::SideBySide;
+                (compare.left, compare.right) = (Quantity::Naive, Quantity::Composite);
+                self.view.bring_forward(Pane::Compare);
+            }
             Action::WipeNaiveOurs => self.wipe_against(Quantity::Naive),
             Action::BeforeAfter => self.wipe_against(Quantity::Photograph),
             Action::WipeRender => self.wipe_against(Quantity::Render),
@@ -203,7 +208,8 @@ impl App {
             Action::ResetLights => self.document.reset_lights(),
             Action::Deselect => self.deselect(),
 
-            Action::RunPause => self.run_or_pause(),
+            Action::RunPause if self.document.is_running() => self.send(Command::Pause),
+            Action::RunPause => self.send(Command::Run),
             Action::Step => self.send(Command::Step),
             Action::Finish => self.send(Command::Finish),
             Action::Reset => self.send(Command::Reset),
@@ -233,11 +239,15 @@ impl App {
             Action::FitPictures => self.view.look.fit(),
             Action::FrameSelection => self.frame_selection(),
             Action::JumpToFrame => self.look_through(self.view.shown.frame),
-            Action::RenderFromHere => self.render_from_here(),
+            Action::RenderFromHere => {
+                let camera = Box::new(self.view.model.orbit.camera());
+                let before = self.view.shown.free.take();
+                self.view.shown.free = before.is_none().then_some(camera);
+            }
 
             Action::Compose => self.preferences.workspace = Workspace::Compose,
             Action::Inspect => self.preferences.workspace = Workspace::Inspect,
-            Action::Thumbnails => self.preferences.thumbnails = !self.preferences.thumbnails,
+            Action::Thumbnails => self.preferences.thumbnails ^= true,
             Action::ResetLayout => self.view.layout.reset = true,
             Action::Larger => self.resize(ctx, Some(1.0)),
             Action::Smaller => self.resize(ctx, Some(-1.0)),
@@ -295,14 +305,6 @@ impl App {
         });
     }
 
-    fn run_or_pause(&mut self) {
-        let command = match self.document.is_running() {
-            true => Command::Pause,
-            false => Command::Run,
-        };
-        self.send(command);
-    }
-
     /// Where a light probe is taken if no point was clicked: at the chosen inserted object, or at the 3D view's target.
     fn probe_point(&self) -> DVec3 {
         let chosen = self.document.insertions.chosen();
@@ -310,14 +312,6 @@ impl App {
         let capture = self.document.capture();
         let origin = capture.map_or(DVec3::ZERO, |open| open.scene.origin);
         (chosen.and_then(|(_, object)| object.at)).unwrap_or(target + origin)
-    }
-
-    /// Shows the naive composite and ours side by side.
-    fn naive_beside_ours(&mut self) {
-        let compare = &mut self.view.compare;
-        compare.mode = Mode::SideBySide;
-        (compare.left, compare.right) = (Quantity::Naive, Quantity::Composite);
-        self.view.bring_forward(Pane::Compare);
     }
 
     /// Puts a picture beside the changed photograph under a wipe, or takes it away where it is there.
@@ -351,18 +345,12 @@ impl App {
     fn copy_picture(&mut self, ctx: &Context) {
         let cursor = self.view.look.cursor;
         let quantity = cursor.map_or(Quantity::Render, |cursor| cursor.over);
-        let (level, message) = match self.view.drawn(&self.document, quantity) {
-            None => (
-                Level::Warning,
-                format!("copy: there is no {} yet", quantity.name()),
-            ),
-            Some(drawn) => {
-                ctx.copy_image(as_seen(&drawn, &self.view.look));
-                let message = format!("{} copied to the clipboard", quantity.name());
-                (Level::Info, message)
-            }
+        let name = quantity.name();
+        let Some(drawn) = self.view.drawn(&self.document, quantity) else {
+            return self.say(Level::Warning, format!("copy: there is no {name} yet"));
         };
-        self.say(level, message);
+        ctx.copy_image(as_seen(&drawn, &self.view.look));
+        self.say(Level::Info, format!("{name} copied to the clipboard"));
     }
 
     /// Shows a photograph, and turns the 3D view to its camera.
@@ -382,14 +370,5 @@ impl App {
             self.view.model.orbit.frame(&capture.scene, selected);
             self.view.bring_forward(Pane::Model);
         }
-    }
-
-    fn render_from_here(&mut self) {
-        let camera = Box::new(self.view.model.orbit.camera());
-        let shown = &mut self.view.shown;
-        shown.free = match shown.free {
-            Some(_) => None,
-            None => Some((camera, 0)),
-        };
     }
 }

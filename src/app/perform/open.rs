@@ -96,11 +96,8 @@ fn import(progress: &Progress<()>, source: &Path, out: &Path) -> Result<Vec<Stri
         progress.say(format!("{done} of {all} depth images fused"));
     })?;
     if progress.is_cancelled() {
-        return Err(Error::file(
-            source,
-            "the import was cancelled",
-            "import it again",
-        ));
+        let problem = "the import was cancelled";
+        return Err(Error::file(source, problem, "import it again"));
     }
     progress.say("writing the capture");
     export::import::write(out, &scan)?;

@@ -68,16 +68,11 @@ impl App {
         }
         let done = written.photographs;
         let s = if done == 1 { "" } else { "s" };
-        let (level, message) = match done == wanted {
-            true => (
-                Level::Info,
-                format!("{done} photograph{s} written to {folder}"),
-            ),
-            false => (
-                Level::Warning,
-                format!("ended after {done} of {wanted} photographs, written to {folder}"),
-            ),
-        };
-        self.say(level, message);
+        if done == wanted {
+            let message = format!("{done} photograph{s} written to {folder}");
+            return self.say(Level::Info, message);
+        }
+        let message = format!("ended after {done} of {wanted} photographs, written to {folder}");
+        self.say(Level::Warning, message);
     }
 }

@@ -75,16 +75,12 @@ impl App {
             return;
         };
         let folder = capture.source.default_out();
-        match trade.write(&folder) {
-            Ok(()) => {
-                self.jobs.measured.unsaved = false;
-                self.say(
-                    Level::Info,
-                    format!("trade written to {}", folder.display()),
-                );
-            }
-            Err(error) => self.say(Level::Error, error.to_string()),
+        if let Err(error) = trade.write(&folder) {
+            return self.say(Level::Error, error.to_string());
         }
+        self.jobs.measured.unsaved = false;
+        let message = format!("trade written to {}", folder.display());
+        self.say(Level::Info, message);
     }
 
     /// Takes over a curve's parameters, as far as they differ from the defaults, and stops where it was chosen.

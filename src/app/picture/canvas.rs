@@ -81,12 +81,8 @@ pub fn interact(
         }
     }
     drag(ui, document, view, requests, rect, size, &response);
-    if view
-        .tool
-        .transform
-        .take_if(|_| response.clicked())
-        .is_some()
-    {
+    let kept = view.tool.transform.take_if(|_| response.clicked());
+    if kept.is_some() {
         // The click kept what the keys began.
     } else if response.double_clicked() {
         view.look.fit();
@@ -126,23 +122,26 @@ fn drag(
     if response.drag_stopped() {
         view.tool.dragged = None;
     }
+    let aim = |pointer| {
+        let at = fraction(placement, pointer);
+        let surface = view.shown.surface_at(document, at);
+        (ray(camera, at), surface.map(|at| at.point))
+    };
     if let Some(pointer) = response.hover_pos()
         && let Some(transform) = &mut view.tool.transform
     {
-        let at = fraction(placement, pointer);
-        let surface = view.shown.surface_at(document, at).map(|at| at.point);
+        let (ray, surface) = aim(pointer);
         let project = |point| on_screen(camera, placement, point);
-        let placed = transform.placed(scene, pointer, &ray(camera, at), surface, project);
+        let placed = transform.placed(scene, pointer, &ray, surface, project);
         requests.ask_all(placed.map(|(index, to)| Request::Place(index, to)));
         return;
     }
     let pointer = response.interact_pointer_pos();
     match (pointer.filter(|_| response.dragged()), view.tool.dragged) {
         (Some(pointer), Some(handle)) => {
-            let at = fraction(placement, pointer);
-            let surface = view.shown.surface_at(document, at).map(|at| at.point);
+            let (ray, surface) = aim(pointer);
             let along = Along::of(ui.input(|input| input.modifiers));
-            let dragged = insertions.dragged(handle, scene, &ray(camera, at), surface, along);
+            let dragged = insertions.dragged(handle, scene, &ray, surface, along);
             requests.ask_all(dragged.map(|(index, to)| Request::Place(index, to)));
         }
         (Some(_), None) => view.look.pan(rect, size, response.drag_delta()),
@@ -188,12 +187,10 @@ pub fn overlay(ui: &Ui, document: &Document, view: &ViewState, rect: Rect, drawn
         let at = placement.min + cursor.at.to_vec2() * placement.size();
         for (color, width) in [(Color32::from_black_alpha(160), 3.0), (tokens.strong, 1.0)] {
             let stroke = egui::Stroke::new(width, color);
-            for arm in [
-                vec2(1.0, 0.0),
-                vec2(-1.0, 0.0),
-                vec2(0.0, 1.0),
-                vec2(0.0, -1.0),
-            ] {
+            for arm in [vec2(1.0, 0.0), vec2(0.0, 1.0)]
+                .into_iter()
+                .flat_map(|a| [a, -a])
+            {
                 painter.line_segment([at + arm * 3.0, at + arm * 9.0], stroke);
             }
         }

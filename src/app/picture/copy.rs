@@ -16,10 +16,8 @@ pub fn as_seen(drawn: &Drawn, look: &Look) -> ColorImage {
         let [r, g, b] = color(value, shading, drawn.range, look);
         Color32::from_rgb(r, g, b)
     });
-    ColorImage::new(
-        [picture.width as usize, picture.height as usize],
-        colors.collect(),
-    )
+    let size = [picture.width as usize, picture.height as usize];
+    ColorImage::new(size, colors.collect())
 }
 
 fn color(value: Vec3, shading: Shading, range: f32, look: &Look) -> [u8; 3] {
@@ -86,15 +84,10 @@ mod tests {
     #[test]
     fn what_is_not_a_number_is_magenta_and_errors_have_a_sign() {
         let look = Look::default();
-        let magenta = Color32::from_rgb(255, 0, 255);
-        assert_eq!(
-            seen(Quantity::Render, Vec3::splat(f32::NAN), &look),
-            magenta
-        );
-        let (dark, bright) = (
-            seen(Quantity::Error, Vec3::NEG_ONE, &look),
-            seen(Quantity::Error, Vec3::ONE, &look),
-        );
+        let odd = seen(Quantity::Render, Vec3::splat(f32::NAN), &look);
+        assert_eq!(odd, Color32::from_rgb(255, 0, 255));
+        let [dark, bright] =
+            [Vec3::NEG_ONE, Vec3::ONE].map(|error| seen(Quantity::Error, error, &look));
         assert!(dark.b() > dark.r() && bright.r() > bright.b());
     }
 }

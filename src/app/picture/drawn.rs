@@ -63,9 +63,8 @@ impl Derived {
     /// Makes a picture of the chosen photograph.
     pub fn convert_photograph(&mut self, document: &Document, frame: usize) {
         if !matches!(&self.photograph, Some((known, _)) if *known == frame) {
-            let photograph = document
-                .capture()
-                .and_then(|open| open.photographs.get(frame));
+            let open = document.capture();
+            let photograph = open.and_then(|open| open.photographs.get(frame));
             self.photograph = photograph.map(|p| (frame, Arc::new(p.picture())));
         }
     }

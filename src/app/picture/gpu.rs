@@ -99,46 +99,89 @@ struct Slot {
 pub fn install(render_state: &eframe::egui_wgpu::RenderState) {
     let device = &render_state.device;
     let shader = device.create_shader_module(wgpu::include_wgsl!("picture.wgsl"));
-    let pipeline = over_screen(render_state, &shader, ["vertex", "fragment"]);
-    render_state
-        .renderer
-        .write()
-        .callback_resources
-        .insert(Pictures {
-            pipeline,
-            slots: HashMap::new(),
-        });
+    let (names, format) = (["vertex", "fragment"], render_state.target_format);
+    let pictures = Pictures {
+        pipeline: pipeline(device, &shader, names, &[], None, format),
+        slots: HashMap::new(),
+    };
+    let mut renderer = render_state.renderer.write();
+    renderer.callback_resources.insert(pictures);
 }
 
-/// A pipeline whose one triangle covers what is drawn into, with the entry points of a shader.
-pub fn over_screen(
-    render_state: &eframe::egui_wgpu::RenderState,
+/// A pipeline with the entry points of a shader, which draws into a target of a format. Without buffers of vertices, one
+/// triangle covers the target.
+pub fn pipeline(
+    device: &wgpu::Device,
     shader: &wgpu::ShaderModule,
     [vertex, fragment]: [&str; 2],
+    buffers: &[Option<wgpu::VertexBufferLayout<'_>>],
+    depth_stencil: Option<wgpu::DepthStencilState>,
+    format: wgpu::TextureFormat,
 ) -> wgpu::RenderPipeline {
     let compilation_options = wgpu::PipelineCompilationOptions::default;
-    let descriptor = wgpu::RenderPipelineDescriptor {
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(fragment),
         layout: None,
         vertex: wgpu::VertexState {
             module: shader,
             entry_point: Some(vertex),
             compilation_options: compilation_options(),
-            buffers: &[],
+            buffers,
         },
         primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: None,
+        depth_stencil,
         multisample: wgpu::MultisampleState::default(),
         fragment: Some(wgpu::FragmentState {
             module: shader,
             entry_point: Some(fragment),
             compilation_options: compilation_options(),
-            targets: &[Some(render_state.target_format.into())],
+            targets: &[Some(format.into())],
         }),
         multiview_mask: None,
         cache: None,
+    })
+}
+
+/// A texture of one level, with at least one pixel.
+pub fn texture(
+    device: &wgpu::Device,
+    label: &str,
+    [width, height]: [u32; 2],
+    format: wgpu::TextureFormat,
+    usage: wgpu::TextureUsages,
+) -> wgpu::Texture {
+    device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(label),
+        size: wgpu::Extent3d {
+            width: width.max(1),
+            height: height.max(1),
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage,
+        view_formats: &[],
+    })
+}
+
+/// A texture of four numbers a pixel that can be filled.
+pub fn float_texture(device: &wgpu::Device, label: &str, size: [u32; 2]) -> wgpu::Texture {
+    let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+    let format = wgpu::TextureFormat::Rgba32Float;
+    texture(device, label, size, format, usage)
+}
+
+/// Writes all pixels of such a texture.
+pub fn fill(queue: &wgpu::Queue, texture: &wgpu::Texture, texels: &[[f32; 4]]) {
+    let layout = wgpu::TexelCopyBufferLayout {
+        offset: 0,
+        bytes_per_row: Some(texture.width() * 16),
+        rows_per_image: None,
     };
-    render_state.device.create_render_pipeline(&descriptor)
+    let (bytes, size) = (bytemuck::cast_slice(texels), texture.size());
+    queue.write_texture(texture.as_image_copy(), bytes, layout, size);
 }
 
 impl CallbackTrait for PicturePaint {
@@ -196,16 +239,8 @@ impl Slot {
         pipeline: &wgpu::RenderPipeline,
         paint: &PicturePaint,
     ) -> Self {
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("picture"),
-            size: extent(&paint.drawn.picture),
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba32Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-            view_formats: &[],
-        });
+        let picture = &paint.drawn.picture;
+        let texture = float_texture(device, "picture", [picture.width, picture.height]);
         upload(queue, &texture, &paint.drawn);
         let uniform = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: Some("picture view"),
@@ -225,14 +260,6 @@ impl Slot {
         let place = |drawn: &Drawn| drawn.objects.as_ref().map(Arc::as_ptr);
         let same = Arc::ptr_eq(&self.drawn.picture, &paint.drawn.picture);
         same && place(&self.drawn) == place(&paint.drawn)
-    }
-}
-
-fn extent(picture: &Picture) -> wgpu::Extent3d {
-    wgpu::Extent3d {
-        width: picture.width.max(1),
-        height: picture.height.max(1),
-        depth_or_array_layers: 1,
     }
 }
 
@@ -271,18 +298,7 @@ fn upload(queue: &wgpu::Queue, texture: &wgpu::Texture, drawn: &Drawn) {
     let texels: Vec<[f32; 4]> = (picture.pixels.iter().enumerate())
         .map(|(index, p)| p.extend(object(index)).to_array())
         .collect();
-    let size = extent(picture);
-    if texels.len() != (size.width * size.height) as usize {
-        return;
+    if texels.len() == (texture.width() * texture.height()) as usize {
+        fill(queue, texture, &texels);
     }
-    queue.write_texture(
-        texture.as_image_copy(),
-        bytemuck::cast_slice(&texels),
-        wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(size.width * 16),
-            rows_per_image: None,
-        },
-        size,
-    );
 }

@@ -15,10 +15,7 @@ const AGAINST: [Quantity; 3] = [Quantity::Photograph, Quantity::Naive, Quantity:
 /// Draws the pane.
 pub fn pane(ui: &mut Ui, document: &Document, view: &mut ViewState, requests: &mut Requests) {
     view.needed.note(Quantity::Composite);
-    theme::strip(ui).show(ui, |ui| {
-        ui.set_min_width(ui.available_width());
-        controls(ui, document, view);
-    });
+    theme::strip(ui, |ui| controls(ui, document, view));
     let rect = ui.available_rect_before_wrap();
     let composite = Quantity::Composite;
     match view.compare.against.filter(|_| !view.look.photograph) {

@@ -8,18 +8,10 @@ use std::sync::Arc;
 /// Albedos below this tell nothing of the light that arrives.
 const DARKEST: f32 = 0.01;
 
-/// The picture of a view's irradiance, made anew when the view's pictures change.
+/// The picture of a view's irradiance, made anew when the view's pictures change: after the render and the albedo that it was
+/// made of.
 #[derive(Debug, Default)]
-pub struct Irradiance {
-    made: Option<Made>,
-}
-
-#[derive(Debug)]
-struct Made {
-    render: Arc<Picture>,
-    albedo: Arc<Picture>,
-    picture: Arc<Picture>,
-}
+pub struct Irradiance(Option<[Arc<Picture>; 3]>);
 
 impl Irradiance {
     /// Follows the pictures of a view; forgets all where there is none.
@@ -29,24 +21,19 @@ impl Irradiance {
             Some((render, albedo, view.emission.as_ref()?))
         });
         let Some((render, albedo, emission)) = parts else {
-            self.made = None;
+            self.0 = None;
             return;
         };
-        let current = self.made.as_ref().is_some_and(|made| {
-            Arc::ptr_eq(&made.render, render) && Arc::ptr_eq(&made.albedo, albedo)
-        });
-        if !current {
-            self.made = Some(Made {
-                render: render.clone(),
-                albedo: albedo.clone(),
-                picture: Arc::new(irradiance(render, albedo, emission)),
-            });
+        let current = |[r, a, _]: &[_; 3]| Arc::ptr_eq(r, render) && Arc::ptr_eq(a, albedo);
+        if !self.0.as_ref().is_some_and(current) {
+            let picture = Arc::new(irradiance(render, albedo, emission));
+            self.0 = Some([render.clone(), albedo.clone(), picture]);
         }
     }
 
     /// The picture, once there is one.
     pub fn picture(&self) -> Option<Arc<Picture>> {
-        Some(self.made.as_ref()?.picture.clone())
+        self.0.as_ref().map(|[_, _, picture]| picture.clone())
     }
 }
 

@@ -97,10 +97,8 @@ impl Look {
 
     fn keep_inside(&mut self) {
         let margin = 0.5 / self.zoom;
-        self.center = self.center.clamp(
-            Pos2::new(margin, margin),
-            Pos2::new(1.0 - margin, 1.0 - margin),
-        );
+        let [low, high] = [margin, 1.0 - margin].map(|end| Pos2::new(end, end));
+        self.center = self.center.clamp(low, high);
     }
 }
 

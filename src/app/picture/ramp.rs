@@ -101,11 +101,8 @@ fn round_up(value: f32) -> f32 {
         return 1e-3;
     }
     let power = 10f32.powf(value.log10().floor());
-    [1.0, 2.0, 5.0, 10.0]
-        .into_iter()
-        .map(|step| step * power)
-        .find(|&step| step >= value)
-        .unwrap_or(value)
+    let mut steps = [1.0, 2.0, 5.0, 10.0].into_iter().map(|step| step * power);
+    steps.find(|&step| step >= value).unwrap_or(value)
 }
 
 #[cfg(test)]
@@ -117,12 +114,7 @@ mod tests {
         for (value, range) in [(0.013, 0.02), (0.5, 0.5), (7.0, 10.0), (0.0, 1e-3)] {
             assert!((round_up(value) - range).abs() < 1e-6 * range, "{value}");
         }
-        let pixels = (0..1000).map(|i| Vec3::splat(i as f32 / 1000.0)).collect();
-        let picture = Picture {
-            width: 1000,
-            height: 1,
-            pixels,
-        };
+        let picture = Picture::from_fn(1000, 1, |x, _| Vec3::splat(x as f32 / 1000.0));
         assert_eq!(range(&picture, Shading::Positive), 1.0);
     }
 

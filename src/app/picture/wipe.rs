@@ -14,10 +14,7 @@ use egui::{Align2, Color32, FontId, Id, Rect, Role, Sense, Ui, UiBuilder, Widget
 pub fn pane(ui: &mut Ui, document: &Document, view: &mut ViewState, requests: &mut Requests) {
     view.needed.note(view.compare.left);
     view.needed.note(view.compare.right);
-    theme::strip(ui).show(ui, |ui| {
-        ui.set_min_width(ui.available_width());
-        controls(ui, &mut view.compare);
-    });
+    theme::strip(ui, |ui| controls(ui, &mut view.compare));
     let rect = ui.available_rect_before_wrap();
     let (left, right) = (view.look.held(view.compare.left), view.compare.right);
     let shown = match view.compare.mode {

@@ -135,8 +135,7 @@ fn length(ui: &mut Ui, found: f64, metres: &mut f64, requests: &mut Requests) ->
     });
     let (clicked, cancel) = go_or_cancel(ui, "Set", *metres > 0.0);
     if clicked {
-        let metres = *metres;
-        requests.ask(Request::Length { found, metres });
+        requests.ask(Request::Length(found, *metres));
     }
     clicked || cancel
 }

@@ -33,34 +33,28 @@ pub fn show(ctx: &egui::Context, open: &mut bool) {
                 .max_height(560.0)
                 .min_scrolled_height(560.0)
                 .show(ui, |ui| {
+                    let grid = |name| Grid::new(name).num_columns(2).striped(true);
                     for menu in Menu::ALL {
                         ui.strong(menu.name());
-                        Grid::new(menu.name())
-                            .num_columns(2)
-                            .striped(true)
-                            .show(ui, |ui| {
-                                let actions = Action::ALL.iter().filter(|a| a.menu() == menu);
-                                for action in actions.filter(|a| a.shortcut().is_some()) {
-                                    ui.monospace(action.keys(ctx));
-                                    ui.label(action.text()).on_hover_text(action.help());
-                                    ui.end_row();
-                                }
-                            });
-                        ui.add_space(6.0);
-                    }
-                    ui.strong("Mouse");
-                    Grid::new("mouse")
-                        .num_columns(2)
-                        .striped(true)
-                        .show(ui, |ui| {
-                            for (how, what) in
-                                MOUSE.lines().filter_map(|line| line.split_once(" | "))
-                            {
-                                ui.label(how);
-                                ui.label(what);
+                        grid(menu.name()).show(ui, |ui| {
+                            let actions = Action::ALL.iter().filter(|a| a.menu() == menu);
+                            for action in actions.filter(|a| a.shortcut().is_some()) {
+                                ui.monospace(action.keys(ctx));
+                                ui.label(action.text()).on_hover_text(action.help());
                                 ui.end_row();
                             }
                         });
+                        ui.add_space(6.0);
+                    }
+                    ui.strong("Mouse");
+                    grid("mouse").show(ui, |ui| {
+                        let lines = MOUSE.lines();
+                        for (how, what) in lines.filter_map(|line| line.split_once(" | ")) {
+                            ui.label(how);
+                            ui.label(what);
+                            ui.end_row();
+                        }
+                    });
                 });
         });
 }

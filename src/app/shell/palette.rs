@@ -38,13 +38,8 @@ pub fn show(ctx: &egui::Context, open: &mut Option<Palette>, requests: &mut Requ
         return;
     };
     let found = matches(&palette.query);
-    let (down, up, enter) = ctx.input_mut(|input| {
-        (
-            input.consume_key(Modifiers::NONE, Key::ArrowDown),
-            input.consume_key(Modifiers::NONE, Key::ArrowUp),
-            input.consume_key(Modifiers::NONE, Key::Enter),
-        )
-    });
+    let [down, up, enter] = [Key::ArrowDown, Key::ArrowUp, Key::Enter]
+        .map(|key| ctx.input_mut(|input| input.consume_key(Modifiers::NONE, key)));
     if !found.is_empty() {
         let step = usize::from(down) + (found.len() - 1) * usize::from(up);
         palette.marked = (palette.marked.min(found.len() - 1) + step) % found.len();

@@ -133,8 +133,6 @@ impl Sheet {
 
 /// A capture's name without what file systems object to.
 fn file_name(name: &str) -> String {
-    name.replace(
-        |c: char| !(c.is_alphanumeric() || c == '-' || c == '_'),
-        "-",
-    )
+    let is_plain = |c: char| c.is_alphanumeric() || c == '-' || c == '_';
+    name.replace(|c: char| !is_plain(c), "-")
 }

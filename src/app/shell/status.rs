@@ -7,40 +7,24 @@ use crate::app::request::Requests;
 use crate::app::shell::photographs;
 use crate::app::theme;
 use crate::inverse::solver::Termination;
+use crate::session::save::memory::resident_bytes;
 use crate::session::snapshot::Phase;
 use egui::{ProgressBar, RichText, Ui};
 use std::time::{Duration, Instant};
-use sysinfo::{ProcessRefreshKind, ProcessesToUpdate, System};
 
 /// Memory of this process, looked up now and then.
+#[derive(Default)]
 pub struct Memory {
-    system: Option<System>,
     looked_up: Option<Instant>,
     bytes: u64,
-}
-
-impl Default for Memory {
-    fn default() -> Self {
-        Self {
-            system: System::new().ok(),
-            looked_up: None,
-            bytes: 0,
-        }
-    }
 }
 
 impl Memory {
     /// Resident bytes, at most two seconds old.
     fn bytes(&mut self) -> u64 {
         let age = self.looked_up.map(|at| at.elapsed());
-        if age.is_none_or(|age| age >= Duration::from_secs(2))
-            && let Some(system) = &mut self.system
-            && let Ok(process) = sysinfo::get_current_pid()
-        {
-            let kind = ProcessRefreshKind::nothing().with_memory();
-            let processes = ProcessesToUpdate::Some(&[process]);
-            system.refresh_processes_specifics(processes, false, kind);
-            self.bytes = system.process(process).map_or(0, |p| p.memory());
+        if age.is_none_or(|age| age >= Duration::from_secs(2)) {
+            self.bytes = resident_bytes().unwrap_or(0);
             self.looked_up = Some(Instant::now());
         }
         self.bytes
@@ -84,11 +68,9 @@ pub fn bar(
     let snapshot = &document.snapshot;
     let color = match snapshot.phase {
         Phase::Solving | Phase::Loading => tokens.accent,
-        Phase::Finished(Termination::Cancelled) => tokens.weak,
-        Phase::Finished(Termination::Diverged) => tokens.error,
+        Phase::Paused | Phase::Idle | Phase::Finished(Termination::Cancelled) => tokens.weak,
+        Phase::Failed | Phase::Finished(Termination::Diverged) => tokens.error,
         Phase::Finished(_) => tokens.good,
-        Phase::Failed => tokens.error,
-        Phase::Paused | Phase::Idle => tokens.weak,
     };
     ui.horizontal_centered(|ui| {
         let phase = RichText::new(phase_word(&snapshot.phase));

@@ -27,10 +27,8 @@ pub struct Thumbnails {
 impl Thumbnails {
     fn texture(&mut self, ui: &Ui, frame: usize, photograph: &Photograph) -> TextureHandle {
         let texture = self.textures.entry(frame).or_insert_with(|| {
-            let (name, image) = (
-                format!("photograph {frame}"),
-                small(photograph, self.exposure),
-            );
+            let name = format!("photograph {frame}");
+            let image = small(photograph, self.exposure);
             ui.ctx().load_texture(name, image, TextureOptions::LINEAR)
         });
         texture.clone()

@@ -123,9 +123,8 @@ impl Painter {
         // The composite that a user waits for comes before the re-render, which few look at then.
         let mut more = true;
         if !inserting.is_rough() || views.shown().is_none() {
-            let drawn = self
-                .threads
-                .install(|| views.draw(&capture, &light.edited, &light.options));
+            let (edited, options) = (&light.edited, &light.options);
+            let drawn = (self.threads).install(|| views.draw(&capture, edited, options));
             (self.changed, more) = (self.changed | drawn.0, drawn.1);
         }
         if !inserting.is_busy() {

@@ -95,18 +95,16 @@ impl Requests {
     /// Another capture is open: without edits and objects, at its first frame, or at that of a requested view, which is kept.
     pub fn open(&self, capture: Arc<OpenCapture>) {
         self.change(|wanted| {
-            let (view, frame) = match wanted.view.take() {
-                Some(view) => match view.camera {
-                    ViewCamera::Frame(frame) => (Some(view), frame),
-                    ViewCamera::Free(_) => (None, 0),
-                },
-                None => (None, 0),
-            };
+            let kept = wanted.view.take().and_then(|view| match view.camera {
+                ViewCamera::Frame(frame) => Some((view, frame)),
+                ViewCamera::Free(_) => None,
+            });
+            let (view, frame) = kept.unzip();
             *wanted = Wanted {
                 capture: Some(capture),
                 settings: wanted.settings.clone(),
                 exact: wanted.exact,
-                frame,
+                frame: frame.unwrap_or(0),
                 view,
                 new: New {
                     capture: true,

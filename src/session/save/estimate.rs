@@ -99,6 +99,7 @@ impl EstimateFile {
             let hash = blake3::hash(bytes).to_hex();
             format!("maps-{}.safetensors", &hash.as_str()[..12])
         });
+        let exposures = estimate.exposures.as_ref();
         let file = Self {
             version: VERSION,
             relit: env!("CARGO_PKG_VERSION").to_owned(),
@@ -107,10 +108,7 @@ impl EstimateFile {
             stopped_because,
             objects: Named::objects(&capture.scene, estimate),
             maps,
-            exposures: estimate
-                .exposures
-                .as_ref()
-                .map(|exposures| exposures.iter().map(|&e| rgb(e)).collect()),
+            exposures: exposures.map(|all| all.iter().copied().map(rgb).collect()),
             vignetting: estimate.vignetting.map(|v| rgb(v.power)),
             response: estimate.response.map(|r| r.terms.map(rgb)),
             albedo_common_stderr: estimate.common_error,
@@ -220,21 +218,16 @@ impl EstimateFile {
         {
             return Err(misfit("maps"));
         }
-        if let Some(exposures) = &self.exposures
-            && exposures.len() != scene.cameras.len()
-        {
+        let exposures = self.exposures.as_ref();
+        if exposures.is_some_and(|all| all.len() != scene.cameras.len()) {
             return Err(misfit("exposures"));
         }
+        let exposure = |rgb: &Rgb| Vec3::from_array(rgb.map(|v| v.unwrap_or(1.0)));
         Ok(Estimate {
             objects,
             texels: maps.texels.clone(),
             outside: maps.outside.clone(),
-            exposures: self.exposures.as_ref().map(|exposures| {
-                exposures
-                    .iter()
-                    .map(|e| Vec3::from_array(e.map(|v| v.unwrap_or(1.0))))
-                    .collect()
-            }),
+            exposures: exposures.map(|all| all.iter().map(exposure).collect()),
             vignetting: self.vignetting(),
             response: self.response(),
             common_error: self.albedo_common_stderr,
@@ -316,10 +309,9 @@ fn relative(from: &Path, to: &Path) -> Option<String> {
     let up = from[shared..].iter().map(|_| Some(".."));
     let down = to[shared..].iter().map(|part| part.as_os_str().to_str());
     let parts: Vec<&str> = up.chain(down).collect::<Option<_>>()?;
-    Some(if parts.is_empty() {
-        ".".to_owned()
-    } else {
-        parts.join("/")
+    Some(match parts.is_empty() {
+        true => ".".to_owned(),
+        false => parts.join("/"),
     })
 }
 

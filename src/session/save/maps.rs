@@ -7,7 +7,8 @@ use crate::transport::material::TexelColors;
 use crate::transport::sun::Sun;
 use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
-use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use safetensors::tensor::Dtype::{self, F32, U8, U32};
+use safetensors::tensor::{SafeTensors, TensorView};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -30,78 +31,60 @@ pub struct Maps {
 /// The maps do not fit their layout.
 pub fn encode(estimate: &Estimate) -> Result<Option<Vec<u8>>> {
     let mut tensors: Vec<(&str, Dtype, Vec<usize>, Vec<u8>)> = Vec::new();
+    let mut add = |name, dtype, shape: &[usize], bytes| {
+        tensors.push((name, dtype, shape.to_vec(), bytes));
+    };
     if let Some(texels) = &estimate.texels {
-        let layout = &texels.colors.layout;
-        let count = layout.len();
-        tensors.push((
-            "texel_levels",
-            Dtype::U8,
-            vec![layout.levels.len()],
-            layout.levels.clone(),
-        ));
-        let rgb = vec![count, 3];
-        tensors.push((
-            "texel_albedo",
-            Dtype::F32,
-            rgb.clone(),
-            color_bytes(&texels.colors.colors),
-        ));
-        tensors.push((
-            "texel_albedo_stderr",
-            Dtype::F32,
-            rgb,
-            color_bytes(&texels.stderr),
-        ));
+        let (levels, textured) = (&texels.colors.layout.levels, &texels.textured);
+        let count = texels.colors.layout.len();
+        let rgb = [count, 3];
         let seen = texels.seen.iter().flat_map(|n| n.to_le_bytes()).collect();
-        tensors.push(("texel_seen", Dtype::U32, vec![count], seen));
-        let textured: Vec<u8> = texels.textured.iter().map(|&t| u8::from(t)).collect();
-        tensors.push(("textured", Dtype::U8, vec![textured.len()], textured));
+        add("texel_levels", U8, &[levels.len()], levels.clone());
+        add(
+            "texel_albedo",
+            F32,
+            &rgb,
+            color_bytes(&texels.colors.colors),
+        );
+        add(
+            "texel_albedo_stderr",
+            F32,
+            &rgb,
+            color_bytes(&texels.stderr),
+        );
+        add("texel_seen", U32, &[count], seen);
+        add("textured", U8, &[textured.len()], flag_bytes(textured));
     }
     if let Some(outside) = &estimate.outside {
-        let shape = vec![outside.height as usize, outside.width as usize, 3];
-        tensors.push(("outside", Dtype::F32, shape, color_bytes(&outside.pixels)));
+        let [height, width] = [outside.height, outside.width].map(|side| side as usize);
+        let rgb = [height, width, 3];
+        add("outside", F32, &rgb, color_bytes(&outside.pixels));
         if let Some(above) = &outside.above {
-            let shape = vec![outside.height as usize, outside.width as usize, 3];
-            tensors.push(("outside_above", Dtype::F32, shape, color_bytes(above)));
+            add("outside_above", F32, &rgb, color_bytes(above));
         }
         if let Some(sun) = outside.sun {
             let bytes = color_bytes(&[sun.direction, sun.irradiance]);
-            tensors.push(("outside_sun", Dtype::F32, vec![2, 3], bytes));
+            add("outside_sun", F32, &[2, 3], bytes);
         }
         if let Some(openings) = &outside.openings {
-            let shape = vec![outside.height as usize, outside.width as usize];
-            let bytes = openings.iter().map(|&open| u8::from(open)).collect();
-            tensors.push(("outside_openings", Dtype::U8, shape, bytes));
+            add("outside_openings", U8, &rgb[..2], flag_bytes(openings));
         }
         if let Surroundings::Box { min, max } = outside.surroundings {
-            tensors.push((
-                "outside_box",
-                Dtype::F32,
-                vec![2, 3],
-                color_bytes(&[min, max]),
-            ));
+            add("outside_box", F32, &[2, 3], color_bytes(&[min, max]));
         }
     }
     if tensors.is_empty() {
         return Ok(None);
     }
-    let misfit = |error: safetensors::SafeTensorError| {
-        Error::new(
-            "estimate",
-            format!("its maps cannot be written: {error}"),
-            "",
-        )
-    };
-    let views = tensors
-        .iter()
-        .map(|(name, dtype, shape, bytes)| {
-            Ok((*name, TensorView::new(*dtype, shape.clone(), bytes)?))
-        })
-        .collect::<std::result::Result<Vec<_>, _>>()
-        .map_err(misfit)?;
-    safetensors::serialize(views, None)
-        .map(Some)
-        .map_err(misfit)
+    let views = tensors.iter().map(|(name, dtype, shape, bytes)| {
+        Ok((*name, TensorView::new(*dtype, shape.clone(), bytes)?))
+    });
+    let views: std::result::Result<Vec<_>, safetensors::SafeTensorError> = views.collect();
+    let bytes = views.and_then(|views| safetensors::serialize(views, None));
+    bytes.map(Some).map_err(|error| {
+        let problem = format!("its maps cannot be written: {error}");
+        Error::new("estimate", problem, "")
+    })
 }
 
 /// Whether a sun has a unit direction and gives light.
@@ -117,53 +100,15 @@ pub fn decode(path: &Path, bytes: &[u8]) -> Result<Maps> {
     let file = SafeTensors::deserialize(bytes)
         .map_err(|error| Error::file(path, error, "solve or save again"))?;
     let read = Tensors { path, file };
-    let texels = match read.optional("texel_levels", Dtype::U8)? {
-        Some(levels) => Some(Arc::new(read.texels(levels.data())?)),
-        None => None,
-    };
-    let outside = match read.optional("outside", Dtype::F32)? {
-        Some(map) => match *map.shape() {
-            [height, width, 3] if height > 0 && width > 0 => Some(Outside {
-                width: width as u32,
-                height: height as u32,
-                pixels: colors(map.data()),
-                above: match read.optional("outside_above", Dtype::F32)? {
-                    None => None,
-                    Some(above) if above.shape() == map.shape() => Some(colors(above.data())),
-                    Some(_) => return Err(read.misfit("outside_above")),
-                },
-                sun: match read.optional("outside_sun", Dtype::F32)? {
-                    None => None,
-                    Some(sun) => match *colors(sun.data()) {
-                        [direction, irradiance] if is_sun(direction, irradiance) => Some(Sun {
-                            direction,
-                            irradiance,
-                        }),
-                        _ => return Err(read.misfit("outside_sun")),
-                    },
-                },
-                openings: match read.optional("outside_openings", Dtype::U8)? {
-                    None => None,
-                    Some(open) if *open.shape() == [height, width] => {
-                        Some(open.data().iter().map(|&open| open != 0).collect())
-                    }
-                    Some(_) => return Err(read.misfit("outside_openings")),
-                },
-                surroundings: match read.optional("outside_box", Dtype::F32)? {
-                    None => Surroundings::Far,
-                    Some(corners) => match *colors(corners.data()) {
-                        [min, max] if min.cmplt(max).all() && (max - min).is_finite() => {
-                            Surroundings::Box { min, max }
-                        }
-                        _ => return Err(read.misfit("outside_box")),
-                    },
-                },
-            }),
-            _ => return Err(read.misfit("outside")),
-        },
-        None => None,
-    };
-    Ok(Maps { texels, outside })
+    let texels = read.optional("texel_levels", U8)?;
+    let texels = texels
+        .map(|levels| read.texels(levels.data()))
+        .transpose()?;
+    let outside = read.optional("outside", F32)?;
+    Ok(Maps {
+        texels: texels.map(Arc::new),
+        outside: outside.map(|map| read.outside(&map)).transpose()?,
+    })
 }
 
 struct Tensors<'a> {
@@ -187,6 +132,55 @@ impl<'a> Tensors<'a> {
         }
     }
 
+    /// What `read` makes of a tensor, which fits unless that is `None`; `None` without the tensor.
+    fn part<T>(
+        &self,
+        name: &str,
+        dtype: Dtype,
+        read: impl FnOnce(&TensorView<'a>) -> Option<T>,
+    ) -> Result<Option<T>> {
+        let part = self.optional(name, dtype)?;
+        part.map(|tensor| read(&tensor).ok_or_else(|| self.misfit(name)))
+            .transpose()
+    }
+
+    fn outside(&self, map: &TensorView<'a>) -> Result<Outside> {
+        let (height, width) = match *map.shape() {
+            [height, width, 3] if height > 0 && width > 0 => (height, width),
+            _ => return Err(self.misfit("outside")),
+        };
+        let above = self.part("outside_above", F32, |above| {
+            (above.shape() == map.shape()).then(|| colors(above.data()))
+        })?;
+        let sun = self.part("outside_sun", F32, |sun| match *colors(sun.data()) {
+            [direction, irradiance] if is_sun(direction, irradiance) => Some(Sun {
+                direction,
+                irradiance,
+            }),
+            _ => None,
+        })?;
+        let openings = self.part("outside_openings", U8, |open| {
+            (*open.shape() == [height, width]).then(|| flags(open.data()))
+        })?;
+        let surroundings = self.part("outside_box", F32, |corners| {
+            match *colors(corners.data()) {
+                [min, max] if min.cmplt(max).all() && (max - min).is_finite() => {
+                    Some(Surroundings::Box { min, max })
+                }
+                _ => None,
+            }
+        })?;
+        Ok(Outside {
+            width: width as u32,
+            height: height as u32,
+            pixels: colors(map.data()),
+            above,
+            sun,
+            openings,
+            surroundings: surroundings.unwrap_or(Surroundings::Far),
+        })
+    }
+
     fn texels(&self, levels: &[u8]) -> Result<TexelEstimate> {
         // Higher levels would overflow the number of texels.
         let total: u64 = levels
@@ -197,12 +191,11 @@ impl<'a> Tensors<'a> {
             return Err(self.misfit("texel_levels"));
         }
         let count = total as usize;
-        let albedo = self.required("texel_albedo", Dtype::F32, count * 12)?;
-        let stderr = self.required("texel_albedo_stderr", Dtype::F32, count * 12)?;
-        let seen = self.required("texel_seen", Dtype::U32, count * 4)?;
-        let textured = self
-            .optional("textured", Dtype::U8)?
-            .ok_or_else(|| self.misfit("textured"))?;
+        let albedo = self.required("texel_albedo", F32, count * 12)?;
+        let stderr = self.required("texel_albedo_stderr", F32, count * 12)?;
+        let seen = self.required("texel_seen", U32, count * 4)?;
+        let textured = self.optional("textured", U8)?;
+        let textured = textured.ok_or_else(|| self.misfit("textured"))?;
         Ok(TexelEstimate {
             colors: Arc::new(TexelColors {
                 layout: TexelLayout::new(levels.to_vec()),
@@ -210,7 +203,7 @@ impl<'a> Tensors<'a> {
             }),
             stderr: colors(stderr),
             seen: words(seen).map(u32::from_le_bytes).collect(),
-            textured: textured.data().iter().map(|&t| t != 0).collect(),
+            textured: flags(textured.data()),
         })
     }
 
@@ -224,11 +217,16 @@ impl<'a> Tensors<'a> {
 }
 
 fn color_bytes(colors: &[Vec3]) -> Vec<u8> {
-    colors
-        .iter()
-        .flat_map(|c| c.to_array())
-        .flat_map(f32::to_le_bytes)
-        .collect()
+    let numbers = colors.iter().flat_map(|c| c.to_array());
+    numbers.flat_map(f32::to_le_bytes).collect()
+}
+
+fn flag_bytes(flags: &[bool]) -> Vec<u8> {
+    flags.iter().map(|&flag| u8::from(flag)).collect()
+}
+
+fn flags(bytes: &[u8]) -> Vec<bool> {
+    bytes.iter().map(|&byte| byte != 0).collect()
 }
 
 fn words(bytes: &[u8]) -> impl Iterator<Item = [u8; 4]> + '_ {
@@ -236,16 +234,9 @@ fn words(bytes: &[u8]) -> impl Iterator<Item = [u8; 4]> + '_ {
 }
 
 fn colors(bytes: &[u8]) -> Vec<Vec3> {
-    bytes
-        .as_chunks::<12>()
-        .0
-        .iter()
-        .map(|c| {
-            let mut channels = words(c).map(f32::from_le_bytes);
-            let mut next = || channels.next().unwrap_or(0.0);
-            Vec3::new(next(), next(), next())
-        })
-        .collect()
+    let numbers: Vec<f32> = words(bytes).map(f32::from_le_bytes).collect();
+    let colors = numbers.as_chunks::<3>().0.iter();
+    colors.copied().map(Vec3::from_array).collect()
 }
 
 #[cfg(test)]
@@ -254,10 +245,11 @@ mod tests {
 
     fn estimate() -> Estimate {
         let layout = TexelLayout::new(vec![0, 1, 2]);
-        let ramp = |scale: f32| {
-            (0..layout.len())
+        let ramp = |scale: f32| -> Vec<Vec3> {
+            let texels = 0..layout.len();
+            texels
                 .map(|i| Vec3::new(i as f32, 0.5, -1.0) * scale)
-                .collect::<Vec<_>>()
+                .collect()
         };
         Estimate {
             texels: Some(Arc::new(TexelEstimate {
@@ -299,9 +291,8 @@ mod tests {
             };
             estimate.outside.as_mut().expect("outside").sun = Some(sun);
             let bytes = encode(&estimate).expect("encodes").expect("has maps");
-            let error = decode(Path::new("maps"), &bytes)
-                .map(drop)
-                .expect_err("no sun");
+            let maps = decode(Path::new("maps"), &bytes);
+            let error = maps.map(drop).expect_err("no sun");
             assert!(error.to_string().contains("outside_sun"), "{error}");
         }
     }
@@ -311,16 +302,11 @@ mod tests {
         let estimate = estimate();
         let bytes = encode(&estimate).expect("fits").expect("has maps");
         let maps = decode(Path::new("maps"), &bytes).expect("reads");
-        let (a, b) = (
-            estimate.texels.expect("texels"),
-            maps.texels.expect("texels"),
-        );
+        let [a, b] = [estimate.texels, maps.texels].map(|texels| texels.expect("texels"));
         assert_eq!(a.colors.layout, b.colors.layout);
         assert_eq!(a.colors.colors, b.colors.colors);
-        assert_eq!(
-            (&a.stderr, &a.seen, &a.textured),
-            (&b.stderr, &b.seen, &b.textured)
-        );
+        assert_eq!((&a.stderr, &a.seen), (&b.stderr, &b.seen));
+        assert_eq!(a.textured, b.textured);
         assert_eq!(estimate.outside, maps.outside);
         assert_eq!(encode(&Estimate::default()), Ok(None));
     }

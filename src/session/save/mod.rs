@@ -1,9 +1,8 @@
 //! Results of a solve: writing them into a folder, and loading them.
 
 pub mod estimate;
-mod frames;
 pub mod maps;
-mod memory;
+pub mod memory;
 pub mod named;
 pub mod pictures;
 pub mod report;

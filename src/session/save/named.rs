@@ -14,22 +14,16 @@ pub struct Named<T>(pub Vec<(String, T)>);
 impl<T> Named<T> {
     /// The value of a name.
     pub fn get(&self, name: &str) -> Option<&T> {
-        self.0
-            .iter()
-            .find(|(n, _)| n == name)
-            .map(|(_, value)| value)
+        let mut pairs = self.0.iter();
+        pairs.find_map(|(known, value)| (known == name).then_some(value))
     }
 }
 
 impl Named<ObjectEstimate> {
     /// All objects of an estimate, by name.
     pub fn objects(scene: &Scene, estimate: &Estimate) -> Self {
-        let named = scene.objects.iter().zip(&estimate.objects);
-        Self(
-            named
-                .map(|(o, estimate)| (o.name.clone(), estimate.clone()))
-                .collect(),
-        )
+        let names = scene.objects.iter().map(|object| object.name.clone());
+        Self(names.zip(estimate.objects.iter().cloned()).collect())
     }
 }
 

@@ -11,6 +11,7 @@ use crate::scene::camera::Camera;
 use crate::session::light::path_options;
 use crate::session::save::results::Results;
 use crate::session::save::staging::Staging;
+use crate::session::view::difference;
 use crate::session::view::hits::Hits;
 use crate::transport::denoise::guides;
 use crate::transport::lit::LitScene;
@@ -20,7 +21,7 @@ use std::sync::Arc;
 
 /// Folder of the pictures within the results.
 pub use crate::export::overwrite::VIEWS as FOLDER;
-pub use crate::session::save::frames::Frames;
+pub use crate::session::save::results::Frames;
 /// Kinds of pictures of each frame.
 pub const KINDS: [&str; 6] = ["render", "albedo", "emission", "error", "stderr", "seen"];
 
@@ -36,16 +37,14 @@ const SAMPLES: (u64, u64) = (4, 64);
 pub fn write(staging: &mut Staging, results: &Results) -> Result<()> {
     let capture = &results.capture;
     let chosen = results.views.chosen(capture.scene.cameras.len());
-    let cameras: Vec<(usize, Camera)> = chosen
-        .into_iter()
-        .map(|index| {
-            let camera = capture.full_camera(index)?;
-            Ok((index, camera.shrunk(results.views.long_side())))
-        })
-        .collect::<Result<_>>()?;
-    let pixels: u64 = cameras
-        .iter()
-        .map(|(_, c)| u64::from(c.intrinsics.width) * u64::from(c.intrinsics.height))
+    let cameras = chosen.into_iter().map(|index| {
+        let camera = capture.full_camera(index)?;
+        Ok((index, camera.shrunk(results.views.long_side())))
+    });
+    let cameras: Vec<(usize, Camera)> = cameras.collect::<Result<_>>()?;
+    let sizes = cameras.iter().map(|(_, camera)| &camera.intrinsics);
+    let pixels: u64 = sizes
+        .map(|k| u64::from(k.width) * u64::from(k.height))
         .sum();
     let samples = (PATHS / pixels.max(1)).clamp(SAMPLES.0, SAMPLES.1) as u32;
     let estimate = results.edited();
@@ -107,12 +106,7 @@ fn frame(
     for picture in [&mut render, &mut clean] {
         exposure.apply(&camera.intrinsics, saturation, picture);
     }
-    let error = Picture {
-        pixels: (render.pixels.iter().zip(&photograph.pixels))
-            .map(|(r, p)| *r - *p)
-            .collect(),
-        ..photograph
-    };
+    let error = difference(&render, &photograph);
     let hits = Hits::new(scene, camera);
     let albedo = hits.albedo(scene, &lit.materials);
     let emission = hits.emission(scene, camera, estimate);
@@ -121,14 +115,8 @@ fn frame(
 
     let mut path =
         |kind: &str, ending: &str| staging.file(format!("{FOLDER}/{index:03}.{kind}.{ending}"));
-    for (kind, picture) in [
-        ("render", &render),
-        ("albedo", &albedo),
-        ("emission", &emission),
-        ("error", &error),
-        ("stderr", &stderr),
-        ("seen", &seen),
-    ] {
+    let pictures = [&render, &albedo, &emission, &error, &stderr, &seen];
+    for (kind, picture) in KINDS.into_iter().zip(pictures) {
         write_rgb(&path(kind, "exr")?, picture, Precision::Float)?;
     }
     write_png(&path("render", "png")?, &clean, shown_at)?;

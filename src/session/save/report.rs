@@ -14,6 +14,7 @@ use crate::transport::sun::Sun;
 use crate::transport::surroundings::Surroundings;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 
 /// The content of `report.json`. Times in seconds, linear radiance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -102,23 +103,15 @@ pub struct OutsideSummary {
     pub sun: Option<Sun>,
 }
 
-/// Durations in seconds.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Seconds {
-    /// Total.
-    pub total: f64,
-    /// Reading the capture.
-    pub load: f64,
-    /// Writing the results.
-    pub write: f64,
-}
-
 impl Report {
-    /// The report of a solve.
-    pub fn new(results: &Results, seconds: Seconds) -> Self {
+    /// The report of a solve, whose results were written in `seconds_write`.
+    pub fn new(results: &Results, seconds_write: f64) -> Self {
         let (capture, settings, estimate) =
             (&results.capture, &results.settings, &results.estimate);
         let (progress, stopped_because) = (&results.progress, results.stopped_because);
+        let exposures = estimate.exposures.as_ref();
+        let photographs = capture.photographs.iter();
+        let sizes = photographs.map(|p| u64::from(p.width) * u64::from(p.height));
         let mut warnings = capture.warnings.clone();
         warnings.extend(progress.warnings.iter().cloned());
         Self {
@@ -126,40 +119,32 @@ impl Report {
             seed: settings.seed,
             preset: settings.preset,
             threads: rayon::current_num_threads(),
-            seconds: seconds.total,
-            seconds_load: seconds.load,
+            seconds: results.started.elapsed().as_secs_f64(),
+            seconds_load: results.seconds_load,
             seconds_solve: progress.seconds,
-            seconds_write: seconds.write,
+            seconds_write,
             seconds_to_first_estimate: progress.seconds_to_first_estimate,
             capture: Counts {
                 triangles: capture.scene.triangles.len(),
                 objects: capture.scene.objects.len(),
                 frames: capture.photographs.len(),
-                pixels: capture
-                    .photographs
-                    .iter()
-                    .map(|p| u64::from(p.width) * u64::from(p.height))
-                    .sum(),
+                pixels: sizes.sum(),
             },
             device: results.renderer.card().unwrap_or("cpu").to_owned(),
             denoiser: results.denoiser.map_or("none", Denoiser::name),
             rays: progress.rays,
-            rays_per_second: if progress.seconds > 0.0 {
-                progress.rays as f64 / progress.seconds
-            } else {
-                0.0
+            rays_per_second: match progress.seconds > 0.0 {
+                true => progress.rays as f64 / progress.seconds,
+                false => 0.0,
             },
             peak_memory_bytes: peak_memory_bytes(),
             stopped_because,
             stages: progress.stages.clone(),
             objects: Named::objects(&capture.scene, estimate),
             outside_light: estimate.outside.as_ref().map(|outside| {
-                let row_angle = |row: usize| {
-                    let edge = |r: usize| {
-                        (std::f64::consts::PI * r as f64 / f64::from(outside.height)).cos()
-                    };
-                    (edge(row) - edge(row + 1)) / (2.0 * f64::from(outside.width))
-                };
+                let edge = |row: usize| (PI * row as f64 / f64::from(outside.height)).cos();
+                let row_angle =
+                    |row| (edge(row) - edge(row + 1)) / (2.0 * f64::from(outside.width));
                 let mean = (outside.means().enumerate())
                     .map(|(i, p)| p.as_dvec3() * row_angle(i / outside.width.max(1) as usize))
                     .sum::<glam::DVec3>();
@@ -177,10 +162,7 @@ impl Report {
                     sun: outside.sun,
                 }
             }),
-            exposures: estimate
-                .exposures
-                .as_ref()
-                .map(|exposures| exposures.iter().map(|&e| rgb(e)).collect()),
+            exposures: exposures.map(|all| all.iter().copied().map(rgb).collect()),
             vignetting: estimate.vignetting.map(|v| rgb(v.power)),
             response: estimate.response.map(|r| r.terms.map(rgb)),
             albedo_common_stderr: estimate.common_error,

@@ -8,10 +8,45 @@ use crate::render::Renderer;
 use crate::session::command::Source;
 use crate::session::edits::{Edited, Edits};
 use crate::session::open_capture::OpenCapture;
-use crate::session::save::frames::Frames;
 use crate::transport::denoise::Denoiser;
 use std::sync::Arc;
 use std::time::Instant;
+
+/// Long side of the pictures in pixels if their number is limited.
+const LONG_SIDE: u32 = 1024;
+
+/// Which frames get pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Frames {
+    /// Every frame, at the photograph's size.
+    All,
+    /// At most this many, evenly spaced, of limited size.
+    AtMost(usize),
+}
+
+impl Default for Frames {
+    fn default() -> Self {
+        Self::AtMost(16)
+    }
+}
+
+impl Frames {
+    /// The indices of the chosen frames among `count`.
+    pub fn chosen(self, count: usize) -> Vec<usize> {
+        match self {
+            Self::AtMost(max) if max < count => (0..max).map(|i| i * count / max).collect(),
+            _ => (0..count).collect(),
+        }
+    }
+
+    /// Long side of the pictures in pixels, at most.
+    pub fn long_side(self) -> u32 {
+        match self {
+            Self::All => u32::MAX,
+            Self::AtMost(_) => LONG_SIDE,
+        }
+    }
+}
 
 /// Everything that is written at the end of a solve.
 #[derive(Debug, Clone)]

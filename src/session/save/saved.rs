@@ -109,11 +109,10 @@ impl Saved {
     /// # Errors
     /// The capture has no object of a name.
     pub fn edits_for(&self, capture: &OpenCapture) -> Result<Edits> {
-        let edits = self.file.edits.as_ref();
-        edits.map_or_else(
-            || Ok(Edits::default()),
-            |edits| edits.edits(&self.path, &capture.scene),
-        )
+        match &self.file.edits {
+            Some(edits) => edits.edits(&self.path, &capture.scene),
+            None => Ok(Edits::default()),
+        }
     }
 
     /// The estimate for any capture with the same objects and mesh, whatever its photographs.

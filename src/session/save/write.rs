@@ -8,7 +8,7 @@ use crate::export::table::{Cell, Table};
 use crate::inverse::solver::Progress;
 use crate::session::save::estimate::{CheckpointFile, EstimateFile};
 use crate::session::save::pictures;
-use crate::session::save::report::{Report, Seconds};
+use crate::session::save::report::Report;
 use crate::session::save::results::Results;
 use crate::session::save::staging::Staging;
 use serde::Serialize;
@@ -27,12 +27,8 @@ const SCENE: &str = "scene.glb";
 pub fn write(folder: &Path, results: &Results) -> Result<()> {
     let started = Instant::now();
     let report = || {
-        let seconds = Seconds {
-            total: results.started.elapsed().as_secs_f64(),
-            load: results.seconds_load,
-            write: started.elapsed().as_secs_f64(),
-        };
-        json(REPORT, &Report::new(results, seconds))
+        let seconds_write = started.elapsed().as_secs_f64();
+        json(REPORT, &Report::new(results, seconds_write))
     };
     let mut staging = Staging::new(folder, &results.capture_id())?;
     stage_estimate(&mut staging, folder, results)?;
@@ -42,12 +38,9 @@ pub fn write(folder: &Path, results: &Results) -> Result<()> {
     staging.commit(earlier)?;
 
     write_shown(folder, results, |staging| {
-        loss_plot(
-            &results.progress.losses,
-            &results.progress.fits,
-            &results.progress.stages,
-        )
-        .write(&staging.file("loss.png")?)?;
+        let progress = &results.progress;
+        let plot = loss_plot(&progress.losses, &progress.fits, &progress.stages);
+        plot.write(&staging.file("loss.png")?)?;
         staging.write(REPORT, &report()?)
     })
 }
@@ -161,34 +154,21 @@ fn losses(progress: &Progress) -> Table {
         "unknowns",
     ]);
     let cell = |value: Option<f64>| value.map_or(Cell::Empty, Cell::from);
+    use Cell::Empty;
     let measured = progress.losses.iter().map(|p| {
-        let values = [
-            cell(p.train),
-            cell(p.held_out),
-            Cell::Empty,
-            Cell::Empty,
-            Cell::Empty,
-        ];
+        let values = [cell(p.train), cell(p.held_out), Empty, Empty, Empty];
         (p.seconds, p.iteration, values)
     });
     let fitted = progress.fits.iter().map(|p| {
-        let unknowns = Cell::from(p.unknowns);
-        let values = [
-            Cell::Empty,
-            Cell::Empty,
-            Cell::from(p.residual),
-            cell(p.stderr),
-            unknowns,
-        ];
+        let (residual, unknowns) = (Cell::from(p.residual), Cell::from(p.unknowns));
+        let values = [Empty, Empty, residual, cell(p.stderr), unknowns];
         (p.seconds, p.iteration, values)
     });
     let mut rows: Vec<_> = measured.chain(fitted).collect();
     rows.sort_by(|a, b| a.0.total_cmp(&b.0));
     for (seconds, iteration, values) in rows {
-        let row: Vec<Cell> = [Cell::from(seconds), Cell::from(iteration)]
-            .into_iter()
-            .chain(values)
-            .collect();
+        let mut row = vec![Cell::from(seconds), Cell::from(iteration)];
+        row.extend(values);
         table.row(&row);
     }
     table

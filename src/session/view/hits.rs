@@ -1,6 +1,6 @@
 //! The surface at each pixel's centre, and maps of the estimate there.
 
-use crate::inverse::estimate::Estimate;
+use crate::inverse::estimate::{Estimate, TexelEstimate};
 use crate::math::picture::Picture;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
@@ -79,14 +79,8 @@ impl Hits {
     /// Standard error of the albedo.
     pub fn stderr(&self, scene: &Scene, estimate: &Estimate) -> Picture {
         self.paint(scene, |object, hit| {
-            let texel = estimate
-                .texels
-                .as_ref()
-                .filter(|texels| texels.textured.get(object) == Some(&true))
-                .and_then(|texels| {
-                    let texel = texels.colors.layout.texel(hit);
-                    texels.stderr.get(texel as usize).copied()
-                });
+            let texel = textured(estimate, object, hit);
+            let texel = texel.and_then(|(texels, texel)| texels.stderr.get(texel).copied());
             let whole = estimate.objects.get(object).map(|o| o.albedo_stderr);
             texel.or(whole).unwrap_or(Vec3::ZERO)
         })
@@ -95,11 +89,8 @@ impl Hits {
     /// Number of pixels of all photographs that see a pixel's texel, or its object without texture.
     pub fn seen(&self, scene: &Scene, estimate: &Estimate) -> Picture {
         self.paint(scene, |object, hit| {
-            let texels = estimate.texels.as_ref();
-            let texel = texels
-                .filter(|texels| texels.textured.get(object) == Some(&true))
-                .and_then(|t| t.seen.get(t.colors.layout.texel(hit) as usize))
-                .map(|&n| n as f32);
+            let texel = textured(estimate, object, hit);
+            let texel = texel.and_then(|(texels, texel)| Some(*texels.seen.get(texel)? as f32));
             let whole = estimate.objects.get(object).map(|o| o.seen_pixels as f32);
             Vec3::splat(texel.or(whole).unwrap_or(0.0))
         })
@@ -121,4 +112,15 @@ impl Hits {
             pixels,
         }
     }
+}
+
+/// The textures and the index of the texel that is hit, if the object has one.
+fn textured<'a>(
+    estimate: &'a Estimate,
+    object: usize,
+    hit: &Hit,
+) -> Option<(&'a TexelEstimate, usize)> {
+    let texels = estimate.texels.as_deref()?;
+    (texels.textured.get(object)).filter(|&&textured| textured)?;
+    Some((texels, texels.colors.layout.texel(hit) as usize))
 }

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use target::Target;
 
-pub use target::differs;
+pub use target::{difference, differs};
 
 /// Long side in pixels of the first picture after a camera move.
 const FIRST_LONG_SIDE: u32 = 96;
@@ -93,7 +93,12 @@ impl Views {
         } else {
             self.follow(estimate, now);
         }
-        let drawn = self.sharpen(options);
+        let (target, sequence) = (self.target.as_mut(), self.sequence + 1);
+        let view = target.and_then(|target| target.sharpen(options, sequence));
+        let drawn = view.is_some();
+        if let Some(view) = view {
+            (self.sequence, self.shown) = (sequence, Some(Arc::new(view)));
+        }
         let more = self.target.as_ref().is_some_and(|t| !t.is_done());
         (drawn, more)
     }
@@ -112,17 +117,5 @@ impl Views {
     /// Whether the first complete picture of the requested view is still missing.
     pub fn is_rough(&self) -> bool {
         self.target.as_ref().is_some_and(Target::is_rough)
-    }
-
-    fn sharpen(&mut self, options: &PathOptions) -> bool {
-        let Some(target) = &mut self.target else {
-            return false;
-        };
-        let Some(view) = target.sharpen(options, self.sequence + 1) else {
-            return false;
-        };
-        self.sequence += 1;
-        self.shown = Some(Arc::new(view));
-        true
     }
 }

@@ -44,11 +44,8 @@ impl Progressive {
     pub fn new(camera: &Camera, split: Option<Arc<Split>>) -> Self {
         let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
         let layers = split.as_ref().map_or(1, |split| split.sources().len());
-        let halved = if split.is_none() {
-            width as usize * height as usize
-        } else {
-            0
-        };
+        let pixels = width as usize * height as usize;
+        let halved = if split.is_none() { pixels } else { 0 };
         Self {
             half: vec![DVec3::ZERO; halved],
             half_weight: 0.0,
@@ -56,7 +53,7 @@ impl Progressive {
             width: width as usize,
             height: height as usize,
             split,
-            sums: vec![DVec3::ZERO; width as usize * height as usize * layers],
+            sums: vec![DVec3::ZERO; pixels * layers],
             weight: 0.0,
             pass: 0,
             row: 0,

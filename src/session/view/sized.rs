@@ -56,11 +56,7 @@ mod tests {
 
     #[test]
     fn box_filtering_keeps_the_mean_and_gives_each_pixel_its_area() {
-        let from = Picture {
-            width: 5,
-            height: 3,
-            pixels: (0..15).map(|i| Vec3::splat(i as f32)).collect(),
-        };
+        let from = Picture::from_fn(5, 3, |x, y| Vec3::splat((5 * y + x) as f32));
         let to = box_filter(&from, 2, 3);
         // The first new pixel of a row covers two and a half old ones.
         assert!((to.pixels[0].x - (0.0 + 1.0 + 0.5 * 2.0) / 2.5).abs() < 1e-6);

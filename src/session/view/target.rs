@@ -1,6 +1,5 @@
 //! A view being rendered.
 
-use crate::capture::exposure::Exposure;
 use crate::inverse::estimate::Estimate;
 use crate::math::picture::Picture;
 use crate::scene::Scene;
@@ -119,13 +118,8 @@ impl Target {
     pub fn start_over(&mut self, estimate: &Arc<Estimate>) {
         self.adopt(estimate);
         self.render.clear();
-        self.wait_for(MIN_REPLACEMENT_SAMPLES);
-    }
-
-    /// Shows a new render when it has `samples`, or as many as the shown one.
-    fn wait_for(&mut self, samples: u32) {
         let shown = self.rendered.as_ref().map_or(0, |(_, samples)| *samples);
-        self.hold = samples.min(shown);
+        self.hold = shown.min(MIN_REPLACEMENT_SAMPLES);
     }
 
     fn adopt(&mut self, estimate: &Arc<Estimate>) {
@@ -178,7 +172,7 @@ impl Target {
             }
             self.hold = 0;
             let smoothed = self.smoothed();
-            let picture = self.exposed(smoothed);
+            let picture = self.exposed(smoothed, false);
             self.layers = self.layers_of(&self.render, &self.camera);
             self.rendered = Some((Arc::new(picture), samples));
         }
@@ -201,7 +195,7 @@ impl Target {
         let mut render = Progressive::new(coarse, self.render.split().cloned());
         while !render.add(&self.world, coarse, options) {}
         self.layers = self.layers_of(&render, coarse);
-        let picture = self.enlarged(self.exposed(render.picture(coarse)));
+        let picture = self.enlarged(self.exposed(render.picture(coarse), false));
         self.rendered = Some((picture, 1));
     }
 
@@ -209,7 +203,7 @@ impl Target {
     fn layers_of(&self, render: &Progressive, camera: &Camera) -> Option<Arc<LightLayers>> {
         let split = render.split()?;
         let pictures = render.layer_pictures(camera).into_iter();
-        let shown = pictures.map(|picture| self.enlarged(self.on_sensor(picture)));
+        let shown = pictures.map(|picture| self.enlarged(self.exposed(picture, true)));
         Some(Arc::new(LightLayers {
             layers: split.sources().iter().copied().zip(shown).collect(),
             samples: render.samples(),
@@ -226,25 +220,12 @@ impl Target {
         self.maps = maps.map(|picture| Some(self.enlarged(picture)));
     }
 
-    /// Converts radiance to the values of the frame's photograph.
-    fn exposed(&self, radiance: Picture) -> Picture {
-        self.seen_by(
-            self.frame.map(|frame| self.estimate.exposure(frame)),
-            radiance,
-        )
-    }
-
-    /// Converts radiance to exposed light of the frame's camera, in which lamps add up.
-    fn on_sensor(&self, radiance: Picture) -> Picture {
-        let exposure = self.frame.map(|frame| Exposure {
-            response: None,
-            ..self.estimate.exposure(frame)
-        });
-        self.seen_by(exposure, radiance)
-    }
-
-    fn seen_by(&self, exposure: Option<Exposure>, mut radiance: Picture) -> Picture {
-        if let Some(exposure) = exposure {
+    /// Converts radiance to the values of the frame's photograph; where `linear`, to the exposed light before the camera's
+    /// response, in which lamps add up.
+    fn exposed(&self, mut radiance: Picture, linear: bool) -> Picture {
+        if let Some(frame) = self.frame {
+            let mut exposure = self.estimate.exposure(frame);
+            exposure.response = exposure.response.filter(|_| !linear);
             exposure.apply(&self.camera.intrinsics, self.saturation, &mut radiance);
         }
         radiance
@@ -282,7 +263,7 @@ impl Target {
 }
 
 /// Render − photograph, signed.
-fn difference(render: &Picture, photograph: &Picture) -> Picture {
+pub fn difference(render: &Picture, photograph: &Picture) -> Picture {
     let pixels = (render.pixels.iter().zip(&photograph.pixels))
         .map(|(r, p)| *r - *p)
         .collect();

@@ -12,8 +12,7 @@ use crate::session::save::{self, Results};
 use crate::session::snapshot::{Level, Phase};
 use crate::session::store::{SessionRecord, State};
 use crate::session::view::sized::box_filter;
-use crate::session::worker::next::{Begin, Next};
-use crate::session::worker::state::Worker;
+use crate::session::worker::state::{Begin, Next, Worker};
 use crate::transport::denoise::Denoiser;
 use std::path::Path;
 
@@ -54,8 +53,7 @@ impl Worker {
                 self.keep(true);
                 self.store.begin_another();
                 self.continued = None;
-                self.paused = false;
-                self.step = false;
+                (self.paused, self.step) = (false, false);
                 let open = self.capture.as_ref()?;
                 let hold_out = HoldOut::from(&self.settings);
                 // Keep segments that were changed by hand.
@@ -82,7 +80,6 @@ impl Worker {
                 }
                 self.regroupings += 1;
             }
-            Command::Quit => return Some(Next::Quit),
             Command::Run => return self.go_on(false),
             Command::Step => return self.go_on(true),
             Command::Pause => {
@@ -94,8 +91,7 @@ impl Worker {
             // Without a running solve there is nothing to end.
             Command::Finish => return self.solving.then_some(Next::Wait),
             Command::SolveOn => {
-                self.paused = false;
-                self.step = false;
+                (self.paused, self.step) = (false, false);
                 let checkpoint = self.checkpoint.clone();
                 return self.capture.is_some().then_some(Next::Solve(checkpoint));
             }
@@ -118,16 +114,15 @@ impl Worker {
 
     /// Runs on, or one iteration only.
     fn go_on(&mut self, one: bool) -> Option<Next> {
-        if self.solving {
-            self.paused = one;
-            self.step = one;
-            self.phase = if one { Phase::Paused } else { Phase::Solving };
+        if !self.solving && self.capture.is_none() {
             return None;
         }
-        self.capture.as_ref()?;
-        self.paused = one;
-        self.step = one;
-        Some(Next::Solve(self.checkpoint.clone()))
+        (self.paused, self.step) = (one, one);
+        if !self.solving {
+            return Some(Next::Solve(self.checkpoint.clone()));
+        }
+        self.phase = if one { Phase::Paused } else { Phase::Solving };
+        None
     }
 
     /// The results in their current state.
@@ -187,14 +182,8 @@ impl Worker {
         let (_, taken) = capture.frame(frame).ok()?;
         let composite = self.slot.pictures().insertion;
         let composite = composite.filter(|shown| shown.frame == frame);
-        let picture = composite.map_or_else(
-            || Picture {
-                width: taken.width,
-                height: taken.height,
-                pixels: taken.pixels.clone(),
-            },
-            |shown| shown.composite.as_ref().clone(),
-        );
+        let picture =
+            composite.map_or_else(|| taken.picture(), |shown| shown.composite.as_ref().clone());
         let (width, height) = (picture.width, picture.height);
         let scale = (f64::from(THUMBNAIL) / f64::from(width.max(height).max(1))).min(1.0);
         let [width, height] =
@@ -247,16 +236,11 @@ impl Worker {
             return;
         };
         let pictures = (layers.layers.iter()).map(|(source, picture)| (*source, &**picture));
-        match light_layers::write(path, &capture.scene, pictures) {
-            Ok(()) => self.say(
-                Level::Info,
-                format!(
-                    "layers at {} samples a pixel saved to {}",
-                    layers.samples,
-                    path.display()
-                ),
-            ),
-            Err(error) => self.fail(&error),
+        if let Err(error) = light_layers::write(path, &capture.scene, pictures) {
+            return self.fail(&error);
         }
+        let (samples, path) = (layers.samples, path.display());
+        let message = format!("layers at {samples} samples a pixel saved to {path}");
+        self.say(Level::Info, message);
     }
 }

@@ -8,8 +8,7 @@ use crate::session::open_capture::OpenCapture;
 use crate::session::save::{self, Saved};
 use crate::session::snapshot::{Level, Phase};
 use crate::session::store::{self, SessionRecord, State};
-use crate::session::worker::next::Next;
-use crate::session::worker::state::Worker;
+use crate::session::worker::state::{Next, Worker};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -62,12 +61,9 @@ impl Worker {
         let differs = *then != *now;
         let reread = differs.then(|| (self.backend.open)(&capture.source, then));
         let reread = reread.transpose()?;
-        Earlier::new(folder, saved, reread.as_ref().unwrap_or(capture)).map(|earlier| {
-            Some(Earlier {
-                capture: reread,
-                ..earlier
-            })
-        })
+        let mut earlier = Earlier::new(folder, saved, reread.as_ref().unwrap_or(capture))?;
+        earlier.capture = reread;
+        Ok(Some(earlier))
     }
 
     /// Opens a folder of results or of a session.

@@ -3,7 +3,6 @@
 mod backend;
 mod commands;
 mod earlier;
-mod next;
 mod state;
 mod steering;
 mod work;
@@ -17,8 +16,7 @@ use crate::session::inbox::{self, Outbox};
 use crate::session::painter::{Painter, Requests};
 use crate::session::slot::Slot;
 use crate::session::snapshot::Snapshot;
-use next::{Begin, Next};
-use state::Worker;
+use state::{Begin, Next, Worker};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
@@ -76,9 +74,8 @@ impl Session {
         if self.requests.take(&command) {
             return true;
         }
-        self.outbox
-            .as_ref()
-            .is_some_and(|outbox| outbox.send(command))
+        let outbox = self.outbox.as_ref();
+        outbox.is_some_and(|outbox| outbox.send(command))
     }
 
     /// The newest snapshot, without waiting.

@@ -1,10 +1,12 @@
-//! The worker's state, and its snapshots.
+//! The worker's state, its snapshots, and its next step.
 
+use crate::calibrate::held_out::HoldOut;
 use crate::compose::placement::Placement;
 use crate::error::Error;
 use crate::inverse::estimate::Estimate;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{Checkpoint, Progress};
+use crate::session::command::{OpenOptions, Regrouping, Source};
 use crate::session::edits::{Edited, Edits};
 use crate::session::inbox::Inbox;
 use crate::session::open_capture::OpenCapture;
@@ -14,8 +16,38 @@ use crate::session::slot::{FRAME, Slot};
 use crate::session::snapshot::{Level, Phase, Snapshot};
 use crate::session::store::SessionStore;
 use crate::session::worker::backend::{Backend, Wake};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
+
+/// The worker's next step.
+pub(super) enum Next {
+    /// Wait for commands.
+    Wait,
+    /// Open a capture, then continue its last session or solve it.
+    Open(Source, OpenOptions, Begin),
+    /// Load results of an earlier run and continue them.
+    Resume(PathBuf),
+    /// Solve the open capture, from the start or from a checkpoint.
+    Solve(Option<Checkpoint>),
+    /// Segment the mesh again because other pixels are held out, and solve from the start.
+    Recut(HoldOut),
+    /// Read the open capture again with other options, and continue the solve if true.
+    Reframe(Box<OpenOptions>, bool),
+    /// Read the open capture again with other objects, and solve from the start. If that fails, continue the solve if true.
+    Regroup(Box<Regrouping>, bool),
+    /// End.
+    Quit,
+}
+
+/// How a capture is opened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Begin {
+    /// With its last session, if there is one.
+    GoingOn,
+    /// In a new session.
+    Anew,
+}
 
 /// Everything the worker owns.
 pub(super) struct Worker {
@@ -133,17 +165,13 @@ impl Worker {
 
     /// Publishes a snapshot if the state has changed: at once if `now`, else at most about 30 times a second.
     pub fn publish(&mut self, now: bool) {
-        if !self.changed && !now {
-            return;
-        }
-        if !now && self.published.elapsed() < FRAME {
+        if !now && (!self.changed || self.published.elapsed() < FRAME) {
             return;
         }
         self.changed = false;
         self.published = Instant::now();
-        let solving = self.solving && !self.paused;
-        self.requests
-            .follow(&self.estimate, &self.settings, solving);
+        let (requests, solving) = (&self.requests, self.solving && !self.paused);
+        requests.follow(&self.estimate, &self.settings, solving);
         self.slot.put(Snapshot {
             phase: self.phase.clone(),
             capture: self.capture.clone(),

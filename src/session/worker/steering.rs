@@ -7,8 +7,7 @@ use crate::inverse::solver::{Checkpoint, Control, Observer, Progress};
 use crate::session::command::Command;
 use crate::session::inbox::Mail;
 use crate::session::slot::FRAME;
-use crate::session::worker::next::Next;
-use crate::session::worker::state::Worker;
+use crate::session::worker::state::{Next, Worker};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -122,13 +121,8 @@ impl Observer for Steering<'_> {
     /// Takes a checkpoint from time to time, and before a command that may save it.
     fn offer(&mut self, make: &dyn Fn() -> Checkpoint) {
         let keeps = |mail: &Mail| {
-            let Mail::Command(command) = mail else {
-                return false;
-            };
-            matches!(
-                command,
-                Command::Save(_) | Command::Pause | Command::SolveOn
-            )
+            use Command::{Pause, Save, SolveOn};
+            matches!(mail, Mail::Command(Save(_) | Pause | SolveOn))
         };
         let waiting = self.worker.inbox.look_ahead();
         self.seen = Some(waiting.len());

@@ -1,7 +1,6 @@
 //! The worker's main loop: waiting, opening, resuming and solving, with recovery from panics.
 
 use crate::calibrate::held_out::HoldOut;
-use crate::calibrate::problem::Problem;
 use crate::error::{Error, panic_message};
 use crate::inverse::solver::{Checkpoint, Termination};
 use crate::session::command::{OpenOptions, Regrouping, Source};
@@ -9,8 +8,7 @@ use crate::session::edits::Edits;
 use crate::session::inbox::Mail;
 use crate::session::open_capture::OpenCapture;
 use crate::session::snapshot::{Level, Phase};
-use crate::session::worker::next::{Begin, Next};
-use crate::session::worker::state::Worker;
+use crate::session::worker::state::{Begin, Next, Worker};
 use crate::session::worker::steering::Steering;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -49,9 +47,7 @@ impl Worker {
 
     /// Reports a panic; the last estimate is kept.
     fn contain(&mut self, payload: &(dyn Any + Send)) {
-        self.solving = false;
-        self.paused = false;
-        self.step = false;
+        (self.solving, self.paused, self.step) = (false, false, false);
         self.phase = Phase::Failed;
         self.fail(&Error::new(
             "worker",
@@ -232,15 +228,13 @@ impl Worker {
         let Some(capture) = self.capture.clone() else {
             return Next::Wait;
         };
-        let problem = Problem {
-            scene: capture.scene.clone(),
-            photographs: capture.photographs.clone(),
-        };
+        let problem = capture.problem();
         if checkpoint.is_none() {
             self.forget();
         }
         let settings = self.settings.clone();
-        self.phase = if self.paused {
+        let paused = self.paused;
+        self.phase = if paused {
             Phase::Paused
         } else {
             Phase::Solving
@@ -258,9 +252,7 @@ impl Worker {
         let next = steering.next();
         let held = self.phase.clone();
         self.backend.solve = solver;
-        self.solving = false;
-        self.paused = false;
-        self.step = false;
+        (self.solving, self.paused, self.step) = (false, false, false);
         self.touch();
         match outcome {
             Ok(Ok(solution)) => {
