@@ -147,6 +147,14 @@ impl Folder {
     }
 }
 
+/// The path of an entry of a subfolder, which is `""` for the folder itself.
+pub fn inside(subfolder: &str, name: &str) -> String {
+    match subfolder {
+        "" => name.to_owned(),
+        _ => format!("{subfolder}/{name}"),
+    }
+}
+
 /// Sort key of the natural order: runs of letters, and runs of digits by value.
 fn natural_key(name: &str) -> Vec<(String, u64, String)> {
     let mut parts: Vec<(String, u64, String)> = Vec::new();

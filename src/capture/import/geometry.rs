@@ -1,7 +1,7 @@
 //! The mesh of an import, read from a file or fused from depth images.
 
 use crate::capture::fuse;
-use crate::capture::import::folder::Folder;
+use crate::capture::import::folder::{Folder, inside};
 use crate::capture::inputs;
 use crate::capture::mesh::Mesh;
 use crate::capture::read::confine::Confine;
@@ -78,13 +78,9 @@ pub fn find(
     places: &[&str],
     remarks: &mut Vec<String>,
 ) -> Result<Option<PathBuf>> {
-    let full = |place: &str, name: &str| match place {
-        "" => name.to_owned(),
-        _ => format!("{place}/{name}"),
-    };
     for place in places {
-        if let Some(name) = NAMES.iter().find(|name| folder.has(&full(place, name))) {
-            return folder.existing(&full(place, name)).map(Some);
+        if let Some(name) = NAMES.iter().find(|name| folder.has(&inside(place, name))) {
+            return folder.existing(&inside(place, name)).map(Some);
         }
     }
     for place in places.iter().filter(|place| folder.has_folder(place)) {
@@ -103,7 +99,7 @@ pub fn find(
             ));
         }
         if let Some(name) = found.first() {
-            return folder.existing(&full(place, name)).map(Some);
+            return folder.existing(&inside(place, name)).map(Some);
         }
     }
     Ok(None)

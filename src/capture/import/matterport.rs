@@ -77,9 +77,8 @@ fn original(folder: &Folder, scan: &mut Scan) -> Result<()> {
             continue;
         };
         let pose_name = format!("{POSES}/{name}");
-        let path = folder.path(&pose_name);
-        let place = path.display().to_string();
-        let Some(pose) = pose_of_rows(&place, &rows(&path, &folder.text(&pose_name)?)?)? else {
+        let place = folder.path(&pose_name).display().to_string();
+        let Some(pose) = pose_of_rows(&place, &rows(folder, &pose_name)?)? else {
             continue;
         };
         let first = |set: &BTreeSet<String>, kind: &str, ends: &[&str]| {
@@ -180,12 +179,8 @@ fn lens(folder: &Folder, name: &str) -> Result<Lens> {
 
 fn depth_image(folder: &Folder, name: &str, lens: &Lens) -> Result<DepthImage> {
     let path = folder.existing(name)?;
-    Ok(DepthImage {
-        lens: lens.resized(depth::size(&path)?),
-        path,
-        metres_per_unit: UNIT,
-        invalid: None,
-    })
+    let lens = lens.resized(depth::size(&path)?);
+    Ok(DepthImage::new(path, lens, UNIT))
 }
 
 /// Reads the undistorted images by their .conf file.

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use glam::DVec2;
 
 /// Coefficients of unsupported lens models; they may be present but must be zero.
-const HIGHER_COEFFICIENTS: [&str; 8] = ["k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"];
+pub const HIGHER_COEFFICIENTS: [&str; 8] = ["k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"];
 
 /// Limit on tan θ of the off-axis angle in a picture: the widest rectilinear lenses (9 mm for 36 × 24 mm) reach 2.4.
 const MAX_TANGENT: f64 = 2.5;

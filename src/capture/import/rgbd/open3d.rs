@@ -132,12 +132,7 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
             }
         };
         let photograph = folder.file(&place, color)?;
-        let depth = DepthImage {
-            path: folder.file(&place, depth)?,
-            lens: depth_lens,
-            metres_per_unit: 0.001,
-            invalid: None,
-        };
+        let depth = DepthImage::new(folder.file(&place, depth)?, depth_lens, 0.001);
         scan.frames
             .push(ImportedFrame::new(photograph, lens, pose, Some(depth)));
     }
@@ -209,8 +204,7 @@ fn from_json(folder: &Folder, name: &str) -> Result<Vec<PosedFrame>> {
         )
     })?;
     let pose = |(index, entry): (usize, &Value)| -> Result<PosedFrame> {
-        let columns = column_major(entry.get("extrinsic"), 16);
-        let Some(columns) = columns else {
+        let Some(columns) = column_major(entry.get("extrinsic"), 16) else {
             return Err(Error::file(
                 &path,
                 format!("parameters[{index}].extrinsic is not a list of 16 numbers"),
