@@ -107,7 +107,7 @@ impl Intrinsics {
             fy: self.fy / scale,
             cx: self.cx / scale,
             cy: self.cy / scale,
-            distortion: self.distortion,
+            ..*self
         }
     }
 }
@@ -237,15 +237,8 @@ mod tests {
     use glam::DVec2;
 
     fn photograph(width: u32, height: u32) -> Photograph {
-        Photograph {
-            width,
-            height,
-            pixels: (0..width * height).map(|i| Vec3::splat(i as f32)).collect(),
-            usable: Vec::new(),
-            encoding: Encoding::Linear,
-            saturation: Vec3::INFINITY,
-            limits: Vec::new(),
-        }
+        let pixels = (0..width * height).map(|i| Vec3::splat(i as f32)).collect();
+        Photograph::new([width, height], pixels, Encoding::Linear, Vec3::INFINITY)
     }
 
     #[test]
@@ -307,10 +300,7 @@ mod tests {
         };
         let reduced = lens.reduced(4);
         assert_eq!((reduced.width, reduced.height), (160, 120));
-        let project = |k: &Intrinsics| {
-            let p = k.distort(DVec2::new(0.2, -0.3)).unwrap();
-            DVec2::new(p.x * k.fx + k.cx, p.y * k.fy + k.cy)
-        };
+        let project = |k: &Intrinsics| k.pixel(k.distort(DVec2::new(0.2, -0.3)).unwrap());
         assert!((project(&lens) / 4.0 - project(&reduced)).length() < 1e-12);
     }
 }

@@ -202,7 +202,7 @@ impl Backdrop {
 mod tests {
     use super::*;
     use crate::capture::camera::{Intrinsics, Pose};
-    use glam::{DMat3, DVec3, Vec2};
+    use glam::{DVec3, Vec2};
 
     const SIDE: u32 = 40;
     const LEVEL: f32 = 0.3;
@@ -232,23 +232,11 @@ mod tests {
 
     /// A grey photograph with a given saturation.
     fn backdrop(finish: PsfAndGrain, saturation: Vec3) -> Backdrop {
-        let intrinsics = Intrinsics {
-            width: SIDE,
-            height: SIDE,
-            fx: 40.0,
-            fy: 40.0,
-            cx: 20.0,
-            cy: 20.0,
-            distortion: [0.0; 4],
-        };
-        let pose = Pose {
-            rotation: DMat3::IDENTITY,
-            center: DVec3::ZERO,
-        };
+        let intrinsics = Intrinsics::plain([SIDE; 2], [40.0; 2], [20.0; 2]);
         let photograph = Picture::from_fn(SIDE, SIDE, |_, _| Vec3::splat(LEVEL));
         Backdrop {
             frame: 4,
-            camera: Camera::new(&intrinsics, &pose, DVec3::ZERO),
+            camera: Camera::new(&intrinsics, &Pose::default(), DVec3::ZERO),
             photograph: Arc::new(photograph),
             exposure: Exposure::default(),
             saturation,

@@ -15,12 +15,8 @@ use std::path::Path;
 
 /// Position in the lens's image of the pinhole's pixel centre (i, j); `None` where the lens is not defined.
 fn source_of(lens: &Lens, i: u32, j: u32) -> Option<DVec2> {
-    let k = lens.intrinsics();
-    let p = DVec2::new(
-        (f64::from(i) + 0.5 - k.cx) / k.fx,
-        (f64::from(j) + 0.5 - k.cy) / k.fy,
-    );
-    lens.project(p.extend(1.0))
+    let center = DVec2::new(f64::from(i), f64::from(j)) + 0.5;
+    lens.project(lens.pinhole.normalized(center).extend(1.0))
 }
 
 /// The photograph as the pinhole of [`Lens::intrinsics`] would have taken it, interpolated bilinearly in linear light. Pixels
@@ -51,13 +47,10 @@ pub fn photograph(source: &Photograph, lens: &Lens) -> Photograph {
         })
         .collect();
     Photograph {
-        width,
-        height,
         pixels: sampled.iter().map(|c| c.unwrap_or(Vec3::ZERO)).collect(),
         usable: sampled.iter().map(Option::is_some).collect(),
-        encoding: source.encoding,
-        saturation: source.saturation,
         limits: Vec::new(),
+        ..*source
     }
 }
 

@@ -7,7 +7,7 @@ use crate::capture::read::image;
 use crate::capture::scan::depth::DepthMap;
 use crate::capture::scan::{ImportedFrame, Lens};
 use crate::error::{Error, Result};
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 /// A decoded frame.
 #[derive(Debug)]
@@ -47,11 +47,8 @@ impl View {
     pub fn color_at(&self, point: DVec3) -> Option<Vec3> {
         let pixel = self.color_lens.project(point)?.floor();
         let (width, height) = (self.photograph.width, self.photograph.height);
-        let inside = pixel.x >= 0.0
-            && pixel.y >= 0.0
-            && pixel.x < f64::from(width)
-            && pixel.y < f64::from(height);
-        if !inside {
+        let far = DVec2::new(f64::from(width), f64::from(height));
+        if !(pixel.cmpge(DVec2::ZERO) & pixel.cmplt(far)).all() {
             return None;
         }
         let index = pixel.y as usize * width as usize + pixel.x as usize;

@@ -103,8 +103,8 @@ pub fn read(
     exposure: Option<f64>,
 ) -> Result<(Photograph, usize)> {
     let decoder = decoder(path)?;
-    let (stored_width, stored_height) = decoder.dimensions();
-    let [width, height] = orientation.size([stored_width, stored_height]);
+    let stored = <[u32; 2]>::from(decoder.dimensions());
+    let [width, height] = orientation.size(stored);
     if (width, height) != (intrinsics.width, intrinsics.height) {
         return Err(Error::file(
             path,
@@ -147,17 +147,13 @@ pub fn read(
     if usable.iter().all(|&good| good) {
         usable.clear();
     }
+    let saturation = match encoding {
+        Encoding::Linear => Vec3::INFINITY,
+        Encoding::Srgb8 | Encoding::Srgb16 => Vec3::splat(scale),
+    };
     let photograph = Photograph {
-        width: stored_width,
-        height: stored_height,
-        pixels,
         usable,
-        encoding,
-        saturation: match encoding {
-            Encoding::Linear => Vec3::INFINITY,
-            Encoding::Srgb8 | Encoding::Srgb16 => Vec3::splat(scale),
-        },
-        limits: Vec::new(),
+        ..Photograph::new(stored, pixels, encoding, saturation)
     };
     match orientation == Orientation::default() {
         true => Ok((photograph, invalid)),

@@ -10,6 +10,7 @@ use crate::capture::import::reader::{ImportOptions, Scan};
 use crate::capture::import::rgbd::{
     COLOR_FOLDERS, depth_size, opencv_lens, photograph_size, possible, remark_on_lost,
 };
+use crate::capture::read::fields;
 use crate::capture::scan::ImportedFrame;
 use crate::capture::scan::depth::DepthImage;
 use crate::capture::scan::lens::Lens;
@@ -225,8 +226,7 @@ fn from_json(folder: &Folder, name: &str) -> Result<Vec<PosedFrame>> {
 }
 
 fn column_major(value: Option<&Value>, count: usize) -> Option<Vec<f64>> {
-    let numbers: Option<Vec<f64>> = value?.as_array()?.iter().map(Value::as_f64).collect();
-    numbers.filter(|numbers| numbers.len() == count)
+    fields::numbers(value?).filter(|numbers| numbers.len() == count)
 }
 
 /// The colour camera.
