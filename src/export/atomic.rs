@@ -1,5 +1,6 @@
 //! Writes files atomically: complete or not at all.
 
+use crate::capture::read::confine::folder_of;
 use crate::error::{Error, Result};
 use crate::export::overwrite;
 use std::fs::File;
@@ -31,10 +32,7 @@ pub fn write_atomically(
         ));
     }
     overwrite::check(path)?;
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
+    let folder = folder_of(path);
     std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, &error))?;
 
     let temporary = temporary_names(0o666).tempfile_in(folder).map_err(io)?;

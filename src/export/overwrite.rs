@@ -14,6 +14,7 @@
 //! [`permit`] (`--overwrite`) disables all checks.
 
 use crate::capture::inputs;
+use crate::capture::read::confine::folder_of;
 use crate::capture::read::{CAMERAS, MESHES};
 use crate::error::{Error, Result};
 use serde::Deserialize;
@@ -51,7 +52,7 @@ pub fn is_permitted() -> bool {
 /// # Errors
 /// The file is protected.
 pub fn check(path: &Path) -> Result<()> {
-    refuse(path, Some)
+    refuse(path, |_| true)
 }
 
 /// Refuses a file that belongs to a capture or that the run has read. For files of results, use [`check_results`] on the
@@ -60,17 +61,14 @@ pub fn check(path: &Path) -> Result<()> {
 /// # Errors
 /// The file is protected.
 pub fn check_input(path: &Path) -> Result<()> {
-    refuse(path, |owner| match owner {
-        Owner::Capture(..) | Owner::Inputs => Some(owner),
-        Owner::Results(_) => None,
-    })
+    refuse(path, |owner| !matches!(owner, Owner::Results(_)))
 }
 
-fn refuse(path: &Path, selects: impl Fn(Owner) -> Option<Owner>) -> Result<()> {
+fn refuse(path: &Path, selects: impl Fn(&Owner) -> bool) -> Result<()> {
     if is_permitted() {
         return Ok(());
     }
-    let what = match owner(path).and_then(selects) {
+    let what = match owner(path).filter(selects) {
         None => return Ok(()),
         Some(Owner::Capture(folder, what)) => {
             format!("is {what} of the capture in {}", folder.display())
@@ -153,11 +151,7 @@ fn owner(path: &Path) -> Option<Owner> {
 
 /// The path with its folder resolved. A symbolic link at its end is not followed, since the link itself would be replaced.
 fn place(path: &Path) -> Option<PathBuf> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let named = folder.canonicalize().ok()?.join(path.file_name()?);
+    let named = folder_of(path).canonicalize().ok()?.join(path.file_name()?);
     match named.symlink_metadata() {
         // On case-insensitive disks, canonicalize gives the spelling on disk.
         Ok(metadata) if !metadata.is_symlink() => named.canonicalize().ok().or(Some(named)),
@@ -166,20 +160,13 @@ fn place(path: &Path) -> Option<PathBuf> {
 }
 
 fn is_of_results(folder: &Path, name: &Path, place: &Path) -> bool {
-    let is_results = || {
-        [ESTIMATE, CHECKPOINT]
-            .iter()
-            .any(|n| folder.join(n).is_file())
-    };
-    let first = name
-        .iter()
-        .next()
-        .and_then(|n| n.to_str())
-        .unwrap_or_default();
-    let is_one = [ESTIMATE, CHECKPOINT].contains(&first)
+    let records = [ESTIMATE, CHECKPOINT];
+    let first = name.iter().next().and_then(|n| n.to_str());
+    let first = first.unwrap_or_default();
+    let is_one = records.contains(&first)
         || OTHER_FILES.contains(&first)
         || (first.starts_with("maps-") && first.ends_with(".safetensors"));
-    is_one && place.exists() && is_results()
+    is_one && place.exists() && records.iter().any(|n| folder.join(n).is_file())
 }
 
 /// The role of a file in the capture of a folder, if it belongs to it.

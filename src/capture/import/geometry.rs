@@ -4,7 +4,7 @@ use crate::capture::fuse;
 use crate::capture::import::folder::{Folder, inside};
 use crate::capture::inputs;
 use crate::capture::mesh::Mesh;
-use crate::capture::read::confine::Confine;
+use crate::capture::read::confine::{Confine, folder_of};
 use crate::capture::read::mesh;
 use crate::capture::scan::ImportedFrame;
 use crate::error::{Error, Result};
@@ -22,12 +22,9 @@ pub fn read(
     remarks: &mut Vec<String>,
 ) -> Result<(Mesh, bool)> {
     // A glTF file may name buffers beside itself or anywhere in the scan.
-    let beside = path
-        .parent()
-        .filter(|parent| !parent.as_os_str().is_empty());
     let confine = match path.starts_with(folder.confine().folder()) {
         true => folder.confine().clone(),
-        false => Confine::new(beside.unwrap_or(Path::new(".")), false)?,
+        false => Confine::new(folder_of(path), false)?,
     };
     inputs::note(path);
     let mut warnings = Vec::new();

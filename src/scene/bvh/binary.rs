@@ -83,18 +83,12 @@ fn grow(
     let middle = Split::best(primitives).partition(primitives);
     let (left, right) = primitives.split_at_mut(middle);
     let second = if count > granularity.parallel_above {
-        let (left, right) = rayon::join(
-            || {
-                let mut nodes = Vec::new();
-                grow(left, first, granularity, &mut nodes);
-                nodes
-            },
-            || {
-                let mut nodes = Vec::new();
-                grow(right, first + middle, granularity, &mut nodes);
-                nodes
-            },
-        );
+        let grown = |primitives: &mut [Primitive], first: usize| {
+            let mut nodes = Vec::new();
+            grow(primitives, first, granularity, &mut nodes);
+            nodes
+        };
+        let (left, right) = rayon::join(|| grown(left, first), || grown(right, first + middle));
         nodes.extend(left);
         let second = nodes.len();
         nodes.extend(right);

@@ -6,25 +6,24 @@ use glam::{UVec3, Vec3, Vec3A};
 /// A triangle's bounding box.
 #[derive(Clone, Copy)]
 pub(super) struct Primitive {
-    pub low: Vec3A,
-    pub high: Vec3A,
+    bounds: Bounds,
     pub triangle: u32,
 }
 
 impl Primitive {
     pub fn of(triangle: u32, corners: [Vec3; 3]) -> Self {
         let [a, b, c] = corners.map(Vec3A::from);
-        Self {
+        let bounds = Bounds {
             low: a.min(b).min(c),
             high: a.max(b).max(c),
-            triangle,
-        }
+        };
+        Self { bounds, triangle }
     }
 
     /// Twice the box's centre.
     #[inline(always)]
     fn center(&self) -> Vec3A {
-        self.low + self.high
+        self.bounds.low + self.bounds.high
     }
 }
 
@@ -42,12 +41,7 @@ impl Bounds {
     };
 
     pub fn of(primitives: &[Primitive]) -> Self {
-        primitives.iter().fold(Self::EMPTY, |bounds, p| {
-            bounds.union(&Self {
-                low: p.low,
-                high: p.high,
-            })
-        })
+        (primitives.iter()).fold(Self::EMPTY, |bounds, p| bounds.union(&p.bounds))
     }
 
     #[inline(always)]
@@ -143,10 +137,7 @@ impl Split {
         let mut bins = [[Bin::EMPTY; BINS]; 3];
         for primitive in primitives {
             let one = Bin {
-                bounds: Bounds {
-                    low: primitive.low,
-                    high: primitive.high,
-                },
+                bounds: primitive.bounds,
                 count: 1,
             };
             let [x, y, z] = binning.bins(primitive).to_array();
