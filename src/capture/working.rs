@@ -149,50 +149,34 @@ fn reduction(frames: &[Frame], max_pixels: u64) -> u32 {
 pub fn reduce(photograph: &Photograph, factor: u32) -> Photograph {
     let (width, height) = (photograph.width / factor, photograph.height / factor);
     let count = f64::from(factor) * f64::from(factor);
-    let blocks: Vec<Block> = (0..height)
-        .flat_map(|y| (0..width).map(move |x| (x, y)))
-        .map(|(x, y)| {
-            let mut sum = DVec3::ZERO;
-            let mut saturated = BVec3::FALSE;
-            let mut usable = true;
-            for j in y * factor..(y + 1) * factor {
-                for i in x * factor..(x + 1) * factor {
-                    let index = j as usize * photograph.width as usize + i as usize;
-                    let pixel = photograph.pixels[index];
-                    sum += pixel.as_dvec3();
-                    saturated |= photograph.saturated(index);
-                    usable &= photograph.is_usable(index);
-                }
+    let limit = photograph.saturation;
+    let (encoding, pixels) = (photograph.encoding, Vec::new());
+    let mut reduced = Photograph::new([width, height], pixels, encoding, limit);
+    for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+        let mut sum = DVec3::ZERO;
+        let mut saturated = BVec3::FALSE;
+        let mut usable = true;
+        for j in y * factor..(y + 1) * factor {
+            for i in x * factor..(x + 1) * factor {
+                let index = j as usize * photograph.width as usize + i as usize;
+                sum += photograph.pixels[index].as_dvec3();
+                saturated |= photograph.saturated(index);
+                usable &= photograph.is_usable(index);
             }
-            let mean = (sum / count).as_vec3();
-            Block {
-                mean,
-                usable,
-                limit: Vec3::select(
-                    saturated,
-                    mean.min(photograph.saturation),
-                    photograph.saturation,
-                ),
-            }
-        })
-        .collect();
-    let mut usable: Vec<bool> = blocks.iter().map(|b| b.usable).collect();
-    if usable.iter().all(|&good| good) {
-        usable.clear();
+        }
+        let mean = (sum / count).as_vec3();
+        reduced.pixels.push(mean);
+        reduced.usable.push(usable);
+        let own_limit = Vec3::select(saturated, mean.min(limit), limit);
+        reduced.limits.push(own_limit);
     }
-    let mut limits: Vec<Vec3> = blocks.iter().map(|b| b.limit).collect();
-    if limits.iter().all(|&limit| limit == photograph.saturation) {
-        limits.clear();
+    if reduced.usable.iter().all(|&good| good) {
+        reduced.usable.clear();
     }
-    Photograph {
-        width,
-        height,
-        pixels: blocks.iter().map(|b| b.mean).collect(),
-        usable,
-        encoding: photograph.encoding,
-        saturation: photograph.saturation,
-        limits,
+    if reduced.limits.iter().all(|&own| own == limit) {
+        reduced.limits.clear();
     }
+    reduced
 }
 
 /// Marks the pixels within [`CLIPPED_RADIUS`] of a saturated one as lower bounds: they hold clipped light, so part of their
@@ -221,13 +205,6 @@ fn bound_near_clipped(photograph: Arc<Photograph>) -> Arc<Photograph> {
     let mut bounded = Arc::unwrap_or_clone(photograph);
     bounded.limits = limits;
     Arc::new(bounded)
-}
-
-/// A downsampled pixel.
-struct Block {
-    mean: Vec3,
-    usable: bool,
-    limit: Vec3,
 }
 
 #[cfg(test)]

@@ -19,18 +19,13 @@ const DEPTH_FRACTION: f64 = 0.02;
 /// Relative tolerance of the aspect ratio between a depth image and its photograph.
 const ASPECT_TOLERANCE: f64 = 0.02;
 
-/// The result of a comparison: photographs with contradicting pixels marked unusable.
-#[derive(Debug)]
-pub struct Compared {
-    /// One per camera.
-    pub photographs: Vec<Arc<Photograph>>,
-    /// Warnings, full sentences.
-    pub warnings: Vec<String>,
-}
-
-/// Compares the depth images of a capture with its mesh. Frames without a readable depth image keep all pixels; unreadable ones
-/// give a warning.
-pub fn compare(capture: &Capture, scene: &Scene, photographs: &[Arc<Photograph>]) -> Compared {
+/// Compares the depth images of a capture with its mesh. Returns the photographs with contradicting pixels marked unusable, one per
+/// camera, and warnings, full sentences. Frames without a readable depth image keep all pixels; unreadable ones give a warning.
+pub fn compare(
+    capture: &Capture,
+    scene: &Scene,
+    photographs: &[Arc<Photograph>],
+) -> (Vec<Arc<Photograph>>, Vec<String>) {
     let frames: Vec<(Arc<Photograph>, Option<Result<u64>>)> = (0..photographs.len())
         .into_par_iter()
         .map(|frame| {
@@ -85,10 +80,7 @@ pub fn compare(capture: &Capture, scene: &Scene, photographs: &[Arc<Photograph>]
             contradicting as f64 / compared as f64 * 100.0
         ));
     }
-    Compared {
-        photographs: frames.into_iter().map(|f| f.0).collect(),
-        warnings,
-    }
+    (frames.into_iter().map(|f| f.0).collect(), warnings)
 }
 
 /// A depth image of the same view as a photograph.
@@ -137,9 +129,7 @@ fn mask(depth: &Depth, scene: &Scene, frame: usize, photograph: &Photograph) -> 
     let median = quantile(&mut differences, 0.5).unwrap_or(0.0);
 
     let mut masked = photograph.clone();
-    if masked.usable.is_empty() {
-        masked.usable = vec![true; masked.pixels.len()];
-    }
+    masked.usable.resize(masked.pixels.len(), true);
     let mut count = 0;
     for (usable, seen) in masked.usable.iter_mut().zip(&pixels) {
         let contradicts = seen.is_some_and(|(measured, mesh)| {
@@ -158,6 +148,5 @@ fn mesh_depth(scene: &Scene, camera: &Camera, at: Vec2, triangle: u32) -> f64 {
     }
     let ray = camera.ray(at);
     let along = scene.plane_distance(triangle, &ray);
-    let forward = -camera.rotation.z_axis;
-    f64::from(along * ray.direction.dot(forward))
+    f64::from(along * ray.direction.dot(camera.forward()))
 }

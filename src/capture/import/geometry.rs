@@ -113,7 +113,8 @@ pub fn fuse(
     remarks: &mut Vec<String>,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Mesh> {
-    if !frames.iter().any(|frame| frame.depth.is_some()) {
+    let count = frames.iter().filter(|frame| frame.depth.is_some()).count();
+    if count == 0 {
         return Err(Error::file(
             source,
             "there is no mesh, and no depth image to fuse one from",
@@ -130,11 +131,10 @@ pub fn fuse(
             fuse::MAX_BYTES >> 30
         ),
     });
-    let fused = fuse::fuse(frames, choice.edge, fuse::MAX_BYTES, progress)?;
+    let mesh = fuse::fuse(frames, choice.edge, fuse::MAX_BYTES, progress)?;
     remarks.push(format!(
-        "mesh: fused from {} depth images, {} triangles",
-        fused.frames,
-        fused.mesh.triangles.len()
+        "mesh: fused from {count} depth images, {} triangles",
+        mesh.triangles.len()
     ));
-    Ok(fused.mesh)
+    Ok(mesh)
 }

@@ -54,13 +54,18 @@ pub fn read(folder: &Folder) -> Result<Scan> {
     Ok(scan)
 }
 
+/// Names of the entries of a subfolder; none where it is missing.
+fn names_of(folder: &Folder, name: &str) -> Result<Vec<String>> {
+    match folder.has_folder(name) {
+        true => folder.names(name),
+        false => Ok(Vec::new()),
+    }
+}
+
 /// Reads the original images.
 fn original(folder: &Folder, scan: &mut Scan) -> Result<()> {
     let listed = |name: &str| -> Result<BTreeSet<String>> {
-        match folder.has_folder(name) {
-            true => Ok(folder.names(name)?.into_iter().collect()),
-            false => Ok(BTreeSet::new()),
-        }
+        Ok(names_of(folder, name)?.into_iter().collect())
     };
     let (hdr, color, depths) = (listed(HDR)?, listed(COLOR)?, listed(DEPTH)?);
     let mut lenses: HashMap<String, Lens> = HashMap::new();
@@ -121,10 +126,9 @@ fn original(folder: &Folder, scan: &mut Scan) -> Result<()> {
                 lens
             }
         };
-        let depth = match first(&depths, "d", &["png"]) {
-            Some(name) => Some(depth_image(folder, &format!("{DEPTH}/{name}"), &lens)?),
-            None => None,
-        };
+        let depth = first(&depths, "d", &["png"])
+            .map(|name| depth_image(folder, &format!("{DEPTH}/{name}"), &lens))
+            .transpose()?;
         let photograph = folder.file(&place, &photograph)?;
         scan.frames
             .push(ImportedFrame::new(photograph, lens, pose, depth));
@@ -185,10 +189,7 @@ fn depth_image(folder: &Folder, name: &str, lens: &Lens) -> Result<DepthImage> {
 
 /// Reads the undistorted images by their .conf file.
 fn undistorted(folder: &Folder, scan: &mut Scan) -> Result<()> {
-    let names = match folder.has_folder(UNDISTORTED) {
-        true => folder.names(UNDISTORTED)?,
-        false => Vec::new(),
-    };
+    let names = names_of(folder, UNDISTORTED)?;
     let Some(name) = names.iter().find(|name| name.ends_with(".conf")) else {
         return Err(Error::file(
             &folder.path(UNDISTORTED),
@@ -240,10 +241,9 @@ fn undistorted(folder: &Folder, scan: &mut Scan) -> Result<()> {
                     [cx, f64::from(header.height) - cy],
                 );
                 let depth_name = format!("{depths}/{depth}");
-                let depth = match folder.has(&depth_name) {
-                    true => Some(depth_image(folder, &depth_name, &lens)?),
-                    false => None,
-                };
+                let depth = (folder.has(&depth_name))
+                    .then(|| depth_image(folder, &depth_name, &lens))
+                    .transpose()?;
                 scan.frames
                     .push(ImportedFrame::new(photograph, lens, pose, depth));
             }

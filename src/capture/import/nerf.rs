@@ -145,15 +145,16 @@ fn frame(
     let rows: Vec<Vec<f64>> = (0..3).map(|i| row(rows.row(i))).collect();
     let (pose, _) = pose::from_rows(&rows).map_err(|problem| refuse(&problem))?;
 
-    let mask = match fields.text("mask_path")? {
-        Some(mask) => Some(folder.file(&fields.place("mask_path"), mask)?),
-        None => None,
+    let file = |field: &str| -> Result<Option<PathBuf>> {
+        let name = fields.text(field)?;
+        name.map(|name| folder.file(&fields.place(field), name))
+            .transpose()
     };
+    let mask = file("mask_path")?;
     let number =
         |name: &str| -> Result<Option<f64>> { Ok(fields.number(name)?.or(shared.number(name)?)) };
-    let depth = match fields.text("depth_file_path")? {
-        Some(name) => {
-            let path = folder.file(&fields.place("depth_file_path"), name)?;
+    let depth = match file("depth_file_path")? {
+        Some(path) => {
             let lens = lens.resized(depth::size(&path)?);
             let unit = number("depth_unit_scale_factor")?.unwrap_or(DEPTH_UNIT);
             Some(DepthImage::new(path, lens, unit))
@@ -191,10 +192,7 @@ fn camera(values: [&Value; 2], fields: [&Fields; 2], size: [u32; 2]) -> Result<L
     let number = |name: &str| -> Result<f64> {
         Ok(frame.number(name)?.or(shared.number(name)?).unwrap_or(0.0))
     };
-    let model = match frame.text("camera_model")? {
-        Some(model) => Some(model),
-        None => shared.text("camera_model")?,
-    };
+    let model = frame.or(shared, "camera_model").text("camera_model")?;
     let model = model.map(str::to_ascii_uppercase);
     let flagged = |fields: &Fields| fields.get("is_fisheye").and_then(Value::as_bool);
     let is_fisheye = flagged(frame).or(flagged(shared)) == Some(true);

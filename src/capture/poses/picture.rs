@@ -169,25 +169,3 @@ impl Grey {
         }
     }
 }
-
-#[cfg(test)]
-impl Picture {
-    /// A picture that shows nothing, without depth.
-    pub fn blank(lens: Lens) -> Self {
-        let grey = || Grey {
-            width: lens.pinhole.width as usize,
-            height: lens.pinhole.height as usize,
-            values: Vec::new(),
-        };
-        Self {
-            lens,
-            fine: grey(),
-            coarse: grey(),
-            depth: DepthMap {
-                lens,
-                metres: Vec::new(),
-            },
-            spoiled: Vec::new(),
-        }
-    }
-}

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::math::color::srgb_to_linear;
 use glam::Vec3;
 use image::codecs::hdr::HdrDecoder;
-use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits, Rgba};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
@@ -297,23 +297,17 @@ fn linear_values(image: DynamicImage, encoding: Encoding) -> Vec<[f32; 4]> {
         Encoding::Srgb8 => {
             let table: [f32; 256] = std::array::from_fn(|i| srgb_to_linear(i as f32 / 255.0));
             let decode = |v: u8| table[usize::from(v)];
-            let rgba = image.into_rgba8();
-            rgba.pixels()
-                .map(|p| {
-                    let [r, g, b, a] = p.0;
-                    [decode(r), decode(g), decode(b), f32::from(a) / 255.0]
-                })
-                .collect()
+            let linear = |&Rgba([r, g, b, a]): &Rgba<u8>| {
+                [decode(r), decode(g), decode(b), f32::from(a) / 255.0]
+            };
+            image.into_rgba8().pixels().map(linear).collect()
         }
         Encoding::Srgb16 => {
             let decode = |v: u16| srgb_to_linear(f32::from(v) / 65535.0);
-            let rgba = image.into_rgba16();
-            rgba.pixels()
-                .map(|p| {
-                    let [r, g, b, a] = p.0;
-                    [decode(r), decode(g), decode(b), f32::from(a) / 65535.0]
-                })
-                .collect()
+            let linear = |&Rgba([r, g, b, a]): &Rgba<u16>| {
+                [decode(r), decode(g), decode(b), f32::from(a) / 65535.0]
+            };
+            image.into_rgba16().pixels().map(linear).collect()
         }
     }
 }

@@ -88,7 +88,7 @@ pub fn scan(draft: Draft) -> Result<Generated> {
     let all: Vec<usize> = (0..frames.len()).collect();
     poses::refine(&mut frames, &all)?;
     let voxel = voxel_size(&frames, None)?.edge;
-    let fused = fuse(&frames, voxel, MAX_BYTES, &mut |_, _| {})?;
+    let mesh = fuse(&frames, voxel, MAX_BYTES, &mut |_, _| {})?;
 
     let photographs = files
         .iter()
@@ -98,7 +98,7 @@ pub fn scan(draft: Draft) -> Result<Generated> {
     for (frame, imported) in capture.frames.iter_mut().zip(&frames) {
         frame.pose = imported.pose;
     }
-    capture.mesh = fused.mesh;
+    capture.mesh = mesh;
     capture.segmentation = Some(Segmentation {
         file: PathBuf::from("fused mesh"),
         wanted: None,
