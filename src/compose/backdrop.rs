@@ -295,10 +295,11 @@ mod tests {
 
     #[test]
     fn objects_take_grain_and_the_photograph_and_its_shadows_keep_their_own() {
-        let grainy = composite(PsfAndGrain {
+        let finish = PsfAndGrain {
             blur: Vec2::ZERO,
             grain: vec![(0.5, Vec3::splat(0.02))],
-        });
+        };
+        let grainy = composite(finish.clone());
         let inside: Vec<f64> = (12..22)
             .flat_map(|y| (12..22).map(move |x| (x, y)))
             .map(|(x, y)| f64::from(at(&grainy, x, y) - OBJECT))
@@ -307,12 +308,6 @@ mod tests {
         assert!((variance.sqrt() / 0.02 - 1.0).abs() < 0.2, "{variance}");
         assert_eq!(at(&grainy, 5, 17), LEVEL);
         assert!((at(&grainy, 23, 17) - 0.1).abs() < 1e-6);
-        assert_eq!(
-            grainy,
-            composite(PsfAndGrain {
-                blur: Vec2::ZERO,
-                grain: vec![(0.5, Vec3::splat(0.02))],
-            })
-        );
+        assert_eq!(grainy, composite(finish));
     }
 }

@@ -79,18 +79,6 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
 mod tests {
     use super::*;
 
-    fn names(folder: &Path) -> Vec<String> {
-        let entries = std::fs::read_dir(folder).expect("folder exists");
-        let name = |entry: std::io::Result<std::fs::DirEntry>| {
-            entry
-                .expect("entry")
-                .file_name()
-                .to_string_lossy()
-                .into_owned()
-        };
-        entries.map(name).collect()
-    }
-
     #[test]
     fn a_failed_write_leaves_the_old_file_and_nothing_else() {
         let folder = tempfile::tempdir().expect("temporary folder");
@@ -103,7 +91,8 @@ mod tests {
         .expect_err("the writer failed");
         assert_eq!(error.problem, "the numbers ran out");
         assert_eq!(std::fs::read(&path).expect("still there"), b"old");
-        assert_eq!(names(&folder.path().join("new")), ["a.txt"]);
+        let entries = std::fs::read_dir(folder.path().join("new")).expect("folder exists");
+        assert_eq!(entries.count(), 1);
     }
 
     #[test]

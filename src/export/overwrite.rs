@@ -346,10 +346,11 @@ mod tests {
         let at = |name: &str| outer.path().join(name);
         write(at("room/transforms.json"), "{}");
         write(at("hall/transforms.json"), "{}");
-        let own = |hash: &str, folder: &str| CaptureId {
+        let of = |hash: &str, folder: Option<PathBuf>| CaptureId {
             hash: hash.to_owned(),
-            folder: Some(at(folder)),
+            folder,
         };
+        let own = |hash: &str, folder: &str| of(hash, Some(at(folder)));
         let estimate = r#"{"capture": {"name": "room", "built_in": false, "relative": "../room", "absolute": null, "hash": "1"}, "x": 1}"#;
         check_results(&at("out"), &own("1", "room")).expect("there is nothing");
         write(at("out/loss.csv"), "mine");
@@ -366,14 +367,7 @@ mod tests {
             check_results(&at("out"), &own("2", "room")).expect("changed since");
             let error = check_results(&at("out"), &own("2", "hall")).expect_err("another capture");
             assert!(error.problem.contains("another capture, room"), "{error}");
-            check_results(
-                &at("out"),
-                &CaptureId {
-                    hash: "2".into(),
-                    folder: None,
-                },
-            )
-            .expect_err("the built-in room");
+            check_results(&at("out"), &of("2", None)).expect_err("the built-in room");
             fs::remove_file(at("out").join(name)).expect("removes");
         }
         write(at("out").join(ESTIMATE), "[1]");

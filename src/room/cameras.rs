@@ -18,8 +18,13 @@ pub struct View {
 impl View {
     /// A level view from `eye` towards `target`, with the built-in room's field of view.
     pub fn towards(eye: DVec3, target: DVec3) -> Self {
+        let back = (eye - target).normalize_or_zero();
+        let right = DVec3::Y.cross(back).normalize_or_zero();
         Self {
-            pose: look_at(eye, target),
+            pose: Pose {
+                rotation: DMat3::from_cols(right, back.cross(right), back),
+                center: eye,
+            },
             half_field: HALF_FIELD,
         }
     }
@@ -69,14 +74,4 @@ pub fn cameras(views: &[View], size: [u32; 2]) -> Vec<(Intrinsics, Pose)> {
     (views.iter())
         .map(|view| (lens(view.half_field), view.pose))
         .collect()
-}
-
-/// Pose of a level camera at `eye` that looks at `target`.
-fn look_at(eye: DVec3, target: DVec3) -> Pose {
-    let back = (eye - target).normalize_or_zero();
-    let right = DVec3::Y.cross(back).normalize_or_zero();
-    Pose {
-        rotation: DMat3::from_cols(right, back.cross(right), back),
-        center: eye,
-    }
 }
