@@ -121,16 +121,12 @@ fn holds_light(photograph: &Photograph) -> bool {
 
 /// The smallest factor that meets the pixel budget; no photograph shrinks below one pixel.
 fn reduction(frames: &[Frame], max_pixels: u64) -> u32 {
-    let sizes = || {
-        frames
-            .iter()
-            .map(|f| (f.intrinsics.width, f.intrinsics.height))
-    };
-    let largest = sizes().map(|(w, h)| w.min(h)).min().unwrap_or(1).max(1);
+    let lenses = || frames.iter().map(|frame| &frame.intrinsics);
+    let shortest = lenses().map(|k| k.width.min(k.height)).min();
+    let largest = shortest.unwrap_or(1).max(1);
     let pixels = |factor: u32| -> u64 {
-        sizes()
-            .map(|(w, h)| u64::from(w / factor) * u64::from(h / factor))
-            .sum()
+        let pixels = |k: &Intrinsics| u64::from(k.width / factor) * u64::from(k.height / factor);
+        lenses().map(pixels).sum()
     };
     // The number of pixels decreases with the factor, so bisection finds the smallest that fits.
     let (mut low, mut high) = (1, largest);

@@ -1,12 +1,10 @@
 //! A depth image and its photograph, looked up by points in space.
 
 use crate::capture::camera::Pose;
-use crate::capture::orientation::Orientation;
 use crate::capture::photograph::Photograph;
-use crate::capture::read::image;
 use crate::capture::scan::depth::DepthMap;
 use crate::capture::scan::{ImportedFrame, Lens};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use glam::{DVec2, DVec3, Vec3};
 
 /// A decoded frame.
@@ -24,20 +22,12 @@ impl View {
     /// Decodes a frame that has depth.
     ///
     /// # Errors
-    /// There is no depth, or an image is broken.
+    /// As [`ImportedFrame::load`].
     pub fn load(frame: &ImportedFrame) -> Result<Self> {
-        let Some(depth) = &frame.depth else {
-            return Err(Error::file(&frame.photograph, "has no depth image", ""));
-        };
-        let (photograph, _) = image::read(
-            &frame.photograph,
-            Orientation::default(),
-            &frame.lens.pinhole,
-            frame.exposure,
-        )?;
+        let (photograph, depth) = frame.load()?;
         Ok(Self {
             pose: frame.pose,
-            depth: depth.map()?,
+            depth,
             color_lens: frame.lens,
             photograph,
         })

@@ -147,36 +147,26 @@ fn original(folder: &Folder, scan: &mut Scan) -> Result<()> {
 
 /// The lens in an intrinsics file, a single line.
 fn lens(folder: &Folder, name: &str) -> Result<Lens> {
-    let path = folder.path(name);
+    let broken = |problem: &str| Error::file(&folder.path(name), problem, "copy it again");
     let numbers = numbers(&folder.text(name)?);
     let Some([w, h, fx, fy, cx, cy, k1, k2, p1, p2, k3]) = numbers
         .as_deref()
         .and_then(|n| <[f64; 11]>::try_from(n).ok())
     else {
-        return Err(Error::file(
-            &path,
-            "is not a line of: width height fx fy cx cy k1 k2 p1 p2 k3",
-            "copy it again",
-        ));
+        let problem = "is not a line of: width height fx fy cx cy k1 k2 p1 p2 k3";
+        return Err(broken(problem));
     };
     let count = |x: f64| (1.0..=65536.0).contains(&x) && x.fract() == 0.0;
     if !(count(w) && count(h)) {
-        return Err(Error::file(
-            &path,
-            format!("an image of {w}×{h} pixels is impossible"),
-            "copy it again",
-        ));
+        let problem = format!("an image of {w}×{h} pixels is impossible");
+        return Err(broken(&problem));
     }
     let lens = Lens::plain([w as u32, h as u32], [fx, fy], [cx, cy]).with(Model::Rational {
         k: [k1, k2, k3, 0.0, 0.0, 0.0],
         p: [p1, p2],
     });
     if !lens.is_possible() {
-        return Err(Error::file(
-            &path,
-            "holds an impossible focal length or coefficient",
-            "copy it again",
-        ));
+        return Err(broken("holds an impossible focal length or coefficient"));
     }
     Ok(lens)
 }

@@ -187,7 +187,8 @@ fn decoder(path: &Path) -> Result<impl ImageDecoder> {
         .with_guessed_format()
         .map_err(|e| Error::io(path, &e))?;
     match reader.format() {
-        Some(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Hdr | ImageFormat::OpenExr) => {}
+        Some(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Hdr) => {}
+        Some(ImageFormat::OpenExr) => check_exr_windows(path)?,
         _ => {
             return Err(Error::file(
                 path,
@@ -195,9 +196,6 @@ fn decoder(path: &Path) -> Result<impl ImageDecoder> {
                 "convert it to one of these",
             ));
         }
-    }
-    if reader.format() == Some(ImageFormat::OpenExr) {
-        check_exr_windows(path)?;
     }
     let mut limits = Limits::default();
     limits.max_alloc = Some(MAX_PIXELS * 16 * 2);

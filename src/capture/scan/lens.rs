@@ -200,13 +200,4 @@ mod tests {
             .unwrap();
         assert!((pixel.x - (318.0 + 500.0 * angle)).abs() < 1e-9);
     }
-
-    #[test]
-    fn a_rational_model_without_higher_terms_is_one_that_captures_hold() {
-        let k = [0.1, 0.2, 0.0, 0.0, 0.0, 0.0];
-        let plain = lens(Model::Rational { k, p: [0.3, 0.4] });
-        assert_eq!(plain.intrinsics().distortion, [0.1, 0.2, 0.3, 0.4]);
-        assert!(plain.fits_a_capture());
-        assert!(!lens(Model::Fisheye([0.0; 4])).fits_a_capture());
-    }
 }
