@@ -9,6 +9,7 @@ use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::visibility::NOTHING;
 use glam::Vec2;
+use image::{ImageBuffer, Luma};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -34,11 +35,7 @@ pub fn compare(
                 return (photograph.clone(), None);
             };
             let depth = match decode(path) {
-                Ok(image) => Depth {
-                    size: [image.width(), image.height()],
-                    values: image.into_raw(),
-                    unit: *unit,
-                },
+                Ok(image) => Depth { image, unit: *unit },
                 Err(error) => return (photograph.clone(), Some(Err(error))),
             };
             if !depth.matches_aspect_of(photograph) {
@@ -85,8 +82,7 @@ pub fn compare(
 
 /// A depth image of the same view as a photograph.
 struct Depth {
-    size: [u32; 2],
-    values: Vec<u16>,
+    image: ImageBuffer<Luma<u16>, Vec<u16>>,
     /// Metres per unit.
     unit: f64,
 }
@@ -94,17 +90,18 @@ struct Depth {
 impl Depth {
     /// Whether the aspect ratios agree.
     fn matches_aspect_of(&self, photograph: &Photograph) -> bool {
-        let aspect = |[width, height]: [u32; 2]| f64::from(width) / f64::from(height.max(1));
-        let ratio = aspect(self.size) / aspect([photograph.width, photograph.height]);
-        !self.size.contains(&0) && (ratio - 1.0).abs() < ASPECT_TOLERANCE
+        let aspect = |(width, height): (u32, u32)| f64::from(width) / f64::from(height.max(1));
+        let size = self.image.dimensions();
+        let ratio = aspect(size) / aspect((photograph.width, photograph.height));
+        size.0 > 0 && size.1 > 0 && (ratio - 1.0).abs() < ASPECT_TOLERANCE
     }
 
     /// Depth in metres along the optical axis at a point in fractions of width and height; `None` where it is missing.
     fn at(&self, fraction: Vec2) -> Option<f64> {
-        let [width, height] = self.size;
+        let (width, height) = self.image.dimensions();
         let x = ((fraction.x * width as f32) as u32).min(width - 1);
         let y = ((fraction.y * height as f32) as u32).min(height - 1);
-        let value = self.values[y as usize * width as usize + x as usize];
+        let [value] = self.image.get_pixel(x, y).0;
         (value > 0).then(|| f64::from(value) * self.unit)
     }
 }
