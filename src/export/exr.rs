@@ -114,19 +114,7 @@ pub fn write_layers(path: &Path, width: u32, height: u32, layers: Vec<Layer>) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use exr::prelude::{ReadChannels, ReadLayers};
     use glam::Vec3;
-
-    fn read_back(path: &Path) -> Image<exr::prelude::Layers<AnyChannels<FlatSamples>>> {
-        exr::prelude::read()
-            .no_deep_data()
-            .largest_resolution_level()
-            .all_channels()
-            .all_layers()
-            .all_attributes()
-            .from_file(path)
-            .expect("an EXR file")
-    }
 
     fn gradient() -> Picture {
         Picture::from_fn(37, 21, |x, y| {
@@ -165,7 +153,7 @@ mod tests {
             Layer::single("object id", "id", FlatSamples::U32(ids.clone())),
         ];
         write_layers(&path, 37, 21, layers.into()).expect("written");
-        let image = read_back(&path);
+        let image = exr::prelude::read_all_flat_layers_from_file(&path).expect("an EXR file");
         let find = |name: &str| {
             image
                 .layer_data

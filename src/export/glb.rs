@@ -14,6 +14,7 @@ use json::buffer::Target;
 use json::mesh::Semantic;
 use json::validation::Checked::Valid;
 use json::validation::USize64;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Writes parts and cameras as a GLB file.
@@ -71,15 +72,8 @@ struct Document {
 
 impl Document {
     fn part(&mut self, part: &Part) -> json::Index<json::Node> {
-        let mut primitive = json::mesh::Primitive {
-            attributes: Default::default(),
-            extensions: None,
-            extras: Default::default(),
-            indices: None,
-            material: Some(self.material(part)),
-            mode: Valid(json::mesh::Mode::Triangles),
-            targets: None,
-        };
+        let material = self.material(part);
+        let mut attributes = BTreeMap::new();
         let positions: Vec<Vec3> = part.positions.iter().map(|p| p.as_vec3()).collect();
         let ends = |start, end: fn(Vec3, Vec3) -> Vec3| {
             let end = positions.iter().copied().fold(start, end);
@@ -88,8 +82,7 @@ impl Document {
         let floats = positions.iter().flat_map(|p| p.to_array());
         let bytes = floats.map(f32::to_le_bytes);
         let accessor = self.accessor(bytes, ComponentType::F32, Type::Vec3);
-        let semantics = &mut primitive.attributes;
-        semantics.insert(
+        attributes.insert(
             Valid(Semantic::Positions),
             self.root.push(json::Accessor {
                 min: ends(Vec3::INFINITY, Vec3::min),
@@ -101,11 +94,19 @@ impl Document {
             let floats = part.uvs.iter().flat_map(|uv| uv.to_array());
             let bytes = floats.map(f32::to_le_bytes);
             let accessor = self.accessor(bytes, ComponentType::F32, Type::Vec2);
-            semantics.insert(Valid(Semantic::TexCoords(0)), self.root.push(accessor));
+            attributes.insert(Valid(Semantic::TexCoords(0)), self.root.push(accessor));
         }
         let bytes = part.triangles.iter().flatten().map(|i| i.to_le_bytes());
         let accessor = self.accessor(bytes, ComponentType::U32, Type::Scalar);
-        primitive.indices = Some(self.root.push(accessor));
+        let primitive = json::mesh::Primitive {
+            attributes,
+            extensions: None,
+            extras: Default::default(),
+            indices: Some(self.root.push(accessor)),
+            material: Some(material),
+            mode: Valid(json::mesh::Mode::Triangles),
+            targets: None,
+        };
 
         let mesh = self.root.push(json::Mesh {
             extensions: None,

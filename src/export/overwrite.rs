@@ -283,55 +283,25 @@ mod tests {
         let at = |name: &str| outer.path().join(name);
         let cameras = r#"{"mesh_path": "scan\\room.ply", "frames": [{"file_path": "images/a/0.png"}, {"file_path": "1.png"}]}"#;
         write(at("room/transforms.json"), cameras);
-        for name in [
-            "scan/room.ply",
-            "scan/notes.txt",
-            "images/a/0.png",
-            "images/a/left-out.png",
-            "1.png",
-            "plain.png",
-            "truth.json",
-        ] {
-            write(at(&format!("room/{name}")), "x");
+        let ours =
+            "transforms.json truth.json scan/room.ply images/a/0.png images/a/left-out.png 1.png
+            out/estimate.json out/report.json out/views/000.render.exr out/maps-1.safetensors";
+        let others = "plain.png scan/notes.txt out/mine.png";
+        for name in ours.split_whitespace().skip(1).chain(others.split(' ')) {
+            write(at("room").join(name), "x");
         }
-        for name in [
-            "estimate.json",
-            "report.json",
-            "views/000.render.exr",
-            "maps-1.safetensors",
-            "mine.png",
-        ] {
-            write(at(&format!("room/out/{name}")), "x");
-        }
-        for refused in [
-            "room/transforms.json",
-            "room/truth.json",
-            "room/scan/room.ply",
-            "room/images/a/0.png",
-            "room/images/a/left-out.png",
-            "room/images/../images/a/0.png",
-            "room/1.png",
-            "room/out/estimate.json",
-            "room/out/report.json",
-            "room/out/views/000.render.exr",
-            "room/out/maps-1.safetensors",
-        ] {
+        let by_another_path = "images/../images/a/0.png";
+        for name in ours.split_whitespace().chain([by_another_path]) {
+            let refused = &format!("room/{name}");
             let error = check(&at(refused)).expect_err(refused);
             assert!(
                 error.place.contains(refused) && error.remedy.contains("--overwrite"),
                 "{error}"
             );
         }
-        for free in [
-            "room/plain.png",
-            "room/scan/notes.txt",
-            "room/images/a/new.png",
-            "room/out/mine.png",
-            "room/out/checkpoint.json",
-            "new/folder/000.exr",
-            "mesh.obj",
-        ] {
-            check(&at(free)).expect(free);
+        let new = "images/a/new.png out/checkpoint.json ../new/folder/000.exr ../mesh.obj";
+        for free in others.split(' ').chain(new.split(' ')) {
+            check(&at("room").join(free)).expect(free);
         }
         write(at("hall/transforms.json"), r#"{"frames": []}"#);
         check(&at("hall/mesh.glb")).expect_err("it would be taken for the mesh");
