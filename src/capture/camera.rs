@@ -25,7 +25,7 @@ pub struct Intrinsics {
 }
 
 /// Rigid camera-to-world transform with OpenGL axes: x right, y up, looking down −z.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Pose {
     /// Columns are the camera's x, y and z axes in world coordinates (orthonormal).
     pub rotation: DMat3,
@@ -47,6 +47,44 @@ impl Pose {
 }
 
 impl Intrinsics {
+    /// A pinhole without distortion.
+    pub const fn plain(size: [u32; 2], focal: [f64; 2], center: [f64; 2]) -> Self {
+        Self {
+            width: size[0],
+            height: size[1],
+            fx: focal[0],
+            fy: focal[1],
+            cx: center[0],
+            cy: center[1],
+            distortion: [0.0; 4],
+        }
+    }
+
+    /// The same lens on an image scaled to another size.
+    pub fn resized(&self, [width, height]: [u32; 2]) -> Self {
+        let x = f64::from(width) / f64::from(self.width);
+        let y = f64::from(height) / f64::from(self.height);
+        Self {
+            width,
+            height,
+            fx: self.fx * x,
+            fy: self.fy * y,
+            cx: self.cx * x,
+            cy: self.cy * y,
+            ..*self
+        }
+    }
+
+    /// Normalised image coordinates (x right, y down, at unit depth) of a pixel position; distorted ones, as the lens is.
+    pub fn normalized(&self, pixel: DVec2) -> DVec2 {
+        (pixel - DVec2::new(self.cx, self.cy)) / DVec2::new(self.fx, self.fy)
+    }
+
+    /// The inverse of [`Intrinsics::normalized`].
+    pub fn pixel(&self, p: DVec2) -> DVec2 {
+        p * DVec2::new(self.fx, self.fy) + DVec2::new(self.cx, self.cy)
+    }
+
     /// Distorted normalised image coordinates of undistorted ones (x right, y down, at unit depth).
     ///
     /// `None` beyond the radius at which the radial polynomial stops increasing: the model does not hold there.

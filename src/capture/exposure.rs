@@ -18,8 +18,7 @@ pub struct Vignetting {
 impl Vignetting {
     /// ln cos θ for a point of the image plane, in pixels from the top-left corner. Ignores lens distortion.
     pub fn off_axis(lens: &Intrinsics, point: DVec2) -> f64 {
-        let tangent = (point - DVec2::new(lens.cx, lens.cy)) / DVec2::new(lens.fx, lens.fy);
-        -0.5 * tangent.length_squared().ln_1p()
+        -0.5 * lens.normalized(point).length_squared().ln_1p()
     }
 
     /// The factor at a point of the image plane, in pixels from the top-left corner.
@@ -98,15 +97,7 @@ impl Exposure {
 mod tests {
     use super::*;
 
-    const LENS: Intrinsics = Intrinsics {
-        width: 80,
-        height: 60,
-        fx: 50.0,
-        fy: 50.0,
-        cx: 40.0,
-        cy: 30.0,
-        distortion: [0.0; 4],
-    };
+    const LENS: Intrinsics = Intrinsics::plain([80, 60], [50.0; 2], [40.0, 30.0]);
 
     #[test]
     fn the_lens_dims_by_the_angle_from_its_axis_alone() {

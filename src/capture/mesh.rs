@@ -20,14 +20,17 @@ pub struct Mesh {
     pub corner_uvs: Vec<[Vec2; 3]>,
 }
 
+/// Lowest and highest coordinates of points; infinite and reversed where there are none.
+pub fn bounds(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
+    points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+        (low.min(p), high.max(p))
+    })
+}
+
 impl Mesh {
     /// Lowest and highest corner of the bounding box; infinite and reversed for a mesh without vertices.
     pub fn bounds(&self) -> (DVec3, DVec3) {
-        self.positions
-            .iter()
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &p| {
-                (low.min(p), high.max(p))
-            })
+        bounds(self.positions.iter().copied())
     }
 
     /// For each vertex the lowest index of a vertex at exactly its position.

@@ -64,8 +64,11 @@ impl Orientation {
         }
     }
 
-    /// The pixels of a stored picture of `size` in display order, row by row.
+    /// The pixels of a stored picture of `size` in display order, row by row; none of none.
     pub fn apply<T: Copy>(self, pixels: &[T], size: [u32; 2]) -> Vec<T> {
+        if pixels.is_empty() {
+            return Vec::new();
+        }
         let [width, height] = size.map(|n| n as usize);
         let [shown_width, shown_height] = self.size(size).map(|n| n as usize);
         let stored = |x: usize, y: usize| {

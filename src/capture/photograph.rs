@@ -41,24 +41,34 @@ pub struct Photograph {
 pub const BELOW_SATURATION: f32 = 0.97;
 
 impl Photograph {
+    /// A photograph whose pixels may all be used and saturate alike.
+    pub fn new(
+        [width, height]: [u32; 2],
+        pixels: Vec<Vec3>,
+        encoding: Encoding,
+        saturation: Vec3,
+    ) -> Self {
+        Self {
+            width,
+            height,
+            pixels,
+            usable: Vec::new(),
+            encoding,
+            saturation,
+            limits: Vec::new(),
+        }
+    }
+
     /// The photograph in another orientation.
     pub fn oriented(&self, orientation: Orientation) -> Self {
         let size = [self.width, self.height];
         let [width, height] = orientation.size(size);
-        let usable = match self.usable.len() {
-            0 => Vec::new(),
-            _ => orientation.apply(&self.usable, size),
-        };
-        let limits = match self.limits.len() {
-            0 => Vec::new(),
-            _ => orientation.apply(&self.limits, size),
-        };
         Self {
             width,
             height,
             pixels: orientation.apply(&self.pixels, size),
-            usable,
-            limits,
+            usable: orientation.apply(&self.usable, size),
+            limits: orientation.apply(&self.limits, size),
             ..*self
         }
     }

@@ -88,70 +88,64 @@ impl Reading {
 
     /// The command-line options for this reading; empty for the default.
     pub fn options(&self) -> String {
-        let mut options = Vec::new();
-        if self.axes == Axes::OpenCv {
-            options.push("--axes opencv".to_owned());
-        }
-        if self.mesh_turns != 0 {
-            options.push(format!("--mesh-turn {}", 90 * u32::from(self.mesh_turns)));
-        }
-        for (name, value) in [
-            ("--mesh-scale", self.mesh_scale),
-            ("--focal", self.focal),
-            ("--lens-scale", self.lens_scale),
-        ] {
-            if value != 1.0 {
-                options.push(format!("{name} {}", number(value)));
-            }
-        }
-        if self.orientation.mirrored {
-            options.push("--mirror".to_owned());
-        }
-        if self.orientation.turns != 0 {
-            options.push(format!("--turn {}", 90 * u32::from(self.orientation.turns)));
-        }
-        if self.shift != 0 {
-            options.push(format!("--shift={}", self.shift));
-        }
+        let options: Vec<String> = self
+            .changes()
+            .into_iter()
+            .map(|[option, _]| option)
+            .collect();
         options.join(" ")
     }
 
     /// A description in words of what this reading does to the files; empty for the default.
     pub fn words(&self) -> String {
-        let mut words = Vec::new();
+        let words: Vec<String> = self.changes().into_iter().map(|[_, words]| words).collect();
+        words.join(" and ")
+    }
+
+    /// What differs from the format's conventions, each as a command-line option and in words.
+    fn changes(&self) -> Vec<[String; 2]> {
+        let mut changes = Vec::new();
+        let mut add = |option: String, words: String| changes.push([option, words]);
         if self.axes == Axes::OpenCv {
-            words.push("read the poses with OpenCV's axes".to_owned());
+            let words = "read the poses with OpenCV's axes";
+            add("--axes opencv".into(), words.into());
         }
         if self.mesh_turns != 0 {
             let degrees = 90 * u32::from(self.mesh_turns);
-            words.push(format!("turn the mesh by {degrees}° about its x axis"));
+            let words = format!("turn the mesh by {degrees}° about its x axis");
+            add(format!("--mesh-turn {degrees}"), words);
         }
-        for (what, factor) in [
-            ("multiply the mesh's size", self.mesh_scale),
-            ("multiply the focal lengths", self.focal),
-            (
-                "fit the lens to the photographs' size: multiply it",
-                self.lens_scale,
-            ),
+        let fit = "fit the lens to the photographs' size: multiply it";
+        for (option, what, factor) in [
+            ("--mesh-scale", "multiply the mesh's size", self.mesh_scale),
+            ("--focal", "multiply the focal lengths", self.focal),
+            ("--lens-scale", fit, self.lens_scale),
         ] {
             if factor != 1.0 {
-                words.push(format!("{what} by {}", number(factor)));
+                let factor = number(factor);
+                add(format!("{option} {factor}"), format!("{what} by {factor}"));
             }
         }
         if self.orientation.mirrored {
-            words.push("mirror the photographs".to_owned());
+            add("--mirror".into(), "mirror the photographs".into());
         }
         if self.orientation.turns != 0 {
             let degrees = 90 * u32::from(self.orientation.turns);
-            words.push(format!("turn the photographs by {degrees}°"));
+            let words = format!("turn the photographs by {degrees}°");
+            add(format!("--turn {degrees}"), words);
         }
-        match self.shift {
-            0 => {}
-            1 => words.push("give each pose the next photograph".to_owned()),
-            -1 => words.push("give each pose the photograph before".to_owned()),
-            n => words.push(format!("give each pose the photograph {n} frames later")),
+        if self.shift != 0 {
+            let which = match self.shift {
+                1 => "the next photograph".to_owned(),
+                -1 => "the photograph before".to_owned(),
+                n => format!("the photograph {n} frames later"),
+            };
+            add(
+                format!("--shift={}", self.shift),
+                format!("give each pose {which}"),
+            );
         }
-        words.join(" and ")
+        changes
     }
 }
 

@@ -107,7 +107,7 @@ impl Intrinsics {
             fy: self.fy / scale,
             cx: self.cx / scale,
             cy: self.cy / scale,
-            distortion: self.distortion,
+            ..*self
         }
     }
 }
@@ -121,16 +121,12 @@ fn holds_light(photograph: &Photograph) -> bool {
 
 /// The smallest factor that meets the pixel budget; no photograph shrinks below one pixel.
 fn reduction(frames: &[Frame], max_pixels: u64) -> u32 {
-    let sizes = || {
-        frames
-            .iter()
-            .map(|f| (f.intrinsics.width, f.intrinsics.height))
-    };
-    let largest = sizes().map(|(w, h)| w.min(h)).min().unwrap_or(1).max(1);
+    let lenses = || frames.iter().map(|frame| &frame.intrinsics);
+    let shortest = lenses().map(|k| k.width.min(k.height)).min();
+    let largest = shortest.unwrap_or(1).max(1);
     let pixels = |factor: u32| -> u64 {
-        sizes()
-            .map(|(w, h)| u64::from(w / factor) * u64::from(h / factor))
-            .sum()
+        let pixels = |k: &Intrinsics| u64::from(k.width / factor) * u64::from(k.height / factor);
+        lenses().map(pixels).sum()
     };
     // The number of pixels decreases with the factor, so bisection finds the smallest that fits.
     let (mut low, mut high) = (1, largest);
@@ -149,50 +145,34 @@ fn reduction(frames: &[Frame], max_pixels: u64) -> u32 {
 pub fn reduce(photograph: &Photograph, factor: u32) -> Photograph {
     let (width, height) = (photograph.width / factor, photograph.height / factor);
     let count = f64::from(factor) * f64::from(factor);
-    let blocks: Vec<Block> = (0..height)
-        .flat_map(|y| (0..width).map(move |x| (x, y)))
-        .map(|(x, y)| {
-            let mut sum = DVec3::ZERO;
-            let mut saturated = BVec3::FALSE;
-            let mut usable = true;
-            for j in y * factor..(y + 1) * factor {
-                for i in x * factor..(x + 1) * factor {
-                    let index = j as usize * photograph.width as usize + i as usize;
-                    let pixel = photograph.pixels[index];
-                    sum += pixel.as_dvec3();
-                    saturated |= photograph.saturated(index);
-                    usable &= photograph.is_usable(index);
-                }
+    let limit = photograph.saturation;
+    let (encoding, pixels) = (photograph.encoding, Vec::new());
+    let mut reduced = Photograph::new([width, height], pixels, encoding, limit);
+    for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+        let mut sum = DVec3::ZERO;
+        let mut saturated = BVec3::FALSE;
+        let mut usable = true;
+        for j in y * factor..(y + 1) * factor {
+            for i in x * factor..(x + 1) * factor {
+                let index = j as usize * photograph.width as usize + i as usize;
+                sum += photograph.pixels[index].as_dvec3();
+                saturated |= photograph.saturated(index);
+                usable &= photograph.is_usable(index);
             }
-            let mean = (sum / count).as_vec3();
-            Block {
-                mean,
-                usable,
-                limit: Vec3::select(
-                    saturated,
-                    mean.min(photograph.saturation),
-                    photograph.saturation,
-                ),
-            }
-        })
-        .collect();
-    let mut usable: Vec<bool> = blocks.iter().map(|b| b.usable).collect();
-    if usable.iter().all(|&good| good) {
-        usable.clear();
+        }
+        let mean = (sum / count).as_vec3();
+        reduced.pixels.push(mean);
+        reduced.usable.push(usable);
+        let own_limit = Vec3::select(saturated, mean.min(limit), limit);
+        reduced.limits.push(own_limit);
     }
-    let mut limits: Vec<Vec3> = blocks.iter().map(|b| b.limit).collect();
-    if limits.iter().all(|&limit| limit == photograph.saturation) {
-        limits.clear();
+    if reduced.usable.iter().all(|&good| good) {
+        reduced.usable.clear();
     }
-    Photograph {
-        width,
-        height,
-        pixels: blocks.iter().map(|b| b.mean).collect(),
-        usable,
-        encoding: photograph.encoding,
-        saturation: photograph.saturation,
-        limits,
+    if reduced.limits.iter().all(|&own| own == limit) {
+        reduced.limits.clear();
     }
+    reduced
 }
 
 /// Marks the pixels within [`CLIPPED_RADIUS`] of a saturated one as lower bounds: they hold clipped light, so part of their
@@ -223,13 +203,6 @@ fn bound_near_clipped(photograph: Arc<Photograph>) -> Arc<Photograph> {
     Arc::new(bounded)
 }
 
-/// A downsampled pixel.
-struct Block {
-    mean: Vec3,
-    usable: bool,
-    limit: Vec3,
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -237,15 +210,8 @@ mod tests {
     use glam::DVec2;
 
     fn photograph(width: u32, height: u32) -> Photograph {
-        Photograph {
-            width,
-            height,
-            pixels: (0..width * height).map(|i| Vec3::splat(i as f32)).collect(),
-            usable: Vec::new(),
-            encoding: Encoding::Linear,
-            saturation: Vec3::INFINITY,
-            limits: Vec::new(),
-        }
+        let pixels = (0..width * height).map(|i| Vec3::splat(i as f32)).collect();
+        Photograph::new([width, height], pixels, Encoding::Linear, Vec3::INFINITY)
     }
 
     #[test]
@@ -307,10 +273,7 @@ mod tests {
         };
         let reduced = lens.reduced(4);
         assert_eq!((reduced.width, reduced.height), (160, 120));
-        let project = |k: &Intrinsics| {
-            let p = k.distort(DVec2::new(0.2, -0.3)).unwrap();
-            DVec2::new(p.x * k.fx + k.cx, p.y * k.fy + k.cy)
-        };
+        let project = |k: &Intrinsics| k.pixel(k.distort(DVec2::new(0.2, -0.3)).unwrap());
         assert!((project(&lens) / 4.0 - project(&reduced)).length() < 1e-12);
     }
 }

@@ -202,7 +202,7 @@ impl Backdrop {
 mod tests {
     use super::*;
     use crate::capture::camera::{Intrinsics, Pose};
-    use glam::{DMat3, DVec3, Vec2};
+    use glam::{DVec3, Vec2};
 
     const SIDE: u32 = 40;
     const LEVEL: f32 = 0.3;
@@ -232,23 +232,11 @@ mod tests {
 
     /// A grey photograph with a given saturation.
     fn backdrop(finish: PsfAndGrain, saturation: Vec3) -> Backdrop {
-        let intrinsics = Intrinsics {
-            width: SIDE,
-            height: SIDE,
-            fx: 40.0,
-            fy: 40.0,
-            cx: 20.0,
-            cy: 20.0,
-            distortion: [0.0; 4],
-        };
-        let pose = Pose {
-            rotation: DMat3::IDENTITY,
-            center: DVec3::ZERO,
-        };
+        let intrinsics = Intrinsics::plain([SIDE; 2], [40.0; 2], [20.0; 2]);
         let photograph = Picture::from_fn(SIDE, SIDE, |_, _| Vec3::splat(LEVEL));
         Backdrop {
             frame: 4,
-            camera: Camera::new(&intrinsics, &pose, DVec3::ZERO),
+            camera: Camera::new(&intrinsics, &Pose::default(), DVec3::ZERO),
             photograph: Arc::new(photograph),
             exposure: Exposure::default(),
             saturation,
@@ -307,10 +295,11 @@ mod tests {
 
     #[test]
     fn objects_take_grain_and_the_photograph_and_its_shadows_keep_their_own() {
-        let grainy = composite(PsfAndGrain {
+        let finish = PsfAndGrain {
             blur: Vec2::ZERO,
             grain: vec![(0.5, Vec3::splat(0.02))],
-        });
+        };
+        let grainy = composite(finish.clone());
         let inside: Vec<f64> = (12..22)
             .flat_map(|y| (12..22).map(move |x| (x, y)))
             .map(|(x, y)| f64::from(at(&grainy, x, y) - OBJECT))
@@ -319,12 +308,6 @@ mod tests {
         assert!((variance.sqrt() / 0.02 - 1.0).abs() < 0.2, "{variance}");
         assert_eq!(at(&grainy, 5, 17), LEVEL);
         assert!((at(&grainy, 23, 17) - 0.1).abs() < 1e-6);
-        assert_eq!(
-            grainy,
-            composite(PsfAndGrain {
-                blur: Vec2::ZERO,
-                grain: vec![(0.5, Vec3::splat(0.02))],
-            })
-        );
+        assert_eq!(grainy, composite(finish));
     }
 }

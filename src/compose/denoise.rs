@@ -103,23 +103,6 @@ pub fn denoised_composite(halves: [&Insertion; 2], denoiser: Denoiser) -> Pictur
 /// [`denoised_composite`] and its layers.
 pub fn denoised(halves: [&Insertion; 2], denoiser: Denoiser) -> (Picture, Layers) {
     let layered = DenoisedLight::new(halves, denoiser).layered();
-    let backdrop = halves[0].backdrop();
-    let (depth, object) = halves[0].at_centers();
-    let picture = |value: &dyn Fn(usize) -> Vec3| Picture {
-        pixels: (0..layered.len()).map(value).collect(),
-        ..*backdrop.photograph
-    };
-    let with = picture(&|pixel| layered[pixel].with);
-    let without = picture(&|pixel| layered[pixel].without);
-    let alpha: Vec<f32> = layered.iter().map(|layer| layer.alpha).collect();
-    let layers = Layers {
-        shadow: Layers::shadow_of(&with, &without, &alpha),
-        with,
-        without,
-        delta: picture(&|pixel| backdrop.delta(pixel, &layered[pixel])),
-        alpha,
-        depth,
-        object,
-    };
-    (backdrop.composite(&layered), layers)
+    let composite = halves[0].backdrop().composite(&layered);
+    (composite, halves[0].layers_of(&layered))
 }

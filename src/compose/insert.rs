@@ -55,19 +55,11 @@ pub struct Layers {
     pub object: Vec<u32>,
 }
 
-impl Layers {
-    /// Computes [`Layers::shadow`] from other layers.
-    pub fn shadow_of(with: &Picture, without: &Picture, alpha: &[f32]) -> Picture {
-        let pixels = with.pixels.iter().zip(&without.pixels).zip(alpha);
-        let shadow = pixels.map(|((&with, &without), &alpha)| {
-            let dimmed = with.cmplt(without) & BVec3::splat(alpha == 0.0);
-            Vec3::select(dimmed, (with / without).max(Vec3::ZERO), Vec3::ONE)
-        });
-        Picture {
-            pixels: shadow.collect(),
-            ..*with
-        }
-    }
+/// Ratio of radiance with to without the objects where they darken a pixel beside them, else 1.
+fn shadow(pixel: &LayeredPixel) -> Vec3 {
+    let dimmed = pixel.with.cmplt(pixel.without) & BVec3::splat(pixel.alpha == 0.0);
+    let ratio = (pixel.with / pixel.without).max(Vec3::ZERO);
+    Vec3::select(dimmed, ratio, Vec3::ONE)
 }
 
 impl Insertion {
@@ -252,7 +244,7 @@ impl Insertion {
     }
 
     /// Depth along the viewing direction and object index of each pixel, as [`Layers`] has them.
-    pub(super) fn at_centers(&self) -> (Vec<f32>, Vec<u32>) {
+    fn at_centers(&self) -> (Vec<f32>, Vec<u32>) {
         let world = FurnishedScene::new(&self.lit, &self.objects);
         let camera = &self.backdrop.camera;
         let forward = camera.forward();
@@ -271,15 +263,19 @@ impl Insertion {
 
     /// The layers of the composite.
     pub fn layers(&self) -> Layers {
+        let pixels = 0..self.pixels.len();
+        self.layers_of(&pixels.map(|pixel| self.layered(pixel)).collect::<Vec<_>>())
+    }
+
+    /// The layers of a composite of given pixels.
+    pub(super) fn layers_of(&self, layered: &[LayeredPixel]) -> Layers {
         let (depth, object) = self.at_centers();
-        let with = self.picture(|pixel| self.means(pixel).0);
-        let (without, alpha) = (self.without(), self.alpha());
         Layers {
-            delta: self.picture(|pixel| self.backdrop.delta(pixel, &self.layered(pixel))),
-            shadow: Layers::shadow_of(&with, &without, &alpha),
-            with,
-            without,
-            alpha,
+            with: self.picture(|pixel| layered[pixel].with),
+            without: self.picture(|pixel| layered[pixel].without),
+            delta: self.picture(|pixel| self.backdrop.delta(pixel, &layered[pixel])),
+            shadow: self.picture(|pixel| shadow(&layered[pixel])),
+            alpha: layered.iter().map(|pixel| pixel.alpha).collect(),
             depth,
             object,
         }
@@ -331,9 +327,8 @@ impl Insertion {
 
     fn picture(&self, color: impl Fn(usize) -> Vec3) -> Picture {
         Picture {
-            width: self.backdrop.photograph.width,
-            height: self.backdrop.photograph.height,
             pixels: (0..self.pixels.len()).map(color).collect(),
+            ..*self.backdrop.photograph
         }
     }
 

@@ -152,13 +152,9 @@ impl PlacedObject {
             .iter()
             .map(|corner| corner.map(|n| turned(n.as_dvec3())))
             .collect();
-        let (low, high) = corners
-            .iter()
-            .flatten()
-            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &p| {
-                (low.min(p), high.max(p))
-            });
         let positions: Vec<Vec3> = corners.iter().flatten().copied().collect();
+        let low = positions.iter().copied().fold(Vec3::INFINITY, Vec3::min);
+        let high = (positions.iter().copied()).fold(Vec3::NEG_INFINITY, Vec3::max);
         let indices: Vec<[u32; 3]> = (0..corners.len() as u32)
             .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
             .collect();

@@ -291,19 +291,8 @@ mod tests {
             pixel + finish.grain([3, index as u64], luminance(pixel), 1.0)
         };
         let pixels = soft.iter().enumerate().map(noisy).collect();
-        photograph(width as u32, height as u32, pixels, Vec3::INFINITY)
-    }
-
-    fn photograph(width: u32, height: u32, pixels: Vec<Vec3>, saturation: Vec3) -> Photograph {
-        Photograph {
-            width,
-            height,
-            pixels,
-            usable: Vec::new(),
-            encoding: Encoding::Srgb8,
-            saturation,
-            limits: Vec::new(),
-        }
+        let size = SIZE.map(|side| side as u32);
+        Photograph::new(size, pixels, Encoding::Srgb8, Vec3::INFINITY)
     }
 
     #[test]
@@ -334,10 +323,12 @@ mod tests {
         assert_eq!(exact.grain([0, 0], 0.5, 1.0), Vec3::ZERO);
         for side in [1, 2, 5, 8] {
             let pixels = (0..side * side).map(|i| Vec3::splat((i % side * (i / side)) as f32));
-            let small = photograph(side, side, pixels.collect(), Vec3::ONE);
+            let pixels = pixels.collect();
+            let small = Photograph::new([side; 2], pixels, Encoding::Srgb8, Vec3::ONE);
             assert!(PsfAndGrain::of(&small).is_none(), "{side}");
         }
-        let black = photograph(50, 40, vec![Vec3::ZERO; 50 * 40], Vec3::ONE);
+        let pixels = vec![Vec3::ZERO; 50 * 40];
+        let black = Photograph::new([50, 40], pixels, Encoding::Srgb8, Vec3::ONE);
         let found = PsfAndGrain::of(&black);
         assert_eq!(
             (found.blur, found.grain([0, 0], 0.0, 1.0)),

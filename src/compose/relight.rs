@@ -216,7 +216,7 @@ mod tests {
     use crate::capture::response::Response;
     use crate::compose::psf_and_grain::PsfAndGrain;
     use crate::scene::camera::Camera;
-    use glam::{DMat3, DVec3};
+    use glam::DVec3;
 
     /// One relit pixel of a photograph with a given saturation.
     fn pixel(photograph: f32, before: f32, after: f32, saturation: f32) -> f32 {
@@ -224,22 +224,10 @@ mod tests {
     }
 
     fn by(exposure: Exposure, photograph: f32, before: f32, after: f32, saturation: f32) -> f32 {
-        let intrinsics = Intrinsics {
-            width: 1,
-            height: 1,
-            fx: 1.0,
-            fy: 1.0,
-            cx: 0.5,
-            cy: 0.5,
-            distortion: [0.0; 4],
-        };
-        let pose = Pose {
-            rotation: DMat3::IDENTITY,
-            center: DVec3::ZERO,
-        };
+        let intrinsics = Intrinsics::plain([1; 2], [1.0; 2], [0.5; 2]);
         let backdrop = Backdrop {
             frame: 0,
-            camera: Camera::new(&intrinsics, &pose, DVec3::ZERO),
+            camera: Camera::new(&intrinsics, &Pose::default(), DVec3::ZERO),
             photograph: Arc::new(Picture::from_fn(1, 1, |_, _| Vec3::splat(photograph))),
             exposure,
             saturation: Vec3::splat(saturation),

@@ -4,9 +4,10 @@ use crate::compose::backdrop::Backdrop;
 use crate::compose::insert::Layers;
 use crate::error::Result;
 use crate::export::compare::write_row;
-use crate::export::exr::{Layer, Precision, Samples, write_layers, write_rgb};
+use crate::export::exr::{Layer, Precision, write_layers, write_rgb};
 use crate::export::picture::write_png;
 use crate::math::picture::Picture;
+use exr::prelude::FlatSamples;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
@@ -46,14 +47,14 @@ pub fn write_insertion(
         &all,
         composite.width,
         composite.height,
-        &[
+        vec![
             rgb("with", &layers.with),
             rgb("without", &layers.without),
-            Layer::single("alpha", "A", Samples::Float(layers.alpha)),
+            Layer::single("alpha", "A", FlatSamples::F32(layers.alpha)),
             rgb("delta", &layers.delta),
             rgb("shadow", &layers.shadow),
-            Layer::single("depth", "Z", Samples::Float(layers.depth)),
-            Layer::single("object id", "id", Samples::Index(layers.object)),
+            Layer::single("depth", "Z", FlatSamples::F32(layers.depth)),
+            Layer::single("object id", "id", FlatSamples::U32(layers.object)),
         ],
     )?;
 

@@ -8,9 +8,9 @@ use crate::error::Result;
 use crate::export::atomic::{WriteError, write_atomically, write_bytes};
 use crate::export::exr::{Precision, write_rgb};
 use crate::math::picture::Picture;
-use glam::DVec3;
+use glam::{DMat4, DVec3};
 use serde::Serialize;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use std::io::Write;
 use std::path::Path;
 
@@ -96,51 +96,36 @@ pub struct Entry {
 /// The content of transforms.json. Numbers are written so that they read back to the bit.
 pub fn transforms(entries: &[Entry], mesh_path: &str, up: Option<DVec3>) -> Value {
     let shared = entries.first().map(|entry| entry.intrinsics);
-    let mut file = Map::new();
-    file.insert("camera_model".into(), json!("OPENCV"));
-    if let Some(shared) = shared {
-        file.extend(lens(&shared));
+    let mut file = json!({"camera_model": "OPENCV", "mesh_path": mesh_path});
+    if let Some(shared) = &shared {
+        add_lens(&mut file, shared);
     }
-    file.insert("mesh_path".into(), json!(mesh_path));
     if let Some(up) = up {
-        file.insert("up".into(), json!(up.to_array()));
+        file["up"] = json!(up.to_array());
     }
-    let frames: Vec<Value> = entries
-        .iter()
-        .map(|frame| {
-            let mut entry = Map::new();
-            entry.insert("file_path".into(), json!(frame.file_path));
-            if Some(frame.intrinsics) != shared {
-                entry.extend(lens(&frame.intrinsics));
-            }
-            if let Some(exposure) = frame.exposure {
-                entry.insert("exposure".into(), json!(exposure));
-            }
-            if let Some((path, unit)) = &frame.depth {
-                entry.insert("depth_file_path".into(), json!(path));
-                entry.insert("depth_unit_scale_factor".into(), json!(unit));
-            }
-            let r = frame.pose.rotation;
-            let c = frame.pose.center;
-            entry.insert(
-                "transform_matrix".into(),
-                json!([
-                    [r.x_axis.x, r.y_axis.x, r.z_axis.x, c.x],
-                    [r.x_axis.y, r.y_axis.y, r.z_axis.y, c.y],
-                    [r.x_axis.z, r.y_axis.z, r.z_axis.z, c.z],
-                    [0.0, 0.0, 0.0, 1.0]
-                ]),
-            );
-            Value::Object(entry)
-        })
-        .collect();
-    file.insert("frames".into(), Value::Array(frames));
-    Value::Object(file)
+    let frame = |frame: &Entry| {
+        let matrix = DMat4::from_mat3_translation(frame.pose.rotation, frame.pose.center);
+        let rows = matrix.transpose().to_cols_array_2d();
+        let mut entry = json!({"file_path": frame.file_path, "transform_matrix": rows});
+        if Some(frame.intrinsics) != shared {
+            add_lens(&mut entry, &frame.intrinsics);
+        }
+        if let Some(exposure) = frame.exposure {
+            entry["exposure"] = json!(exposure);
+        }
+        if let Some((path, unit)) = &frame.depth {
+            entry["depth_file_path"] = json!(path);
+            entry["depth_unit_scale_factor"] = json!(unit);
+        }
+        entry
+    };
+    file["frames"] = entries.iter().map(frame).collect();
+    file
 }
 
-fn lens(k: &Intrinsics) -> impl Iterator<Item = (String, Value)> {
+fn add_lens(fields: &mut Value, k: &Intrinsics) {
     let [k1, k2, p1, p2] = k.distortion;
-    [
+    for (name, value) in [
         ("w", json!(k.width)),
         ("h", json!(k.height)),
         ("fl_x", json!(k.fx)),
@@ -151,9 +136,9 @@ fn lens(k: &Intrinsics) -> impl Iterator<Item = (String, Value)> {
         ("k2", json!(k2)),
         ("p1", json!(p1)),
         ("p2", json!(p2)),
-    ]
-    .into_iter()
-    .map(|(name, value)| (name.to_owned(), value))
+    ] {
+        fields[name] = value;
+    }
 }
 
 /// Writes objects as `o`, texture coordinates per corner, and vertex colours. Positions read back to the bit.

@@ -5,7 +5,7 @@ use crate::export::atomic::write_atomically;
 use crate::math::picture::Picture;
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds,
-    LayerAttributes, SmallVec, Text, Vec2, WritableImage, f16,
+    LayerAttributes, Text, Vec2, WritableImage, f16,
 };
 use std::path::Path;
 
@@ -23,80 +23,31 @@ pub enum Precision {
 pub struct Layer {
     /// Name of the layer; channels are shown as `name.channel`.
     pub name: String,
-    /// Its channels, in any order.
-    pub channels: Vec<Channel>,
-}
-
-/// A channel: one value a pixel.
-#[derive(Debug, Clone)]
-pub struct Channel {
-    /// Name, such as "R" or "Z".
-    pub name: String,
-    /// Values, row by row from the top left.
-    pub samples: Samples,
-}
-
-/// The values of a channel.
-#[derive(Debug, Clone)]
-pub enum Samples {
-    /// 16-bit floats.
-    Half(Vec<f16>),
-    /// 32-bit floats.
-    Float(Vec<f32>),
-    /// Integers, such as object indices.
-    Index(Vec<u32>),
+    /// Its channels in any order: names such as "R" or "Z", and values row by row from the top left.
+    pub channels: Vec<(&'static str, FlatSamples)>,
 }
 
 impl Layer {
     /// The channels R, G and B of a picture.
     pub fn rgb(name: &str, picture: &Picture, precision: Precision) -> Self {
-        let channel = |index: usize, letter: &str| Channel {
-            name: letter.to_owned(),
-            samples: match precision {
-                Precision::Float => {
-                    Samples::Float(picture.pixels.iter().map(|c| c[index]).collect())
-                }
-                Precision::Half => Samples::Half(
-                    picture
-                        .pixels
-                        .iter()
-                        .map(|c| f16::from_f32(c[index]))
-                        .collect(),
-                ),
-            },
+        let channel = |index: usize| {
+            let values = picture.pixels.iter().map(|c| c[index]);
+            match precision {
+                Precision::Float => FlatSamples::F32(values.collect()),
+                Precision::Half => FlatSamples::F16(values.map(f16::from_f32).collect()),
+            }
         };
         Self {
             name: name.to_owned(),
-            channels: vec![channel(0, "R"), channel(1, "G"), channel(2, "B")],
+            channels: vec![("R", channel(0)), ("G", channel(1)), ("B", channel(2))],
         }
     }
 
     /// A single channel.
-    pub fn single(name: &str, channel: &str, samples: Samples) -> Self {
+    pub fn single(name: &str, channel: &'static str, samples: FlatSamples) -> Self {
         Self {
             name: name.to_owned(),
-            channels: vec![Channel {
-                name: channel.to_owned(),
-                samples,
-            }],
-        }
-    }
-}
-
-impl Samples {
-    fn len(&self) -> usize {
-        match self {
-            Self::Half(values) => values.len(),
-            Self::Float(values) => values.len(),
-            Self::Index(values) => values.len(),
-        }
-    }
-
-    fn flat(&self) -> FlatSamples {
-        match self {
-            Self::Half(values) => FlatSamples::F16(values.clone()),
-            Self::Float(values) => FlatSamples::F32(values.clone()),
-            Self::Index(values) => FlatSamples::U32(values.clone()),
+            channels: vec![(channel, samples)],
         }
     }
 }
@@ -107,33 +58,20 @@ impl Samples {
 /// The file cannot be written, or the picture has no pixels.
 pub fn write_rgb(path: &Path, picture: &Picture, precision: Precision) -> Result<()> {
     let layer = Layer::rgb("", picture, precision);
-    write_layers(path, picture.width, picture.height, &[layer])
-}
-
-/// Writes one value a pixel as the channel Y, which viewers show as grey.
-///
-/// # Errors
-/// The file cannot be written, or there is not one value a pixel.
-pub fn write_scalar(path: &Path, width: u32, height: u32, values: &[f32]) -> Result<()> {
-    let layer = Layer::single("", "Y", Samples::Float(values.to_vec()));
-    write_layers(path, width, height, &[layer])
+    write_layers(path, picture.width, picture.height, vec![layer])
 }
 
 /// Writes named layers of one size. A single layer may have an empty name; its channels are then R, G, B, ….
 ///
 /// # Errors
 /// The file cannot be written, there is nothing to write, or a channel's length does not match the size.
-pub fn write_layers(path: &Path, width: u32, height: u32, layers: &[Layer]) -> Result<()> {
+pub fn write_layers(path: &Path, width: u32, height: u32, layers: Vec<Layer>) -> Result<()> {
     let count = width as usize * height as usize;
-    let wrong = layers
-        .iter()
-        .flat_map(|layer| &layer.channels)
-        .find(|channel| channel.samples.len() != count);
-    if let Some(channel) = wrong {
+    let mut channels = layers.iter().flat_map(|layer| &layer.channels);
+    if let Some((name, samples)) = channels.find(|(_, samples)| samples.len() != count) {
         let problem = format!(
-            "channel {} has {} values for {width} × {height} pixels",
-            channel.name,
-            channel.samples.len()
+            "channel {name} has {} values for {width} × {height} pixels",
+            samples.len()
         );
         return Err(Error::file(path, problem, ""));
     }
@@ -143,13 +81,10 @@ pub fn write_layers(path: &Path, width: u32, height: u32, layers: &[Layer]) -> R
 
     let size = Vec2(width as usize, height as usize);
     let exr_layers: Vec<_> = layers
-        .iter()
+        .into_iter()
         .map(|layer| {
-            let channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = layer
-                .channels
-                .iter()
-                .map(|c| AnyChannel::new(c.name.as_str(), c.samples.flat()))
-                .collect();
+            let channels = layer.channels.into_iter();
+            let channels = channels.map(|(name, samples)| AnyChannel::new(name, samples));
             let attributes = if layer.name.is_empty() {
                 LayerAttributes::default()
             } else {
@@ -159,7 +94,7 @@ pub fn write_layers(path: &Path, width: u32, height: u32, layers: &[Layer]) -> R
                 size,
                 attributes,
                 Encoding::SMALL_LOSSLESS,
-                AnyChannels::sort(channels),
+                AnyChannels::sort(channels.collect()),
             )
         })
         .collect();
@@ -179,19 +114,7 @@ pub fn write_layers(path: &Path, width: u32, height: u32, layers: &[Layer]) -> R
 #[cfg(test)]
 mod tests {
     use super::*;
-    use exr::prelude::{ReadChannels, ReadLayers};
     use glam::Vec3;
-
-    fn read_back(path: &Path) -> Image<exr::prelude::Layers<AnyChannels<FlatSamples>>> {
-        exr::prelude::read()
-            .no_deep_data()
-            .largest_resolution_level()
-            .all_channels()
-            .all_layers()
-            .all_attributes()
-            .from_file(path)
-            .expect("an EXR file")
-    }
 
     fn gradient() -> Picture {
         Picture::from_fn(37, 21, |x, y| {
@@ -227,10 +150,10 @@ mod tests {
         let ids: Vec<u32> = (0..37 * 21).map(|i| u32::MAX - i).collect();
         let layers = [
             Layer::rgb("with", &picture, Precision::Float),
-            Layer::single("object id", "id", Samples::Index(ids.clone())),
+            Layer::single("object id", "id", FlatSamples::U32(ids.clone())),
         ];
-        write_layers(&path, 37, 21, &layers).expect("written");
-        let image = read_back(&path);
+        write_layers(&path, 37, 21, layers.into()).expect("written");
+        let image = exr::prelude::read_all_flat_layers_from_file(&path).expect("an EXR file");
         let find = |name: &str| {
             image
                 .layer_data
@@ -254,14 +177,9 @@ mod tests {
     fn a_picture_of_the_wrong_size_is_refused_and_no_file_appears() {
         let folder = tempfile::tempdir().expect("temporary folder");
         let path = folder.path().join("a.exr");
-        assert!(write_scalar(&path, 3, 3, &[0.0; 8]).is_err());
-        assert!(write_scalar(&path, 0, 3, &[]).is_err());
+        let layers = |count| vec![Layer::single("", "Y", FlatSamples::F32(vec![2.5; count]))];
+        assert!(write_layers(&path, 3, 3, layers(8)).is_err());
+        assert!(write_layers(&path, 0, 3, layers(0)).is_err());
         assert!(!path.exists());
-        write_scalar(&path, 3, 3, &[2.5; 9]).expect("written");
-        let image = read_back(&path);
-        assert_eq!(
-            image.layer_data[0].channel_data.list[0].sample_data,
-            FlatSamples::F32(vec![2.5; 9])
-        );
     }
 }

@@ -2,10 +2,11 @@
 
 use crate::error::Result;
 use crate::export::canvas::Canvas;
-use crate::export::picture::write_png_bytes;
+use crate::export::picture::{percentile_exposure, write_png_bytes};
 use crate::export::scale::Scale;
 use crate::math::color::luminance;
 use crate::math::picture::Picture;
+use glam::Vec3;
 use plotters::coord::ranged1d::ValueFormatter;
 use std::path::Path;
 
@@ -56,9 +57,7 @@ fn ramp(stops: &[[f32; 3]; 5], position: f32) -> [u8; 3] {
 /// # Errors
 /// The file cannot be written, or the picture has no pixels.
 pub fn write_signed(path: &Path, picture: &Picture, unit: &str) -> Result<()> {
-    let values: Vec<f32> = picture.pixels.iter().map(|&c| luminance(c)).collect();
-    let end = scale_end(&values);
-    write(path, picture, &values, |v| diverging(v / end), -end, unit)
+    write(path, picture, diverging, -1.0, unit)
 }
 
 /// Writes the luminance of a picture of magnitudes (a standard error) in sequential colours with a legend.
@@ -68,15 +67,7 @@ pub fn write_signed(path: &Path, picture: &Picture, unit: &str) -> Result<()> {
 /// # Errors
 /// The file cannot be written, or the picture has no pixels.
 pub fn write_magnitude(path: &Path, picture: &Picture, unit: &str) -> Result<()> {
-    let values: Vec<f32> = picture.pixels.iter().map(|&c| luminance(c)).collect();
-    let end = scale_end(&values);
-    write(path, picture, &values, |v| sequential(v / end), 0.0, unit)
-}
-
-/// The 99th percentile of the finite magnitudes; their maximum if it is zero, and 1 if all are zero.
-fn scale_end(values: &[f32]) -> f32 {
-    let magnitudes: Vec<glam::Vec3> = values.iter().map(|v| glam::Vec3::splat(v.abs())).collect();
-    crate::export::picture::percentile_exposure(&magnitudes).recip()
+    write(path, picture, sequential, 0.0, unit)
 }
 
 /// Formats a value with three significant digits.
@@ -86,19 +77,22 @@ fn three_digits(value: f32) -> String {
         .map_or_else(|_| value.to_string(), |v: f64| Scale::format(&v))
 }
 
-/// Writes picture and legend. `low` is the legend's left end; its right end is [`scale_end`].
+/// Writes the luminance of a picture and a legend. The legend's right end is the 99th percentile of the finite magnitudes, their maximum
+/// if it is zero, and 1 if all are zero; `low` is its left end as a fraction of it, `color_of` the colour of such fractions.
 fn write(
     path: &Path,
     picture: &Picture,
-    values: &[f32],
-    color_of: impl Fn(f32) -> [u8; 3],
+    color_of: fn(f32) -> [u8; 3],
     low: f32,
     unit: &str,
 ) -> Result<()> {
-    let high = scale_end(values);
+    let values: Vec<f32> = picture.pixels.iter().map(|&c| luminance(c)).collect();
+    let magnitudes: Vec<Vec3> = values.iter().map(|v| Vec3::splat(v.abs())).collect();
+    let high = percentile_exposure(&magnitudes).recip();
+    let low = low * high;
     let (width, height) = (picture.width, picture.height);
     let mut canvas = Canvas::new(width, height + LEGEND, [255; 3]);
-    let bytes: Vec<u8> = values.iter().flat_map(|&v| color_of(v)).collect();
+    let bytes: Vec<u8> = values.iter().flat_map(|&v| color_of(v / high)).collect();
     canvas.paste(&bytes, width, 0, 0);
 
     // A colour bar, with the values of its ends and middle below.
@@ -106,13 +100,8 @@ fn write(
     let bar = (width - 2 * margin).max(1);
     for x in 0..bar {
         let fraction = x as f32 / bar as f32;
-        canvas.fill(
-            margin + x,
-            height + 5,
-            1,
-            10,
-            color_of(low + (high - low) * fraction),
-        );
+        let color = color_of((low + (high - low) * fraction) / high);
+        canvas.fill(margin + x, height + 5, 1, 10, color);
     }
     let middle = (low + high) * 0.5;
     let labels = [
@@ -129,7 +118,6 @@ fn write(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
 
     #[test]
     fn colours_tell_signs_apart_and_saturate() {

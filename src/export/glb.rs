@@ -7,10 +7,14 @@ use crate::export::picture::png_bytes;
 use crate::math::picture::Picture;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
-use glam::{Mat4, Vec2, Vec3};
+use glam::{Mat4, Vec3};
 use gltf_json as json;
+use json::accessor::{ComponentType, Type};
+use json::buffer::Target;
+use json::mesh::Semantic;
 use json::validation::Checked::Valid;
 use json::validation::USize64;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Writes parts and cameras as a GLB file.
@@ -68,29 +72,41 @@ struct Document {
 
 impl Document {
     fn part(&mut self, part: &Part) -> json::Index<json::Node> {
-        let mut primitive = json::mesh::Primitive {
-            attributes: Default::default(),
+        let material = self.material(part);
+        let mut attributes = BTreeMap::new();
+        let positions: Vec<Vec3> = part.positions.iter().map(|p| p.as_vec3()).collect();
+        let ends = |start, end: fn(Vec3, Vec3) -> Vec3| {
+            let end = positions.iter().copied().fold(start, end);
+            Some(json::Value::from(end.to_array().to_vec()))
+        };
+        let floats = positions.iter().flat_map(|p| p.to_array());
+        let bytes = floats.map(f32::to_le_bytes);
+        let accessor = self.accessor(bytes, ComponentType::F32, Type::Vec3);
+        attributes.insert(
+            Valid(Semantic::Positions),
+            self.root.push(json::Accessor {
+                min: ends(Vec3::INFINITY, Vec3::min),
+                max: ends(Vec3::NEG_INFINITY, Vec3::max),
+                ..accessor
+            }),
+        );
+        if !part.uvs.is_empty() {
+            let floats = part.uvs.iter().flat_map(|uv| uv.to_array());
+            let bytes = floats.map(f32::to_le_bytes);
+            let accessor = self.accessor(bytes, ComponentType::F32, Type::Vec2);
+            attributes.insert(Valid(Semantic::TexCoords(0)), self.root.push(accessor));
+        }
+        let bytes = part.triangles.iter().flatten().map(|i| i.to_le_bytes());
+        let accessor = self.accessor(bytes, ComponentType::U32, Type::Scalar);
+        let primitive = json::mesh::Primitive {
+            attributes,
             extensions: None,
             extras: Default::default(),
-            indices: None,
-            material: Some(self.material(part)),
+            indices: Some(self.root.push(accessor)),
+            material: Some(material),
             mode: Valid(json::mesh::Mode::Triangles),
             targets: None,
         };
-        let positions: Vec<Vec3> = part.positions.iter().map(|p| p.as_vec3()).collect();
-        let bounds = positions
-            .iter()
-            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &p| {
-                (low.min(p), high.max(p))
-            });
-        let accessor = self.vectors(&positions, Some(bounds));
-        let semantics = &mut primitive.attributes;
-        semantics.insert(Valid(json::mesh::Semantic::Positions), accessor);
-        if !part.uvs.is_empty() {
-            let accessor = self.coordinates(&part.uvs);
-            semantics.insert(Valid(json::mesh::Semantic::TexCoords(0)), accessor);
-        }
-        primitive.indices = Some(self.indices(&part.triangles));
 
         let mesh = self.root.push(json::Mesh {
             extensions: None,
@@ -190,16 +206,7 @@ impl Document {
         // What follows must be aligned to four bytes.
         let length = encoded.len();
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
-        let view = self.root.push(json::buffer::View {
-            buffer: json::Index::new(0),
-            byte_length: USize64::from(length),
-            byte_offset: Some(USize64::from(start)),
-            byte_stride: None,
-            name: None,
-            target: None,
-            extensions: None,
-            extras: Default::default(),
-        });
+        let view = self.view(start, length, None);
         let source = self.root.push(json::Image {
             buffer_view: Some(view),
             mime_type: Some(json::image::MimeType("image/png".to_owned())),
@@ -224,79 +231,24 @@ impl Document {
         }));
     }
 
-    /// Appends an array of texture coordinates.
-    fn coordinates(&mut self, values: &[Vec2]) -> json::Index<json::Accessor> {
-        let start = self.bytes.len();
-        let floats = values.iter().flat_map(|v| v.to_array());
-        self.bytes.extend(floats.flat_map(f32::to_le_bytes));
-        let accessor = self.accessor(
-            start,
-            values.len(),
-            json::accessor::ComponentType::F32,
-            json::accessor::Type::Vec2,
-            json::buffer::Target::ArrayBuffer,
-        );
-        self.root.push(accessor)
-    }
-
-    /// Appends an array of vectors; `bounds` are the componentwise minimum and maximum.
-    fn vectors(
-        &mut self,
-        values: &[Vec3],
-        bounds: Option<(Vec3, Vec3)>,
-    ) -> json::Index<json::Accessor> {
-        let start = self.bytes.len();
-        let floats = values.iter().flat_map(|v| v.to_array());
-        self.bytes.extend(floats.flat_map(f32::to_le_bytes));
-        let mut accessor = self.accessor(
-            start,
-            values.len(),
-            json::accessor::ComponentType::F32,
-            json::accessor::Type::Vec3,
-            json::buffer::Target::ArrayBuffer,
-        );
-        accessor.min = bounds.map(|(low, _)| json::Value::from(low.to_array().to_vec()));
-        accessor.max = bounds.map(|(_, high)| json::Value::from(high.to_array().to_vec()));
-        self.root.push(accessor)
-    }
-
-    fn indices(&mut self, triangles: &[[u32; 3]]) -> json::Index<json::Accessor> {
-        let start = self.bytes.len();
-        let indices = triangles.iter().flatten();
-        self.bytes.extend(indices.flat_map(|i| i.to_le_bytes()));
-        let accessor = self.accessor(
-            start,
-            triangles.len() * 3,
-            json::accessor::ComponentType::U32,
-            json::accessor::Type::Scalar,
-            json::buffer::Target::ElementArrayBuffer,
-        );
-        self.root.push(accessor)
-    }
-
-    /// An accessor of `count` elements over the bytes from `start` to the end.
+    /// Appends numbers of four bytes, and describes them as elements of a type.
     fn accessor(
         &mut self,
-        start: usize,
-        count: usize,
-        component: json::accessor::ComponentType,
-        type_: json::accessor::Type,
-        target: json::buffer::Target,
+        numbers: impl Iterator<Item = [u8; 4]>,
+        component: ComponentType,
+        type_: Type,
     ) -> json::Accessor {
-        let view = self.root.push(json::buffer::View {
-            buffer: json::Index::new(0),
-            byte_length: USize64::from(self.bytes.len() - start),
-            byte_offset: Some(USize64::from(start)),
-            byte_stride: None,
-            name: None,
-            target: Some(Valid(target)),
-            extensions: None,
-            extras: Default::default(),
-        });
+        let start = self.bytes.len();
+        self.bytes.extend(numbers.flatten());
+        let length = self.bytes.len() - start;
+        let target = match type_ {
+            Type::Scalar => Target::ElementArrayBuffer,
+            _ => Target::ArrayBuffer,
+        };
         json::Accessor {
-            buffer_view: Some(view),
+            buffer_view: Some(self.view(start, length, Some(target))),
             byte_offset: None,
-            count: USize64::from(count),
+            count: USize64::from(length / (4 * type_.multiplicity())),
             component_type: Valid(json::accessor::GenericComponentType(component)),
             extensions: None,
             extras: Default::default(),
@@ -307,6 +259,24 @@ impl Document {
             normalized: false,
             sparse: None,
         }
+    }
+
+    fn view(
+        &mut self,
+        start: usize,
+        length: usize,
+        target: Option<Target>,
+    ) -> json::Index<json::buffer::View> {
+        self.root.push(json::buffer::View {
+            buffer: json::Index::new(0),
+            byte_length: USize64::from(length),
+            byte_offset: Some(USize64::from(start)),
+            byte_stride: None,
+            name: None,
+            target: target.map(Valid),
+            extensions: None,
+            extras: Default::default(),
+        })
     }
 
     fn finish(&mut self, nodes: Vec<json::Index<json::Node>>) {

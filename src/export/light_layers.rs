@@ -45,5 +45,5 @@ pub fn write<'a>(
             "continue the solve, or give an object an emission",
         ));
     };
-    write_layers(path, width, height, &named)
+    write_layers(path, width, height, named)
 }

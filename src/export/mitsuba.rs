@@ -6,9 +6,15 @@ use crate::export::part::Part;
 use crate::export::ply::write_part;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
-use glam::{DMat4, DVec4, Vec3};
+use glam::{DMat3, DMat4, Vec3};
 use std::fmt::Write;
 use std::path::Path;
+
+/// How the XML file begins.
+const HEAD: &str = r#"<?xml version="1.0" encoding="utf-8"?>
+<scene version="3.0.0">
+  <integrator type="path"><integer name="max_depth" value="-1"/></integrator>
+"#;
 
 /// Writes PATH, and the meshes into a folder named like PATH with "-meshes" for its extension.
 ///
@@ -35,33 +41,21 @@ fn mesh_name(index: usize, part: &Part) -> String {
 }
 
 fn describe(xml: &mut String, scene: &Scene, parts: &[Part], folder: &str) -> std::fmt::Result {
-    writeln!(
-        xml,
-        "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<scene version=\"3.0.0\">"
-    )?;
-    writeln!(
-        xml,
-        "  <integrator type=\"path\"><integer name=\"max_depth\" value=\"-1\"/></integrator>"
-    )?;
+    xml.push_str(HEAD);
     for (index, camera) in scene.cameras.iter().enumerate() {
         sensor(xml, index, camera, scene)?;
     }
     for (index, part) in parts.iter().enumerate() {
         let file = format!("{folder}/{}", mesh_name(index, part));
-        writeln!(xml, "  <shape type=\"ply\" id=\"{}\">", escape(&part.name))?;
-        writeln!(
-            xml,
-            "    <string name=\"filename\" value=\"{}\"/>",
-            escape(&file)
-        )?;
-        writeln!(xml, "    <boolean name=\"face_normals\" value=\"true\"/>")?;
+        let [id, file] = [&part.name, &file].map(|text| escape(text));
+        writeln!(xml, r#"  <shape type="ply" id="{id}">"#)?;
+        writeln!(xml, r#"    <string name="filename" value="{file}"/>"#)?;
+        writeln!(xml, r#"    <boolean name="face_normals" value="true"/>"#)?;
         bsdf(xml, part)?;
         if part.estimate.emission != Vec3::ZERO {
             let radiance = numbers(part.estimate.emission);
-            writeln!(
-                xml,
-                "    <emitter type=\"area\"><rgb name=\"radiance\" value=\"{radiance}\"/></emitter>"
-            )?;
+            let radiance = format!(r#"<rgb name="radiance" value="{radiance}"/>"#);
+            writeln!(xml, r#"    <emitter type="area">{radiance}</emitter>"#)?;
         }
         writeln!(xml, "  </shape>")?;
     }
@@ -74,23 +68,22 @@ fn bsdf(xml: &mut String, part: &Part) -> std::fmt::Result {
         Some(_) => ("principled", "base_color"),
         None => ("diffuse", "reflectance"),
     };
-    writeln!(xml, "    <bsdf type=\"twosided\"><bsdf type=\"{kind}\">")?;
+    writeln!(xml, r#"    <bsdf type="twosided"><bsdf type="{kind}">"#)?;
     if part.colors.is_empty() {
         let albedo = numbers(part.estimate.albedo.clamp(Vec3::ZERO, Vec3::ONE));
-        writeln!(xml, "      <rgb name=\"{parameter}\" value=\"{albedo}\"/>")?;
+        writeln!(xml, r#"      <rgb name="{parameter}" value="{albedo}"/>"#)?;
     } else {
-        writeln!(
-            xml,
-            "      <texture name=\"{parameter}\" type=\"mesh_attribute\"><string name=\"name\" value=\"vertex_color\"/></texture>"
-        )?;
+        let name = r#"<string name="name" value="vertex_color"/>"#;
+        let texture = format!(r#"<texture name="{parameter}" type="mesh_attribute">"#);
+        writeln!(xml, "      {texture}{name}</texture>")?;
     }
     if let Some((alpha, specular)) = lobe {
         let (roughness, level) = (alpha.max(0.0).sqrt(), (specular / 0.08).clamp(0.0, 1.0));
         writeln!(
             xml,
-            "      <float name=\"roughness\" value=\"{roughness}\"/>"
+            r#"      <float name="roughness" value="{roughness}"/>"#
         )?;
-        writeln!(xml, "      <float name=\"specular\" value=\"{level}\"/>")?;
+        writeln!(xml, r#"      <float name="specular" value="{level}"/>"#)?;
     }
     writeln!(xml, "    </bsdf></bsdf>")
 }
@@ -99,49 +92,23 @@ fn sensor(xml: &mut String, index: usize, camera: &Camera, scene: &Scene) -> std
     let lens = &camera.intrinsics;
     let (width, height) = (f64::from(lens.width), f64::from(lens.height));
     // Mitsuba's cameras look along +z with x to the left.
-    let [x, y, z] = [
-        camera.rotation.x_axis,
-        camera.rotation.y_axis,
-        camera.rotation.z_axis,
-    ]
-    .map(|a| a.as_dvec3());
+    let r = camera.rotation.as_dmat3();
     let center = camera.center.as_dvec3() + scene.origin;
-    let pose = DMat4::from_cols(
-        (-x).extend(0.0),
-        y.extend(0.0),
-        (-z).extend(0.0),
-        DVec4::from((center, 1.0)),
-    );
-    let rows: Vec<String> = pose
-        .transpose()
-        .to_cols_array()
-        .map(|v| v.to_string())
-        .to_vec();
+    let axes = DMat3::from_cols(-r.x_axis, r.y_axis, -r.z_axis);
+    let pose = DMat4::from_mat3_translation(axes, center).transpose();
+    let matrix = pose.to_cols_array().map(|v| v.to_string()).join(" ");
     let field = 2.0 * (width * 0.5 / lens.fx).atan().to_degrees();
+    let [x, y] = [0.5 - lens.cx / width, 0.5 - lens.cy / height];
     writeln!(
         xml,
-        "  <sensor type=\"perspective\" id=\"camera-{index:03}\">"
-    )?;
-    writeln!(
-        xml,
-        "    <string name=\"fov_axis\" value=\"x\"/><float name=\"fov\" value=\"{field}\"/>"
-    )?;
-    for (name, offset) in [("x", 0.5 - lens.cx / width), ("y", 0.5 - lens.cy / height)] {
-        writeln!(
-            xml,
-            "    <float name=\"principal_point_offset_{name}\" value=\"{offset}\"/>"
-        )?;
-    }
-    writeln!(
-        xml,
-        "    <transform name=\"to_world\"><matrix value=\"{}\"/></transform>",
-        rows.join(" ")
-    )?;
-    writeln!(
-        xml,
-        "    <film type=\"hdrfilm\"><integer name=\"width\" value=\"{width}\"/><integer name=\"height\" value=\"{height}\"/><rfilter type=\"box\"/></film>"
-    )?;
-    writeln!(xml, "  </sensor>")
+        r#"  <sensor type="perspective" id="camera-{index:03}">
+    <string name="fov_axis" value="x"/><float name="fov" value="{field}"/>
+    <float name="principal_point_offset_x" value="{x}"/>
+    <float name="principal_point_offset_y" value="{y}"/>
+    <transform name="to_world"><matrix value="{matrix}"/></transform>
+    <film type="hdrfilm"><integer name="width" value="{width}"/><integer name="height" value="{height}"/><rfilter type="box"/></film>
+  </sensor>"#
+    )
 }
 
 fn numbers(color: Vec3) -> String {
@@ -150,14 +117,9 @@ fn numbers(color: Vec3) -> String {
 
 /// Text for an XML attribute.
 fn escape(text: &str) -> String {
-    text.chars()
-        .filter(|c| !c.is_control())
-        .map(|c| match c {
-            '&' => "&amp;".to_owned(),
-            '<' => "&lt;".to_owned(),
-            '>' => "&gt;".to_owned(),
-            '"' => "&quot;".to_owned(),
-            c => c.to_string(),
-        })
-        .collect()
+    (text.replace(char::is_control, ""))
+        .replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
 }

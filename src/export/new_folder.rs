@@ -1,9 +1,11 @@
 //! Creates folders atomically: complete or not at all.
 
 use crate::capture::read::CAMERAS;
+use crate::capture::read::confine::folder_of;
 use crate::error::{Error, Result};
 use crate::export::atomic::temporary_names;
 use crate::export::overwrite;
+use std::ffi::OsString;
 use std::fs;
 use std::io::ErrorKind::NotFound;
 use std::path::{Path, PathBuf};
@@ -37,13 +39,9 @@ impl NewFolder {
                 "name a new folder, or add --overwrite to replace what has the same names",
             ));
         }
-        let parent = match place.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
-        fs::create_dir_all(parent).map_err(|e| Error::io(parent, &e))?;
-        let temporary = temporary_names(0o777)
-            .tempdir_in(parent)
+        let parent = folder_of(place);
+        let temporary = fs::create_dir_all(parent)
+            .and_then(|()| temporary_names(0o777).tempdir_in(parent))
             .map_err(|e| Error::io(parent, &e))?;
         Ok(Self {
             temporary,
@@ -73,15 +71,10 @@ impl NewFolder {
 
 /// Moves all files of a folder into another one, replacing those of the same names.
 fn merge(from: &Path, to: &Path) -> Result<()> {
-    let io = |path: &Path| {
-        let path = path.to_owned();
-        move |e: std::io::Error| Error::io(&path, &e)
-    };
-    fs::create_dir_all(to).map_err(io(to))?;
-    let mut names = Vec::new();
-    for entry in fs::read_dir(from).map_err(io(from))? {
-        names.push(entry.map_err(io(from))?.file_name());
-    }
+    fs::create_dir_all(to).map_err(|e| Error::io(to, &e))?;
+    let names = fs::read_dir(from)
+        .and_then(|entries| entries.map(|entry| Ok(entry?.file_name())).collect());
+    let mut names: Vec<OsString> = names.map_err(|e| Error::io(from, &e))?;
     // transforms.json last: a folder that has it is complete.
     names.sort_by_key(|name| (name == CAMERAS, name.clone()));
     for name in names {
@@ -89,7 +82,7 @@ fn merge(from: &Path, to: &Path) -> Result<()> {
         if source.is_dir() {
             merge(&source, &target)?;
         } else {
-            fs::rename(&source, &target).map_err(io(&target))?;
+            fs::rename(&source, &target).map_err(|e| Error::io(&target, &e))?;
         }
     }
     Ok(())

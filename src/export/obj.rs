@@ -49,7 +49,7 @@ pub fn write(path: &Path, parts: &[Part], atlas: Option<&Picture>) -> Result<()>
         writeln!(out, "mtllib {}", file_name(&library))?;
         let (mut first, mut first_uv) = (1, 1);
         for (index, part) in parts.iter().enumerate() {
-            let name: String = part.name.chars().filter(|c| !c.is_control()).collect();
+            let name = part.name.replace(char::is_control, "");
             writeln!(out, "o {name}\nusemtl {}", material_name(index, part))?;
             for p in &part.positions {
                 writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;

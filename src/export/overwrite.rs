@@ -14,6 +14,7 @@
 //! [`permit`] (`--overwrite`) disables all checks.
 
 use crate::capture::inputs;
+use crate::capture::read::confine::folder_of;
 use crate::capture::read::{CAMERAS, MESHES};
 use crate::error::{Error, Result};
 use serde::Deserialize;
@@ -51,7 +52,7 @@ pub fn is_permitted() -> bool {
 /// # Errors
 /// The file is protected.
 pub fn check(path: &Path) -> Result<()> {
-    refuse(path, Some)
+    refuse(path, |_| true)
 }
 
 /// Refuses a file that belongs to a capture or that the run has read. For files of results, use [`check_results`] on the
@@ -60,17 +61,14 @@ pub fn check(path: &Path) -> Result<()> {
 /// # Errors
 /// The file is protected.
 pub fn check_input(path: &Path) -> Result<()> {
-    refuse(path, |owner| match owner {
-        Owner::Capture(..) | Owner::Inputs => Some(owner),
-        Owner::Results(_) => None,
-    })
+    refuse(path, |owner| !matches!(owner, Owner::Results(_)))
 }
 
-fn refuse(path: &Path, selects: impl Fn(Owner) -> Option<Owner>) -> Result<()> {
+fn refuse(path: &Path, selects: impl Fn(&Owner) -> bool) -> Result<()> {
     if is_permitted() {
         return Ok(());
     }
-    let what = match owner(path).and_then(selects) {
+    let what = match owner(path).filter(selects) {
         None => return Ok(()),
         Some(Owner::Capture(folder, what)) => {
             format!("is {what} of the capture in {}", folder.display())
@@ -153,11 +151,7 @@ fn owner(path: &Path) -> Option<Owner> {
 
 /// The path with its folder resolved. A symbolic link at its end is not followed, since the link itself would be replaced.
 fn place(path: &Path) -> Option<PathBuf> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let named = folder.canonicalize().ok()?.join(path.file_name()?);
+    let named = folder_of(path).canonicalize().ok()?.join(path.file_name()?);
     match named.symlink_metadata() {
         // On case-insensitive disks, canonicalize gives the spelling on disk.
         Ok(metadata) if !metadata.is_symlink() => named.canonicalize().ok().or(Some(named)),
@@ -166,20 +160,13 @@ fn place(path: &Path) -> Option<PathBuf> {
 }
 
 fn is_of_results(folder: &Path, name: &Path, place: &Path) -> bool {
-    let is_results = || {
-        [ESTIMATE, CHECKPOINT]
-            .iter()
-            .any(|n| folder.join(n).is_file())
-    };
-    let first = name
-        .iter()
-        .next()
-        .and_then(|n| n.to_str())
-        .unwrap_or_default();
-    let is_one = [ESTIMATE, CHECKPOINT].contains(&first)
+    let records = [ESTIMATE, CHECKPOINT];
+    let first = name.iter().next().and_then(|n| n.to_str());
+    let first = first.unwrap_or_default();
+    let is_one = records.contains(&first)
         || OTHER_FILES.contains(&first)
         || (first.starts_with("maps-") && first.ends_with(".safetensors"));
-    is_one && place.exists() && is_results()
+    is_one && place.exists() && records.iter().any(|n| folder.join(n).is_file())
 }
 
 /// The role of a file in the capture of a folder, if it belongs to it.
@@ -296,55 +283,25 @@ mod tests {
         let at = |name: &str| outer.path().join(name);
         let cameras = r#"{"mesh_path": "scan\\room.ply", "frames": [{"file_path": "images/a/0.png"}, {"file_path": "1.png"}]}"#;
         write(at("room/transforms.json"), cameras);
-        for name in [
-            "scan/room.ply",
-            "scan/notes.txt",
-            "images/a/0.png",
-            "images/a/left-out.png",
-            "1.png",
-            "plain.png",
-            "truth.json",
-        ] {
-            write(at(&format!("room/{name}")), "x");
+        let ours =
+            "transforms.json truth.json scan/room.ply images/a/0.png images/a/left-out.png 1.png
+            out/estimate.json out/report.json out/views/000.render.exr out/maps-1.safetensors";
+        let others = "plain.png scan/notes.txt out/mine.png";
+        for name in ours.split_whitespace().skip(1).chain(others.split(' ')) {
+            write(at("room").join(name), "x");
         }
-        for name in [
-            "estimate.json",
-            "report.json",
-            "views/000.render.exr",
-            "maps-1.safetensors",
-            "mine.png",
-        ] {
-            write(at(&format!("room/out/{name}")), "x");
-        }
-        for refused in [
-            "room/transforms.json",
-            "room/truth.json",
-            "room/scan/room.ply",
-            "room/images/a/0.png",
-            "room/images/a/left-out.png",
-            "room/images/../images/a/0.png",
-            "room/1.png",
-            "room/out/estimate.json",
-            "room/out/report.json",
-            "room/out/views/000.render.exr",
-            "room/out/maps-1.safetensors",
-        ] {
+        let by_another_path = "images/../images/a/0.png";
+        for name in ours.split_whitespace().chain([by_another_path]) {
+            let refused = &format!("room/{name}");
             let error = check(&at(refused)).expect_err(refused);
             assert!(
                 error.place.contains(refused) && error.remedy.contains("--overwrite"),
                 "{error}"
             );
         }
-        for free in [
-            "room/plain.png",
-            "room/scan/notes.txt",
-            "room/images/a/new.png",
-            "room/out/mine.png",
-            "room/out/checkpoint.json",
-            "new/folder/000.exr",
-            "mesh.obj",
-        ] {
-            check(&at(free)).expect(free);
+        let new = "images/a/new.png out/checkpoint.json ../new/folder/000.exr ../mesh.obj";
+        for free in others.split(' ').chain(new.split(' ')) {
+            check(&at("room").join(free)).expect(free);
         }
         write(at("hall/transforms.json"), r#"{"frames": []}"#);
         check(&at("hall/mesh.glb")).expect_err("it would be taken for the mesh");
@@ -359,10 +316,11 @@ mod tests {
         let at = |name: &str| outer.path().join(name);
         write(at("room/transforms.json"), "{}");
         write(at("hall/transforms.json"), "{}");
-        let own = |hash: &str, folder: &str| CaptureId {
+        let of = |hash: &str, folder: Option<PathBuf>| CaptureId {
             hash: hash.to_owned(),
-            folder: Some(at(folder)),
+            folder,
         };
+        let own = |hash: &str, folder: &str| of(hash, Some(at(folder)));
         let estimate = r#"{"capture": {"name": "room", "built_in": false, "relative": "../room", "absolute": null, "hash": "1"}, "x": 1}"#;
         check_results(&at("out"), &own("1", "room")).expect("there is nothing");
         write(at("out/loss.csv"), "mine");
@@ -379,14 +337,7 @@ mod tests {
             check_results(&at("out"), &own("2", "room")).expect("changed since");
             let error = check_results(&at("out"), &own("2", "hall")).expect_err("another capture");
             assert!(error.problem.contains("another capture, room"), "{error}");
-            check_results(
-                &at("out"),
-                &CaptureId {
-                    hash: "2".into(),
-                    folder: None,
-                },
-            )
-            .expect_err("the built-in room");
+            check_results(&at("out"), &of("2", None)).expect_err("the built-in room");
             fs::remove_file(at("out").join(name)).expect("removes");
         }
         write(at("out").join(ESTIMATE), "[1]");

@@ -127,15 +127,7 @@ impl Part {
 
     /// The name without characters that would break a line or a path of a text format.
     pub fn plain_name(&self) -> String {
-        self.name
-            .chars()
-            .map(|c| {
-                if c.is_alphanumeric() || "-_.".contains(c) {
-                    c
-                } else {
-                    '_'
-                }
-            })
-            .collect()
+        let is_odd = |c: char| !c.is_alphanumeric() && !"-_.".contains(c);
+        self.name.replace(is_odd, "_")
     }
 }

@@ -5,8 +5,15 @@ use crate::error::Result;
 use crate::export::atomic::write_atomically;
 use crate::export::part::Part;
 use glam::Vec3;
+use std::fmt::Display;
 use std::io::Write;
 use std::path::Path;
+
+/// How every file begins.
+const FORMAT: &str = "ply\nformat binary_little_endian 1.0";
+const COLORS: [&str; 3] = ["red", "green", "blue"];
+const CORNERS: &str = "property list uchar int vertex_indices";
+const OBJECT_ID: &str = "property int object_id";
 
 /// Writes all parts as one mesh: positions, albedo as linear 8-bit `red green blue`, and for each face its emission and
 /// `object_id`, whose names are in the comments. [`crate::capture::read`] reads it back.
@@ -17,26 +24,20 @@ pub fn write_scene(path: &Path, parts: &[Part]) -> Result<()> {
     let vertices: usize = parts.iter().map(|p| p.positions.len()).sum();
     let faces: usize = parts.iter().map(|p| p.triangles.len()).sum();
     write_atomically(path, |out| {
-        writeln!(out, "ply\nformat binary_little_endian 1.0")?;
+        writeln!(out, "{FORMAT}")?;
         for (index, part) in parts.iter().enumerate() {
-            let name: String = part.name.chars().filter(|c| !c.is_control()).collect();
+            let name = part.name.replace(char::is_control, "");
             writeln!(out, "comment object_id {index} {name}")?;
         }
         writeln!(out, "element vertex {vertices}")?;
-        for axis in ["x", "y", "z"] {
-            writeln!(out, "property double {axis}")?;
-        }
-        for color in ["red", "green", "blue"] {
-            writeln!(out, "property uchar {color}")?;
-        }
-        writeln!(out, "element face {faces}")?;
-        writeln!(
+        properties(out, "double", ["x", "y", "z"])?;
+        properties(out, "uchar", COLORS)?;
+        writeln!(out, "element face {faces}\n{CORNERS}\n{OBJECT_ID}")?;
+        properties(
             out,
-            "property list uchar int vertex_indices\nproperty int object_id"
+            "float",
+            COLORS.map(|color| format!("emission_{color}")),
         )?;
-        for color in ["red", "green", "blue"] {
-            writeln!(out, "property float emission_{color}")?;
-        }
         writeln!(out, "end_header")?;
 
         for part in parts {
@@ -68,18 +69,13 @@ pub fn write_scene(path: &Path, parts: &[Part]) -> Result<()> {
 /// The file cannot be written.
 pub fn write_part(path: &Path, part: &Part) -> Result<()> {
     write_atomically(path, |out| {
-        writeln!(out, "ply\nformat binary_little_endian 1.0")?;
-        writeln!(out, "element vertex {}", part.positions.len())?;
-        let colors: &[&str] = if part.colors.is_empty() {
-            &[]
-        } else {
-            &["r", "g", "b"]
-        };
-        for property in ["x", "y", "z"].iter().chain(colors) {
-            writeln!(out, "property float {property}")?;
+        writeln!(out, "{FORMAT}\nelement vertex {}", part.positions.len())?;
+        properties(out, "float", ["x", "y", "z"])?;
+        if !part.colors.is_empty() {
+            properties(out, "float", ["r", "g", "b"])?;
         }
-        writeln!(out, "element face {}", part.triangles.len())?;
-        writeln!(out, "property list uchar int vertex_indices\nend_header")?;
+        let faces = part.triangles.len();
+        writeln!(out, "element face {faces}\n{CORNERS}\nend_header")?;
         for (vertex, position) in part.positions.iter().enumerate() {
             write_color(out, position.as_vec3())?;
             if let Some(&color) = part.colors.get(vertex) {
@@ -102,7 +98,7 @@ pub fn write_mesh(path: &Path, mesh: &Mesh, with_objects: bool) -> Result<()> {
     let colored = mesh.vertex_colors.len() == mesh.positions.len();
     let textured = mesh.corner_uvs.len() == mesh.triangles.len();
     write_atomically(path, |out| {
-        writeln!(out, "ply\nformat binary_little_endian 1.0")?;
+        writeln!(out, "{FORMAT}")?;
         if with_objects {
             for (index, name) in mesh.objects.iter().enumerate() {
                 let name = name.replace(char::is_control, " ");
@@ -110,19 +106,16 @@ pub fn write_mesh(path: &Path, mesh: &Mesh, with_objects: bool) -> Result<()> {
             }
         }
         writeln!(out, "element vertex {}", mesh.positions.len())?;
-        for axis in ["x", "y", "z"] {
-            writeln!(out, "property double {axis}")?;
+        properties(out, "double", ["x", "y", "z"])?;
+        if colored {
+            properties(out, "float", COLORS)?;
         }
-        for color in ["red", "green", "blue"].iter().filter(|_| colored) {
-            writeln!(out, "property float {color}")?;
-        }
-        writeln!(out, "element face {}", mesh.triangles.len())?;
-        writeln!(out, "property list uchar int vertex_indices")?;
+        writeln!(out, "element face {}\n{CORNERS}", mesh.triangles.len())?;
         if textured {
             writeln!(out, "property list uchar float texcoord")?;
         }
         if with_objects {
-            writeln!(out, "property int object_id")?;
+            writeln!(out, "{OBJECT_ID}")?;
         }
         writeln!(out, "end_header")?;
         for (index, position) in mesh.positions.iter().enumerate() {
@@ -147,6 +140,10 @@ pub fn write_mesh(path: &Path, mesh: &Mesh, with_objects: bool) -> Result<()> {
         }
         Ok(())
     })
+}
+
+fn properties(out: &mut impl Write, kind: &str, names: [impl Display; 3]) -> std::io::Result<()> {
+    (names.into_iter()).try_for_each(|name| writeln!(out, "property {kind} {name}"))
 }
 
 fn write_color(out: &mut impl Write, color: Vec3) -> std::io::Result<()> {

@@ -3,9 +3,10 @@
 use crate::capture::import::Lens;
 use crate::capture::photograph::{Encoding, Photograph};
 use crate::error::{Error, Result};
-use crate::export::atomic::write_atomically;
-use crate::export::exr::{Channel, Layer, Samples, write_layers};
+use crate::export::atomic::write_bytes;
+use crate::export::exr::{Layer, Precision, write_layers};
 use crate::math::color::linear_to_srgb;
+use exr::prelude::FlatSamples;
 use glam::{DVec2, Vec3};
 use image::{ImageBuffer, ImageFormat, Luma, Rgba};
 use rayon::prelude::*;
@@ -14,19 +15,14 @@ use std::path::Path;
 
 /// Position in the lens's image of the pinhole's pixel centre (i, j); `None` where the lens is not defined.
 fn source_of(lens: &Lens, i: u32, j: u32) -> Option<DVec2> {
-    let k = lens.intrinsics();
-    let p = DVec2::new(
-        (f64::from(i) + 0.5 - k.cx) / k.fx,
-        (f64::from(j) + 0.5 - k.cy) / k.fy,
-    );
-    lens.project(p.extend(1.0))
+    let center = DVec2::new(f64::from(i), f64::from(j)) + 0.5;
+    lens.project(lens.pinhole.normalized(center).extend(1.0))
 }
 
 /// The photograph as the pinhole of [`Lens::intrinsics`] would have taken it, interpolated bilinearly in linear light. Pixels
 /// outside of the lens's image, or interpolated from unusable ones, are unusable.
 pub fn photograph(source: &Photograph, lens: &Lens) -> Photograph {
     let (width, height) = (source.width, source.height);
-    let usable = |i: usize| source.usable.get(i).copied().unwrap_or(true);
     let sampled: Vec<Option<Vec3>> = (0..width * height)
         .into_par_iter()
         .map(|index| {
@@ -43,7 +39,7 @@ pub fn photograph(source: &Photograph, lens: &Lens) -> Photograph {
                 let x = (floor.x as i64 + dx).clamp(0, i64::from(width) - 1);
                 let y = (floor.y as i64 + dy).clamp(0, i64::from(height) - 1);
                 let i = y as usize * width as usize + x as usize;
-                usable(i).then(|| source.pixels[i])
+                source.is_usable(i).then(|| source.pixels[i])
             };
             let top = pixel(0, 0)?.lerp(pixel(1, 0)?, u);
             let bottom = pixel(0, 1)?.lerp(pixel(1, 1)?, u);
@@ -51,13 +47,10 @@ pub fn photograph(source: &Photograph, lens: &Lens) -> Photograph {
         })
         .collect();
     Photograph {
-        width,
-        height,
         pixels: sampled.iter().map(|c| c.unwrap_or(Vec3::ZERO)).collect(),
         usable: sampled.iter().map(Option::is_some).collect(),
-        encoding: source.encoding,
-        saturation: source.saturation,
         limits: Vec::new(),
+        ..*source
     }
 }
 
@@ -88,23 +81,13 @@ pub fn depth(values: &[u16], lens: &Lens) -> Vec<u16> {
 /// The file cannot be written.
 pub fn write_photograph(stem: &Path, photograph: &Photograph) -> Result<&'static str> {
     let (width, height) = (photograph.width, photograph.height);
-    let usable = |i: usize| photograph.usable.get(i).copied().unwrap_or(true);
     if photograph.encoding == Encoding::Linear {
         let path = stem.with_extension("exr");
-        let channel = |name: &str, value: &dyn Fn(usize) -> f32| Channel {
-            name: name.to_owned(),
-            samples: Samples::Float((0..photograph.pixels.len()).map(value).collect()),
-        };
-        let layer = Layer {
-            name: String::new(),
-            channels: vec![
-                channel("R", &|i| photograph.pixels[i].x),
-                channel("G", &|i| photograph.pixels[i].y),
-                channel("B", &|i| photograph.pixels[i].z),
-                channel("A", &|i| f32::from(u8::from(usable(i)))),
-            ],
-        };
-        write_layers(&path, width, height, &[layer])?;
+        let mut layer = Layer::rgb("", &photograph.picture(), Precision::Float);
+        let alpha =
+            (0..photograph.pixels.len()).map(|i| f32::from(u8::from(photograph.is_usable(i))));
+        (layer.channels).push(("A", FlatSamples::F32(alpha.collect())));
+        write_layers(&path, width, height, vec![layer])?;
         return Ok("exr");
     }
     let path = stem.with_extension("png");
@@ -112,7 +95,7 @@ pub fn write_photograph(stem: &Path, photograph: &Photograph) -> Result<&'static
     let image: ImageBuffer<Rgba<u16>, Vec<u16>> = ImageBuffer::from_fn(width, height, |x, y| {
         let i = y as usize * width as usize + x as usize;
         let [r, g, b] = photograph.pixels[i].to_array().map(code);
-        Rgba([r, g, b, if usable(i) { u16::MAX } else { 0 }])
+        Rgba([r, g, b, u16::MAX * u16::from(photograph.is_usable(i))])
     });
     write_png(&path, |bytes| image.write_to(bytes, ImageFormat::Png))?;
     Ok("png")
@@ -135,8 +118,5 @@ fn write_png(
 ) -> Result<()> {
     let mut bytes = Cursor::new(Vec::new());
     encode(&mut bytes).map_err(|e| Error::file(path, e, "nothing was written there"))?;
-    write_atomically(path, |out| {
-        std::io::Write::write_all(out, bytes.get_ref())?;
-        Ok(())
-    })
+    write_bytes(path, bytes.get_ref())
 }

@@ -1,8 +1,6 @@
 //! A plot axis with round ticks, linear or logarithmic.
 
-use plotters::coord::ranged1d::{
-    KeyPointHint, NoDefaultFormatting, Ranged, ReversibleRanged, ValueFormatter,
-};
+use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use std::ops::Range;
 
 /// Maps values to pixels along one axis.
@@ -111,15 +109,6 @@ impl Ranged for Scale {
     }
 }
 
-impl ReversibleRanged for Scale {
-    fn unmap(&self, pixel: i32, (min, max): (i32, i32)) -> Option<f64> {
-        let fraction = f64::from(pixel - min) / f64::from(max - min);
-        (0.0..=1.0)
-            .contains(&fraction)
-            .then(|| self.value(self.low + fraction * (self.high - self.low)))
-    }
-}
-
 impl ValueFormatter<f64> for Scale {
     fn format(value: &f64) -> String {
         let magnitude = value.abs();
@@ -161,7 +150,6 @@ mod tests {
         let scale = Scale::around([1.0, 100.0].into_iter(), true);
         let [a, b, c] = [1.0, 10.0, 100.0].map(|v| scale.map(&v, (0, 1000)));
         assert!((2 * b - a - c).abs() <= 1 && a < b);
-        assert!((scale.unmap(b, (0, 1000)).expect("inside") - 10.0).abs() < 0.1);
     }
 
     #[test]

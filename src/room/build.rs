@@ -23,8 +23,7 @@ const FLOOR_LAMP: Vec3 = Vec3::new(9.5, 5.2, 2.1);
 
 /// Material of an object; a texture still lacks its coordinates.
 enum ObjectMaterial {
-    Plain(Vec3),
-    Lamp { albedo: Vec3, emission: Vec3 },
+    Plain(Material),
     Printed(Picture),
 }
 
@@ -45,7 +44,8 @@ impl Builder {
 
     /// Adds an object of constant albedo.
     fn plain(&mut self, name: &str, albedo: [f32; 3], shapes: impl FnOnce(&mut Modeller)) {
-        self.add(name, ObjectMaterial::Plain(albedo.into()), shapes);
+        let material = Material::diffuse(albedo.into(), Vec3::ZERO);
+        self.add(name, ObjectMaterial::Plain(material), shapes);
     }
 }
 
@@ -71,8 +71,7 @@ pub fn build() -> (Mesh, Vec<Material>) {
         .materials
         .into_iter()
         .map(|material| match material {
-            ObjectMaterial::Plain(albedo) => Material::diffuse(albedo, Vec3::ZERO),
-            ObjectMaterial::Lamp { albedo, emission } => Material::diffuse(albedo, emission),
+            ObjectMaterial::Plain(material) => material,
             ObjectMaterial::Printed(picture) => Material {
                 albedo: Albedo::Image(
                     Arc::new(Texture {
@@ -139,12 +138,8 @@ fn shell(b: &mut Builder) {
 /// The ceiling lamp in its rim, and the floor lamp on its stand.
 fn lamps(b: &mut Builder) {
     let (width, depth) = (0.84, 0.46);
-    let emission = CEILING_LAMP;
-    let material = ObjectMaterial::Lamp {
-        albedo: Vec3::splat(0.70),
-        emission,
-    };
-    b.add("ceiling-lamp", material, |m| {
+    let lamp = |albedo, emission| ObjectMaterial::Plain(Material::diffuse(albedo, emission));
+    b.add("ceiling-lamp", lamp(Vec3::splat(0.70), CEILING_LAMP), |m| {
         let corner = DVec3::new(-width * 0.5, HEIGHT - 0.035, -depth * 0.5);
         m.grid(corner, DVec3::X * width, DVec3::Z * depth, 4, 2);
     });
@@ -156,11 +151,8 @@ fn lamps(b: &mut Builder) {
         });
     });
     let place = at(-1.72, 0.0, -1.52, 0.0);
-    let material = ObjectMaterial::Lamp {
-        albedo: Vec3::new(0.72, 0.66, 0.54),
-        emission: FLOOR_LAMP,
-    };
-    b.add("floor-lamp", material, |m| {
+    let paper = Vec3::new(0.72, 0.66, 0.54);
+    b.add("floor-lamp", lamp(paper, FLOOR_LAMP), |m| {
         m.placed(place, |m| vessels::lantern(m, 1.42))
     });
     b.plain("floor-lamp-stand", [0.045, 0.045, 0.05], |m| {

@@ -18,8 +18,13 @@ pub struct View {
 impl View {
     /// A level view from `eye` towards `target`, with the built-in room's field of view.
     pub fn towards(eye: DVec3, target: DVec3) -> Self {
+        let back = (eye - target).normalize_or_zero();
+        let right = DVec3::Y.cross(back).normalize_or_zero();
         Self {
-            pose: look_at(eye, target),
+            pose: Pose {
+                rotation: DMat3::from_cols(right, back.cross(right), back),
+                center: eye,
+            },
             half_field: HALF_FIELD,
         }
     }
@@ -61,30 +66,12 @@ pub fn built_in() -> Vec<View> {
 }
 
 /// Intrinsics and poses of the views at a size in pixels: square pixels, no distortion, principal point in the middle.
-pub fn cameras(views: &[View], [width, height]: [u32; 2]) -> Vec<(Intrinsics, Pose)> {
+pub fn cameras(views: &[View], size: [u32; 2]) -> Vec<(Intrinsics, Pose)> {
     let lens = |half_field: f64| {
-        let focal = f64::from(width) * 0.5 / half_field;
-        Intrinsics {
-            width,
-            height,
-            fx: focal,
-            fy: focal,
-            cx: f64::from(width) * 0.5,
-            cy: f64::from(height) * 0.5,
-            distortion: [0.0; 4],
-        }
+        let middle = size.map(|side| f64::from(side) * 0.5);
+        Intrinsics::plain(size, [middle[0] / half_field; 2], middle)
     };
     (views.iter())
         .map(|view| (lens(view.half_field), view.pose))
         .collect()
-}
-
-/// Pose of a level camera at `eye` that looks at `target`.
-fn look_at(eye: DVec3, target: DVec3) -> Pose {
-    let back = (eye - target).normalize_or_zero();
-    let right = DVec3::Y.cross(back).normalize_or_zero();
-    Pose {
-        rotation: DMat3::from_cols(right, back.cross(right), back),
-        center: eye,
-    }
 }

@@ -81,10 +81,7 @@ impl Room {
     /// # Errors
     /// As [`Room::lit`].
     pub fn truth(&self, size: [u32; 2]) -> Result<Truth> {
-        let objects = truth::objects(&self.lit(size)?);
-        Ok(Truth {
-            objects: objects.into_iter().map(|(n, o)| (n, o.into())).collect(),
-        })
+        Ok(truth::objects(&self.lit(size)?).into())
     }
 
     /// The room as a capture with photographs in memory, one a view, all of one size.
@@ -104,14 +101,6 @@ impl Default for Room {
 }
 
 /// A linear photograph without unusable pixels.
-pub fn linear_photograph([width, height]: [u32; 2], pixels: Vec<Vec3>) -> Photograph {
-    Photograph {
-        width,
-        height,
-        pixels,
-        usable: Vec::new(),
-        encoding: Encoding::Linear,
-        saturation: Vec3::INFINITY,
-        limits: Vec::new(),
-    }
+pub fn linear_photograph(size: [u32; 2], pixels: Vec<Vec3>) -> Photograph {
+    Photograph::new(size, pixels, Encoding::Linear, Vec3::INFINITY)
 }

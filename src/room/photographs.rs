@@ -21,26 +21,17 @@ pub const STORED: Rendering = Rendering {
     size: [640, 480],
 };
 
+macro_rules! stored {
+    ($($number:literal)*) => {
+        [$(include_bytes!(concat!("../../assets/room/", $number, ".exr"))),*]
+    };
+}
+
 /// The stored photographs: half-float EXR files, in the order of the views. Rendered by `relit demo --seed 7`, which makes the same
 /// but for the rounding, and compressed anew without loss by OpenEXR, whose PIZ takes a fifth less than the crate's.
-const FILES: [&[u8]; 16] = [
-    include_bytes!("../../assets/room/000.exr"),
-    include_bytes!("../../assets/room/001.exr"),
-    include_bytes!("../../assets/room/002.exr"),
-    include_bytes!("../../assets/room/003.exr"),
-    include_bytes!("../../assets/room/004.exr"),
-    include_bytes!("../../assets/room/005.exr"),
-    include_bytes!("../../assets/room/006.exr"),
-    include_bytes!("../../assets/room/007.exr"),
-    include_bytes!("../../assets/room/008.exr"),
-    include_bytes!("../../assets/room/009.exr"),
-    include_bytes!("../../assets/room/010.exr"),
-    include_bytes!("../../assets/room/011.exr"),
-    include_bytes!("../../assets/room/012.exr"),
-    include_bytes!("../../assets/room/013.exr"),
-    include_bytes!("../../assets/room/014.exr"),
-    include_bytes!("../../assets/room/015.exr"),
-];
+const FILES: [&[u8]; 16] = stored!(
+    "000" "001" "002" "003" "004" "005" "006" "007" "008" "009" "010" "011" "012" "013" "014" "015"
+);
 
 /// Significant bits of the values in written photographs: rounding is then off by 2 % in the root of the mean square, less
 /// than the noise of 256 samples (about 5 %), and makes files about half as large.

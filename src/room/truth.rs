@@ -71,6 +71,14 @@ impl From<ObjectTruth> for crate::capture::truth::ObjectTruth {
     }
 }
 
+impl From<BTreeMap<String, ObjectTruth>> for crate::capture::truth::Truth {
+    fn from(objects: BTreeMap<String, ObjectTruth>) -> Self {
+        Self {
+            objects: objects.into_iter().map(|(n, o)| (n, o.into())).collect(),
+        }
+    }
+}
+
 /// The truth of each object of a lit scene.
 pub fn objects(world: &LitScene) -> BTreeMap<String, ObjectTruth> {
     let scene = &world.scene;

@@ -2,7 +2,7 @@
 
 use crate::capture::camera::{Intrinsics, Pose};
 use crate::scene::geometry::Ray;
-use glam::{DVec2, DVec3, Mat3, Vec2, Vec3};
+use glam::{DVec3, Mat3, Vec2, Vec3};
 
 /// A posed camera relative to the scene's origin.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,11 +29,7 @@ impl Camera {
     #[inline]
     pub fn ray(&self, pixel: Vec2) -> Ray {
         let k = &self.intrinsics;
-        let distorted = DVec2::new(
-            (f64::from(pixel.x) - k.cx) / k.fx,
-            (f64::from(pixel.y) - k.cy) / k.fy,
-        );
-        let p = k.undistort(distorted);
+        let p = k.undistort(k.normalized(pixel.as_dvec2()));
         let local = Vec3::new(p.x as f32, -p.y as f32, -1.0);
         Ray::new(self.center, (self.rotation * local).normalize_or_zero())
     }
@@ -47,16 +43,11 @@ impl Camera {
             return None;
         }
         let k = &self.intrinsics;
-        let p = k.distort(DVec2::new(
-            f64::from(local.x / depth),
-            f64::from(-local.y / depth),
-        ))?;
-        let pixel = Vec2::new((p.x * k.fx + k.cx) as f32, (p.y * k.fy + k.cy) as f32);
-        let inside = pixel.x >= 0.0
-            && pixel.y >= 0.0
-            && pixel.x < k.width as f32
-            && pixel.y < k.height as f32;
-        inside.then_some(pixel)
+        let p = k.distort(Vec2::new(local.x / depth, -local.y / depth).as_dvec2())?;
+        let pixel = k.pixel(p).as_vec2();
+        let far = Vec2::new(k.width as f32, k.height as f32);
+        let inside = pixel.cmpge(Vec2::ZERO) & pixel.cmplt(far);
+        inside.all().then_some(pixel)
     }
 
     /// The camera with its picture downscaled to a long side of at most `long_side` pixels.
@@ -66,16 +57,12 @@ impl Camera {
         if factor >= 1.0 {
             return self.clone();
         }
-        let width = ((f64::from(k.width) * factor).round() as u32).max(1);
-        let height = ((f64::from(k.height) * factor).round() as u32).max(1);
-        let sx = f64::from(width) / f64::from(k.width);
-        let sy = f64::from(height) / f64::from(k.height);
-        let mut camera = self.clone();
-        let k = &mut camera.intrinsics;
-        (k.width, k.height) = (width, height);
-        (k.fx, k.cx) = (k.fx * sx, k.cx * sx);
-        (k.fy, k.cy) = (k.fy * sy, k.cy * sy);
-        camera
+        let size = [k.width, k.height];
+        let size = size.map(|side| ((f64::from(side) * factor).round() as u32).max(1));
+        Self {
+            intrinsics: k.resized(size),
+            ..*self
+        }
     }
 
     /// Unit viewing direction.

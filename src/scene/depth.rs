@@ -9,6 +9,7 @@ use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::visibility::NOTHING;
 use glam::Vec2;
+use image::{ImageBuffer, Luma};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -19,18 +20,13 @@ const DEPTH_FRACTION: f64 = 0.02;
 /// Relative tolerance of the aspect ratio between a depth image and its photograph.
 const ASPECT_TOLERANCE: f64 = 0.02;
 
-/// The result of a comparison: photographs with contradicting pixels marked unusable.
-#[derive(Debug)]
-pub struct Compared {
-    /// One per camera.
-    pub photographs: Vec<Arc<Photograph>>,
-    /// Warnings, full sentences.
-    pub warnings: Vec<String>,
-}
-
-/// Compares the depth images of a capture with its mesh. Frames without a readable depth image keep all pixels; unreadable ones
-/// give a warning.
-pub fn compare(capture: &Capture, scene: &Scene, photographs: &[Arc<Photograph>]) -> Compared {
+/// Compares the depth images of a capture with its mesh. Returns the photographs with contradicting pixels marked unusable, one per
+/// camera, and warnings, full sentences. Frames without a readable depth image keep all pixels; unreadable ones give a warning.
+pub fn compare(
+    capture: &Capture,
+    scene: &Scene,
+    photographs: &[Arc<Photograph>],
+) -> (Vec<Arc<Photograph>>, Vec<String>) {
     let frames: Vec<(Arc<Photograph>, Option<Result<u64>>)> = (0..photographs.len())
         .into_par_iter()
         .map(|frame| {
@@ -39,11 +35,7 @@ pub fn compare(capture: &Capture, scene: &Scene, photographs: &[Arc<Photograph>]
                 return (photograph.clone(), None);
             };
             let depth = match decode(path) {
-                Ok(image) => Depth {
-                    size: [image.width(), image.height()],
-                    values: image.into_raw(),
-                    unit: *unit,
-                },
+                Ok(image) => Depth { image, unit: *unit },
                 Err(error) => return (photograph.clone(), Some(Err(error))),
             };
             if !depth.matches_aspect_of(photograph) {
@@ -85,16 +77,12 @@ pub fn compare(capture: &Capture, scene: &Scene, photographs: &[Arc<Photograph>]
             contradicting as f64 / compared as f64 * 100.0
         ));
     }
-    Compared {
-        photographs: frames.into_iter().map(|f| f.0).collect(),
-        warnings,
-    }
+    (frames.into_iter().map(|f| f.0).collect(), warnings)
 }
 
 /// A depth image of the same view as a photograph.
 struct Depth {
-    size: [u32; 2],
-    values: Vec<u16>,
+    image: ImageBuffer<Luma<u16>, Vec<u16>>,
     /// Metres per unit.
     unit: f64,
 }
@@ -102,17 +90,18 @@ struct Depth {
 impl Depth {
     /// Whether the aspect ratios agree.
     fn matches_aspect_of(&self, photograph: &Photograph) -> bool {
-        let aspect = |[width, height]: [u32; 2]| f64::from(width) / f64::from(height.max(1));
-        let ratio = aspect(self.size) / aspect([photograph.width, photograph.height]);
-        !self.size.contains(&0) && (ratio - 1.0).abs() < ASPECT_TOLERANCE
+        let aspect = |(width, height): (u32, u32)| f64::from(width) / f64::from(height.max(1));
+        let size = self.image.dimensions();
+        let ratio = aspect(size) / aspect((photograph.width, photograph.height));
+        size.0 > 0 && size.1 > 0 && (ratio - 1.0).abs() < ASPECT_TOLERANCE
     }
 
     /// Depth in metres along the optical axis at a point in fractions of width and height; `None` where it is missing.
     fn at(&self, fraction: Vec2) -> Option<f64> {
-        let [width, height] = self.size;
+        let (width, height) = self.image.dimensions();
         let x = ((fraction.x * width as f32) as u32).min(width - 1);
         let y = ((fraction.y * height as f32) as u32).min(height - 1);
-        let value = self.values[y as usize * width as usize + x as usize];
+        let [value] = self.image.get_pixel(x, y).0;
         (value > 0).then(|| f64::from(value) * self.unit)
     }
 }
@@ -137,9 +126,7 @@ fn mask(depth: &Depth, scene: &Scene, frame: usize, photograph: &Photograph) -> 
     let median = quantile(&mut differences, 0.5).unwrap_or(0.0);
 
     let mut masked = photograph.clone();
-    if masked.usable.is_empty() {
-        masked.usable = vec![true; masked.pixels.len()];
-    }
+    masked.usable.resize(masked.pixels.len(), true);
     let mut count = 0;
     for (usable, seen) in masked.usable.iter_mut().zip(&pixels) {
         let contradicts = seen.is_some_and(|(measured, mesh)| {
@@ -158,6 +145,5 @@ fn mesh_depth(scene: &Scene, camera: &Camera, at: Vec2, triangle: u32) -> f64 {
     }
     let ray = camera.ray(at);
     let along = scene.plane_distance(triangle, &ray);
-    let forward = -camera.rotation.z_axis;
-    f64::from(along * ray.direction.dot(forward))
+    f64::from(along * ray.direction.dot(camera.forward()))
 }

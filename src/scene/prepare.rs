@@ -55,11 +55,11 @@ pub fn prepare(capture: &Capture, working: &Working) -> Result<Prepared> {
         scene = scene.with_ids(ids);
     }
     warnings.extend(unseen(&scene));
-    let compared = depth::compare(&capture, &scene, &working.photographs);
-    warnings.extend(compared.warnings);
+    let (photographs, contradictions) = depth::compare(&capture, &scene, &working.photographs);
+    warnings.extend(contradictions);
     Ok(Prepared {
         seen_area_fraction: seen_area_fraction(&scene, AREA_SAMPLES),
-        photographs: compared.photographs,
+        photographs,
         capture,
         scene,
         warnings,

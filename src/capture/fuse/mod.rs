@@ -22,16 +22,8 @@ use view::View;
 /// Default limit on the memory of all voxels.
 pub const MAX_BYTES: usize = 2 << 30;
 
-/// A fused mesh.
-#[derive(Debug)]
-pub struct Fused {
-    /// Triangles whose front faces the cameras, with linear vertex colours; one object.
-    pub mesh: Mesh,
-    /// Number of depth images fused.
-    pub frames: usize,
-}
-
-/// Fuses all depth images, in frame order, into a mesh with voxels of `edge` metres that take at most `max_bytes` of memory.
+/// Fuses all depth images, in frame order, into a mesh with voxels of `edge` metres that take at most `max_bytes` of memory: one object of
+/// triangles whose front faces the cameras, with linear vertex colours.
 /// `progress` gets the number of fused depth images and of all.
 ///
 /// # Errors
@@ -41,7 +33,7 @@ pub fn fuse(
     edge: f64,
     max_bytes: usize,
     progress: &mut dyn FnMut(usize, usize),
-) -> Result<Fused> {
+) -> Result<Mesh> {
     let frames: Vec<&ImportedFrame> = frames.iter().filter(|f| f.depth.is_some()).collect();
     let mut field = Field::new(edge, max_bytes);
     // Decode one image per thread at a time, to bound memory.
@@ -64,8 +56,5 @@ pub fn fuse(
             "check depth, poses and --voxel, or name a mesh with --mesh",
         ));
     }
-    Ok(Fused {
-        mesh,
-        frames: frames.len(),
-    })
+    Ok(mesh)
 }

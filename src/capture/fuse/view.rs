@@ -1,13 +1,11 @@
 //! A depth image and its photograph, looked up by points in space.
 
 use crate::capture::camera::Pose;
-use crate::capture::orientation::Orientation;
 use crate::capture::photograph::Photograph;
-use crate::capture::read::image;
 use crate::capture::scan::depth::DepthMap;
 use crate::capture::scan::{ImportedFrame, Lens};
-use crate::error::{Error, Result};
-use glam::{DVec3, Vec3};
+use crate::error::Result;
+use glam::{DVec2, DVec3, Vec3};
 
 /// A decoded frame.
 #[derive(Debug)]
@@ -24,20 +22,12 @@ impl View {
     /// Decodes a frame that has depth.
     ///
     /// # Errors
-    /// There is no depth, or an image is broken.
+    /// As [`ImportedFrame::load`].
     pub fn load(frame: &ImportedFrame) -> Result<Self> {
-        let Some(depth) = &frame.depth else {
-            return Err(Error::file(&frame.photograph, "has no depth image", ""));
-        };
-        let (photograph, _) = image::read(
-            &frame.photograph,
-            Orientation::default(),
-            &frame.lens.pinhole,
-            frame.exposure,
-        )?;
+        let (photograph, depth) = frame.load()?;
         Ok(Self {
             pose: frame.pose,
-            depth: depth.map()?,
+            depth,
             color_lens: frame.lens,
             photograph,
         })
@@ -47,11 +37,8 @@ impl View {
     pub fn color_at(&self, point: DVec3) -> Option<Vec3> {
         let pixel = self.color_lens.project(point)?.floor();
         let (width, height) = (self.photograph.width, self.photograph.height);
-        let inside = pixel.x >= 0.0
-            && pixel.y >= 0.0
-            && pixel.x < f64::from(width)
-            && pixel.y < f64::from(height);
-        if !inside {
+        let far = DVec2::new(f64::from(width), f64::from(height));
+        if !(pixel.cmpge(DVec2::ZERO) & pixel.cmplt(far)).all() {
             return None;
         }
         let index = pixel.y as usize * width as usize + pixel.x as usize;

@@ -147,6 +147,14 @@ impl Folder {
     }
 }
 
+/// The path of an entry of a subfolder, which is `""` for the folder itself.
+pub fn inside(subfolder: &str, name: &str) -> String {
+    match subfolder {
+        "" => name.to_owned(),
+        _ => format!("{subfolder}/{name}"),
+    }
+}
+
 /// Sort key of the natural order: runs of letters, and runs of digits by value.
 fn natural_key(name: &str) -> Vec<(String, u64, String)> {
     let mut parts: Vec<(String, u64, String)> = Vec::new();
@@ -173,25 +181,9 @@ mod tests {
 
     #[test]
     fn numbers_in_names_order_by_value() {
-        let mut names = [
-            "frame-10.png",
-            "frame-9.png",
-            "a",
-            "frame-010.png",
-            "2",
-            "11",
-        ];
+        let mut names = ["frame-10", "frame-9", "a", "frame-010", "2", "11"];
         names.sort_by_cached_key(|name| natural_key(name));
-        assert_eq!(
-            names,
-            [
-                "2",
-                "11",
-                "a",
-                "frame-9.png",
-                "frame-010.png",
-                "frame-10.png"
-            ]
-        );
+        let ordered = ["2", "11", "a", "frame-9", "frame-010", "frame-10"];
+        assert_eq!(names, ordered);
     }
 }

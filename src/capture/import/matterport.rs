@@ -54,13 +54,18 @@ pub fn read(folder: &Folder) -> Result<Scan> {
     Ok(scan)
 }
 
+/// Names of the entries of a subfolder; none where it is missing.
+fn names_of(folder: &Folder, name: &str) -> Result<Vec<String>> {
+    match folder.has_folder(name) {
+        true => folder.names(name),
+        false => Ok(Vec::new()),
+    }
+}
+
 /// Reads the original images.
 fn original(folder: &Folder, scan: &mut Scan) -> Result<()> {
     let listed = |name: &str| -> Result<BTreeSet<String>> {
-        match folder.has_folder(name) {
-            true => Ok(folder.names(name)?.into_iter().collect()),
-            false => Ok(BTreeSet::new()),
-        }
+        Ok(names_of(folder, name)?.into_iter().collect())
     };
     let (hdr, color, depths) = (listed(HDR)?, listed(COLOR)?, listed(DEPTH)?);
     let mut lenses: HashMap<String, Lens> = HashMap::new();
@@ -77,9 +82,8 @@ fn original(folder: &Folder, scan: &mut Scan) -> Result<()> {
             continue;
         };
         let pose_name = format!("{POSES}/{name}");
-        let path = folder.path(&pose_name);
-        let place = path.display().to_string();
-        let Some(pose) = pose_of_rows(&place, &rows(&path, &folder.text(&pose_name)?)?)? else {
+        let place = folder.path(&pose_name).display().to_string();
+        let Some(pose) = pose_of_rows(&place, &rows(folder, &pose_name)?)? else {
             continue;
         };
         let first = |set: &BTreeSet<String>, kind: &str, ends: &[&str]| {
@@ -122,10 +126,9 @@ fn original(folder: &Folder, scan: &mut Scan) -> Result<()> {
                 lens
             }
         };
-        let depth = match first(&depths, "d", &["png"]) {
-            Some(name) => Some(depth_image(folder, &format!("{DEPTH}/{name}"), &lens)?),
-            None => None,
-        };
+        let depth = first(&depths, "d", &["png"])
+            .map(|name| depth_image(folder, &format!("{DEPTH}/{name}"), &lens))
+            .transpose()?;
         let photograph = folder.file(&place, &photograph)?;
         scan.frames
             .push(ImportedFrame::new(photograph, lens, pose, depth));
@@ -144,56 +147,39 @@ fn original(folder: &Folder, scan: &mut Scan) -> Result<()> {
 
 /// The lens in an intrinsics file, a single line.
 fn lens(folder: &Folder, name: &str) -> Result<Lens> {
-    let path = folder.path(name);
+    let broken = |problem: &str| Error::file(&folder.path(name), problem, "copy it again");
     let numbers = numbers(&folder.text(name)?);
     let Some([w, h, fx, fy, cx, cy, k1, k2, p1, p2, k3]) = numbers
         .as_deref()
         .and_then(|n| <[f64; 11]>::try_from(n).ok())
     else {
-        return Err(Error::file(
-            &path,
-            "is not a line of: width height fx fy cx cy k1 k2 p1 p2 k3",
-            "copy it again",
-        ));
+        let problem = "is not a line of: width height fx fy cx cy k1 k2 p1 p2 k3";
+        return Err(broken(problem));
     };
     let count = |x: f64| (1.0..=65536.0).contains(&x) && x.fract() == 0.0;
     if !(count(w) && count(h)) {
-        return Err(Error::file(
-            &path,
-            format!("an image of {w}×{h} pixels is impossible"),
-            "copy it again",
-        ));
+        let problem = format!("an image of {w}×{h} pixels is impossible");
+        return Err(broken(&problem));
     }
     let lens = Lens::plain([w as u32, h as u32], [fx, fy], [cx, cy]).with(Model::Rational {
         k: [k1, k2, k3, 0.0, 0.0, 0.0],
         p: [p1, p2],
     });
     if !lens.is_possible() {
-        return Err(Error::file(
-            &path,
-            "holds an impossible focal length or coefficient",
-            "copy it again",
-        ));
+        return Err(broken("holds an impossible focal length or coefficient"));
     }
     Ok(lens)
 }
 
 fn depth_image(folder: &Folder, name: &str, lens: &Lens) -> Result<DepthImage> {
     let path = folder.existing(name)?;
-    Ok(DepthImage {
-        lens: lens.resized(depth::size(&path)?),
-        path,
-        metres_per_unit: UNIT,
-        invalid: None,
-    })
+    let lens = lens.resized(depth::size(&path)?);
+    Ok(DepthImage::new(path, lens, UNIT))
 }
 
 /// Reads the undistorted images by their .conf file.
 fn undistorted(folder: &Folder, scan: &mut Scan) -> Result<()> {
-    let names = match folder.has_folder(UNDISTORTED) {
-        true => folder.names(UNDISTORTED)?,
-        false => Vec::new(),
-    };
+    let names = names_of(folder, UNDISTORTED)?;
     let Some(name) = names.iter().find(|name| name.ends_with(".conf")) else {
         return Err(Error::file(
             &folder.path(UNDISTORTED),
@@ -245,10 +231,9 @@ fn undistorted(folder: &Folder, scan: &mut Scan) -> Result<()> {
                     [cx, f64::from(header.height) - cy],
                 );
                 let depth_name = format!("{depths}/{depth}");
-                let depth = match folder.has(&depth_name) {
-                    true => Some(depth_image(folder, &depth_name, &lens)?),
-                    false => None,
-                };
+                let depth = (folder.has(&depth_name))
+                    .then(|| depth_image(folder, &depth_name, &lens))
+                    .transpose()?;
                 scan.frames
                     .push(ImportedFrame::new(photograph, lens, pose, depth));
             }

@@ -116,29 +116,21 @@ pub fn read(
 
 /// Detects the layout of a folder from its content.
 fn detect(folder: &Folder) -> Result<Format> {
-    if matterport::is_here(folder) {
-        return Ok(Format::Matterport);
-    }
-    if nerf::is_here(folder) {
-        return Ok(Format::Nerfstudio);
-    }
-    if colmap::is_here(folder) {
-        return Ok(Format::Colmap);
-    }
-    if rgbd::seven_scenes::is_here(folder)? {
-        return Ok(Format::SevenScenes);
-    }
-    if rgbd::scannet::is_here(folder) {
-        return Ok(Format::ScanNet);
-    }
-    if rgbd::tum::is_icl_nuim(folder)? {
-        return Ok(Format::IclNuim);
-    }
-    if rgbd::tum::is_here(folder) {
-        return Ok(Format::Tum);
-    }
-    if rgbd::open3d::is_here(folder)? {
-        return Ok(Format::Open3d);
+    type IsHere = fn(&Folder) -> Result<bool>;
+    let layouts: [(Format, IsHere); 8] = [
+        (Format::Matterport, |f| Ok(matterport::is_here(f))),
+        (Format::Nerfstudio, |f| Ok(nerf::is_here(f))),
+        (Format::Colmap, |f| Ok(colmap::is_here(f))),
+        (Format::SevenScenes, rgbd::seven_scenes::is_here),
+        (Format::ScanNet, |f| Ok(rgbd::scannet::is_here(f))),
+        (Format::IclNuim, rgbd::tum::is_icl_nuim),
+        (Format::Tum, |f| Ok(rgbd::tum::is_here(f))),
+        (Format::Open3d, rgbd::open3d::is_here),
+    ];
+    for (format, is_here) in layouts {
+        if is_here(folder)? {
+            return Ok(format);
+        }
     }
     let words: Vec<&str> = Format::ALL.iter().map(|(word, _)| *word).collect();
     Err(Error::file(

@@ -3,7 +3,6 @@
 //! Supports more than a capture's own transforms.json: k3 to k6 and fisheye lenses, intrinsics for another resolution than the
 //! photographs', file names without an extension, mask files, `applied_transform`, and depth to fuse a mesh from.
 
-use crate::capture::camera::Intrinsics;
 use crate::capture::import::folder::Folder;
 use crate::capture::import::geometry;
 use crate::capture::import::matrix::matrix_of_rows;
@@ -146,22 +145,19 @@ fn frame(
     let rows: Vec<Vec<f64>> = (0..3).map(|i| row(rows.row(i))).collect();
     let (pose, _) = pose::from_rows(&rows).map_err(|problem| refuse(&problem))?;
 
-    let mask = match fields.text("mask_path")? {
-        Some(mask) => Some(folder.file(&fields.place("mask_path"), mask)?),
-        None => None,
+    let file = |field: &str| -> Result<Option<PathBuf>> {
+        let name = fields.text(field)?;
+        name.map(|name| folder.file(&fields.place(field), name))
+            .transpose()
     };
+    let mask = file("mask_path")?;
     let number =
         |name: &str| -> Result<Option<f64>> { Ok(fields.number(name)?.or(shared.number(name)?)) };
-    let depth = match fields.text("depth_file_path")? {
-        Some(name) => {
-            let path = folder.file(&fields.place("depth_file_path"), name)?;
-            let size = depth::size(&path)?;
-            Some(DepthImage {
-                lens: lens.resized(size),
-                path,
-                metres_per_unit: number("depth_unit_scale_factor")?.unwrap_or(DEPTH_UNIT),
-                invalid: None,
-            })
+    let depth = match file("depth_file_path")? {
+        Some(path) => {
+            let lens = lens.resized(depth::size(&path)?);
+            let unit = number("depth_unit_scale_factor")?.unwrap_or(DEPTH_UNIT);
+            Some(DepthImage::new(path, lens, unit))
         }
         None => None,
     };
@@ -196,25 +192,19 @@ fn camera(values: [&Value; 2], fields: [&Fields; 2], size: [u32; 2]) -> Result<L
     let number = |name: &str| -> Result<f64> {
         Ok(frame.number(name)?.or(shared.number(name)?).unwrap_or(0.0))
     };
-    let model = match frame.text("camera_model")? {
-        Some(model) => Some(model),
-        None => shared.text("camera_model")?,
-    };
+    let model = frame.or(shared, "camera_model").text("camera_model")?;
     let model = model.map(str::to_ascii_uppercase);
     let flagged = |fields: &Fields| fields.get("is_fisheye").and_then(Value::as_bool);
     let is_fisheye = flagged(frame).or(flagged(shared)) == Some(true);
-    let k = [
-        number("k1")?,
-        number("k2")?,
-        number("k3")?,
-        number("k4")?,
-        number("k5")?,
-        number("k6")?,
-    ];
+    let mut k = [0.0; 6];
+    for (name, k) in ["k1", "k2", "k3", "k4", "k5", "k6"].into_iter().zip(&mut k) {
+        *k = number(name)?;
+    }
     let p = [number("p1")?, number("p2")?];
+    let fisheye = Model::Fisheye([k[0], k[1], k[2], k[3]]);
     let model = match model.as_deref() {
-        Some("OPENCV_FISHEYE" | "FISHEYE") => Model::Fisheye([k[0], k[1], k[2], k[3]]),
-        _ if is_fisheye => Model::Fisheye([k[0], k[1], k[2], k[3]]),
+        Some("OPENCV_FISHEYE" | "FISHEYE") => fisheye,
+        _ if is_fisheye => fisheye,
         None | Some("PINHOLE" | "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" | "OPENCV") => {
             // k4 of Nerfstudio belongs to another polynomial than OpenCV's.
             if k[3..].iter().any(|&k| k != 0.0) {
@@ -261,42 +251,24 @@ fn camera(values: [&Value; 2], fields: [&Fields; 2], size: [u32; 2]) -> Result<L
         let map = value.as_object().cloned().unwrap_or_default();
         Value::Object(without_distortion(map, factor))
     });
-    let places = fields.map(|fields| fields.place(""));
-    let [shared_place, frame_place] = places;
-    let (intrinsics, _) = lens::read(
-        &Fields::new(shared_place, &pinhole_only[0])?,
-        &Fields::new(frame_place, &pinhole_only[1])?,
+    let (pinhole, _) = lens::read(
+        &Fields::new(shared.place(""), &pinhole_only[0])?,
+        &Fields::new(frame.place(""), &pinhole_only[1])?,
         size,
     )?;
+    // The distortion was taken out, so it is zero.
+    let plain = Model::Brown([0.0; 4]);
     Ok(Lens {
-        pinhole: Intrinsics {
-            distortion: [0.0; 4],
-            ..intrinsics
-        },
-        model: Model::Brown([0.0; 4]),
+        pinhole,
+        model: plain,
     }
     .with(model))
 }
 
 /// The fields of a file or frame without distortion and size, with pinhole parameters scaled by x and y.
 fn without_distortion(mut map: Map<String, Value>, [x, y]: [f64; 2]) -> Map<String, Value> {
-    for name in [
-        "camera_model",
-        "w",
-        "h",
-        "k1",
-        "k2",
-        "k3",
-        "k4",
-        "k5",
-        "k6",
-        "p1",
-        "p2",
-        "s1",
-        "s2",
-        "s3",
-        "s4",
-    ] {
+    let others = ["camera_model", "w", "h", "k1", "k2", "p1", "p2"];
+    for name in others.into_iter().chain(lens::HIGHER_COEFFICIENTS) {
         map.remove(name);
     }
     for (name, factor) in [("fl_x", x), ("cx", x), ("fl_y", y), ("cy", y)] {

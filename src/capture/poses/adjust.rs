@@ -2,8 +2,8 @@
 
 use crate::capture::camera::Pose;
 use crate::capture::poses::matches::Match;
-use crate::capture::poses::picture::Picture;
 use crate::capture::poses::points::Point;
+use crate::capture::scan::Lens;
 use crate::math::stats::quantile;
 use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
@@ -25,7 +25,7 @@ type Rows = SMatrix<f64, 2, POSE>;
 /// Points that are seen by two photographs and more, and what is known of them.
 pub struct Adjustment<'a> {
     tracks: Vec<(&'a Point, &'a [Match])>,
-    pictures: &'a [Picture],
+    lenses: &'a [Lens],
 }
 
 /// A match's difference from what poses and depth say.
@@ -44,14 +44,14 @@ impl<'a> Adjustment<'a> {
     pub fn new(
         points: &'a [Point],
         matches: &'a [Vec<Match>],
-        pictures: &'a [Picture],
+        lenses: &'a [Lens],
         takes: impl Fn(usize) -> bool,
     ) -> Self {
         let tracks = (points.iter().zip(matches).enumerate())
             .filter(|(index, (_, seen))| takes(*index) && !seen.is_empty())
             .map(|(_, (point, seen))| (point, seen.as_slice()))
             .collect();
-        Self { tracks, pictures }
+        Self { tracks, lenses }
     }
 
     /// Poses that fit the matches best, beginning with `poses`; `given` are the scan's.
@@ -83,7 +83,7 @@ impl<'a> Adjustment<'a> {
             .iter()
             .map(|(p, _)| 1.0 / p.inverse_depth.x)
             .collect();
-        let mut focal: Vec<f64> = self.pictures.iter().map(|p| p.lens.pinhole.fx).collect();
+        let mut focal: Vec<f64> = self.lenses.iter().map(|lens| lens.pinhole.fx).collect();
         let angle =
             error / (RAYLEIGH_MEDIAN * std::f64::consts::SQRT_2 * quantile(&mut focal, 0.5)?);
         Some([angle * quantile(&mut depths, 0.5)?, angle])
@@ -226,7 +226,7 @@ impl<'a> Adjustment<'a> {
         matches.iter().filter_map(move |seen| {
             let pose = poses[seen.frame];
             let there = pose.to_camera(world);
-            let lens = &self.pictures[seen.frame].lens;
+            let lens = &self.lenses[seen.frame];
             let expected = lens.project(there)?;
             // Derivatives of the pixel by the point in the world; a millionth of the distance is far above rounding.
             let small = 1e-6 * there.length();
@@ -300,12 +300,11 @@ pub fn turn_between(from: &DMat3, to: &DMat3) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::scan::Lens;
 
     #[test]
     fn derivatives_equal_differences() {
         let lens = Lens::plain([320, 240], [250.0, 255.0], [158.0, 121.0]);
-        let pictures = [Picture::blank(lens), Picture::blank(lens)];
+        let lenses = [lens; 2];
         let turned = |turn: [f64; 3], center: [f64; 3]| Pose {
             rotation: rotation(DVec3::from(turn)),
             center: DVec3::from(center),
@@ -326,7 +325,7 @@ mod tests {
             information: DMat2::IDENTITY,
         }]];
         let points = [point];
-        let adjustment = Adjustment::new(&points, &seen, &pictures, |_| true);
+        let adjustment = Adjustment::new(&points, &seen, &lenses, |_| true);
         let at = |poses: &[Pose], depth: f64| {
             let mut residuals = adjustment.residuals(0, poses, depth);
             residuals.next().expect("in front of the camera").1

@@ -11,7 +11,7 @@ mod picture;
 mod points;
 
 use crate::capture::camera::Pose;
-use crate::capture::scan::ImportedFrame;
+use crate::capture::scan::{ImportedFrame, Lens};
 use crate::error::Result;
 use adjust::{Adjustment, turn_between};
 use matches::{Match, Reach};
@@ -75,6 +75,7 @@ pub fn refine(frames: &mut [ImportedFrame], chosen: &[usize]) -> Result<Option<R
         .map(|&i| Picture::load(&frames[i]))
         .collect::<Result<_>>()?;
     let given: Vec<Pose> = chosen.iter().map(|&i| frames[i].pose).collect();
+    let lenses: Vec<Lens> = pictures.iter().map(|picture| picture.lens).collect();
     let points: Vec<Point> = (pictures.par_iter().enumerate())
         .flat_map_iter(|(frame, picture)| points::find(frame, picture))
         .collect();
@@ -84,11 +85,11 @@ pub fn refine(frames: &mut [ImportedFrame], chosen: &[usize]) -> Result<Option<R
     for round in 0..ROUNDS {
         let reach = if round == 0 { Reach::Far } else { Reach::Near };
         seen = matches::look_up(&points, &pictures, &poses, reach);
-        let fitted = Adjustment::new(&points, &seen, &pictures, |point| point % HELD_OUT != 0);
+        let fitted = Adjustment::new(&points, &seen, &lenses, |point| point % HELD_OUT != 0);
         poses = fitted.adjust(&given, poses);
     }
 
-    let held_out = Adjustment::new(&points, &seen, &pictures, |point| point % HELD_OUT == 0);
+    let held_out = Adjustment::new(&points, &seen, &lenses, |point| point % HELD_OUT == 0);
     let least = MIN_HELD_OUT * chosen.len();
     let (Some(before), Some(after)) = (
         held_out.median_error(&given, least),

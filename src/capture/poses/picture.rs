@@ -1,11 +1,9 @@
 //! A photograph as points are looked up in it: grey, small, smoothed, with its depth image.
 
-use crate::capture::orientation::Orientation;
-use crate::capture::read::image;
 use crate::capture::scan::depth::DepthMap;
 use crate::capture::scan::{ImportedFrame, Lens};
 use crate::capture::working::reduce;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::math::blur::blurred;
 use crate::math::color::luminance;
 use glam::{DVec2, DVec3};
@@ -45,18 +43,15 @@ impl Picture {
     /// Decodes a frame that has depth.
     ///
     /// # Errors
-    /// There is no depth, or an image is broken.
+    /// As [`ImportedFrame::load`].
     pub fn load(frame: &ImportedFrame) -> Result<Self> {
-        let Some(depth) = &frame.depth else {
-            return Err(Error::file(&frame.photograph, "has no depth image", ""));
-        };
+        let (photograph, depth) = frame.load()?;
         let k = &frame.lens.pinhole;
-        let (photograph, _) =
-            image::read(&frame.photograph, Orientation::default(), k, frame.exposure)?;
         // The smallest factor that meets the limit; the remainder at the right and the bottom is cropped.
         let pixels = |factor: &u32| u64::from(k.width / factor) * u64::from(k.height / factor);
-        let factor = (1..).find(|factor| pixels(factor) <= MAX_PIXELS);
-        let factor = factor.unwrap_or(1);
+        let factor = (1..)
+            .find(|factor| pixels(factor) <= MAX_PIXELS)
+            .unwrap_or(1);
         let photograph = match factor {
             1 => photograph,
             _ => reduce(&photograph, factor),
@@ -80,7 +75,7 @@ impl Picture {
             lens,
             fine,
             coarse,
-            depth: depth.map()?,
+            depth,
             spoiled,
         })
     }
@@ -166,28 +161,6 @@ impl Grey {
             values: (0..width * height)
                 .map(|i| value(i % width, i / width))
                 .collect(),
-        }
-    }
-}
-
-#[cfg(test)]
-impl Picture {
-    /// A picture that shows nothing, without depth.
-    pub fn blank(lens: Lens) -> Self {
-        let grey = || Grey {
-            width: lens.pinhole.width as usize,
-            height: lens.pinhole.height as usize,
-            values: Vec::new(),
-        };
-        Self {
-            lens,
-            fine: grey(),
-            coarse: grey(),
-            depth: DepthMap {
-                lens,
-                metres: Vec::new(),
-            },
-            spoiled: Vec::new(),
         }
     }
 }

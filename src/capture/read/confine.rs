@@ -4,6 +4,14 @@ use crate::capture::inputs;
 use crate::error::{Error, Result};
 use std::path::{Component, Path, PathBuf};
 
+/// The folder that a file lies in.
+pub fn folder_of(file: &Path) -> &Path {
+    match file.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
 /// Larger files are refused.
 const MAX_FILE_BYTES: u64 = 1 << 36;
 

@@ -38,6 +38,14 @@ impl<'a> Fields<'a> {
         self.map.get(name).filter(|value| !value.is_null())
     }
 
+    /// These fields where they have one of this name, else `shared`.
+    pub fn or<'b>(&'b self, shared: &'b Self, name: &str) -> &'b Self {
+        match self.get(name) {
+            Some(_) => self,
+            None => shared,
+        }
+    }
+
     /// A finite number.
     ///
     /// # Errors
@@ -90,10 +98,7 @@ impl<'a> Fields<'a> {
         let Some(value) = self.get(name) else {
             return Ok(None);
         };
-        let numbers: Option<Vec<f64>> = value
-            .as_array()
-            .and_then(|array| array.iter().map(Value::as_f64).collect());
-        match numbers.as_deref() {
+        match numbers(value).as_deref() {
             Some(&[x, y, z]) if x.is_finite() && y.is_finite() && z.is_finite() => {
                 Ok(Some(DVec3::new(x, y, z)))
             }
@@ -109,17 +114,15 @@ impl<'a> Fields<'a> {
         let Some(value) = self.get(name) else {
             return Ok(None);
         };
-        let row = |value: &Value| -> Option<Vec<f64>> {
-            value.as_array()?.iter().map(Value::as_f64).collect()
-        };
-        let rows = value
-            .as_array()
-            .and_then(|array| array.iter().map(row).collect());
-        match rows {
-            Some(rows) => Ok(Some(rows)),
-            None => Err(wrong(&self.place(name), "is not a matrix of numbers")),
-        }
+        let rows = (value.as_array()).and_then(|array| array.iter().map(numbers).collect());
+        rows.map(Some)
+            .ok_or_else(|| wrong(&self.place(name), "is not a matrix of numbers"))
     }
+}
+
+/// The numbers of a list; `None` if it is something else.
+pub fn numbers(value: &Value) -> Option<Vec<f64>> {
+    value.as_array()?.iter().map(Value::as_f64).collect()
 }
 
 fn wrong(place: &str, problem: &str) -> Error {

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::math::color::srgb_to_linear;
 use glam::Vec3;
 use image::codecs::hdr::HdrDecoder;
-use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits, Rgba};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
@@ -103,8 +103,8 @@ pub fn read(
     exposure: Option<f64>,
 ) -> Result<(Photograph, usize)> {
     let decoder = decoder(path)?;
-    let (stored_width, stored_height) = decoder.dimensions();
-    let [width, height] = orientation.size([stored_width, stored_height]);
+    let stored = <[u32; 2]>::from(decoder.dimensions());
+    let [width, height] = orientation.size(stored);
     if (width, height) != (intrinsics.width, intrinsics.height) {
         return Err(Error::file(
             path,
@@ -147,17 +147,13 @@ pub fn read(
     if usable.iter().all(|&good| good) {
         usable.clear();
     }
+    let saturation = match encoding {
+        Encoding::Linear => Vec3::INFINITY,
+        Encoding::Srgb8 | Encoding::Srgb16 => Vec3::splat(scale),
+    };
     let photograph = Photograph {
-        width: stored_width,
-        height: stored_height,
-        pixels,
         usable,
-        encoding,
-        saturation: match encoding {
-            Encoding::Linear => Vec3::INFINITY,
-            Encoding::Srgb8 | Encoding::Srgb16 => Vec3::splat(scale),
-        },
-        limits: Vec::new(),
+        ..Photograph::new(stored, pixels, encoding, saturation)
     };
     match orientation == Orientation::default() {
         true => Ok((photograph, invalid)),
@@ -191,7 +187,8 @@ fn decoder(path: &Path) -> Result<impl ImageDecoder> {
         .with_guessed_format()
         .map_err(|e| Error::io(path, &e))?;
     match reader.format() {
-        Some(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Hdr | ImageFormat::OpenExr) => {}
+        Some(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Hdr) => {}
+        Some(ImageFormat::OpenExr) => check_exr_windows(path)?,
         _ => {
             return Err(Error::file(
                 path,
@@ -199,9 +196,6 @@ fn decoder(path: &Path) -> Result<impl ImageDecoder> {
                 "convert it to one of these",
             ));
         }
-    }
-    if reader.format() == Some(ImageFormat::OpenExr) {
-        check_exr_windows(path)?;
     }
     let mut limits = Limits::default();
     limits.max_alloc = Some(MAX_PIXELS * 16 * 2);
@@ -301,23 +295,17 @@ fn linear_values(image: DynamicImage, encoding: Encoding) -> Vec<[f32; 4]> {
         Encoding::Srgb8 => {
             let table: [f32; 256] = std::array::from_fn(|i| srgb_to_linear(i as f32 / 255.0));
             let decode = |v: u8| table[usize::from(v)];
-            let rgba = image.into_rgba8();
-            rgba.pixels()
-                .map(|p| {
-                    let [r, g, b, a] = p.0;
-                    [decode(r), decode(g), decode(b), f32::from(a) / 255.0]
-                })
-                .collect()
+            let linear = |&Rgba([r, g, b, a]): &Rgba<u8>| {
+                [decode(r), decode(g), decode(b), f32::from(a) / 255.0]
+            };
+            image.into_rgba8().pixels().map(linear).collect()
         }
         Encoding::Srgb16 => {
             let decode = |v: u16| srgb_to_linear(f32::from(v) / 65535.0);
-            let rgba = image.into_rgba16();
-            rgba.pixels()
-                .map(|p| {
-                    let [r, g, b, a] = p.0;
-                    [decode(r), decode(g), decode(b), f32::from(a) / 65535.0]
-                })
-                .collect()
+            let linear = |&Rgba([r, g, b, a]): &Rgba<u16>| {
+                [decode(r), decode(g), decode(b), f32::from(a) / 65535.0]
+            };
+            image.into_rgba16().pixels().map(linear).collect()
         }
     }
 }

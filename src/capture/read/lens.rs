@@ -5,8 +5,16 @@ use crate::capture::read::fields::Fields;
 use crate::error::{Error, Result};
 use glam::DVec2;
 
+/// Supported lens models.
+const MODELS: [&str; 5] = [
+    "PINHOLE",
+    "SIMPLE_PINHOLE",
+    "SIMPLE_RADIAL",
+    "RADIAL",
+    "OPENCV",
+];
 /// Coefficients of unsupported lens models; they may be present but must be zero.
-const HIGHER_COEFFICIENTS: [&str; 8] = ["k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"];
+pub const HIGHER_COEFFICIENTS: [&str; 8] = ["k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"];
 
 /// Limit on tan θ of the off-axis angle in a picture: the widest rectilinear lenses (9 mm for 36 × 24 mm) reach 2.4.
 const MAX_TANGENT: f64 = 2.5;
@@ -23,28 +31,17 @@ pub fn read(
     size: [u32; 2],
 ) -> Result<(Intrinsics, Vec<&'static str>)> {
     let mut remarks = Vec::new();
-    let fields_of = |name: &str| -> &Fields {
-        if frame.get(name).is_some() {
-            frame
-        } else {
-            shared
-        }
-    };
+    let fields_of = |name: &str| frame.or(shared, name);
     let number = |name: &str| fields_of(name).number(name);
 
     let fields = fields_of("camera_model");
-    match fields.text("camera_model")?.map(str::to_ascii_uppercase) {
-        None => {}
-        Some(model) => match model.as_str() {
-            "PINHOLE" | "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" | "OPENCV" => {}
-            _ => {
-                return Err(Error::new(
-                    fields.place("camera_model"),
-                    format!("the lens model {model:?} is not supported"),
-                    "undistort the photographs to PINHOLE or OPENCV first",
-                ));
-            }
-        },
+    let model = fields.text("camera_model")?.map(str::to_ascii_uppercase);
+    if let Some(model) = model.filter(|model| !MODELS.contains(&model.as_str())) {
+        return Err(Error::new(
+            fields.place("camera_model"),
+            format!("the lens model {model:?} is not supported"),
+            "undistort the photographs to PINHOLE or OPENCV first",
+        ));
     }
     for name in HIGHER_COEFFICIENTS {
         if number(name)?.is_some_and(|k| k != 0.0) {
@@ -165,13 +162,9 @@ pub fn read(
 
 /// Width and height that the lens is given for, if both are present.
 pub fn stated_size(shared: &Fields, frame: &Fields) -> Result<Option<[u32; 2]>> {
-    let count = |name: &str| match frame.get(name) {
-        Some(_) => frame.count(name),
-        None => shared.count(name),
-    };
-    let sizes = [count("w")?, count("h")?];
-    Ok(match sizes {
-        [Some(w), Some(h)] if w > 0 && h > 0 => Some([w, h]),
+    let count = |name: &str| frame.or(shared, name).count(name);
+    Ok(match (count("w")?, count("h")?) {
+        (Some(w), Some(h)) => Some([w, h]),
         _ => None,
     })
 }
@@ -181,7 +174,7 @@ fn invertible(k: &Intrinsics) -> bool {
     let (w, h) = (f64::from(k.width), f64::from(k.height));
     (0..9).all(|i| {
         let pixel = DVec2::new(w * f64::from(i % 3) * 0.5, h * f64::from(i / 3) * 0.5);
-        let distorted = DVec2::new((pixel.x - k.cx) / k.fx, (pixel.y - k.cy) / k.fy);
+        let distorted = k.normalized(pixel);
         k.distort(k.undistort(distorted))
             .is_some_and(|d| ((d - distorted) * DVec2::new(k.fx, k.fy)).length() < 0.1)
     })

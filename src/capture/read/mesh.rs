@@ -50,31 +50,19 @@ fn check(path: &Path, mesh: &Mesh) -> Result<()> {
             "export it with faces",
         ));
     }
-    if let Some(index) = mesh.positions.iter().position(|p| !p.is_finite()) {
-        return Err(Error::file(
-            path,
-            format!(
-                "vertex {index} (counted from 0) is not finite: {}",
-                mesh.positions[index]
-            ),
-            "repair the mesh",
-        ));
-    }
+    let mut vertices = mesh.positions.iter().enumerate();
+    let mut triangles = mesh.triangles.iter();
     let count = mesh.positions.len();
-    let bad = mesh
-        .triangles
-        .iter()
-        .position(|t| t.iter().any(|&i| i as usize >= count));
-    if let Some(index) = bad {
-        return Err(Error::file(
-            path,
-            format!(
-                "triangle {index} (counted from 0) refers to a vertex beyond the {count} of the mesh"
-            ),
-            "repair the mesh",
-        ));
-    }
-    Ok(())
+    let problem = if let Some((index, p)) = vertices.find(|(_, p)| !p.is_finite()) {
+        format!("vertex {index} (counted from 0) is not finite: {p}")
+    } else if let Some(index) = triangles.position(|t| t.iter().any(|&i| i as usize >= count)) {
+        format!(
+            "triangle {index} (counted from 0) refers to a vertex beyond the {count} of the mesh"
+        )
+    } else {
+        return Ok(());
+    };
+    Err(Error::file(path, problem, "repair the mesh"))
 }
 
 /// Removes unused vertices: they would change the scene's origin and size.

@@ -32,7 +32,10 @@ fn parse(path: &Path, reader: impl BufRead) -> Result<RawMesh> {
         ignore_lines: true,
         ..tobj::LoadOptions::default()
     };
-    let mut lines = CountLines::new(reader);
+    let mut lines = CountLines {
+        inner: reader,
+        line: 0,
+    };
     let no_materials = |_: &Path| Ok((Vec::new(), Default::default()));
     let (models, _) = tobj::load_obj_buf(&mut lines, &options, no_materials).map_err(|e| {
         let problem = match e {
@@ -118,12 +121,6 @@ fn too_large(path: &Path) -> Error {
 struct CountLines<R> {
     inner: R,
     line: usize,
-}
-
-impl<R> CountLines<R> {
-    fn new(inner: R) -> Self {
-        Self { inner, line: 0 }
-    }
 }
 
 impl<R: BufRead> Read for CountLines<R> {

@@ -254,20 +254,8 @@ mod tests {
             );
             return bytes;
         }
-        let double = |x: f64| {
-            if big {
-                x.to_be_bytes()
-            } else {
-                x.to_le_bytes()
-            }
-        };
-        let int = |x: i32| {
-            if big {
-                x.to_be_bytes()
-            } else {
-                x.to_le_bytes()
-            }
-        };
+        let double = |x: f64| [x.to_le_bytes(), x.to_be_bytes()][usize::from(big)];
+        let int = |x: i32| [x.to_le_bytes(), x.to_be_bytes()][usize::from(big)];
         for (p, c) in [
             ([0.0, 0.0, 0.0], [255, 0, 0]),
             ([1.0, 0.0, 0.0], [0, 255, 0]),

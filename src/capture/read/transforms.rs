@@ -130,10 +130,7 @@ fn read_frame(
         .ok_or_else(|| Error::new(&place, "is absent", "name the photograph"))?;
     let photograph = confine.file(&place, name)?;
     let header = image::header(&photograph)?;
-    let flag = match fields.get("is_fisheye") {
-        Some(_) => fields,
-        None => shared,
-    };
+    let flag = fields.or(shared, "is_fisheye");
     if flag.get("is_fisheye").and_then(Value::as_bool) == Some(true) {
         return Err(Error::new(
             flag.place("is_fisheye"),
@@ -159,11 +156,7 @@ fn read_frame(
     let (pose, remark) = pose::of_frame(fields)?;
     remarks.extend(remark);
 
-    let source = if fields.get("exposure").is_some() {
-        fields
-    } else {
-        shared
-    };
+    let source = fields.or(shared, "exposure");
     let exposure = source.number("exposure")?;
     if let Some(value) = exposure
         && value <= 0.0
@@ -198,10 +191,8 @@ fn read_depth(
     let Some(name) = fields.text("depth_file_path")? else {
         return Ok(None);
     };
-    let scale = match fields.number("depth_unit_scale_factor")? {
-        Some(scale) => Some(scale),
-        None => shared.number("depth_unit_scale_factor")?,
-    };
+    let name_of_scale = "depth_unit_scale_factor";
+    let scale = fields.or(shared, name_of_scale).number(name_of_scale)?;
     let scale = scale.unwrap_or_else(|| {
         remarks.push("depth_unit_scale_factor is absent and taken as 0.001 (millimetres)".into());
         DEPTH_UNIT
@@ -209,7 +200,7 @@ fn read_depth(
     let place = fields.place("depth_file_path");
     if scale <= 0.0 {
         return Err(Error::new(
-            shared.place("depth_unit_scale_factor"),
+            shared.place(name_of_scale),
             format!("a depth unit of {scale} is impossible"),
             "give the metres per unit",
         ));

@@ -23,6 +23,16 @@ pub struct DepthImage {
 }
 
 impl DepthImage {
+    /// A depth image in which only 0 marks missing depth.
+    pub fn new(path: PathBuf, lens: Lens, metres_per_unit: f64) -> Self {
+        Self {
+            path,
+            lens,
+            metres_per_unit,
+            invalid: None,
+        }
+    }
+
     /// The raw values, row by row; 0 where depth is missing.
     ///
     /// # Errors

@@ -7,6 +7,11 @@ pub use depth::DepthImage;
 pub use lens::{Lens, Model};
 
 use crate::capture::camera::Pose;
+use crate::capture::orientation::Orientation;
+use crate::capture::photograph::Photograph;
+use crate::capture::read::image;
+use crate::error::{Error, Result};
+use depth::DepthMap;
 use std::path::PathBuf;
 
 /// A photograph of a scan, with its camera and its depth image.
@@ -37,5 +42,18 @@ impl ImportedFrame {
             mask: None,
             depth,
         }
+    }
+
+    /// Decodes the photograph and the depth image.
+    ///
+    /// # Errors
+    /// There is no depth, or an image is broken.
+    pub fn load(&self) -> Result<(Photograph, DepthMap)> {
+        let Some(depth) = &self.depth else {
+            return Err(Error::file(&self.photograph, "has no depth image", ""));
+        };
+        let (upright, lens) = (Orientation::default(), &self.lens.pinhole);
+        let (photograph, _) = image::read(&self.photograph, upright, lens, self.exposure)?;
+        Ok((photograph, depth.map()?))
     }
 }

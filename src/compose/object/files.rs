@@ -1,6 +1,7 @@
 //! Files that an object file refers to. They must lie in its own folder and be of bounded size.
 
 use crate::capture::inputs;
+use crate::capture::read::confine::folder_of;
 use crate::error::{Error, Result};
 use crate::math::color::srgb_to_linear;
 use crate::math::picture::Picture;
@@ -35,10 +36,7 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
 
 /// Resolves a file name in `referrer`. Refuses a file outside the referrer's folder.
 pub fn resolve(referrer: &Path, name: &str) -> Result<PathBuf> {
-    let folder = match referrer.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
+    let folder = folder_of(referrer);
     let folder = folder.canonicalize().map_err(|e| Error::io(folder, &e))?;
     let missing = |_| {
         Error::file(

@@ -181,10 +181,9 @@ fn surface(
         images.insert(key, decoded.clone());
         Ok(decoded)
     };
-    let texture = match pbr.base_color_texture() {
-        Some(info) => Some(image(info.texture(), TextureKind::Color)?),
-        None => None,
-    };
+    let texture = (pbr.base_color_texture())
+        .map(|info| image(info.texture(), TextureKind::Color))
+        .transpose()?;
     // An object has one lobe, so roughness (green) and metalness (blue) are means of the texture.
     let (mut roughness, mut metallic) = (pbr.roughness_factor(), pbr.metallic_factor());
     if let Some(info) = pbr.metallic_roughness_texture() {

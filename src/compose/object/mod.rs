@@ -5,6 +5,7 @@ mod gltf;
 mod obj;
 pub mod surface;
 
+use crate::capture::mesh::bounds;
 use crate::error::{Error, Result};
 use crate::transport::material::Material;
 use glam::{DQuat, DVec3, Vec2, Vec3};
@@ -70,7 +71,11 @@ impl ObjectModel {
     pub fn from_corners(name: &str, corners: Vec<[DVec3; 3]>, material: Material) -> Result<Self> {
         let mut parts = Parts::default();
         for triangle in corners {
-            parts.push(Corners::flat(triangle), 0);
+            let corners = Corners {
+                positions: triangle,
+                ..Corners::default()
+            };
+            parts.push(corners, 0);
         }
         let mut model = parts.finish(name.to_owned(), Path::new(name))?;
         model.materials = vec![material];
@@ -116,30 +121,13 @@ pub fn base(points: impl Iterator<Item = DVec3>) -> DVec3 {
     DVec3::new((low.x + high.x) * 0.5, low.y, (low.z + high.z) * 0.5)
 }
 
-/// Lowest and highest coordinates of points.
-fn bounds(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
-    points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
-        (low.min(p), high.max(p))
-    })
-}
-
 /// A triangle as it was read.
+#[derive(Default)]
 struct Corners {
     positions: [DVec3; 3],
     normals: Option<[Vec3; 3]>,
     uvs: Option<[Vec2; 3]>,
     colors: Option<[Vec3; 3]>,
-}
-
-impl Corners {
-    fn flat(positions: [DVec3; 3]) -> Self {
-        Self {
-            positions,
-            normals: None,
-            uvs: None,
-            colors: None,
-        }
-    }
 }
 
 /// Triangles and surfaces as they were read, before missing attributes are filled in.
@@ -201,38 +189,27 @@ impl Parts {
         // If some triangles have an attribute, the others get a default value.
         let has_normals = self.triangles.iter().any(|(c, _)| c.normals.is_some());
         let has_colors = self.triangles.iter().any(|(c, _)| c.colors.is_some());
-        let corner_uvs: Arc<Vec<[Vec2; 3]>> = Arc::new(
-            self.triangles
-                .iter()
-                .map(|(c, _)| c.uvs.unwrap_or_default().map(usable_uv))
-                .collect(),
-        );
-        let mut model = ObjectModel {
+        let corners = || self.triangles.iter().map(|(corners, _)| corners);
+        let uvs = corners().map(|c| c.uvs.unwrap_or_default().map(usable_uv));
+        let corner_uvs = Arc::new(uvs.collect());
+        let normals = corners().filter(|_| has_normals).map(front_normals);
+        let colors = corners().filter(|_| has_colors);
+        let colors = colors.map(|c| c.colors.unwrap_or([Vec3::ONE; 3]).map(usable_color));
+        Ok(ObjectModel {
             name,
-            corners: Vec::with_capacity(self.triangles.len()),
-            corner_normals: Vec::new(),
-            corner_colors: Vec::new(),
-            material_of: Vec::with_capacity(self.triangles.len()),
-            materials: self
-                .surfaces
+            corners: corners().map(|c| c.positions).collect(),
+            corner_normals: normals.collect(),
+            corner_colors: colors.collect(),
+            material_of: self
+                .triangles
                 .iter()
+                .map(|(_, material)| *material)
+                .collect(),
+            materials: (self.surfaces.iter())
                 .map(|surface| surface.material(Some(&corner_uvs)))
                 .collect(),
             warnings: self.warnings,
-        };
-        for (corners, material) in self.triangles {
-            if has_normals {
-                model.corner_normals.push(front_normals(&corners));
-            }
-            if has_colors {
-                model
-                    .corner_colors
-                    .push(corners.colors.unwrap_or([Vec3::ONE; 3]).map(usable_color));
-            }
-            model.corners.push(corners.positions);
-            model.material_of.push(material);
-        }
-        Ok(model)
+        })
     }
 }
 

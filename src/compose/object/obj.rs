@@ -204,13 +204,9 @@ fn surface(
 
     if let Some(options) = &material.diffuse_texture {
         // Options such as `-s 1 1 1` precede the file's name.
-        let name = options.split_whitespace().last().unwrap_or_default();
-        let name = if options.starts_with('-') {
-            name
-        } else {
-            options
-        };
+        let mut name = options.as_str();
         if options.starts_with('-') {
+            name = options.split_whitespace().last().unwrap_or_default();
             warnings.push(format!("{}: options of map_Kd are ignored.", place()));
         }
         let texture = match textures.get(name) {
@@ -218,11 +214,8 @@ fn surface(
             None => {
                 let found = files::resolve(library, name)?;
                 let bytes = files::read_bytes(&found)?;
-                Arc::new(files::decode(
-                    &bytes,
-                    TextureKind::Color,
-                    &found.display().to_string(),
-                )?)
+                let place = found.display().to_string();
+                Arc::new(files::decode(&bytes, TextureKind::Color, &place)?)
             }
         };
         textures.insert(name.to_owned(), texture.clone());

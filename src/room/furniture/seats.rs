@@ -87,16 +87,9 @@ pub fn stool(m: &mut Modeller) {
         20,
     );
     for i in 0..3 {
-        let direction = DVec3::new(
-            f64::from(i).mul_add(2.094, 0.5).cos(),
-            0.0,
-            f64::from(i).mul_add(2.094, 0.5).sin(),
-        );
-        m.bar(
-            direction * 0.19,
-            direction * 0.11 + DVec3::Y * 0.425,
-            [0.013, 0.019],
-            8,
-        );
+        let turn = f64::from(i).mul_add(2.094, 0.5);
+        let direction = DVec3::new(turn.cos(), 0.0, turn.sin());
+        let top = direction * 0.11 + DVec3::Y * 0.425;
+        m.bar(direction * 0.19, top, [0.013, 0.019], 8);
     }
 }

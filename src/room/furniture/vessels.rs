@@ -22,11 +22,7 @@ pub fn vase(m: &mut Modeller, height: f64) {
         [0.08, 0.74],
         [0.16, 0.55],
     ];
-    let outline: Vec<[f64; 2]> = OUTLINE
-        .iter()
-        .map(|[r, y]| [r * height, y * height])
-        .collect();
-    m.lathe(&outline, 16);
+    m.lathe(&OUTLINE.map(|[r, y]| [r * height, y * height]), 16);
 }
 
 /// A shallow bowl.
@@ -42,11 +38,7 @@ pub fn bowl(m: &mut Modeller, radius: f64) {
         [0.66, 0.18],
         [0.30, 0.09],
     ];
-    let outline: Vec<[f64; 2]> = OUTLINE
-        .iter()
-        .map(|[r, y]| [r * radius, y * radius])
-        .collect();
-    m.lathe(&outline, 20);
+    m.lathe(&OUTLINE.map(|[r, y]| [r * radius, y * radius]), 20);
 }
 
 /// A conical pot, filled to a little below its rim.

@@ -161,15 +161,9 @@ pub fn decode(file: &[u8]) -> Result<Photograph> {
         let linear = pixel.0.map(|v| srgb_to_linear(f32::from(v) / 255.0));
         Vec3::from(linear)
     });
-    Ok(Photograph {
-        width: image.width(),
-        height: image.height(),
-        pixels: pixels.collect(),
-        usable: Vec::new(),
-        encoding: Encoding::Srgb8,
-        saturation: Vec3::ONE,
-        limits: Vec::new(),
-    })
+    let size = [image.width(), image.height()];
+    let pixels = pixels.collect();
+    Ok(Photograph::new(size, pixels, Encoding::Srgb8, Vec3::ONE))
 }
 
 fn broken(error: &image::ImageError) -> Error {

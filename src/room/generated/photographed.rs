@@ -8,7 +8,6 @@ use crate::room::truth;
 use crate::scene::geometry::Hit;
 use crate::transport::lit::LitScene;
 use glam::{Vec2, Vec3};
-use std::collections::BTreeMap;
 
 /// A generated room with its photographs and ground truth.
 #[derive(Debug, Clone)]
@@ -28,12 +27,9 @@ pub struct Generated {
 impl Generated {
     /// The truth of each object by name; empty if the capture's mesh has no objects.
     pub fn truth(&self) -> Truth {
-        let objects = match self.capture.segmentation {
-            Some(_) => BTreeMap::new(),
-            None => truth::objects(&self.lit),
-        };
-        Truth {
-            objects: objects.into_iter().map(|(n, o)| (n, o.into())).collect(),
+        match self.capture.segmentation {
+            Some(_) => Truth::default(),
+            None => truth::objects(&self.lit).into(),
         }
     }
 

@@ -77,31 +77,18 @@ pub fn scan(draft: Draft) -> Result<Generated> {
         let k = &intrinsics;
         let lens = Lens::plain([k.width, k.height], [k.fx, k.fy], [k.cx, k.cy]);
         let height = (WIDTH * k.height).div_ceil(k.width.max(1));
-        let depth = DepthImage {
-            path: folder.path().join(format!("{index:03}.png")),
-            lens: lens.resized([WIDTH, height]),
-            metres_per_unit: UNIT,
-            invalid: None,
-        };
+        let path = folder.path().join(format!("{index:03}.png"));
+        let depth = DepthImage::new(path, lens.resized([WIDTH, height]), UNIT);
         let camera = Camera::new(&depth.lens.pinhole, &pose, lit.scene.origin);
-        write_depth(
-            &depth.path,
-            &measure(&lit.scene, &camera, &mut stream),
-            &camera,
-        )?;
-        frames.push(ImportedFrame {
-            photograph,
-            lens,
-            pose: jittered(&pose, &mut stream),
-            exposure: None,
-            mask: None,
-            depth: Some(depth),
-        });
+        let measured = measure(&lit.scene, &camera, &mut stream);
+        write_depth(&depth.path, &measured, &camera)?;
+        let pose = jittered(&pose, &mut stream);
+        frames.push(ImportedFrame::new(photograph, lens, pose, Some(depth)));
     }
     let all: Vec<usize> = (0..frames.len()).collect();
     poses::refine(&mut frames, &all)?;
     let voxel = voxel_size(&frames, None)?.edge;
-    let fused = fuse(&frames, voxel, MAX_BYTES, &mut |_, _| {})?;
+    let mesh = fuse(&frames, voxel, MAX_BYTES, &mut |_, _| {})?;
 
     let photographs = files
         .iter()
@@ -111,7 +98,7 @@ pub fn scan(draft: Draft) -> Result<Generated> {
     for (frame, imported) in capture.frames.iter_mut().zip(&frames) {
         frame.pose = imported.pose;
     }
-    capture.mesh = fused.mesh;
+    capture.mesh = mesh;
     capture.segmentation = Some(Segmentation {
         file: PathBuf::from("fused mesh"),
         wanted: None,

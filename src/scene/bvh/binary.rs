@@ -1,6 +1,6 @@
 //! Builds a binary hierarchy top-down by the surface area heuristic, and collapses it optimally to eight children per node.
 
-use crate::scene::bvh::split::{Bounds, Primitive, Split};
+use crate::scene::bvh::split::{Bounds, Primitive, split};
 use crate::scene::bvh::{GROUP, Tree, WIDTH};
 
 /// Leaves hold at most this many triangles.
@@ -80,21 +80,15 @@ fn grow(
     if count <= GROUP {
         return;
     }
-    let middle = Split::best(primitives).partition(primitives);
+    let middle = split(primitives);
     let (left, right) = primitives.split_at_mut(middle);
     let second = if count > granularity.parallel_above {
-        let (left, right) = rayon::join(
-            || {
-                let mut nodes = Vec::new();
-                grow(left, first, granularity, &mut nodes);
-                nodes
-            },
-            || {
-                let mut nodes = Vec::new();
-                grow(right, first + middle, granularity, &mut nodes);
-                nodes
-            },
-        );
+        let grown = |primitives: &mut [Primitive], first: usize| {
+            let mut nodes = Vec::new();
+            grow(primitives, first, granularity, &mut nodes);
+            nodes
+        };
+        let (left, right) = rayon::join(|| grown(left, first), || grown(right, first + middle));
         nodes.extend(left);
         let second = nodes.len();
         nodes.extend(right);

@@ -6,25 +6,24 @@ use glam::{UVec3, Vec3, Vec3A};
 /// A triangle's bounding box.
 #[derive(Clone, Copy)]
 pub(super) struct Primitive {
-    pub low: Vec3A,
-    pub high: Vec3A,
+    bounds: Bounds,
     pub triangle: u32,
 }
 
 impl Primitive {
     pub fn of(triangle: u32, corners: [Vec3; 3]) -> Self {
         let [a, b, c] = corners.map(Vec3A::from);
-        Self {
+        let bounds = Bounds {
             low: a.min(b).min(c),
             high: a.max(b).max(c),
-            triangle,
-        }
+        };
+        Self { bounds, triangle }
     }
 
     /// Twice the box's centre.
     #[inline(always)]
     fn center(&self) -> Vec3A {
-        self.low + self.high
+        self.bounds.low + self.bounds.high
     }
 }
 
@@ -42,12 +41,7 @@ impl Bounds {
     };
 
     pub fn of(primitives: &[Primitive]) -> Self {
-        primitives.iter().fold(Self::EMPTY, |bounds, p| {
-            bounds.union(&Self {
-                low: p.low,
-                high: p.high,
-            })
-        })
+        (primitives.iter()).fold(Self::EMPTY, |bounds, p| bounds.union(&p.bounds))
     }
 
     #[inline(always)]
@@ -69,22 +63,8 @@ impl Bounds {
 /// Bins per axis.
 const BINS: usize = 16;
 
-/// How to split a range of primitives.
-#[derive(Clone)]
-pub(super) enum Split {
-    /// Primitives in bins below `bin` of an axis go left.
-    Plane {
-        binning: Binning,
-        axis: usize,
-        bin: u32,
-    },
-    /// No plane separates the centres: the first half goes left.
-    Halves,
-}
-
 /// The map from box centres to bins on each axis.
-#[derive(Clone)]
-pub(super) struct Binning {
+struct Binning {
     low: Vec3A,
     scale: Vec3A,
 }
@@ -123,84 +103,65 @@ impl Bin {
     }
 }
 
-impl Split {
-    /// The split of minimum surface area cost.
-    pub fn best(primitives: &[Primitive]) -> Self {
-        let (low, high) = primitives
-            .iter()
-            .fold((Vec3A::INFINITY, Vec3A::NEG_INFINITY), |(low, high), p| {
-                (low.min(p.center()), high.max(p.center()))
-            });
-        // Bin boxes by their centres; an axis without extent has one bin.
-        let size = high - low;
-        let binning = Binning {
-            low,
-            scale: Vec3A::from_array(size.to_array().map(|s| {
-                let scale = BINS as f32 * (1.0 - 1e-6) / s;
-                if scale.is_finite() { scale } else { 0.0 }
-            })),
+/// Reorders primitives so that those left of the plane of minimum surface area cost come first; returns their number. Where no plane
+/// separates the centres, it is the first half.
+pub(super) fn split(primitives: &mut [Primitive]) -> usize {
+    let (low, high) = primitives
+        .iter()
+        .fold((Vec3A::INFINITY, Vec3A::NEG_INFINITY), |(low, high), p| {
+            (low.min(p.center()), high.max(p.center()))
+        });
+    // Bin boxes by their centres; an axis without extent has one bin.
+    let size = high - low;
+    let binning = Binning {
+        low,
+        scale: Vec3A::from_array(size.to_array().map(|s| {
+            let scale = BINS as f32 * (1.0 - 1e-6) / s;
+            if scale.is_finite() { scale } else { 0.0 }
+        })),
+    };
+    let mut bins = [[Bin::EMPTY; BINS]; 3];
+    for primitive in primitives.iter() {
+        let one = Bin {
+            bounds: primitive.bounds,
+            count: 1,
         };
-        let mut bins = [[Bin::EMPTY; BINS]; 3];
-        for primitive in primitives {
-            let one = Bin {
-                bounds: Bounds {
-                    low: primitive.low,
-                    high: primitive.high,
-                },
-                count: 1,
-            };
-            let [x, y, z] = binning.bins(primitive).to_array();
-            for (axis, bin) in [x, y, z].into_iter().enumerate() {
-                let bin = &mut bins[axis][bin as usize & (BINS - 1)];
-                *bin = bin.join(&one);
-            }
+        let [x, y, z] = binning.bins(primitive).to_array();
+        for (axis, bin) in [x, y, z].into_iter().enumerate() {
+            let bin = &mut bins[axis][bin as usize & (BINS - 1)];
+            *bin = bin.join(&one);
         }
-        // Evaluate the planes between bins by sweeps from both sides.
-        let mut best = (f32::INFINITY, 0, 0);
-        for (axis, bins) in bins.iter().enumerate() {
-            let mut right = [Bin::EMPTY; BINS];
-            let mut sum = Bin::EMPTY;
-            for bin in (1..BINS).rev() {
-                sum = sum.join(&bins[bin]);
-                right[bin] = sum;
-            }
-            let mut left = Bin::EMPTY;
-            for bin in 1..BINS {
-                left = left.join(&bins[bin - 1]);
-                if left.count > 0 && right[bin].count > 0 {
-                    let cost = left.cost() + right[bin].cost();
-                    if cost < best.0 {
-                        best = (cost, axis, bin);
-                    }
+    }
+    // Evaluate the planes between bins by sweeps from both sides.
+    let mut best = (f32::INFINITY, 0, 0);
+    for (axis, bins) in bins.iter().enumerate() {
+        let mut right = [Bin::EMPTY; BINS];
+        let mut sum = Bin::EMPTY;
+        for bin in (1..BINS).rev() {
+            sum = sum.join(&bins[bin]);
+            right[bin] = sum;
+        }
+        let mut left = Bin::EMPTY;
+        for bin in 1..BINS {
+            left = left.join(&bins[bin - 1]);
+            if left.count > 0 && right[bin].count > 0 {
+                let cost = left.cost() + right[bin].cost();
+                if cost < best.0 {
+                    best = (cost, axis, bin);
                 }
             }
         }
-        let (_, axis, bin) = best;
-        if bin == 0 {
-            Self::Halves
-        } else {
-            Self::Plane {
-                binning,
-                axis,
-                bin: bin as u32,
-            }
+    }
+    let (_, axis, bin) = best;
+    if bin == 0 {
+        return primitives.len() / 2;
+    }
+    let mut middle = 0;
+    for index in 0..primitives.len() {
+        if binning.bins(&primitives[index])[axis] < bin as u32 {
+            primitives.swap(middle, index);
+            middle += 1;
         }
     }
-
-    /// Reorders primitives so that the left ones come first; returns their number.
-    pub fn partition(&self, primitives: &mut [Primitive]) -> usize {
-        match self {
-            Self::Halves => primitives.len() / 2,
-            Self::Plane { binning, axis, bin } => {
-                let mut middle = 0;
-                for index in 0..primitives.len() {
-                    if binning.bins(&primitives[index])[*axis] < *bin {
-                        primitives.swap(middle, index);
-                        middle += 1;
-                    }
-                }
-                middle
-            }
-        }
-    }
+    middle
 }

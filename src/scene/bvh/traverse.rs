@@ -42,53 +42,35 @@ pub(super) fn occluded(bvh: &Bvh, ray: &Ray) -> bool {
     }
 }
 
-#[inline(always)]
-fn nearest_hit(bvh: &Bvh, ray: &Ray, stack: &mut [nearest::Entry]) -> Hit {
-    match bvh.instructions {
-        // SAFETY: `Bvh::instructions` is at most what `InstructionSet::widest` detected.
-        #[cfg(target_arch = "x86_64")]
-        InstructionSet::Avx512 => unsafe { nearest_avx512(bvh, ray, stack) },
-        #[cfg(target_arch = "x86_64")]
-        InstructionSet::Avx2 => unsafe { nearest_avx2(bvh, ray, stack) },
-        _ => nearest::traverse::<Portable<WIDTH>, Portable<GROUP>>(bvh, ray, stack),
-    }
+/// A traversal of a module, compiled for each instruction set.
+macro_rules! dispatched {
+    ($name:ident, $module:ident, $entry:ty, $found:ty) => {
+        #[inline(always)]
+        fn $name(bvh: &Bvh, ray: &Ray, stack: &mut [$entry]) -> $found {
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,bmi1,bmi2,lzcnt,popcnt")]
+            fn avx512(bvh: &Bvh, ray: &Ray, stack: &mut [$entry]) -> $found {
+                $module::traverse::<Eight, Four>(bvh, ray, stack)
+            }
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+            fn avx2(bvh: &Bvh, ray: &Ray, stack: &mut [$entry]) -> $found {
+                $module::traverse::<Eight, Four>(bvh, ray, stack)
+            }
+            match bvh.instructions {
+                // SAFETY: `Bvh::instructions` is at most what `InstructionSet::widest` detected.
+                #[cfg(target_arch = "x86_64")]
+                InstructionSet::Avx512 => unsafe { avx512(bvh, ray, stack) },
+                #[cfg(target_arch = "x86_64")]
+                InstructionSet::Avx2 => unsafe { avx2(bvh, ray, stack) },
+                _ => $module::traverse::<Portable<WIDTH>, Portable<GROUP>>(bvh, ray, stack),
+            }
+        }
+    };
 }
 
-#[inline(always)]
-fn any_hit(bvh: &Bvh, ray: &Ray, stack: &mut [u32]) -> bool {
-    match bvh.instructions {
-        // SAFETY: `Bvh::instructions` is at most what `InstructionSet::widest` detected.
-        #[cfg(target_arch = "x86_64")]
-        InstructionSet::Avx512 => unsafe { any_avx512(bvh, ray, stack) },
-        #[cfg(target_arch = "x86_64")]
-        InstructionSet::Avx2 => unsafe { any_avx2(bvh, ray, stack) },
-        _ => any::traverse::<Portable<WIDTH>, Portable<GROUP>>(bvh, ray, stack),
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,bmi1,bmi2,lzcnt,popcnt")]
-fn nearest_avx512(bvh: &Bvh, ray: &Ray, stack: &mut [nearest::Entry]) -> Hit {
-    nearest::traverse::<Eight, Four>(bvh, ray, stack)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn nearest_avx2(bvh: &Bvh, ray: &Ray, stack: &mut [nearest::Entry]) -> Hit {
-    nearest::traverse::<Eight, Four>(bvh, ray, stack)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,bmi1,bmi2,lzcnt,popcnt")]
-fn any_avx512(bvh: &Bvh, ray: &Ray, stack: &mut [u32]) -> bool {
-    any::traverse::<Eight, Four>(bvh, ray, stack)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn any_avx2(bvh: &Bvh, ray: &Ray, stack: &mut [u32]) -> bool {
-    any::traverse::<Eight, Four>(bvh, ray, stack)
-}
+dispatched!(nearest_hit, nearest, nearest::Entry, Hit);
+dispatched!(any_hit, any, u32, bool);
 
 #[cfg(test)]
 mod tests {

@@ -5,7 +5,7 @@ mod binary;
 mod model;
 mod text;
 
-use crate::capture::import::folder::Folder;
+use crate::capture::import::folder::{Folder, inside};
 use crate::capture::import::geometry;
 use crate::capture::import::matrix::{from_opencv, no_quaternion, rotation};
 use crate::capture::import::reader::Scan;
@@ -135,11 +135,4 @@ fn photographs(folder: &Folder, place: &str, first: Option<&Image>) -> String {
     let mut candidates = candidates
         .filter(|candidate| first.is_some_and(|image| folder.has(&inside(candidate, &image.name))));
     candidates.next().unwrap_or_else(|| "images".into())
-}
-
-fn inside(place: &str, name: &str) -> String {
-    match place {
-        "" => name.to_owned(),
-        _ => format!("{place}/{name}"),
-    }
 }

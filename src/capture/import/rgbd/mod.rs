@@ -6,6 +6,7 @@ pub mod seven_scenes;
 pub mod tum;
 
 use crate::capture::import::folder::Folder;
+use crate::capture::import::matrix::rows;
 use crate::capture::read::image;
 use crate::capture::scan::depth;
 use crate::capture::scan::lens::Lens;
@@ -29,6 +30,16 @@ fn depth_size(folder: &Folder, name: &str) -> Result<[u32; 2]> {
 /// The lens of fx, fy, cx, cy in OpenCV's convention, with pixel centres at integers; captures have them at half-integers.
 fn opencv_lens(size: [u32; 2], [fx, fy, cx, cy]: [f64; 4]) -> Lens {
     Lens::plain(size, [fx, fy], [cx + 0.5, cy + 0.5])
+}
+
+/// The lens of a file with OpenCV's matrix of intrinsics.
+///
+/// # Errors
+/// The file holds no matrix, or an impossible one.
+fn opencv_camera(folder: &Folder, name: &str, size: [u32; 2]) -> Result<Lens> {
+    let k = rows(folder, name)?;
+    let lens = opencv_lens(size, [k[0][0], k[1][1], k[0][2], k[1][2]]);
+    possible(lens, &folder.path(name))
 }
 
 /// Refuses an impossible lens from the file at `path`.

@@ -10,6 +10,7 @@ use crate::capture::import::reader::{ImportOptions, Scan};
 use crate::capture::import::rgbd::{
     COLOR_FOLDERS, depth_size, opencv_lens, photograph_size, possible, remark_on_lost,
 };
+use crate::capture::read::fields;
 use crate::capture::scan::ImportedFrame;
 use crate::capture::scan::depth::DepthImage;
 use crate::capture::scan::lens::Lens;
@@ -132,12 +133,7 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
             }
         };
         let photograph = folder.file(&place, color)?;
-        let depth = DepthImage {
-            path: folder.file(&place, depth)?,
-            lens: depth_lens,
-            metres_per_unit: 0.001,
-            invalid: None,
-        };
+        let depth = DepthImage::new(folder.file(&place, depth)?, depth_lens, 0.001);
         scan.frames
             .push(ImportedFrame::new(photograph, lens, pose, Some(depth)));
     }
@@ -209,8 +205,7 @@ fn from_json(folder: &Folder, name: &str) -> Result<Vec<PosedFrame>> {
         )
     })?;
     let pose = |(index, entry): (usize, &Value)| -> Result<PosedFrame> {
-        let columns = column_major(entry.get("extrinsic"), 16);
-        let Some(columns) = columns else {
+        let Some(columns) = column_major(entry.get("extrinsic"), 16) else {
             return Err(Error::file(
                 &path,
                 format!("parameters[{index}].extrinsic is not a list of 16 numbers"),
@@ -231,8 +226,7 @@ fn from_json(folder: &Folder, name: &str) -> Result<Vec<PosedFrame>> {
 }
 
 fn column_major(value: Option<&Value>, count: usize) -> Option<Vec<f64>> {
-    let numbers: Option<Vec<f64>> = value?.as_array()?.iter().map(Value::as_f64).collect();
-    numbers.filter(|numbers| numbers.len() == count)
+    fields::numbers(value?).filter(|numbers| numbers.len() == count)
 }
 
 /// The colour camera.

@@ -6,14 +6,16 @@
 use crate::capture::import::folder::Folder;
 use crate::capture::import::matrix::{pose_of_rows, rows};
 use crate::capture::import::reader::Scan;
-use crate::capture::import::rgbd::{
-    depth_size, opencv_lens, photograph_size, possible, remark_on_lost,
-};
+use crate::capture::import::rgbd::{depth_size, opencv_camera, photograph_size, remark_on_lost};
 use crate::capture::scan::ImportedFrame;
 use crate::capture::scan::depth::DepthImage;
 use crate::capture::scan::lens::Lens;
 use crate::error::Result;
 use glam::DMat3;
+
+/// Files of the cameras of both kinds of image.
+const COLOR_CAMERA: &str = "intrinsic/intrinsic_color.txt";
+const DEPTH_CAMERA: &str = "intrinsic/intrinsic_depth.txt";
 
 /// Whether a folder has this layout.
 pub fn is_here(folder: &Folder) -> bool {
@@ -39,10 +41,8 @@ pub fn read(folder: &Folder) -> Result<Scan> {
             continue;
         };
         let pose_name = format!("pose/{name}");
-        let path = folder.path(&pose_name);
-        let place = path.display().to_string();
-        let rows = rows(&path, &folder.text(&pose_name)?)?;
-        let Some(pose) = pose_of_rows(&place, &rows)? else {
+        let place = folder.path(&pose_name).display().to_string();
+        let Some(pose) = pose_of_rows(&place, &rows(folder, &pose_name)?)? else {
             left_out += 1;
             continue;
         };
@@ -59,32 +59,18 @@ pub fn read(folder: &Folder) -> Result<Scan> {
         let [lens, depth_lens] = match cameras {
             Some(known) => known,
             None => *cameras.insert([
-                camera(folder, "color", photograph_size(folder, &color)?)?,
-                camera(folder, "depth", depth_size(folder, &depth)?)?,
+                opencv_camera(folder, COLOR_CAMERA, photograph_size(folder, &color)?)?,
+                opencv_camera(folder, DEPTH_CAMERA, depth_size(folder, &depth)?)?,
             ]),
         };
         let photograph = folder.file(&place, &color)?;
-        let depth = DepthImage {
-            path: folder.file(&place, &depth)?,
-            lens: depth_lens,
-            metres_per_unit: 0.001,
-            invalid: None,
-        };
+        let depth = DepthImage::new(folder.file(&place, &depth)?, depth_lens, 0.001);
         scan.frames
             .push(ImportedFrame::new(photograph, lens, pose, Some(depth)));
     }
     remark_on_lost(left_out, &mut scan.remarks);
     remark_on_extrinsics(folder, &mut scan.remarks)?;
     Ok(scan)
-}
-
-/// The camera of one kind of image.
-fn camera(folder: &Folder, kind: &str, size: [u32; 2]) -> Result<Lens> {
-    let name = format!("intrinsic/intrinsic_{kind}.txt");
-    let path = folder.path(&name);
-    let k = rows(&path, &folder.text(&name)?)?;
-    let lens = opencv_lens(size, [k[0][0], k[1][1], k[0][2], k[1][2]]);
-    possible(lens, &path)
 }
 
 /// Adds a remark if the depth and colour cameras have different poses.
@@ -94,8 +80,7 @@ fn remark_on_extrinsics(folder: &Folder, remarks: &mut Vec<String>) -> Result<()
         if !folder.has(&name) {
             continue;
         }
-        let path = folder.path(&name);
-        let m = rows(&path, &folder.text(&name)?)?;
+        let m = rows(folder, &name)?;
         let column = |j: usize| glam::DVec3::new(m[0][j], m[1][j], m[2][j]);
         let difference = DMat3::from_cols(column(0), column(1), column(2)) - DMat3::IDENTITY;
         let shift = if m[0].len() == 4 {

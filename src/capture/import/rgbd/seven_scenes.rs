@@ -3,11 +3,11 @@
 //! Poses are 4×4 camera-to-world matrices with OpenCV's axes; depth is in millimetres, with 65535 for missing depth. 3DMatch adds
 //! `camera-intrinsics.txt`, a 3×3 matrix; 7-Scenes states a focal length of 585 pixels at 640 × 480.
 
-use crate::capture::import::folder::Folder;
+use crate::capture::import::folder::{Folder, inside};
 use crate::capture::import::matrix::{pose_of_rows, rows};
 use crate::capture::import::reader::{ImportOptions, Scan};
 use crate::capture::import::rgbd::{
-    depth_size, opencv_lens, photograph_size, possible, remark_on_lost,
+    depth_size, opencv_camera, opencv_lens, photograph_size, remark_on_lost,
 };
 use crate::capture::scan::ImportedFrame;
 use crate::capture::scan::depth::DepthImage;
@@ -55,15 +55,11 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
     let mut lenses: Option<[Lens; 2]> = None;
     let mut left_out = 0;
     for sequence in sequences(folder)? {
-        let prefix = match sequence.as_str() {
-            "" => String::new(),
-            name => format!("{name}/"),
-        };
         for name in folder.names(&sequence)? {
             let Some(stem) = name.strip_suffix(POSE) else {
                 continue;
             };
-            let stem = format!("{prefix}{stem}");
+            let stem = inside(&sequence, stem);
             let either = |kind: &str, ends: &[&str]| -> Result<String> {
                 let names = ends.iter().map(|end| format!("{stem}.{kind}.{end}"));
                 names.clone().find(|n| folder.has(n)).ok_or_else(|| {
@@ -76,10 +72,9 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
             };
             let color = either("color", &["png", "jpg", "jpeg"])?;
             let depth = either("depth", &["png", "pgm"])?;
-            let pose_name = format!("{prefix}{name}");
-            let path = folder.path(&pose_name);
-            let rows = rows(&path, &folder.text(&pose_name)?)?;
-            let Some(pose) = pose_of_rows(&path.display().to_string(), &rows)? else {
+            let pose_name = inside(&sequence, &name);
+            let place = folder.path(&pose_name).display().to_string();
+            let Some(pose) = pose_of_rows(&place, &rows(folder, &pose_name)?)? else {
                 left_out += 1;
                 continue;
             };
@@ -89,12 +84,10 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
                     *lenses.insert(cameras(folder, &color, &depth, options, &mut scan.remarks)?)
                 }
             };
-            let photograph = folder.file(&path.display().to_string(), &color)?;
+            let photograph = folder.file(&place, &color)?;
             let depth = DepthImage {
-                path: folder.file(&path.display().to_string(), &depth)?,
-                lens: depth_lens,
-                metres_per_unit: 0.001,
                 invalid: Some(INVALID),
+                ..DepthImage::new(folder.file(&place, &depth)?, depth_lens, 0.001)
             };
             scan.frames
                 .push(ImportedFrame::new(photograph, lens, pose, Some(depth)));
@@ -116,21 +109,15 @@ fn cameras(
     let lens = match (options.intrinsics, folder.first(&INTRINSICS)) {
         (Some(given), _) => opencv_lens(size, given),
         (None, Some(name)) => {
-            let k = rows(&folder.path(name), &folder.text(name)?)?;
             remarks.push(format!("intrinsics: {name}"));
-            let lens = opencv_lens(size, [k[0][0], k[1][1], k[0][2], k[1][2]]);
-            possible(lens, &folder.path(name))?
+            opencv_camera(folder, name, size)?
         }
         (None, None) => {
             let focal = 585.0 * f64::from(size[0]) / 640.0;
             remarks.push(format!(
                 "intrinsics: a focal length of {focal} pixels and the middle of the image, as 7-Scenes states; --intrinsics overrides"
             ));
-            Lens::plain(
-                size,
-                [focal; 2],
-                [f64::from(size[0]) * 0.5, f64::from(size[1]) * 0.5],
-            )
+            Lens::plain(size, [focal; 2], size.map(|side| f64::from(side) * 0.5))
         }
     };
     remarks.push("depth is taken to be seen by the colour camera".into());

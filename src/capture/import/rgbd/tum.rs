@@ -114,12 +114,7 @@ pub fn read(folder: &Folder, options: &ImportOptions, left_handed: bool) -> Resu
             )?),
         };
         let photograph = folder.existing(color)?;
-        let depth = DepthImage {
-            path: folder.existing(depth)?,
-            lens: depth_lens,
-            metres_per_unit: UNIT,
-            invalid: None,
-        };
+        let depth = DepthImage::new(folder.existing(depth)?, depth_lens, UNIT);
         scan.frames
             .push(ImportedFrame::new(photograph, lens, pose, Some(depth)));
     }
