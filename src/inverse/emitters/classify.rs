@@ -389,13 +389,4 @@ mod tests {
         let settled = classify(&cache, &unknowns, &[Role::Reflector, Role::Emitter]);
         assert_eq!(settled, []);
     }
-
-    #[test]
-    fn nothing_to_look_at_changes_nothing() {
-        let roles = [Role::Reflector, Role::Unseen];
-        assert_eq!(
-            classify(&PathCache::default(), &Unknowns::new(2), &roles),
-            []
-        );
-    }
 }
