@@ -222,10 +222,7 @@ mod tests {
     fn glossy(albedo: f32, roughness: f32, specular: f32) -> Bsdf {
         Bsdf {
             albedo: Vec3::splat(albedo),
-            lobe: Some(Lobe {
-                roughness,
-                specular: Vec3::splat(specular),
-            }),
+            lobe: Some(Lobe::grey(roughness, specular)),
         }
     }
 
@@ -284,10 +281,7 @@ mod tests {
 
     #[test]
     fn the_base_looks_the_same_from_everywhere_but_for_a_factor() {
-        let lobe = Lobe {
-            roughness: 0.3,
-            specular: Vec3::splat(0.2),
-        };
+        let lobe = Lobe::grey(0.3, 0.2);
         for (cos_o, cos_i) in [(0.05, 0.7), (0.4, 0.1), (0.9, 0.95), (1.0, 0.5)] {
             let (wo, wi) = (direction(cos_o, 0.3), direction(cos_i, 2.0));
             let along_normal = lobe.base(Vec3::Z, wi) * f64::from(base_by_view(wo.z));
@@ -379,31 +373,8 @@ mod tests {
                 assert_eq!(s.pdf, bsdf.pdf(wo, s.wi));
                 assert!((s.weight * s.pdf - value).abs().x <= 1e-5 * value.x);
             }
-        }
-    }
-
-    #[test]
-    fn grazing_and_narrow_lobes_stay_finite() {
-        let mut stream = Stream::new(6, 0, 0, 0);
-        for roughness in [0.0, 1e-4, 1e-3, 0.03, 1.0] {
-            for specular in [0.0, 0.04, 1.0] {
-                let bsdf = glossy(0.8, roughness, specular);
-                for cos_theta in [1e-7, 1e-5, 1e-3, 0.5, 1.0] {
-                    let wo = direction(cos_theta, stream.uniform() * 6.0);
-                    for _ in 0..500 {
-                        let drawn = bsdf.sample(wo, stream.uniform(), stream.uniform2());
-                        let Some(s) = drawn else { continue };
-                        let d = bsdf.derivative(wo, s.wi);
-                        assert!(s.wi.z > 0.0 && (s.wi.length() - 1.0).abs() < 1e-5);
-                        assert!(s.weight.is_finite() && s.weight.min_element() >= 0.0);
-                        assert!(s.weight.max_element() < 3.0, "{s:?} from {wo} on {bsdf:?}");
-                        assert!(d.roughness.is_finite() && d.specular.is_finite());
-                    }
-                    assert_eq!(bsdf.eval(wo, -wo), Vec3::ZERO);
-                    assert_eq!(bsdf.pdf(wo, -wo), 0.0);
-                    assert!(bsdf.sample(-wo, 0.5, [0.5; 2]).is_none());
-                }
-            }
+            assert_eq!((bsdf.eval(wo, -wi), bsdf.pdf(wo, -wi)), (Vec3::ZERO, 0.0));
+            assert!(bsdf.sample(-wo, 0.5, [0.5; 2]).is_none());
         }
     }
 

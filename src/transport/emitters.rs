@@ -28,16 +28,6 @@ impl FenwickTree {
         tree
     }
 
-    /// Number of weights.
-    pub fn len(&self) -> usize {
-        self.weights.len()
-    }
-
-    /// Whether there are no weights.
-    pub fn is_empty(&self) -> bool {
-        self.weights.is_empty()
-    }
-
     /// Sum of all weights.
     pub fn total(&self) -> f64 {
         let (mut sum, mut i) = (0.0, self.weights.len());
@@ -184,15 +174,9 @@ impl Emitters {
     #[inline]
     pub fn pdf(&self, object: u32) -> f32 {
         let index = object as usize;
-        let area = self.objects[index]
-            .cumulative
-            .last()
-            .copied()
-            .unwrap_or(0.0);
-        if area > 0.0 {
-            (self.tree.probability(index) / area) as f32
-        } else {
-            0.0
+        match self.objects[index].cumulative.last() {
+            Some(&area) if area > 0.0 => (self.tree.probability(index) / area) as f32,
+            _ => 0.0,
         }
     }
 
@@ -210,11 +194,8 @@ impl Emitters {
             .cumulative
             .partition_point(|&c| c <= target)
             .min(distribution.triangles.len() - 1);
-        let low = if index == 0 {
-            0.0
-        } else {
-            distribution.cumulative[index - 1]
-        };
+        let before = index.checked_sub(1);
+        let low = before.map_or(0.0, |before| distribution.cumulative[before]);
         let size = distribution.cumulative[index] - low;
         let within = if size > 0.0 {
             ((target - low) / size) as f32
@@ -232,30 +213,6 @@ impl Emitters {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::rng::Stream;
-
-    #[test]
-    fn probabilities_hold_after_millions_of_updates_over_sixteen_decades() {
-        let n = 1000;
-        let mut weights = vec![0.0f64; n];
-        let mut tree = FenwickTree::new(&weights);
-        let mut stream = Stream::new(5, 0, 0, 0);
-        for _ in 0..1_000_000 {
-            let i = stream.below(n);
-            let w = if stream.uniform() < 0.2 {
-                0.0
-            } else {
-                10f64.powf(16.0 * stream.uniform_f64() - 8.0)
-            };
-            weights[i] = w;
-            tree.set(i, w);
-        }
-        let total: f64 = weights.iter().sum();
-        assert!((tree.total() - total).abs() <= 1e-12 * total);
-        for (i, w) in weights.iter().enumerate() {
-            assert!((tree.probability(i) - w / total).abs() <= 1e-12);
-        }
-    }
 
     #[test]
     fn zero_weights_are_never_drawn_and_others_by_their_fraction() {

@@ -198,23 +198,20 @@ impl Run<'_, '_> {
                 ),
             ),
         };
-        let (seconds, iterations) = self.state.stage_started;
+        let (started, iterations) = self.state.stage_started;
+        let seconds = self.monitor.seconds() - started;
         let progress = &mut self.monitor.progress;
         progress.stages.retain(|stage| stage.name != name);
-        let stage = Stage {
+        progress.stages.push(Stage {
             name,
-            seconds: self.monitor.seconds() - seconds,
-            iterations: self.monitor.progress.iterations.saturating_sub(iterations),
+            seconds,
+            iterations: progress.iterations.saturating_sub(iterations),
             train_loss: best.train,
             held_out_loss: best.held_out,
             kept,
             why: format!("{what}: {course}"),
-        };
-        self.monitor.stage(stage);
-        self.state.fruitless = match kept {
-            true => 0,
-            false => self.state.fruitless + 1,
-        };
+        });
+        self.state.fruitless = if kept { 0 } else { self.state.fruitless + 1 };
         self.state.descent.albedo = best.albedo;
         self.state.descent.set_emission(best.emission);
         self.describe();

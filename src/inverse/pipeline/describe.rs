@@ -88,19 +88,15 @@ pub fn estimate(
                         object.note.push_str("; only a few pixels see it");
                     }
                 }
-                Role::Unseen => {
+                Role::Unseen | Role::Dark => {
                     object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION);
                     object.identifiable = false;
                     object.albedo_identifiable = false;
-                    object.note =
-                        "no photograph sees it; its emission is inferred from its effect on others"
-                            .into();
-                }
-                Role::Dark => {
-                    object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION);
-                    object.identifiable = false;
-                    object.albedo_identifiable = false;
-                    object.note = "no photograph sees it; its albedo is assumed".into();
+                    object.note = match roles[k] {
+                        Role::Dark => "no photograph sees it; its albedo is assumed",
+                        _ => "no photograph sees it; its emission is inferred from its effect on others",
+                    }
+                    .into();
                 }
             }
             object

@@ -36,8 +36,7 @@ impl Pipeline<'_, '_> {
         let equations = cache.normal_equations(&self.unknowns, &free, &self.robust, &self.prior);
         let tests = score_tests(&equations, &free, active);
         for test in &tests {
-            self.errors.emission[test.index - objects] =
-                Vec3::from_array(test.stderr.map(|e| e as f32));
+            self.errors.emission[test.index - objects] = test.stderr.as_vec3();
         }
         self.describe();
         tests

@@ -167,8 +167,11 @@ impl Pipeline<'_, '_> {
             rounds.next += 1;
             // The reflected light of lamps is traced again each round instead of linearised.
             self.light_patches(round);
-            let linearised =
-                self.linearised(&rounds.lights, 2, round, &rounds.about, &rounds.places)?;
+            let reflected = self.patches.reflected.clone();
+            let (about, places) = (&rounds.about, &rounds.places);
+            let linearised = self.traced(&rounds.lights, None, 2, round, |slice| {
+                slice.linearise(about, places, &reflected)
+            })?;
             rounds.sums.add(linearised);
             let mut clusters = rounds.mean(&self.roles);
             self.leave_textures_out(&mut clusters);
