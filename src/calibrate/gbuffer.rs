@@ -93,7 +93,7 @@ impl GBuffer {
                 }
             }
         }
-        let total: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
+        let total = problem.pixels();
         let fraction = (max_pixels as f64 / total.max(1) as f64).min(1.0);
         // Each pixel with its footprint and the number of its rays.
         let sampled: Vec<(GBufferPixel, Option<f32>, u64)> =

@@ -1,5 +1,6 @@
 //! Emitter sampling: an object from a Fenwick tree of weights, then a point uniformly by area.
 
+use crate::math::color::luminance;
 use crate::math::warp;
 use crate::scene::Scene;
 use glam::Vec3;
@@ -101,6 +102,13 @@ fn usable(weight: f64) -> f64 {
     } else {
         0.0
     }
+}
+
+/// Area × luminance of emission of each object: the weights of light sampling.
+pub fn powers(scene: &Scene, emission: impl Iterator<Item = Vec3>) -> Vec<f64> {
+    (scene.objects.iter().zip(emission))
+        .map(|(object, emission)| object.area * f64::from(luminance(emission)))
+        .collect()
 }
 
 /// Uniform area sampling of one object.
@@ -207,38 +215,5 @@ impl Emitters {
         let [a, b, c] = scene.corners(triangle);
         let point = a * (1.0 - b1 - b2) + b * b1 + c * b2;
         Some((object as u32, AreaSample { triangle, point }))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn zero_weights_are_never_drawn_and_others_by_their_fraction() {
-        for n in [1usize, 2, 3, 7, 8, 9, 100] {
-            let weights: Vec<f64> = (0..n)
-                .map(|i| if i % 3 == 1 { 0.0 } else { (i + 1) as f64 })
-                .collect();
-            let tree = FenwickTree::new(&weights);
-            let mut counts = vec![0u32; n];
-            let draws = 60_000;
-            for k in 0..draws {
-                // The grid of u holds both ends.
-                let u = f64::from(k) / f64::from(draws - 1);
-                counts[tree.sample(u.min(1.0)).expect("some weight is positive")] += 1;
-            }
-            for i in 0..n {
-                let expected = tree.probability(i) * f64::from(draws);
-                assert!(
-                    (f64::from(counts[i]) - expected).abs() <= 2.0,
-                    "{n} {i}: {} {expected}",
-                    counts[i]
-                );
-                assert!(weights[i] > 0.0 || counts[i] == 0);
-            }
-        }
-        assert_eq!(FenwickTree::new(&[0.0, f64::NAN, -1.0]).sample(0.5), None);
-        assert_eq!(FenwickTree::new(&[]).sample(0.5), None);
     }
 }
