@@ -32,17 +32,6 @@ pub struct BsdfSample {
     pub pdf: f32,
 }
 
-/// Derivatives of [`Bsdf::eval`], channel by channel (no channel depends on another's parameters).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BsdfDerivative {
-    /// With respect to the albedo of the channel.
-    pub albedo: Vec3,
-    /// With respect to the GGX roughness α.
-    pub roughness: Vec3,
-    /// With respect to the specular reflectance at normal incidence of the channel.
-    pub specular: Vec3,
-}
-
 impl Bsdf {
     /// f(wo, wi) cosθi; zero where either direction is at or below the horizon.
     #[inline]
@@ -90,35 +79,6 @@ impl Bsdf {
             None => self.albedo,
         };
         Some(BsdfSample { wi, weight, pdf })
-    }
-
-    /// Derivatives of [`Bsdf::eval`] with respect to the parameters, for fixed directions.
-    ///
-    /// Without a lobe, those of roughness and specular reflectance are zero.
-    pub fn derivative(&self, wo: Vec3, wi: Vec3) -> BsdfDerivative {
-        let mut derivative = BsdfDerivative {
-            albedo: Vec3::ZERO,
-            roughness: Vec3::ZERO,
-            specular: Vec3::ZERO,
-        };
-        if wo.z <= 0.0 || wi.z <= 0.0 {
-            return derivative;
-        }
-        let Some(lobe) = self.lobe else {
-            derivative.albedo = Vec3::splat(warp::cosine_hemisphere_pdf(wi.z));
-            return derivative;
-        };
-        let specular = lobe.specular.as_dvec3();
-        let base = coupling(wo, wi);
-        let microfacet = Microfacet::new(alpha(&lobe), wo, wi);
-        let value = microfacet.eval();
-        derivative.albedo = ((DVec3::ONE - specular) * base).as_vec3();
-        derivative.roughness =
-            (microfacet.fresnel(specular) * value * microfacet.log_derivative()).as_vec3();
-        derivative.specular = (DVec3::splat(value * (1.0 - microfacet.schlick))
-            - self.albedo.as_dvec3() * base)
-            .as_vec3();
-        derivative
     }
 }
 
@@ -296,64 +256,5 @@ mod tests {
             assert_eq!((bsdf.eval(wo, -wi), bsdf.pdf(wo, -wi)), (Vec3::ZERO, 0.0));
             assert!(bsdf.sample(-wo, 0.5, [0.5; 2]).is_none());
         }
-    }
-
-    /// Central differences of an f64 evaluation, so that only the step's own error is left.
-    #[test]
-    fn derivatives_agree_with_finite_differences() {
-        let value = |albedo: f64, alpha: f64, specular: f64, wo: Vec3, wi: Vec3| {
-            let microfacet = Microfacet::new(alpha, wo, wi);
-            albedo * (1.0 - specular) * coupling(wo, wi)
-                + microfacet.fresnel(DVec3::splat(specular)).x * microfacet.eval()
-        };
-        let mut stream = Stream::new(7, 0, 0, 0);
-        for _ in 0..5_000 {
-            let roughness = 0.05 + 0.95 * stream.uniform();
-            let bsdf = glossy(stream.uniform(), roughness, stream.uniform());
-            let wo = warp::cosine_hemisphere(stream.uniform2());
-            let Some(s) = bsdf.sample(wo, stream.uniform(), stream.uniform2()) else {
-                continue;
-            };
-            let wi = s.wi;
-            let d = bsdf.derivative(wo, wi);
-            let (a, r) = (f64::from(bsdf.albedo.x), f64::from(roughness));
-            let Some(f) = bsdf.lobe.map(|lobe| f64::from(lobe.specular.x)) else {
-                continue;
-            };
-            let scale = value(a, r, f, wo, wi);
-            assert!((scale - f64::from(bsdf.eval(wo, wi).x)).abs() <= 1e-6 * scale);
-            let h = 1e-5 * r;
-            for (name, got, want) in [
-                (
-                    "albedo",
-                    d.albedo.x,
-                    (value(a + h, r, f, wo, wi) - value(a - h, r, f, wo, wi)) / (2.0 * h),
-                ),
-                (
-                    "roughness",
-                    d.roughness.x,
-                    (value(a, r + h, f, wo, wi) - value(a, r - h, f, wo, wi)) / (2.0 * h),
-                ),
-                (
-                    "specular",
-                    d.specular.x,
-                    (value(a, r, f + h, wo, wi) - value(a, r, f - h, wo, wi)) / (2.0 * h),
-                ),
-            ] {
-                let error = (f64::from(got) - want).abs();
-                assert!(
-                    error <= 1e-6 * (want.abs() + scale / r) + 1e-9,
-                    "{name}: {got} against {want} for {bsdf:?}"
-                );
-            }
-        }
-        // Without a lobe only the albedo moves anything.
-        let diffuse = Bsdf {
-            albedo: Vec3::splat(0.5),
-            lobe: None,
-        };
-        let d = diffuse.derivative(Vec3::Z, direction(0.5, 0.0));
-        assert_eq!(d.albedo, diffuse.eval(Vec3::Z, direction(0.5, 0.0)) * 2.0);
-        assert_eq!((d.roughness, d.specular), (Vec3::ZERO, Vec3::ZERO));
     }
 }
