@@ -304,7 +304,10 @@ fn direct_light(
     if world.occluded(&light.ray) {
         return (origin, Vec3::ZERO);
     }
-    let weight = light_weight(light.pdf, bsdf.pdf(local_wo, local_wi), options);
+    let weight = match options.sample_bsdf {
+        true => power_heuristic(light.pdf, bsdf.pdf(local_wo, local_wi)),
+        false => 1.0,
+    };
     (origin, scattered * light.radiance / light.pdf * weight)
 }
 
@@ -378,14 +381,5 @@ fn emission_weight(bsdf_pdf: f32, light_pdf: f32, options: &PathOptions) -> f32 
         // Emission that light sampling cannot reach is left to BSDF sampling.
         (false, true) => f32::from(light_pdf <= 0.0),
         _ => 1.0,
-    }
-}
-
-/// MIS weight of a light sample.
-fn light_weight(light_pdf: f32, bsdf_pdf: f32, options: &PathOptions) -> f32 {
-    if options.sample_bsdf {
-        power_heuristic(light_pdf, bsdf_pdf)
-    } else {
-        1.0
     }
 }

@@ -74,11 +74,7 @@ impl Rows {
             .map(|part| {
                 let mut sum = vec![DVec3::ZERO; self.diagonal.len()];
                 for cluster in part * clusters / PARTS..(part + 1) * clusters / PARTS {
-                    let start = if cluster == 0 {
-                        0
-                    } else {
-                        self.ends[cluster - 1]
-                    };
+                    let start = cluster.checked_sub(1).map_or(0, |before| self.ends[before]);
                     let own = &entries[start..self.ends[cluster]];
                     let factor = factor(cluster, own);
                     for entry in own {

@@ -150,11 +150,9 @@ impl Descent {
             emission,
             patches: Some(patches),
             level: 0,
-            believed: self.believed.clone(),
-            steps: self.steps,
-            lobes: self.lobes.clone(),
             fixed: Vec::new(),
             caches: None,
+            ..self.clone()
         }
     }
 

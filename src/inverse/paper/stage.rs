@@ -220,23 +220,20 @@ impl Run<'_, '_> {
     /// Starts the next stage: an albedo for each triangle, then the worst patches cut into four. `false` if there is none.
     fn refine(&mut self) -> bool {
         let scene = &self.problem.scene;
-        let mut which = Vec::new();
-        if self.state.descent.patches.is_none() {
-            if scene.triangles.len() <= scene.objects.len() {
-                return false;
+        let which = match self.state.descent.patches {
+            None if scene.triangles.len() <= scene.objects.len() => return false,
+            None => Vec::new(),
+            Some(_) => {
+                let (settings, descent) = (&self.monitor.settings, &mut self.state.descent);
+                let (worst, cast) =
+                    (self.cover).to_cut(self.problem, settings, self.bounces, descent);
+                self.monitor.cast(cast);
+                if !worst.contains(&true) {
+                    return false;
+                }
+                worst
             }
-        } else {
-            let settings = &self.monitor.settings;
-            let descent = &mut self.state.descent;
-            let (worst, cast) = self
-                .cover
-                .to_cut(self.problem, settings, self.bounces, descent);
-            self.monitor.cast(cast);
-            if !worst.contains(&true) {
-                return false;
-            }
-            which = worst;
-        }
+        };
         let cuts = match self.state.descent.patches {
             None => 0,
             Some(_) => self.state.cuts + 1,
