@@ -61,35 +61,29 @@ impl CameraModel {
 
     /// Log radiance of an observation.
     pub fn radiance(&self, observation: &Observation) -> DVec3 {
-        let light = match &self.response {
-            None => observation.level,
-            Some(response) => {
-                let value = observation.level - observation.saturation;
-                observation.saturation + by_channel(|c| response.log_light(c, value[c])[0])
-            }
-        };
-        light - self.factor(observation)
+        self.light(observation)[0] - self.factor(observation)
     }
 
     /// Derivative of an observation's log radiance with respect to its log value.
     pub fn slope(&self, observation: &Observation) -> DVec3 {
-        match &self.response {
-            None => DVec3::ONE,
-            Some(response) => {
-                let value = observation.level - observation.saturation;
-                by_channel(|c| response.log_light(c, value[c])[1])
-            }
-        }
+        self.light(observation)[1]
+    }
+
+    /// Log light of an observation on the sensor, and its derivative with respect to the log value.
+    fn light(&self, observation: &Observation) -> [DVec3; 2] {
+        let Some(response) = &self.response else {
+            return [observation.level, DVec3::ONE];
+        };
+        let value = observation.level - observation.saturation;
+        let channels = [0, 1, 2].map(|c| response.log_light(c, value[c]));
+        let [light, slope] = [0, 1].map(|i| DVec3::from_array(channels.map(|c| c[i])));
+        [observation.saturation + light, slope]
     }
 
     /// Difference of an observation's log value from the one that log `radiance` would give, to first order.
     pub fn residual(&self, observation: &Observation, radiance: DVec3) -> DVec3 {
         (self.radiance(observation) - radiance) / self.slope(observation)
     }
-}
-
-fn by_channel(f: impl Fn(usize) -> f64) -> DVec3 {
-    DVec3::from_array(std::array::from_fn(f))
 }
 
 /// The model with the least sum of absolute differences from the cells' levels, by iteratively reweighted least squares. Parts
