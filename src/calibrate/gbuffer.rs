@@ -63,6 +63,12 @@ pub struct GBuffer {
 }
 
 impl GBuffer {
+    /// The pixels in the fit whose centre sees the mesh.
+    pub fn fitted(&self) -> impl Iterator<Item = &GBufferPixel> {
+        let fitted = |p: &&GBufferPixel| !p.held_out && p.object != u32::MAX;
+        self.pixels.iter().filter(fitted)
+    }
+
     /// For each photograph, whether none of its pixels is in the fit: it is held out whole or has no usable pixel.
     pub fn unfitted(&self, photographs: usize) -> Vec<bool> {
         let mut unfitted = vec![true; photographs];
@@ -87,70 +93,40 @@ impl GBuffer {
                 }
             }
         }
-        let total: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
+        let total = problem.pixels();
         let fraction = (max_pixels as f64 / total.max(1) as f64).min(1.0);
-        let frames: Vec<FramePixels> = problem
-            .photographs
-            .par_iter()
-            .enumerate()
-            .map(|(frame, photograph)| {
-                let view = FrameView {
-                    scene,
-                    camera: &scene.cameras[frame],
-                    triangles: &centers.triangles[frame],
-                };
-                let mut pixels_of_frame = FramePixels::default();
-                for pixel in 0..photograph.pixels.len() {
-                    let usable = photograph.is_usable(pixel);
-                    let triangle = centers.triangles[frame][pixel] as usize;
-                    let rare = scene
-                        .object_of
-                        .get(triangle)
-                        .is_some_and(|&k| seen[k as usize] < RARE);
-                    if !usable || !(rare || drawn(fraction, frame as u64, pixel as u64)) {
-                        continue;
-                    }
-                    let key = Stream::new(seed, frame as u64, pixel as u64, KEY);
-                    let sampled = view.sample(pixel, key);
-                    pixels_of_frame.footprints.extend(sampled.footprint);
-                    pixels_of_frame.rays += sampled.rays;
-                    pixels_of_frame.pixels.push(GBufferPixel {
+        // Each pixel with its footprint and the number of its rays.
+        let sampled: Vec<(GBufferPixel, Option<f32>, u64)> =
+            (problem.photographs.par_iter().enumerate())
+                .flat_map_iter(|(frame, photograph)| {
+                    let view = FrameView {
+                        scene,
+                        camera: &scene.cameras[frame],
+                        triangles: &centers.triangles[frame],
                         frame: frame as u32,
-                        pixel: pixel as u32,
-                        object: sampled.object,
-                        pure: sampled.pure,
-                        inside: sampled.inside,
-                        held_out: hold_out.contains(frame as u32, pixel as u32),
-                        points: sampled.points,
-                    });
-                }
-                pixels_of_frame
-            })
-            .collect();
-
-        let mut pixels = Vec::with_capacity(frames.iter().map(|f| f.pixels.len()).sum());
-        let mut footprints = Vec::with_capacity(pixels.capacity());
-        let mut rays = total as u64;
-        for frame in frames {
-            pixels.extend(frame.pixels);
-            footprints.extend(frame.footprints);
-            rays += frame.rays;
-        }
+                        hold_out,
+                    };
+                    let seen = &seen;
+                    let chosen = move |&pixel: &usize| {
+                        let object = scene.object_of.get(view.triangles[pixel] as usize);
+                        let rare = object.is_some_and(|&k| seen[k as usize] < RARE);
+                        photograph.is_usable(pixel)
+                            && (rare || drawn(fraction, frame as u64, pixel as u64))
+                    };
+                    let pixels = (0..photograph.pixels.len()).filter(chosen);
+                    pixels.map(move |pixel| {
+                        view.sample(pixel, Stream::new(seed, frame as u64, pixel as u64, KEY))
+                    })
+                })
+                .collect();
+        let mut footprints: Vec<f32> = sampled.iter().filter_map(|s| s.1).collect();
         Self {
-            pixels,
+            rays: total as u64 + sampled.iter().map(|s| s.2).sum::<u64>(),
+            pixels: sampled.into_iter().map(|s| s.0).collect(),
             seen,
             footprint: upper_median(&mut footprints).unwrap_or(0.0),
-            rays,
         }
     }
-}
-
-/// The sampled pixels of one frame.
-#[derive(Default)]
-struct FramePixels {
-    pixels: Vec<GBufferPixel>,
-    footprints: Vec<f32>,
-    rays: u64,
 }
 
 /// Whether a pixel belongs to the hashed fraction of sampled pixels.
@@ -160,28 +136,20 @@ fn drawn(fraction: f64, frame: u64, pixel: u64) -> bool {
             < fraction * (1u64 << 53) as f64
 }
 
-/// A camera and the triangle that the centre of each of its pixels sees.
+/// A photograph's camera, and the triangle that the centre of each of its pixels sees.
+#[derive(Clone, Copy)]
 struct FrameView<'a> {
     scene: &'a Scene,
     camera: &'a Camera,
     triangles: &'a [u32],
-}
-
-/// What the rays through one pixel hit.
-struct SampledPixel {
-    object: u32,
-    pure: bool,
-    inside: bool,
-    points: [Option<SurfacePoint>; QUARTERS],
-    /// Width of the pixel on the surface.
-    footprint: Option<f32>,
-    rays: u64,
+    frame: u32,
+    hold_out: HoldOut,
 }
 
 impl FrameView<'_> {
-    /// Samples a pixel with stratified offsets from `stream`. Where the pixel and its neighbours see one plane, the points are
-    /// computed on that plane without casting rays.
-    fn sample(&self, pixel: usize, mut stream: Stream) -> SampledPixel {
+    /// Samples a pixel with stratified offsets from `stream`; returns it with its width on the surface and the number of rays. Where
+    /// the pixel and its neighbours see one plane, the points are computed on that plane without casting rays.
+    fn sample(&self, pixel: usize, mut stream: Stream) -> (GBufferPixel, Option<f32>, u64) {
         let width = self.camera.intrinsics.width as usize;
         let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
         let triangle = self.triangles[pixel];
@@ -218,14 +186,16 @@ impl FrameView<'_> {
                 })
             })
         });
-        SampledPixel {
+        let sampled = GBufferPixel {
+            frame: self.frame,
+            pixel: pixel as u32,
             object: center.map_or(u32::MAX, |c| c.object),
             pure,
             inside: pure && one_object.is_some(),
+            held_out: self.hold_out.contains(self.frame, pixel as u32),
             points,
-            footprint,
-            rays: if flat { 0 } else { QUARTERS as u64 },
-        }
+        };
+        (sampled, footprint, if flat { 0 } else { QUARTERS as u64 })
     }
 
     /// A point on a triangle, with the normal of the side that faces the camera.

@@ -7,6 +7,8 @@ use crate::calibrate::gbuffer::{GBuffer, SurfacePoint};
 use crate::calibrate::problem::Problem;
 use crate::math::rng::splitmix64;
 use glam::{DVec3, Vec3};
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 
 /// Cells of the coarsest level are 2^(LEVELS − 1) times as wide as those of the finest.
 const LEVELS: usize = 3;
@@ -26,7 +28,6 @@ pub struct MeasuredRadiance {
 /// The samples in one cell.
 #[derive(Debug, Clone, Copy, Default)]
 struct Cell {
-    key: u64,
     sum: DVec3,
     /// Samples of pure, unsaturated pixels, which `sum` adds up.
     valid: u32,
@@ -34,45 +35,23 @@ struct Cell {
     total: u32,
 }
 
-/// Open-addressing hash table; keys are never zero.
-#[derive(Debug, Clone)]
-struct Table {
-    cells: Vec<Cell>,
-    used: usize,
-}
+/// Cells by key. Keys are hashes already and are not hashed again.
+type Table = HashMap<u64, Cell, BuildHasherDefault<KeyHasher>>;
 
-impl Table {
-    fn new() -> Self {
-        Self {
-            cells: vec![Cell::default(); 1024],
-            used: 0,
-        }
+#[derive(Debug, Clone, Copy, Default)]
+struct KeyHasher(u64);
+
+impl Hasher for KeyHasher {
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|&b| self.write_u64(u64::from(b)));
     }
 
-    fn slot(&self, key: u64) -> usize {
-        let mask = self.cells.len() - 1;
-        let mut slot = key as usize & mask;
-        while self.cells[slot].key != 0 && self.cells[slot].key != key {
-            slot = (slot + 1) & mask;
-        }
-        slot
+    fn write_u64(&mut self, key: u64) {
+        self.0 ^= key;
     }
 
-    fn entry(&mut self, key: u64) -> &mut Cell {
-        if self.used * 2 > self.cells.len() {
-            let larger = vec![Cell::default(); self.cells.len() * 4];
-            let old = std::mem::replace(&mut self.cells, larger);
-            for cell in old.into_iter().filter(|c| c.key != 0) {
-                let slot = self.slot(cell.key);
-                self.cells[slot] = cell;
-            }
-        }
-        let slot = self.slot(key);
-        if self.cells[slot].key == 0 {
-            self.cells[slot].key = key;
-            self.used += 1;
-        }
-        &mut self.cells[slot]
+    fn finish(&self) -> u64 {
+        self.0
     }
 }
 
@@ -81,7 +60,7 @@ impl MeasuredRadiance {
     pub fn new(problem: &Problem, gbuffer: &GBuffer) -> Self {
         let mut measured = Self {
             cell: gbuffer.footprint * CELL_FOOTPRINTS,
-            levels: (0..LEVELS).map(|_| Table::new()).collect(),
+            levels: vec![Table::default(); LEVELS],
             object_means: Vec::new(),
         };
         let mut means = vec![(DVec3::ZERO, 0u64); problem.scene.objects.len()];
@@ -93,7 +72,7 @@ impl MeasuredRadiance {
             for point in pixel.points.iter().flatten() {
                 for level in 0..LEVELS {
                     let key = measured.key(level, point);
-                    let cell = measured.levels[level].entry(key);
+                    let cell = measured.levels[level].entry(key).or_default();
                     cell.total += 1;
                     if is_valid {
                         cell.valid += 1;
@@ -121,18 +100,11 @@ impl MeasuredRadiance {
         if self.cell <= 0.0 {
             return None;
         }
-        for (level, table) in self.levels.iter().enumerate() {
-            let key = self.key(level, point);
-            let cell = &table.cells[table.slot(key)];
-            // Cells at the edges of objects hold mostly mixed pixels, which measure neither object.
-            if cell.valid > 0 && 2 * cell.valid >= cell.total {
-                return Some((cell.sum / f64::from(cell.valid)).as_vec3());
-            }
-            if cell.total > 0 {
-                return None;
-            }
-        }
-        None
+        let mut levels = self.levels.iter().enumerate();
+        let cell = levels.find_map(|(level, table)| table.get(&self.key(level, point)))?;
+        // Cells at the edges of objects hold mostly mixed pixels, which measure neither object.
+        let is_measured = cell.valid > 0 && 2 * cell.valid >= cell.total;
+        is_measured.then(|| (cell.sum / f64::from(cell.valid)).as_vec3())
     }
 
     #[inline]
@@ -142,7 +114,7 @@ impl MeasuredRadiance {
 }
 
 /// Hash key of the cell of width `size` that a surface point lies in: from its position, object, and dominant signed axis of
-/// the normal; never zero.
+/// the normal.
 #[inline]
 pub fn cell_key(size: f32, at: &SurfacePoint) -> u64 {
     let position = (at.point / size).floor();
@@ -159,5 +131,5 @@ pub fn cell_key(size: f32, at: &SurfacePoint) -> u64 {
     for c in position.to_array() {
         h = splitmix64(h ^ (c as i64 as u64));
     }
-    h.max(1)
+    h
 }

@@ -102,7 +102,8 @@ impl Sharpness {
         let median = upper_median(&mut sizes).unwrap_or(0.0);
         let min_step = MIN_STEP.max(ABOVE_MEDIAN * median);
         Self {
-            contrast: fit_contrasts(&ratios(&steps, min_step), frames),
+            contrast: fit_contrasts(&ratios(&steps, min_step))
+                .unwrap_or_else(|| vec![None; frames]),
         }
     }
 
@@ -154,8 +155,9 @@ fn ratios(steps: &[Steps], min_step: f32) -> Vec<Vec<(usize, f64, usize)>> {
     steps.iter().map(ratios_of).collect()
 }
 
-/// The least-squares contrasts of photographs, scaled to a median of 1, from their [`ratios`].
-fn fit_contrasts(ratios: &[Vec<(usize, f64, usize)>], frames: usize) -> Vec<Option<f64>> {
+/// The least-squares contrasts of photographs, scaled to a median of 1, from their [`ratios`]; `None` if too few share edges.
+fn fit_contrasts(ratios: &[Vec<(usize, f64, usize)>]) -> Option<Vec<Option<f64>>> {
+    let frames = ratios.len();
     let mut matrix = DMatrix::<f64>::identity(frames, frames) * RIDGE;
     let mut right = DVector::<f64>::zeros(frames);
     let mut pairs = vec![0; frames];
@@ -179,25 +181,18 @@ fn fit_contrasts(ratios: &[Vec<(usize, f64, usize)>], frames: usize) -> Vec<Opti
             }
         }
     }
-    let unknown = vec![None; frames];
-    let Some(factor) = matrix.cholesky() else {
-        return unknown;
-    };
-    let logarithms = factor.solve(&right);
+    let logarithms = matrix.cholesky()?.solve(&right);
     let is_known = |frame: &usize| pairs[*frame] > 0;
     let mut known: Vec<f64> = (0..frames)
         .filter(is_known)
         .map(|frame| logarithms[frame])
         .collect();
     if known.len() < MIN_PHOTOGRAPHS {
-        return unknown;
+        return None;
     }
-    let Some(median) = quantile(&mut known, 0.5) else {
-        return unknown;
-    };
-    (0..frames)
-        .map(|frame| is_known(&frame).then(|| (logarithms[frame] - median).exp()))
-        .collect()
+    let median = quantile(&mut known, 0.5)?;
+    let contrast = |frame| is_known(&frame).then(|| (logarithms[frame] - median).exp());
+    Some((0..frames).map(contrast).collect())
 }
 
 /// The steps between neighbouring pixels of a photograph, each with the step between the same points in other photographs.

@@ -43,34 +43,20 @@ pub struct Estimate {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ObjectEstimate {
     /// Diffuse reflectance, linear RGB in [0, 1].
-    #[serde(
-        serialize_with = "nullable::color",
-        deserialize_with = "nullable::or_zero"
-    )]
+    #[serde(deserialize_with = "nullable::or_zero")]
     pub albedo: Vec3,
     /// Standard error of `albedo`.
-    #[serde(
-        serialize_with = "nullable::color",
-        deserialize_with = "nullable::or_infinity"
-    )]
+    #[serde(deserialize_with = "nullable::or_infinity")]
     pub albedo_stderr: Vec3,
     /// Emitted radiance, W·sr⁻¹·m⁻².
-    #[serde(
-        serialize_with = "nullable::color",
-        deserialize_with = "nullable::or_zero"
-    )]
+    #[serde(deserialize_with = "nullable::or_zero")]
     pub emission: Vec3,
     /// Standard error of `emission`.
-    #[serde(
-        serialize_with = "nullable::color",
-        deserialize_with = "nullable::or_infinity"
-    )]
+    #[serde(deserialize_with = "nullable::or_infinity")]
     pub emission_stderr: Vec3,
     /// GGX roughness α; `None` without a lobe.
-    #[serde(serialize_with = "nullable::number")]
     pub roughness: Option<f32>,
     /// Specular reflectance at normal incidence; `None` without a lobe.
-    #[serde(serialize_with = "nullable::number")]
     pub specular: Option<f32>,
     /// Number of pixels of all photographs whose centre sees the object.
     pub seen_pixels: u64,
@@ -260,14 +246,11 @@ impl Estimate {
                     }
                     _ => Albedo::Constant(object.albedo),
                 };
-                let lobe = object.lobe().map(|(roughness, specular)| Lobe {
-                    roughness,
-                    specular: Vec3::splat(specular),
-                });
+                let lobe = object.lobe();
                 Material {
                     albedo,
                     emission: object.emission,
-                    lobe,
+                    lobe: lobe.map(|(roughness, specular)| Lobe::grey(roughness, specular)),
                 }
             })
             .collect()

@@ -60,24 +60,17 @@ impl LossProbe {
         max_bounces: u32,
     ) -> Self {
         let mut sets = [Vec::new(), Vec::new()];
-        let total: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
         // About forty times as many pixels are visited, which is enough to find the held-out ones.
-        let stride = (total / (pixels * 40).max(1)).max(1);
+        let stride = (problem.pixels() / (pixels * 40).max(1)).max(1);
         let triangles = &problem.scene.ids().triangles;
         let mut next = 0;
-        let mut before = 0;
-        for (frame, photograph) in problem.photographs.iter().enumerate() {
-            let end = before + photograph.pixels.len();
-            while next < end {
-                let pixel = next - before;
-                let usable = photograph.is_usable(pixel);
-                if usable && triangles[frame].get(pixel) != Some(&NOTHING) {
-                    let held = HoldOut::from(settings).contains(frame as u32, pixel as u32);
-                    sets[usize::from(held)].push((frame as u32, pixel as u32));
-                }
-                next += 1 + splitmix64(next as u64) as usize % (2 * stride - 1).max(1);
+        while let Some((frame, pixel)) = problem.locate(next) {
+            let usable = problem.photographs[frame].is_usable(pixel);
+            if usable && triangles[frame].get(pixel) != Some(&NOTHING) {
+                let held = HoldOut::from(settings).contains(frame as u32, pixel as u32);
+                sets[usize::from(held)].push((frame as u32, pixel as u32));
             }
-            before = end;
+            next += 1 + splitmix64(next as u64) as usize % (2 * stride - 1).max(1);
         }
         let [train, held_out] = sets.map(|all| {
             let count = all.len().min(pixels);

@@ -4,7 +4,7 @@ use crate::inverse::estimate::Estimate;
 use crate::inverse::known::Known;
 use crate::inverse::settings::Settings;
 use crate::inverse::solver::{
-    Checkpoint, Control, FitPoint, LossPoint, Observer, Progress, Stage, Termination,
+    Checkpoint, Control, FitPoint, LossPoint, Observer, Progress, Termination,
 };
 use crate::transport::arrival::RayCount;
 use std::time::{Duration, Instant};
@@ -138,11 +138,6 @@ impl<'a> Monitor<'a> {
         self.progress.fits.push(point);
     }
 
-    /// Records a finished stage.
-    pub fn stage(&mut self, stage: Stage) {
-        self.progress.stages.push(stage);
-    }
-
     /// Counts rays cast, and paths rejected because their weights were not finite.
     pub fn cast(&mut self, cast: RayCount) {
         self.progress.rays += cast.rays;
@@ -267,16 +262,5 @@ mod tests {
         assert_eq!(report(&mut monitor), Ok(()));
         let seconds = monitor.seconds();
         assert!(seconds <= (begun.elapsed() - pause).as_secs_f64());
-    }
-
-    #[test]
-    fn only_samples_that_were_dropped_are_counted() {
-        let mut observer = puppet(Control::Continue);
-        let mut monitor = Monitor::new(&Settings::default(), &mut observer, Progress::default());
-        monitor.rejected("a", 0);
-        monitor.rejected("b", 2);
-        monitor.rejected("b", 3);
-        let counts: Vec<_> = monitor.progress.rejected.into_iter().collect();
-        assert_eq!(counts, [("b".to_owned(), 5)]);
     }
 }

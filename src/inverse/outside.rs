@@ -21,8 +21,6 @@ const LEVELS: usize = 3;
 /// Mean measured radiance by direction; black in unmeasured directions.
 #[derive(Debug, Clone)]
 pub struct MeasuredOutside {
-    width: usize,
-    height: usize,
     /// Cells of light from below the horizon and from above it.
     halves: [Half; 2],
     /// Radiance of each cell, or its lower bound, on both sides of the horizon.
@@ -80,7 +78,7 @@ impl MeasuredOutside {
             return None;
         }
         let (mut room, mut pixels) = (0.0, 0);
-        for p in (gbuffer.pixels.iter()).filter(|p| !p.held_out && p.object != u32::MAX) {
+        for p in gbuffer.fitted() {
             let pixel = problem.photographs[p.frame as usize].pixels[p.pixel as usize];
             room += f64::from(luminance(pixel));
             pixels += 1;
@@ -88,8 +86,6 @@ impl MeasuredOutside {
         let [(below, dark), (above, bright)] = sums.map(|sums| Half::new(width, height, &sums));
         let map = Environment::new(width, height, dark)?.around(surroundings);
         Some(Self {
-            width,
-            height,
             map: map.with_above(bright, scene.up)?,
             halves: [below, above],
             up: scene.up,
@@ -129,9 +125,7 @@ impl MeasuredOutside {
     }
 
     fn cell(&self, origin: Vec3, direction: Vec3) -> (&Half, usize) {
-        let map_direction = self.map.surroundings().map_direction(origin, direction);
-        let cell = pixel_of(self.width, self.height, map_direction);
-        (self.half(direction), cell)
+        (self.half(direction), self.map.pixel(origin, direction))
     }
 
     /// The cells of a direction's side of the horizon.
@@ -158,9 +152,10 @@ impl MeasuredOutside {
     pub fn expected(&self, direction: Vec3, band: f64) -> Vec3 {
         let elevation_of = |d: Vec3| f64::from(d.dot(self.up).clamp(-1.0, 1.0)).asin();
         let elevation = elevation_of(direction);
+        let [width, height] = self.size();
         let (mut near, mut all) = ((DVec3::ZERO, 0.0), (DVec3::ZERO, 0.0));
         for (cell, radiance) in self.cells_with(|half| &half.known) {
-            let seen = direction_of(self.width, self.height, cell);
+            let seen = direction_of(width, height, cell);
             let solid_angle = f64::from(1.0 - seen.y * seen.y).max(0.0).sqrt();
             let radiance = radiance.as_dvec3() * solid_angle;
             all = (all.0 + radiance, all.1 + solid_angle);
@@ -181,7 +176,7 @@ impl MeasuredOutside {
 
     /// Columns and rows.
     pub fn size(&self) -> [usize; 2] {
-        [self.width, self.height]
+        self.map.size()
     }
 
     /// The completed map of light that comes from `towards`, or of each cell's own direction: measured radiance, plus `excess` where it
@@ -192,9 +187,10 @@ impl MeasuredOutside {
         excess: impl Fn(Vec3) -> Vec3,
         elsewhere: impl Fn(Vec3) -> Vec3,
     ) -> Vec<Vec3> {
-        (0..self.width * self.height)
+        let [width, height] = self.size();
+        (0..width * height)
             .map(|cell| {
-                let direction = direction_of(self.width, self.height, cell);
+                let direction = direction_of(width, height, cell);
                 let from = towards.unwrap_or(direction);
                 let half = self.half(from);
                 let radiance = self.map.pixels_from(from)[cell];
@@ -278,8 +274,6 @@ mod tests {
             ..half.clone()
         };
         let measured = MeasuredOutside {
-            width,
-            height,
             halves: [half, none],
             map: Environment::new(width, height, pixels).expect("sizes fit"),
             up: Vec3::Y,
@@ -314,8 +308,6 @@ mod tests {
         let pixels = |radiance: f32| vec![Vec3::splat(radiance), Vec3::ZERO];
         let map = Environment::new(2, 1, pixels(0.5)).expect("sizes fit");
         let measured = MeasuredOutside {
-            width: 2,
-            height: 1,
             halves: [half(false), half(true)],
             map: map.with_above(pixels(3.0), Vec3::Y).expect("sizes fit"),
             up: Vec3::Y,

@@ -369,22 +369,18 @@ mod tests {
     #[test]
     fn what_is_out_of_range_or_of_another_kind_is_refused_with_the_range() {
         let mut settings = Settings::default();
-        let batch = PARAMETERS
-            .iter()
-            .find(|p| p.name == "batch")
-            .expect("batch is declared");
+        let named = |name| {
+            PARAMETERS
+                .iter()
+                .find(|p| p.name == name)
+                .expect("declared")
+        };
+        let batch = named("batch");
         let message = batch.set(&mut settings, &Value::Whole(0)).unwrap_err();
         assert!(message.contains("from 1 to 1000000"), "{message}");
         assert!(batch.parse("many").is_err());
-        let preset = PARAMETERS
-            .iter()
-            .find(|p| p.name == "preset")
-            .expect("preset is declared");
-        assert!(
-            preset
-                .set(&mut settings, &Value::Choice("fastest".into()))
-                .is_err()
-        );
+        let fastest = Value::Choice("fastest".into());
+        assert!(named("preset").set(&mut settings, &fastest).is_err());
         assert_eq!(settings, Settings::default());
     }
 }

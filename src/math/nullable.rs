@@ -1,35 +1,14 @@
-//! Serialization of numbers to JSON: non-finite numbers become `null`.
+//! JSON of numbers that may not be finite: `serde_json` writes those as `null`.
 
 use glam::Vec3;
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Deserializer};
 
 /// A linear colour; non-finite channels are `None`.
 pub type Rgb = [Option<f32>; 3];
 
 /// A colour for serialization.
 pub fn rgb(color: Vec3) -> Rgb {
-    color.to_array().map(finite)
-}
-
-/// A number for serialization: `None` if not finite.
-pub fn finite(value: f32) -> Option<f32> {
-    value.is_finite().then_some(value)
-}
-
-/// `serialize_with` for a colour.
-///
-/// # Errors
-/// The writer fails.
-pub fn color<S: Serializer>(color: &Vec3, serializer: S) -> Result<S::Ok, S::Error> {
-    rgb(*color).serialize(serializer)
-}
-
-/// `serialize_with` for an optional number.
-///
-/// # Errors
-/// The writer fails.
-pub fn number<S: Serializer>(value: &Option<f32>, serializer: S) -> Result<S::Ok, S::Error> {
-    value.and_then(finite).serialize(serializer)
+    color.to_array().map(|v| v.is_finite().then_some(v))
 }
 
 /// `deserialize_with` for a colour; `null` channels are 0.
@@ -37,9 +16,7 @@ pub fn number<S: Serializer>(value: &Option<f32>, serializer: S) -> Result<S::Ok
 /// # Errors
 /// The value is no colour.
 pub fn or_zero<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec3, D::Error> {
-    Ok(Rgb::deserialize(deserializer)?
-        .map(|v| v.unwrap_or(0.0))
-        .into())
+    Rgb::deserialize(deserializer).map(|color| color.map(|v| v.unwrap_or(0.0)).into())
 }
 
 /// `deserialize_with` for a standard error; `null` channels are infinite.
@@ -47,7 +24,18 @@ pub fn or_zero<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec3, D::Er
 /// # Errors
 /// The value is no colour.
 pub fn or_infinity<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec3, D::Error> {
-    Ok(Rgb::deserialize(deserializer)?
-        .map(|v| v.unwrap_or(f32::INFINITY))
-        .into())
+    Rgb::deserialize(deserializer).map(or_infinite)
+}
+
+/// `deserialize_with` for standard errors; `null` channels are infinite.
+///
+/// # Errors
+/// The value is no list of colours.
+pub fn all_or_infinity<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Vec3>, D::Error> {
+    let colors = Vec::<Rgb>::deserialize(deserializer)?;
+    Ok(colors.into_iter().map(or_infinite).collect())
+}
+
+fn or_infinite(color: Rgb) -> Vec3 {
+    color.map(|v| v.unwrap_or(f32::INFINITY)).into()
 }

@@ -85,28 +85,15 @@ mod tests {
 
     #[test]
     fn the_same_key_gives_the_same_stream_and_another_key_another() {
-        let a: Vec<u32> = (0..8)
-            .map({
-                let mut s = Stream::new(1, 2, 3, 4);
-                move |_| s.next_u32()
-            })
-            .collect();
-        let b: Vec<u32> = (0..8)
-            .map({
-                let mut s = Stream::new(1, 2, 3, 4);
-                move |_| s.next_u32()
-            })
-            .collect();
+        let numbers = |[seed, frame, pixel, sample]: [u64; 4]| {
+            let mut stream = Stream::new(seed, frame, pixel, sample);
+            [(); 8].map(|()| stream.next_u32())
+        };
+        let [a, b] = [[1, 2, 3, 4]; 2].map(numbers);
         assert_eq!(a, b);
-        for key in [
-            [9, 2, 3, 4],
-            [1, 9, 3, 4],
-            [1, 2, 9, 4],
-            [1, 2, 3, 9],
-            [2, 1, 3, 4],
-        ] {
-            let mut s = Stream::new(key[0], key[1], key[2], key[3]);
-            assert!(a.iter().all(|&x| x != s.next_u32()));
+        let others = [[9, 2, 3, 4], [1, 9, 3, 4], [1, 2, 9, 4], [1, 2, 3, 9]];
+        for other in others.into_iter().chain([[2, 1, 3, 4]]).map(numbers) {
+            assert!(a.iter().zip(other).all(|(a, b)| *a != b));
         }
     }
 

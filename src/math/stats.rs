@@ -1,5 +1,6 @@
 //! Running means and variances, and quantiles, in f64.
 
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// Running mean and variance (Welford 1962), mergeable (Chan et al. 1979).
@@ -64,6 +65,15 @@ pub fn quantile(values: &mut [f64], q: f64) -> Option<f64> {
     let low = rank.floor() as usize;
     let high = rank.ceil() as usize;
     Some(values[low] + (values[high] - values[low]) * (rank - low as f64))
+}
+
+/// The median of each channel; zero without values.
+pub fn medians(values: impl Iterator<Item = DVec3>) -> DVec3 {
+    let all: Vec<DVec3> = values.collect();
+    DVec3::from_array(std::array::from_fn(|channel| {
+        let mut values: Vec<f64> = all.iter().map(|v| v[channel]).collect();
+        quantile(&mut values, 0.5).unwrap_or(0.0)
+    }))
 }
 
 /// The value, of those with a weight, up to which half of the weight lies; `None` without weight.

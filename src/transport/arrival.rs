@@ -168,10 +168,7 @@ mod tests {
         let wo = Vec3::new(0.6, 0.2, 0.5).normalize();
         let materials = [0.08, 0.2, 0.5, 1.0].map(|roughness| Bsdf {
             albedo: Vec3::splat(0.3),
-            lobe: Some(Lobe {
-                roughness,
-                specular: Vec3::splat(0.4),
-            }),
+            lobe: Some(Lobe::grey(roughness, 0.4)),
         });
         let diffuse = Bsdf {
             albedo: Vec3::ONE,

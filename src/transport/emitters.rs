@@ -1,5 +1,6 @@
 //! Emitter sampling: an object from a Fenwick tree of weights, then a point uniformly by area.
 
+use crate::math::color::luminance;
 use crate::math::warp;
 use crate::scene::Scene;
 use glam::Vec3;
@@ -26,16 +27,6 @@ impl FenwickTree {
             tree.recompute(i);
         }
         tree
-    }
-
-    /// Number of weights.
-    pub fn len(&self) -> usize {
-        self.weights.len()
-    }
-
-    /// Whether there are no weights.
-    pub fn is_empty(&self) -> bool {
-        self.weights.is_empty()
     }
 
     /// Sum of all weights.
@@ -113,6 +104,13 @@ fn usable(weight: f64) -> f64 {
     }
 }
 
+/// Area × luminance of emission of each object: the weights of light sampling.
+pub fn powers(scene: &Scene, emission: impl Iterator<Item = Vec3>) -> Vec<f64> {
+    (scene.objects.iter().zip(emission))
+        .map(|(object, emission)| object.area * f64::from(luminance(emission)))
+        .collect()
+}
+
 /// Uniform area sampling of one object.
 #[derive(Debug, Clone)]
 struct AreaDistribution {
@@ -184,15 +182,9 @@ impl Emitters {
     #[inline]
     pub fn pdf(&self, object: u32) -> f32 {
         let index = object as usize;
-        let area = self.objects[index]
-            .cumulative
-            .last()
-            .copied()
-            .unwrap_or(0.0);
-        if area > 0.0 {
-            (self.tree.probability(index) / area) as f32
-        } else {
-            0.0
+        match self.objects[index].cumulative.last() {
+            Some(&area) if area > 0.0 => (self.tree.probability(index) / area) as f32,
+            _ => 0.0,
         }
     }
 
@@ -210,11 +202,8 @@ impl Emitters {
             .cumulative
             .partition_point(|&c| c <= target)
             .min(distribution.triangles.len() - 1);
-        let low = if index == 0 {
-            0.0
-        } else {
-            distribution.cumulative[index - 1]
-        };
+        let before = index.checked_sub(1);
+        let low = before.map_or(0.0, |before| distribution.cumulative[before]);
         let size = distribution.cumulative[index] - low;
         let within = if size > 0.0 {
             ((target - low) / size) as f32
@@ -226,62 +215,5 @@ impl Emitters {
         let [a, b, c] = scene.corners(triangle);
         let point = a * (1.0 - b1 - b2) + b * b1 + c * b2;
         Some((object as u32, AreaSample { triangle, point }))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::rng::Stream;
-
-    #[test]
-    fn probabilities_hold_after_millions_of_updates_over_sixteen_decades() {
-        let n = 1000;
-        let mut weights = vec![0.0f64; n];
-        let mut tree = FenwickTree::new(&weights);
-        let mut stream = Stream::new(5, 0, 0, 0);
-        for _ in 0..1_000_000 {
-            let i = stream.below(n);
-            let w = if stream.uniform() < 0.2 {
-                0.0
-            } else {
-                10f64.powf(16.0 * stream.uniform_f64() - 8.0)
-            };
-            weights[i] = w;
-            tree.set(i, w);
-        }
-        let total: f64 = weights.iter().sum();
-        assert!((tree.total() - total).abs() <= 1e-12 * total);
-        for (i, w) in weights.iter().enumerate() {
-            assert!((tree.probability(i) - w / total).abs() <= 1e-12);
-        }
-    }
-
-    #[test]
-    fn zero_weights_are_never_drawn_and_others_by_their_fraction() {
-        for n in [1usize, 2, 3, 7, 8, 9, 100] {
-            let weights: Vec<f64> = (0..n)
-                .map(|i| if i % 3 == 1 { 0.0 } else { (i + 1) as f64 })
-                .collect();
-            let tree = FenwickTree::new(&weights);
-            let mut counts = vec![0u32; n];
-            let draws = 60_000;
-            for k in 0..draws {
-                // The grid of u holds both ends.
-                let u = f64::from(k) / f64::from(draws - 1);
-                counts[tree.sample(u.min(1.0)).expect("some weight is positive")] += 1;
-            }
-            for i in 0..n {
-                let expected = tree.probability(i) * f64::from(draws);
-                assert!(
-                    (f64::from(counts[i]) - expected).abs() <= 2.0,
-                    "{n} {i}: {} {expected}",
-                    counts[i]
-                );
-                assert!(weights[i] > 0.0 || counts[i] == 0);
-            }
-        }
-        assert_eq!(FenwickTree::new(&[0.0, f64::NAN, -1.0]).sample(0.5), None);
-        assert_eq!(FenwickTree::new(&[]).sample(0.5), None);
     }
 }

@@ -175,7 +175,8 @@ impl Environment {
         self.cumulative.last().copied().unwrap_or(0.0)
     }
 
-    fn pixel(&self, origin: Vec3, direction: Vec3) -> usize {
+    /// The pixel that light along a ray comes from.
+    pub fn pixel(&self, origin: Vec3, direction: Vec3) -> usize {
         let map_direction = self.surroundings.map_direction(origin, direction);
         pixel_of(self.width, self.height, map_direction)
     }
@@ -186,11 +187,8 @@ impl Environment {
         if total <= 0.0 {
             return 0.0;
         }
-        let low = if index == 0 {
-            0.0
-        } else {
-            self.cumulative[index - 1]
-        };
+        let before = index.checked_sub(1);
+        let low = before.map_or(0.0, |before| self.cumulative[before]);
         let solid_angle = row_solid_angle(index / self.width, self.width, self.height);
         ((self.cumulative[index] - low) / total / solid_angle) as f32
     }

@@ -1,9 +1,8 @@
 //! A scene with materials and lights, one material per object.
 
-use crate::math::color::luminance;
 use crate::scene::Scene;
 use crate::scene::geometry::{Hit, Ray};
-use crate::transport::emitters::Emitters;
+use crate::transport::emitters::{Emitters, powers};
 use crate::transport::environment::Environment;
 use crate::transport::material::Material;
 use crate::transport::world::{EmitterSample, SurfacePoint, World};
@@ -29,12 +28,7 @@ impl LitScene {
         materials: Vec<Material>,
         outside: Option<Arc<Environment>>,
     ) -> Self {
-        let weights: Vec<f64> = scene
-            .objects
-            .iter()
-            .zip(&materials)
-            .map(|(object, material)| object.area * f64::from(luminance(material.emission)))
-            .collect();
+        let weights = powers(&scene, materials.iter().map(|m| m.emission));
         let emitters = Emitters::new(&scene, &weights);
         Self {
             scene,

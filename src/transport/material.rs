@@ -71,6 +71,16 @@ pub struct Lobe {
     pub specular: Vec3,
 }
 
+impl Lobe {
+    /// A lobe of grey reflectance.
+    pub fn grey(roughness: f32, specular: f32) -> Self {
+        Self {
+            roughness,
+            specular: Vec3::splat(specular),
+        }
+    }
+}
+
 /// An object's scattering and emission.
 #[derive(Debug, Clone)]
 pub struct Material {

@@ -25,8 +25,6 @@ pub struct Microfacet {
     /// Squared sines of the two directions.
     sin2_o: f64,
     sin2_i: f64,
-    /// Squared sine of the half vector.
-    sin2_h: f64,
     /// Denominator of the distribution: sin²θh / α² + cos²θh.
     q: f64,
     /// Schlick's (1 − wo · h)⁵.
@@ -45,7 +43,6 @@ impl Microfacet {
             cos_i: wi.z,
             sin2_o: wo.x * wo.x + wo.y * wo.y,
             sin2_i: wi.x * wi.x + wi.y * wi.y,
-            sin2_h,
             q: sin2_h / (alpha * alpha) + h.z * h.z,
             // Mean of wo · h and wi · h, so that rounding does not break reciprocity.
             schlick: (1.0 - 0.5 * h.dot(wo + wi)).clamp(0.0, 1.0).powi(5),
@@ -82,18 +79,6 @@ impl Microfacet {
     #[inline]
     pub fn pdf(&self) -> f64 {
         0.5 * self.distribution() / (self.cos_o + self.smith(self.cos_o, self.sin2_o))
-    }
-
-    /// ∂ ln eval / ∂α.
-    pub fn log_derivative(&self) -> f64 {
-        let a = self.alpha;
-        let (smith_o, smith_i) = (
-            self.smith(self.cos_o, self.sin2_o),
-            self.smith(self.cos_i, self.sin2_i),
-        );
-        let masking = self.cos_i * smith_o + self.cos_o * smith_i;
-        let slope = a * (self.cos_i * self.sin2_o / smith_o + self.cos_o * self.sin2_i / smith_i);
-        4.0 * self.sin2_h / (a * a * a * self.q) - 2.0 / a - slope / masking
     }
 }
 

@@ -201,12 +201,10 @@ pub(super) fn follow(
         let Some(surface) = world.intersect(&ray) else {
             if let Some(environment) = world.environment() {
                 let direction = ray.direction.normalize_or_zero();
-                let weight = match bsdf_pdf {
-                    Some(pdf) => {
-                        emission_weight(pdf, environment_pdf(world, ray.origin, direction), options)
-                    }
-                    None => 1.0,
-                };
+                let weight = bsdf_pdf.map_or(1.0, |pdf| {
+                    let map_pdf = environment.pdf(ray.origin, direction);
+                    emission_weight(pdf, map_pdf * (1.0 - emitter_fraction(world)), options)
+                });
                 let light = throughput * environment.radiance(ray.origin, direction) * weight;
                 add(Origin::Outside, light);
             }
@@ -217,16 +215,11 @@ pub(super) fn follow(
         let wo = -ray.direction.normalize_or_zero();
         let cos_emitter = surface.normal.dot(wo);
         if cos_emitter > 0.0 && surface.emission != Vec3::ZERO {
-            let weight = match bsdf_pdf {
-                Some(pdf) => {
-                    let distance2 = (ray.direction * surface.t).length_squared();
-                    let solid_angle_pdf =
-                        emitter_fraction(world) * world.emitter_pdf(&surface) * distance2
-                            / cos_emitter;
-                    emission_weight(pdf, solid_angle_pdf, options)
-                }
-                None => 1.0,
-            };
+            let weight = bsdf_pdf.map_or(1.0, |pdf| {
+                let distance2 = (ray.direction * surface.t).length_squared();
+                let area_pdf = emitter_fraction(world) * world.emitter_pdf(&surface);
+                emission_weight(pdf, area_pdf * distance2 / cos_emitter, options)
+            });
             let light = throughput * surface.emission * weight;
             add(Origin::Object(surface.object), light);
         }
@@ -311,7 +304,10 @@ fn direct_light(
     if world.occluded(&light.ray) {
         return (origin, Vec3::ZERO);
     }
-    let weight = light_weight(light.pdf, bsdf.pdf(local_wo, local_wi), options);
+    let weight = match options.sample_bsdf {
+        true => power_heuristic(light.pdf, bsdf.pdf(local_wo, local_wi)),
+        false => 1.0,
+    };
     (origin, scattered * light.radiance / light.pdf * weight)
 }
 
@@ -378,13 +374,6 @@ pub fn emitter_fraction(world: &impl World) -> f32 {
     }
 }
 
-/// Pdf per solid angle of light sampling for a direction of the environment.
-fn environment_pdf(world: &impl World, origin: Vec3, direction: Vec3) -> f32 {
-    world.environment().map_or(0.0, |e| {
-        e.pdf(origin, direction) * (1.0 - emitter_fraction(world))
-    })
-}
-
 /// MIS weight of emission hit by BSDF sampling.
 fn emission_weight(bsdf_pdf: f32, light_pdf: f32, options: &PathOptions) -> f32 {
     match (options.sample_bsdf, options.sample_emitters) {
@@ -392,14 +381,5 @@ fn emission_weight(bsdf_pdf: f32, light_pdf: f32, options: &PathOptions) -> f32 
         // Emission that light sampling cannot reach is left to BSDF sampling.
         (false, true) => f32::from(light_pdf <= 0.0),
         _ => 1.0,
-    }
-}
-
-/// MIS weight of a light sample.
-fn light_weight(light_pdf: f32, bsdf_pdf: f32, options: &PathOptions) -> f32 {
-    if options.sample_bsdf {
-        power_heuristic(light_pdf, bsdf_pdf)
-    } else {
-        1.0
     }
 }

@@ -107,6 +107,7 @@ mod tests {
     use super::*;
     use crate::math::rng::Stream;
     use crate::math::stats::Moments;
+    use crate::math::warp;
 
     fn unit_box() -> Surroundings {
         let corners = [Vec3::new(-1.0, -2.0, -3.0), Vec3::new(3.0, 2.0, 1.0)];
@@ -119,7 +120,7 @@ mod tests {
         let middle = Vec3::new(1.0, 0.0, -1.0);
         let mut stream = Stream::new(3, 0, 0, 0);
         for _ in 0..200 {
-            let direction = sphere(&mut stream);
+            let direction = warp::uniform_sphere(stream.uniform2());
             let same = surroundings.map_direction(middle, direction);
             assert!((same - direction).length() < 1e-5);
             assert!((surroundings.density_ratio(middle, direction) - 1.0).abs() < 1e-4);
@@ -146,7 +147,7 @@ mod tests {
         // Estimates of ∫ f dω around the origin, f = 1 and (1 + z)².
         let mut found = [Moments::default(); 2];
         for _ in 0..n {
-            let map_direction = sphere(&mut stream);
+            let map_direction = warp::uniform_sphere(stream.uniform2());
             let wi = surroundings.from_map(origin, map_direction);
             let pdf = surroundings.density_ratio(origin, wi) / (4.0 * std::f32::consts::PI);
             found[0].push(f64::from(1.0 / pdf));
@@ -173,15 +174,5 @@ mod tests {
         );
         let away = unit_box().map_direction(Vec3::new(9.0, 0.0, 0.0), Vec3::X);
         assert_eq!(away, Vec3::X);
-    }
-
-    fn sphere(stream: &mut Stream) -> Vec3 {
-        let [u, _] = stream.uniform2();
-        let up = if u < 0.5 { 1.0 } else { -1.0 };
-        // Uniform over the upper half, turned over half of the time.
-        let [a, b] = stream.uniform2();
-        let r = (1.0 - a * a).sqrt();
-        let phi = 2.0 * std::f32::consts::PI * b;
-        Vec3::new(r * phi.cos(), r * phi.sin(), up * a)
     }
 }

@@ -3,7 +3,7 @@
 use crate::calibrate::exposure::normal::{Layout, ResponseBasis, levels};
 use crate::calibrate::exposure::observations::{Observation, Observations};
 use crate::capture::response::{Response, TERMS};
-use crate::math::stats::quantile;
+use crate::math::stats::medians;
 use glam::{DVec3, Vec3};
 use std::collections::BTreeMap;
 
@@ -22,6 +22,15 @@ pub(super) struct ModelParts {
     pub exposures: bool,
     pub vignetting: bool,
     pub response: bool,
+}
+
+impl ModelParts {
+    /// Exposures alone.
+    pub const EXPOSURES: Self = Self {
+        exposures: true,
+        vignetting: false,
+        response: false,
+    };
 }
 
 /// The map from radiance to the values of each photograph, in logarithms.
@@ -52,35 +61,29 @@ impl CameraModel {
 
     /// Log radiance of an observation.
     pub fn radiance(&self, observation: &Observation) -> DVec3 {
-        let light = match &self.response {
-            None => observation.level,
-            Some(response) => {
-                let value = observation.level - observation.saturation;
-                observation.saturation + by_channel(|c| response.log_light(c, value[c])[0])
-            }
-        };
-        light - self.factor(observation)
+        self.light(observation)[0] - self.factor(observation)
     }
 
     /// Derivative of an observation's log radiance with respect to its log value.
     pub fn slope(&self, observation: &Observation) -> DVec3 {
-        match &self.response {
-            None => DVec3::ONE,
-            Some(response) => {
-                let value = observation.level - observation.saturation;
-                by_channel(|c| response.log_light(c, value[c])[1])
-            }
-        }
+        self.light(observation)[1]
+    }
+
+    /// Log light of an observation on the sensor, and its derivative with respect to the log value.
+    fn light(&self, observation: &Observation) -> [DVec3; 2] {
+        let Some(response) = &self.response else {
+            return [observation.level, DVec3::ONE];
+        };
+        let value = observation.level - observation.saturation;
+        let channels = [0, 1, 2].map(|c| response.log_light(c, value[c]));
+        let [light, slope] = [0, 1].map(|i| DVec3::from_array(channels.map(|c| c[i])));
+        [observation.saturation + light, slope]
     }
 
     /// Difference of an observation's log value from the one that log `radiance` would give, to first order.
     pub fn residual(&self, observation: &Observation, radiance: DVec3) -> DVec3 {
         (self.radiance(observation) - radiance) / self.slope(observation)
     }
-}
-
-fn by_channel(f: impl Fn(usize) -> f64) -> DVec3 {
-    DVec3::from_array(std::array::from_fn(f))
 }
 
 /// The model with the least sum of absolute differences from the cells' levels, by iteratively reweighted least squares. Parts
@@ -114,7 +117,7 @@ pub(super) fn fit(observations: &[Observation], frames: usize, parts: ModelParts
         if parts.response {
             model.response = Some(step.response());
         }
-        let middle = median(layout.frames.iter().map(|&frame| model.exposures[frame]));
+        let middle = medians(layout.frames.iter().map(|&frame| model.exposures[frame]));
         for &frame in &layout.frames {
             model.exposures[frame] -= middle;
         }
@@ -161,7 +164,7 @@ pub(super) fn fit_held_out(
     }
     differences.retain(|_, differences| differences.len() >= MIN_CELLS);
     for (&frame, differences) in &mut differences {
-        let exposure = median(differences.iter().copied());
+        let exposure = medians(differences.iter().copied());
         model.exposures[frame] = exposure;
         differences.iter_mut().for_each(|d| *d -= exposure);
     }
@@ -179,7 +182,7 @@ fn residuals(observations: &[Observation], weights: &[DVec3], model: &CameraMode
 fn cell_levels(observations: &[Observation], model: &CameraModel) -> Vec<DVec3> {
     let mut levels = Vec::with_capacity(observations.len());
     for cell in observations.chunk_by(|a, b| a.cell == b.cell) {
-        let level = median(cell.iter().map(|s| model.radiance(s)));
+        let level = medians(cell.iter().map(|s| model.radiance(s)));
         levels.extend(std::iter::repeat_n(level, cell.len()));
     }
     levels
@@ -189,18 +192,9 @@ fn cell_levels(observations: &[Observation], model: &CameraModel) -> Vec<DVec3> 
 pub(super) fn disagreements(observations: &[Observation], model: &CameraModel) -> Vec<f64> {
     (observations.chunk_by(|a, b| a.cell == b.cell))
         .map(|cell| {
-            let level = median(cell.iter().map(|s| model.radiance(s)));
+            let level = medians(cell.iter().map(|s| model.radiance(s)));
             let residuals = cell.iter().map(|s| model.residual(s, level));
             residuals.map(|r| r.abs().element_sum()).sum()
         })
         .collect()
-}
-
-/// Median of each channel; zero without values.
-fn median(values: impl Iterator<Item = DVec3>) -> DVec3 {
-    let all: Vec<DVec3> = values.collect();
-    DVec3::from_array(std::array::from_fn(|channel| {
-        let mut values: Vec<f64> = all.iter().map(|v| v[channel]).collect();
-        quantile(&mut values, 0.5).unwrap_or(0.0)
-    }))
 }

@@ -58,18 +58,15 @@ impl Exposures {
     pub fn new(problem: &Problem, observations: &Observations) -> Option<Self> {
         let one_lens = one_lens(&problem.scene.cameras);
         let all_saturate = (problem.photographs.iter()).all(|p| p.saturation.is_finite());
-        let camera = CameraAssumptions {
-            one_lens,
-            has_response: one_lens && all_saturate,
+        let camera = match (one_lens, all_saturate) {
+            (false, _) => Common::Nothing,
+            (true, false) => Common::Lens,
+            (true, true) => Common::Camera,
         };
         Self::estimate(observations, problem.photographs.len(), camera)
     }
 
-    fn estimate(
-        observations: &Observations,
-        photographs: usize,
-        camera: CameraAssumptions,
-    ) -> Option<Self> {
+    fn estimate(observations: &Observations, photographs: usize, camera: Common) -> Option<Self> {
         let shared = shared(&observations.fitted);
         // Models fitted to one half of the cells are tested on the other half.
         let (fitted, tested): (Vec<Observation>, Vec<Observation>) =
@@ -93,7 +90,7 @@ impl Exposures {
             [false, true].map(|vignetting| test(true, vignetting, false));
         let vignetting_gain = explained(&without, &with);
         let vignetting =
-            camera.one_lens && model.power.min_element() > 0.0 && is_needed(&without, &with);
+            camera >= Common::Lens && model.power.min_element() > 0.0 && is_needed(&without, &with);
         let exposed = if vignetting { with } else { without };
         let unexposed = test(false, vignetting, false).0;
 
@@ -106,7 +103,7 @@ impl Exposures {
         };
         let mut gain = explained(&unexposed, &exposed);
         let mut response_gain = 0.0;
-        if camera.has_response {
+        if camera == Common::Camera {
             let [response_only, both] =
                 [false, true].map(|exposures| test(exposures, vignetting, true).0);
             let [before, after] = match explained(&response_only, &both) > MIN_GAIN {
@@ -153,13 +150,14 @@ impl Exposures {
     }
 }
 
-/// What photographs may share.
-#[derive(Debug, Clone, Copy)]
-struct CameraAssumptions {
+/// What photographs may have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Common {
+    Nothing,
     /// One lens, and with it vignetting.
-    one_lens: bool,
-    /// One camera response: all photographs saturate, so they are not linear renderings.
-    has_response: bool,
+    Lens,
+    /// Also the camera's response: all photographs saturate, so they are not linear renderings.
+    Camera,
 }
 
 /// Whether the focal lengths allow that all photographs were taken through one lens.
@@ -197,16 +195,6 @@ fn is_significant(before: &[f64], after: &[f64]) -> bool {
 mod tests {
     use super::*;
     use crate::math::rng::Stream;
-
-    const EXPOSURES: ModelParts = ModelParts {
-        exposures: true,
-        vignetting: false,
-        response: false,
-    };
-    const LENS: CameraAssumptions = CameraAssumptions {
-        one_lens: true,
-        has_response: false,
-    };
 
     fn observation(frame: usize, cell: usize, level: f64) -> Observation {
         Observation {
@@ -248,7 +236,7 @@ mod tests {
         let truth: Vec<DVec3> = (0..6)
             .map(|f| DVec3::new(0.1, -0.05, 0.2) * f64::from(f) - DVec3::new(0.25, -0.125, 0.5))
             .collect();
-        let found = fit(&seen(&truth, 0.1), 6, EXPOSURES).exposures;
+        let found = fit(&seen(&truth, 0.1), 6, ModelParts::EXPOSURES).exposures;
         for (found, truth) in found.iter().zip(&truth) {
             assert!((*found - *truth).length() < 0.03, "{found} {truth}");
         }
@@ -259,7 +247,7 @@ mod tests {
         let mut observations = seen(&[DVec3::splat(0.3), DVec3::splat(-0.3)], 0.0);
         let cell = observations.last().map_or(0, |s| s.cell as usize);
         observations.push(observation(2, cell, 9.0));
-        let found = fit(&observations, 3, EXPOSURES).exposures;
+        let found = fit(&observations, 3, ModelParts::EXPOSURES).exposures;
         assert_eq!(found[2], DVec3::ZERO);
         assert!((found[0] - found[1] - DVec3::splat(0.6)).length() < 0.01);
     }
@@ -280,7 +268,7 @@ mod tests {
                 observations.push(observation(frame, cell, level + truth(frame) + error));
             }
         }
-        let found = fit(&observations, frames, EXPOSURES).exposures;
+        let found = fit(&observations, frames, ModelParts::EXPOSURES).exposures;
         for (frame, found) in found.iter().enumerate() {
             assert!((found.x - truth(frame)).abs() < 0.1, "{frame}: {found}");
         }
@@ -309,8 +297,8 @@ mod tests {
                 .collect(),
             held_out: Vec::new(),
         };
-        let [with, without] =
-            [with, without].map(|s| Exposures::estimate(&s, 4, LENS).expect("cells are shared"));
+        let [with, without] = [with, without]
+            .map(|s| Exposures::estimate(&s, 4, Common::Lens).expect("cells are shared"));
         let of_fitted = |e: &Exposures| [e.factors[0], e.factors[1], e.factors[3]];
         assert_eq!(of_fitted(&with), of_fitted(&without));
         assert_eq!((with.gain, with.differ), (without.gain, without.differ));
@@ -337,7 +325,7 @@ mod tests {
         let exposures = [0.5, 0.0, -0.4, 0.9].map(DVec3::splat);
         let power = DVec3::new(1.0, 2.0, 4.0);
         let observations = dimmed(&exposures, power);
-        let found = Exposures::estimate(&observations, 4, LENS).expect("cells are shared");
+        let found = Exposures::estimate(&observations, 4, Common::Lens).expect("cells are shared");
         assert!(found.differ);
         let vignetting = found.vignetting.expect("a lens that dims");
         let off = vignetting.power.as_dvec3() - power;
@@ -347,19 +335,15 @@ mod tests {
             let off = found.as_dvec3().map(f64::ln) - *truth;
             assert!(off.abs().max_element() < 0.03, "{off}");
         }
-        const DIFFERENT: CameraAssumptions = CameraAssumptions {
-            one_lens: false,
-            has_response: false,
-        };
         let other_lenses =
-            Exposures::estimate(&observations, 4, DIFFERENT).expect("cells are shared");
+            Exposures::estimate(&observations, 4, Common::Nothing).expect("cells are shared");
         assert_eq!(other_lenses.vignetting, None);
     }
 
     #[test]
     fn a_lens_that_dims_needs_no_exposures() {
         let observations = dimmed(&[DVec3::ZERO; 4], DVec3::splat(4.0));
-        let found = Exposures::estimate(&observations, 4, LENS).expect("cells are shared");
+        let found = Exposures::estimate(&observations, 4, Common::Lens).expect("cells are shared");
         assert!(found.vignetting.is_some() && !found.differ && found.needed());
         assert_eq!(found.factors, [Vec3::ONE; 4]);
     }
@@ -367,14 +351,9 @@ mod tests {
     #[test]
     fn a_lens_that_brightens_its_corners_is_not_believed() {
         let observations = dimmed(&[DVec3::ZERO; 4], DVec3::splat(-2.0));
-        let found = Exposures::estimate(&observations, 4, LENS).expect("cells are shared");
+        let found = Exposures::estimate(&observations, 4, Common::Lens).expect("cells are shared");
         assert_eq!(found.vignetting, None);
     }
-
-    const CAMERA: CameraAssumptions = CameraAssumptions {
-        one_lens: true,
-        has_response: true,
-    };
 
     /// A response of raised contrast with a shoulder, different in each channel.
     fn contrasty() -> Response {
@@ -429,7 +408,8 @@ mod tests {
         let exposures = [0.7, 0.2, 0.0, -0.5, -0.9, 0.4].map(DVec3::splat);
         let truth = contrasty();
         let observations = bent(seen(&exposures, 0.1), &truth, |_| 0.0);
-        let found = Exposures::estimate(&observations, 6, CAMERA).expect("cells are shared");
+        let found =
+            Exposures::estimate(&observations, 6, Common::Camera).expect("cells are shared");
         assert!(found.differ && found.vignetting.is_none());
         let response = found.response.expect("a response");
         for channel in 0..3 {
@@ -456,7 +436,8 @@ mod tests {
             terms: [Vec3::new(-0.25, -0.2, 0.2), Vec3::ZERO, Vec3::ZERO],
         };
         let observations = bent(seen(&[DVec3::ZERO; 4], 0.1), &truth, known);
-        let found = Exposures::estimate(&observations, 4, CAMERA).expect("cells are shared");
+        let found =
+            Exposures::estimate(&observations, 4, Common::Camera).expect("cells are shared");
         assert!(!found.differ && found.needed(), "{}", found.gain);
         let response = found.response.expect("a response");
         for channel in 0..3 {
@@ -472,23 +453,16 @@ mod tests {
             terms: [Vec3::ZERO; 3],
         };
         let observations = bent(seen(&exposures, 0.2), &straight, |_| 0.0);
-        let found = Exposures::estimate(&observations, 4, CAMERA).expect("cells are shared");
+        let found =
+            Exposures::estimate(&observations, 4, Common::Camera).expect("cells are shared");
         assert!(found.differ && found.response.is_none());
+        assert_eq!(
+            Exposures::estimate(&Observations::default(), 4, Common::Lens),
+            None
+        );
         // Without a shared response, as of linear files, none is fitted.
         let observations = bent(seen(&exposures, 0.1), &contrasty(), |_| 0.0);
-        let found = Exposures::estimate(&observations, 4, LENS).expect("cells are shared");
+        let found = Exposures::estimate(&observations, 4, Common::Lens).expect("cells are shared");
         assert_eq!(found.response, None);
-    }
-
-    #[test]
-    fn equal_exposures_explain_nothing() {
-        let observations = Observations {
-            fitted: seen(&[DVec3::ZERO; 5], 0.2),
-            held_out: Vec::new(),
-        };
-        let found = Exposures::estimate(&observations, 5, LENS).expect("cells are shared");
-        assert!(found.gain.abs() < 0.02, "{}", found.gain);
-        assert!(!found.needed());
-        assert_eq!(Exposures::estimate(&Observations::default(), 5, LENS), None);
     }
 }

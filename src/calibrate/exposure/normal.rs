@@ -74,7 +74,7 @@ impl<'a> ResponseBasis<'a> {
     /// The weighted least-squares unknowns of all channels; `None` if a channel's matrix is singular.
     pub fn solve(&self, weights: &[DVec3], layout: &Layout) -> Option<CameraUnknowns> {
         let [Some(r), Some(g), Some(b)] = [0, 1, 2].map(|channel| {
-            let NormalEquations { matrix, right } = self.normal(weights, layout, channel);
+            let (matrix, right) = self.normal(weights, layout, channel);
             matrix.cholesky().map(|factor| factor.solve(&right))
         }) else {
             return None;
@@ -133,7 +133,12 @@ impl<'a> ResponseBasis<'a> {
     }
 
     /// The weighted normal equations of one channel, with the cells' levels eliminated by the Schur complement.
-    fn normal(&self, weights: &[DVec3], layout: &Layout, channel: usize) -> NormalEquations {
+    fn normal(
+        &self,
+        weights: &[DVec3],
+        layout: &Layout,
+        channel: usize,
+    ) -> (DMatrix<f64>, DVector<f64>) {
         let rows = layout.rows();
         let mut matrix = DMatrix::zeros(rows, rows);
         let mut right = DVector::zeros(rows);
@@ -171,7 +176,7 @@ impl<'a> ResponseBasis<'a> {
         for row in 0..rows {
             matrix[(row, row)] += RIDGE * (matrix[(row, row)] + scale);
         }
-        NormalEquations { matrix, right }
+        (matrix, right)
     }
 }
 
@@ -183,11 +188,6 @@ pub(super) struct CameraUnknowns {
     pub power: DVec3,
     /// The response's coefficients.
     pub terms: [DVec3; TERMS],
-}
-
-struct NormalEquations {
-    matrix: DMatrix<f64>,
-    right: DVector<f64>,
 }
 
 /// For each observation, the weighted mean log radiance of its cell.

@@ -33,7 +33,7 @@ impl OutlierFrames {
     pub fn new(observations: &mut Observations, photographs: usize) -> Option<Self> {
         let mut outliers = BTreeMap::new();
         let cells = shared(&observations.fitted);
-        let mut fitted = exposures(&cells, photographs);
+        let mut fitted = fit(&cells, photographs, ModelParts::EXPOSURES);
         let mut current = differences(&cells, &fitted);
         let max_outliers = current.len().div_ceil(2).saturating_sub(1);
         let mut usual = median(&current)?;
@@ -51,7 +51,8 @@ impl OutlierFrames {
             usual = median(&current).unwrap_or(usual);
         }
         if !outliers.is_empty() {
-            fitted = exposures(&shared(&observations.fitted), photographs);
+            let cells = shared(&observations.fitted);
+            fitted = fit(&cells, photographs, ModelParts::EXPOSURES);
         }
         for (frame, residuals) in fit_held_out(observations, &mut fitted) {
             let mut sizes: Vec<f64> = (residuals.iter())
@@ -95,16 +96,6 @@ impl OutlierFrames {
 
 fn is_outlier(difference: f64, usual: f64) -> bool {
     difference > (usual * TIMES_MEDIAN).max(MIN_DIFFERENCE)
-}
-
-/// Fits exposures alone.
-fn exposures(shared: &[Observation], photographs: usize) -> CameraModel {
-    let parts = ModelParts {
-        exposures: true,
-        vignetting: false,
-        response: false,
-    };
-    fit(shared, photographs, parts)
 }
 
 /// For each photograph that shares enough cells, its median absolute difference in log radiance from the other photographs.

@@ -177,9 +177,4 @@ mod tests {
             assert!((*found - *wanted).length() < 1e-5 * size);
         }
     }
-
-    #[test]
-    fn without_rounds_there_is_nothing_to_know() {
-        assert!(Accumulated::default().mean().is_empty());
-    }
 }

@@ -42,28 +42,24 @@ pub struct ScoreTest {
     /// Index into albedos, then emissions.
     pub index: usize,
     /// The step, per channel.
-    pub step: [f64; 3],
+    pub step: DVec3,
     /// Standard error of the step, per channel.
-    pub stderr: [f64; 3],
+    pub stderr: DVec3,
     /// Half the second derivative of the squared error with the active parameters eliminated, per channel.
-    pub curvature: [f64; 3],
+    pub curvature: DVec3,
 }
 
 impl ScoreTest {
     /// χ² with three degrees of freedom, over the channels that would increase.
     pub fn significance(&self) -> f64 {
-        (0..3)
-            .filter(|&c| self.step[c] > 0.0 && self.stderr[c] > 0.0)
-            .map(|c| (self.step[c] / self.stderr[c]).powi(2))
-            .sum()
+        let counted = self.step.cmpgt(DVec3::ZERO) & self.stderr.cmpgt(DVec3::ZERO);
+        DVec3::select(counted, self.step / self.stderr, DVec3::ZERO).length_squared()
     }
 
     /// Decrease of the squared error, over the channels that would increase.
     pub fn gain(&self) -> f64 {
-        (0..3)
-            .filter(|&c| self.step[c] > 0.0)
-            .map(|c| self.step[c].powi(2) * self.curvature[c])
-            .sum()
+        let step = self.step.max(DVec3::ZERO);
+        (step * step * self.curvature).element_sum()
     }
 }
 
@@ -257,30 +253,23 @@ fn bootstrap(rows: &Rows, prior: &PriorTerms) -> Vec<DVec3> {
 /// were set free together with the active ones, and the standard error of the step.
 pub fn score_tests(equations: &NormalEquations, free: &[usize], active: usize) -> Vec<ScoreTest> {
     let prior = PriorTerms::new(equations, &free[..active]);
-    let mut results: Vec<ScoreTest> = (free[active..].iter())
-        .map(|&index| ScoreTest {
-            index,
-            step: [0.0; 3],
-            stderr: [f64::INFINITY; 3],
-            curvature: [0.0; 3],
-        })
-        .collect();
     let eliminated = match &equations.coupling {
         Coupling::Dense(matrices) => eliminate_dense(equations, matrices, &prior, active),
         Coupling::Sparse(rows) => eliminate_sparse(equations, rows, &prior, active),
     };
-    for ((result, own), row) in results.iter_mut().zip(eliminated).zip(active..) {
-        let (diagonal, score) = (equations.diagonal[row], equations.descent[row]);
-        for channel in 0..3 {
-            let curvature = own.curvature[channel];
-            if curvature > MIN_OWN * diagonal[channel] && curvature > 0.0 {
-                result.curvature[channel] = curvature;
-                result.step[channel] = score[channel] / curvature;
-                result.stderr[channel] = own.variance[channel].max(0.0).sqrt() / curvature;
+    (eliminated.into_iter().zip(active..))
+        .map(|(own, row)| {
+            let (curvature, zero) = (own.curvature, DVec3::ZERO);
+            let known = curvature.cmpgt(equations.diagonal[row] * MIN_OWN) & curvature.cmpgt(zero);
+            let stderr = own.variance.max(zero).sqrt() / curvature;
+            ScoreTest {
+                index: free[row],
+                step: DVec3::select(known, equations.descent[row] / curvature, zero),
+                stderr: DVec3::select(known, stderr, DVec3::INFINITY),
+                curvature: DVec3::select(known, curvature, zero),
             }
-        }
-    }
-    results
+        })
+        .collect()
 }
 
 /// A tested parameter with the active ones eliminated.

@@ -4,7 +4,6 @@ use crate::inverse::fit::equations::{Coupling, Matrices, NormalEquations, per_ch
 use crate::inverse::fit::errors::signal;
 use crate::inverse::fit::prior::Prior;
 use crate::inverse::fit::robust_weights::RobustWeights;
-use crate::inverse::fit::rows::Bounded;
 use crate::inverse::fit::step::Step;
 use crate::inverse::paths::PathCache;
 use crate::inverse::unknowns::Unknowns;
@@ -171,12 +170,7 @@ pub fn propose(
     let upper: Vec<f64> = free.iter().map(|&i| upper(i, from)).collect();
     let step = match &equations.coupling {
         Coupling::Dense(matrices) => dense_step(matrices, &x, &descent, &upper, damping, &added),
-        Coupling::Sparse(rows) => rows.bounded_step(&Bounded {
-            x: &x,
-            descent: &descent,
-            added: &added(damping),
-            upper: &upper,
-        }),
+        Coupling::Sparse(rows) => rows.bounded_step(&x, &descent, &added(damping), &upper),
     };
 
     let mut proposal = from.clone();
@@ -208,7 +202,6 @@ fn dense_step(
     damping: f64,
     added: &(dyn Fn(f64) -> Vec<DVec3> + Sync),
 ) -> Vec<DVec3> {
-    let lower = vec![0.0; x.len()];
     per_channel(|channel| {
         let of = |all: &[DVec3]| -> Vec<f64> { all.iter().map(|v| v[channel]).collect() };
         let (x, descent) = (of(x), DVector::from_vec(of(descent)));
@@ -218,7 +211,6 @@ fn dense_step(
                 hessian: &matrices.hessian[channel],
                 descent: &descent,
                 damping: DVector::from_vec(of(&added(damping))),
-                lower: &lower,
                 upper,
             };
             if let Some(solution) = step.solve(&x) {

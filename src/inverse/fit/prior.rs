@@ -53,11 +53,12 @@ impl ExpectedAlbedo {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
     surfaces: usize,
-    albedo: ExpectedAlbedo,
+    /// The distributions of albedos.
+    pub albedo: ExpectedAlbedo,
     /// Index of the first surface that stands for an outside direction.
     outside: usize,
     /// Mean and standard deviation of the radiance of each outside direction.
-    directions: Vec<(Vec3, Vec3)>,
+    pub directions: Vec<(Vec3, Vec3)>,
     /// Mean radiance of all photographs.
     photographed: Vec3,
     /// Whether the mesh is a scan.
@@ -93,21 +94,10 @@ impl Prior {
         self
     }
 
-    /// The prior with the given distributions of albedos.
-    pub fn with_albedo(mut self, albedo: ExpectedAlbedo) -> Self {
-        self.albedo = albedo;
-        self
-    }
-
     /// Resets a surface's albedo to the unknown distribution.
     pub fn forget_albedo(&mut self, surface: usize) {
         self.albedo.mean[surface] = Vec3::splat(ALBEDO_MEAN);
         self.albedo.deviation[surface] = Vec3::splat(ALBEDO_DEVIATION);
-    }
-
-    /// The distributions of albedos.
-    pub fn albedo(&self) -> &ExpectedAlbedo {
-        &self.albedo
     }
 
     /// The prior of a scan: outside directions are about as bright as the rest of the room. The last surface is the sun's.
@@ -136,17 +126,6 @@ impl Prior {
             }
         }
         self
-    }
-
-    /// The prior with means and standard deviations of the outside directions.
-    pub fn with_directions(mut self, directions: Vec<(Vec3, Vec3)>) -> Self {
-        self.directions = directions;
-        self
-    }
-
-    /// Mean and standard deviation of the radiance of each outside direction.
-    pub fn directions(&self) -> &[(Vec3, Vec3)] {
-        &self.directions
     }
 
     /// The prior with each outside direction held near its expected colour, at its fitted brightness.
@@ -228,7 +207,8 @@ mod tests {
             mean: vec![Vec3::new(0.2, 0.3, 0.4)],
             deviation: vec![Vec3::new(0.1, 0.01, 0.5)],
         };
-        let prior = Prior::new(1, 1, Vec3::ONE).with_albedo(expected);
+        let mut prior = Prior::new(1, 1, Vec3::ONE);
+        prior.albedo = expected;
         let (mean, precision) = prior.of(0, DVec3::ONE);
         assert!((mean - DVec3::new(0.2, 0.3, 0.4)).length() < 1e-6, "{mean}");
         let wanted = DVec3::new(100.0, 1e4, 4.0);

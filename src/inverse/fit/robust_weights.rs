@@ -9,7 +9,7 @@
 //! the variances.
 
 use crate::inverse::paths::evaluate::Linearised;
-use crate::math::stats::weighted_median;
+use crate::math::stats::{medians, weighted_median};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -63,7 +63,7 @@ impl RobustWeights {
             .map(|cluster| (cluster, square(cluster, steps[cluster.object as usize])))
             .unzip();
         // A median, robust to badly described objects.
-        let typical = typical_variance(squares.iter().copied());
+        let typical = typical_variance(&squares);
         let mut of_object: Vec<Vec<DVec3>> = vec![Vec::new(); objects];
         let mut floors = vec![0.0; objects];
         for (cluster, square) in clusters.iter().zip(&squares) {
@@ -75,7 +75,7 @@ impl RobustWeights {
             // Variances differ by orders of magnitude, so logarithms are averaged with the typical one's.
             let fraction = count / (count + PRIOR_CLUSTERS);
             let shrunk = |own: DVec3| own.powf(fraction) * typical.powf(1.0 - fraction);
-            let usual = shrunk(typical_variance(squares.iter().copied()));
+            let usual = shrunk(typical_variance(&squares));
             let max = usual * (MAX_DEVIATIONS * MAX_DEVIATIONS);
             let sum: DVec3 = squares.iter().map(|s| s.min(max)).sum();
             let [own, min] = [sum, DVec3::splat(floor)].map(|s| s / f64::max(count, 1.0));
@@ -108,11 +108,8 @@ impl RobustWeights {
 }
 
 /// The variance of a normal distribution with the same median of squares; zero without values.
-fn typical_variance(squares: impl Iterator<Item = DVec3> + Clone) -> DVec3 {
-    DVec3::from_array(std::array::from_fn(|channel| {
-        let mut values: Vec<f64> = squares.clone().map(|s| s[channel]).collect();
-        crate::math::stats::quantile(&mut values, 0.5).unwrap_or(0.0) / MEDIAN_CHI2
-    }))
+fn typical_variance(squares: &[DVec3]) -> DVec3 {
+    medians(squares.iter().copied()) / MEDIAN_CHI2
 }
 
 /// Weighted square of a cluster's residual after a step of its object's own parameter.

@@ -35,18 +35,6 @@ pub struct Rows {
     pub diagonal: Vec<DVec3>,
 }
 
-/// A quadratic problem with bounds: each parameter lies between zero and `upper`.
-pub struct Bounded<'a> {
-    /// Present values of the parameters.
-    pub x: &'a [DVec3],
-    /// Minus the gradient at `x`.
-    pub descent: &'a [DVec3],
-    /// Terms added to the diagonal of the Hessian.
-    pub added: &'a [DVec3],
-    /// Upper bound of each parameter.
-    pub upper: &'a [f64],
-}
-
 impl Rows {
     /// From linearised clusters with `n` free parameters.
     pub fn new(linearised: &[Linearised], n: usize, robust: &RobustWeights) -> Self {
@@ -86,11 +74,7 @@ impl Rows {
             .map(|part| {
                 let mut sum = vec![DVec3::ZERO; self.diagonal.len()];
                 for cluster in part * clusters / PARTS..(part + 1) * clusters / PARTS {
-                    let start = if cluster == 0 {
-                        0
-                    } else {
-                        self.ends[cluster - 1]
-                    };
+                    let start = cluster.checked_sub(1).map_or(0, |before| self.ends[before]);
                     let own = &entries[start..self.ends[cluster]];
                     let factor = factor(cluster, own);
                     for entry in own {
@@ -186,15 +170,15 @@ impl Rows {
         x
     }
 
-    /// Minimises ½ dᵀ(H + D) d − gᵀ d with x + d within the bounds by block principal pivoting (Júdice and Pires 1994), which
-    /// changes many parameters at a time between free and held at a bound.
-    pub fn bounded_step(&self, problem: &Bounded) -> Vec<DVec3> {
-        let Bounded {
-            x,
-            descent,
-            added,
-            upper,
-        } = *problem;
+    /// Minimises ½ dᵀ(H + D) d − gᵀ d with x + d between zero and `upper` by block principal pivoting (Júdice and Pires 1994), which
+    /// changes many parameters at a time between free and held at a bound. D is `added`, and g is `descent`, minus the gradient at x.
+    pub fn bounded_step(
+        &self,
+        x: &[DVec3],
+        descent: &[DVec3],
+        added: &[DVec3],
+        upper: &[f64],
+    ) -> Vec<DVec3> {
         let n = x.len();
         let mut free = vec![DVec3::ONE; n];
         let mut held = vec![DVec3::ZERO; n];

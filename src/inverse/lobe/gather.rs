@@ -12,7 +12,7 @@ use crate::transport::lit::LitScene;
 use crate::transport::microfacet::Microfacet;
 use crate::transport::path::PathOptions;
 use glam::{DVec3, Vec2};
-use std::ops::{Add, AddAssign, Div, Mul, Sub};
+use std::ops::{AddAssign, Div, Mul, Sub};
 
 /// First of the sample keys of these paths, disjoint from those of other stages.
 const KEY: u64 = 9 << 59;
@@ -68,16 +68,9 @@ impl Components {
     }
 }
 
-impl Add for Components {
-    type Output = Self;
-    fn add(self, other: Self) -> Self {
-        self.map(other, |a, b| a + b)
-    }
-}
-
 impl AddAssign for Components {
     fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
+        *self = self.map(other, |a, b| a + b);
     }
 }
 

@@ -103,10 +103,7 @@ impl LobeFit {
 
     /// The lobe of a material.
     pub fn lobe(&self) -> Lobe {
-        Lobe {
-            roughness: self.roughness as f32,
-            specular: Vec3::splat(self.specular as f32),
-        }
+        Lobe::grey(self.roughness as f32, self.specular as f32)
     }
 
     /// Standard error of the albedo.

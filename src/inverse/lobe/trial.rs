@@ -4,7 +4,7 @@ use crate::inverse::lobe::LobeFit;
 use crate::inverse::lobe::fit::{Model, Row, Variances, decorrelated};
 use crate::inverse::lobe::gather::{Components, Gathered, Gathering};
 use crate::inverse::lobe::observations::{Spot, SpotObservation, choose};
-use crate::math::stats::{Moments, quantile};
+use crate::math::stats::{Moments, medians, quantile};
 use crate::scene::Scene;
 use crate::transport::arrival::RayCount;
 use glam::DVec3;
@@ -110,10 +110,7 @@ fn levels(observations: &[(usize, &SpotObservation, [Gathered; 2])]) -> Vec<DVec
             (spot.len(), (weight > 0.0).then(|| sum / weight))
         })
         .collect();
-    let median = DVec3::from_array(std::array::from_fn(|c| {
-        let mut values: Vec<f64> = spots.iter().filter_map(|s| Some(s.1?[c])).collect();
-        quantile(&mut values, 0.5).unwrap_or(0.0)
-    }));
+    let median = medians(spots.iter().filter_map(|s| s.1));
     let dark = (median * DARK).max(DVec3::splat(f64::MIN_POSITIVE.sqrt()));
     (spots.into_iter())
         .flat_map(|(count, mean)| {

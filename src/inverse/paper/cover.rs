@@ -34,33 +34,23 @@ pub struct Cover {
 impl Cover {
     /// Casts a ray through the centre of each pixel.
     pub fn new(problem: &Problem, settings: &Settings) -> Self {
-        let scene = &problem.scene;
-        let total: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
-        let stride = total.div_ceil(MAX_PIXELS).max(1);
-        let mut pixels = Vec::new();
-        let mut before = 0;
-        for (frame, photograph) in problem.photographs.iter().enumerate() {
-            let count = photograph.pixels.len();
-            let camera = &scene.cameras[frame];
-            let seen: Vec<(u32, u32, Hit)> = (0..count)
-                .into_par_iter()
-                .filter(|pixel| (before + pixel).is_multiple_of(stride))
-                .filter(|&pixel| {
-                    let held = HoldOut::from(settings).contains(frame as u32, pixel as u32);
-                    photograph.is_usable(pixel) && !held
-                })
-                .filter_map(|pixel| {
-                    let width = photograph.width as usize;
-                    let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
-                    let hit = scene.intersect(&camera.ray(corner + 0.5))?;
-                    Some((frame as u32, pixel as u32, hit))
-                })
-                .collect();
-            pixels.extend(seen);
-            before += count;
-        }
+        let stride = problem.pixels().div_ceil(MAX_PIXELS).max(1);
+        let hit = |index: usize| {
+            let (frame, pixel) = problem.locate(index * stride)?;
+            let photograph = &problem.photographs[frame];
+            let held_out = HoldOut::from(settings).contains(frame as u32, pixel as u32);
+            if held_out || !photograph.is_usable(pixel) {
+                return None;
+            }
+            let width = photograph.width as usize;
+            let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
+            let camera = &problem.scene.cameras[frame];
+            let hit = problem.scene.intersect(&camera.ray(corner + 0.5))?;
+            Some((frame as u32, pixel as u32, hit))
+        };
+        let visited = 0..problem.pixels().div_ceil(stride);
         Self {
-            pixels,
+            pixels: visited.into_par_iter().filter_map(hit).collect(),
             stride: stride as u64,
         }
     }

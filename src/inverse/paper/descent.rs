@@ -13,7 +13,7 @@ use crate::math::color::luminance;
 use crate::math::rng::Stream;
 use crate::scene::Scene;
 use crate::transport::arrival::RayCount;
-use crate::transport::emitters::Emitters;
+use crate::transport::emitters::{Emitters, powers};
 use crate::transport::material::{Lobe, TexelColors};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -150,11 +150,9 @@ impl Descent {
             emission,
             patches: Some(patches),
             level: 0,
-            believed: self.believed.clone(),
-            steps: self.steps,
-            lobes: self.lobes.clone(),
             fixed: Vec::new(),
             caches: None,
+            ..self.clone()
         }
     }
 
@@ -298,10 +296,7 @@ impl Descent {
     ) -> T {
         let (scene, objects) = (&*problem.scene, self.emission.len());
         let caches = self.caches.get_or_insert_with(|| {
-            // Emitters are sampled in proportion to area × luminance of their present emission.
-            let weights: Vec<f64> = (scene.objects.iter().zip(&self.emission))
-                .map(|(object, emission)| object.area * f64::from(luminance(*emission)))
-                .collect();
+            let weights = powers(scene, self.emission.iter().copied());
             let grid = self.patches.as_ref().map(|patches| TexelEstimate {
                 colors: Arc::new(TexelColors {
                     layout: patches.layout().clone(),

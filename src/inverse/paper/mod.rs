@@ -106,8 +106,7 @@ pub fn solve(
     let cover = Cover::new(problem, settings);
     let covered =
         (state.descent.patches.as_ref()).map_or_else(Vec::new, |patches| cover.counts(patches));
-    let pixels: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
-    let loss_pixels = (pixels / LOSS_FRACTION).clamp(1, LOSS_PIXELS);
+    let loss_pixels = (problem.pixels() / LOSS_FRACTION).clamp(1, LOSS_PIXELS);
     let mut run = Run {
         estimate: describe(problem, &gbuffer, &notes, &state.descent, &covered),
         losses: LossProbe::new(problem, settings, loss_pixels, LOSS_SAMPLES, bounces),

@@ -100,17 +100,6 @@ impl Patches {
             && (self.patch_of.iter()).all(|&patch| (patch as usize) < self.depth.len())
     }
 
-    /// The triangle of each patch.
-    pub fn triangle_of(&self) -> Vec<u32> {
-        let mut triangle_of = vec![0; self.len()];
-        for triangle in 0..self.layout.levels.len() {
-            for texel in self.layout.first[triangle]..self.layout.first[triangle + 1] {
-                triangle_of[self.of_texel(texel)] = triangle as u32;
-            }
-        }
-        triangle_of
-    }
-
     /// Subdivides the patches in `which` into four at the midpoints of their edges, unless they have [`MAX_DEPTH`]. Returns the new
     /// patches, and the old patch of each.
     pub fn cut(&self, which: &[bool]) -> (Self, Vec<u32>) {

@@ -31,29 +31,16 @@ pub type Draw<'a> = &'a (dyn Fn(&mut Stream) -> Option<Drawn> + Sync);
 
 /// Draws a usable pixel that is not held out, uniformly over all photographs; `None` if no attempt finds one.
 pub fn draw(problem: &Problem, settings: &Settings, stream: &mut Stream) -> Option<Drawn> {
-    let total: usize = problem.photographs.iter().map(|p| p.pixels.len()).sum();
-    if total == 0 {
-        return None;
-    }
-    for _ in 0..TRIES {
-        let mut at = stream.below(total);
-        for (frame, photograph) in problem.photographs.iter().enumerate() {
-            if at >= photograph.pixels.len() {
-                at -= photograph.pixels.len();
-                continue;
-            }
-            let usable = photograph.is_usable(at);
-            if usable && !HoldOut::from(settings).contains(frame as u32, at as u32) {
-                return Some(Drawn {
-                    frame: frame as u32,
-                    pixel: at as u32,
-                    weight: 1.0,
-                });
-            }
-            break;
-        }
-    }
-    None
+    (0..TRIES).find_map(|_| {
+        let (frame, pixel) = problem.locate(stream.below(problem.pixels()))?;
+        let held_out = HoldOut::from(settings).contains(frame as u32, pixel as u32);
+        let fitted = problem.photographs[frame].is_usable(pixel) && !held_out;
+        fitted.then_some(Drawn {
+            frame: frame as u32,
+            pixel: pixel as u32,
+            weight: 1.0,
+        })
+    })
 }
 
 /// Traces and evaluates the paths of pixels.

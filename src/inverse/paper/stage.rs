@@ -198,23 +198,20 @@ impl Run<'_, '_> {
                 ),
             ),
         };
-        let (seconds, iterations) = self.state.stage_started;
+        let (started, iterations) = self.state.stage_started;
+        let seconds = self.monitor.seconds() - started;
         let progress = &mut self.monitor.progress;
         progress.stages.retain(|stage| stage.name != name);
-        let stage = Stage {
+        progress.stages.push(Stage {
             name,
-            seconds: self.monitor.seconds() - seconds,
-            iterations: self.monitor.progress.iterations.saturating_sub(iterations),
+            seconds,
+            iterations: progress.iterations.saturating_sub(iterations),
             train_loss: best.train,
             held_out_loss: best.held_out,
             kept,
             why: format!("{what}: {course}"),
-        };
-        self.monitor.stage(stage);
-        self.state.fruitless = match kept {
-            true => 0,
-            false => self.state.fruitless + 1,
-        };
+        });
+        self.state.fruitless = if kept { 0 } else { self.state.fruitless + 1 };
         self.state.descent.albedo = best.albedo;
         self.state.descent.set_emission(best.emission);
         self.describe();
@@ -223,23 +220,20 @@ impl Run<'_, '_> {
     /// Starts the next stage: an albedo for each triangle, then the worst patches cut into four. `false` if there is none.
     fn refine(&mut self) -> bool {
         let scene = &self.problem.scene;
-        let mut which = Vec::new();
-        if self.state.descent.patches.is_none() {
-            if scene.triangles.len() <= scene.objects.len() {
-                return false;
+        let which = match self.state.descent.patches {
+            None if scene.triangles.len() <= scene.objects.len() => return false,
+            None => Vec::new(),
+            Some(_) => {
+                let (settings, descent) = (&self.monitor.settings, &mut self.state.descent);
+                let (worst, cast) =
+                    (self.cover).to_cut(self.problem, settings, self.bounces, descent);
+                self.monitor.cast(cast);
+                if !worst.contains(&true) {
+                    return false;
+                }
+                worst
             }
-        } else {
-            let settings = &self.monitor.settings;
-            let descent = &mut self.state.descent;
-            let (worst, cast) = self
-                .cover
-                .to_cut(self.problem, settings, self.bounces, descent);
-            self.monitor.cast(cast);
-            if !worst.contains(&true) {
-                return false;
-            }
-            which = worst;
-        }
+        };
         let cuts = match self.state.descent.patches {
             None => 0,
             Some(_) => self.state.cuts + 1,

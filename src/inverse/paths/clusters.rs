@@ -53,11 +53,7 @@ impl Cluster {
 pub fn cluster(problem: &Problem, gbuffer: &GBuffer, max_pixels: usize) -> Vec<Cluster> {
     // Pixels at edges are used only on objects with few other pixels.
     let seen = |object: u32| gbuffer.seen.get(object as usize).copied().unwrap_or(0);
-    let mut usable: Vec<&GBufferPixel> = gbuffer
-        .pixels
-        .iter()
-        .filter(|p| !p.held_out && p.object != u32::MAX)
-        .collect();
+    let mut usable: Vec<&GBufferPixel> = gbuffer.fitted().collect();
     let saturated = |frame: u32, pixel: u32| {
         let photograph = &problem.photographs[frame as usize];
         photograph.saturated(pixel as usize)
@@ -173,10 +169,7 @@ fn tile_at_edges(pixels: u64) -> u32 {
 /// Median of the positive values of pixels in the fit, per channel; one if there are none.
 fn typical_level(problem: &Problem, gbuffer: &GBuffer) -> Vec3 {
     let channel = |c: usize| {
-        let mut values: Vec<f32> = gbuffer
-            .pixels
-            .iter()
-            .filter(|p| !p.held_out && p.object != u32::MAX)
+        let mut values: Vec<f32> = (gbuffer.fitted())
             .map(|p| problem.photographs[p.frame as usize].pixels[p.pixel as usize][c])
             .filter(|&v| v > 0.0)
             .collect();

@@ -254,43 +254,6 @@ mod tests {
         }
     }
 
-    #[test]
-    fn gradients_add_up_over_paths_and_are_gone_when_cleared() {
-        let mut stream = Stream::new(12, 0, 0, 0);
-        let unknowns = random_unknowns(&mut stream);
-        let paths = [random_path(&mut stream), random_path(&mut stream)];
-        let (mut gathered, mut both) = (Vec::new(), Gradient::new(2 * SURFACES));
-        let mut each = [Vec3A::ZERO; 2 * SURFACES];
-        for path in &paths {
-            differentiate(path, &unknowns, &[], &mut gathered, &mut both);
-            let mut alone = Gradient::new(2 * SURFACES);
-            differentiate(path, &unknowns, &[], &mut gathered, &mut alone);
-            each.iter_mut()
-                .zip(&alone.values)
-                .for_each(|(sum, v)| *sum += *v);
-        }
-        for (sum, value) in each.iter().zip(&both.values) {
-            assert!((*sum - *value).length() < 1e-5, "{sum} {value}");
-        }
-        both.clear();
-        assert!(both.values.iter().all(|v| *v == Vec3A::ZERO));
-        assert!(both.touched.is_empty() && !both.marked.contains(&true));
-    }
-
-    #[test]
-    fn a_path_that_met_nothing_is_dark() {
-        let mut gradient = Gradient::new(2 * SURFACES);
-        let dark = differentiate(
-            &[],
-            &Unknowns::new(SURFACES),
-            &[],
-            &mut Vec::new(),
-            &mut gradient,
-        );
-        assert_eq!(dark, Vec3::ZERO);
-        assert!(gradient.touched.is_empty());
-    }
-
     /// A patch sends its reflected light in addition to its emission, both to light samples and to paths that end at it.
     #[test]
     fn a_lamp_s_albedo_changes_what_its_patches_send() {

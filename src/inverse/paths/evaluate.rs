@@ -71,7 +71,7 @@ impl PathCache {
         self.clusters
             .par_iter()
             .map_init(
-                || Scratch::new(parameters),
+                || ([(); 2].map(|()| Gradient::new(parameters)), Vec::new()),
                 |scratch, cluster| linearise(cluster, unknowns, row_of, reflected, scratch),
             )
             .collect()
@@ -144,12 +144,8 @@ fn linearise(
     unknowns: &Unknowns,
     row_of: &[usize],
     reflected: &[Vec3],
-    scratch: &mut Scratch,
+    (gradients, incident): &mut Scratch,
 ) -> Linearised {
-    let Scratch {
-        incident,
-        gradients,
-    } = scratch;
     gradients.iter_mut().for_each(Gradient::clear);
     let means = means(cached, |vertices, set| {
         differentiate(vertices, unknowns, reflected, incident, &mut gradients[set])
@@ -189,20 +185,8 @@ fn linearise(
     }
 }
 
-/// Memory reused between clusters.
-struct Scratch {
-    gradients: [Gradient; 2],
-    incident: Vec<Vec3A>,
-}
-
-impl Scratch {
-    fn new(parameters: usize) -> Self {
-        Self {
-            gradients: [Gradient::new(parameters), Gradient::new(parameters)],
-            incident: Vec::new(),
-        }
-    }
-}
+/// Memory reused between clusters: a gradient of each set, and what arrives along a path.
+type Scratch = ([Gradient; 2], Vec<Vec3A>);
 
 #[cfg(test)]
 impl Linearised {

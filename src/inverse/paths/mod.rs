@@ -116,10 +116,4 @@ impl PathCache {
         }
         ending as f64 / all.max(1) as f64
     }
-
-    /// Adds another cache's clusters.
-    pub fn append(&mut self, mut other: Self) {
-        self.clusters.append(&mut other.clusters);
-        self.cast += other.cast;
-    }
 }

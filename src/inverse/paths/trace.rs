@@ -162,18 +162,19 @@ impl Tracer<'_> {
         let mut expected = 1.0f32;
         let mut bounce = 0;
         loop {
-            let surface = self.surface(&hit, wo);
+            let mut surface = self.surface(&hit, wo);
             let albedo = self.expected_albedo[surface.id as usize];
-            let scattering = self.lobe(surface.point.object).map(|lobe| {
+            surface.scale = scale;
+            surface.scattering = self.lobe(surface.point.object).map(|lobe| {
                 let [choice, ..] = numbers.four();
                 Scattering::new(lobe, surface.point.normal, wo, albedo, choice)
             });
-            let mut vertex = Vertex::on(match &scattering {
+            let mut vertex = Vertex::on(match &surface.scattering {
                 Some(scattering) if scattering.specular => SPECULAR,
                 _ => surface.id,
             });
             vertex.texel = self.texel(&hit);
-            if surface.front && scattering.is_none() {
+            if surface.front && surface.scattering.is_none() {
                 vertex.emission_weight = emission_weight * scale;
             }
             if surface.front && bounce > 0 {
@@ -190,18 +191,18 @@ impl Tracer<'_> {
                 let choice = numbers.refine(choice);
                 let [sky, sun] = [self.sky_fraction(), self.sun_fraction()];
                 rays += if pick < sky {
-                    self.sky_sample(&surface, &scattering, scale, choice, [u, v], &mut vertex)
+                    self.sky_sample(&surface, choice, [u, v], &mut vertex)
                 } else if pick < sky + sun {
-                    self.sun_sample(&surface, &scattering, scale, &mut vertex)
+                    self.sun_sample(&surface, &mut vertex)
                 } else {
-                    self.light_sample(&surface, &scattering, scale, choice, [u, v], &mut vertex)
+                    self.light_sample(&surface, choice, [u, v], &mut vertex)
                 };
             }
 
             // Russian roulette by the expected albedo, which is constant while the unknowns are fitted.
             let [u, v, end, _] = numbers.four();
             let throughput =
-                (scattering.as_ref()).map_or(albedo, |s| s.expected_throughput(albedo));
+                (surface.scattering.as_ref()).map_or(albedo, |s| s.expected_throughput(albedo));
             expected *= throughput;
             if bounce >= RR_DEPTH {
                 let survival = expected.clamp(RR_MIN_SURVIVAL, RR_MAX_SURVIVAL);
@@ -214,7 +215,7 @@ impl Tracer<'_> {
             }
 
             // Scatter with pdf cosθ/π, so that the weight is the albedo alone, or from the chosen component of a lobed surface.
-            let Some(scattered) = surface.scatter(&scattering, [u, v]) else {
+            let Some(scattered) = surface.scatter([u, v]) else {
                 vertices.push(vertex);
                 return rays;
             };
@@ -270,8 +271,6 @@ impl Tracer<'_> {
     fn light_sample(
         &self,
         surface: &Surface,
-        scattering: &Option<Scattering>,
-        scale: f32,
         choice: f64,
         u: [f32; 2],
         vertex: &mut Vertex,
@@ -298,7 +297,7 @@ impl Tracer<'_> {
             return 1;
         }
         let light_pdf = self.light_pdf(object) * distance2 / cos_light;
-        let weight = self.sample_weight(light_pdf, surface.value(scattering, wi)) * scale;
+        let weight = self.sample_weight(light_pdf, surface.value(wi)) * surface.scale;
         let light_point = SurfacePoint {
             point: sample.point,
             normal: light_normal,
@@ -316,15 +315,7 @@ impl Tracer<'_> {
     }
 
     /// Adds a light sample of the measured outside light to a vertex; returns the number of rays.
-    fn sky_sample(
-        &self,
-        surface: &Surface,
-        scattering: &Option<Scattering>,
-        scale: f32,
-        choice: f64,
-        u: [f32; 2],
-        vertex: &mut Vertex,
-    ) -> u64 {
+    fn sky_sample(&self, surface: &Surface, choice: f64, u: [f32; 2], vertex: &mut Vertex) -> u64 {
         let point = surface.point.point;
         let Some((sky, (wi, pdf))) =
             (self.sky).and_then(|s| Some((s, s.map().sample(point, choice, u)?)))
@@ -336,7 +327,7 @@ impl Tracer<'_> {
             return rays;
         }
         let sky_pdf = pdf * self.sky_fraction();
-        let weight = self.sample_weight(sky_pdf, surface.value(scattering, wi)) * scale;
+        let weight = self.sample_weight(sky_pdf, surface.value(wi)) * surface.scale;
         vertex.known += sky.map().radiance(point, wi) * weight;
         if let Some(grid) = self.outside.filter(|_| sky.is_bound(point, wi)) {
             (vertex.lamp, vertex.lamp_weight) = (grid.excess(wi), weight);
@@ -345,13 +336,7 @@ impl Tracer<'_> {
     }
 
     /// Adds light of the sun to a vertex; returns the number of rays. No other sample reaches the sun, so its weight is one.
-    fn sun_sample(
-        &self,
-        surface: &Surface,
-        scattering: &Option<Scattering>,
-        scale: f32,
-        vertex: &mut Vertex,
-    ) -> u64 {
+    fn sun_sample(&self, surface: &Surface, vertex: &mut Vertex) -> u64 {
         let Some((grid, wi)) = self.outside.and_then(|grid| Some((grid, grid.sun?))) else {
             return 0;
         };
@@ -360,9 +345,9 @@ impl Tracer<'_> {
         }
         let (leaves, rays) = self.leaves_mesh(surface, wi);
         if leaves {
-            let (value, _) = surface.value(scattering, wi);
+            let (value, _) = surface.value(wi);
             vertex.lamp = grid.sun_surface();
-            vertex.lamp_weight = PI * value / self.sun_fraction() * scale;
+            vertex.lamp_weight = PI * value / self.sun_fraction() * surface.scale;
         }
         rays
     }
@@ -446,6 +431,8 @@ impl Tracer<'_> {
             corners: self.scene.corners(hit.triangle),
             id: self.surface_of[hit.triangle as usize],
             front,
+            scattering: None,
+            scale: 1.0,
         }
     }
 }
@@ -459,6 +446,10 @@ struct Surface {
     id: u32,
     /// Whether the path arrives at the front.
     front: bool,
+    /// What the path chose of a surface with a lobe.
+    scattering: Option<Scattering>,
+    /// Product of the path's known weights up to here.
+    scale: f32,
 }
 
 impl Surface {
@@ -469,8 +460,8 @@ impl Surface {
 
     /// For a unit direction above the horizon: f cosθ / albedo, and the pdf of sampling it. Both are cosθ/π, or those of the
     /// chosen component of a surface with a lobe.
-    fn value(&self, scattering: &Option<Scattering>, wi: Vec3) -> (f32, f32) {
-        match scattering {
+    fn value(&self, wi: Vec3) -> (f32, f32) {
+        match &self.scattering {
             Some(scattering) => scattering.value(wi),
             None => {
                 let cosine_pdf = self.point.normal.dot(wi) * FRAC_1_PI;
@@ -480,8 +471,8 @@ impl Surface {
     }
 
     /// Samples a direction; `None` if a lobe reflects below the horizon.
-    fn scatter(&self, scattering: &Option<Scattering>, u: [f32; 2]) -> Option<Scattered> {
-        if let Some(scattering) = scattering {
+    fn scatter(&self, u: [f32; 2]) -> Option<Scattered> {
+        if let Some(scattering) = &self.scattering {
             return scattering.sample(u);
         }
         let local = warp::cosine_hemisphere(u);

@@ -21,11 +21,18 @@ pub struct Budget {
     pub rounds: u32,
     /// Greatest number of rounds before textures are fitted.
     pub texture_rounds: u32,
-    /// Target of the median relative standard error of the seen albedos.
-    pub median_error: f64,
-    /// Target of their 95th percentile.
-    pub tail_error: f64,
-    /// Fraction of these errors below which the part due to path noise is negligible.
+    /// Target errors.
+    pub aim: Aim,
+}
+
+/// Target relative standard errors of the albedos of seen objects.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Aim {
+    /// Median over objects.
+    pub median: f64,
+    /// 95th percentile over objects.
+    pub tail: f64,
+    /// Fraction of these below which the part due to path noise is negligible.
     pub path_noise: f64,
 }
 
@@ -63,9 +70,11 @@ impl Budget {
                 round_paths: 0,
                 rounds: 0,
                 texture_rounds: 0,
-                median_error: 0.02,
-                tail_error: 0.2,
-                path_noise: 0.5,
+                aim: Aim {
+                    median: 0.02,
+                    tail: 0.2,
+                    path_noise: 0.5,
+                },
             },
             Preset::Balanced | Preset::Paper => Self {
                 gbuffer_pixels: 400_000,
@@ -74,9 +83,11 @@ impl Budget {
                 round_paths: 1_500_000,
                 rounds: 16,
                 texture_rounds: 16,
-                median_error: 5e-3,
-                tail_error: 0.05,
-                path_noise: 0.5,
+                aim: Aim {
+                    median: 5e-3,
+                    tail: 0.05,
+                    path_noise: 0.5,
+                },
             },
             Preset::Reference => Self {
                 gbuffer_pixels: 1_500_000,
@@ -85,9 +96,11 @@ impl Budget {
                 round_paths: 3_000_000,
                 rounds: 100,
                 texture_rounds: 8,
-                median_error: 4e-4,
-                tail_error: 0.01,
-                path_noise: ACCURATE,
+                aim: Aim {
+                    median: 4e-4,
+                    tail: 0.01,
+                    path_noise: ACCURATE,
+                },
             },
         }
     }

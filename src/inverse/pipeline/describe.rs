@@ -88,19 +88,15 @@ pub fn estimate(
                         object.note.push_str("; only a few pixels see it");
                     }
                 }
-                Role::Unseen => {
+                Role::Unseen | Role::Dark => {
                     object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION);
                     object.identifiable = false;
                     object.albedo_identifiable = false;
-                    object.note =
-                        "no photograph sees it; its emission is inferred from its effect on others"
-                            .into();
-                }
-                Role::Dark => {
-                    object.albedo_stderr = Vec3::splat(ALBEDO_DEVIATION);
-                    object.identifiable = false;
-                    object.albedo_identifiable = false;
-                    object.note = "no photograph sees it; its albedo is assumed".into();
+                    object.note = match roles[k] {
+                        Role::Dark => "no photograph sees it; its albedo is assumed",
+                        _ => "no photograph sees it; its emission is inferred from its effect on others",
+                    }
+                    .into();
                 }
             }
             object
@@ -247,14 +243,6 @@ mod tests {
         assert!(at(UNKNOWN_ALBEDO) < 0.02);
         assert!((at(ALBEDO_DEVIATION) - 0.2).abs() < 1e-6);
         assert!((at(f32::INFINITY) - 0.4).abs() < 1e-6);
-    }
-
-    #[test]
-    fn an_emission_is_known_where_its_error_is_small_beside_its_brightest_channel() {
-        let red = Vec3::new(2.0, 0.1, 0.0);
-        assert!(!is_unknown(red, Vec3::splat(0.3)));
-        assert!(is_unknown(red, Vec3::new(1.1, 0.0, 0.0)));
-        assert!(is_unknown(red, Vec3::INFINITY));
     }
 
     #[test]

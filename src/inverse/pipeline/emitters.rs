@@ -7,8 +7,7 @@ use crate::inverse::paths::PathCache;
 use crate::inverse::pipeline::Pipeline;
 use crate::inverse::roles::Role;
 use crate::inverse::solver::Termination;
-use crate::math::color::luminance;
-use crate::transport::emitters::Emitters;
+use crate::transport::emitters::{Emitters, powers};
 use glam::Vec3;
 
 /// χ² (three channels) above which an emission is significant.
@@ -36,8 +35,7 @@ impl Pipeline<'_, '_> {
         let equations = cache.normal_equations(&self.unknowns, &free, &self.robust, &self.prior);
         let tests = score_tests(&equations, &free, active);
         for test in &tests {
-            self.errors.emission[test.index - objects] =
-                Vec3::from_array(test.stderr.map(|e| e as f32));
+            self.errors.emission[test.index - objects] = test.stderr.as_vec3();
         }
         self.describe();
         tests
@@ -162,10 +160,8 @@ impl Pipeline<'_, '_> {
 
     /// Area × luminance of the present emission of each object.
     pub(super) fn light_weights(&self) -> Vec<f64> {
-        let objects = self.problem.scene.objects.iter();
-        (objects.zip(&self.unknowns.emission))
-            .map(|(object, emission)| object.area * f64::from(luminance(*emission)))
-            .collect()
+        let emission = self.unknowns.emission.iter().copied();
+        powers(&self.problem.scene, emission)
     }
 
     /// Adds a fraction of the weights to all objects with an area.

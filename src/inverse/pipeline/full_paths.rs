@@ -31,8 +31,7 @@ impl Pipeline<'_, '_> {
                 names.join(", ")
             ),
         };
-        self.record("objects", started, true, why + &limit)?;
-        Ok(())
+        self.record("objects", started, true, why + &limit)
     }
 
     /// Stores full paths to the present lamps and settles all roles on them. Also returns the remark of

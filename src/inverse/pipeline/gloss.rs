@@ -118,8 +118,7 @@ impl<'a> Pipeline<'a, '_> {
             }
         }
         self.describe();
-        self.record("lobes refined", started, true, names.join("; "))?;
-        Ok(())
+        self.record("lobes refined", started, true, names.join("; "))
     }
 
     /// The task of fitting the lobes of `objects` objects.

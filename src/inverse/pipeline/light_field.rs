@@ -5,6 +5,7 @@ use crate::inverse::fit::prior::ExpectedAlbedo;
 use crate::inverse::fit::robust_weights::RobustWeights;
 use crate::inverse::paths::PathCache;
 use crate::inverse::pipeline::Pipeline;
+use crate::inverse::pipeline::outside::LightField;
 use crate::inverse::roles::Role;
 use crate::inverse::solver::Termination;
 use crate::inverse::unknowns::Unknowns;
@@ -48,7 +49,11 @@ impl Pipeline<'_, '_> {
             self.lamps()
         );
         self.record("light field", started, true, why)?;
-        self.light_from_outside(&cache, &lights, &measured)?;
+        self.light_from_outside(LightField {
+            cache: &cache,
+            lights: &lights,
+            measured: &measured,
+        })?;
         self.expect_of_albedo();
         self.monitor
             .report(&self.estimate, &|_| self.checkpoint.clone())
@@ -68,7 +73,7 @@ impl Pipeline<'_, '_> {
                 expected.mean[k] = self.unknowns.albedo[k];
             }
         }
-        self.prior = (self.prior.clone()).with_albedo(expected);
+        self.prior.albedo = expected;
     }
 
     /// Fits all seen objects as reflectors, then settles which are emitters. Outside light is fitted if `outside` is

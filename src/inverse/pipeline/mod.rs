@@ -149,71 +149,50 @@ pub fn solve(
     }
     let max_bounces = settings.max_bounces().min(MAX_DEPTH);
     let clusters = cluster(problem, &gbuffer, budget.pixels);
-    let mut prior = Prior::new(surfaces, objects, mean_radiance(&clusters));
+    let photographed = mean_radiance(&clusters);
+    let mut prior = Prior::new(surfaces, objects, photographed).with_known(&monitor.known);
     if problem.scene.scanned {
         prior = prior.of_scan();
     }
-    let prior = prior
-        .with_known(&monitor.known)
-        .with_albedo(ExpectedAlbedo::unknown(surfaces, &gbuffer.seen));
-    let start = match resume {
-        Some(checkpoint) => {
-            checkpoint.state(|state: &SolverState| state.fits(surfaces, outside.surfaces()))?
-        }
-        None => SolverState::new(
-            0,
-            false,
-            &prior,
-            &vec![Role::Reflector; surfaces],
-            &Unknowns::new(surfaces),
-            &StandardErrors {
-                albedo: vec![Vec3::splat(0.5); surfaces],
-                emission: vec![Vec3::INFINITY; surfaces],
-            },
-            &[],
-        ),
-    };
-    let mut lobes = start.lobes();
-    lobes.resize(objects, None);
-    let sky = (start.open)
-        .then(|| MeasuredOutside::new(problem, &gbuffer, start.surroundings))
-        .flatten();
-    let expected = (start.expected.clone()).unwrap_or_else(|| prior.albedo().clone());
-    let prior = (prior.with_albedo(expected)).with_directions(start.directions.clone());
+    prior.albedo = ExpectedAlbedo::unknown(surfaces, &gbuffer.seen);
     let mut pipeline = Pipeline {
         problem,
         budget,
         losses: LossProbe::new(problem, settings, 400, 16, max_bounces),
-        checkpoint: Checkpoint::new(&monitor.progress, &start),
+        checkpoint: Checkpoint::new(&monitor.progress, &()),
         monitor,
-        sky,
-        open: start.open,
+        sky: None,
+        open: false,
         brightness: brightness(&clusters, surfaces),
         clusters,
         gbuffer,
         widths: problem.photographs.iter().map(|p| p.width).collect(),
         mesh_area: problem.scene.objects.iter().map(|o| o.area).sum(),
         max_bounces,
-        outside: OutsideGrid {
-            surroundings: start.surroundings,
-            sun: start.sun,
-            ..outside
+        outside,
+        errors: StandardErrors {
+            albedo: vec![Vec3::splat(0.5); surfaces],
+            emission: vec![Vec3::INFINITY; surfaces],
         },
-        errors: start.errors(),
-        model_variance: start.model_variance,
-        roles: start.roles,
+        model_variance: 0.0,
+        roles: vec![Role::Reflector; surfaces],
         robust: RobustWeights::even(surfaces),
         prior,
         patches: LampPatches::default(),
         path_noise: vec![1.0; surfaces],
-        unknowns: start.unknowns,
-        lobes,
+        unknowns: Unknowns::new(surfaces),
+        lobes: vec![None; objects],
         exposures: exposures.clone().filter(Exposures::needed),
         estimate: Estimate::default(),
         summed: None,
         detail: None,
-        stages: start.stages,
+        stages: 0,
     };
+    if let Some(checkpoint) = resume {
+        let fits = |state: &SolverState| state.fits(surfaces, outside.surfaces());
+        pipeline.restore(checkpoint.state(fits)?);
+    }
+    pipeline.checkpoint = Checkpoint::new(&pipeline.monitor.progress, &pipeline.state());
     pipeline.hold();
     pipeline.describe();
     if let Some(exposures) = exposures.filter(|_| resume.is_none()) {

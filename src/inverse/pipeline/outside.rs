@@ -29,6 +29,14 @@ const FALL_ERRORS: f64 = 4.0;
 /// Standard errors by which a sun's light exceeds zero: the usual bound for one unknown, since the squared error decides about its direction.
 const SUN_ERRORS: f32 = 3.0;
 
+/// Stored paths that end in measured radiance, and what more of them are traced with.
+#[derive(Clone, Copy)]
+pub(super) struct LightField<'a> {
+    pub cache: &'a PathCache,
+    pub lights: &'a Emitters,
+    pub measured: &'a MeasuredRadiance,
+}
+
 /// The result of a trial of outside light.
 #[derive(Clone)]
 struct Found {
@@ -67,13 +75,8 @@ impl Pipeline<'_, '_> {
     /// Tries light from outside the mesh, where paths leave it. A scan gets it without a test: what was not scanned reflects light, if
     /// nothing else, and the light field without it makes walls lighter, or gives them light of their own, until nothing is left to
     /// improve.
-    pub(super) fn light_from_outside(
-        &mut self,
-        cache: &PathCache,
-        lights: &Emitters,
-        measured: &MeasuredRadiance,
-    ) -> Result<(), Termination> {
-        let escaping = cache.fraction_ending_on(self.outside.first);
+    pub(super) fn light_from_outside(&mut self, field: LightField) -> Result<(), Termination> {
+        let escaping = field.cache.fraction_ending_on(self.outside.first);
         if escaping <= ESCAPING || !self.monitor.settings.outside_light {
             return Ok(());
         }
@@ -82,26 +85,20 @@ impl Pipeline<'_, '_> {
         let leave = format!("{:.1} % of the paths leave the mesh", escaping * 100.0);
         let scene = &self.problem.scene;
         let what = if scene.scanned {
-            self.light_around_scan(cache, lights, measured)?
+            self.light_around_scan(field)?
         } else {
-            self.light_through_windows(cache, lights, measured)?
+            self.light_through_windows(field)?
         };
         self.describe();
         let why = format!("{leave}; light from there {what}");
-        self.record("outside light", started, self.open, why)?;
-        Ok(())
+        self.record("outside light", started, self.open, why)
     }
 
     /// Tries light from infinity, without a sun and with one if there is a candidate. Keeps it if the light field's squared error falls
     /// clearly. A mesh that is not a scan is assumed to lack windows only. Returns in words what the light does.
-    fn light_through_windows(
-        &mut self,
-        cache: &PathCache,
-        lights: &Emitters,
-        measured: &MeasuredRadiance,
-    ) -> Result<String, Termination> {
+    fn light_through_windows(&mut self, field: LightField) -> Result<String, Termination> {
         // A linear step estimates the gain at a small fraction of the cost of a trial.
-        let gain = self.outside_gain(cache);
+        let gain = self.outside_gain(field.cache);
         if gain < OUTSIDE_GAIN {
             return Ok(format!(
                 "would change the squared error by {:.1} %, so it is not called for",
@@ -109,10 +106,10 @@ impl Pipeline<'_, '_> {
             ));
         }
         let without = self.found();
-        let before = Misfit::new(cache, &without.unknowns);
-        let plain = self.fit_open(Surroundings::Far, None, cache, lights, measured)?;
+        let before = Misfit::new(field.cache, &without.unknowns);
+        let plain = self.fit_open(Surroundings::Far, None, field)?;
         let needed = OUTSIDE_GAIN * before.mean();
-        let best = self.with_sun(without.clone(), plain, needed, cache, lights, measured)?;
+        let best = self.with_sun(without.clone(), plain, needed, field)?;
         if !before.falls(&best.misfit, OUTSIDE_GAIN * before.mean()) {
             self.go_back_to(without);
             return Ok("is not called for".to_owned());
@@ -127,20 +124,15 @@ impl Pipeline<'_, '_> {
     }
 
     /// Fits light from a box around a scan, and tries a sun beyond it. Returns in words what the light does.
-    fn light_around_scan(
-        &mut self,
-        cache: &PathCache,
-        lights: &Emitters,
-        measured: &MeasuredRadiance,
-    ) -> Result<String, Termination> {
+    fn light_around_scan(&mut self, field: LightField) -> Result<String, Termination> {
         let scene = &self.problem.scene;
         let cameras = scene.cameras.iter().map(|camera| camera.center);
         let around = Surroundings::around(scene.positions.iter().copied().chain(cameras));
         let around = around.unwrap_or(Surroundings::Far);
         let without = self.found();
-        let plain = self.fit_open(around, None, cache, lights, measured)?;
+        let plain = self.fit_open(around, None, field)?;
         let needed = OUTSIDE_GAIN * plain.misfit.mean();
-        let best = self.with_sun(without, plain, needed, cache, lights, measured)?;
+        let best = self.with_sun(without, plain, needed, field)?;
         self.go_back_to(best.found);
         let from = match around {
             Surroundings::Far => "far away",
@@ -156,20 +148,18 @@ impl Pipeline<'_, '_> {
         without: Found,
         mut plain: Trial,
         needed: f64,
-        cache: &PathCache,
-        lights: &Emitters,
-        measured: &MeasuredRadiance,
+        field: LightField,
     ) -> Result<Trial, Termination> {
-        let sun = self.find_sun(plain.paths.take().as_ref().unwrap_or(cache));
+        let sun = self.find_sun(plain.paths.take().as_ref().unwrap_or(field.cache));
         if sun.is_none() {
             return Ok(plain);
         }
         let sunny = if self.problem.scene.scanned {
-            self.add_sun(sun, without.prior, cache, lights, measured)?
+            self.add_sun(sun, without.prior, field)?
         } else {
             // With the sun known, windows and lamps are told apart anew.
             self.go_back_to(without);
-            self.fit_open(Surroundings::Far, sun, cache, lights, measured)?
+            self.fit_open(Surroundings::Far, sun, field)?
         };
         let fall = plain.misfit.mean() - sunny.misfit.mean();
         Ok(match fall > needed && self.sun_shines() {
@@ -183,9 +173,7 @@ impl Pipeline<'_, '_> {
         &mut self,
         sun: Option<Vec3>,
         prior: Prior,
-        cache: &PathCache,
-        lights: &Emitters,
-        measured: &MeasuredRadiance,
+        field: LightField,
     ) -> Result<Trial, Termination> {
         self.outside.sun = sun;
         self.prior = prior;
@@ -194,12 +182,11 @@ impl Pipeline<'_, '_> {
         self.roles[surface] = Role::Unseen;
         self.unknowns.emission[surface] = mean_radiance(&self.clusters);
         self.robust = RobustWeights::even(self.roles.len());
-        let count = self.budget.light_field_paths;
-        let (paths, _) = self.stored(lights, Some(measured), 0, count)?;
+        let paths = self.paths_of(field)?;
         let fitted = self.fit(&paths)?;
         self.settle_roles(&paths, fitted)?;
         self.weigh(&paths)?;
-        self.trial(Some(paths), cache)
+        self.trial(Some(paths), field.cache)
     }
 
     /// Where the sun stands, for reports; empty without one.
@@ -222,23 +209,27 @@ impl Pipeline<'_, '_> {
         &mut self,
         surroundings: Surroundings,
         sun: Option<Vec3>,
-        cache: &PathCache,
-        lights: &Emitters,
-        measured: &MeasuredRadiance,
+        field: LightField,
     ) -> Result<Trial, Termination> {
         self.open = true;
         self.outside.surroundings = surroundings;
         self.outside.sun = sun;
         self.sky = MeasuredOutside::new(self.problem, &self.gbuffer, surroundings);
         self.expect_of_outside();
-        let count = self.budget.light_field_paths;
         let as_stored = self.sky.is_none() && surroundings == Surroundings::Far && sun.is_none();
         let paths = match as_stored {
             true => None,
-            false => Some(self.stored(lights, Some(measured), 0, count)?.0),
+            false => Some(self.paths_of(field)?),
         };
-        self.tell_lamps(paths.as_ref().unwrap_or(cache), Role::Unseen)?;
-        self.trial(paths, cache)
+        self.tell_lamps(paths.as_ref().unwrap_or(field.cache), Role::Unseen)?;
+        self.trial(paths, field.cache)
+    }
+
+    /// Paths as of the light field, with the present light from outside.
+    fn paths_of(&mut self, field: LightField) -> Result<PathCache, Termination> {
+        let count = self.budget.light_field_paths;
+        let (paths, _) = self.stored(field.lights, Some(field.measured), 0, count)?;
+        Ok(paths)
     }
 
     /// Fits again with the expected colours of outside light. `paths` replace the stored ones of `cache`.

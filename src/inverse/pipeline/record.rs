@@ -1,9 +1,7 @@
 //! Reports of a solve: the present estimate, stages with their losses, and checkpoints.
 
 use crate::inverse::fit::model_error;
-use crate::inverse::loss::Losses;
 use crate::inverse::paths::evaluate::Linearised;
-use crate::inverse::pipeline::state::SolverState;
 use crate::inverse::pipeline::{Pipeline, STAGES, describe};
 use crate::inverse::solver::{Checkpoint, Solution, Stage, Termination};
 
@@ -51,11 +49,12 @@ impl Pipeline<'_, '_> {
         );
     }
 
-    /// The losses of the present estimate.
-    pub(super) fn measure(&mut self) -> Losses {
+    /// Adds the losses of the present estimate to the loss curve, and returns them: in the fit, and held out.
+    fn measure(&mut self) -> [Option<f64>; 2] {
         let losses = self.losses.measure(self.problem, &self.estimate);
         self.monitor.cast(losses.cast);
-        losses
+        self.monitor.loss(losses.train, losses.held_out);
+        [losses.train, losses.held_out]
     }
 
     /// Records a stage with its losses, and adds them to the loss curve.
@@ -65,32 +64,33 @@ impl Pipeline<'_, '_> {
         started: f64,
         kept: bool,
         why: String,
-    ) -> Result<Losses, Termination> {
+    ) -> Result<(), Termination> {
         let losses = self.measure();
-        self.monitor.loss(losses.train, losses.held_out);
-        let stage = Stage {
-            name: name.to_owned(),
-            seconds: self.monitor.seconds() - started,
-            iterations: self.monitor.progress.iterations,
-            train_loss: losses.train,
-            held_out_loss: losses.held_out,
-            kept,
-            why,
-        };
-        self.monitor.stage(stage);
+        self.record_with(losses, name, started, kept, why);
         self.monitor
-            .report(&self.estimate, &|_| self.checkpoint.clone())?;
-        Ok(losses)
+            .report(&self.estimate, &|_| self.checkpoint.clone())
     }
 
     /// Records a stage that leaves the estimate as it is, without losses.
     pub(super) fn record_unmeasured(&mut self, name: &str, started: f64, kept: bool, why: String) {
-        self.monitor.stage(Stage {
+        self.record_with([None; 2], name, started, kept, why);
+    }
+
+    fn record_with(
+        &mut self,
+        [train_loss, held_out_loss]: [Option<f64>; 2],
+        name: &str,
+        started: f64,
+        kept: bool,
+        why: String,
+    ) {
+        let seconds = self.monitor.seconds() - started;
+        self.monitor.progress.stages.push(Stage {
             name: name.to_owned(),
-            seconds: self.monitor.seconds() - started,
+            seconds,
             iterations: self.monitor.progress.iterations,
-            train_loss: None,
-            held_out_loss: None,
+            train_loss,
+            held_out_loss,
             kept,
             why,
         });
@@ -107,19 +107,7 @@ impl Pipeline<'_, '_> {
     pub(super) fn keep_checkpoint(&mut self, stages: u32) {
         self.stages = stages;
         self.monitor.progress.seconds = self.monitor.seconds();
-        let mut state = SolverState::new(
-            stages,
-            self.open,
-            &self.prior,
-            &self.roles,
-            &self.unknowns,
-            &self.errors,
-            &self.lobes,
-        );
-        state.model_variance = self.model_variance;
-        state.surroundings = self.outside.surroundings;
-        state.sun = self.outside.sun;
-        self.checkpoint = Checkpoint::new(&self.monitor.progress, &state);
+        self.checkpoint = Checkpoint::new(&self.monitor.progress, &self.state());
     }
 
     /// The solution; it has a checkpoint unless the solve is complete.
@@ -127,8 +115,7 @@ impl Pipeline<'_, '_> {
         // A complete solve has measured the loss of its last stage.
         let done = self.stages >= STAGES || termination == Termination::Converged;
         if !done {
-            let losses = self.measure();
-            self.monitor.loss(losses.train, losses.held_out);
+            self.measure();
         }
         self.monitor.phase("done");
         self.monitor.progress.seconds = self.monitor.seconds();

@@ -10,7 +10,7 @@ use crate::inverse::fit::path_noise::distribute_paths;
 use crate::inverse::paths::evaluate::Linearised;
 use crate::inverse::paths::lamp_patches::LampPatches;
 use crate::inverse::pipeline::Pipeline;
-use crate::inverse::pipeline::budget::ACCURATE;
+use crate::inverse::pipeline::budget::{ACCURATE, Aim};
 use crate::inverse::pipeline::refit::increase;
 use crate::inverse::roles;
 use crate::inverse::roles::Role;
@@ -75,17 +75,6 @@ enum Leg {
     UntilTextures,
     /// Until the end.
     UntilDone,
-}
-
-/// Target relative standard errors of albedo.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Aim {
-    /// Median over objects.
-    pub median: f64,
-    /// 95th percentile over objects.
-    pub tail: f64,
-    /// Fraction of these below which the part due to path noise is negligible.
-    pub path_noise: f64,
 }
 
 impl Pipeline<'_, '_> {
@@ -167,8 +156,11 @@ impl Pipeline<'_, '_> {
             rounds.next += 1;
             // The reflected light of lamps is traced again each round instead of linearised.
             self.light_patches(round);
-            let linearised =
-                self.linearised(&rounds.lights, 2, round, &rounds.about, &rounds.places)?;
+            let reflected = self.patches.reflected.clone();
+            let (about, places) = (&rounds.about, &rounds.places);
+            let linearised = self.traced(&rounds.lights, None, 2, round, |slice| {
+                slice.linearise(about, places, &reflected)
+            })?;
             rounds.sums.add(linearised);
             let mut clusters = rounds.mean(&self.roles);
             self.leave_textures_out(&mut clusters);
@@ -243,10 +235,9 @@ impl Pipeline<'_, '_> {
         let (most, aim) = self.aim();
         match leg {
             Leg::UntilTextures => {
-                let (median, tail) = (ENOUGH_FOR_TEXTURES, f64::INFINITY);
                 let aim = Aim {
-                    median,
-                    tail,
+                    median: ENOUGH_FOR_TEXTURES,
+                    tail: f64::INFINITY,
                     ..aim
                 };
                 (self.budget.texture_rounds.min(most), aim)
@@ -258,18 +249,16 @@ impl Pipeline<'_, '_> {
     /// Greatest number of rounds and the target errors of the preset; a smaller median in the settings has no limit of rounds.
     fn aim(&self) -> (u32, Aim) {
         let asked = self.monitor.settings.target_error * 0.01;
-        let budget = &self.budget;
-        let (most, median, path_noise) = if asked > 0.0 && asked < budget.median_error {
-            (u32::MAX, asked, ACCURATE)
-        } else {
-            (budget.rounds, budget.median_error, budget.path_noise)
+        let aim = self.budget.aim;
+        if asked <= 0.0 || asked >= aim.median {
+            return (self.budget.rounds, aim);
+        }
+        let accurate = Aim {
+            median: asked,
+            path_noise: ACCURATE,
+            ..aim
         };
-        let aim = Aim {
-            median,
-            tail: budget.tail_error,
-            path_noise,
-        };
-        (most, aim)
+        (u32::MAX, accurate)
     }
 
     /// Traces the reflected light of lamp patches with the present estimate.

@@ -51,7 +51,10 @@ impl Pipeline<'_, '_> {
                 flat.albedo[k] = *albedo;
             }
         }
-        let offsets = self.texture_offsets(&lights, 4, &texels, &flat)?;
+        let colors = &texels.colors.colors;
+        let offsets = self.traced(&lights, None, 4, 0, |slice| {
+            slice.texture_offsets(&flat, colors)
+        })?;
         self.detail = Some(Detail {
             offsets,
             ..detail.clone()
@@ -86,8 +89,7 @@ impl Pipeline<'_, '_> {
                 "held-out pixels get worse by {increase:.1} standard errors, so the refit is undone"
             ),
         };
-        self.record("refit", started, kept, why)?;
-        Ok(())
+        self.record("refit", started, kept, why)
     }
 
     /// The loss of each held-out pixel.

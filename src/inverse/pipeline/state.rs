@@ -1,9 +1,12 @@
 //! The state between stages, which a checkpoint stores.
 
 use crate::inverse::fit::errors::StandardErrors;
-use crate::inverse::fit::prior::{ExpectedAlbedo, Prior};
+use crate::inverse::fit::prior::ExpectedAlbedo;
+use crate::inverse::outside::MeasuredOutside;
+use crate::inverse::pipeline::Pipeline;
 use crate::inverse::roles::Role;
 use crate::inverse::unknowns::Unknowns;
+use crate::math::nullable;
 use crate::transport::material::Lobe;
 use crate::transport::surroundings::Surroundings;
 use glam::Vec3;
@@ -13,67 +16,37 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SolverState {
     /// Number of finished stages.
-    pub stages: u32,
+    stages: u32,
     /// Whether light comes from outside.
-    pub open: bool,
+    open: bool,
     /// Distance of the outside light.
     #[serde(default)]
-    pub surroundings: Surroundings,
+    surroundings: Surroundings,
     /// The unit direction towards the sun, if one was found.
     #[serde(default)]
-    pub sun: Option<Vec3>,
+    sun: Option<Vec3>,
     /// Prior of the albedos, which may come from the light field.
     #[serde(default)]
-    pub expected: Option<ExpectedAlbedo>,
+    expected: Option<ExpectedAlbedo>,
     /// Prior of the outside light: mean and standard deviation by direction.
-    pub directions: Vec<(Vec3, Vec3)>,
+    directions: Vec<(Vec3, Vec3)>,
     /// Role of each surface.
-    pub roles: Vec<Role>,
+    roles: Vec<Role>,
     /// Values of all unknowns.
-    pub unknowns: Unknowns,
+    unknowns: Unknowns,
     /// Variance of the model error, relative to reflected radiance.
     #[serde(default)]
-    pub model_variance: f64,
-    albedo_errors: Vec<[Option<f32>; 3]>,
-    emission_errors: Vec<[Option<f32>; 3]>,
+    model_variance: f64,
+    #[serde(deserialize_with = "nullable::all_or_infinity")]
+    albedo_errors: Vec<Vec3>,
+    #[serde(deserialize_with = "nullable::all_or_infinity")]
+    emission_errors: Vec<Vec3>,
     /// Roughness and specular reflectance of each object that has a lobe.
     #[serde(default)]
     lobes: Vec<Option<(f32, f32)>>,
 }
 
 impl SolverState {
-    /// Stores the result of the stages; infinite errors become `null`.
-    pub fn new(
-        stages: u32,
-        open: bool,
-        prior: &Prior,
-        roles: &[Role],
-        unknowns: &Unknowns,
-        errors: &StandardErrors,
-        lobes: &[Option<Lobe>],
-    ) -> Self {
-        let finite = |errors: &[Vec3]| {
-            let finite = |e: f32| e.is_finite().then_some(e);
-            errors.iter().map(|e| e.to_array().map(finite)).collect()
-        };
-        Self {
-            stages,
-            open,
-            surroundings: Surroundings::Far,
-            sun: None,
-            expected: Some(prior.albedo().clone()),
-            directions: prior.directions().to_vec(),
-            roles: roles.to_vec(),
-            unknowns: unknowns.clone(),
-            model_variance: 0.0,
-            albedo_errors: finite(&errors.albedo),
-            emission_errors: finite(&errors.emission),
-            lobes: (lobes.iter())
-                .map(|lobe| lobe.map(|l| (l.roughness, l.specular.x)))
-                .collect(),
-        }
-    }
-
     /// Whether the sizes fit this number of surfaces, of which `outside` are outside directions.
     pub fn fits(&self, objects: usize, outside: usize) -> bool {
         self.roles.len() == objects
@@ -86,28 +59,52 @@ impl SolverState {
             && self.emission_errors.len() == objects
             && self.lobes.len() <= objects
     }
+}
 
-    /// The lobe of each object that has one.
-    pub fn lobes(&self) -> Vec<Option<Lobe>> {
-        let lobe = |(roughness, specular): (f32, f32)| Lobe {
-            roughness,
-            specular: Vec3::splat(specular),
-        };
-        self.lobes.iter().map(|l| l.map(lobe)).collect()
+impl Pipeline<'_, '_> {
+    /// The present state.
+    pub(super) fn state(&self) -> SolverState {
+        let lobes = self.lobes.iter();
+        SolverState {
+            stages: self.stages,
+            open: self.open,
+            surroundings: self.outside.surroundings,
+            sun: self.outside.sun,
+            expected: Some(self.prior.albedo.clone()),
+            directions: self.prior.directions.clone(),
+            roles: self.roles.clone(),
+            unknowns: self.unknowns.clone(),
+            model_variance: self.model_variance,
+            albedo_errors: self.errors.albedo.clone(),
+            emission_errors: self.errors.emission.clone(),
+            lobes: lobes
+                .map(|lobe| lobe.map(|l| (l.roughness, l.specular.x)))
+                .collect(),
+        }
     }
 
-    /// Standard errors of all parameters.
-    pub fn errors(&self) -> StandardErrors {
-        let read = |errors: &[[Option<f32>; 3]]| {
-            let known = |e: Option<f32>| e.unwrap_or(f32::INFINITY);
-            errors
-                .iter()
-                .map(|e| Vec3::from_array(e.map(known)))
-                .collect()
+    /// Goes on from a state that [`SolverState::fits`].
+    pub(super) fn restore(&mut self, state: SolverState) {
+        self.stages = state.stages;
+        self.open = state.open;
+        self.outside.surroundings = state.surroundings;
+        self.outside.sun = state.sun;
+        if state.open {
+            self.sky = MeasuredOutside::new(self.problem, &self.gbuffer, state.surroundings);
+        }
+        if let Some(expected) = state.expected {
+            self.prior.albedo = expected;
+        }
+        self.prior.directions = state.directions;
+        self.roles = state.roles;
+        self.unknowns = state.unknowns;
+        self.model_variance = state.model_variance;
+        self.errors = StandardErrors {
+            albedo: state.albedo_errors,
+            emission: state.emission_errors,
         };
-        StandardErrors {
-            albedo: read(&self.albedo_errors),
-            emission: read(&self.emission_errors),
+        for (lobe, stored) in self.lobes.iter_mut().zip(state.lobes) {
+            *lobe = stored.map(|(roughness, specular)| Lobe::grey(roughness, specular));
         }
     }
 }

@@ -113,6 +113,6 @@ impl Pipeline<'_, '_> {
         self.describe();
         // The stage is recorded even if it ended early.
         let recorded = self.record("textures", started, kept, why);
-        ended.and(recorded.map(drop))
+        ended.and(recorded)
     }
 }

@@ -1,20 +1,17 @@
 //! Traces the paths of the pipeline in slices, with reports in between, and within the memory limit.
 
 use crate::calibrate::measured_radiance::MeasuredRadiance;
-use crate::inverse::estimate::TexelEstimate;
 use crate::inverse::fit::path_noise::distribute_paths;
 use crate::inverse::fit::prior::ALBEDO_MEAN;
 use crate::inverse::paths::clusters::{Cluster, cluster};
-use crate::inverse::paths::evaluate::Linearised;
 use crate::inverse::paths::memory::PILOT_CLUSTERS;
 use crate::inverse::paths::trace::{Tracer, max_mean_path_length};
 use crate::inverse::paths::{PathCache, memory};
 use crate::inverse::pipeline::Pipeline;
 use crate::inverse::roles::Role;
 use crate::inverse::solver::Termination;
-use crate::inverse::unknowns::Unknowns;
 use crate::transport::emitters::Emitters;
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use std::time::{Duration, Instant};
 
 /// Target duration of a slice.
@@ -65,14 +62,17 @@ impl Pipeline<'_, '_> {
             self.clusters = cluster(self.problem, &self.gbuffer, pixels as usize);
         }
         distribute_paths(&mut self.clusters, surfaces, fits);
-        let mut cache = PathCache::default();
-        self.slices(lights, measured, stage, 0, |slice| cache.append(slice))?;
+        let clusters = self.traced(lights, measured, stage, 0, |slice| slice.clusters)?;
         let limit = match fits < paths {
             true => {
                 let pixels: usize = self.clusters.iter().map(|c| c.pixels.len()).sum();
                 format!("; memory allows {fits} paths of {pixels} pixels in place of {paths}")
             }
             false => String::new(),
+        };
+        let cache = PathCache {
+            clusters,
+            ..PathCache::default()
         };
         Ok((cache, limit))
     }
@@ -90,57 +90,23 @@ impl Pipeline<'_, '_> {
                 *albedo = (*albedo + self.errors.albedo[k]).min(Vec3::ONE);
             }
         }
-        let mut all = Vec::with_capacity(self.clusters.len());
-        self.slices(lights, None, stage, 0, |slice| {
-            all.extend(slice.levels(&unknowns))
-        })?;
-        Ok(all)
+        self.traced(lights, None, stage, 0, |slice| slice.levels(&unknowns))
     }
 
-    /// Change of the radiance of each cluster by textures, relative to the albedos of `unknowns`.
-    pub(super) fn texture_offsets(
-        &mut self,
-        lights: &Emitters,
-        stage: u64,
-        texels: &TexelEstimate,
-        unknowns: &Unknowns,
-    ) -> Result<Vec<DVec3>, Termination> {
-        let mut all = Vec::with_capacity(self.clusters.len());
-        self.slices(lights, None, stage, 0, |slice| {
-            all.extend(slice.texture_offsets(unknowns, &texels.colors.colors));
-        })?;
-        Ok(all)
-    }
-
-    /// Traces the clusters' paths and linearises them about given unknowns, without storing them; `places` maps parameters to rows.
-    pub(super) fn linearised(
-        &mut self,
-        lights: &Emitters,
-        stage: u64,
-        round: u32,
-        about: &Unknowns,
-        places: &[usize],
-    ) -> Result<Vec<Linearised>, Termination> {
-        let mut all = Vec::with_capacity(self.clusters.len());
-        let reflected = self.patches.reflected.clone();
-        self.slices(lights, None, stage, round, |slice| {
-            all.extend(slice.linearise(about, places, &reflected));
-        })?;
-        Ok(all)
-    }
-
-    /// Traces the clusters' paths in slices, with reports in between; `take` receives the slices in order.
-    fn slices(
+    /// Traces the clusters' paths in slices, with reports in between, and joins what `of_slice` makes of the slices, in order. The
+    /// paths are not stored.
+    pub(super) fn traced<T>(
         &mut self,
         lights: &Emitters,
         measured: Option<&MeasuredRadiance>,
         stage: u64,
         round: u32,
-        mut take: impl FnMut(PathCache),
-    ) -> Result<(), Termination> {
+        of_slice: impl Fn(PathCache) -> Vec<T>,
+    ) -> Result<Vec<T>, Termination> {
         let expected = self.expected_albedo();
         let allowed = memory::allowed(self.monitor.settings.memory) / SLICE_FRACTION;
         let vertices = max_mean_path_length(self.max_albedo(&expected));
+        let mut all = Vec::with_capacity(self.clusters.len());
         let mut next = 0;
         let mut slice = 16;
         while next < self.clusters.len() {
@@ -155,7 +121,7 @@ impl Pipeline<'_, '_> {
                 .tracer(lights, measured, &expected, stage, round)
                 .trace(&self.clusters[next..end], &self.widths);
             self.monitor.cast(traced.cast);
-            take(traced);
+            all.extend(of_slice(traced));
             let elapsed = started.elapsed();
             self.monitor
                 .tick(&self.estimate, &|_| self.checkpoint.clone())?;
@@ -166,7 +132,7 @@ impl Pipeline<'_, '_> {
             };
             next = end;
         }
-        Ok(())
+        Ok(all)
     }
 
     /// For each surface, the largest channel of its present albedo, and the prior's mean for emitters, whose albedo is unknown.

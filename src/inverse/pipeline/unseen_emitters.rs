@@ -17,7 +17,7 @@ use crate::inverse::solver::Termination;
 use crate::inverse::unknowns::Unknowns;
 use crate::math::stats::Moments;
 use crate::transport::emitters::Emitters;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// Greatest number of unseen lamps.
 const MAX_LAMPS: usize = 24;
@@ -160,7 +160,7 @@ impl Pipeline<'_, '_> {
         for test in promising {
             let k = test.index - surfaces;
             self.roles[k] = Role::Unseen;
-            self.unknowns.emission[k] = Vec3::from_array(test.step.map(|s| s.max(0.0) as f32));
+            self.unknowns.emission[k] = test.step.max(DVec3::ZERO).as_vec3();
             let tried = self.hypothesis(paths)?;
             if let Some(decrease) = present.decrease_to(&tried)
                 && best.as_ref().is_none_or(|(max, ..)| decrease > *max)
