@@ -74,6 +74,25 @@ mod tests {
     }
 
     #[test]
+    fn the_basis_is_orthonormal() {
+        let mut products = [[0.0; 9]; 9];
+        for (d, solid_angle) in sphere() {
+            let values = basis(d);
+            for (row, a) in products.iter_mut().zip(values) {
+                for (sum, b) in row.iter_mut().zip(values) {
+                    *sum += a * b * solid_angle;
+                }
+            }
+        }
+        for (i, row) in products.iter().enumerate() {
+            for (j, &product) in row.iter().enumerate() {
+                let want = f64::from(u8::from(i == j));
+                assert!((product - want).abs() < 1e-3, "{i} {j}: {product}");
+            }
+        }
+    }
+
+    #[test]
     fn irradiance_has_its_closed_forms() {
         let light = Vec3::new(0.48, -0.6, 0.64);
         let (mut sky, mut lamp) = (Harmonics::default(), Harmonics::default());

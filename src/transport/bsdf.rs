@@ -171,6 +171,8 @@ fn alpha(lobe: &Lobe) -> f64 {
 mod tests {
     use super::*;
     use crate::math::rng::Stream;
+    use statrs::distribution::{ChiSquared, ContinuousCDF};
+    use std::f64::consts::PI;
 
     fn direction(cos_theta: f32, phi: f32) -> Vec3 {
         let sin = (1.0 - cos_theta * cos_theta).max(0.0).sqrt();
@@ -184,6 +186,59 @@ mod tests {
         }
     }
 
+    /// Pearson's test of `sample` against `pdf` over 10 × 20 cells of equal solid angle, one for lost samples.
+    fn p_value(bsdf: &Bsdf, wo: Vec3, seed: u64) -> f64 {
+        const ROWS: usize = 10;
+        const COLUMNS: usize = 20;
+        const FINE: usize = 48;
+        let n = 100_000u32;
+        let mut observed = vec![0f64; ROWS * COLUMNS + 1];
+        for sample in 0..n {
+            let mut stream = Stream::new(seed, 0, 0, u64::from(sample));
+            let drawn = bsdf.sample(wo, stream.uniform(), stream.uniform2());
+            let cell = drawn.map_or(ROWS * COLUMNS, |s| {
+                let row = ((s.wi.z * ROWS as f32) as usize).min(ROWS - 1);
+                let turn = (s.wi.y.atan2(s.wi.x) / (2.0 * std::f32::consts::PI)).rem_euclid(1.0);
+                row * COLUMNS + ((turn * COLUMNS as f32) as usize).min(COLUMNS - 1)
+            });
+            observed[cell] += 1.0;
+        }
+        let mut expected = vec![0f64; ROWS * COLUMNS + 1];
+        let area = 2.0 * PI / (ROWS * COLUMNS * FINE * FINE) as f64;
+        for i in 0..ROWS * FINE {
+            for j in 0..COLUMNS * FINE {
+                let z = (i as f32 + 0.5) / (ROWS * FINE) as f32;
+                let turn = (j as f32 + 0.5) / (COLUMNS * FINE) as f32;
+                let wi = direction(z, turn * 2.0 * std::f32::consts::PI);
+                expected[i / FINE * COLUMNS + j / FINE] +=
+                    f64::from(bsdf.pdf(wo, wi)) * area * f64::from(n);
+            }
+        }
+        let integral = expected.iter().sum::<f64>() / f64::from(n);
+        assert!(
+            integral < 1.0 + 2e-3,
+            "the density integrates to {integral}"
+        );
+        expected[ROWS * COLUMNS] = f64::from(n) * (1.0 - integral).max(0.0);
+        // Cells that expect fewer than five samples are pooled.
+        let (mut chi2, mut cells, mut rare) = (0.0, 0, (0.0, 0.0));
+        for (o, e) in observed.iter().zip(&expected) {
+            if *e < 5.0 {
+                rare = (rare.0 + o, rare.1 + e);
+            } else {
+                chi2 += (o - e).powi(2) / e;
+                cells += 1;
+            }
+        }
+        if rare.1 > 5.0 {
+            chi2 += (rare.0 - rare.1).powi(2) / rare.1;
+            cells += 1;
+        } else {
+            assert!(rare.0 < 25.0, "{} samples where none are expected", rare.0);
+        }
+        ChiSquared::new(f64::from(cells - 1)).map_or(0.0, |d| 1.0 - d.cdf(chi2))
+    }
+
     #[test]
     fn the_base_looks_the_same_from_everywhere_but_for_a_factor() {
         let lobe = Lobe::grey(0.3, 0.2);
@@ -191,6 +246,31 @@ mod tests {
             let (wo, wi) = (direction(cos_o, 0.3), direction(cos_i, 2.0));
             let along_normal = lobe.base(Vec3::Z, wi) * f64::from(base_by_view(wo.z));
             assert!((lobe.base(wo, wi) - along_normal).abs().max_element() < 1e-7);
+        }
+    }
+
+    /// 15 tests at significance 1e-4 each; a narrow lobe at the horizon is too thin for the cells' midpoint rule.
+    #[test]
+    fn samples_follow_the_density() {
+        let mut seed = 0;
+        for cos_theta in [1.0, 0.7, 0.2, 1e-3] {
+            let wo = direction(cos_theta, 0.4);
+            for bsdf in [
+                Bsdf {
+                    albedo: Vec3::ONE,
+                    lobe: None,
+                },
+                glossy(0.5, 0.1, 0.3),
+                glossy(0.5, 0.4, 0.9),
+                glossy(0.5, 1.0, 0.6),
+            ] {
+                seed += 1;
+                if cos_theta < 0.01 && bsdf.lobe.is_some_and(|lobe| lobe.roughness < 0.2) {
+                    continue;
+                }
+                let p = p_value(&bsdf, wo, seed);
+                assert!(p > 1e-4, "p = {p} at cos {cos_theta} for {bsdf:?}");
+            }
         }
     }
 

@@ -60,4 +60,15 @@ mod tests {
         level.start_over();
         assert!(!level.measured(Some(1.0), 1, 4));
     }
+
+    #[test]
+    fn a_measurement_is_due_at_first_and_after_enough_paths() {
+        let mut schedule = Schedule::default();
+        assert!(schedule.due());
+        schedule.measured(None, 1000, 4);
+        schedule.traced(999);
+        assert!(!schedule.due());
+        schedule.traced(16);
+        assert!(schedule.due());
+    }
 }

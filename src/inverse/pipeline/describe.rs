@@ -246,6 +246,14 @@ mod tests {
     }
 
     #[test]
+    fn an_emission_is_known_where_its_error_is_small_beside_its_brightest_channel() {
+        let red = Vec3::new(2.0, 0.1, 0.0);
+        assert!(!is_unknown(red, Vec3::splat(0.3)));
+        assert!(is_unknown(red, Vec3::new(1.1, 0.0, 0.0)));
+        assert!(is_unknown(red, Vec3::INFINITY));
+    }
+
+    #[test]
     fn a_white_wall_as_bright_as_the_lamp_is_doubted_with_it_and_a_grey_or_darker_one_is_not() {
         let object = |albedo: f32, emission: f32| ObjectEstimate {
             albedo: Vec3::splat(albedo),
