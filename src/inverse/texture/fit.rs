@@ -391,24 +391,26 @@ mod tests {
             .chain(part(1, 6, 0.05, false))
             .chain(part(1, 34, 0.6, true))
             .unzip();
-        let seen: Vec<&SeenPixel> = pixels.iter().collect();
-        let links = Links {
-            ends: vec![0; 2],
-            ..Links::default()
-        };
-        let mut measurements =
-            Measurements::new(&seen, Observations::new(&rows, 2), &[Vec3::ONE; 2]);
-        let between = || Ok::<_, ()>(());
-        let texture = measurements
-            .fit(&links, 1, None, between)
-            .expect("nothing ends it");
-        let [known, stray] = [0, 1].map(|cell: usize| texture.colors[cell].x);
+        let colors = colors(&pixels, &rows, 2);
+        let [known, stray] = [0, 1].map(|cell: usize| colors[cell].x);
         assert!((known - 0.8).abs() < 1e-3, "{known}");
         assert!((0.45..0.6).contains(&stray), "{stray}");
     }
 
-    /// One pixel sees a hundredth of a cell, and is off by a fifth of its level: the cell would be twenty times as bright as that
-    /// pixel says.
+    /// The fit to pixels that see these fractions of unconnected cells under a light of one.
+    fn colors(pixels: &[SeenPixel], rows: &[Vec<(u32, f32)>], cells: usize) -> Vec<Vec3> {
+        let seen: Vec<&SeenPixel> = pixels.iter().collect();
+        let links = Links {
+            ends: vec![0; cells],
+            ..Links::default()
+        };
+        let observations = Observations::new(rows, cells);
+        let mut measurements = Measurements::new(&seen, observations, &vec![Vec3::ONE; cells]);
+        let texture = measurements.fit(&links, 1, None, || Ok::<_, ()>(()));
+        texture.expect("nothing ends it").colors
+    }
+
+    /// One pixel sees a hundredth of a cell, and is off by a fifth of its level: without a prior the cell's albedo would be 6.3.
     #[test]
     fn a_cell_that_pixels_hardly_see_stays_near_the_colour_of_the_object() {
         let textured = |i: u32| [0.3, 0.5][(i / 4 % 2) as usize];
@@ -419,18 +421,8 @@ mod tests {
         let mut rows: Vec<Vec<(u32, f32)>> = (0..160).map(|i| vec![(i / 4, 1.0)]).collect();
         pixels.push(pixel(160, Vec3::splat(0.36), false));
         rows.push(vec![(0, 0.99), (40, 0.01)]);
-        let seen: Vec<&SeenPixel> = pixels.iter().collect();
-        let links = Links {
-            ends: vec![0; 41],
-            ..Links::default()
-        };
-        let mut measurements =
-            Measurements::new(&seen, Observations::new(&rows, 41), &[Vec3::ONE; 41]);
-        let between = || Ok::<_, ()>(());
-        let texture = measurements
-            .fit(&links, 1, None, between)
-            .expect("nothing ends it");
-        let [seen, hidden] = [0, 40].map(|cell: usize| texture.colors[cell].x);
+        let colors = colors(&pixels, &rows, 41);
+        let [seen, hidden] = [0, 40].map(|cell: usize| colors[cell].x);
         assert!((seen - 0.3).abs() < 0.03, "{seen}");
         assert!((0.3..0.9).contains(&hidden), "{hidden}");
     }

@@ -3,7 +3,8 @@
 //!
 //! Minimises ½ Σ ω ‖y − Σ w x‖² + λ Σ b φ(‖xᵢ − xⱼ‖ / l) + ½ τ Σ ‖x − p‖². The second sum is over pairs of neighbours with common
 //! border b and mean level l, where φ is Huber's: quadratic up to [`FLAT`], linear beyond. The norm couples the channels, so that
-//! edges coincide in all of them. The third sum is the prior about the mean p. Solved by iteratively reweighted least squares with preconditioned conjugate gradients.
+//! edges coincide in all of them. The third sum is the prior about the mean p. Solved by iteratively reweighted least squares with
+//! preconditioned conjugate gradients.
 
 use crate::inverse::texture::links::Links;
 use crate::inverse::texture::observations::Observations;

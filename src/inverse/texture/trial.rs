@@ -285,7 +285,7 @@ fn error_by_block(pixels: &[(u32, UVec2)], gains: &[f64], mean: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// A texture that is the right colour everywhere gains nothing over a fit that was off by a fifth.
+    /// A texture that has the right colour everywhere is no better than the best single colour.
     #[test]
     fn a_texture_is_compared_with_the_best_single_colour() {
         let pixels: Vec<Predicted> = (1..101u32)
