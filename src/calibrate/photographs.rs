@@ -48,15 +48,9 @@ pub fn leave_out(capture: &Capture, working: &mut Working) -> Result<()> {
     }
 
     if reasons.iter().all(Option::is_some) {
-        let first = reasons.iter().flatten().next().cloned();
-        return Err(Error::new(
-            &capture.name,
-            format!(
-                "no photograph is usable; the first one {}",
-                first.unwrap_or_default()
-            ),
-            "check the image files",
-        ));
+        let first = reasons.into_iter().flatten().next().unwrap_or_default();
+        let problem = format!("no photograph is usable; the first one {first}");
+        return Err(Error::new(&capture.name, problem, "check the image files"));
     }
     for (frame, reason) in reasons.into_iter().enumerate() {
         if let Some(reason) = reason {
@@ -99,12 +93,7 @@ pub fn leave_out_mispaired(
 
 /// Masks a photograph and adds a warning with the reason.
 fn take_out(capture: &Capture, working: &mut Working, frame: usize, reason: &str) {
-    let photograph = &mut working.photographs[frame];
-    let usable = vec![false; photograph.pixels.len()];
-    *photograph = Arc::new(Photograph {
-        usable,
-        ..(**photograph).clone()
-    });
+    working.photographs[frame] = Arc::new(working.photographs[frame].masked());
     let name = name(capture, frame);
     let warning = format!("{name} {reason}; it is left out");
     working.warnings.push(warning);
@@ -206,13 +195,9 @@ fn same_pictures(photographs: &[Arc<Photograph>]) -> Vec<Option<usize>> {
     let hashes: Vec<blake3::Hash> = photographs
         .iter()
         .map(|photograph| {
-            let mut hasher = blake3::Hasher::new();
-            for pixel in &photograph.pixels {
-                for value in pixel.to_array() {
-                    hasher.update(&value.to_le_bytes());
-                }
-            }
-            hasher.finalize()
+            let values = photograph.pixels.iter().flat_map(|pixel| pixel.to_array());
+            let bytes: Vec<u8> = values.flat_map(f32::to_le_bytes).collect();
+            blake3::hash(&bytes)
         })
         .collect();
     (0..hashes.len())
@@ -230,15 +215,7 @@ mod tests {
     use glam::Vec3;
 
     fn photograph(pixels: Vec<Vec3>, encoding: Encoding) -> Arc<Photograph> {
-        Arc::new(Photograph {
-            width: 5,
-            height: 5,
-            pixels,
-            usable: Vec::new(),
-            encoding,
-            saturation: Vec3::ONE,
-            limits: Vec::new(),
-        })
+        Arc::new(Photograph::new([5; 2], pixels, encoding, Vec3::ONE))
     }
 
     fn ramp() -> Vec<Vec3> {

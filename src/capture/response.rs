@@ -16,7 +16,7 @@ const TOLERANCE: f64 = 1e-10;
 /// a is a power; b and c bend the midtones and the highlights. The curve tends to a power in the dark and continues as one above
 /// saturation. A power of such a curve is again such a curve, so unknown exposures leave the power undetermined (Grossberg and
 /// Nayar 2003); then the terms are chosen such that over the photographs' values ln light has a mean slope of 1 in ln V.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Response {
     /// a, b and c, each per channel.
     pub terms: [Vec3; TERMS],

@@ -104,6 +104,20 @@ impl Observations {
     }
 }
 
+#[cfg(test)]
+impl Observation {
+    /// A grey observation on the optical axis, for tests.
+    pub fn grey(frame: usize, cell: usize, level: f64) -> Self {
+        Self {
+            frame,
+            cell: cell as u64,
+            level: DVec3::splat(level),
+            off_axis: 0.0,
+            saturation: DVec3::ZERO,
+        }
+    }
+}
+
 /// The observations of cells that at least two photographs see.
 pub(super) fn shared(observations: &[Observation]) -> Vec<Observation> {
     let cells = observations.chunk_by(|a, b| a.cell == b.cell);

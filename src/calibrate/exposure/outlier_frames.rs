@@ -3,7 +3,6 @@
 use crate::calibrate::exposure::fit::{CameraModel, MIN_CELLS, ModelParts, fit, fit_held_out};
 use crate::calibrate::exposure::observations::{Observation, Observations, shared};
 use crate::calibrate::problem::Problem;
-use crate::capture::photograph::Photograph;
 use crate::math::stats::quantile;
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -70,11 +69,7 @@ impl OutlierFrames {
     pub fn without_outliers(&self, problem: &Problem) -> Problem {
         let mut problem = problem.clone();
         for &frame in self.outliers.keys() {
-            let photograph = &problem.photographs[frame];
-            problem.photographs[frame] = Arc::new(Photograph {
-                usable: vec![false; photograph.pixels.len()],
-                ..(**photograph).clone()
-            });
+            problem.photographs[frame] = Arc::new(problem.photographs[frame].masked());
         }
         problem
     }
@@ -168,13 +163,7 @@ mod tests {
                     true => draw(),
                     false => level + 0.1 * draw(),
                 };
-                observations.push(Observation {
-                    frame,
-                    cell: cell as u64,
-                    level: DVec3::splat(radiance + exposure),
-                    off_axis: 0.0,
-                    saturation: DVec3::ZERO,
-                });
+                observations.push(Observation::grey(frame, cell, radiance + exposure));
             }
         }
         observations
