@@ -25,17 +25,12 @@ const UNDISTORTED: &str = "undistorted_camera_parameters";
 /// Metres per unit of depth.
 const UNIT: f64 = 0.000_25;
 
-/// Whether a folder has this layout.
 pub fn is_here(folder: &Folder) -> bool {
     [POSES, UNDISTORTED]
         .iter()
         .any(|name| folder.has_folder(name))
 }
 
-/// Reads the frames and finds the mesh.
-///
-/// # Errors
-/// A photograph or its camera is missing, or a file is broken.
 pub fn read(folder: &Folder) -> Result<Scan> {
     let mut scan = Scan::default();
     if folder.has_folder(POSES) && folder.has_folder(INTRINSICS) {
@@ -62,7 +57,6 @@ fn names_of(folder: &Folder, name: &str) -> Result<Vec<String>> {
     }
 }
 
-/// Reads the original images.
 fn original(folder: &Folder, scan: &mut Scan) -> Result<()> {
     let listed = |name: &str| -> Result<BTreeSet<String>> {
         Ok(names_of(folder, name)?.into_iter().collect())

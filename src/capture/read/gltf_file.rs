@@ -29,7 +29,8 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Gltf> {
         (gltf::json::deserialize::from_slice(bytes), None)
     };
     let root = root.map_err(|e| invalid(gltf::Error::Deserialize(e)))?;
-    if let Some(name) = compression(&root) {
+    let required = |extension: &str| root.extensions_required.iter().any(|r| r == extension);
+    if let Some((_, name)) = COMPRESSIONS.iter().find(|(e, _)| required(e)) {
         return Err(Error::file(
             path,
             format!("is compressed with {name}, which is not supported"),
@@ -46,15 +47,6 @@ const COMPRESSIONS: [(&str, &str); 2] = [
     ("KHR_draco_mesh_compression", "Draco"),
     ("EXT_meshopt_compression", "meshopt"),
 ];
-
-/// The name of an unsupported compression that a file requires.
-fn compression(root: &Root) -> Option<&'static str> {
-    let required = |extension: &str| root.extensions_required.iter().any(|r| r == extension);
-    let found = COMPRESSIONS
-        .iter()
-        .find(|(extension, _)| required(extension));
-    found.map(|(_, name)| *name)
-}
 
 /// Checks that attributes refer to existing accessors: the crate's validation would panic otherwise.
 fn check_accessors(root: &Root) -> std::result::Result<(), String> {

@@ -28,7 +28,6 @@ pub fn read(path: &Path) -> Result<RawMesh> {
     parse(path, BufReader::new(file), length)
 }
 
-/// Parses a file of `length` bytes.
 fn parse(path: &Path, source: impl BufRead, length: u64) -> Result<RawMesh> {
     let broken = |e: ParseError| {
         let text = e.to_string();
@@ -109,7 +108,6 @@ fn check_count(path: &Path, element: &ElementDef, encoding: Encoding, left: u64)
     Ok(())
 }
 
-/// Assembles the mesh from vertices and faces.
 fn assemble(path: &Path, header: &Header, vertices: &[Vertex], faces: &[Face]) -> Result<RawMesh> {
     let vertex_has = |name: &str| {
         let element = header.elements.get("vertex");
@@ -219,7 +217,6 @@ fn assemble(path: &Path, header: &Header, vertices: &[Vertex], faces: &[Face]) -
     })
 }
 
-/// Object names from the header's comments.
 fn object_names(header: &Header) -> HashMap<i64, String> {
     header
         .comments
