@@ -112,9 +112,7 @@ mod tests {
 
     fn solved(albedo: f64, seen: bool) -> (Unknowns, Unknowns) {
         let roles = [Role::Emitter, Role::Reflector, Role::Reflector];
-        let mut about = Unknowns::new(3);
-        about.albedo = [0.0, 0.5, 0.5].map(Vec3::splat).to_vec();
-        about.emission[0] = Vec3::splat(10.0);
+        let about = Unknowns::grey([0.0, 0.5, 0.5], [10.0, 0.0, 0.0]);
         let prior = Prior::new(3, 3, Vec3::ONE);
         let plain = {
             let clusters = room(albedo, seen).into_iter().map(|mut c| {

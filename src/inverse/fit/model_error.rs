@@ -143,8 +143,7 @@ mod tests {
                 (Cluster::unit(0, 1, Vec3::splat(0.5)), line)
             })
             .unzip::<_, _, Vec<_>, Vec<_>>();
-        let mut unknowns = Unknowns::new(1);
-        unknowns.albedo[0] = Vec3::splat(0.5);
+        let unknowns = Unknowns::grey([0.5], [0.0]);
         variance(&clusters, &lines, &unknowns, &[]).sqrt()
     }
 

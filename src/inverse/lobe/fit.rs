@@ -16,7 +16,6 @@ pub struct Row {
     pub spot: usize,
     /// Number of pixels.
     pub weight: f64,
-    /// Radiance in the photograph.
     pub measured: DVec3,
     /// An absolute radiance of one.
     pub one: DVec3,
@@ -28,10 +27,7 @@ pub struct Row {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Model {
     /// A diffuse surface. Parameters: RGB albedo, and RGB emission if it may emit.
-    Diffuse {
-        /// Whether it may emit light.
-        emits: bool,
-    },
+    Diffuse { emits: bool },
     /// A lobe over a diffuse base. Parameters: RGB albedo × (1 − specular), and specular.
     Lobe,
 }
@@ -46,7 +42,6 @@ pub struct Variances {
 }
 
 impl Model {
-    /// Number of parameters.
     pub fn len(self) -> usize {
         match self {
             Self::Diffuse { emits: false } => 3,

@@ -28,9 +28,7 @@ pub struct Gathering<'a> {
     pub points: u32,
     /// GGX roughnesses whose lobes directions are sampled from, in addition to cosine sampling.
     pub roughnesses: &'a [f64],
-    /// Options of the continued paths.
     pub options: PathOptions,
-    /// Seed of the random streams.
     pub seed: u64,
     /// Different passes are independent.
     pub pass: u64,
@@ -200,7 +198,6 @@ impl Gathered {
         self.points == 0
     }
 
-    /// Both sets as one.
     pub fn joined([mut a, b]: [Self; 2]) -> Self {
         a.arrivals.extend(b.arrivals);
         a.points += b.points;

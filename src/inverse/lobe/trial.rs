@@ -120,7 +120,6 @@ fn levels(observations: &[(usize, &SpotObservation, [Gathered; 2])]) -> Vec<DVec
         .collect()
 }
 
-/// The rows of one candidate roughness.
 struct Candidate {
     alpha: f64,
     rows: Vec<Row>,

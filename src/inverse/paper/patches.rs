@@ -51,7 +51,6 @@ impl From<Patches> for Stored {
 }
 
 impl Patches {
-    /// One patch per triangle.
     pub fn triangles(count: usize) -> Self {
         Self {
             layout: TexelLayout::new(vec![0; count]),
@@ -60,12 +59,10 @@ impl Patches {
         }
     }
 
-    /// Number of patches.
     pub fn len(&self) -> usize {
         self.depth.len()
     }
 
-    /// The grid of texels.
     pub fn layout(&self) -> &TexelLayout {
         &self.layout
     }

@@ -20,7 +20,6 @@ impl Schedule {
         self.until_measured == 0
     }
 
-    /// Counts traced paths.
     pub fn traced(&mut self, paths: u64) {
         self.until_measured = self.until_measured.saturating_sub(paths);
     }

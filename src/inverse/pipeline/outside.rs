@@ -244,7 +244,6 @@ impl Pipeline<'_, '_> {
         })
     }
 
-    /// The present result of a trial.
     fn found(&self) -> Found {
         Found {
             roles: self.roles.clone(),
@@ -258,7 +257,6 @@ impl Pipeline<'_, '_> {
         }
     }
 
-    /// Restores the result of a trial.
     fn go_back_to(&mut self, found: Found) {
         self.roles = found.roles;
         self.unknowns = found.unknowns;
@@ -333,7 +331,6 @@ impl Misfit {
         Self(clusters.map(of).collect())
     }
 
-    /// Mean over all pixels.
     fn mean(&self) -> f64 {
         let (sum, pixels) = (self.0.iter()).fold((0.0, 0.0), |(sum, all), (square, pixels)| {
             (sum + square * pixels, all + pixels)

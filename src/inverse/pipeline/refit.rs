@@ -92,7 +92,6 @@ impl Pipeline<'_, '_> {
         self.record("refit", started, kept, why)
     }
 
-    /// The loss of each held-out pixel.
     pub(super) fn held_out_each(&mut self) -> Vec<f64> {
         let (each, cast) = self.losses.held_out_each(self.problem, &self.estimate);
         self.monitor.cast(cast);

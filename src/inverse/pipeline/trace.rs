@@ -11,7 +11,6 @@ use crate::inverse::pipeline::Pipeline;
 use crate::inverse::roles::Role;
 use crate::inverse::solver::Termination;
 use crate::transport::emitters::Emitters;
-use glam::Vec3;
 use std::time::{Duration, Instant};
 
 /// Target duration of a slice.
@@ -70,27 +69,7 @@ impl Pipeline<'_, '_> {
             }
             false => String::new(),
         };
-        let cache = PathCache {
-            clusters,
-            ..PathCache::default()
-        };
-        Ok((cache, limit))
-    }
-
-    /// The clusters' levels predicted by paths, with each albedo raised by its standard error: objects wrongly estimated as black
-    /// would otherwise get too much weight.
-    pub(super) fn levels(
-        &mut self,
-        lights: &Emitters,
-        stage: u64,
-    ) -> Result<Vec<Vec3>, Termination> {
-        let mut unknowns = self.unknowns.clone();
-        for (k, albedo) in unknowns.albedo.iter_mut().enumerate() {
-            if self.roles[k].reflects() {
-                *albedo = (*albedo + self.errors.albedo[k]).min(Vec3::ONE);
-            }
-        }
-        self.traced(lights, None, stage, 0, |slice| slice.levels(&unknowns))
+        Ok((PathCache::from(clusters), limit))
     }
 
     /// Traces the clusters' paths in slices, with reports in between, and joins what `of_slice` makes of the slices, in order. The
