@@ -263,13 +263,8 @@ mod tests {
     #[test]
     fn a_point_lands_on_the_same_spot_of_the_reduced_photograph() {
         let lens = Intrinsics {
-            width: 641,
-            height: 480,
-            fx: 500.0,
-            fy: 510.0,
-            cx: 321.3,
-            cy: 240.1,
             distortion: [0.1, -0.02, 1e-3, 2e-3],
+            ..Intrinsics::plain([641, 480], [500.0, 510.0], [321.3, 240.1])
         };
         let reduced = lens.reduced(4);
         assert_eq!((reduced.width, reduced.height), (160, 120));

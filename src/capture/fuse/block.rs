@@ -38,7 +38,6 @@ impl Block {
         }
     }
 
-    /// Memory of a block in bytes.
     pub const fn bytes() -> usize {
         size_of::<Self>() + VOLUME * size_of::<Voxel>()
     }

@@ -24,7 +24,6 @@ pub struct Field {
 }
 
 impl Field {
-    /// An empty field.
     pub fn new(edge: f64, max_bytes: usize) -> Self {
         Self {
             edge,

@@ -10,19 +10,13 @@ use glam::{DVec2, DVec3, Vec3};
 /// A decoded frame.
 #[derive(Debug)]
 pub struct View {
-    /// Camera to world.
     pub pose: Pose,
-    /// The decoded depth image.
     pub depth: DepthMap,
     color_lens: Lens,
     photograph: Photograph,
 }
 
 impl View {
-    /// Decodes a frame that has depth.
-    ///
-    /// # Errors
-    /// As [`ImportedFrame::load`].
     pub fn load(frame: &ImportedFrame) -> Result<Self> {
         let (photograph, depth) = frame.load()?;
         Ok(Self {

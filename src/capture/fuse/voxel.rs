@@ -95,8 +95,7 @@ fn points(frame: &ImportedFrame, depth: &DepthImage) -> Result<Vec<(DVec3, f64)>
             if z > 0.0
                 && let Some(ray) = depth.lens.ray(pixel)
             {
-                let p = DVec3::new(ray.x, -ray.y, -1.0) * z;
-                points.push((frame.pose.rotation * p + frame.pose.center, z / k.fx));
+                points.push((frame.pose.to_world(ray.extend(1.0) * z), z / k.fx));
             }
         }
     }

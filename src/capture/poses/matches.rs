@@ -168,7 +168,6 @@ struct Patch {
     structure: DMat2,
 }
 
-/// Where a patch was found.
 struct Found {
     pixel: DVec2,
     correlation: f64,

@@ -32,18 +32,12 @@ pub struct Picture {
 /// An image of one channel.
 #[derive(Debug)]
 pub struct Grey {
-    /// Width in pixels.
     pub width: usize,
-    /// Height in pixels.
     pub height: usize,
     values: Vec<f32>,
 }
 
 impl Picture {
-    /// Decodes a frame that has depth.
-    ///
-    /// # Errors
-    /// As [`ImportedFrame::load`].
     pub fn load(frame: &ImportedFrame) -> Result<Self> {
         let (photograph, depth) = frame.load()?;
         let k = &frame.lens.pinhole;
@@ -107,7 +101,6 @@ impl Picture {
 }
 
 impl Grey {
-    /// The difference of two Gaussians.
     fn band(&self, narrow: f32, wide: f32) -> Self {
         let mut band = self.smoothed(narrow);
         let wide = self.smoothed(wide);
@@ -153,7 +146,6 @@ impl Grey {
 
 #[cfg(test)]
 impl Grey {
-    /// Values by pixel.
     pub fn from_fn([width, height]: [usize; 2], value: impl Fn(usize, usize) -> f32) -> Self {
         Self {
             width,

@@ -26,7 +26,6 @@ impl Sets {
         x
     }
 
-    /// Joins the sets of two members.
     pub fn unite(&mut self, a: u32, b: u32) {
         let (a, b) = (self.find(a), self.find(b));
         if a != b {
