@@ -11,7 +11,6 @@ use std::collections::HashMap;
 const TRUNCATION: f64 = 4.0;
 
 /// A sparse truncated signed distance field. Voxel (i, j, k) sits at (i, j, k) times the edge.
-#[derive(Debug)]
 pub struct Field {
     /// Edge of a voxel in metres.
     pub edge: f64,

@@ -11,7 +11,6 @@ const MAX_TEXT: u64 = 1 << 28;
 const MAX_ENTRIES: usize = 1 << 20;
 
 /// A folder that paths may not leave.
-#[derive(Debug, Clone)]
 pub struct Folder {
     confine: Confine,
 }

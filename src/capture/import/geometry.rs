@@ -115,17 +115,9 @@ pub fn fuse(
             "name the mesh with --mesh FILE",
         ));
     }
-    let choice = fuse::voxel_size(frames, voxel)?;
-    remarks.push(match voxel {
-        Some(edge) => format!("voxels of {edge} m"),
-        None => format!(
-            "voxels of {:.4} m: {} (at most {} GiB of them; --voxel overrides)",
-            choice.edge,
-            choice.reason,
-            fuse::MAX_BYTES >> 30
-        ),
-    });
-    let mesh = fuse::fuse(frames, choice.edge, fuse::MAX_BYTES, progress)?;
+    let (edge, remark) = fuse::voxel_size(frames, voxel)?;
+    remarks.push(remark);
+    let mesh = fuse::fuse(frames, edge, fuse::MAX_BYTES, progress)?;
     remarks.push(format!(
         "mesh: fused from {count} depth images, {} triangles",
         mesh.triangles.len()

@@ -14,6 +14,7 @@ use crate::capture::scan::ImportedFrame;
 use crate::capture::scan::depth::{self, DepthImage};
 use crate::capture::scan::lens::{Lens, Model};
 use crate::error::{Error, Result};
+use std::collections::hash_map::Entry;
 use std::collections::{BTreeSet, HashMap};
 
 const POSES: &str = "matterport_camera_poses";
@@ -112,12 +113,11 @@ fn original(folder: &Folder, scan: &mut Scan) -> Result<()> {
             }
         };
         let key = format!("{INTRINSICS}/{uuid}_intrinsics_{camera}.txt");
-        let lens = match lenses.get(&key) {
-            Some(lens) => *lens,
-            None => {
-                let lens = lens(folder, &key)?;
-                lenses.insert(key, lens);
-                lens
+        let lens = match lenses.entry(key) {
+            Entry::Occupied(known) => *known.get(),
+            Entry::Vacant(entry) => {
+                let lens = lens(folder, entry.key())?;
+                *entry.insert(lens)
             }
         };
         let depth = first(&depths, "d", &["png"])

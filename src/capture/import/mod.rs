@@ -92,9 +92,9 @@ pub fn read(
 
     let chosen = choose(scan.frames.len(), options, scan.is_video, &mut remarks);
     if !options.keep_poses
-        && let Some(refined) = poses::refine(&mut scan.frames, &chosen)?
+        && let Some(remark) = poses::refine(&mut scan.frames, &chosen)?
     {
-        remarks.push(refined.to_string());
+        remarks.push(remark);
     }
 
     // The mesh: the one that the person names, the scan's own, or one fused from the depth of all frames.

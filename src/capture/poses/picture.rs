@@ -16,7 +16,6 @@ const MAX_PIXELS: u64 = 640 * 480;
 const BANDS: [[f32; 2]; 2] = [[1.0, 4.0], [3.0, 10.0]];
 
 /// A decoded photograph: square roots of luminance, so that noise is about the same everywhere.
-#[derive(Debug)]
 pub struct Picture {
     /// The lens at this size.
     pub lens: Lens,
@@ -30,7 +29,6 @@ pub struct Picture {
 }
 
 /// An image of one channel.
-#[derive(Debug)]
 pub struct Grey {
     pub width: usize,
     pub height: usize,

@@ -10,7 +10,6 @@ pub fn without_bom(text: &[u8]) -> &[u8] {
 }
 
 /// A JSON object and its path, e.g. `transforms.json: frames[3].`.
-#[derive(Debug, Clone)]
 pub struct Fields<'a> {
     place: String,
     map: &'a Map<String, Value>,

@@ -127,7 +127,6 @@ pub fn resource(place: &str, uri: &str, file: ReadFile<'_>) -> Result<Vec<u8>> {
     file(place, &percent_decoded(uri))
 }
 
-/// Decodes the %XX of a URI.
 fn percent_decoded(uri: &str) -> String {
     let bytes = uri.as_bytes();
     let mut decoded = Vec::with_capacity(bytes.len());

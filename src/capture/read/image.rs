@@ -125,9 +125,9 @@ pub fn read(
     }
     let decoded = DynamicImage::from_decoder(decoder).map_err(|e| broken(path, &e))?;
     let scale = (1.0 / exposure.unwrap_or(1.0)) as f32;
-    let multiplier = match encoding {
-        Encoding::Linear => hdr_multiplier(path)?,
-        Encoding::Srgb8 | Encoding::Srgb16 => Vec3::ONE,
+    let (multiplier, saturation) = match encoding {
+        Encoding::Linear => (hdr_multiplier(path)?, Vec3::INFINITY),
+        Encoding::Srgb8 | Encoding::Srgb16 => (Vec3::ONE, Vec3::splat(scale)),
     };
     let values = linear_values(decoded, encoding);
 
@@ -147,10 +147,6 @@ pub fn read(
     if usable.iter().all(|&good| good) {
         usable.clear();
     }
-    let saturation = match encoding {
-        Encoding::Linear => Vec3::INFINITY,
-        Encoding::Srgb8 | Encoding::Srgb16 => Vec3::splat(scale),
-    };
     let photograph = Photograph {
         usable,
         ..Photograph::new(stored, pixels, encoding, saturation)

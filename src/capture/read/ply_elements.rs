@@ -13,7 +13,6 @@ pub struct Vertex {
 }
 
 /// An element of another kind; nothing of it is stored.
-#[derive(Debug, Clone, Copy)]
 pub struct Skipped;
 
 impl PropertyAccess for Skipped {

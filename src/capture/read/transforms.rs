@@ -18,7 +18,6 @@ const MAX_BYTES: u64 = 1 << 28;
 const DEPTH_UNIT: f64 = 0.001;
 
 /// The content of transforms.json.
-#[derive(Debug)]
 pub struct Transforms {
     /// Posed photographs in file order.
     pub frames: Vec<Frame>,

@@ -13,7 +13,6 @@ const COLOR_WEIGHT: f64 = 0.5;
 const BRIGHTNESS_WEIGHT: f64 = 0.5;
 
 /// The dual graph of a mesh, with the features of segmentation per face.
-#[derive(Debug)]
 pub struct FaceGraph {
     pub area: Vec<f64>,
     /// Unit normals, smoothed over vertices; zero for degenerate faces.

@@ -1,7 +1,6 @@
 //! Disjoint sets with path halving and union by size (Tarjan 1975).
 
 /// A partition of 0 … n−1.
-#[derive(Debug)]
 pub struct Sets {
     parent: Vec<u32>,
     size: Vec<u32>,

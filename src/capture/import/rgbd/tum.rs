@@ -33,7 +33,6 @@ const TRAJECTORIES: [&str; 4] = [
 const ASSOCIATIONS: [&str; 2] = ["associations.txt", "associated.txt"];
 
 /// A line of a list: timestamp and the words after it.
-#[derive(Debug, Clone)]
 struct Entry {
     stamp: f64,
     words: Vec<String>,
