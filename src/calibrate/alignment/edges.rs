@@ -21,12 +21,8 @@ pub struct Edge {
     pub axis: usize,
 }
 
-/// Edges by kind.
-#[derive(Debug, Clone, Default)]
-pub struct Edges {
-    /// Depth discontinuities, creases, borders between objects, and outlines of the mesh.
-    pub kinds: [Vec<Edge>; 4],
-}
+/// Edges by kind: depth discontinuities, creases, borders between objects, and outlines of the mesh.
+pub type Edges = [Vec<Edge>; 4];
 
 const DEPTH: usize = 0;
 const FOLD: usize = 1;
@@ -103,7 +99,7 @@ pub fn edges(scene: &Scene, camera: &Camera) -> Edges {
                     }
                 }
             };
-            edges.kinds[kind].push(Edge { pixel, axis });
+            edges[kind].push(Edge { pixel, axis });
         }
     }
     edges

@@ -18,7 +18,6 @@ const MAX_SCORE: f64 = 8.0;
 const DARK: f32 = 1e-8;
 
 /// Gradient magnitudes of a photograph as ranks, which are invariant to exposure and contrast.
-#[derive(Debug, Clone)]
 pub struct Contrast {
     size: IVec2,
     /// Rank in [0, 1) of the difference to the pixel on the right and below; NaN without that neighbour.
@@ -70,7 +69,7 @@ impl Contrast {
     /// unrelated edges, several for correct ones. Zero if there are too few edges.
     pub fn score(&self, edges: &Edges) -> f64 {
         let (mut sum, mut weights) = (0.0, 0.0);
-        for kind in edges.kinds.iter().filter(|kind| kind.len() >= MIN_EDGES) {
+        for kind in edges.iter().filter(|kind| kind.len() >= MIN_EDGES) {
             if let Some(score) = self.score_of(kind) {
                 let count = kind.len() as f64;
                 sum += count.sqrt() * score.clamp(-MAX_SCORE, MAX_SCORE);
@@ -84,7 +83,6 @@ impl Contrast {
         }
     }
 
-    /// The score of one kind of edges.
     fn score_of(&self, edges: &[Edge]) -> Option<f64> {
         let side = 2 * REACH + 1;
         let profile: Vec<Option<f64>> = (0..side * side)
@@ -161,7 +159,7 @@ mod tests {
                 for axis in [0, 1] {
                     if inside(p) != inside(p + IVec2::AXES[axis]) {
                         let pixel = p + shift;
-                        edges.kinds[0].push(Edge { pixel, axis });
+                        edges[0].push(Edge { pixel, axis });
                     }
                 }
             }

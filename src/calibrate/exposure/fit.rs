@@ -167,7 +167,6 @@ pub(super) fn fit_held_out(
     differences
 }
 
-/// The median log radiance of a cell.
 fn median_level(cell: &[Observation], model: &CameraModel) -> DVec3 {
     medians(cell.iter().map(|s| model.radiance(s)))
 }

@@ -83,9 +83,6 @@ impl Exposures {
             let model = fit(&fitted, photographs, parts);
             (disagreements(&tested, &model), model)
         };
-        let is_needed = |before: &[f64], after: &[f64]| {
-            explained(before, after) > MIN_CAMERA_GAIN && is_significant(before, after)
-        };
         let [(without, _), (with, model)] =
             [false, true].map(|vignetting| test(true, vignetting, false));
         let vignetting_gain = explained(&without, &with);
@@ -175,20 +172,20 @@ fn one_lens(cameras: &[Camera]) -> bool {
 /// Relative decrease of the summed disagreement.
 fn explained(before: &[f64], after: &[f64]) -> f64 {
     let [before, after] = [before, after].map(|d| d.iter().sum::<f64>());
-    if before > 0.0 {
-        1.0 - after / before
-    } else {
-        0.0
+    match before > 0.0 {
+        true => 1.0 - after / before,
+        false => 0.0,
     }
 }
 
-/// Whether the mean decrease per cell is larger than chance.
-fn is_significant(before: &[f64], after: &[f64]) -> bool {
+/// Whether the disagreement decreases enough, and its mean per cell by more than chance.
+fn is_needed(before: &[f64], after: &[f64]) -> bool {
     let mut gains = Moments::default();
     for (before, after) in before.iter().zip(after) {
         gains.push(before - after);
     }
-    gains.mean > SIGNIFICANT * gains.standard_error()
+    let is_significant = gains.mean > SIGNIFICANT * gains.standard_error();
+    is_significant && explained(before, after) > MIN_CAMERA_GAIN
 }
 
 #[cfg(test)]
@@ -379,12 +376,9 @@ mod tests {
 
     /// Fits a power law between the light of `found` and of `truth` in one channel: the power and the largest deviation.
     fn power_between(found: &Response, truth: &Response, channel: usize) -> (f64, f64) {
-        let lights: Vec<f64> = (0..80).map(|k| -4.0 + 0.05 * f64::from(k)).collect();
+        let x: Vec<f64> = (0..80).map(|k| -4.0 + 0.05 * f64::from(k)).collect();
         let recovered = |light: &f64| found.log_light(channel, truth.log_value(channel, *light))[0];
-        let (x, y) = (
-            lights.clone(),
-            lights.iter().map(recovered).collect::<Vec<f64>>(),
-        );
+        let y: Vec<f64> = x.iter().map(recovered).collect();
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
         let (mx, my) = (mean(&x), mean(&y));
         let both: f64 = x.iter().zip(&y).map(|(x, y)| (x - mx) * (y - my)).sum();
@@ -439,10 +433,8 @@ mod tests {
         let observations = bent(seen(&exposures, 0.2), &straight, |_| 0.0);
         let found = estimate(&observations, 4, Common::Camera);
         assert!(found.differ && found.response.is_none());
-        assert_eq!(
-            Exposures::estimate(&Observations::default(), 4, Common::Lens),
-            None
-        );
+        let of_nothing = Exposures::estimate(&Observations::default(), 4, Common::Lens);
+        assert_eq!(of_nothing, None);
         // Without a shared response, as of linear files, none is fitted.
         let observations = bent(seen(&exposures, 0.1), &contrasty(), |_| 0.0);
         let found = estimate(&observations, 4, Common::Lens);

@@ -96,7 +96,6 @@ impl Observations {
         Self { fitted, held_out }
     }
 
-    /// Removes the observations of a photograph.
     pub(super) fn remove(&mut self, frame: usize) {
         self.fitted.retain(|observation| observation.frame != frame);
         self.held_out

@@ -157,7 +157,6 @@ pub fn signal(diagonal: DVec3, across: DVec3) -> DVec3 {
 
 /// The prior of the free parameters, in the units of the normal equations.
 struct PriorTerms {
-    /// Precision of each parameter.
     precision: Vec<DVec3>,
     /// Terms added to the diagonal: the precision, and one for parameters that no path meets.
     added: Vec<DVec3>,

@@ -148,12 +148,8 @@ impl Gathering<'_> {
         // Incident light on the side that the camera sees.
         let surface = self.lit.surface(&hit);
         let to_camera = -ray.direction.normalize_or_zero();
-        let side = if surface.normal.dot(to_camera) < 0.0 {
-            -1.0
-        } else {
-            1.0
-        };
-        let frame = Frame::around(surface.normal * side);
+        let is_back = surface.normal.dot(to_camera) < 0.0;
+        let frame = Frame::around(surface.normal * if is_back { -1.0 } else { 1.0 });
         let wo = frame.to_local(to_camera);
         if wo.z <= 0.0 {
             return cast;

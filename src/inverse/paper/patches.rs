@@ -15,7 +15,6 @@ pub const MAX_DEPTH: u8 = 8;
 #[serde(from = "Stored", into = "Stored")]
 pub struct Patches {
     layout: TexelLayout,
-    /// The patch of each texel.
     patch_of: Vec<u32>,
     /// Depth of subdivision of each patch.
     depth: Vec<u8>,

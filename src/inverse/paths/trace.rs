@@ -75,16 +75,12 @@ pub struct Tracer<'a> {
 impl Tracer<'_> {
     /// Traces two independent sets of paths for every cluster. `widths` are the image widths of the frames.
     pub fn trace(&self, clusters: &[Cluster], widths: &[u32]) -> PathCache {
-        let traced: Vec<(CachedCluster, RayCount)> = clusters
+        let (clusters, casts): (Vec<CachedCluster>, Vec<RayCount>) = clusters
             .par_iter()
             .map(|cluster| self.cluster(cluster, widths[cluster.frame as usize]))
-            .collect();
-        let mut cache = PathCache::default();
-        for (cluster, cast) in traced {
-            cache.clusters.push(cluster);
-            cache.cast += cast;
-        }
-        cache
+            .unzip();
+        let cast = casts.into_iter().sum();
+        PathCache { clusters, cast }
     }
 
     fn cluster(&self, cluster: &Cluster, width: u32) -> (CachedCluster, RayCount) {
@@ -437,7 +433,6 @@ impl Tracer<'_> {
     }
 }
 
-/// A surface point on a path.
 struct Surface {
     /// With the normal of the side that the path arrives at.
     point: SurfacePoint,

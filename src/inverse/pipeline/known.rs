@@ -11,7 +11,6 @@ impl Pipeline<'_, '_> {
         role_under(self.monitor.known.object(object), role)
     }
 
-    /// Whether an object's emission is known.
     pub(super) fn emission_is_known(&self, object: usize) -> bool {
         self.monitor.known.object(object).emission.is_some()
     }

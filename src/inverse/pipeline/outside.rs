@@ -204,7 +204,6 @@ impl Pipeline<'_, '_> {
         found > SUN_ERRORS * luminance(self.errors.emission[sun])
     }
 
-    /// Fits everything with outside light.
     fn fit_open(
         &mut self,
         surroundings: Surroundings,

@@ -102,7 +102,6 @@ impl Pipeline<'_, '_> {
         });
     }
 
-    /// Records the estimated exposures, vignetting and response.
     pub(super) fn tell_exposures(&mut self, exposures: &Exposures, started: f64) {
         let (min, max) = exposures.range();
         let fraction = exposures.gain.max(0.0) * 100.0;

@@ -41,7 +41,6 @@ const LIGHTING_LAMPS: u64 = 32;
 const ENOUGH_FOR_TEXTURES: f64 = 5e-3;
 
 /// The linearised clusters over all rounds.
-#[derive(Debug)]
 pub struct Summed {
     /// Mean over the rounds of each cluster.
     pub clusters: Vec<Linearised>,
