@@ -108,33 +108,23 @@ pub fn without_hot_pixels(
     if photograph.encoding != Encoding::Linear {
         return None;
     }
-    let width = photograph.width as usize;
-    let height = photograph.height as usize;
-    let mut hot = Vec::new();
-    for y in 1..height.saturating_sub(1) {
-        for x in 1..width.saturating_sub(1) {
-            let pixel = y * width + x;
-            let value = photograph.pixels[pixel].max_element();
-            if value <= 0.0 || !photograph.is_usable(pixel) {
-                continue;
-            }
-            let around = [pixel - width, pixel, pixel + width]
-                .into_iter()
-                .flat_map(|row| [row - 1, row, row + 1])
-                .filter(|&p| p != pixel);
-            let max = around
-                .clone()
-                .map(|p| photograph.pixels[p].max_element())
-                .fold(0.0, f32::max);
-            let object = object_at(pixel);
-            if value > HOT * max
-                && object.is_some()
-                && around.clone().all(|p| object_at(p) == object)
-            {
-                hot.push(pixel);
-            }
+    let [width, height] = [photograph.width, photograph.height].map(|side| side as usize);
+    let value = |pixel: usize| photograph.pixels[pixel].max_element();
+    let is_hot = |&pixel: &usize| {
+        if value(pixel) <= 0.0 || !photograph.is_usable(pixel) {
+            return false;
         }
-    }
+        let mut around = [pixel - width, pixel, pixel + width]
+            .into_iter()
+            .flat_map(|row| [row - 1, row, row + 1])
+            .filter(|&p| p != pixel);
+        let max = around.clone().map(value).fold(0.0, f32::max);
+        let object = object_at(pixel);
+        value(pixel) > HOT * max && object.is_some() && around.all(|p| object_at(p) == object)
+    };
+    let rows = 1..height.saturating_sub(1);
+    let inner = rows.flat_map(|y| (1..width.saturating_sub(1)).map(move |x| y * width + x));
+    let hot: Vec<usize> = inner.filter(is_hot).collect();
     if hot.is_empty() {
         return None;
     }

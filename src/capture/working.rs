@@ -37,9 +37,8 @@ pub fn load_working(capture: &Capture, max_pixels: u64) -> Result<Working> {
         .frames
         .par_iter()
         .map(|frame| {
-            let (photograph, invalid) = frame
-                .photograph
-                .load_counted(&frame.intrinsics, frame.exposure)?;
+            let (photograph, invalid) =
+                (frame.photograph).load(&frame.intrinsics, frame.exposure)?;
             let reduced = match factor {
                 1 => photograph,
                 _ => Arc::new(reduce(&photograph, factor)),
@@ -128,17 +127,8 @@ fn reduction(frames: &[Frame], max_pixels: u64) -> u32 {
         let pixels = |k: &Intrinsics| u64::from(k.width / factor) * u64::from(k.height / factor);
         lenses().map(pixels).sum()
     };
-    // The number of pixels decreases with the factor, so bisection finds the smallest that fits.
-    let (mut low, mut high) = (1, largest);
-    while low < high {
-        let middle = low + (high - low) / 2;
-        if pixels(middle) <= max_pixels {
-            high = middle;
-        } else {
-            low = middle + 1;
-        }
-    }
-    low
+    let fits = |factor: &u32| pixels(*factor) <= max_pixels;
+    (1..largest).find(fits).unwrap_or(largest)
 }
 
 /// Downsamples by block means. A block with an unusable pixel is unusable; a block with a saturated pixel is a lower bound.

@@ -64,19 +64,11 @@ pub fn header(path: &Path) -> Result<Header> {
 }
 
 impl PhotographSource {
-    /// Reads the photograph and divides by the exposure.
+    /// Reads the photograph and divides by the exposure. Also returns the number of pixels with negative or non-finite values.
     ///
     /// # Errors
     /// The file cannot be read, is not an image, or has another size than the camera.
-    pub fn load(&self, intrinsics: &Intrinsics, exposure: Option<f64>) -> Result<Arc<Photograph>> {
-        Ok(self.load_counted(intrinsics, exposure)?.0)
-    }
-
-    /// [`PhotographSource::load`], and the number of pixels with negative or non-finite values.
-    ///
-    /// # Errors
-    /// As [`PhotographSource::load`].
-    pub fn load_counted(
+    pub fn load(
         &self,
         intrinsics: &Intrinsics,
         exposure: Option<f64>,

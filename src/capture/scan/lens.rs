@@ -54,16 +54,12 @@ impl Lens {
     /// Whether every number is finite and the focal lengths are positive.
     pub fn is_possible(&self) -> bool {
         let k = &self.pinhole;
-        let coefficients: &[f64] = match &self.model {
-            Model::Brown(k) | Model::Fisheye(k) => k,
-            Model::Rational { k, p } if p.iter().all(|p| p.is_finite()) => k,
-            Model::Rational { .. } => return false,
-        };
-        let finite = |x: &f64| x.is_finite();
-        k.fx > 0.0
-            && k.fy > 0.0
-            && [k.fx, k.fy, k.cx, k.cy].iter().all(finite)
-            && coefficients.iter().all(finite)
+        let mut numbers = vec![k.fx, k.fy, k.cx, k.cy];
+        match &self.model {
+            Model::Brown(k) | Model::Fisheye(k) => numbers.extend(k),
+            Model::Rational { k, p } => numbers.extend(k.iter().chain(p)),
+        }
+        k.fx > 0.0 && k.fy > 0.0 && numbers.iter().all(|x| x.is_finite())
     }
 
     /// Whether a capture supports this lens; otherwise the photograph has to be resampled.

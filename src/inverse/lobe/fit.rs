@@ -188,12 +188,10 @@ impl Model {
         let total: f64 = means.iter().map(|m| m.0).sum();
         let inverse: f64 = means.iter().map(|m| 1.0 / m.1).sum();
         let count = means.len().max(1) as f64;
-        let within = if freedom > 0 {
-            within / freedom as f64
-        } else {
-            0.0
+        let within = match freedom {
+            0 => MIN_VARIANCE,
+            _ => (within / freedom as f64).max(MIN_VARIANCE),
         };
-        let within = within.max(MIN_VARIANCE);
         Variances {
             within,
             between: ((total - within * inverse) / count).max(0.0),
@@ -220,14 +218,14 @@ pub fn decorrelated(rows: &[Row], fraction: impl Fn(f64) -> f64) -> Vec<Row> {
         let components = [0, 1].map(|set| {
             let mut sum = Components::default();
             for row in spot {
-                sum += row.sets[set] * row.weight;
+                sum = sum.zip(row.sets[set], |sum, own| sum + own * row.weight);
             }
-            sum * (fraction / weight)
+            sum.map(|component| component * (fraction / weight))
         });
         all.extend(spot.iter().map(|row| Row {
             measured: row.measured - measured,
             one: row.one - one,
-            sets: [0, 1].map(|set| row.sets[set] - components[set]),
+            sets: [0, 1].map(|set| row.sets[set].zip(components[set], |own, mean| own - mean)),
             ..*row
         }));
     }

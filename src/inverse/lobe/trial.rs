@@ -81,7 +81,7 @@ impl<'a> LitObservations<'a> {
                     weight: observation.pixels.len() as f64,
                     measured: observation.measured / level,
                     one: level.recip(),
-                    sets: [0, 1].map(|set| light[set].components(alpha) / level),
+                    sets: [0, 1].map(|set| light[set].components(alpha).map(|c| c / level)),
                 };
                 (observation.held_out, row)
             })

@@ -161,7 +161,8 @@ impl Tracer<'_> {
             let mut surface = self.surface(&hit, wo);
             let albedo = self.expected_albedo[surface.id as usize];
             surface.scale = scale;
-            surface.scattering = self.lobe(surface.point.object).map(|lobe| {
+            let lobe = self.lobes.get(surface.point.object as usize);
+            surface.scattering = lobe.copied().flatten().map(|lobe| {
                 let [choice, ..] = numbers.four();
                 Scattering::new(lobe, surface.point.normal, wo, albedo, choice)
             });
@@ -409,10 +410,6 @@ impl Tracer<'_> {
 
     fn patch(&self, triangle: u32) -> u32 {
         self.patches.map_or(NO_PATCH, |p| p.patch(triangle))
-    }
-
-    fn lobe(&self, object: u32) -> Option<Lobe> {
-        self.lobes.get(object as usize).copied().flatten()
     }
 
     fn surface(&self, hit: &Hit, wo: Vec3) -> Surface {

@@ -6,7 +6,6 @@ use crate::inverse::fit::accumulate::Accumulated;
 use crate::inverse::fit::errors::{StandardErrors, jackknifed, standard_errors};
 use crate::inverse::fit::linear::{Descended, descend};
 use crate::inverse::fit::path_noise;
-use crate::inverse::fit::path_noise::distribute_paths;
 use crate::inverse::paths::evaluate::Linearised;
 use crate::inverse::paths::lamp_patches::LampPatches;
 use crate::inverse::pipeline::Pipeline;
@@ -120,11 +119,7 @@ impl Pipeline<'_, '_> {
         let lights = self.lights();
         self.patches = LampPatches::new(&self.problem.scene, &self.roles);
         self.weigh_by_prediction(&lights)?;
-        distribute_paths(
-            &mut self.clusters,
-            self.roles.len(),
-            self.budget.round_paths,
-        );
+        self.distribute(self.budget.round_paths);
         // Including the albedos of lamps.
         let free = roles::free(&self.roles, |k| self.has_free_albedo(k));
         Ok(Rounds {
@@ -277,8 +272,7 @@ impl Pipeline<'_, '_> {
     /// Weights the clusters by levels predicted from a few paths, which are independent of those of the rounds. Each albedo is raised
     /// by its standard error: objects wrongly estimated as black would otherwise get too much weight.
     fn weigh_by_prediction(&mut self, lights: &Emitters) -> Result<(), Termination> {
-        let paths = self.budget.round_paths / PREDICTING;
-        distribute_paths(&mut self.clusters, self.roles.len(), paths);
+        self.distribute(self.budget.round_paths / PREDICTING);
         let least =
             (self.budget.round_paths / self.clusters.len().max(1) as u64).min(MIN_PREDICTING);
         for cluster in &mut self.clusters {
