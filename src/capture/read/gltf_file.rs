@@ -61,7 +61,6 @@ fn check_accessors(root: &Root) -> std::result::Result<(), String> {
     Ok(())
 }
 
-/// The file length that a GLB header declares.
 fn declared_length(bytes: &[u8]) -> Option<usize> {
     let field = bytes.get(8..GLB_HEADER)?;
     Some(u32::from_le_bytes(field.try_into().ok()?) as usize)

@@ -11,7 +11,6 @@ const MAX_BYTES: u64 = 1 << 32;
 /// Bytes of an image's feature point: x, y, and the id of its 3-D point.
 const POINT_BYTES: u64 = 24;
 
-/// The unread bytes.
 struct Cursor<'a>(&'a [u8]);
 
 impl<'a> Cursor<'a> {
