@@ -57,7 +57,6 @@ pub fn bounded(problem: &Problem, gbuffer: &GBuffer) -> Option<Problem> {
     })
 }
 
-/// Counts of pixels by photograph and object.
 struct Counts {
     objects: usize,
     /// For pure pixels and for all pixels: their number, and how many are saturated in R, G and B.

@@ -118,14 +118,7 @@ impl MeasuredRadiance {
 #[inline]
 pub fn cell_key(size: f32, at: &SurfacePoint) -> u64 {
     let position = (at.point / size).floor();
-    let a = at.normal.abs();
-    let axis = if a.x >= a.y && a.x >= a.z {
-        0
-    } else if a.y >= a.z {
-        1
-    } else {
-        2
-    };
+    let axis = at.normal.abs().max_position();
     let facing = 2 * axis as u64 + u64::from(at.normal[axis] < 0.0);
     let mut h = splitmix64(u64::from(at.object) << 3 | facing);
     for c in position.to_array() {

@@ -48,15 +48,9 @@ pub fn leave_out(capture: &Capture, working: &mut Working) -> Result<()> {
     }
 
     if reasons.iter().all(Option::is_some) {
-        let first = reasons.iter().flatten().next().cloned();
-        return Err(Error::new(
-            &capture.name,
-            format!(
-                "no photograph is usable; the first one {}",
-                first.unwrap_or_default()
-            ),
-            "check the image files",
-        ));
+        let first = reasons.into_iter().flatten().next().unwrap_or_default();
+        let problem = format!("no photograph is usable; the first one {first}");
+        return Err(Error::new(&capture.name, problem, "check the image files"));
     }
     for (frame, reason) in reasons.into_iter().enumerate() {
         if let Some(reason) = reason {
@@ -99,12 +93,7 @@ pub fn leave_out_mispaired(
 
 /// Masks a photograph and adds a warning with the reason.
 fn take_out(capture: &Capture, working: &mut Working, frame: usize, reason: &str) {
-    let photograph = &mut working.photographs[frame];
-    let usable = vec![false; photograph.pixels.len()];
-    *photograph = Arc::new(Photograph {
-        usable,
-        ..(**photograph).clone()
-    });
+    working.photographs[frame] = Arc::new(working.photographs[frame].masked());
     let name = name(capture, frame);
     let warning = format!("{name} {reason}; it is left out");
     working.warnings.push(warning);
@@ -119,33 +108,23 @@ pub fn without_hot_pixels(
     if photograph.encoding != Encoding::Linear {
         return None;
     }
-    let width = photograph.width as usize;
-    let height = photograph.height as usize;
-    let mut hot = Vec::new();
-    for y in 1..height.saturating_sub(1) {
-        for x in 1..width.saturating_sub(1) {
-            let pixel = y * width + x;
-            let value = photograph.pixels[pixel].max_element();
-            if value <= 0.0 || !photograph.is_usable(pixel) {
-                continue;
-            }
-            let around = [pixel - width, pixel, pixel + width]
-                .into_iter()
-                .flat_map(|row| [row - 1, row, row + 1])
-                .filter(|&p| p != pixel);
-            let max = around
-                .clone()
-                .map(|p| photograph.pixels[p].max_element())
-                .fold(0.0, f32::max);
-            let object = object_at(pixel);
-            if value > HOT * max
-                && object.is_some()
-                && around.clone().all(|p| object_at(p) == object)
-            {
-                hot.push(pixel);
-            }
+    let [width, height] = [photograph.width, photograph.height].map(|side| side as usize);
+    let value = |pixel: usize| photograph.pixels[pixel].max_element();
+    let is_hot = |&pixel: &usize| {
+        if value(pixel) <= 0.0 || !photograph.is_usable(pixel) {
+            return false;
         }
-    }
+        let mut around = [pixel - width, pixel, pixel + width]
+            .into_iter()
+            .flat_map(|row| [row - 1, row, row + 1])
+            .filter(|&p| p != pixel);
+        let max = around.clone().map(value).fold(0.0, f32::max);
+        let object = object_at(pixel);
+        value(pixel) > HOT * max && object.is_some() && around.all(|p| object_at(p) == object)
+    };
+    let rows = 1..height.saturating_sub(1);
+    let inner = rows.flat_map(|y| (1..width.saturating_sub(1)).map(move |x| y * width + x));
+    let hot: Vec<usize> = inner.filter(is_hot).collect();
     if hot.is_empty() {
         return None;
     }
@@ -206,13 +185,9 @@ fn same_pictures(photographs: &[Arc<Photograph>]) -> Vec<Option<usize>> {
     let hashes: Vec<blake3::Hash> = photographs
         .iter()
         .map(|photograph| {
-            let mut hasher = blake3::Hasher::new();
-            for pixel in &photograph.pixels {
-                for value in pixel.to_array() {
-                    hasher.update(&value.to_le_bytes());
-                }
-            }
-            hasher.finalize()
+            let values = photograph.pixels.iter().flat_map(|pixel| pixel.to_array());
+            let bytes: Vec<u8> = values.flat_map(f32::to_le_bytes).collect();
+            blake3::hash(&bytes)
         })
         .collect();
     (0..hashes.len())
@@ -230,15 +205,7 @@ mod tests {
     use glam::Vec3;
 
     fn photograph(pixels: Vec<Vec3>, encoding: Encoding) -> Arc<Photograph> {
-        Arc::new(Photograph {
-            width: 5,
-            height: 5,
-            pixels,
-            usable: Vec::new(),
-            encoding,
-            saturation: Vec3::ONE,
-            limits: Vec::new(),
-        })
+        Arc::new(Photograph::new([5; 2], pixels, encoding, Vec3::ONE))
     }
 
     fn ramp() -> Vec<Vec3> {

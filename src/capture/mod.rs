@@ -78,6 +78,6 @@ impl Frame {
     /// # Errors
     /// The file cannot be read, is not an image, or has another size than the camera.
     pub fn load(&self) -> Result<Arc<Photograph>> {
-        self.photograph.load(&self.intrinsics, self.exposure)
+        Ok((self.photograph.load(&self.intrinsics, self.exposure)?).0)
     }
 }

@@ -97,17 +97,10 @@ mod tests {
         // 1 2 3      4 1
         // 4 5 6  ->  5 2
         //            6 3
-        let turned = Orientation::turned(1);
-        assert_eq!(turned.size([3, 2]), [2, 3]);
-        assert_eq!(
-            turned.apply(&[1, 2, 3, 4, 5, 6], [3, 2]),
-            [4, 1, 5, 2, 6, 3]
-        );
-        let mirrored = Orientation::MIRRORED;
-        assert_eq!(
-            mirrored.apply(&[1, 2, 3, 4, 5, 6], [3, 2]),
-            [3, 2, 1, 6, 5, 4]
-        );
+        let shown = |orientation: Orientation| orientation.apply(&[1, 2, 3, 4, 5, 6], [3, 2]);
+        assert_eq!(Orientation::turned(1).size([3, 2]), [2, 3]);
+        assert_eq!(shown(Orientation::turned(1)), [4, 1, 5, 2, 6, 3]);
+        assert_eq!(shown(Orientation::MIRRORED), [3, 2, 1, 6, 5, 4]);
     }
 
     #[test]

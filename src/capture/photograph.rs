@@ -73,6 +73,14 @@ impl Photograph {
         }
     }
 
+    /// The photograph with none of its pixels usable.
+    pub fn masked(&self) -> Self {
+        Self {
+            usable: vec![false; self.pixels.len()],
+            ..self.clone()
+        }
+    }
+
     /// A copy of the pixels as a picture.
     pub fn picture(&self) -> Picture {
         Picture {

@@ -88,64 +88,84 @@ impl Reading {
 
     /// The command-line options for this reading; empty for the default.
     pub fn options(&self) -> String {
-        let options: Vec<String> = self
-            .changes()
-            .into_iter()
-            .map(|[option, _]| option)
-            .collect();
-        options.join(" ")
+        self.changes(0).join(" ")
     }
 
     /// A description in words of what this reading does to the files; empty for the default.
     pub fn words(&self) -> String {
-        let words: Vec<String> = self.changes().into_iter().map(|[_, words]| words).collect();
-        words.join(" and ")
+        self.changes(1).join(" and ")
     }
 
-    /// What differs from the format's conventions, each as a command-line option and in words.
-    fn changes(&self) -> Vec<[String; 2]> {
-        let mut changes = Vec::new();
-        let mut add = |option: String, words: String| changes.push([option, words]);
-        if self.axes == Axes::OpenCv {
-            let words = "read the poses with OpenCV's axes";
-            add("--axes opencv".into(), words.into());
-        }
-        if self.mesh_turns != 0 {
-            let degrees = 90 * u32::from(self.mesh_turns);
-            let words = format!("turn the mesh by {degrees}° about its x axis");
-            add(format!("--mesh-turn {degrees}"), words);
-        }
-        let fit = "fit the lens to the photographs' size: multiply it";
-        for (option, what, factor) in [
-            ("--mesh-scale", "multiply the mesh's size", self.mesh_scale),
-            ("--focal", "multiply the focal lengths", self.focal),
-            ("--lens-scale", fit, self.lens_scale),
-        ] {
-            if factor != 1.0 {
-                let factor = number(factor);
-                add(format!("{option} {factor}"), format!("{what} by {factor}"));
-            }
-        }
-        if self.orientation.mirrored {
-            add("--mirror".into(), "mirror the photographs".into());
-        }
-        if self.orientation.turns != 0 {
-            let degrees = 90 * u32::from(self.orientation.turns);
-            let words = format!("turn the photographs by {degrees}°");
-            add(format!("--turn {degrees}"), words);
-        }
-        if self.shift != 0 {
-            let which = match self.shift {
-                1 => "the next photograph".to_owned(),
-                -1 => "the photograph before".to_owned(),
-                n => format!("the photograph {n} frames later"),
-            };
-            add(
+    /// The conditions under which the photographs show the mesh as this reading says; empty for the default.
+    pub fn conditions(&self) -> String {
+        self.changes(2).join(" and ")
+    }
+
+    /// What differs from the format's conventions: as command-line options (0), in words (1), or as conditions (2).
+    fn changes(&self, form: usize) -> Vec<String> {
+        let [mesh_turn, turn] =
+            [self.mesh_turns, self.orientation.turns].map(|turns| 90 * u32::from(turns));
+        let [mesh_scale, focal, lens_scale] =
+            [self.mesh_scale, self.focal, self.lens_scale].map(number);
+        let shown = match self.shift {
+            1 => "the next photograph".to_owned(),
+            -1 => "the photograph before".to_owned(),
+            n => format!("the photograph {n} frames later"),
+        };
+        let all = [
+            (
+                self.axes == Axes::OpenCv,
+                "--axes opencv".to_owned(),
+                "read the poses with OpenCV's axes".to_owned(),
+                "if poses have OpenCV's axes".to_owned(),
+            ),
+            (
+                self.mesh_turns != 0,
+                format!("--mesh-turn {mesh_turn}"),
+                format!("turn the mesh by {mesh_turn}° about its x axis"),
+                format!("if the mesh is turned about its x axis by {mesh_turn}°"),
+            ),
+            (
+                self.mesh_scale != 1.0,
+                format!("--mesh-scale {mesh_scale}"),
+                format!("multiply the mesh's size by {mesh_scale}"),
+                format!("if the mesh is {:.4} times as large", self.mesh_scale),
+            ),
+            (
+                self.focal != 1.0,
+                format!("--focal {focal}"),
+                format!("multiply the focal lengths by {focal}"),
+                format!("if focal lengths are {:.3} times as long", self.focal),
+            ),
+            (
+                self.lens_scale != 1.0,
+                format!("--lens-scale {lens_scale}"),
+                format!("fit the lens to the photographs' size: multiply it by {lens_scale}"),
+                "if the lens is given for another size of the photographs".to_owned(),
+            ),
+            (
+                self.orientation.mirrored,
+                "--mirror".to_owned(),
+                "mirror the photographs".to_owned(),
+                "if they are mirrored".to_owned(),
+            ),
+            (
+                self.orientation.turns != 0,
+                format!("--turn {turn}"),
+                format!("turn the photographs by {turn}°"),
+                format!("if they are turned by {turn}°"),
+            ),
+            (
+                self.shift != 0,
                 format!("--shift={}", self.shift),
-                format!("give each pose {which}"),
-            );
-        }
-        changes
+                format!("give each pose {shown}"),
+                "if each pose has the photograph of the frame beside it".to_owned(),
+            ),
+        ];
+        all.into_iter()
+            .filter(|change| change.0)
+            .map(|(_, option, words, condition)| [option, words, condition][form].clone())
+            .collect()
     }
 }
 
@@ -240,8 +260,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn options_say_what_differs_from_the_format() {
-        assert_eq!(Reading::default().options(), "");
+    fn what_differs_from_the_format_is_said_as_options_in_words_and_as_conditions() {
+        let given = Reading::default();
+        assert_eq!(given.options() + &given.words() + &given.conditions(), "");
         let reading = Reading {
             axes: Axes::OpenCv,
             mesh_turns: 3,
@@ -255,31 +276,20 @@ mod tests {
             reading.options(),
             "--axes opencv --mesh-turn 270 --mesh-scale 0.01 --focal 1.25 --lens-scale 0.5 --turn 180 --shift=-1"
         );
-    }
-
-    #[test]
-    fn words_say_what_is_done() {
-        let sound = Reading::default();
-        let read = |reading: Reading| reading.words();
-        assert_eq!(read(sound), "");
-        let axes = Axes::OpenCv;
-        assert_eq!(
-            read(Reading { axes, ..sound }),
-            "read the poses with OpenCV's axes"
-        );
-        let (mesh_scale, mesh_turns) = (0.0254, 3);
-        assert_eq!(
-            read(Reading {
-                mesh_scale,
-                mesh_turns,
-                ..sound
-            }),
-            "turn the mesh by 270° about its x axis and multiply the mesh's size by 0.0254"
-        );
-        assert_eq!(
-            read(Reading { shift: -1, ..sound }),
-            "give each pose the photograph before"
-        );
+        let (axes, shift) = (given.axes, given.shift);
+        let words = "turn the mesh by 270° about its x axis and multiply the mesh's size by 0.01 and multiply the focal lengths by 1.25 \
+                     and fit the lens to the photographs' size: multiply it by 0.5 and turn the photographs by 180°";
+        let some = Reading {
+            axes,
+            shift,
+            ..reading
+        };
+        assert_eq!(some.words(), words);
+        let focal = given.focal;
+        let conditions = "if poses have OpenCV's axes and if the mesh is turned about its x axis by 270° and if the mesh is 0.0100 times as \
+                          large and if the lens is given for another size of the photographs and if they are turned by 180° and if each \
+                          pose has the photograph of the frame beside it";
+        assert_eq!(Reading { focal, ..reading }.conditions(), conditions);
     }
 
     #[test]

@@ -139,7 +139,6 @@ fn wrong(what: &str) -> Error {
     )
 }
 
-/// Removes objects without faces.
 fn drop_empty(mesh: &mut Mesh) {
     let mut used = vec![false; mesh.objects.len()];
     for &object in &mesh.object_of {
@@ -219,10 +218,8 @@ mod tests {
             Regroup::cut([u32::MAX], "rug".into()),
             Regroup::cut([1], "floor".into()),
         ] {
-            assert!(
-                regroup(&mut mesh(), std::slice::from_ref(&change)).is_err(),
-                "{change:?}"
-            );
+            let changes = [change];
+            assert!(regroup(&mut mesh(), &changes).is_err(), "{changes:?}");
         }
         regroup(&mut mesh(), &[rename("wall", "wall")]).expect("it has that name");
     }

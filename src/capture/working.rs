@@ -37,9 +37,8 @@ pub fn load_working(capture: &Capture, max_pixels: u64) -> Result<Working> {
         .frames
         .par_iter()
         .map(|frame| {
-            let (photograph, invalid) = frame
-                .photograph
-                .load_counted(&frame.intrinsics, frame.exposure)?;
+            let (photograph, invalid) =
+                (frame.photograph).load(&frame.intrinsics, frame.exposure)?;
             let reduced = match factor {
                 1 => photograph,
                 _ => Arc::new(reduce(&photograph, factor)),
@@ -128,17 +127,8 @@ fn reduction(frames: &[Frame], max_pixels: u64) -> u32 {
         let pixels = |k: &Intrinsics| u64::from(k.width / factor) * u64::from(k.height / factor);
         lenses().map(pixels).sum()
     };
-    // The number of pixels decreases with the factor, so bisection finds the smallest that fits.
-    let (mut low, mut high) = (1, largest);
-    while low < high {
-        let middle = low + (high - low) / 2;
-        if pixels(middle) <= max_pixels {
-            high = middle;
-        } else {
-            low = middle + 1;
-        }
-    }
-    low
+    let fits = |factor: &u32| pixels(*factor) <= max_pixels;
+    (1..largest).find(fits).unwrap_or(largest)
 }
 
 /// Downsamples by block means. A block with an unusable pixel is unusable; a block with a saturated pixel is a lower bound.
@@ -263,13 +253,8 @@ mod tests {
     #[test]
     fn a_point_lands_on_the_same_spot_of_the_reduced_photograph() {
         let lens = Intrinsics {
-            width: 641,
-            height: 480,
-            fx: 500.0,
-            fy: 510.0,
-            cx: 321.3,
-            cy: 240.1,
             distortion: [0.1, -0.02, 1e-3, 2e-3],
+            ..Intrinsics::plain([641, 480], [500.0, 510.0], [321.3, 240.1])
         };
         let reduced = lens.reduced(4);
         assert_eq!((reduced.width, reduced.height), (160, 120));

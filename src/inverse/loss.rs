@@ -171,7 +171,7 @@ impl LossProbe {
         lit: &LitScene,
         pixels: &[(u32, u32)],
     ) -> (Vec<f64>, RayCount) {
-        let each: Vec<(f64, RayCount)> = pixels
+        let (each, casts): (Vec<f64>, Vec<RayCount>) = pixels
             .par_iter()
             .map(|&(frame, pixel)| {
                 let (rendered, cast) =
@@ -183,9 +183,8 @@ impl LossProbe {
                 let error = DVec3::select(censored, residual.max(DVec3::ZERO), residual.abs());
                 (error.element_sum() / 3.0, cast)
             })
-            .collect();
-        let cast = each.iter().map(|e| e.1).sum();
-        (each.into_iter().map(|e| e.0).collect(), cast)
+            .unzip();
+        (each, casts.into_iter().sum())
     }
 
     /// Radiance of a pixel (frame, index) by paths of at most `max_bounces` bounces.

@@ -159,23 +159,17 @@ mod tests {
     use glam::Vec3;
 
     /// Gives a fixed answer after a pause.
-    struct Puppet {
-        answer: Control,
-        pause: Duration,
-    }
+    struct Puppet(Control, Duration);
 
     impl Observer for Puppet {
         fn observe(&mut self, _: &Progress, _: &Estimate) -> Control {
-            std::thread::sleep(self.pause);
-            self.answer.clone()
+            std::thread::sleep(self.1);
+            self.0.clone()
         }
     }
 
     fn puppet(answer: Control) -> Puppet {
-        Puppet {
-            answer,
-            pause: Duration::ZERO,
-        }
+        Puppet(answer, Duration::ZERO)
     }
 
     fn report(monitor: &mut Monitor) -> Result<(), Termination> {
@@ -253,10 +247,7 @@ mod tests {
     fn the_observers_time_is_not_the_solvers() {
         let pause = Duration::from_millis(50);
         let begun = Instant::now();
-        let mut observer = Puppet {
-            answer: Control::Continue,
-            pause,
-        };
+        let mut observer = Puppet(Control::Continue, pause);
         let mut monitor = Monitor::new(&Settings::default(), &mut observer, Progress::default());
         assert!(monitor.due());
         assert_eq!(report(&mut monitor), Ok(()));

@@ -369,12 +369,7 @@ mod tests {
     #[test]
     fn what_is_out_of_range_or_of_another_kind_is_refused_with_the_range() {
         let mut settings = Settings::default();
-        let named = |name| {
-            PARAMETERS
-                .iter()
-                .find(|p| p.name == name)
-                .expect("declared")
-        };
+        let named = |name| (PARAMETERS.iter().find(|p| p.name == name)).expect("declared");
         let batch = named("batch");
         let message = batch.set(&mut settings, &Value::Whole(0)).unwrap_err();
         assert!(message.contains("from 1 to 1000000"), "{message}");

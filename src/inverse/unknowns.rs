@@ -4,7 +4,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 /// Values of all unknowns. A surface is a set of triangles with common unknowns: an object, or an outside direction.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Unknowns {
     /// Diffuse reflectance of each surface, in [0, 1].
     pub albedo: Vec<Vec3>,
@@ -39,6 +39,17 @@ impl Unknowns {
         match parameter.checked_sub(self.surfaces()) {
             None => &mut self.albedo[parameter],
             Some(surface) => &mut self.emission[surface],
+        }
+    }
+}
+
+#[cfg(test)]
+impl Unknowns {
+    /// Grey albedos and emissions, for tests.
+    pub fn grey<const N: usize>(albedo: [f32; N], emission: [f32; N]) -> Self {
+        Self {
+            albedo: albedo.map(Vec3::splat).to_vec(),
+            emission: emission.map(Vec3::splat).to_vec(),
         }
     }
 }

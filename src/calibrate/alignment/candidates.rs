@@ -14,7 +14,8 @@ const STEPS: i32 = 19;
 
 /// Readings that partly fit together with the given one: scale or focal length off by 5 and 10 %.
 pub fn near() -> Vec<Reading> {
-    [-2, -1, 1, 2].into_iter().flat_map(factor).collect()
+    let steps = [-2, -1, 1, 2].into_iter();
+    steps.flat_map(|n| scaled(STEP.powi(n))).collect()
 }
 
 /// Readings that turn, mirror or permute something. Symmetric rooms partly fit several of them.
@@ -30,13 +31,11 @@ pub fn exchanged() -> Vec<Reading> {
         .collect();
     readings.extend([-1, 1].map(|shift| Reading { shift, ..given }));
     for axes in [Axes::OpenGl, Axes::OpenCv] {
-        for mesh_turns in 0..4 {
-            readings.push(Reading {
-                axes,
-                mesh_turns,
-                ..given
-            });
-        }
+        readings.extend([0, 1, 2, 3].map(|mesh_turns| Reading {
+            axes,
+            mesh_turns,
+            ..given
+        }));
     }
     readings.retain(|reading| !reading.is_default());
     readings
@@ -44,55 +43,35 @@ pub fn exchanged() -> Vec<Reading> {
 
 /// All candidate readings other than the given one.
 pub fn all() -> Vec<Reading> {
-    let given = Reading::default();
-    let mut readings: Vec<Reading> = (1..=STEPS).flat_map(|n| [n, -n]).flat_map(factor).collect();
-    readings.extend(UNITS.map(|mesh_scale| Reading {
-        mesh_scale,
-        ..given
-    }));
-    readings.extend([0.1, 10.0].map(|focal| Reading { focal, ..given }));
+    let steps = (1..=STEPS).flat_map(|n| [n, -n]);
+    let mut readings: Vec<Reading> = steps.flat_map(|n| scaled(STEP.powi(n))).collect();
+    readings.extend(UNITS.map(|unit| scaled(unit)[0]));
+    readings.extend([0.1, 10.0].map(|focal| scaled(focal)[1]));
     readings.extend(SIZES.map(|lens_scale| Reading {
         lens_scale,
-        ..given
+        ..Reading::default()
     }));
     readings.extend(exchanged());
-    readings.retain(|reading| !reading.is_default());
     readings
 }
 
-/// The readings with the mesh's scale, or the focal length, off by `steps` steps.
-fn factor(steps: i32) -> [Reading; 2] {
-    let factor = STEP.powi(steps);
-    let given = Reading::default();
-    [
-        Reading {
-            mesh_scale: factor,
-            ..given
-        },
-        Reading {
-            focal: factor,
-            ..given
-        },
-    ]
+/// The readings with the mesh's scale, and with the focal length, off by a factor.
+fn scaled(factor: f64) -> [Reading; 2] {
+    let mut readings = [Reading::default(); 2];
+    readings[0].mesh_scale = factor;
+    readings[1].focal = factor;
+    readings
 }
 
 /// Readings between `reading` and its neighbouring factors; none if it changes neither scale nor focal length alone.
 pub fn finer(reading: &Reading) -> Vec<Reading> {
-    let steps = (-4..=4).filter(|&n| n != 0);
-    let factors = steps.map(|n| STEP.powf(f64::from(n) / 5.0));
-    match (reading.mesh_scale != 1.0, reading.focal != 1.0) {
-        (true, false) => factors
-            .map(|f| Reading {
-                mesh_scale: reading.mesh_scale * f,
-                ..*reading
-            })
-            .collect(),
-        (false, true) => factors
-            .map(|f| Reading {
-                focal: reading.focal * f,
-                ..*reading
-            })
-            .collect(),
-        _ => Vec::new(),
-    }
+    let which = match (reading.mesh_scale != 1.0, reading.focal != 1.0) {
+        (true, false) => 0,
+        (false, true) => 1,
+        _ => return Vec::new(),
+    };
+    (-4..=4)
+        .filter(|&n| n != 0)
+        .map(|n| reading.then(&scaled(STEP.powf(f64::from(n) / 5.0))[which]))
+        .collect()
 }

@@ -2,7 +2,7 @@
 
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
-use glam::{Vec2, Vec3};
+use glam::{IVec2, Vec3};
 
 /// Distance of a neighbour from a pixel's plane, in pixel footprints, that makes a depth edge.
 const JUMP_FOOTPRINTS: f32 = 6.0;
@@ -12,32 +12,17 @@ const CREASE: f32 = 0.2;
 /// Least length of the sum of a block's nine unit normals for which their mean counts.
 const COHERENT: f32 = 5.0;
 
-/// The neighbour on the other side of an edge.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Towards {
-    /// The pixel to the right.
-    Right,
-    /// The pixel below.
-    Down,
-}
-
-/// An edge between a pixel and its neighbour.
+/// An edge between a pixel and a neighbour.
 #[derive(Debug, Clone, Copy)]
 pub struct Edge {
-    /// Column of the pixel.
-    pub x: i32,
-    /// Row of the pixel.
-    pub y: i32,
-    /// The neighbour.
-    pub towards: Towards,
+    /// Column and row of the pixel.
+    pub pixel: IVec2,
+    /// 0 if the neighbour is the pixel to the right, 1 if it is the one below.
+    pub axis: usize,
 }
 
-/// Edges by kind.
-#[derive(Debug, Clone, Default)]
-pub struct Edges {
-    /// Depth discontinuities, creases, borders between objects, and outlines of the mesh.
-    pub kinds: [Vec<Edge>; 4],
-}
+/// Edges by kind: depth discontinuities, creases, borders between objects, and outlines of the mesh.
+pub type Edges = [Vec<Edge>; 4];
 
 const DEPTH: usize = 0;
 const FOLD: usize = 1;
@@ -57,30 +42,24 @@ struct PixelHit {
 /// The edges of the mesh in a camera's image.
 pub fn edges(scene: &Scene, camera: &Camera) -> Edges {
     let lens = &camera.intrinsics;
-    let (width, height) = (lens.width as i32, lens.height as i32);
-    let at = |x: i32, y: i32| (y * width + x) as usize;
-    let hits: Vec<Option<PixelHit>> = (0..width * height)
-        .map(|pixel| pixel_hit(scene, camera, pixel % width, pixel / width))
-        .collect();
-    let normal = |x: i32, y: i32| {
-        let inside = x >= 0 && y >= 0 && x < width && y < height;
-        inside
-            .then(|| hits[at(x, y)])
-            .flatten()
-            .map_or(Vec3::ZERO, |hit| hit.normal)
+    let size = IVec2::new(lens.width as i32, lens.height as i32);
+    let is_inside = |p: IVec2| p.cmpge(IVec2::ZERO).all() && p.cmplt(size).all();
+    let at = |p: IVec2| (p.y * size.x + p.x) as usize;
+    let pixels = || (0..size.y).flat_map(move |y| (0..size.x).map(move |x| IVec2::new(x, y)));
+    let hits: Vec<Option<PixelHit>> = pixels().map(|p| pixel_hit(scene, camera, p)).collect();
+    let normal = |p: IVec2| {
+        let hit = is_inside(p).then(|| hits[at(p)]).flatten();
+        hit.map_or(Vec3::ZERO, |hit| hit.normal)
     };
 
     // One minus the cosine between the mean normals on both sides of each pair of pixels.
-    let turn = |x: i32, y: i32, towards: Towards| {
+    let turn = |pixel: IVec2, axis: usize| {
+        let (ahead, beside) = (IVec2::AXES[axis], IVec2::AXES[1 - axis]);
         let (mut before, mut after) = (Vec3::ZERO, Vec3::ZERO);
         for along in -1..=1 {
             for away in 0..3 {
-                let ([x0, y0], [x1, y1]) = match towards {
-                    Towards::Right => ([x - away, y + along], [x + 1 + away, y + along]),
-                    Towards::Down => ([x + along, y - away], [x + along, y + 1 + away]),
-                };
-                before += normal(x0, y0);
-                after += normal(x1, y1);
+                before += normal(pixel + along * beside - away * ahead);
+                after += normal(pixel + along * beside + (1 + away) * ahead);
             }
         }
         let lengths = before.length().min(after.length());
@@ -89,65 +68,52 @@ pub fn edges(scene: &Scene, camera: &Camera) -> Edges {
             false => 0.0,
         }
     };
-    let turns = [Towards::Right, Towards::Down].map(|towards| -> Vec<f32> {
-        (0..width * height)
-            .map(|pixel| turn(pixel % width, pixel / width, towards))
-            .collect()
-    });
+    let turns = [0, 1].map(|axis| pixels().map(|p| turn(p, axis)).collect::<Vec<f32>>());
 
     let footprint = 1.0 / lens.fx.abs() as f32;
     let mut edges = Edges::default();
-    for y in 0..height {
-        for x in 0..width {
-            for (towards, turns) in [Towards::Right, Towards::Down].into_iter().zip(&turns) {
-                let (dx, dy) = match towards {
-                    Towards::Right => (1, 0),
-                    Towards::Down => (0, 1),
-                };
-                if x + dx >= width || y + dy >= height {
-                    continue;
-                }
-                let kind = match (hits[at(x, y)], hits[at(x + dx, y + dy)]) {
-                    (None, None) => continue,
-                    (None, Some(_)) | (Some(_), None) => OUTLINE,
-                    (Some(a), Some(b)) => {
-                        let step = b.point - a.point;
-                        let off = (a.normal.dot(step).abs()).min(b.normal.dot(step).abs());
-                        let turned = turns[at(x, y)];
-                        let sharpest = [(x - dx, y - dy), (x + dx, y + dy)]
-                            .into_iter()
-                            .filter(|&(x, y)| x >= 0 && y >= 0)
-                            .all(|(x, y)| turned >= turns[at(x, y)]);
-                        if off > JUMP_FOOTPRINTS * footprint * a.distance.min(b.distance) {
-                            DEPTH
-                        } else if turned > CREASE && sharpest {
-                            FOLD
-                        } else if a.object != b.object {
-                            BORDER
-                        } else {
-                            continue;
-                        }
-                    }
-                };
-                edges.kinds[kind].push(Edge { x, y, towards });
+    for pixel in pixels() {
+        for (axis, turns) in turns.iter().enumerate() {
+            let step = IVec2::AXES[axis];
+            if !is_inside(pixel + step) {
+                continue;
             }
+            let kind = match (hits[at(pixel)], hits[at(pixel + step)]) {
+                (None, None) => continue,
+                (None, Some(_)) | (Some(_), None) => OUTLINE,
+                (Some(a), Some(b)) => {
+                    let between = b.point - a.point;
+                    let off = (a.normal.dot(between).abs()).min(b.normal.dot(between).abs());
+                    let turned = turns[at(pixel)];
+                    let is_sharpest = [pixel - step, pixel + step]
+                        .into_iter()
+                        .all(|p| !is_inside(p) || turned >= turns[at(p)]);
+                    if off > JUMP_FOOTPRINTS * footprint * a.distance.min(b.distance) {
+                        DEPTH
+                    } else if turned > CREASE && is_sharpest {
+                        FOLD
+                    } else if a.object != b.object {
+                        BORDER
+                    } else {
+                        continue;
+                    }
+                }
+            };
+            edges[kind].push(Edge { pixel, axis });
         }
     }
     edges
 }
 
-fn pixel_hit(scene: &Scene, camera: &Camera, x: i32, y: i32) -> Option<PixelHit> {
-    let ray = camera.ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5));
+fn pixel_hit(scene: &Scene, camera: &Camera, pixel: IVec2) -> Option<PixelHit> {
+    let ray = camera.ray(pixel.as_vec2() + 0.5);
     let hit = scene.intersect(&ray)?;
     let normal = scene.normals[hit.triangle as usize];
+    let is_back = normal.dot(ray.direction) > 0.0;
     let point = scene.point(&hit);
     Some(PixelHit {
         point,
-        normal: if normal.dot(ray.direction) > 0.0 {
-            -normal
-        } else {
-            normal
-        },
+        normal: if is_back { -normal } else { normal },
         object: scene.object_of[hit.triangle as usize],
         distance: (point - camera.center).length(),
     })

@@ -107,7 +107,7 @@ impl Alignment {
             format!(
                 "the photographs do not show the mesh from their poses; they do {} (edges agree by {agreement:.1} standard \
                  deviations instead of {:.1})",
-                condition(reading),
+                reading.conditions(),
                 self.agreement
             ),
             match before.then(reading).options().as_str() {
@@ -127,46 +127,6 @@ impl Alignment {
             )
         })
     }
-}
-
-/// The conditions of a reading, to follow "they do".
-fn condition(reading: &Reading) -> String {
-    let mut conditions = Vec::new();
-    if reading.axes == Axes::OpenCv {
-        conditions.push("if poses have OpenCV's axes".to_owned());
-    }
-    if reading.mesh_turns != 0 {
-        let degrees = 90 * u32::from(reading.mesh_turns);
-        conditions.push(format!(
-            "if the mesh is turned about its x axis by {degrees}°"
-        ));
-    }
-    if reading.mesh_scale != 1.0 {
-        conditions.push(format!(
-            "if the mesh is {:.4} times as large",
-            reading.mesh_scale
-        ));
-    }
-    if reading.focal != 1.0 {
-        conditions.push(format!(
-            "if focal lengths are {:.3} times as long",
-            reading.focal
-        ));
-    }
-    if reading.lens_scale != 1.0 {
-        conditions.push("if the lens is given for another size of the photographs".to_owned());
-    }
-    if reading.orientation.mirrored {
-        conditions.push("if they are mirrored".to_owned());
-    }
-    if reading.orientation.turns != 0 {
-        let degrees = 90 * u32::from(reading.orientation.turns);
-        conditions.push(format!("if they are turned by {degrees}°"));
-    }
-    if reading.shift != 0 {
-        conditions.push("if each pose has the photograph of the frame beside it".to_owned());
-    }
-    conditions.join(" and ")
 }
 
 /// The sum of independent scores of standard deviation one, scaled to standard deviation one.

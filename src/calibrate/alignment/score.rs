@@ -1,10 +1,10 @@
 //! Scores how well the gradients of a photograph coincide with the projected edges of the mesh.
 
-use crate::calibrate::alignment::edges::{Edge, Edges, Towards};
+use crate::calibrate::alignment::edges::{Edge, Edges};
 use crate::capture::photograph::Photograph;
 use crate::math::color::luminance;
 use crate::math::stats::Moments;
-use glam::Vec3;
+use glam::{IVec2, Vec3};
 
 /// Largest displacement of the edges, in pixels.
 const REACH: i32 = 8;
@@ -18,10 +18,8 @@ const MAX_SCORE: f64 = 8.0;
 const DARK: f32 = 1e-8;
 
 /// Gradient magnitudes of a photograph as ranks, which are invariant to exposure and contrast.
-#[derive(Debug, Clone)]
 pub struct Contrast {
-    width: i32,
-    height: i32,
+    size: IVec2,
     /// Rank in [0, 1) of the difference to the pixel on the right and below; NaN without that neighbour.
     ranks: [Vec<f32>; 2],
 }
@@ -41,29 +39,24 @@ impl Contrast {
         }
         changes.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut ranks = [vec![f32::NAN; levels.len()], vec![f32::NAN; levels.len()]];
-        for (rank, &(_, towards, pixel)) in changes.iter().enumerate() {
-            ranks[towards][pixel] = rank as f32 / changes.len() as f32;
+        for (rank, &(_, axis, pixel)) in changes.iter().enumerate() {
+            ranks[axis][pixel] = rank as f32 / changes.len() as f32;
         }
         Self {
-            width: width as i32,
-            height: height as i32,
+            size: IVec2::new(width as i32, height as i32),
             ranks,
         }
     }
 
-    /// Mean rank of the gradients at edges displaced by (dx, dy) pixels; `None` if too few of them are inside the image.
-    fn at(&self, edges: &[Edge], dx: i32, dy: i32) -> Option<f64> {
+    /// Mean rank of the gradients at edges displaced by `shift` pixels; `None` if too few of them are inside the image.
+    fn at(&self, edges: &[Edge], shift: IVec2) -> Option<f64> {
         let (mut sum, mut count) = (0.0, 0u32);
         for edge in edges {
-            let (x, y) = (edge.x + dx, edge.y + dy);
-            if x < 0 || y < 0 || x >= self.width || y >= self.height {
+            let p = edge.pixel + shift;
+            if p.cmplt(IVec2::ZERO).any() || p.cmpge(self.size).any() {
                 continue;
             }
-            let ranks = match edge.towards {
-                Towards::Right => &self.ranks[0],
-                Towards::Down => &self.ranks[1],
-            };
-            let rank = ranks[(y * self.width + x) as usize];
+            let rank = self.ranks[edge.axis][(p.y * self.size.x + p.x) as usize];
             if rank.is_finite() {
                 sum += f64::from(rank);
                 count += 1;
@@ -76,7 +69,7 @@ impl Contrast {
     /// unrelated edges, several for correct ones. Zero if there are too few edges.
     pub fn score(&self, edges: &Edges) -> f64 {
         let (mut sum, mut weights) = (0.0, 0.0);
-        for kind in edges.kinds.iter().filter(|kind| kind.len() >= MIN_EDGES) {
+        for kind in edges.iter().filter(|kind| kind.len() >= MIN_EDGES) {
             if let Some(score) = self.score_of(kind) {
                 let count = kind.len() as f64;
                 sum += count.sqrt() * score.clamp(-MAX_SCORE, MAX_SCORE);
@@ -90,11 +83,10 @@ impl Contrast {
         }
     }
 
-    /// The score of one kind of edges.
     fn score_of(&self, edges: &[Edge]) -> Option<f64> {
         let side = 2 * REACH + 1;
         let profile: Vec<Option<f64>> = (0..side * side)
-            .map(|i| self.at(edges, i % side - REACH, i / side - REACH))
+            .map(|i| self.at(edges, IVec2::new(i % side, i / side) - REACH))
             .collect();
         // The maximum over 3 × 3 displacements, since poses are off by up to a pixel.
         let best = |dx: i32, dy: i32| -> Option<f64> {
@@ -149,24 +141,25 @@ mod tests {
     use super::*;
     use crate::math::rng::Stream;
 
-    /// A picture with a bright disc in noise, and the edges of a disc displaced by `(dx, dy)`.
-    fn disc(dx: i32, dy: i32) -> (Contrast, Edges) {
+    /// A picture with a bright disc in noise, and the edges of a disc displaced by `shift`.
+    fn disc(shift: IVec2) -> (Contrast, Edges) {
         let (width, height) = (96i32, 72i32);
-        let inside = |x: i32, y: i32| (x - 48).pow(2) + (y - 36).pow(2) < 400;
+        let inside = |p: IVec2| p.distance_squared(IVec2::new(48, 36)) < 400;
         let mut stream = Stream::new(81, 0, 0, 0);
         let levels: Vec<f32> = (0..width * height)
-            .map(|i| f32::from(inside(i % width, i / width)) + 0.5 * stream.uniform())
+            .map(|i| {
+                let is_inside = inside(IVec2::new(i % width, i / width));
+                f32::from(is_inside) + 0.5 * stream.uniform()
+            })
             .collect();
         let mut edges = Edges::default();
         for y in 0..height - 1 {
             for x in 0..width - 1 {
-                for (towards, there) in [
-                    (Towards::Right, inside(x + 1, y)),
-                    (Towards::Down, inside(x, y + 1)),
-                ] {
-                    if inside(x, y) != there {
-                        let (x, y) = (x + dx, y + dy);
-                        edges.kinds[0].push(Edge { x, y, towards });
+                let p = IVec2::new(x, y);
+                for axis in [0, 1] {
+                    if inside(p) != inside(p + IVec2::AXES[axis]) {
+                        let pixel = p + shift;
+                        edges[0].push(Edge { pixel, axis });
                     }
                 }
             }
@@ -177,7 +170,7 @@ mod tests {
     #[test]
     fn edges_in_place_score_and_displaced_ones_do_not() {
         let score = |dx, dy| {
-            let (contrast, edges) = disc(dx, dy);
+            let (contrast, edges) = disc(IVec2::new(dx, dy));
             contrast.score(&edges)
         };
         assert!(score(0, 0) > 4.0, "{}", score(0, 0));

@@ -2,9 +2,9 @@
 
 use crate::calibrate::exposure::normal::{Layout, ResponseBasis, levels};
 use crate::calibrate::exposure::observations::{Observation, Observations};
-use crate::capture::response::{Response, TERMS};
+use crate::capture::response::Response;
 use crate::math::stats::medians;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use std::collections::BTreeMap;
 
 /// Greatest number of reweighted solves.
@@ -25,7 +25,6 @@ pub(super) struct ModelParts {
 }
 
 impl ModelParts {
-    /// Exposures alone.
     pub const EXPOSURES: Self = Self {
         exposures: true,
         vignetting: false,
@@ -40,7 +39,6 @@ pub(super) struct CameraModel {
     pub exposures: Vec<DVec3>,
     /// Exponent of the vignetting of all photographs.
     pub power: DVec3,
-    /// The camera's response.
     pub response: Option<Response>,
 }
 
@@ -100,9 +98,7 @@ pub(super) fn fit(observations: &[Observation], frames: usize, parts: ModelParts
     fitted.retain(|&frame| parts.exposures && counts[frame] >= MIN_CELLS);
     let layout = Layout::new(fitted, frames, parts);
     let mut model = CameraModel::identity(frames);
-    model.response = parts.response.then_some(Response {
-        terms: [Vec3::ZERO; TERMS],
-    });
+    model.response = parts.response.then(Response::default);
     let mut weights = vec![DVec3::ONE; observations.len()];
     let basis = ResponseBasis::new(observations, parts);
     for _ in 0..MAX_ITERATIONS {
@@ -114,9 +110,7 @@ pub(super) fn fit(observations: &[Observation], frames: usize, parts: ModelParts
             model.exposures[frame] = *exposure;
         }
         model.power = step.power;
-        if parts.response {
-            model.response = Some(step.response());
-        }
+        model.response = step.response;
         let middle = medians(layout.frames.iter().map(|&frame| model.exposures[frame]));
         for &frame in &layout.frames {
             model.exposures[frame] -= middle;
@@ -135,11 +129,12 @@ pub(super) fn fit(observations: &[Observation], frames: usize, parts: ModelParts
             break;
         }
         // Absolute differences of values, which is where the noise is, hence the squared slope.
-        let residuals = residuals(observations, &weights, &model);
-        weights = (observations.iter().zip(&residuals))
-            .map(|(observation, residual)| {
+        let levels = levels(observations, &weights, &model);
+        weights = (observations.iter().zip(levels))
+            .map(|(observation, level)| {
+                let residual = model.residual(observation, level).abs();
                 let slope = model.slope(observation);
-                (residual.abs().max(DVec3::splat(NEAR)) * slope * slope).recip()
+                (residual.max(DVec3::splat(NEAR)) * slope * slope).recip()
             })
             .collect();
     }
@@ -152,9 +147,10 @@ pub(super) fn fit_held_out(
     observations: &Observations,
     model: &mut CameraModel,
 ) -> BTreeMap<usize, Vec<DVec3>> {
-    let levels = cell_levels(&observations.fitted, model);
-    let cells = observations.fitted.iter().map(|s| s.cell);
-    let level_of: BTreeMap<u64, DVec3> = cells.zip(levels).collect();
+    let cells = observations.fitted.chunk_by(|a, b| a.cell == b.cell);
+    let level_of: BTreeMap<u64, DVec3> = cells
+        .map(|cell| (cell[0].cell, median_level(cell, model)))
+        .collect();
     let mut differences: BTreeMap<usize, Vec<DVec3>> = BTreeMap::new();
     for observation in &observations.held_out {
         if let Some(level) = level_of.get(&observation.cell) {
@@ -171,28 +167,15 @@ pub(super) fn fit_held_out(
     differences
 }
 
-/// For each observation, its residual from the weighted mean level of its cell.
-fn residuals(observations: &[Observation], weights: &[DVec3], model: &CameraModel) -> Vec<DVec3> {
-    let levels = levels(observations, weights, model);
-    let pairs = observations.iter().zip(&levels);
-    pairs.map(|(s, level)| model.residual(s, *level)).collect()
-}
-
-/// For each observation, the median log radiance of its cell.
-fn cell_levels(observations: &[Observation], model: &CameraModel) -> Vec<DVec3> {
-    let mut levels = Vec::with_capacity(observations.len());
-    for cell in observations.chunk_by(|a, b| a.cell == b.cell) {
-        let level = medians(cell.iter().map(|s| model.radiance(s)));
-        levels.extend(std::iter::repeat_n(level, cell.len()));
-    }
-    levels
+fn median_level(cell: &[Observation], model: &CameraModel) -> DVec3 {
+    medians(cell.iter().map(|s| model.radiance(s)))
 }
 
 /// For each cell, the sum over observations and channels of the absolute residuals from the cell's median.
 pub(super) fn disagreements(observations: &[Observation], model: &CameraModel) -> Vec<f64> {
     (observations.chunk_by(|a, b| a.cell == b.cell))
         .map(|cell| {
-            let level = medians(cell.iter().map(|s| model.radiance(s)));
+            let level = median_level(cell, model);
             let residuals = cell.iter().map(|s| model.residual(s, level));
             residuals.map(|r| r.abs().element_sum()).sum()
         })

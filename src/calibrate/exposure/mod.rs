@@ -83,9 +83,6 @@ impl Exposures {
             let model = fit(&fitted, photographs, parts);
             (disagreements(&tested, &model), model)
         };
-        let is_needed = |before: &[f64], after: &[f64]| {
-            explained(before, after) > MIN_CAMERA_GAIN && is_significant(before, after)
-        };
         let [(without, _), (with, model)] =
             [false, true].map(|vignetting| test(true, vignetting, false));
         let vignetting_gain = explained(&without, &with);
@@ -175,36 +172,26 @@ fn one_lens(cameras: &[Camera]) -> bool {
 /// Relative decrease of the summed disagreement.
 fn explained(before: &[f64], after: &[f64]) -> f64 {
     let [before, after] = [before, after].map(|d| d.iter().sum::<f64>());
-    if before > 0.0 {
-        1.0 - after / before
-    } else {
-        0.0
+    match before > 0.0 {
+        true => 1.0 - after / before,
+        false => 0.0,
     }
 }
 
-/// Whether the mean decrease per cell is larger than chance.
-fn is_significant(before: &[f64], after: &[f64]) -> bool {
+/// Whether the disagreement decreases enough, and its mean per cell by more than chance.
+fn is_needed(before: &[f64], after: &[f64]) -> bool {
     let mut gains = Moments::default();
     for (before, after) in before.iter().zip(after) {
         gains.push(before - after);
     }
-    gains.mean > SIGNIFICANT * gains.standard_error()
+    let is_significant = gains.mean > SIGNIFICANT * gains.standard_error();
+    is_significant && explained(before, after) > MIN_CAMERA_GAIN
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::math::rng::Stream;
-
-    fn observation(frame: usize, cell: usize, level: f64) -> Observation {
-        Observation {
-            frame,
-            cell: cell as u64,
-            level: DVec3::splat(level),
-            off_axis: 0.0,
-            saturation: DVec3::ZERO,
-        }
-    }
 
     /// Observations of cells of random levels by random photographs of given log exposures, with noise and 10 % outliers.
     fn seen(exposures: &[DVec3], noise: f64) -> Vec<Observation> {
@@ -218,17 +205,19 @@ mod tests {
                         let wrong = if stream.uniform() < 0.1 { 1.5 } else { 0.0 };
                         let error = f64::from(stream.uniform() - 0.5) * noise + wrong;
                         own.push(Observation {
-                            frame,
-                            cell,
                             level: level + *exposure + DVec3::splat(error),
                             off_axis: -0.3 * f64::from(stream.uniform()),
-                            saturation: DVec3::ZERO,
+                            ..Observation::grey(frame, cell, 0.0)
                         });
                     }
                 }
                 if own.len() > 1 { own } else { Vec::new() }
             })
             .collect()
+    }
+
+    fn estimate(observations: &Observations, frames: usize, camera: Common) -> Exposures {
+        Exposures::estimate(observations, frames, camera).expect("cells are shared")
     }
 
     #[test]
@@ -246,7 +235,7 @@ mod tests {
     fn a_photograph_that_shares_too_little_keeps_its_exposure() {
         let mut observations = seen(&[DVec3::splat(0.3), DVec3::splat(-0.3)], 0.0);
         let cell = observations.last().map_or(0, |s| s.cell as usize);
-        observations.push(observation(2, cell, 9.0));
+        observations.push(Observation::grey(2, cell, 9.0));
         let found = fit(&observations, 3, ModelParts::EXPOSURES).exposures;
         assert_eq!(found[2], DVec3::ZERO);
         assert!((found[0] - found[1] - DVec3::splat(0.6)).length() < 0.01);
@@ -265,7 +254,7 @@ mod tests {
             for frame in [cell / 40, cell / 40 + 1] {
                 let wrong = if stream.uniform() < 0.05 { 1.0 } else { 0.0 };
                 let error = f64::from(stream.uniform() - 0.5) * 0.05 + wrong;
-                observations.push(observation(frame, cell, level + truth(frame) + error));
+                observations.push(Observation::grey(frame, cell, level + truth(frame) + error));
             }
         }
         let found = fit(&observations, frames, ModelParts::EXPOSURES).exposures;
@@ -285,7 +274,7 @@ mod tests {
                 .partition(|s| s.frame == 2);
         for cell in 1000..1040 {
             let [own, others] =
-                [(3, 1.0), (2, 2.3)].map(|(frame, level)| observation(frame, cell, level));
+                [(3, 1.0), (2, 2.3)].map(|(frame, level)| Observation::grey(frame, cell, level));
             fitted.push(own);
             held_out.push(others);
         }
@@ -297,8 +286,7 @@ mod tests {
                 .collect(),
             held_out: Vec::new(),
         };
-        let [with, without] = [with, without]
-            .map(|s| Exposures::estimate(&s, 4, Common::Lens).expect("cells are shared"));
+        let [with, without] = [with, without].map(|s| estimate(&s, 4, Common::Lens));
         let of_fitted = |e: &Exposures| [e.factors[0], e.factors[1], e.factors[3]];
         assert_eq!(of_fitted(&with), of_fitted(&without));
         assert_eq!((with.gain, with.differ), (without.gain, without.differ));
@@ -325,7 +313,7 @@ mod tests {
         let exposures = [0.5, 0.0, -0.4, 0.9].map(DVec3::splat);
         let power = DVec3::new(1.0, 2.0, 4.0);
         let observations = dimmed(&exposures, power);
-        let found = Exposures::estimate(&observations, 4, Common::Lens).expect("cells are shared");
+        let found = estimate(&observations, 4, Common::Lens);
         assert!(found.differ);
         let vignetting = found.vignetting.expect("a lens that dims");
         let off = vignetting.power.as_dvec3() - power;
@@ -335,15 +323,14 @@ mod tests {
             let off = found.as_dvec3().map(f64::ln) - *truth;
             assert!(off.abs().max_element() < 0.03, "{off}");
         }
-        let other_lenses =
-            Exposures::estimate(&observations, 4, Common::Nothing).expect("cells are shared");
+        let other_lenses = estimate(&observations, 4, Common::Nothing);
         assert_eq!(other_lenses.vignetting, None);
     }
 
     #[test]
     fn a_lens_that_dims_needs_no_exposures() {
         let observations = dimmed(&[DVec3::ZERO; 4], DVec3::splat(4.0));
-        let found = Exposures::estimate(&observations, 4, Common::Lens).expect("cells are shared");
+        let found = estimate(&observations, 4, Common::Lens);
         assert!(found.vignetting.is_some() && !found.differ && found.needed());
         assert_eq!(found.factors, [Vec3::ONE; 4]);
     }
@@ -351,7 +338,7 @@ mod tests {
     #[test]
     fn a_lens_that_brightens_its_corners_is_not_believed() {
         let observations = dimmed(&[DVec3::ZERO; 4], DVec3::splat(-2.0));
-        let found = Exposures::estimate(&observations, 4, Common::Lens).expect("cells are shared");
+        let found = estimate(&observations, 4, Common::Lens);
         assert_eq!(found.vignetting, None);
     }
 
@@ -389,12 +376,9 @@ mod tests {
 
     /// Fits a power law between the light of `found` and of `truth` in one channel: the power and the largest deviation.
     fn power_between(found: &Response, truth: &Response, channel: usize) -> (f64, f64) {
-        let lights: Vec<f64> = (0..80).map(|k| -4.0 + 0.05 * f64::from(k)).collect();
+        let x: Vec<f64> = (0..80).map(|k| -4.0 + 0.05 * f64::from(k)).collect();
         let recovered = |light: &f64| found.log_light(channel, truth.log_value(channel, *light))[0];
-        let (x, y) = (
-            lights.clone(),
-            lights.iter().map(recovered).collect::<Vec<f64>>(),
-        );
+        let y: Vec<f64> = x.iter().map(recovered).collect();
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
         let (mx, my) = (mean(&x), mean(&y));
         let both: f64 = x.iter().zip(&y).map(|(x, y)| (x - mx) * (y - my)).sum();
@@ -408,8 +392,7 @@ mod tests {
         let exposures = [0.7, 0.2, 0.0, -0.5, -0.9, 0.4].map(DVec3::splat);
         let truth = contrasty();
         let observations = bent(seen(&exposures, 0.1), &truth, |_| 0.0);
-        let found =
-            Exposures::estimate(&observations, 6, Common::Camera).expect("cells are shared");
+        let found = estimate(&observations, 6, Common::Camera);
         assert!(found.differ && found.vignetting.is_none());
         let response = found.response.expect("a response");
         for channel in 0..3 {
@@ -422,9 +405,7 @@ mod tests {
             }
         }
         // The identity deviates much more.
-        let none = Response {
-            terms: [Vec3::ZERO; 3],
-        };
+        let none = Response::default();
         assert!(power_between(&none, &truth, 0).1 > 0.15);
     }
 
@@ -436,8 +417,7 @@ mod tests {
             terms: [Vec3::new(-0.25, -0.2, 0.2), Vec3::ZERO, Vec3::ZERO],
         };
         let observations = bent(seen(&[DVec3::ZERO; 4], 0.1), &truth, known);
-        let found =
-            Exposures::estimate(&observations, 4, Common::Camera).expect("cells are shared");
+        let found = estimate(&observations, 4, Common::Camera);
         assert!(!found.differ && found.needed(), "{}", found.gain);
         let response = found.response.expect("a response");
         for channel in 0..3 {
@@ -449,20 +429,15 @@ mod tests {
     #[test]
     fn a_camera_that_bends_nothing_is_given_no_response() {
         let exposures = [0.7, 0.2, -0.5, -0.9].map(DVec3::splat);
-        let straight = Response {
-            terms: [Vec3::ZERO; 3],
-        };
+        let straight = Response::default();
         let observations = bent(seen(&exposures, 0.2), &straight, |_| 0.0);
-        let found =
-            Exposures::estimate(&observations, 4, Common::Camera).expect("cells are shared");
+        let found = estimate(&observations, 4, Common::Camera);
         assert!(found.differ && found.response.is_none());
-        assert_eq!(
-            Exposures::estimate(&Observations::default(), 4, Common::Lens),
-            None
-        );
+        let of_nothing = Exposures::estimate(&Observations::default(), 4, Common::Lens);
+        assert_eq!(of_nothing, None);
         // Without a shared response, as of linear files, none is fitted.
         let observations = bent(seen(&exposures, 0.1), &contrasty(), |_| 0.0);
-        let found = Exposures::estimate(&observations, 4, Common::Lens).expect("cells are shared");
+        let found = estimate(&observations, 4, Common::Lens);
         assert_eq!(found.response, None);
     }
 }

@@ -84,20 +84,20 @@ impl<'a> ResponseBasis<'a> {
         let first = exposures + usize::from(layout.vignetting);
         Some(CameraUnknowns {
             exposures: (0..exposures).map(row).collect(),
-            power: if layout.vignetting {
-                row(exposures)
-            } else {
-                DVec3::ZERO
+            power: match layout.vignetting {
+                true => row(exposures),
+                false => DVec3::ZERO,
             },
-            terms: match layout.response {
-                None => [DVec3::ZERO; TERMS],
-                Some(true) => std::array::from_fn(|term| row(first + term)),
-                Some(false) => {
-                    let [root, linear] = [row(first), row(first + 1)];
-                    let power = -(root * self.powers[1] + linear * self.powers[2]);
-                    [power, root, linear]
-                }
-            },
+            response: layout.response.map(|has_power| {
+                valid_response(match has_power {
+                    true => std::array::from_fn(|term| row(first + term)),
+                    false => {
+                        let [root, linear] = [row(first), row(first + 1)];
+                        let power = -(root * self.powers[1] + linear * self.powers[2]);
+                        [power, root, linear]
+                    }
+                })
+            }),
         })
     }
 
@@ -117,10 +117,9 @@ impl<'a> ResponseBasis<'a> {
             let basis = self.values[index].map(|rgb| rgb[channel]);
             (skipped..TERMS).map(move |term| {
                 // The power term is projected out of the other terms if it is not fitted.
-                let projected = if skipped > 0 {
-                    powers[term] * basis[0]
-                } else {
-                    0.0
+                let projected = match skipped {
+                    0 => 0.0,
+                    _ => powers[term] * basis[0],
                 };
                 (first + term - skipped, projected - basis[term])
             })
@@ -184,10 +183,9 @@ impl<'a> ResponseBasis<'a> {
 pub(super) struct CameraUnknowns {
     /// Log exposures of [`Layout::frames`].
     pub exposures: Vec<DVec3>,
-    /// Vignetting's power.
     pub power: DVec3,
-    /// The response's coefficients.
-    pub terms: [DVec3; TERMS],
+    /// The camera's response, scaled down as far as needed to make it valid.
+    pub response: Option<Response>,
 }
 
 /// For each observation, the weighted mean log radiance of its cell.
@@ -228,26 +226,22 @@ fn powers(values: &[[DVec3; TERMS]]) -> [DVec3; TERMS] {
     })
 }
 
-impl CameraUnknowns {
-    /// The response with these terms, scaled down as far as needed to make it valid.
-    pub fn response(&self) -> Response {
-        let scaled = |fraction: f64| Response {
-            terms: self.terms.map(|term| (term * fraction).as_vec3()),
-        };
-        let whole = scaled(1.0);
-        if whole.is_possible() {
-            return whole;
-        }
-        // Slopes are linear in the terms, so the valid fractions form an interval from 0.
-        let [mut low, mut high] = [0.0, 1.0];
-        for _ in 0..BISECTIONS {
-            let middle = 0.5 * (low + high);
-            if scaled(middle).is_possible() {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        scaled(low)
+/// The response with these terms, scaled down as far as needed to make it valid.
+fn valid_response(terms: [DVec3; TERMS]) -> Response {
+    let scaled = |fraction: f64| Response {
+        terms: terms.map(|term| (term * fraction).as_vec3()),
+    };
+    if scaled(1.0).is_possible() {
+        return scaled(1.0);
     }
+    // Slopes are linear in the terms, so the valid fractions form an interval from 0.
+    let [mut low, mut high] = [0.0, 1.0];
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (low + high);
+        match scaled(middle).is_possible() {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    scaled(low)
 }

@@ -96,11 +96,24 @@ impl Observations {
         Self { fitted, held_out }
     }
 
-    /// Removes the observations of a photograph.
     pub(super) fn remove(&mut self, frame: usize) {
         self.fitted.retain(|observation| observation.frame != frame);
         self.held_out
             .retain(|observation| observation.frame != frame);
+    }
+}
+
+#[cfg(test)]
+impl Observation {
+    /// A grey observation on the optical axis, for tests.
+    pub fn grey(frame: usize, cell: usize, level: f64) -> Self {
+        Self {
+            frame,
+            cell: cell as u64,
+            level: DVec3::splat(level),
+            off_axis: 0.0,
+            saturation: DVec3::ZERO,
+        }
     }
 }
 

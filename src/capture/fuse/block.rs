@@ -21,7 +21,6 @@ pub struct Voxel {
 }
 
 /// A cube of voxels.
-#[derive(Debug)]
 pub struct Block {
     /// Position in units of blocks; the lowest voxel is at `SIDE` times it.
     pub at: IVec3,
@@ -38,7 +37,6 @@ impl Block {
         }
     }
 
-    /// Memory of a block in bytes.
     pub const fn bytes() -> usize {
         size_of::<Self>() + VOLUME * size_of::<Voxel>()
     }

@@ -11,7 +11,6 @@ use std::collections::HashMap;
 const TRUNCATION: f64 = 4.0;
 
 /// A sparse truncated signed distance field. Voxel (i, j, k) sits at (i, j, k) times the edge.
-#[derive(Debug)]
 pub struct Field {
     /// Edge of a voxel in metres.
     pub edge: f64,
@@ -24,7 +23,6 @@ pub struct Field {
 }
 
 impl Field {
-    /// An empty field.
     pub fn new(edge: f64, max_bytes: usize) -> Self {
         Self {
             edge,

@@ -10,7 +10,7 @@ mod surface;
 mod view;
 mod voxel;
 
-pub use voxel::{VoxelChoice, voxel_size};
+pub use voxel::voxel_size;
 
 use crate::capture::mesh::Mesh;
 use crate::capture::scan::ImportedFrame;

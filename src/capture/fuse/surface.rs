@@ -14,12 +14,11 @@ type Samples = ConstShape3u32<10, 10, 10>;
 /// Blocks extracted in parallel before their surfaces are merged.
 const BATCH: usize = 1024;
 
-/// The surface of one block; each vertex lies in its own grid cell.
-#[derive(Debug, Default)]
+/// The surface of one block.
+#[derive(Default)]
 struct Piece {
-    cells: Vec<IVec3>,
-    positions: Vec<DVec3>,
-    colors: Vec<Vec3>,
+    /// The grid cell of each vertex, which has no other vertex; its position and its colour.
+    vertices: Vec<(IVec3, DVec3, Vec3)>,
     triangles: Vec<[u32; 3]>,
 }
 
@@ -36,13 +35,13 @@ pub fn extract(field: &Field) -> Mesh {
     for blocks in order.chunks(BATCH) {
         let pieces: Vec<Piece> = blocks.par_iter().map(|b| piece(field, b)).collect();
         for piece in pieces {
-            let mut index = Vec::with_capacity(piece.cells.len());
-            for (i, &cell) in piece.cells.iter().enumerate() {
+            let mut index = Vec::with_capacity(piece.vertices.len());
+            for (cell, position, color) in piece.vertices {
                 let next = mesh.positions.len() as u32;
                 let vertex = *vertices.entry(cell).or_insert(next);
                 if vertex == next {
-                    mesh.positions.push(piece.positions[i]);
-                    mesh.vertex_colors.push(piece.colors[i]);
+                    mesh.positions.push(position);
+                    mesh.vertex_colors.push(color);
                 }
                 index.push(vertex);
             }
@@ -97,13 +96,11 @@ fn piece(field: &Field, block: &Block) -> Piece {
             })
             .collect();
         let Some(corners) = corners else { continue };
-        kept[vertex] = Some(piece.cells.len() as u32);
+        kept[vertex] = Some(piece.vertices.len() as u32);
         let local = Vec3::from_array(net.positions[vertex]).as_dvec3();
-        piece.positions.push((low.as_dvec3() + local) * field.edge);
-        piece.colors.push(mean_color(&corners));
-        piece
-            .cells
-            .push(low + IVec3::from_array(cell.map(|c| c as i32)));
+        let position = (low.as_dvec3() + local) * field.edge;
+        let cell = low + IVec3::from_array(cell.map(|c| c as i32));
+        (piece.vertices).push((cell, position, mean_color(&corners)));
     }
     for triangle in net.indices.chunks_exact(3) {
         let corners = [triangle[0], triangle[1], triangle[2]].map(|i| kept[i as usize]);

@@ -8,34 +8,28 @@ use crate::error::Result;
 use glam::{DVec2, DVec3, Vec3};
 
 /// A decoded frame.
-#[derive(Debug)]
 pub struct View {
-    /// Camera to world.
     pub pose: Pose,
-    /// The decoded depth image.
     pub depth: DepthMap,
-    color_lens: Lens,
+    lens: Lens,
     photograph: Photograph,
 }
 
 impl View {
-    /// Decodes a frame that has depth.
-    ///
-    /// # Errors
-    /// As [`ImportedFrame::load`].
     pub fn load(frame: &ImportedFrame) -> Result<Self> {
         let (photograph, depth) = frame.load()?;
+        let (pose, lens) = (frame.pose, frame.lens);
         Ok(Self {
-            pose: frame.pose,
+            pose,
             depth,
-            color_lens: frame.lens,
+            lens,
             photograph,
         })
     }
 
     /// The photograph's linear colour at a point in camera coordinates; `None` outside it and at unusable pixels.
     pub fn color_at(&self, point: DVec3) -> Option<Vec3> {
-        let pixel = self.color_lens.project(point)?.floor();
+        let pixel = self.lens.project(point)?.floor();
         let (width, height) = (self.photograph.width, self.photograph.height);
         let far = DVec2::new(f64::from(width), f64::from(height));
         if !(pixel.cmpge(DVec2::ZERO) & pixel.cmplt(far)).all() {

@@ -1,5 +1,6 @@
 //! Chooses the voxel size.
 
+use crate::capture::fuse::MAX_BYTES;
 use crate::capture::scan::{DepthImage, ImportedFrame};
 use crate::error::{Error, Result};
 use crate::math::stats::quantile;
@@ -13,22 +14,13 @@ const FRAMES: usize = 64;
 /// Points sampled along the longer side of each depth image.
 const POINTS: u32 = 64;
 
-/// A voxel edge and the reason for it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct VoxelChoice {
-    /// Edge in metres.
-    pub edge: f64,
-    /// The reason in words; empty for an edge that the person gave.
-    pub reason: String,
-}
-
 /// The edge that the person gives, or 1/256 of the longest side of the measured points' bounding box (from their 1 % to their
 /// 99 % quantiles), but at least the median size of a depth pixel on the surfaces. A room that fills its bounding box with
-/// surfaces then needs 400 MB.
+/// surfaces then needs 400 MB. Also returns a remark on it.
 ///
 /// # Errors
 /// The given edge is not positive, a depth image is broken, or no depth was measured.
-pub fn voxel_size(frames: &[ImportedFrame], given: Option<f64>) -> Result<VoxelChoice> {
+pub fn voxel_size(frames: &[ImportedFrame], given: Option<f64>) -> Result<(f64, String)> {
     if let Some(edge) = given {
         if !(edge.is_finite() && edge > 0.0) {
             return Err(Error::usage(
@@ -37,10 +29,7 @@ pub fn voxel_size(frames: &[ImportedFrame], given: Option<f64>) -> Result<VoxelC
                 "give it in metres, e.g. 0.02",
             ));
         }
-        return Ok(VoxelChoice {
-            edge,
-            reason: String::new(),
-        });
+        return Ok((edge, format!("voxels of {edge} m")));
     }
     let with_depth: Vec<(&ImportedFrame, &DepthImage)> = frames
         .iter()
@@ -71,15 +60,15 @@ pub fn voxel_size(frames: &[ImportedFrame], given: Option<f64>) -> Result<VoxelC
         ));
     };
 
-    let (mut edge, mut reason) = (
-        longest / ACROSS,
-        format!("1/{ACROSS} of the depth's extent of {longest:.2} m"),
-    );
-    if pixel > edge {
-        edge = pixel;
-        reason = "the size of a depth pixel".into();
-    }
-    Ok(VoxelChoice { edge, reason })
+    let reason = match pixel > longest / ACROSS {
+        true => "the size of a depth pixel".to_owned(),
+        false => format!("1/{ACROSS} of the depth's extent of {longest:.2} m"),
+    };
+    let edge = pixel.max(longest / ACROSS);
+    let most = MAX_BYTES >> 30;
+    let remark =
+        format!("voxels of {edge:.4} m: {reason} (at most {most} GiB of them; --voxel overrides)");
+    Ok((edge, remark))
 }
 
 /// Measured points of a depth image in the world, each with the size of a pixel at its depth, in metres.
@@ -95,8 +84,7 @@ fn points(frame: &ImportedFrame, depth: &DepthImage) -> Result<Vec<(DVec3, f64)>
             if z > 0.0
                 && let Some(ray) = depth.lens.ray(pixel)
             {
-                let p = DVec3::new(ray.x, -ray.y, -1.0) * z;
-                points.push((frame.pose.rotation * p + frame.pose.center, z / k.fx));
+                points.push((frame.pose.to_world(ray.extend(1.0) * z), z / k.fx));
             }
         }
     }

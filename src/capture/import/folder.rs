@@ -1,4 +1,4 @@
-//! The folder of a scan: listings and files of bounded size, confined to the folder.
+//! The folder of a scan: listings and regular files of bounded size. What is missing or leads out of the folder is an error.
 
 use crate::capture::read::confine::Confine;
 use crate::error::{Error, Result};
@@ -11,16 +11,11 @@ const MAX_TEXT: u64 = 1 << 28;
 const MAX_ENTRIES: usize = 1 << 20;
 
 /// A folder that paths may not leave.
-#[derive(Debug, Clone)]
 pub struct Folder {
     confine: Confine,
 }
 
 impl Folder {
-    /// The folder to import.
-    ///
-    /// # Errors
-    /// It is not a folder.
     pub fn new(path: &Path) -> Result<Self> {
         if !path.is_dir() {
             return Err(Error::file(
@@ -34,7 +29,6 @@ impl Folder {
         })
     }
 
-    /// The confinement of paths to the folder.
     pub fn confine(&self) -> &Confine {
         &self.confine
     }
@@ -49,36 +43,24 @@ impl Folder {
         self.confine.holds(name)
     }
 
-    /// Whether a folder of this name exists.
     pub fn has_folder(&self, name: &str) -> bool {
         self.path(name).is_dir()
     }
 
-    /// The first of the names that exists.
     pub fn first<'a>(&self, names: &[&'a str]) -> Option<&'a str> {
         names.iter().copied().find(|name| self.has(name))
     }
 
     /// The existing file of this name; `place` names the field for messages.
-    ///
-    /// # Errors
-    /// It leads out of the folder, or is not a regular file.
     pub fn file(&self, place: &str, name: &str) -> Result<PathBuf> {
         self.confine.file(place, name)
     }
 
     /// The existing file of this name.
-    ///
-    /// # Errors
-    /// As [`Folder::file`].
     pub fn existing(&self, name: &str) -> Result<PathBuf> {
         self.file(&self.path(name).display().to_string(), name)
     }
 
-    /// The content of a JSON file.
-    ///
-    /// # Errors
-    /// As [`Folder::text`], or the file is not valid JSON.
     pub fn json(&self, name: &str) -> Result<Value> {
         serde_json::from_str(&self.text(name)?).map_err(|e| {
             let problem = format!("is not valid JSON: {e}");
@@ -87,18 +69,12 @@ impl Folder {
     }
 
     /// A text file's content; bytes that are not UTF-8 are replaced.
-    ///
-    /// # Errors
-    /// As [`Folder::file`], or the file is too long.
     pub fn text(&self, name: &str) -> Result<String> {
         let bytes = self.bytes(name, MAX_TEXT)?;
         Ok(String::from_utf8_lossy(&bytes).into_owned())
     }
 
     /// A file's content of at most `max` bytes.
-    ///
-    /// # Errors
-    /// As [`Folder::file`], or the file is too long.
     pub fn bytes(&self, name: &str, max: u64) -> Result<Vec<u8>> {
         let file = self.existing(name)?;
         let length = file.metadata().map_err(|e| Error::io(&file, &e))?.len();

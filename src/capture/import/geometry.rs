@@ -12,9 +12,6 @@ use std::path::{Path, PathBuf};
 
 /// Reads a mesh; returns it and whether the file defines objects. `mirrored` converts a left-handed world: it negates z and
 /// reverses the winding.
-///
-/// # Errors
-/// The file is missing or broken.
 pub fn read(
     path: &Path,
     folder: &Folder,
@@ -67,9 +64,6 @@ const NAMES: [&str; 9] = [
 const POINTS: [&str; 5] = ["fused", "point", "cloud", "sparse", "input"];
 
 /// Finds a mesh in some folders: a file with one of the usual names, or else the first file that may be a mesh.
-///
-/// # Errors
-/// A folder cannot be read.
 pub fn find(
     folder: &Folder,
     places: &[&str],
@@ -121,17 +115,9 @@ pub fn fuse(
             "name the mesh with --mesh FILE",
         ));
     }
-    let choice = fuse::voxel_size(frames, voxel)?;
-    remarks.push(match voxel {
-        Some(edge) => format!("voxels of {edge} m"),
-        None => format!(
-            "voxels of {:.4} m: {} (at most {} GiB of them; --voxel overrides)",
-            choice.edge,
-            choice.reason,
-            fuse::MAX_BYTES >> 30
-        ),
-    });
-    let mesh = fuse::fuse(frames, choice.edge, fuse::MAX_BYTES, progress)?;
+    let (edge, remark) = fuse::voxel_size(frames, voxel)?;
+    remarks.push(remark);
+    let mesh = fuse::fuse(frames, edge, fuse::MAX_BYTES, progress)?;
     remarks.push(format!(
         "mesh: fused from {count} depth images, {} triangles",
         mesh.triangles.len()

@@ -26,9 +26,6 @@ pub fn numbers(text: &str) -> Option<Vec<f64>> {
 }
 
 /// The 3×3, 3×4 or 4×4 matrix of a text file, in rows.
-///
-/// # Errors
-/// The file cannot be read or holds something else.
 pub fn rows(folder: &Folder, name: &str) -> Result<Vec<Vec<f64>>> {
     let numbers = numbers(&folder.text(name)?).unwrap_or_default();
     let width = match numbers.len() {
@@ -58,9 +55,6 @@ pub fn matrix_of_rows(rows: &[Vec<f64>]) -> Option<DMat4> {
 }
 
 /// The pose of a camera-to-world matrix with OpenCV's camera axes; `None` if a number is not finite.
-///
-/// # Errors
-/// The matrix is not a rigid motion.
 pub fn pose_of_rows(place: &str, rows: &[Vec<f64>]) -> Result<Option<Pose>> {
     if rows.iter().flatten().any(|x| !x.is_finite()) {
         return Ok(None);
@@ -90,7 +84,6 @@ pub fn rotation(x: f64, y: f64, z: f64, w: f64) -> Option<DMat3> {
     (length.is_finite() && length > 1e-9).then(|| DMat3::from_quat(q / length))
 }
 
-/// The error for a zero quaternion.
 pub fn no_quaternion(place: &str) -> Error {
     Error::new(
         place,

@@ -14,6 +14,7 @@ use crate::capture::scan::ImportedFrame;
 use crate::capture::scan::depth::{self, DepthImage};
 use crate::capture::scan::lens::{Lens, Model};
 use crate::error::{Error, Result};
+use std::collections::hash_map::Entry;
 use std::collections::{BTreeSet, HashMap};
 
 const POSES: &str = "matterport_camera_poses";
@@ -25,17 +26,12 @@ const UNDISTORTED: &str = "undistorted_camera_parameters";
 /// Metres per unit of depth.
 const UNIT: f64 = 0.000_25;
 
-/// Whether a folder has this layout.
 pub fn is_here(folder: &Folder) -> bool {
     [POSES, UNDISTORTED]
         .iter()
         .any(|name| folder.has_folder(name))
 }
 
-/// Reads the frames and finds the mesh.
-///
-/// # Errors
-/// A photograph or its camera is missing, or a file is broken.
 pub fn read(folder: &Folder) -> Result<Scan> {
     let mut scan = Scan::default();
     if folder.has_folder(POSES) && folder.has_folder(INTRINSICS) {
@@ -62,7 +58,6 @@ fn names_of(folder: &Folder, name: &str) -> Result<Vec<String>> {
     }
 }
 
-/// Reads the original images.
 fn original(folder: &Folder, scan: &mut Scan) -> Result<()> {
     let listed = |name: &str| -> Result<BTreeSet<String>> {
         Ok(names_of(folder, name)?.into_iter().collect())
@@ -118,12 +113,11 @@ fn original(folder: &Folder, scan: &mut Scan) -> Result<()> {
             }
         };
         let key = format!("{INTRINSICS}/{uuid}_intrinsics_{camera}.txt");
-        let lens = match lenses.get(&key) {
-            Some(lens) => *lens,
-            None => {
-                let lens = lens(folder, &key)?;
-                lenses.insert(key, lens);
-                lens
+        let lens = match lenses.entry(key) {
+            Entry::Occupied(known) => *known.get(),
+            Entry::Vacant(entry) => {
+                let lens = lens(folder, entry.key())?;
+                *entry.insert(lens)
             }
         };
         let depth = first(&depths, "d", &["png"])

@@ -1,8 +1,9 @@
 //! Imports scans of other programs: posed photographs with their lenses, and a mesh.
 //!
-//! Each format's reader returns a `Scan`: every frame with a known pose, and the mesh if the scan has one. This
-//! module does what all formats share: it selects frames and reads the mesh or fuses one from the depth images
-//! ([`crate::capture::fuse`]). Nothing outside the scan's folder is opened except a mesh that the person names.
+//! Each format's reader has `is_here`, whether a folder has its layout, and `read`, which returns a `Scan`: every frame with a known
+//! pose, and the mesh if the scan has one. It fails if a file is missing, broken or outside the folder. This module does what all
+//! formats share: it selects frames and reads the mesh or fuses one from the depth images ([`crate::capture::fuse`]). Nothing outside
+//! the scan's folder is opened except a mesh that the person names.
 
 mod colmap;
 mod folder;
@@ -91,9 +92,9 @@ pub fn read(
 
     let chosen = choose(scan.frames.len(), options, scan.is_video, &mut remarks);
     if !options.keep_poses
-        && let Some(refined) = poses::refine(&mut scan.frames, &chosen)?
+        && let Some(remark) = poses::refine(&mut scan.frames, &chosen)?
     {
-        remarks.push(refined.to_string());
+        remarks.push(remark);
     }
 
     // The mesh: the one that the person names, the scan's own, or one fused from the depth of all frames.

@@ -13,8 +13,8 @@ use crate::capture::scan::ImportedFrame;
 use crate::capture::scan::depth::{self, DepthImage};
 use crate::capture::scan::lens::{Lens, Model};
 use crate::error::{Error, Result};
-use glam::{DMat4, DVec4};
-use serde_json::{Map, Value};
+use glam::{DMat4, DVec2, DVec4};
+use serde_json::Value;
 use std::path::PathBuf;
 
 /// Names of the file, in order of preference.
@@ -24,15 +24,10 @@ const EXTENSIONS: [&str; 5] = ["", ".png", ".jpg", ".jpeg", ".exr"];
 /// Default metres per unit of depth.
 const DEPTH_UNIT: f64 = 0.001;
 
-/// Whether a folder has such a file.
 pub fn is_here(folder: &Folder) -> bool {
     folder.first(&NAMES).is_some()
 }
 
-/// Reads the frames and finds the mesh.
-///
-/// # Errors
-/// The file is missing or broken, or names something that is not there.
 pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
     let name = folder.first(&NAMES).unwrap_or(NAMES[0]);
     let value = folder.json(name)?;
@@ -67,7 +62,7 @@ pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
     let mut lost_frames = 0;
     for (index, entry) in list.iter().enumerate() {
         let fields = Fields::new(format!("{place}: frames[{index}]."), entry)?;
-        match frame(folder, [&value, entry], [&shared, &fields], &to_mesh)? {
+        match frame(folder, [&shared, &fields], &to_mesh)? {
             Some(frame) => scan.frames.push(frame),
             None => lost_frames += 1,
         }
@@ -122,13 +117,12 @@ fn to_mesh_coordinates(shared: &Fields, options: &ImportOptions, scan: &mut Scan
 /// One frame; `None` if its pose is not finite.
 fn frame(
     folder: &Folder,
-    values: [&Value; 2],
     [shared, fields]: [&Fields; 2],
     to_mesh: &DMat4,
 ) -> Result<Option<ImportedFrame>> {
     let photograph = photograph(folder, fields)?;
     let header = image::header(&photograph)?;
-    let lens = camera(values, [shared, fields], [header.width, header.height])?;
+    let lens = camera([shared, fields], [header.width, header.height])?;
 
     let place = fields.place("transform_matrix");
     let refuse = |problem: &str| pose::refused(&place, problem);
@@ -187,8 +181,7 @@ fn photograph(folder: &Folder, fields: &Fields) -> Result<PathBuf> {
 }
 
 /// The lens of a frame. The pinhole fields are read as those of a capture; distortion is read here.
-fn camera(values: [&Value; 2], fields: [&Fields; 2], size: [u32; 2]) -> Result<Lens> {
-    let [shared, frame] = fields;
+fn camera([shared, frame]: [&Fields; 2], size: [u32; 2]) -> Result<Lens> {
     let number = |name: &str| -> Result<f64> {
         Ok(frame.number(name)?.or(shared.number(name)?).unwrap_or(0.0))
     };
@@ -229,7 +222,7 @@ fn camera(values: [&Value; 2], fields: [&Fields; 2], size: [u32; 2]) -> Result<L
     // Scale focal lengths and principal point to the photograph's resolution.
     let stated =
         |name: &str| -> Result<Option<u32>> { Ok(frame.count(name)?.or(shared.count(name)?)) };
-    let factor = match (stated("w")?, stated("h")?) {
+    let scale = match (stated("w")?, stated("h")?) {
         (Some(w), Some(h)) if [w, h] != size => {
             let x = f64::from(size[0]) / f64::from(w);
             let y = f64::from(size[1]) / f64::from(h);
@@ -243,38 +236,13 @@ fn camera(values: [&Value; 2], fields: [&Fields; 2], size: [u32; 2]) -> Result<L
                     "correct the intrinsics or use photographs of the camera's shape",
                 ));
             }
-            [x, y]
+            DVec2::new(x, y)
         }
-        _ => [1.0, 1.0],
+        _ => DVec2::ONE,
     };
-    let pinhole_only = values.map(|value| {
-        let map = value.as_object().cloned().unwrap_or_default();
-        Value::Object(without_distortion(map, factor))
-    });
-    let (pinhole, _) = lens::read(
-        &Fields::new(shared.place(""), &pinhole_only[0])?,
-        &Fields::new(frame.place(""), &pinhole_only[1])?,
-        size,
-    )?;
-    // The distortion was taken out, so it is zero.
-    let plain = Model::Brown([0.0; 4]);
-    Ok(Lens {
-        pinhole,
-        model: plain,
-    }
-    .with(model))
-}
-
-/// The fields of a file or frame without distortion and size, with pinhole parameters scaled by x and y.
-fn without_distortion(mut map: Map<String, Value>, [x, y]: [f64; 2]) -> Map<String, Value> {
-    let others = ["camera_model", "w", "h", "k1", "k2", "p1", "p2"];
-    for name in others.into_iter().chain(lens::HIGHER_COEFFICIENTS) {
-        map.remove(name);
-    }
-    for (name, factor) in [("fl_x", x), ("cx", x), ("fl_y", y), ("cy", y)] {
-        if let Some(number) = map.get(name).and_then(Value::as_f64) {
-            map.insert(name.into(), Value::from(number * factor));
-        }
-    }
-    map
+    let plain = Lens {
+        pinhole: lens::pinhole(shared, frame, size, scale, &mut Vec::new())?,
+        model: Model::Brown([0.0; 4]),
+    };
+    Ok(plain.with(model))
 }

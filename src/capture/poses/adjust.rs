@@ -96,7 +96,8 @@ impl<'a> Adjustment<'a> {
         for _ in 0..STEPS {
             let scale = self.scale(poses, &depths)?;
             for (track, depth) in depths.iter_mut().enumerate() {
-                let (gradient, curvature) = self.depth_equation(track, poses, *depth, scale);
+                let residuals: Vec<_> = self.residuals(track, poses, *depth).collect();
+                let (gradient, curvature) = depth_equation(&residuals, *depth, scale);
                 *depth -= gradient / curvature;
             }
         }
@@ -115,20 +116,6 @@ impl<'a> Adjustment<'a> {
             .collect();
         let median = quantile(&mut lengths, 0.5)?;
         (median > 0.0).then(|| median / RAYLEIGH_MEDIAN)
-    }
-
-    /// Gradient and curvature of a point's robust cost by the logarithm of its inverse depth, whose deviation from the depth
-    /// image is `depth`.
-    fn depth_equation(&self, track: usize, poses: &[Pose], depth: f64, scale: f64) -> (f64, f64) {
-        let precision = 1.0 / (DEPTH_DEVIATION * DEPTH_DEVIATION);
-        let mut sums = (depth * precision, precision);
-        for (_, residual) in self.residuals(track, poses, depth) {
-            let weighted = residual.weighted(scale);
-            let towards = weighted * residual.depth;
-            sums.0 += towards.dot(&vector(residual.error));
-            sums.1 += towards.dot(&residual.depth);
-        }
-        sums
     }
 
     /// One step of all poses and depths. Returns the largest change of a pose; `None` if the equations have no solution.
@@ -161,14 +148,14 @@ impl<'a> Adjustment<'a> {
         // Each point's equations, its depth eliminated.
         let mut eliminated = Vec::with_capacity(self.tracks.len());
         for (track, depth) in depths.iter().enumerate() {
-            let precision = 1.0 / (DEPTH_DEVIATION * DEPTH_DEVIATION);
-            let (mut own_gradient, mut curvature) = (depth * precision, precision);
+            let residuals: Vec<_> = self.residuals(track, poses, *depth).collect();
+            let (own_gradient, curvature) = depth_equation(&residuals, *depth, scale);
             let mut mixed: BTreeMap<usize, SVector<f64, POSE>> = BTreeMap::new();
             let own = self.tracks[track].0.frame;
-            for (other, residual) in self.residuals(track, poses, *depth) {
+            for (other, residual) in &residuals {
                 let weighted = residual.weighted(scale);
                 let error = vector(residual.error);
-                let sides = [(own, residual.own), (other, residual.other)];
+                let sides = [(own, residual.own), (*other, residual.other)];
                 for (i, rows) in sides {
                     let weighted_rows = rows.transpose() * weighted;
                     let mut part = gradient.fixed_rows_mut::<POSE>(POSE * i);
@@ -180,9 +167,6 @@ impl<'a> Adjustment<'a> {
                         block += weighted_rows * columns;
                     }
                 }
-                let towards = weighted * residual.depth;
-                own_gradient += towards.dot(&error);
-                curvature += towards.dot(&residual.depth);
             }
             for (&i, a) in &mixed {
                 let mut part = gradient.fixed_rows_mut::<POSE>(POSE * i);
@@ -283,6 +267,19 @@ impl Residual {
     }
 }
 
+/// Gradient and curvature of a point's robust cost by the logarithm of its inverse depth, whose deviation from the depth image is
+/// `depth`.
+fn depth_equation(residuals: &[(usize, Residual)], depth: f64, scale: f64) -> (f64, f64) {
+    let precision = 1.0 / (DEPTH_DEVIATION * DEPTH_DEVIATION);
+    let mut sums = (depth * precision, precision);
+    for (_, residual) in residuals {
+        let towards = residual.weighted(scale) * residual.depth;
+        sums.0 += towards.dot(&vector(residual.error));
+        sums.1 += towards.dot(&residual.depth);
+    }
+    sums
+}
+
 fn vector(v: DVec2) -> SVector<f64, 2> {
     SVector::from(v.to_array())
 }
@@ -348,9 +345,7 @@ mod tests {
         }
         let difference = (at(&poses, step).error - here.error) / step;
         let found = DVec2::new(here.depth[0], here.depth[1]);
-        assert!(
-            difference.distance(found) < 1e-2,
-            "{found} not {difference}"
-        );
+        let off = difference.distance(found);
+        assert!(off < 1e-2, "{found} not {difference}");
     }
 }

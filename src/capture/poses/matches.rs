@@ -168,7 +168,6 @@ struct Patch {
     structure: DMat2,
 }
 
-/// Where a patch was found.
 struct Found {
     pixel: DVec2,
     correlation: f64,
@@ -195,16 +194,13 @@ impl Patch {
                 let y = inside(pixel[1] as i64 + offset[1], grey.height)?;
                 let [u, v] = grey.gradient(x, y);
                 let distance = (i * i + j * j) as f64;
-                patch
-                    .weights
-                    .push((-0.5 * distance / (SPREAD * SPREAD)).exp());
-                patch
-                    .offsets
-                    .push(warp * DVec2::new(offset[0] as f64, offset[1] as f64));
+                let offset = DVec2::new(offset[0] as f64, offset[1] as f64);
+                let weight = (-0.5 * distance / (SPREAD * SPREAD)).exp();
+                patch.weights.push(weight);
+                patch.offsets.push(warp * offset);
                 patch.values.push(f64::from(grey.pixel(x, y)));
-                patch
-                    .gradients
-                    .push(unwarp * DVec2::new(f64::from(u), f64::from(v)));
+                let gradient = DVec2::new(f64::from(u), f64::from(v));
+                patch.gradients.push(unwarp * gradient);
             }
         }
         let total: f64 = patch.weights.iter().sum();
@@ -304,11 +300,8 @@ mod tests {
         let start = DVec2::new(22.5, 19.5);
         let found = patch.find(&to, start, 4.0).expect("found");
         // Bilinear interpolation of these waves shifts them by some hundredths of a pixel.
-        assert!(
-            found.pixel.distance(start + shift) < 0.05,
-            "{}",
-            found.pixel
-        );
+        let off = found.pixel.distance(start + shift);
+        assert!(off < 0.05, "{off}");
         assert!(found.correlation > 0.98);
         assert!(patch.find(&to, start, 0.5).is_none());
     }

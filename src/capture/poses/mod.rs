@@ -18,7 +18,6 @@ use matches::{Match, Reach};
 use picture::Picture;
 use points::Point;
 use rayon::prelude::*;
-use std::fmt;
 
 /// Rounds of looking up points and adjusting poses; from the second, points are near where they are expected.
 const ROUNDS: usize = 3;
@@ -33,38 +32,12 @@ const MIN_HELD_OUT: usize = 4;
 /// More photographs are not refined: the equations of all poses are dense.
 const MAX_PHOTOGRAPHS: usize = 400;
 
-/// What was refined.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Refined {
-    /// Median distance in pixels between where a held-out point is seen and where the given poses expect it.
-    pub before: f64,
-    /// The same for the refined poses.
-    pub after: f64,
-    /// Largest shift of a camera in metres.
-    pub shift: f64,
-    /// Largest turn of a camera in radians.
-    pub turn: f64,
-}
-
-impl fmt::Display for Refined {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "poses: refined by up to {:.1} mm and {:.2}°; points that several photographs show lie {:.2} pixels off instead of {:.2} (--keep-poses keeps the scan's)",
-            1e3 * self.shift,
-            self.turn.to_degrees(),
-            self.after,
-            self.before
-        )
-    }
-}
-
-/// Refines the poses of the photographs `chosen` (indices, those without depth are left out). Returns `None`, and
-/// changes nothing, where held-out points do not gain, and with more than [`MAX_PHOTOGRAPHS`].
+/// Refines the poses of the photographs `chosen` (indices, those without depth are left out). Returns a remark on it. Returns `None`,
+/// and changes nothing, where held-out points do not gain, and with more than [`MAX_PHOTOGRAPHS`].
 ///
 /// # Errors
 /// A photograph or depth image is broken.
-pub fn refine(frames: &mut [ImportedFrame], chosen: &[usize]) -> Result<Option<Refined>> {
+pub fn refine(frames: &mut [ImportedFrame], chosen: &[usize]) -> Result<Option<String>> {
     let chosen: Vec<usize> = (chosen.iter().copied())
         .filter(|&i| frames[i].depth.is_some())
         .collect();
@@ -100,17 +73,16 @@ pub fn refine(frames: &mut [ImportedFrame], chosen: &[usize]) -> Result<Option<R
     if before < SMALL_ERROR || after > MIN_GAIN * before {
         return Ok(None);
     }
-    let mut refined = Refined {
-        before,
-        after,
-        shift: 0.0,
-        turn: 0.0,
-    };
+    let (mut max_shift, mut max_turn) = (0.0_f64, 0.0_f64);
     for (&frame, (given, pose)) in chosen.iter().zip(given.iter().zip(&poses)) {
-        let turn = turn_between(&given.rotation, &pose.rotation);
-        refined.turn = refined.turn.max(turn.length());
-        refined.shift = refined.shift.max(given.center.distance(pose.center));
+        max_shift = max_shift.max(given.center.distance(pose.center));
+        max_turn = max_turn.max(turn_between(&given.rotation, &pose.rotation).length());
         frames[frame].pose = *pose;
     }
-    Ok(Some(refined))
+    Ok(Some(format!(
+        "poses: refined by up to {:.1} mm and {:.2}°; points that several photographs show lie {after:.2} pixels off instead of \
+         {before:.2} (--keep-poses keeps the scan's)",
+        1e3 * max_shift,
+        max_turn.to_degrees()
+    )))
 }

@@ -16,7 +16,6 @@ const MAX_PIXELS: u64 = 640 * 480;
 const BANDS: [[f32; 2]; 2] = [[1.0, 4.0], [3.0, 10.0]];
 
 /// A decoded photograph: square roots of luminance, so that noise is about the same everywhere.
-#[derive(Debug)]
 pub struct Picture {
     /// The lens at this size.
     pub lens: Lens,
@@ -30,20 +29,13 @@ pub struct Picture {
 }
 
 /// An image of one channel.
-#[derive(Debug)]
 pub struct Grey {
-    /// Width in pixels.
     pub width: usize,
-    /// Height in pixels.
     pub height: usize,
     values: Vec<f32>,
 }
 
 impl Picture {
-    /// Decodes a frame that has depth.
-    ///
-    /// # Errors
-    /// As [`ImportedFrame::load`].
     pub fn load(frame: &ImportedFrame) -> Result<Self> {
         let (photograph, depth) = frame.load()?;
         let k = &frame.lens.pinhole;
@@ -107,7 +99,6 @@ impl Picture {
 }
 
 impl Grey {
-    /// The difference of two Gaussians.
     fn band(&self, narrow: f32, wide: f32) -> Self {
         let mut band = self.smoothed(narrow);
         let wide = self.smoothed(wide);
@@ -153,7 +144,6 @@ impl Grey {
 
 #[cfg(test)]
 impl Grey {
-    /// Values by pixel.
     pub fn from_fn([width, height]: [usize; 2], value: impl Fn(usize, usize) -> f32) -> Self {
         Self {
             width,

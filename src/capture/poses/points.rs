@@ -24,9 +24,7 @@ const STRIDE: usize = 4;
 /// A point on a surface, seen at a pixel of the photograph that it was found in.
 #[derive(Debug, Clone, Copy)]
 pub struct Point {
-    /// The photograph.
     pub frame: usize,
-    /// The pixel.
     pub pixel: [usize; 2],
     /// Its undistorted normalised coordinates.
     pub ray: DVec2,

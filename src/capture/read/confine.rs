@@ -190,26 +190,7 @@ mod tests {
         }
         assert!(confined.file("field", "images").is_err());
         assert!(confined.file("field", "images/none.png").is_err());
-        assert!(
-            Confine::new(&folder, true)
-                .unwrap()
-                .file("field", "../secret")
-                .is_ok()
-        );
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn symbolic_links_out_of_the_folder_are_refused() {
-        let outer = tempfile::tempdir().unwrap();
-        let folder = outer.path().join("capture");
-        std::fs::create_dir(&folder).unwrap();
-        std::fs::write(outer.path().join("secret"), "x").unwrap();
-        std::os::unix::fs::symlink(outer.path().join("secret"), folder.join("link")).unwrap();
-        let error = Confine::new(&folder, false)
-            .unwrap()
-            .file("field", "link")
-            .unwrap_err();
-        assert!(error.problem.contains("leaves"), "{error}");
+        let open = Confine::new(&folder, true).unwrap();
+        assert!(open.file("field", "../secret").is_ok());
     }
 }

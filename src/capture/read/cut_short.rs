@@ -10,9 +10,6 @@ const SOI: u8 = 0xd8;
 const EOI: u8 = 0xd9;
 
 /// Whether a file is a truncated JPEG; false for other formats.
-///
-/// # Errors
-/// The file cannot be read.
 pub fn jpeg(path: &Path) -> Result<bool> {
     let mut file = fs::File::open(path)?;
     let mut start = [0; 2];

@@ -1,4 +1,4 @@
-//! Typed access to the fields of a JSON object; every error names the field by its path.
+//! Typed access to the fields of a JSON object. A field of another type is an error that names it by its path.
 
 use crate::error::{Error, Result};
 use glam::DVec3;
@@ -10,7 +10,6 @@ pub fn without_bom(text: &[u8]) -> &[u8] {
 }
 
 /// A JSON object and its path, e.g. `transforms.json: frames[3].`.
-#[derive(Debug, Clone)]
 pub struct Fields<'a> {
     place: String,
     map: &'a Map<String, Value>,
@@ -46,77 +45,49 @@ impl<'a> Fields<'a> {
         }
     }
 
-    /// A finite number.
-    ///
-    /// # Errors
-    /// The field is something else.
+    /// The field as `parse` reads it; `wanted` says what that is.
+    fn parsed<T>(
+        &self,
+        name: &str,
+        wanted: &str,
+        parse: impl FnOnce(&'a Value) -> Option<T>,
+    ) -> Result<Option<T>> {
+        let Some(value) = self.get(name) else {
+            return Ok(None);
+        };
+        let parsed = parse(value).map(Some);
+        parsed.ok_or_else(|| wrong(&self.place(name), &format!("is not {wanted}")))
+    }
+
     pub fn number(&self, name: &str) -> Result<Option<f64>> {
-        self.get(name)
-            .map(|value| match value.as_f64() {
-                Some(x) if x.is_finite() => Ok(x),
-                _ => Err(wrong(&self.place(name), "is not a finite number")),
-            })
-            .transpose()
+        let finite = |value: &Value| value.as_f64().filter(|x| x.is_finite());
+        self.parsed(name, "a finite number", finite)
     }
 
     /// A whole number from 1 to 2³²−1, also written as 540.0.
-    ///
-    /// # Errors
-    /// The field is something else.
     pub fn count(&self, name: &str) -> Result<Option<u32>> {
         let number = self.number(name)?;
-        number
-            .map(|x| {
-                if x >= 1.0 && x <= f64::from(u32::MAX) && x.fract() == 0.0 {
-                    Ok(x as u32)
-                } else {
-                    Err(wrong(&self.place(name), "is not a positive whole number"))
-                }
-            })
-            .transpose()
+        self.parsed(name, "a positive whole number", |_| {
+            let whole = |x: &f64| (1.0..=f64::from(u32::MAX)).contains(x) && x.fract() == 0.0;
+            number.filter(whole).map(|x| x as u32)
+        })
     }
 
-    /// A string.
-    ///
-    /// # Errors
-    /// The field is something else.
     pub fn text(&self, name: &str) -> Result<Option<&'a str>> {
-        self.get(name)
-            .map(|value| {
-                value
-                    .as_str()
-                    .ok_or_else(|| wrong(&self.place(name), "is not a string"))
-            })
-            .transpose()
+        self.parsed(name, "a string", Value::as_str)
     }
 
-    /// Three finite numbers.
-    ///
-    /// # Errors
-    /// The field is something else.
     pub fn vector(&self, name: &str) -> Result<Option<DVec3>> {
-        let Some(value) = self.get(name) else {
-            return Ok(None);
-        };
-        match numbers(value).as_deref() {
-            Some(&[x, y, z]) if x.is_finite() && y.is_finite() && z.is_finite() => {
-                Ok(Some(DVec3::new(x, y, z)))
-            }
-            _ => Err(wrong(&self.place(name), "is not three finite numbers")),
-        }
+        self.parsed(name, "three finite numbers", |value| {
+            let numbers = <[f64; 3]>::try_from(numbers(value)?).ok()?;
+            Some(DVec3::from(numbers)).filter(|v| v.is_finite())
+        })
     }
 
-    /// Rows of numbers.
-    ///
-    /// # Errors
-    /// The field is something else.
     pub fn matrix(&self, name: &str) -> Result<Option<Vec<Vec<f64>>>> {
-        let Some(value) = self.get(name) else {
-            return Ok(None);
-        };
-        let rows = (value.as_array()).and_then(|array| array.iter().map(numbers).collect());
-        rows.map(Some)
-            .ok_or_else(|| wrong(&self.place(name), "is not a matrix of numbers"))
+        self.parsed(name, "a matrix of numbers", |value| {
+            value.as_array()?.iter().map(numbers).collect()
+        })
     }
 }
 

@@ -72,7 +72,6 @@ fn add_node(
     Ok(())
 }
 
-/// Adds the vertices and triangles of a primitive.
 fn add_primitive(
     raw: &mut RawMesh,
     primitive: &Primitive,

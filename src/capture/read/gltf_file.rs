@@ -29,7 +29,8 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Gltf> {
         (gltf::json::deserialize::from_slice(bytes), None)
     };
     let root = root.map_err(|e| invalid(gltf::Error::Deserialize(e)))?;
-    if let Some(name) = compression(&root) {
+    let required = |extension: &str| root.extensions_required.iter().any(|r| r == extension);
+    if let Some((_, name)) = COMPRESSIONS.iter().find(|(e, _)| required(e)) {
         return Err(Error::file(
             path,
             format!("is compressed with {name}, which is not supported"),
@@ -47,15 +48,6 @@ const COMPRESSIONS: [(&str, &str); 2] = [
     ("EXT_meshopt_compression", "meshopt"),
 ];
 
-/// The name of an unsupported compression that a file requires.
-fn compression(root: &Root) -> Option<&'static str> {
-    let required = |extension: &str| root.extensions_required.iter().any(|r| r == extension);
-    let found = COMPRESSIONS
-        .iter()
-        .find(|(extension, _)| required(extension));
-    found.map(|(_, name)| *name)
-}
-
 /// Checks that attributes refer to existing accessors: the crate's validation would panic otherwise.
 fn check_accessors(root: &Root) -> std::result::Result<(), String> {
     for (index, mesh) in root.meshes.iter().enumerate() {
@@ -69,7 +61,6 @@ fn check_accessors(root: &Root) -> std::result::Result<(), String> {
     Ok(())
 }
 
-/// The file length that a GLB header declares.
 fn declared_length(bytes: &[u8]) -> Option<usize> {
     let field = bytes.get(8..GLB_HEADER)?;
     Some(u32::from_le_bytes(field.try_into().ok()?) as usize)
@@ -135,7 +126,6 @@ pub fn resource(place: &str, uri: &str, file: ReadFile<'_>) -> Result<Vec<u8>> {
     file(place, &percent_decoded(uri))
 }
 
-/// Decodes the %XX of a URI.
 fn percent_decoded(uri: &str) -> String {
     let bytes = uri.as_bytes();
     let mut decoded = Vec::with_capacity(bytes.len());

@@ -83,10 +83,9 @@ fn matrix(transform: &Transform) -> DMat4 {
         } => {
             let rotation = DQuat::from_array(rotation.map(f64::from));
             // A zero quaternion is no rotation; others may be off unit length by rounding.
-            let rotation = if rotation.length() > 0.0 {
-                rotation.normalize()
-            } else {
-                DQuat::IDENTITY
+            let rotation = match rotation.length() > 0.0 {
+                true => rotation.normalize(),
+                false => DQuat::IDENTITY,
             };
             DMat4::from_scale_rotation_translation(
                 DVec3::from_array(scale.map(f64::from)),

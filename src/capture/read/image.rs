@@ -64,19 +64,11 @@ pub fn header(path: &Path) -> Result<Header> {
 }
 
 impl PhotographSource {
-    /// Reads the photograph and divides by the exposure.
+    /// Reads the photograph and divides by the exposure. Also returns the number of pixels with negative or non-finite values.
     ///
     /// # Errors
     /// The file cannot be read, is not an image, or has another size than the camera.
-    pub fn load(&self, intrinsics: &Intrinsics, exposure: Option<f64>) -> Result<Arc<Photograph>> {
-        Ok(self.load_counted(intrinsics, exposure)?.0)
-    }
-
-    /// [`PhotographSource::load`], and the number of pixels with negative or non-finite values.
-    ///
-    /// # Errors
-    /// As [`PhotographSource::load`].
-    pub fn load_counted(
+    pub fn load(
         &self,
         intrinsics: &Intrinsics,
         exposure: Option<f64>,
@@ -125,9 +117,9 @@ pub fn read(
     }
     let decoded = DynamicImage::from_decoder(decoder).map_err(|e| broken(path, &e))?;
     let scale = (1.0 / exposure.unwrap_or(1.0)) as f32;
-    let multiplier = match encoding {
-        Encoding::Linear => hdr_multiplier(path)?,
-        Encoding::Srgb8 | Encoding::Srgb16 => Vec3::ONE,
+    let (multiplier, saturation) = match encoding {
+        Encoding::Linear => (hdr_multiplier(path)?, Vec3::INFINITY),
+        Encoding::Srgb8 | Encoding::Srgb16 => (Vec3::ONE, Vec3::splat(scale)),
     };
     let values = linear_values(decoded, encoding);
 
@@ -147,10 +139,6 @@ pub fn read(
     if usable.iter().all(|&good| good) {
         usable.clear();
     }
-    let saturation = match encoding {
-        Encoding::Linear => Vec3::INFINITY,
-        Encoding::Srgb8 | Encoding::Srgb16 => Vec3::splat(scale),
-    };
     let photograph = Photograph {
         usable,
         ..Photograph::new(stored, pixels, encoding, saturation)

@@ -5,7 +5,6 @@ use crate::capture::read::fields::Fields;
 use crate::error::{Error, Result};
 use glam::DVec2;
 
-/// Supported lens models.
 const MODELS: [&str; 5] = [
     "PINHOLE",
     "SIMPLE_PINHOLE",
@@ -14,7 +13,7 @@ const MODELS: [&str; 5] = [
     "OPENCV",
 ];
 /// Coefficients of unsupported lens models; they may be present but must be zero.
-pub const HIGHER_COEFFICIENTS: [&str; 8] = ["k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"];
+const HIGHER_COEFFICIENTS: [&str; 8] = ["k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"];
 
 /// Limit on tan θ of the off-axis angle in a picture: the widest rectilinear lenses (9 mm for 36 × 24 mm) reach 2.4.
 const MAX_TANGENT: f64 = 2.5;
@@ -81,6 +80,28 @@ pub fn read(
         remarks.push("the lens is given for another size of the same photograph, and scaled to it");
     }
 
+    let mut intrinsics = pinhole(shared, frame, size, scale, &mut remarks)?;
+    for (value, name) in (intrinsics.distortion.iter_mut()).zip(["k1", "k2", "p1", "p2"]) {
+        *value = number(name)?.unwrap_or(0.0);
+    }
+    if !invertible(&intrinsics) {
+        remarks
+            .push("the lens distortion turns back inside the photograph; its corners may be wrong");
+    }
+    Ok((intrinsics, remarks))
+}
+
+/// The lens of one frame without distortion, for a photograph that is `scale` times as large as the size that it is given for.
+pub fn pinhole(
+    shared: &Fields,
+    frame: &Fields,
+    [width, height]: [u32; 2],
+    scale: DVec2,
+    remarks: &mut Vec<&'static str>,
+) -> Result<Intrinsics> {
+    let fields_of = |name: &str| frame.or(shared, name);
+    let number = |name: &str| fields_of(name).number(name);
+
     // Focal length in pixels, or from the field of view.
     let focal = |extent: u32, angle: f64| f64::from(extent) * 0.5 / (angle * 0.5).tan();
     let fx = match (number("fl_x")?, number("camera_angle_x")?) {
@@ -140,24 +161,7 @@ pub fn read(
             remarks.push("the principal point (cx, cy) lies outside the picture");
         }
     }
-    let mut distortion = [0.0; 4];
-    for (value, name) in distortion.iter_mut().zip(["k1", "k2", "p1", "p2"]) {
-        *value = number(name)?.unwrap_or(0.0);
-    }
-    let intrinsics = Intrinsics {
-        width,
-        height,
-        fx,
-        fy,
-        cx,
-        cy,
-        distortion,
-    };
-    if !invertible(&intrinsics) {
-        remarks
-            .push("the lens distortion turns back inside the photograph; its corners may be wrong");
-    }
-    Ok((intrinsics, remarks))
+    Ok(Intrinsics::plain([width, height], [fx, fy], [cx, cy]))
 }
 
 /// Width and height that the lens is given for, if both are present.

@@ -6,7 +6,6 @@ use crate::error::{Error, Result};
 use crate::say::listed;
 use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashMap;
-use std::io::{BufRead, Read};
 use std::path::Path;
 
 /// The name tobj gives to faces before the first `o` or `g`.
@@ -19,33 +18,26 @@ const UNNAMED: &str = "unnamed_object";
 pub fn read(path: &Path) -> Result<RawMesh> {
     let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
     // Tolerate comments and names in other encodings than UTF-8.
-    parse(
-        path,
-        String::from_utf8_lossy(without_bom(&bytes)).as_bytes(),
-    )
-}
-
-fn parse(path: &Path, reader: impl BufRead) -> Result<RawMesh> {
+    let text = String::from_utf8_lossy(without_bom(&bytes));
     let options = tobj::LoadOptions {
         triangulate: true,
         ignore_points: true,
         ignore_lines: true,
         ..tobj::LoadOptions::default()
     };
-    let mut lines = CountLines {
-        inner: reader,
-        line: 0,
-    };
+    let mut rest = text.as_bytes();
     let no_materials = |_: &Path| Ok((Vec::new(), Default::default()));
-    let (models, _) = tobj::load_obj_buf(&mut lines, &options, no_materials).map_err(|e| {
+    let (models, _) = tobj::load_obj_buf(&mut rest, &options, no_materials).map_err(|e| {
+        let read = &text.as_bytes()[..text.len() - rest.len()];
+        let line = read.iter().filter(|&&byte| byte == b'\n').count();
         let problem = match e {
             tobj::LoadError::FaceVertexOutOfBounds
             | tobj::LoadError::FaceTexCoordOutOfBounds
             | tobj::LoadError::FaceNormalOutOfBounds
             | tobj::LoadError::FaceColorOutOfBounds => {
-                format!("{e}, in the object that ends before line {}", lines.line)
+                format!("{e}, in the object that ends before line {line}")
             }
-            _ => format!("line {}: {e}", lines.line),
+            _ => format!("line {line}: {e}"),
         };
         Error::file(path, problem, "repair the mesh")
     })?;
@@ -115,30 +107,4 @@ fn parse(path: &Path, reader: impl BufRead) -> Result<RawMesh> {
 
 fn too_large(path: &Path) -> Error {
     Error::file(path, "has more than 2³² vertices", "make the mesh smaller")
-}
-
-/// A reader that counts lines, so that an error can name one.
-struct CountLines<R> {
-    inner: R,
-    line: usize,
-}
-
-impl<R: BufRead> Read for CountLines<R> {
-    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-        self.inner.read(buffer)
-    }
-}
-
-impl<R: BufRead> BufRead for CountLines<R> {
-    fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
-        self.inner.fill_buf()
-    }
-
-    fn consume(&mut self, amount: usize) {
-        if let Ok(buffer) = self.inner.fill_buf() {
-            let consumed = &buffer[..amount.min(buffer.len())];
-            self.line += consumed.iter().filter(|&&byte| byte == b'\n').count();
-        }
-        self.inner.consume(amount);
-    }
 }

@@ -3,10 +3,8 @@
 use glam::{DVec3, Vec2, Vec3};
 use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 
-/// A vertex.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Vertex {
-    /// x, y, z.
     pub position: DVec3,
     /// red, green, blue, as linear values; integers are scaled to [0, 1].
     pub color: Vec3,
@@ -15,7 +13,6 @@ pub struct Vertex {
 }
 
 /// An element of another kind; nothing of it is stored.
-#[derive(Debug, Clone, Copy)]
 pub struct Skipped;
 
 impl PropertyAccess for Skipped {
@@ -24,7 +21,6 @@ impl PropertyAccess for Skipped {
     }
 }
 
-/// A polygon.
 #[derive(Debug, Clone, Default)]
 pub struct Face {
     /// vertex_indices; `u32::MAX` for a negative one.
@@ -116,7 +112,6 @@ fn indices(property: Property) -> Option<Vec<u32>> {
     }
 }
 
-/// An integer of any type.
 fn integer(property: &Property) -> Option<i64> {
     match *property {
         Property::Char(x) => Some(x.into()),

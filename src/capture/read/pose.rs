@@ -110,13 +110,7 @@ mod tests {
     fn rotations_come_back_and_small_flaws_are_mended_with_a_remark() {
         let r = DMat3::from_quat(DQuat::from_rotation_y(0.7) * DQuat::from_rotation_x(-0.3));
         let (pose, remark) = from_rows(&rows(r)).unwrap();
-        assert!(
-            remark.is_none()
-                && (pose.rotation - r)
-                    .to_cols_array()
-                    .iter()
-                    .all(|x| x.abs() < 1e-14)
-        );
+        assert!(remark.is_none() && pose.rotation.abs_diff_eq(r, 1e-14));
         let (pose, remark) = from_rows(&rows(r * 1.5)).unwrap();
         assert!(remark.unwrap().contains("scale") && deviation(&pose.rotation) < 1e-14);
         let mut sheared = r;

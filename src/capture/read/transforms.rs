@@ -13,26 +13,20 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Longest transforms.json that is read.
 const MAX_BYTES: u64 = 1 << 28;
 /// Default metres per unit of a depth image (millimetres).
 const DEPTH_UNIT: f64 = 0.001;
 
 /// The content of transforms.json.
-#[derive(Debug)]
 pub struct Transforms {
     /// Posed photographs in file order.
     pub frames: Vec<Frame>,
-    /// The mesh file.
     pub mesh: PathBuf,
     /// Unit up vector.
     pub up: DVec3,
 }
 
 /// Reads transforms.json and the headers of the photographs it names.
-///
-/// # Errors
-/// See [`crate::capture::read::read`].
 pub fn read(
     confine: &Confine,
     up: Option<DVec3>,

@@ -54,16 +54,12 @@ impl Lens {
     /// Whether every number is finite and the focal lengths are positive.
     pub fn is_possible(&self) -> bool {
         let k = &self.pinhole;
-        let coefficients: &[f64] = match &self.model {
-            Model::Brown(k) | Model::Fisheye(k) => k,
-            Model::Rational { k, p } if p.iter().all(|p| p.is_finite()) => k,
-            Model::Rational { .. } => return false,
-        };
-        let finite = |x: &f64| x.is_finite();
-        k.fx > 0.0
-            && k.fy > 0.0
-            && [k.fx, k.fy, k.cx, k.cy].iter().all(finite)
-            && coefficients.iter().all(finite)
+        let mut numbers = vec![k.fx, k.fy, k.cx, k.cy];
+        match &self.model {
+            Model::Brown(k) | Model::Fisheye(k) => numbers.extend(k),
+            Model::Rational { k, p } => numbers.extend(k.iter().chain(p)),
+        }
+        k.fx > 0.0 && k.fy > 0.0 && numbers.iter().all(|x| x.is_finite())
     }
 
     /// Whether a capture supports this lens; otherwise the photograph has to be resampled.
@@ -181,11 +177,8 @@ mod tests {
                 DVec3::new(-1.0, 0.7, 2.5),
             ] {
                 let pixel = lens.project(point).unwrap();
-                let ray = lens.ray(pixel).unwrap();
-                assert!(
-                    (ray - point.truncate() / point.z).length() < 1e-6,
-                    "{model:?} {point}"
-                );
+                let off = lens.ray(pixel).unwrap() - point.truncate() / point.z;
+                assert!(off.length() < 1e-6, "{model:?} {point}");
             }
             assert!(lens.project(DVec3::new(0.0, 0.0, -1.0)).is_none());
         }

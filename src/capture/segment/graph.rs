@@ -13,9 +13,7 @@ const COLOR_WEIGHT: f64 = 0.5;
 const BRIGHTNESS_WEIGHT: f64 = 0.5;
 
 /// The dual graph of a mesh, with the features of segmentation per face.
-#[derive(Debug)]
 pub struct FaceGraph {
-    /// Face areas.
     pub area: Vec<f64>,
     /// Unit normals, smoothed over vertices; zero for degenerate faces.
     pub normal: Vec<DVec3>,
@@ -24,7 +22,6 @@ pub struct FaceGraph {
     pub color: Vec<DVec3>,
     /// Whether a face belongs to a saturated patch.
     pub saturated: Vec<bool>,
-    /// Face centroids.
     pub centroid: Vec<DVec3>,
     /// Pairs of faces that share an edge.
     pub edges: Vec<[u32; 2]>,

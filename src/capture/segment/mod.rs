@@ -96,11 +96,7 @@ mod tests {
                 for i in 0..side {
                     let (s, t) = (f64::from(i) / n as f64, f64::from(j) / n as f64);
                     let inside = i > 0 && j > 0 && i + 1 < side && j + 1 < side;
-                    let noise = if inside {
-                        ((i * 7 + j * 13) % 5) as f64 * 0.002
-                    } else {
-                        0.0
-                    };
+                    let noise = f64::from(inside) * f64::from((i * 7 + j * 13) % 5) * 0.002;
                     let normal = u.cross(v).normalize();
                     mesh.positions
                         .push((origin + u * s + v * t + normal * noise) * scale);
@@ -116,12 +112,9 @@ mod tests {
             }
         };
         let gray = |_: f64| Vec3::splat(0.5);
-        let half_red = |s: f64| {
-            if s < 0.5 {
-                Vec3::new(0.6, 0.1, 0.1)
-            } else {
-                Vec3::splat(0.5)
-            }
+        let half_red = |s: f64| match s < 0.5 {
+            true => Vec3::new(0.6, 0.1, 0.1),
+            false => Vec3::splat(0.5),
         };
         square(DVec3::ZERO, DVec3::X * 4.0, DVec3::Y * 4.0, &half_red);
         square(DVec3::Y * 4.0, DVec3::X * 4.0, DVec3::Z * 3.0, &gray);

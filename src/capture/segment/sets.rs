@@ -1,7 +1,6 @@
 //! Disjoint sets with path halving and union by size (Tarjan 1975).
 
 /// A partition of 0 … n−1.
-#[derive(Debug)]
 pub struct Sets {
     parent: Vec<u32>,
     size: Vec<u32>,
@@ -26,7 +25,6 @@ impl Sets {
         x
     }
 
-    /// Joins the sets of two members.
     pub fn unite(&mut self, a: u32, b: u32) {
         let (a, b) = (self.find(a), self.find(b));
         if a != b {

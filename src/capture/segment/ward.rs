@@ -24,7 +24,6 @@ struct Region {
     normal: DVec3,
     color: DVec3,
     position: DVec3,
-    /// Whether it is saturated: never merged.
     saturated: bool,
     /// Counts merges; candidates of older versions are outdated.
     version: u32,

@@ -272,10 +272,7 @@ mod tests {
     }
 
     fn cache(clusters: impl Iterator<Item = CachedCluster>) -> PathCache {
-        PathCache {
-            clusters: clusters.collect(),
-            ..Default::default()
-        }
+        PathCache::from(clusters.collect::<Vec<_>>())
     }
 
     /// A wall in uneven light that reflects 0.6, a lamp far brighter than what reaches it, an object that no pixel sees.
@@ -291,14 +288,9 @@ mod tests {
 
     #[test]
     fn a_lamp_becomes_an_emitter_of_its_radiance_and_a_wall_stays_a_reflector() {
-        let mut unknowns = Unknowns::new(3);
-        unknowns.albedo[0] = Vec3::splat(0.6);
-        unknowns.albedo[1] = Vec3::ONE;
-        let changes = classify(
-            &room(),
-            &unknowns,
-            &[Role::Reflector, Role::Reflector, Role::Unseen],
-        );
+        let unknowns = Unknowns::grey([0.6, 1.0, 0.5], [0.0; 3]);
+        let roles = [Role::Reflector, Role::Reflector, Role::Unseen];
+        let changes = classify(&room(), &unknowns, &roles);
         assert_eq!(changes.len(), 1, "{changes:?}");
         assert_eq!((changes[0].object, changes[0].role), (1, Role::Emitter));
         assert!((changes[0].value - Vec3::splat(8.0)).length() < 1e-5);
@@ -315,8 +307,7 @@ mod tests {
                 cluster.vertices[0].known *= 100.0;
             }
         }
-        let mut unknowns = Unknowns::new(2);
-        unknowns.albedo = vec![Vec3::splat(0.6), Vec3::ONE];
+        let mut unknowns = Unknowns::grey([0.6, 1.0], [0.0; 2]);
         let changes = classify(&strayed, &unknowns, &[Role::Reflector; 2]);
         assert_eq!(changes.len(), 1, "{changes:?}");
         assert_eq!((changes[0].object, changes[0].role), (1, Role::Emitter));
@@ -328,14 +319,9 @@ mod tests {
 
     #[test]
     fn a_wall_taken_for_an_emitter_becomes_a_reflector_again_and_a_lamp_stays() {
-        let mut unknowns = Unknowns::new(3);
-        unknowns.emission[0] = Vec3::splat(0.9);
-        unknowns.emission[1] = Vec3::splat(8.0);
-        let changes = classify(
-            &room(),
-            &unknowns,
-            &[Role::Emitter, Role::Emitter, Role::Unseen],
-        );
+        let unknowns = Unknowns::grey([0.5; 3], [0.9, 8.0, 0.0]);
+        let roles = [Role::Emitter, Role::Emitter, Role::Unseen];
+        let changes = classify(&room(), &unknowns, &roles);
         assert_eq!(changes.len(), 1, "{changes:?}");
         assert_eq!((changes[0].object, changes[0].role), (0, Role::Reflector));
         assert!((changes[0].value - Vec3::splat(0.6)).length() < 0.01);
@@ -344,8 +330,7 @@ mod tests {
     #[test]
     fn an_evenly_lit_wall_stays_a_reflector_though_one_radiance_would_explain_it_too() {
         let cache = cache((0..40).map(|index| cluster(0, index, 1.0, 0.6)));
-        let mut unknowns = Unknowns::new(1);
-        unknowns.albedo[0] = Vec3::splat(0.6);
+        let unknowns = Unknowns::grey([0.6], [0.0]);
         assert_eq!(classify(&cache, &unknowns, &[Role::Reflector]), []);
     }
 
@@ -357,8 +342,7 @@ mod tests {
             let stripes = [0.2, 0.9, 0.3, 0.8, 0.25][index % 5];
             cluster(0, index, light, stripes * 0.9)
         }));
-        let mut unknowns = Unknowns::new(1);
-        unknowns.albedo[0] = Vec3::splat(0.5);
+        let unknowns = Unknowns::grey([0.5], [0.0]);
         assert_eq!(classify(&cache, &unknowns, &[Role::Reflector]), []);
     }
 
@@ -376,16 +360,14 @@ mod tests {
         });
         let highlights = (0..60).map(|index| bound(cluster(0, index, 40.0, 1.0)));
         let lamp = (0..60).map(|index| bound(cluster(1, index, 0.3, 1.0)));
-        let mut unknowns = Unknowns::new(2);
-        unknowns.albedo = vec![Vec3::splat(0.6), Vec3::ONE];
+        let mut unknowns = Unknowns::grey([0.6, 1.0], [0.0; 2]);
         let cache = cache(wall.chain(highlights).chain(lamp));
         let changes = classify(&cache, &unknowns, &[Role::Reflector; 2]);
         assert_eq!(changes.len(), 1, "{changes:?}");
         assert_eq!((changes[0].object, changes[0].role), (1, Role::Emitter));
         assert!((changes[0].value - Vec3::ONE).length() < 1e-5);
         // An emitter brighter than its lower bounds stays one.
-        unknowns.albedo[1] = Vec3::ZERO;
-        unknowns.emission[1] = Vec3::splat(8.0);
+        unknowns = Unknowns::grey([0.6, 0.0], [0.0, 8.0]);
         let settled = classify(&cache, &unknowns, &[Role::Reflector, Role::Emitter]);
         assert_eq!(settled, []);
     }

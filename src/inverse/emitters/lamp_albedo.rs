@@ -112,25 +112,15 @@ mod tests {
 
     fn solved(albedo: f64, seen: bool) -> (Unknowns, Unknowns) {
         let roles = [Role::Emitter, Role::Reflector, Role::Reflector];
-        let mut about = Unknowns::new(3);
-        about.albedo = [0.0, 0.5, 0.5].map(Vec3::splat).to_vec();
-        about.emission[0] = Vec3::splat(10.0);
+        let about = Unknowns::grey([0.0, 0.5, 0.5], [10.0, 0.0, 0.0]);
         let prior = Prior::new(3, 3, Vec3::ONE);
-        let plain = {
-            let clusters = room(albedo, seen).into_iter().map(|mut c| {
-                c.rows.retain(|r| r.0 != 0);
-                c.rows.iter_mut().for_each(|r| r.0 -= 1);
-                c
-            });
-            descend(
-                clusters.collect(),
-                &about,
-                &about,
-                &roles::free(&roles, |k| roles[k] != Role::Emitter),
-                &prior,
-            )
-            .unknowns
-        };
+        let mut clusters = room(albedo, seen);
+        for cluster in &mut clusters {
+            cluster.rows.retain(|r| r.0 != 0);
+            cluster.rows.iter_mut().for_each(|r| r.0 -= 1);
+        }
+        let free = roles::free(&roles, |k| roles[k] != Role::Emitter);
+        let plain = descend(clusters, &about, &about, &free, &prior).unknowns;
         let free = roles::free(&roles, |_| true);
         let mut clusters = room(albedo, seen);
         hold_exitance(&mut clusters, &roles, &roles::places(&free, 3));
@@ -145,16 +135,11 @@ mod tests {
     fn a_lamp_that_reflects_is_no_brighter_and_lights_the_ceiling_more() {
         for albedo in [0.3, 0.7, 0.9] {
             let (plain, found) = solved(albedo, false);
-            let exitance = (10.0 + albedo) as f32;
-            assert!(
-                (found.emission[0] - exitance).abs().max_element() < 0.02,
-                "{found:?}"
-            );
+            let exitance = Vec3::splat((10.0 + albedo) as f32);
+            assert!(found.emission[0].abs_diff_eq(exitance, 0.02), "{found:?}");
             assert_eq!(found.albedo[0], Vec3::ZERO);
-            assert!(
-                (found.albedo[1] - 0.5).abs().max_element() < 1e-3,
-                "{found:?}"
-            );
+            let half = Vec3::splat(0.5);
+            assert!(found.albedo[1].abs_diff_eq(half, 1e-3), "{found:?}");
             let errors = [&plain, &found].map(|u| (u.albedo[2].x - 0.5).abs());
             assert!(errors[1] < 0.75 * errors[0], "{albedo}: {errors:?}");
         }
@@ -164,10 +149,8 @@ mod tests {
     fn where_more_of_a_lamp_is_seen_its_albedo_is_known() {
         for albedo in [0.0, 0.8] {
             let (_, found) = solved(albedo, true);
-            assert!(
-                (found.albedo[2] - 0.5).abs().max_element() < 2e-3,
-                "{albedo}: {found:?}"
-            );
+            let close = found.albedo[2].abs_diff_eq(Vec3::splat(0.5), 2e-3);
+            assert!(close, "{albedo}: {found:?}");
         }
     }
 }

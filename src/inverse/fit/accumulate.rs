@@ -1,7 +1,6 @@
 //! Sums linearised clusters over rounds of paths, so that the paths need not be kept.
 
 use crate::inverse::paths::evaluate::Linearised;
-use glam::DVec3;
 
 /// Sums of linearised clusters over rounds of independent paths.
 #[derive(Debug, Clone, Default)]
@@ -49,17 +48,12 @@ impl Accumulated {
         self.clusters
             .iter()
             .map(|c| Linearised {
-                object: c.object,
-                weight: c.weight,
-                pixels: c.pixels,
-                residuals: c.residuals.map(|r: DVec3| r * scale),
-                censored: c.censored,
+                residuals: c.residuals.map(|r| r * scale),
                 own: c.own * scale,
-                rows: c
-                    .rows
-                    .iter()
+                rows: (c.rows.iter())
                     .map(|&(parameter, a, b)| (parameter, a * scale, b * scale))
                     .collect(),
+                ..*c
             })
             .collect()
     }
@@ -72,7 +66,7 @@ mod tests {
     use crate::inverse::fit::prior::Prior;
     use crate::inverse::fit::robust_weights::RobustWeights;
     use crate::inverse::paths::clusters::Cluster;
-    use crate::inverse::paths::{CachedCluster, NO_LAMP, PathCache, Vertex};
+    use crate::inverse::paths::{CachedCluster, PathCache, Vertex};
     use crate::inverse::unknowns::Unknowns;
     use crate::math::rng::Stream;
     use glam::Vec3;
@@ -81,20 +75,6 @@ mod tests {
     const PIXELS: usize = 2;
     const PATHS: usize = 2;
     const ROUNDS: usize = 3;
-
-    fn random_path(key: u64) -> Vec<Vertex> {
-        let mut stream = Stream::new(51, 0, 0, key);
-        (0..1 + stream.below(4))
-            .map(|_| Vertex {
-                surface: stream.below(SURFACES) as u32,
-                lamp: [NO_LAMP, stream.below(SURFACES) as u32][stream.below(2)],
-                lamp_weight: stream.uniform(),
-                emission_weight: stream.uniform(),
-                known: Vec3::splat(stream.uniform()),
-                ..Vertex::on(0)
-            })
-            .collect()
-    }
 
     /// One cluster with the given paths for each pixel and set.
     fn cache(paths: impl Fn(usize, usize) -> Vec<Vec<Vertex>>) -> PathCache {
@@ -112,20 +92,20 @@ mod tests {
             weight: Vec3::new(1.0, 2.0, 3.0),
             ..Cluster::unit(0, PIXELS as u32, Vec3::new(0.5, 0.6, 0.7))
         };
-        PathCache {
-            clusters: vec![CachedCluster {
-                cluster,
-                vertices,
-                ends,
-            }],
-            ..Default::default()
-        }
+        PathCache::from(vec![CachedCluster {
+            cluster,
+            vertices,
+            ends,
+        }])
     }
 
     /// The paths of one round through a pixel, of one set.
     fn round(round: usize, pixel: usize, set: usize) -> Vec<Vec<Vertex>> {
         (0..PATHS)
-            .map(|path| random_path((((round * PIXELS + pixel) * 2 + set) * PATHS + path) as u64))
+            .map(|path| {
+                let key = ((round * PIXELS + pixel) * 2 + set) * PATHS + path;
+                Vertex::random_path(SURFACES, &mut Stream::new(51, 0, 0, key as u64))
+            })
             .collect()
     }
 

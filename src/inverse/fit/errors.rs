@@ -157,7 +157,6 @@ pub fn signal(diagonal: DVec3, across: DVec3) -> DVec3 {
 
 /// The prior of the free parameters, in the units of the normal equations.
 struct PriorTerms {
-    /// Precision of each parameter.
     precision: Vec<DVec3>,
     /// Terms added to the diagonal: the precision, and one for parameters that no path meets.
     added: Vec<DVec3>,
@@ -259,9 +258,10 @@ pub fn score_tests(equations: &NormalEquations, free: &[usize], active: usize) -
     };
     (eliminated.into_iter().zip(active..))
         .map(|(own, row)| {
-            let (curvature, zero) = (own.curvature, DVec3::ZERO);
+            let (curvature, variance) = own;
+            let zero = DVec3::ZERO;
             let known = curvature.cmpgt(equations.diagonal[row] * MIN_OWN) & curvature.cmpgt(zero);
-            let stderr = own.variance.max(zero).sqrt() / curvature;
+            let stderr = variance.max(zero).sqrt() / curvature;
             ScoreTest {
                 index: free[row],
                 step: DVec3::select(known, equations.descent[row] / curvature, zero),
@@ -272,14 +272,8 @@ pub fn score_tests(equations: &NormalEquations, free: &[usize], active: usize) -
         .collect()
 }
 
-/// A tested parameter with the active ones eliminated.
-#[derive(Clone)]
-struct Eliminated {
-    /// Its curvature (Schur complement).
-    curvature: DVec3,
-    /// Variance of its score.
-    variance: DVec3,
-}
+/// The curvature (Schur complement) and the variance of the score of a tested parameter with the active ones eliminated.
+type Eliminated = (DVec3, DVec3);
 
 fn eliminate_dense(
     equations: &NormalEquations,
@@ -313,11 +307,8 @@ fn eliminate_dense(
         curvatures.chain((0..tested).map(variance)).collect()
     });
     let (curvatures, variances) = values.split_at(tested);
-    (curvatures.iter().zip(variances))
-        .map(|(&curvature, &variance)| Eliminated {
-            curvature,
-            variance,
-        })
+    (curvatures.iter().copied())
+        .zip(variances.iter().copied())
         .collect()
 }
 
@@ -330,16 +321,11 @@ fn eliminate_sparse(
 ) -> Vec<Eliminated> {
     let n = equations.diagonal.len();
     let mut tests: Vec<Eliminated> = (active..n)
-        .map(|row| Eliminated {
-            curvature: equations.diagonal[row],
-            variance: equations.scatter[row],
-        })
+        .map(|row| (equations.diagonal[row], equations.scatter[row]))
         .collect();
     let significance = |row: usize| {
-        let (score, scatter) = (
-            equations.descent[row].max(DVec3::ZERO),
-            equations.scatter[row],
-        );
+        let score = equations.descent[row].max(DVec3::ZERO);
+        let scatter = equations.scatter[row];
         let known = scatter.cmpgt(DVec3::ZERO);
         DVec3::select(known, score * score / scatter, DVec3::ZERO).element_sum()
     };
@@ -363,11 +349,8 @@ fn eliminate_sparse(
                 .sum::<DVec3>();
             direction.iter_mut().for_each(|u| *u = -*u);
             direction[row] = DVec3::ONE;
-            let test = Eliminated {
-                curvature: equations.diagonal[row] - explained,
-                variance: rows.scatter_along(&direction),
-            };
-            (row - active, test)
+            let curvature = equations.diagonal[row] - explained;
+            (row - active, (curvature, rows.scatter_along(&direction)))
         })
         .collect();
     for (index, test) in exact {

@@ -255,10 +255,7 @@ mod tests {
 
     /// A fit of at most thirty steps in which all clusters weigh alike.
     fn fitted(clusters: Vec<CachedCluster>, roles: &[Role], start: &Unknowns) -> Fit {
-        let cache = PathCache {
-            clusters,
-            ..PathCache::default()
-        };
+        let cache = PathCache::from(clusters);
         let (even, free) = (
             RobustWeights::even(roles.len()),
             roles::free(roles, |k| roles[k] != Role::Emitter),
@@ -301,8 +298,7 @@ mod tests {
 
     #[test]
     fn a_fit_ends_where_only_the_paths_are_noisy() {
-        let mut start = Unknowns::new(2);
-        start.albedo[1] = Vec3::ZERO;
+        let start = Unknowns::grey([0.5, 0.0], [0.0; 2]);
         let clusters = (0..80).map(opposed).collect();
         let fitted = fitted(clusters, &[Role::Reflector, Role::Emitter], &start);
         assert!(fitted.equations.objective.max_element() < 0.0);

@@ -91,8 +91,7 @@ mod tests {
                 }
             })
             .collect();
-        let mut about = Unknowns::new(1);
-        about.albedo[0] = Vec3::splat(begun as f32);
+        let about = Unknowns::grey([begun as f32], [0.0]);
         let prior = Prior::new(1, 1, Vec3::ONE);
         let (one, _) = {
             let robust = RobustWeights::even(1);

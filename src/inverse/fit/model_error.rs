@@ -143,8 +143,7 @@ mod tests {
                 (Cluster::unit(0, 1, Vec3::splat(0.5)), line)
             })
             .unzip::<_, _, Vec<_>, Vec<_>>();
-        let mut unknowns = Unknowns::new(1);
-        unknowns.albedo[0] = Vec3::splat(0.5);
+        let unknowns = Unknowns::grey([0.5], [0.0]);
         variance(&clusters, &lines, &unknowns, &[]).sqrt()
     }
 
@@ -158,6 +157,13 @@ mod tests {
         }
     }
 
+    fn estimate(objects: Vec<ObjectEstimate>) -> Estimate {
+        Estimate {
+            objects,
+            ..Estimate::default()
+        }
+    }
+
     #[test]
     fn gloss_of_some_objects_makes_the_others_less_certain() {
         let object = |specular| ObjectEstimate {
@@ -167,25 +173,18 @@ mod tests {
             ..Default::default()
         };
         let after = |objects: Vec<ObjectEstimate>| -> Vec<f32> {
-            let mut estimate = Estimate {
-                objects,
-                ..Estimate::default()
-            };
+            let mut estimate = estimate(objects);
             add_gloss(&mut estimate, &[Role::Reflector; 4]);
-            (estimate.objects.iter())
-                .map(|o| o.albedo_stderr.x)
-                .collect()
+            let errors = estimate.objects.iter().map(|o| o.albedo_stderr.x);
+            errors.collect()
         };
         let matte = || object(None);
-        assert_eq!(after(vec![matte(), matte(), matte(), matte()]), [0.03; 4]);
+        assert_eq!(after(vec![matte(); 4]), [0.03; 4]);
         // One of four has a lobe that reflects 0.08 along the normal and 0.14 of light from all directions; half of that is added.
         let errors = after(vec![object(Some(0.08)), matte(), matte(), matte()]);
         assert_eq!(errors[0], 0.03);
-        let mirrored = 0.08 + 0.92 * 0.0658;
-        assert!(
-            (errors[3] - 0.03f32.hypot(mirrored / 2.0)).abs() < 1e-4,
-            "{errors:?}"
-        );
+        let expected = 0.03f32.hypot((0.08 + 0.92 * 0.0658) / 2.0);
+        assert!((errors[3] - expected).abs() < 1e-4, "{errors:?}");
     }
 
     #[test]
@@ -196,10 +195,7 @@ mod tests {
             seen_pixels: ENOUGH_PIXELS,
             ..Default::default()
         };
-        let mut estimate = Estimate {
-            objects: vec![object; 2],
-            ..Estimate::default()
-        };
+        let mut estimate = estimate(vec![object; 2]);
         let before = estimate.relative_error();
         add_common(&mut estimate, &[Role::Reflector, Role::Emitter]);
         let expected = 0.03f32.hypot(0.5 * SCANNED);
@@ -219,10 +215,7 @@ mod tests {
             emission_stderr: Vec3::splat(0.1),
             ..Default::default()
         };
-        let mut estimate = Estimate {
-            objects: vec![object; 3],
-            ..Estimate::default()
-        };
+        let mut estimate = estimate(vec![object; 3]);
         let roles = [Role::Reflector, Role::Unseen, Role::Emitter];
         add_to(&mut estimate, &roles, 0.01);
         let model = SHARED as f32 * 0.1;

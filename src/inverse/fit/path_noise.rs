@@ -21,12 +21,10 @@ pub fn fractions(clusters: &[Linearised], objects: usize) -> Vec<f64> {
     sums.into_iter()
         .map(|(paths, all, count)| {
             let mean = all / f64::max(count, 1.0) * PRIOR_CLUSTERS;
-            let fraction = (paths + 0.5 * mean) / (all + mean);
-            if fraction.is_finite() {
-                fraction.min(1.0)
-            } else {
-                0.0
-            }
+            let fraction = Some((paths + 0.5 * mean) / (all + mean));
+            fraction
+                .filter(|f| f.is_finite())
+                .map_or(0.0, |f| f.min(1.0))
         })
         .collect()
 }

@@ -61,9 +61,7 @@ pub struct Prior {
     pub directions: Vec<(Vec3, Vec3)>,
     /// Mean radiance of all photographs.
     photographed: Vec3,
-    /// Whether the mesh is a scan.
     scanned: bool,
-    /// Known parameters and their values.
     known: BTreeMap<usize, Vec3>,
 }
 
@@ -211,11 +209,8 @@ mod tests {
         prior.albedo = expected;
         let (mean, precision) = prior.of(0, DVec3::ONE);
         assert!((mean - DVec3::new(0.2, 0.3, 0.4)).length() < 1e-6, "{mean}");
-        let wanted = DVec3::new(100.0, 1e4, 4.0);
-        assert!(
-            (precision / wanted - DVec3::ONE).length() < 1e-5,
-            "{precision}"
-        );
+        let ratio = precision / DVec3::new(100.0, 1e4, 4.0);
+        assert!((ratio - DVec3::ONE).length() < 1e-5, "{precision}");
         let nothing = Prior::new(1, 1, Vec3::ONE).of(0, DVec3::ONE);
         assert_eq!(nothing, (DVec3::splat(0.5), DVec3::splat(4.0)));
     }
@@ -228,12 +223,8 @@ mod tests {
         let prior =
             Prior::new(2, 1, Vec3::splat(0.1)).with_outside_found(|_| found, |_, _| Some(color));
         let (mean, precision) = prior.of(3, DVec3::ONE);
-        assert!(
-            (mean / color.as_dvec3() - DVec3::splat(3.0))
-                .abs()
-                .max_element()
-                < 1e-2
-        );
+        let ratio = mean / color.as_dvec3();
+        assert!(ratio.abs_diff_eq(DVec3::splat(3.0), 1e-2));
         let deviation = precision.powf(-0.5) / mean;
         assert!((deviation - f64::from(OUTSIDE_TINT)).abs().max_element() < 1e-6);
         // Dark ones may still be something.

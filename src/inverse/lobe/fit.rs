@@ -16,7 +16,6 @@ pub struct Row {
     pub spot: usize,
     /// Number of pixels.
     pub weight: f64,
-    /// Radiance in the photograph.
     pub measured: DVec3,
     /// An absolute radiance of one.
     pub one: DVec3,
@@ -28,10 +27,7 @@ pub struct Row {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Model {
     /// A diffuse surface. Parameters: RGB albedo, and RGB emission if it may emit.
-    Diffuse {
-        /// Whether it may emit light.
-        emits: bool,
-    },
+    Diffuse { emits: bool },
     /// A lobe over a diffuse base. Parameters: RGB albedo × (1 − specular), and specular.
     Lobe,
 }
@@ -46,7 +42,6 @@ pub struct Variances {
 }
 
 impl Model {
-    /// Number of parameters.
     pub fn len(self) -> usize {
         match self {
             Self::Diffuse { emits: false } => 3,
@@ -193,12 +188,10 @@ impl Model {
         let total: f64 = means.iter().map(|m| m.0).sum();
         let inverse: f64 = means.iter().map(|m| 1.0 / m.1).sum();
         let count = means.len().max(1) as f64;
-        let within = if freedom > 0 {
-            within / freedom as f64
-        } else {
-            0.0
+        let within = match freedom {
+            0 => MIN_VARIANCE,
+            _ => (within / freedom as f64).max(MIN_VARIANCE),
         };
-        let within = within.max(MIN_VARIANCE);
         Variances {
             within,
             between: ((total - within * inverse) / count).max(0.0),
@@ -225,14 +218,14 @@ pub fn decorrelated(rows: &[Row], fraction: impl Fn(f64) -> f64) -> Vec<Row> {
         let components = [0, 1].map(|set| {
             let mut sum = Components::default();
             for row in spot {
-                sum += row.sets[set] * row.weight;
+                sum = sum.zip(row.sets[set], |sum, own| sum + own * row.weight);
             }
-            sum * (fraction / weight)
+            sum.map(|component| component * (fraction / weight))
         });
         all.extend(spot.iter().map(|row| Row {
             measured: row.measured - measured,
             one: row.one - one,
-            sets: [0, 1].map(|set| row.sets[set] - components[set]),
+            sets: [0, 1].map(|set| row.sets[set].zip(components[set], |own, mean| own - mean)),
             ..*row
         }));
     }
@@ -293,10 +286,8 @@ mod tests {
     fn noise_of_paths_biases_neither_albedo_nor_specular() {
         let found = Model::Lobe.fit(&rows(0.5, 0.2, 0.0)).expect("rows tell");
         assert!((found[3] - 0.2).abs() < 0.02, "{found:?}");
-        assert!(
-            (found[0] / (1.0 - found[3]) - 0.5).abs() < 0.03,
-            "{found:?}"
-        );
+        let albedo = found[0] / (1.0 - found[3]);
+        assert!((albedo - 0.5).abs() < 0.03, "{found:?}");
     }
 
     #[test]

@@ -12,7 +12,6 @@ use crate::transport::lit::LitScene;
 use crate::transport::microfacet::Microfacet;
 use crate::transport::path::PathOptions;
 use glam::{DVec3, Vec2};
-use std::ops::{AddAssign, Div, Mul, Sub};
 
 /// First of the sample keys of these paths, disjoint from those of other stages.
 const KEY: u64 = 9 << 59;
@@ -28,9 +27,7 @@ pub struct Gathering<'a> {
     pub points: u32,
     /// GGX roughnesses whose lobes directions are sampled from, in addition to cosine sampling.
     pub roughnesses: &'a [f64],
-    /// Options of the continued paths.
     pub options: PathOptions,
-    /// Seed of the random streams.
     pub seed: u64,
     /// Different passes are independent.
     pub pass: u64,
@@ -58,40 +55,19 @@ pub struct Components {
 }
 
 impl Components {
-    fn map(self, other: Self, f: impl Fn(DVec3, DVec3) -> DVec3) -> Self {
+    /// What `f` makes of each component.
+    pub fn map(self, f: impl Fn(DVec3) -> DVec3) -> Self {
+        self.zip(self, |own, _| f(own))
+    }
+
+    /// What `f` makes of each component of both.
+    pub fn zip(self, other: Self, f: impl Fn(DVec3, DVec3) -> DVec3) -> Self {
         Self {
             diffuse: f(self.diffuse, other.diffuse),
             base: f(self.base, other.base),
             lobe: f(self.lobe, other.lobe),
             grazing: f(self.grazing, other.grazing),
         }
-    }
-}
-
-impl AddAssign for Components {
-    fn add_assign(&mut self, other: Self) {
-        *self = self.map(other, |a, b| a + b);
-    }
-}
-
-impl Sub for Components {
-    type Output = Self;
-    fn sub(self, other: Self) -> Self {
-        self.map(other, |a, b| a - b)
-    }
-}
-
-impl Mul<f64> for Components {
-    type Output = Self;
-    fn mul(self, factor: f64) -> Self {
-        self.map(self, |a, _| a * factor)
-    }
-}
-
-impl Div<DVec3> for Components {
-    type Output = Self;
-    fn div(self, level: DVec3) -> Self {
-        self.map(self, |a, _| a / level)
     }
 }
 
@@ -126,11 +102,11 @@ impl Gathering<'_> {
         let first = u64::from(observation.pixels[0]);
         let mut stream = Stream::new(self.seed, u64::from(observation.frame), first, index);
         let count = observation.pixels.len() as u32;
-        let index_in_pixels = if self.points < count {
-            point * count / self.points + stream.below(1 + (count / self.points) as usize) as u32
-        } else {
-            point
-        };
+        let mut index_in_pixels = point;
+        if self.points < count {
+            let within = stream.below(1 + (count / self.points) as usize) as u32;
+            index_in_pixels = point * count / self.points + within;
+        }
         let pixel = observation.pixels[(index_in_pixels % count) as usize];
         let width = camera.intrinsics.width;
         let corner = Vec2::new((pixel % width) as f32, (pixel / width) as f32);
@@ -150,12 +126,8 @@ impl Gathering<'_> {
         // Incident light on the side that the camera sees.
         let surface = self.lit.surface(&hit);
         let to_camera = -ray.direction.normalize_or_zero();
-        let side = if surface.normal.dot(to_camera) < 0.0 {
-            -1.0
-        } else {
-            1.0
-        };
-        let frame = Frame::around(surface.normal * side);
+        let is_back = surface.normal.dot(to_camera) < 0.0;
+        let frame = Frame::around(surface.normal * if is_back { -1.0 } else { 1.0 });
         let wo = frame.to_local(to_camera);
         if wo.z <= 0.0 {
             return cast;
@@ -185,14 +157,13 @@ impl Gathered {
             let light = arrival.light.as_dvec3();
             let lobe = Microfacet::new(alpha, *wo, arrival.wi);
             let value = lobe.eval();
-            sum += Components {
-                diffuse: light * f64::from(warp::cosine_hemisphere_pdf(arrival.wi.z)),
-                base: light * coupling(*wo, arrival.wi),
-                lobe: light * value,
-                grazing: light * (value * lobe.schlick),
-            };
+            sum.diffuse += light * f64::from(warp::cosine_hemisphere_pdf(arrival.wi.z));
+            sum.base += light * coupling(*wo, arrival.wi);
+            sum.lobe += light * value;
+            sum.grazing += light * (value * lobe.schlick);
         }
-        sum * (1.0 / f64::from(self.points.max(1)))
+        let fraction = 1.0 / f64::from(self.points.max(1));
+        sum.map(|component| component * fraction)
     }
 
     /// Whether no point hit the object.
@@ -200,7 +171,6 @@ impl Gathered {
         self.points == 0
     }
 
-    /// Both sets as one.
     pub fn joined([mut a, b]: [Self; 2]) -> Self {
         a.arrivals.extend(b.arrivals);
         a.points += b.points;

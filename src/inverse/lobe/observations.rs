@@ -15,7 +15,6 @@ const SPOT_FOOTPRINTS: f32 = 3.0;
 /// The pixels of one photograph that see one spot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpotObservation {
-    /// Frame index.
     pub frame: u32,
     /// Pixel indices, row by row from the top left.
     pub pixels: Vec<u32>,

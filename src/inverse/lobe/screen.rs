@@ -47,7 +47,8 @@ pub fn evidence(
     if observations < MIN_OBSERVATIONS {
         return (None, RayCount::default());
     }
-    let gathered: Vec<(Vec<(&SpotObservation, Gathered)>, RayCount)> = (chosen.par_iter())
+    type Own<'a> = Vec<(&'a SpotObservation, Gathered)>;
+    let (gathered, casts): (Vec<Own>, Vec<RayCount>) = (chosen.par_iter())
         .map(|spot| {
             let mut cast = RayCount::default();
             let own = (spot.iter().filter(|s| !s.held_out))
@@ -61,18 +62,17 @@ pub fn evidence(
                 .collect();
             (own, cast)
         })
-        .collect();
-    let cast = gathered.iter().map(|(_, cast)| *cast).sum();
+        .unzip();
     let strongest = (ROUGHNESSES.iter())
         .filter_map(|&alpha| {
             let all: Vec<Vec<Difference>> = (gathered.par_iter())
-                .map(|(own, _)| differences(own, alpha, albedo))
+                .map(|own| differences(own, alpha, albedo))
                 .collect();
             let all: Vec<Difference> = all.into_iter().flatten().collect();
             strength(&all, gathered.len())
         })
         .reduce(f64::max);
-    (strongest, cast)
+    (strongest, casts.into_iter().sum())
 }
 
 /// The differences of a spot's observations; none for fewer than two.

@@ -56,26 +56,20 @@ impl<'a> LitObservations<'a> {
             (choose(spots, 1, max).into_iter().enumerate())
                 .flat_map(|(index, spot)| spot.iter().map(move |observation| (index, observation)))
                 .collect();
-        let gathered: Vec<([Gathered; 2], RayCount)> = (chosen.par_iter())
+        let (gathered, casts): (Vec<[Gathered; 2]>, Vec<RayCount>) = (chosen.par_iter())
             .map(|(_, observation)| {
                 gathering.observation(&scene.cameras[observation.frame as usize], observation)
             })
+            .unzip();
+        let observations: Vec<_> = (chosen.into_iter().zip(gathered))
+            .filter(|(_, light)| !light.iter().any(Gathered::is_empty))
+            .map(|((spot, observation), light)| (spot, observation, light))
             .collect();
-        let cast = gathered.iter().map(|(_, cast)| *cast).sum();
-        let mut observations = Vec::new();
-        for ((spot, observation), (light, _)) in chosen.into_iter().zip(gathered) {
-            if !light.iter().any(Gathered::is_empty) {
-                observations.push((spot, observation, light));
-            }
-        }
-        let levels = levels(&observations);
-        (
-            Self {
-                observations,
-                levels,
-            },
-            cast,
-        )
+        let lit = Self {
+            levels: levels(&observations),
+            observations,
+        };
+        (lit, casts.into_iter().sum())
     }
 
     /// The rows in the fit, and the held-out ones, for a lobe of GGX roughness α.
@@ -87,7 +81,7 @@ impl<'a> LitObservations<'a> {
                     weight: observation.pixels.len() as f64,
                     measured: observation.measured / level,
                     one: level.recip(),
-                    sets: [0, 1].map(|set| light[set].components(alpha) / level),
+                    sets: [0, 1].map(|set| light[set].components(alpha).map(|c| c / level)),
                 };
                 (observation.held_out, row)
             })
@@ -120,7 +114,6 @@ fn levels(observations: &[(usize, &SpotObservation, [Gathered; 2])]) -> Vec<DVec
         .collect()
 }
 
-/// The rows of one candidate roughness.
 struct Candidate {
     alpha: f64,
     rows: Vec<Row>,

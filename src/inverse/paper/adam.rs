@@ -59,11 +59,7 @@ mod tests {
         let step = adam.step(0, Vec3::splat(0.5), 1.0);
         let m = (0.9 * 0.1 + 0.1 * 0.5) / (1.0 - 0.81);
         let v: f32 = (0.999 * 0.001 + 0.001 * 0.25) / (1.0 - 0.998_001);
-        assert!(
-            (step.x + m / v.sqrt()).abs() < 1e-4,
-            "{step} {}",
-            m / v.sqrt()
-        );
+        assert!((step.x + m / v.sqrt()).abs() < 1e-4, "{step} {m} {v}");
     }
 
     /// A parameter that is stepped once in a thousand steps of another one behaves as if it were alone.

@@ -65,6 +65,9 @@ impl Cover {
     }
 
     /// Selects the patches to cut by the mean squared error of the pixels that they cover. Also returns the rays cast.
+    ///
+    /// The squared error of a pixel, summed over the channels, is the product of the residuals of two independent colours, whose
+    /// expectation is free of path noise.
     pub fn to_cut(
         &self,
         problem: &Problem,
@@ -72,28 +75,6 @@ impl Cover {
         bounces: u32,
         descent: &mut Descent,
     ) -> (Vec<bool>, RayCount) {
-        let (errors, cast) = self.errors(problem, settings, bounces, descent);
-        let Some(patches) = &descent.patches else {
-            return (Vec::new(), cast);
-        };
-        let mut sums = vec![(0.0, 0u64); patches.len()];
-        for ((_, _, hit), error) in self.pixels.iter().zip(errors) {
-            let sum = &mut sums[patches.of_texel(patches.layout().texel(hit))];
-            sum.0 += error;
-            sum.1 += self.stride;
-        }
-        (worst(&sums, patches.depth()), cast)
-    }
-
-    /// The squared residual of each pixel, summed over the channels: the product of the residuals of two independent colours, whose
-    /// expectation is free of path noise.
-    fn errors(
-        &self,
-        problem: &Problem,
-        settings: &Settings,
-        bounces: u32,
-        descent: &mut Descent,
-    ) -> (Vec<f64>, RayCount) {
         let each: Vec<(f64, RayCount)> = descent.render(problem, settings, bounces, |rendering| {
             let error = |&(frame, pixel, _): &(u32, u32, Hit)| {
                 let (frame_key, pixel_key) = (u64::from(frame), u64::from(pixel));
@@ -118,7 +99,16 @@ impl Cover {
             self.pixels.par_iter().map(error).collect()
         });
         let cast = each.iter().map(|e| e.1).sum();
-        (each.into_iter().map(|e| e.0).collect(), cast)
+        let Some(patches) = &descent.patches else {
+            return (Vec::new(), cast);
+        };
+        let mut sums = vec![(0.0, 0u64); patches.len()];
+        for ((_, _, hit), (error, _)) in self.pixels.iter().zip(each) {
+            let sum = &mut sums[patches.of_texel(patches.layout().texel(hit))];
+            sum.0 += error;
+            sum.1 += self.stride;
+        }
+        (worst(&sums, patches.depth()), cast)
     }
 }
 

@@ -80,7 +80,6 @@ pub fn describe(
     }
 }
 
-/// Area-weighted mean over an object's texels.
 fn mean_albedo(scene: &Scene, object: usize, texels: &TexelColors) -> Vec3 {
     let object = &scene.objects[object];
     let mut sum = DVec3::ZERO;

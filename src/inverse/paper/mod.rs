@@ -155,7 +155,6 @@ impl Run<'_, '_> {
         }
     }
 
-    /// Reports the present estimate to the observer.
     fn report(&mut self) -> Result<(), Termination> {
         if self.covered.is_empty() || self.described.elapsed() >= DESCRIBE_EVERY {
             self.describe();

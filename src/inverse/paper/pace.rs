@@ -25,7 +25,6 @@ const PATCH_SAMPLES: [u64; 2] = [4, 2];
 /// The amount of work in a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pace {
-    /// Pixels in the batch.
     pub batch: u64,
     /// Paths for a pixel's colour, and independent ones for its derivative.
     pub samples: [u64; 2],
@@ -58,12 +57,10 @@ impl Pace {
         }
     }
 
-    /// Number of paths in a step.
     pub fn paths(&self) -> u64 {
         self.batch * (self.samples[0] + self.samples[1])
     }
 
-    /// The learning rate after `steps` steps.
     pub fn rate(&self, settings: &Settings, steps: u64) -> f64 {
         let decay = (1.0 - settings.decay).powf(steps as f64 / 1000.0);
         settings.learning_rate * decay * 0.5f64.powi(self.level as i32)

@@ -15,7 +15,6 @@ pub const MAX_DEPTH: u8 = 8;
 #[serde(from = "Stored", into = "Stored")]
 pub struct Patches {
     layout: TexelLayout,
-    /// The patch of each texel.
     patch_of: Vec<u32>,
     /// Depth of subdivision of each patch.
     depth: Vec<u8>,
@@ -51,7 +50,6 @@ impl From<Patches> for Stored {
 }
 
 impl Patches {
-    /// One patch per triangle.
     pub fn triangles(count: usize) -> Self {
         Self {
             layout: TexelLayout::new(vec![0; count]),
@@ -60,12 +58,10 @@ impl Patches {
         }
     }
 
-    /// Number of patches.
     pub fn len(&self) -> usize {
         self.depth.len()
     }
 
-    /// The grid of texels.
     pub fn layout(&self) -> &TexelLayout {
         &self.layout
     }

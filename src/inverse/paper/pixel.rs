@@ -67,6 +67,7 @@ pub struct PixelGradient {
 }
 
 /// A path with local indices: the surfaces of its vertices are indices into `unknowns`, which holds only what the path meets.
+#[derive(Default)]
 pub struct Path {
     vertices: Vec<Vertex>,
     /// Global albedo and emission index of each local index.
@@ -74,17 +75,6 @@ pub struct Path {
     unknowns: Unknowns,
     /// Scratch memory of [`differentiate`].
     incident: Vec<Vec3A>,
-}
-
-impl Default for Path {
-    fn default() -> Self {
-        Self {
-            vertices: Vec::new(),
-            global: Vec::new(),
-            unknowns: Unknowns::new(0),
-            incident: Vec::new(),
-        }
-    }
 }
 
 impl Rendering<'_> {

@@ -20,7 +20,6 @@ impl Schedule {
         self.until_measured == 0
     }
 
-    /// Counts traced paths.
     pub fn traced(&mut self, paths: u64) {
         self.until_measured = self.until_measured.saturating_sub(paths);
     }
@@ -52,11 +51,8 @@ mod tests {
         let mut falling = Schedule::default();
         assert!((0..20).all(|i| !falling.measured(Some(0.9f64.powi(i)), 1, 4)));
         let mut level = Schedule::default();
-        let still: Vec<bool> = (0..8).map(|_| level.measured(Some(1.0), 1, 4)).collect();
-        assert_eq!(
-            still,
-            [false, false, false, false, false, false, false, true]
-        );
+        assert!((0..7).all(|_| !level.measured(Some(1.0), 1, 4)));
+        assert!(level.measured(Some(1.0), 1, 4));
         level.start_over();
         assert!(!level.measured(Some(1.0), 1, 4));
     }

@@ -41,7 +41,6 @@ pub struct Best {
 }
 
 impl Best {
-    /// Whether the sizes fit a state.
     pub fn fits(&self, descent: &Descent) -> bool {
         self.albedo.len() == descent.albedo.len() && self.emission.len() == descent.emission.len()
     }
@@ -62,7 +61,6 @@ fn is_below(loss: Option<f64>, other: Option<f64>) -> bool {
 }
 
 impl Run<'_, '_> {
-    /// Runs all stages.
     pub fn descend(&mut self) -> Result<Termination, Termination> {
         loop {
             self.monitor.phase(&match self.covered.len() {

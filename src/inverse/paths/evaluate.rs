@@ -230,18 +230,12 @@ mod tests {
     }
 
     fn unknowns() -> Unknowns {
-        let mut unknowns = Unknowns::new(3);
-        unknowns.albedo = [0.4, 0.8, 0.0].map(Vec3::splat).to_vec();
-        unknowns.emission[2] = Vec3::splat(10.0);
-        unknowns
+        Unknowns::grey([0.4, 0.8, 0.0], [0.0, 0.0, 10.0])
     }
 
     #[test]
     fn a_texture_changes_the_paths_that_meet_it_by_the_difference_of_its_texel() {
-        let cache = PathCache {
-            clusters: vec![cached()],
-            ..PathCache::default()
-        };
+        let cache = PathCache::from(vec![cached()]);
         let texels = [Vec3::splat(0.1), Vec3::new(0.6, 0.4, 0.2)];
         let [offset] = cache.texture_offsets(&unknowns(), &texels)[..] else {
             panic!("there is one cluster");
@@ -258,13 +252,8 @@ mod tests {
         bound.cluster.censored = BVec3::new(false, true, false);
         let mut linearise = |measured: f32| {
             bound.cluster.measured = Vec3::splat(measured);
-            let cache = PathCache {
-                clusters: vec![bound.clone()],
-                ..PathCache::default()
-            };
-            cache
-                .linearise(&unknowns(), &[usize::MAX; 6], &[])
-                .remove(0)
+            let cache = PathCache::from(vec![bound.clone()]);
+            cache.residuals(&unknowns()).remove(0)
         };
         let (darker, brighter) = (linearise(9.0), linearise(0.1));
         assert!(darker.residual().min_element() > 0.0);

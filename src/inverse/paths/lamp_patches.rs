@@ -73,7 +73,7 @@ impl LampPatches {
         let area: f64 = self.triangles.iter().map(|&t| area_of(scene, t)).sum();
         let even = paths as f64 / self.triangles.len() as f64;
         let min = even.clamp(1.0, PATHS[0]);
-        let traced: Vec<(Vec3, RayCount)> = (self.triangles.par_iter())
+        let (reflected, casts): (_, Vec<RayCount>) = (self.triangles.par_iter())
             .map(|&triangle| {
                 let fraction = paths as f64 * area_of(scene, triangle) / area;
                 // `max` ignores the NaN of lamps without any area.
@@ -97,9 +97,9 @@ impl LampPatches {
                 }
                 ((sum / count as f64).as_vec3(), cast)
             })
-            .collect();
-        self.reflected = traced.iter().map(|t| t.0).collect();
-        traced.iter().map(|t| t.1).sum()
+            .unzip();
+        self.reflected = reflected;
+        casts.into_iter().sum()
     }
 }
 

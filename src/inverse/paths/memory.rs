@@ -46,14 +46,11 @@ mod tests {
     #[test]
     fn as_many_paths_fit_as_are_as_long_as_those_of_the_pilot() {
         // Four paths of three vertices.
-        let pilot = PathCache {
-            clusters: vec![CachedCluster {
-                cluster: Cluster::unit(0, 2, Vec3::ONE),
-                vertices: vec![Vertex::on(0); 12],
-                ends: vec![3, 6, 9, 12],
-            }],
-            ..PathCache::default()
-        };
+        let pilot = PathCache::from(vec![CachedCluster {
+            cluster: Cluster::unit(0, 2, Vec3::ONE),
+            vertices: vec![Vertex::on(0); 12],
+            ends: vec![3, 6, 9, 12],
+        }]);
         let a_path = 3 * size_of::<Vertex>() as u64 + 4;
         assert_eq!(paths_that_fit(1000 * a_path + 5, &pilot), 1000);
         assert_eq!(paths_that_fit(1000, &PathCache::default()), 0);

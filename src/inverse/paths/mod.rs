@@ -63,6 +63,23 @@ impl Vertex {
     }
 }
 
+#[cfg(test)]
+impl Vertex {
+    /// A random path over few surfaces, so that they repeat, with lobes, light samples, hit emission and known radiance.
+    pub fn random_path(surfaces: usize, stream: &mut crate::math::rng::Stream) -> Vec<Self> {
+        (0..1 + stream.below(7))
+            .map(|_| Self {
+                surface: [SPECULAR, stream.below(surfaces) as u32][stream.below(5).min(1)],
+                lamp: [NO_LAMP, stream.below(surfaces) as u32][stream.below(2)],
+                lamp_weight: stream.uniform(),
+                emission_weight: [0.0, stream.uniform()][stream.below(3).min(1)],
+                known: Vec3::from_array(std::array::from_fn(|_| stream.uniform())),
+                ..Self::on(0)
+            })
+            .collect()
+    }
+}
+
 /// The paths of one cluster of pixels: for each pixel those of set A, then those of set B.
 #[derive(Debug, Clone)]
 pub struct CachedCluster {
@@ -93,6 +110,14 @@ pub struct PathCache {
     pub clusters: Vec<CachedCluster>,
     /// Number of rays cast, and of paths rejected because a weight was not finite.
     pub cast: RayCount,
+}
+
+impl From<Vec<CachedCluster>> for PathCache {
+    /// Stored paths whose rays are counted elsewhere.
+    fn from(clusters: Vec<CachedCluster>) -> Self {
+        let cast = RayCount::default();
+        Self { clusters, cast }
+    }
 }
 
 impl PathCache {

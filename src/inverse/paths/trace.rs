@@ -75,16 +75,12 @@ pub struct Tracer<'a> {
 impl Tracer<'_> {
     /// Traces two independent sets of paths for every cluster. `widths` are the image widths of the frames.
     pub fn trace(&self, clusters: &[Cluster], widths: &[u32]) -> PathCache {
-        let traced: Vec<(CachedCluster, RayCount)> = clusters
+        let (clusters, casts): (Vec<CachedCluster>, Vec<RayCount>) = clusters
             .par_iter()
             .map(|cluster| self.cluster(cluster, widths[cluster.frame as usize]))
-            .collect();
-        let mut cache = PathCache::default();
-        for (cluster, cast) in traced {
-            cache.clusters.push(cluster);
-            cache.cast += cast;
-        }
-        cache
+            .unzip();
+        let cast = casts.into_iter().sum();
+        PathCache { clusters, cast }
     }
 
     fn cluster(&self, cluster: &Cluster, width: u32) -> (CachedCluster, RayCount) {
@@ -165,7 +161,8 @@ impl Tracer<'_> {
             let mut surface = self.surface(&hit, wo);
             let albedo = self.expected_albedo[surface.id as usize];
             surface.scale = scale;
-            surface.scattering = self.lobe(surface.point.object).map(|lobe| {
+            let lobe = self.lobes.get(surface.point.object as usize);
+            surface.scattering = lobe.copied().flatten().map(|lobe| {
                 let [choice, ..] = numbers.four();
                 Scattering::new(lobe, surface.point.normal, wo, albedo, choice)
             });
@@ -415,10 +412,6 @@ impl Tracer<'_> {
         self.patches.map_or(NO_PATCH, |p| p.patch(triangle))
     }
 
-    fn lobe(&self, object: u32) -> Option<Lobe> {
-        self.lobes.get(object as usize).copied().flatten()
-    }
-
     fn surface(&self, hit: &Hit, wo: Vec3) -> Surface {
         let normal = self.scene.normals[hit.triangle as usize];
         let front = normal.dot(wo) > 0.0;
@@ -437,7 +430,6 @@ impl Tracer<'_> {
     }
 }
 
-/// A surface point on a path.
 struct Surface {
     /// With the normal of the side that the path arrives at.
     point: SurfacePoint,

@@ -52,7 +52,8 @@ pub fn estimate(
                 albedo: unknowns.albedo[k],
                 albedo_stderr: errors.albedo[k],
                 emission: unknowns.emission[k],
-                emission_stderr: finite(errors.emission[k]),
+                // File formats have no infinity.
+                emission_stderr: errors.emission[k].min(Vec3::splat(f32::MAX)),
                 seen_pixels: seen,
                 roughness: lobes[k].map(|lobe| lobe.roughness),
                 specular: lobes[k].map(|lobe| lobe.specular.x),
@@ -225,11 +226,6 @@ fn typical_albedo(
     } else {
         Vec3::splat(0.5)
     }
-}
-
-/// Replaces infinite errors by the largest finite number, for file formats without infinity.
-fn finite(error: Vec3) -> Vec3 {
-    error.min(Vec3::splat(f32::MAX))
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use crate::inverse::fit::errors::{ScoreTest, score_tests};
 use crate::inverse::fit::gauss_newton::Fit;
 use crate::inverse::paths::PathCache;
 use crate::inverse::pipeline::Pipeline;
+use crate::inverse::pipeline::known::role_under;
 use crate::inverse::roles::Role;
 use crate::inverse::solver::Termination;
 use crate::transport::emitters::{Emitters, powers};
@@ -83,7 +84,7 @@ impl Pipeline<'_, '_> {
             let mut changed = false;
             for change in classify(cache, &self.unknowns, &self.roles) {
                 let k = change.object;
-                let role = self.allowed(k, change.role);
+                let role = role_under(self.monitor.known.object(k), change.role);
                 // An object that became a reflector stays one, which ends oscillations; known roles do not change.
                 if was_emitter[k] || role == self.roles[k] {
                     continue;

@@ -34,22 +34,17 @@ impl Pipeline<'_, '_> {
         self.record("objects", started, true, why + &limit)
     }
 
-    /// Stores full paths to the present lamps and settles all roles on them. Also returns the remark of
+    /// Stores full paths to the present lamps, fits all that is free to them, and settles the roles. Also returns the remark of
     /// [`Self::stored`] on their number.
     fn fit_full_paths(&mut self) -> Result<(PathCache, String), Termination> {
         self.monitor.phase("tracing paths to the lamps");
         let lights = self.lights();
         let (cache, limit) = self.stored(&lights, None, 1, self.budget.round_paths)?;
-        self.fit_stored(&cache)?;
-        Ok((cache, limit))
-    }
-
-    /// Fits all that is free to stored paths, and settles the roles on them.
-    fn fit_stored(&mut self, cache: &PathCache) -> Result<(), Termination> {
         self.monitor.phase("fitting albedo and emission");
         // Roles are tested with even weights, since residuals under a wrong role are no measure of noise.
         self.robust = RobustWeights::even(self.roles.len());
-        let fitted = self.fit(cache)?;
-        self.settle_roles(cache, fitted)
+        let fitted = self.fit(&cache)?;
+        self.settle_roles(&cache, fitted)?;
+        Ok((cache, limit))
     }
 }

@@ -6,12 +6,6 @@ use crate::inverse::roles::Role;
 use glam::Vec3;
 
 impl Pipeline<'_, '_> {
-    /// The role of an object, given its role according to the photographs and its known values.
-    pub(super) fn allowed(&self, object: usize, role: Role) -> Role {
-        role_under(self.monitor.known.object(object), role)
-    }
-
-    /// Whether an object's emission is known.
     pub(super) fn emission_is_known(&self, object: usize) -> bool {
         self.monitor.known.object(object).emission.is_some()
     }
@@ -57,8 +51,8 @@ impl Pipeline<'_, '_> {
     }
 }
 
-/// The role under known values: a known emission decides whether the object emits, and with a known albedo it reflects.
-fn role_under(pinned: Pinned, role: Role) -> Role {
+/// The role, according to the photographs and under known values: a known emission decides whether the object emits, and with a known albedo it reflects.
+pub(super) fn role_under(pinned: Pinned, role: Role) -> Role {
     let emits = pinned.emission.map(|emission| emission != Vec3::ZERO);
     match (emits, role) {
         (Some(false), Role::Emitter | Role::Glowing) => Role::Reflector,

@@ -2,10 +2,8 @@
 //! stage is a method in the file of its name and stores its result in the [`Pipeline`].
 
 pub mod budget;
-mod depth;
 mod describe;
 mod emitters;
-mod exposures;
 mod fitting;
 mod full_paths;
 mod gloss;

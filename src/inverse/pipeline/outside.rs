@@ -204,7 +204,6 @@ impl Pipeline<'_, '_> {
         found > SUN_ERRORS * luminance(self.errors.emission[sun])
     }
 
-    /// Fits everything with outside light.
     fn fit_open(
         &mut self,
         surroundings: Surroundings,
@@ -244,7 +243,6 @@ impl Pipeline<'_, '_> {
         })
     }
 
-    /// The present result of a trial.
     fn found(&self) -> Found {
         Found {
             roles: self.roles.clone(),
@@ -258,7 +256,6 @@ impl Pipeline<'_, '_> {
         }
     }
 
-    /// Restores the result of a trial.
     fn go_back_to(&mut self, found: Found) {
         self.roles = found.roles;
         self.unknowns = found.unknowns;
@@ -333,7 +330,6 @@ impl Misfit {
         Self(clusters.map(of).collect())
     }
 
-    /// Mean over all pixels.
     fn mean(&self) -> f64 {
         let (sum, pixels) = (self.0.iter()).fold((0.0, 0.0), |(sum, all), (square, pixels)| {
             (sum + square * pixels, all + pixels)

@@ -1,9 +1,15 @@
-//! Reports of a solve: the present estimate, stages with their losses, and checkpoints.
+//! Reports of a solve: the present estimate, stages with their losses, exposures, path depth, and checkpoints.
 
+use crate::calibrate::exposure::Exposures;
 use crate::inverse::fit::model_error;
+use crate::inverse::loss::LateLight;
 use crate::inverse::paths::evaluate::Linearised;
-use crate::inverse::pipeline::{Pipeline, STAGES, describe};
+use crate::inverse::pipeline::{MAX_DEPTH, Pipeline, STAGES, describe};
 use crate::inverse::solver::{Checkpoint, Solution, Stage, Termination};
+use glam::{DVec2, Vec3};
+
+/// A common fixed depth, in bounces.
+const COMMON_DEPTH: u32 = 10;
 
 impl Pipeline<'_, '_> {
     /// Updates the estimate from the present unknowns.
@@ -96,6 +102,62 @@ impl Pipeline<'_, '_> {
         });
     }
 
+    pub(super) fn tell_exposures(&mut self, exposures: &Exposures, started: f64) {
+        let (min, max) = exposures.range();
+        let fraction = exposures.gain.max(0.0) * 100.0;
+        let mut why = if exposures.differ {
+            format!(
+                "exposure and white balance of each photograph, {min:.2} to {max:.2} times their median, explain {fraction:.0} % of \
+                 the disagreement between photographs on shared surfaces"
+            )
+        } else {
+            format!(
+                "exposures would explain only {fraction:.0} % of the disagreement between photographs and are not used"
+            )
+        };
+        if let Some((vignetting, camera)) =
+            exposures.vignetting.zip(self.problem.scene.cameras.first())
+        {
+            let corner = vignetting.factor(&camera.intrinsics, DVec2::ZERO);
+            why.push_str(&format!(
+                "; vignetting to {:.0} % in the corners explains {:.0} % of the rest",
+                corner.element_sum() / 3.0 * 100.0,
+                exposures.vignetting_gain * 100.0
+            ));
+        }
+        if let Some(response) = exposures.response {
+            let [half, full] =
+                [0.5, 1.0].map(|value| response.light(Vec3::splat(value), Vec3::ONE));
+            let of_half = half / full * 100.0;
+            why.push_str(&format!(
+                "; a camera response that maps half of the largest value to {:.0} %, {:.0} % and {:.0} % of the largest radiance \
+                 (red, green, blue) explains {:.0} % of what remains",
+                of_half.x,
+                of_half.y,
+                of_half.z,
+                exposures.response_gain * 100.0
+            ));
+        }
+        self.record_unmeasured("exposures", started, exposures.needed(), why);
+    }
+
+    /// Records the path depth, and the fraction of the photographed light beyond it, or beyond [`COMMON_DEPTH`] if it is unlimited.
+    pub(super) fn tell_depth(&mut self) {
+        let started = self.monitor.seconds();
+        let limit = match self.monitor.settings.bounces {
+            0 => None,
+            _ => Some(self.max_bounces),
+        };
+        // Deeper paths than those of a limited solve measure what it leaves out.
+        let deep = self.losses.deepened(MAX_DEPTH);
+        let bounces = limit.unwrap_or(COMMON_DEPTH);
+        let late = deep.beyond(self.problem, &self.estimate, bounces);
+        if let Some(late) = &late {
+            self.monitor.cast(late.cast);
+        }
+        self.record_unmeasured("depth", started, true, depth_in_words(limit, late.as_ref()));
+    }
+
     /// Ends a stage: updates the checkpoint, and offers it to the observer.
     pub(super) fn end_stage(&mut self, stages: u32) -> Result<(), Termination> {
         self.keep_checkpoint(stages);
@@ -125,5 +187,26 @@ impl Pipeline<'_, '_> {
             termination,
             checkpoint: (!done).then_some(self.checkpoint),
         }
+    }
+}
+
+/// The path depth, and what lies beyond it, in one sentence.
+fn depth_in_words(limit: Option<u32>, late: Option<&LateLight>) -> String {
+    let fraction = late.map(|late| {
+        format!(
+            "{:.2} ± {:.2} % of the light in the photographs",
+            late.fraction * 100.0,
+            late.stderr * 100.0
+        )
+    });
+    match (limit, fraction) {
+        (None, Some(fraction)) => format!(
+            "paths end by Russian roulette alone and leave nothing out; with the albedos found, {fraction} comes after {COMMON_DEPTH} bounces"
+        ),
+        (None, None) => "paths end by Russian roulette alone and leave nothing out".to_owned(),
+        (Some(limit), Some(fraction)) => format!(
+            "paths end after {limit} bounces, as set, and with the albedos found leave out {fraction}"
+        ),
+        (Some(limit), None) => format!("paths end after {limit} bounces, as set"),
     }
 }

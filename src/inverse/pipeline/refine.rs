@@ -6,7 +6,6 @@ use crate::inverse::fit::accumulate::Accumulated;
 use crate::inverse::fit::errors::{StandardErrors, jackknifed, standard_errors};
 use crate::inverse::fit::linear::{Descended, descend};
 use crate::inverse::fit::path_noise;
-use crate::inverse::fit::path_noise::distribute_paths;
 use crate::inverse::paths::evaluate::Linearised;
 use crate::inverse::paths::lamp_patches::LampPatches;
 use crate::inverse::pipeline::Pipeline;
@@ -41,7 +40,6 @@ const LIGHTING_LAMPS: u64 = 32;
 const ENOUGH_FOR_TEXTURES: f64 = 5e-3;
 
 /// The linearised clusters over all rounds.
-#[derive(Debug)]
 pub struct Summed {
     /// Mean over the rounds of each cluster.
     pub clusters: Vec<Linearised>,
@@ -68,7 +66,6 @@ impl Rounds {
     }
 }
 
-/// A part of the rounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Leg {
     /// Until the light is accurate enough for textures.
@@ -122,11 +119,7 @@ impl Pipeline<'_, '_> {
         let lights = self.lights();
         self.patches = LampPatches::new(&self.problem.scene, &self.roles);
         self.weigh_by_prediction(&lights)?;
-        distribute_paths(
-            &mut self.clusters,
-            self.roles.len(),
-            self.budget.round_paths,
-        );
+        self.distribute(self.budget.round_paths);
         // Including the albedos of lamps.
         let free = roles::free(&self.roles, |k| self.has_free_albedo(k));
         Ok(Rounds {
@@ -276,17 +269,23 @@ impl Pipeline<'_, '_> {
         self.monitor.cast(cast);
     }
 
-    /// Weights the clusters by levels predicted from a few paths, which are independent of those of the rounds.
+    /// Weights the clusters by levels predicted from a few paths, which are independent of those of the rounds. Each albedo is raised
+    /// by its standard error: objects wrongly estimated as black would otherwise get too much weight.
     fn weigh_by_prediction(&mut self, lights: &Emitters) -> Result<(), Termination> {
-        let paths = self.budget.round_paths / PREDICTING;
-        distribute_paths(&mut self.clusters, self.roles.len(), paths);
+        self.distribute(self.budget.round_paths / PREDICTING);
         let least =
             (self.budget.round_paths / self.clusters.len().max(1) as u64).min(MIN_PREDICTING);
         for cluster in &mut self.clusters {
             let a_pixel = least.div_ceil(2 * cluster.pixels.len() as u64);
             cluster.paths = cluster.paths.max(a_pixel as u32);
         }
-        let levels = self.levels(lights, 3)?;
+        let mut unknowns = self.unknowns.clone();
+        for (k, albedo) in unknowns.albedo.iter_mut().enumerate() {
+            if self.roles[k].reflects() {
+                *albedo = (*albedo + self.errors.albedo[k]).min(Vec3::ONE);
+            }
+        }
+        let levels = self.traced(lights, None, 3, 0, |slice| slice.levels(&unknowns))?;
         for (cluster, level) in self.clusters.iter_mut().zip(levels) {
             cluster.weigh(level);
         }
@@ -360,12 +359,7 @@ mod tests {
 
     #[test]
     fn a_step_is_nonlinear_by_its_square_against_its_own_error() {
-        let unknowns = |albedo: f32, emission: f32| {
-            let mut unknowns = Unknowns::new(2);
-            unknowns.albedo[0] = Vec3::splat(albedo);
-            unknowns.emission[1] = Vec3::splat(emission);
-            unknowns
-        };
+        let unknowns = |albedo, emission| Unknowns::grey([albedo, 0.5], [0.0, emission]);
         let mut errors = StandardErrors {
             albedo: vec![Vec3::splat(0.06), Vec3::splat(0.5)],
             emission: vec![Vec3::INFINITY, Vec3::splat(0.01)],

@@ -1,6 +1,5 @@
 //! Refits all albedos and lamps with the effect of the textures.
 
-use crate::inverse::fit::path_noise::distribute_paths;
 use crate::inverse::pipeline::Pipeline;
 use crate::inverse::pipeline::textures::Detail;
 use crate::inverse::solver::Termination;
@@ -39,11 +38,7 @@ impl Pipeline<'_, '_> {
             self.held_out_each(),
         );
         let lights = self.lights();
-        distribute_paths(
-            &mut self.clusters,
-            self.roles.len(),
-            self.budget.round_paths,
-        );
+        self.distribute(self.budget.round_paths);
         // The change by textures is relative to the mean albedos that they were fitted with.
         let mut flat = self.unknowns.clone();
         for (k, albedo) in detail.albedo.iter().enumerate() {
@@ -92,7 +87,6 @@ impl Pipeline<'_, '_> {
         self.record("refit", started, kept, why)
     }
 
-    /// The loss of each held-out pixel.
     pub(super) fn held_out_each(&mut self) -> Vec<f64> {
         let (each, cast) = self.losses.held_out_each(self.problem, &self.estimate);
         self.monitor.cast(cast);

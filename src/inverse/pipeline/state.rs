@@ -15,9 +15,7 @@ use serde::{Deserialize, Serialize};
 /// The result of the finished stages.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SolverState {
-    /// Number of finished stages.
     stages: u32,
-    /// Whether light comes from outside.
     open: bool,
     /// Distance of the outside light.
     #[serde(default)]
@@ -30,9 +28,7 @@ pub struct SolverState {
     expected: Option<ExpectedAlbedo>,
     /// Prior of the outside light: mean and standard deviation by direction.
     directions: Vec<(Vec3, Vec3)>,
-    /// Role of each surface.
     roles: Vec<Role>,
-    /// Values of all unknowns.
     unknowns: Unknowns,
     /// Variance of the model error, relative to reflected radiance.
     #[serde(default)]
@@ -62,7 +58,6 @@ impl SolverState {
 }
 
 impl Pipeline<'_, '_> {
-    /// The present state.
     pub(super) fn state(&self) -> SolverState {
         let lobes = self.lobes.iter();
         SolverState {

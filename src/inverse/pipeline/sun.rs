@@ -102,7 +102,6 @@ impl Patch {
     }
 }
 
-/// The search's data.
 struct Search<'a> {
     scene: &'a Scene,
     sky: Option<&'a MeasuredOutside>,
@@ -182,7 +181,6 @@ impl Search<'_> {
     }
 }
 
-/// The pixels' directions of a map.
 fn directions(columns: usize) -> impl Iterator<Item = Vec3> {
     let rows = columns / 2;
     (0..columns * rows).map(move |pixel| direction_of(columns, rows, pixel))

@@ -15,7 +15,6 @@ use std::cell::Cell;
 /// Textures, and their effect on the fit of mean albedos.
 #[derive(Debug, Clone)]
 pub(super) struct Detail {
-    /// The textures.
     pub refined: Refined,
     /// The albedo of each object that they were fitted with.
     pub albedo: Vec<Vec3>,

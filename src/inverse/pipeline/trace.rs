@@ -11,7 +11,6 @@ use crate::inverse::pipeline::Pipeline;
 use crate::inverse::roles::Role;
 use crate::inverse::solver::Termination;
 use crate::transport::emitters::Emitters;
-use glam::Vec3;
 use std::time::{Duration, Instant};
 
 /// Target duration of a slice.
@@ -27,6 +26,11 @@ fn paths(clusters: &[Cluster]) -> u64 {
 }
 
 impl Pipeline<'_, '_> {
+    /// Distributes `paths` paths over the clusters.
+    pub(super) fn distribute(&mut self, paths: u64) {
+        distribute_paths(&mut self.clusters, self.roles.len(), paths);
+    }
+
     /// Traces and stores about `paths` paths of the clusters, fewer if memory does not suffice. Also returns a remark on that, or
     /// an empty string.
     pub(super) fn stored(
@@ -37,7 +41,6 @@ impl Pipeline<'_, '_> {
         paths: u64,
     ) -> Result<(PathCache, String), Termination> {
         let allowed = memory::allowed(self.monitor.settings.memory);
-        let surfaces = self.roles.len();
         let mut fits = paths;
         let expected = self.expected_albedo();
         if !memory::suffices(
@@ -46,7 +49,7 @@ impl Pipeline<'_, '_> {
             max_mean_path_length(self.max_albedo(&expected)),
         ) {
             // A pilot measures the mean length of these paths.
-            distribute_paths(&mut self.clusters, surfaces, 0);
+            self.distribute(0);
             let step = self.clusters.len().div_ceil(PILOT_CLUSTERS).max(1);
             let pilot: Vec<_> = self.clusters.iter().step_by(step).cloned().collect();
             let pilot = self
@@ -61,7 +64,7 @@ impl Pipeline<'_, '_> {
             let pixels = (fits / 2).min(self.budget.pixels as u64);
             self.clusters = cluster(self.problem, &self.gbuffer, pixels as usize);
         }
-        distribute_paths(&mut self.clusters, surfaces, fits);
+        self.distribute(fits);
         let clusters = self.traced(lights, measured, stage, 0, |slice| slice.clusters)?;
         let limit = match fits < paths {
             true => {
@@ -70,27 +73,7 @@ impl Pipeline<'_, '_> {
             }
             false => String::new(),
         };
-        let cache = PathCache {
-            clusters,
-            ..PathCache::default()
-        };
-        Ok((cache, limit))
-    }
-
-    /// The clusters' levels predicted by paths, with each albedo raised by its standard error: objects wrongly estimated as black
-    /// would otherwise get too much weight.
-    pub(super) fn levels(
-        &mut self,
-        lights: &Emitters,
-        stage: u64,
-    ) -> Result<Vec<Vec3>, Termination> {
-        let mut unknowns = self.unknowns.clone();
-        for (k, albedo) in unknowns.albedo.iter_mut().enumerate() {
-            if self.roles[k].reflects() {
-                *albedo = (*albedo + self.errors.albedo[k]).min(Vec3::ONE);
-            }
-        }
-        self.traced(lights, None, stage, 0, |slice| slice.levels(&unknowns))
+        Ok((PathCache::from(clusters), limit))
     }
 
     /// Traces the clusters' paths in slices, with reports in between, and joins what `of_slice` makes of the slices, in order. The

@@ -122,13 +122,8 @@ impl Pipeline<'_, '_> {
         let max_tried = MAX_TRIED[usize::from(!at_first)];
         let mut promising: Vec<ScoreTest> = Vec::new();
         let all = self.free();
-        let light = all.iter().copied().filter(|&i| i >= surfaces).collect();
-        let tests = if at_first {
-            vec![light, all]
-        } else {
-            vec![all]
-        };
-        for mut free in tests {
+        let light: Vec<usize> = all.iter().copied().filter(|&i| i >= surfaces).collect();
+        for mut free in at_first.then_some(light).into_iter().chain([all]) {
             let active = free.len();
             free.extend(candidates.iter().map(|k| surfaces + k));
             let equations =

@@ -87,7 +87,7 @@ pub fn scan(draft: Draft) -> Result<Generated> {
     }
     let all: Vec<usize> = (0..frames.len()).collect();
     poses::refine(&mut frames, &all)?;
-    let voxel = voxel_size(&frames, None)?.edge;
+    let (voxel, _) = voxel_size(&frames, None)?;
     let mesh = fuse(&frames, voxel, MAX_BYTES, &mut |_, _| {})?;
 
     let photographs = files

@@ -7,12 +7,10 @@ use crate::error::{Error, Result};
 use glam::DVec3;
 use std::collections::HashMap;
 
-/// Longest file that is read.
 const MAX_BYTES: u64 = 1 << 32;
 /// Bytes of an image's feature point: x, y, and the id of its 3-D point.
 const POINT_BYTES: u64 = 24;
 
-/// The unread bytes.
 struct Cursor<'a>(&'a [u8]);
 
 impl<'a> Cursor<'a> {
@@ -22,20 +20,9 @@ impl<'a> Cursor<'a> {
         Some(head)
     }
 
-    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
-        self.take(N)?.try_into().ok()
-    }
-
-    fn u32(&mut self) -> Option<u32> {
-        self.array().map(u32::from_le_bytes)
-    }
-
-    fn u64(&mut self) -> Option<u64> {
-        self.array().map(u64::from_le_bytes)
-    }
-
-    fn f64(&mut self) -> Option<f64> {
-        self.array().map(f64::from_le_bytes)
+    /// A number by its function `from_le_bytes`.
+    fn number<T, const N: usize>(&mut self, from: fn([u8; N]) -> T) -> Option<T> {
+        self.take(N)?.try_into().ok().map(from)
     }
 
     fn text(&mut self) -> Option<String> {
@@ -55,19 +42,24 @@ fn broken(folder: &Folder, name: &str, index: u64, problem: &str) -> Error {
 }
 
 /// Cameras by id. An entry is: id, model, width, height, parameters.
-///
-/// # Errors
-/// The file ends too early or holds an impossible camera.
 pub fn cameras(folder: &Folder, name: &str) -> Result<HashMap<u32, Lens>> {
     let bytes = folder.bytes(name, MAX_BYTES)?;
     let mut cursor = Cursor(&bytes);
     let cut = |index| broken(folder, name, index, "is cut off");
-    let count = cursor.u64().ok_or_else(|| cut(0))?;
+    let count = cursor.number(u64::from_le_bytes).ok_or_else(|| cut(0))?;
     let mut cameras = HashMap::new();
     for index in 0..count {
         let mut head = || {
-            let (id, kind) = (cursor.u32()?, cursor.u32()?);
-            Some((id, kind as i32, cursor.u64()?, cursor.u64()?))
+            let (id, kind) = (
+                cursor.number(u32::from_le_bytes)?,
+                cursor.number(u32::from_le_bytes)?,
+            );
+            Some((
+                id,
+                kind as i32,
+                cursor.number(u64::from_le_bytes)?,
+                cursor.number(u64::from_le_bytes)?,
+            ))
         };
         let (id, kind, width, height) = head().ok_or_else(|| cut(index))?;
         let known = model::MODELS.iter().find(|(number, _, _)| *number == kind);
@@ -75,7 +67,9 @@ pub fn cameras(folder: &Folder, name: &str) -> Result<HashMap<u32, Lens>> {
             let problem = format!("has the unknown camera model {kind}");
             return Err(broken(folder, name, index, &problem));
         };
-        let values: Option<Vec<f64>> = (0..*parameters).map(|_| cursor.f64()).collect();
+        let values: Option<Vec<f64>> = (0..*parameters)
+            .map(|_| cursor.number(f64::from_le_bytes))
+            .collect();
         let values = values.ok_or_else(|| cut(index))?;
         let (Ok(width), Ok(height)) = (u32::try_from(width), u32::try_from(height)) else {
             return Err(broken(folder, name, index, "has an impossible size"));
@@ -88,14 +82,11 @@ pub fn cameras(folder: &Folder, name: &str) -> Result<HashMap<u32, Lens>> {
 }
 
 /// Images. An entry is: id, quaternion, translation, camera, name, points.
-///
-/// # Errors
-/// The file ends too early.
 pub fn images(folder: &Folder, name: &str) -> Result<Vec<Image>> {
     let bytes = folder.bytes(name, MAX_BYTES)?;
     let mut cursor = Cursor(&bytes);
     let cut = |index| broken(folder, name, index, "is cut off");
-    let count = cursor.u64().ok_or_else(|| cut(0))?;
+    let count = cursor.number(u64::from_le_bytes).ok_or_else(|| cut(0))?;
     let mut images = Vec::new();
     for index in 0..count {
         let image = image(&mut cursor).ok_or_else(|| cut(index))?;
@@ -105,13 +96,15 @@ pub fn images(folder: &Folder, name: &str) -> Result<Vec<Image>> {
 }
 
 fn image(cursor: &mut Cursor) -> Option<Image> {
-    cursor.u32()?;
-    let mut number = || cursor.f64();
+    cursor.number(u32::from_le_bytes)?;
+    let mut number = || cursor.number(f64::from_le_bytes);
     let quaternion = [number()?, number()?, number()?, number()?];
     let translation = DVec3::new(number()?, number()?, number()?);
-    let camera = cursor.u32()?;
+    let camera = cursor.number(u32::from_le_bytes)?;
     let name = cursor.text()?;
-    let points = cursor.u64()?.checked_mul(POINT_BYTES)?;
+    let points = cursor
+        .number(u64::from_le_bytes)?
+        .checked_mul(POINT_BYTES)?;
     cursor.take(usize::try_from(points).ok()?)?;
     Some(Image {
         quaternion,

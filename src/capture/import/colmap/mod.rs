@@ -43,15 +43,10 @@ fn find(folder: &Folder) -> Option<(&'static str, bool)> {
     })
 }
 
-/// Whether a folder holds a model.
 pub fn is_here(folder: &Folder) -> bool {
     find(folder).is_some()
 }
 
-/// Reads the model.
-///
-/// # Errors
-/// The model is missing or broken, or a photograph is missing.
 pub fn read(folder: &Folder) -> Result<Scan> {
     let Some((place, is_binary)) = find(folder) else {
         return Err(Error::file(
@@ -89,7 +84,6 @@ pub fn read(folder: &Folder) -> Result<Scan> {
     Ok(scan)
 }
 
-/// The frame of an image.
 fn frame(
     folder: &Folder,
     place: &str,

@@ -4,7 +4,6 @@ use crate::capture::scan::lens::{Lens, Model};
 use glam::DVec3;
 
 /// An image of the model.
-#[derive(Debug, Clone, PartialEq)]
 pub struct Image {
     /// Quaternion w, x, y, z of the rotation from world to camera.
     pub quaternion: [f64; 4],

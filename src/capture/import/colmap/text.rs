@@ -17,9 +17,6 @@ fn broken(folder: &Folder, name: &str, line: usize, problem: &str) -> Error {
 }
 
 /// Cameras by id, from lines of `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`.
-///
-/// # Errors
-/// A line is something else.
 pub fn cameras(folder: &Folder, name: &str) -> Result<HashMap<u32, Lens>> {
     let text = folder.text(name)?;
     let mut cameras = HashMap::new();
@@ -45,9 +42,6 @@ pub fn cameras(folder: &Folder, name: &str) -> Result<HashMap<u32, Lens>> {
 }
 
 /// Images, from pairs of lines: `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME` and the image's points, which may be empty.
-///
-/// # Errors
-/// A line is something else.
 pub fn images(folder: &Folder, name: &str) -> Result<Vec<Image>> {
     let text = folder.text(name)?;
     let mut images = Vec::new();

@@ -33,9 +33,6 @@ fn opencv_lens(size: [u32; 2], [fx, fy, cx, cy]: [f64; 4]) -> Lens {
 }
 
 /// The lens of a file with OpenCV's matrix of intrinsics.
-///
-/// # Errors
-/// The file holds no matrix, or an impossible one.
 fn opencv_camera(folder: &Folder, name: &str, size: [u32; 2]) -> Result<Lens> {
     let k = rows(folder, name)?;
     let lens = opencv_lens(size, [k[0][0], k[1][1], k[0][2], k[1][2]]);
@@ -43,9 +40,6 @@ fn opencv_camera(folder: &Folder, name: &str, size: [u32; 2]) -> Result<Lens> {
 }
 
 /// Refuses an impossible lens from the file at `path`.
-///
-/// # Errors
-/// A number is not finite, or a focal length not positive.
 fn possible(lens: Lens, path: &Path) -> Result<Lens> {
     match lens.is_possible() {
         true => Ok(lens),

@@ -45,10 +45,6 @@ const MESHES: [&str; 4] = [
 /// A frame's index, and the rows of its camera-to-world matrix.
 type PosedFrame = (usize, Vec<Vec<f64>>);
 
-/// Whether a folder has this layout.
-///
-/// # Errors
-/// The folder cannot be read.
 pub fn is_here(folder: &Folder) -> Result<bool> {
     let images = folder.has_folder("depth") && color_folder(folder).is_some();
     Ok(images && trajectory_name(folder)?.is_some())
@@ -68,10 +64,6 @@ fn trajectory_name(folder: &Folder) -> Result<Option<String>> {
     Ok(names.into_iter().find(|name| name.ends_with(".log")))
 }
 
-/// Reads the frames and finds the mesh.
-///
-/// # Errors
-/// A file is missing or broken, or a pose names an image that does not exist.
 pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
     let mut scan = Scan {
         is_video: true,
@@ -160,7 +152,6 @@ fn images(folder: &Folder, inside: &str, ends: &[&str]) -> Result<Vec<String>> {
         .collect())
 }
 
-/// The poses of a `.log` file.
 fn from_log(folder: &Folder, name: &str) -> Result<Vec<PosedFrame>> {
     let text = folder.text(name)?;
     let path = folder.path(name);
@@ -192,7 +183,6 @@ fn from_log(folder: &Folder, name: &str) -> Result<Vec<PosedFrame>> {
     Ok(poses)
 }
 
-/// The poses of a JSON trajectory.
 fn from_json(folder: &Folder, name: &str) -> Result<Vec<PosedFrame>> {
     let path = folder.path(name);
     let value = folder.json(name)?;
@@ -229,7 +219,6 @@ fn column_major(value: Option<&Value>, count: usize) -> Option<Vec<f64>> {
     fields::numbers(value?).filter(|numbers| numbers.len() == count)
 }
 
-/// The colour camera.
 fn camera(
     folder: &Folder,
     size: [u32; 2],

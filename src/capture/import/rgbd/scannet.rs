@@ -17,17 +17,12 @@ use glam::DMat3;
 const COLOR_CAMERA: &str = "intrinsic/intrinsic_color.txt";
 const DEPTH_CAMERA: &str = "intrinsic/intrinsic_depth.txt";
 
-/// Whether a folder has this layout.
 pub fn is_here(folder: &Folder) -> bool {
     ["color", "depth", "pose", "intrinsic"]
         .iter()
         .all(|name| folder.has_folder(name))
 }
 
-/// Reads the frames and finds the mesh.
-///
-/// # Errors
-/// A frame lacks its photograph or depth image, or a file is broken.
 pub fn read(folder: &Folder) -> Result<Scan> {
     let mut scan = Scan {
         is_video: true,

@@ -14,17 +14,12 @@ use crate::capture::scan::depth::DepthImage;
 use crate::capture::scan::lens::Lens;
 use crate::error::{Error, Result};
 
-/// Suffix of a pose file's name.
 const POSE: &str = ".pose.txt";
 /// Names of 3DMatch's intrinsics.
 const INTRINSICS: [&str; 2] = ["camera-intrinsics.txt", "intrinsics.txt"];
 /// Depth value for missing depth.
 const INVALID: u16 = 65535;
 
-/// Whether a folder has this layout.
-///
-/// # Errors
-/// The folder cannot be read.
 pub fn is_here(folder: &Folder) -> Result<bool> {
     for sequence in sequences(folder)? {
         if folder.names(&sequence)?.iter().any(|n| n.ends_with(POSE)) {
@@ -43,10 +38,6 @@ fn sequences(folder: &Folder) -> Result<Vec<String>> {
     Ok(std::iter::once(String::new()).chain(inner).collect())
 }
 
-/// Reads the frames of all sequences.
-///
-/// # Errors
-/// A frame lacks its photograph or depth image, or a file is broken.
 pub fn read(folder: &Folder, options: &ImportOptions) -> Result<Scan> {
     let mut scan = Scan {
         is_video: true,

@@ -33,13 +33,11 @@ const TRAJECTORIES: [&str; 4] = [
 const ASSOCIATIONS: [&str; 2] = ["associations.txt", "associated.txt"];
 
 /// A line of a list: timestamp and the words after it.
-#[derive(Debug, Clone)]
 struct Entry {
     stamp: f64,
     words: Vec<String>,
 }
 
-/// Whether a folder has TUM's layout.
 pub fn is_here(folder: &Folder) -> bool {
     let images =
         (folder.has("rgb.txt") && folder.has("depth.txt")) || folder.first(&ASSOCIATIONS).is_some();
@@ -47,9 +45,6 @@ pub fn is_here(folder: &Folder) -> bool {
 }
 
 /// Whether a folder is ICL-NUIM's: a trajectory called `*.gt.freiburg` beside the images.
-///
-/// # Errors
-/// The folder cannot be read.
 pub fn is_icl_nuim(folder: &Folder) -> Result<bool> {
     Ok(folder.has_folder("depth") && folder.has_folder("rgb") && freiburg(folder)?.is_some())
 }
@@ -61,9 +56,6 @@ fn freiburg(folder: &Folder) -> Result<Option<String>> {
 }
 
 /// Reads the frames; `left_handed` for ICL-NUIM's cameras.
-///
-/// # Errors
-/// A list is missing or broken, or names a file that is not there.
 pub fn read(folder: &Folder, options: &ImportOptions, left_handed: bool) -> Result<Scan> {
     let mut scan = Scan {
         is_video: true,
