@@ -9,6 +9,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 /// A decoded frame.
 pub struct View {
+    /// Camera to world.
     pub pose: Pose,
     pub depth: DepthMap,
     lens: Lens,
@@ -16,6 +17,7 @@ pub struct View {
 }
 
 impl View {
+    /// Decodes a frame that has depth.
     pub fn load(frame: &ImportedFrame) -> Result<Self> {
         let (photograph, depth) = frame.load()?;
         let (pose, lens) = (frame.pose, frame.lens);

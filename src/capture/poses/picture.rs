@@ -30,12 +30,15 @@ pub struct Picture {
 
 /// An image of one channel.
 pub struct Grey {
+    /// Size in pixels.
     pub width: usize,
     pub height: usize,
+    /// Row by row from the top left.
     values: Vec<f32>,
 }
 
 impl Picture {
+    /// Decodes a frame that has depth.
     pub fn load(frame: &ImportedFrame) -> Result<Self> {
         let (photograph, depth) = frame.load()?;
         let k = &frame.lens.pinhole;

@@ -24,6 +24,7 @@ struct Region {
     normal: DVec3,
     color: DVec3,
     position: DVec3,
+    /// A saturated region is never merged.
     saturated: bool,
     /// Counts merges; candidates of older versions are outdated.
     version: u32,
