@@ -94,13 +94,6 @@ pub struct SolveArguments {
     pub capture: PathBuf,
     #[command(flatten)]
     pub solve: SolveOptions,
-    #[command(flatten)]
-    pub known: KnownValues,
-}
-
-/// Object values that are known and held fixed.
-#[derive(Debug, Args)]
-pub struct KnownValues {
     /// Radiance that an object is known to emit; held while the rest is solved
     #[arg(long, value_name = "NAME=R,G,B", value_parser = named_color)]
     pub known_emission: Vec<(String, Vec3)>,

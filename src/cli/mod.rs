@@ -82,8 +82,8 @@ fn act(arguments: Arguments, window: Option<Window>) -> Result<i32> {
         Some(Action::Study(studied)) => study::study(&studied).map(done),
         Some(Action::Solve(capture)) => {
             let known = ObjectValues {
-                emission: capture.known.known_emission,
-                albedo: capture.known.known_albedo,
+                emission: capture.known_emission,
+                albedo: capture.known_albedo,
                 ..ObjectValues::default()
             };
             let mut options = capture.solve;

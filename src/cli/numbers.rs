@@ -79,6 +79,14 @@ pub fn triple(text: &str) -> Parsed<DVec3> {
     }
 }
 
+/// Focal lengths fx and fy, and the principal point cx and cy.
+pub fn intrinsics(text: &str) -> Parsed<[f64; 4]> {
+    match numbers(text).as_deref() {
+        Some(&[fx, fy, cx, cy]) if fx > 0.0 && fy != 0.0 => Ok([fx, fy, cx, cy]),
+        _ => Err("four numbers are wanted, e.g. 525,525,319.5,239.5".to_owned()),
+    }
+}
+
 fn numbers(text: &str) -> Option<Vec<f64>> {
     text.split(',').map(|part| finite(part.trim())).collect()
 }

@@ -94,21 +94,16 @@ pub fn scan(draft: Draft) -> Result<Generated> {
         .iter()
         .map(|file| phone::decode(file))
         .collect::<Result<_>>()?;
-    let mut capture = draft.room.capture_of(photographs, draft.rendering.size);
-    for (frame, imported) in capture.frames.iter_mut().zip(&frames) {
+    let mut scanned = draft.photographed(lit, photographs);
+    for (frame, imported) in scanned.capture.frames.iter_mut().zip(&frames) {
         frame.pose = imported.pose;
     }
-    capture.mesh = mesh;
-    capture.segmentation = Some(Segmentation {
+    scanned.capture.mesh = mesh;
+    scanned.capture.segmentation = Some(Segmentation {
         file: PathBuf::from("fused mesh"),
         wanted: None,
     });
-    Ok(Generated {
-        family: draft.family,
-        seed: draft.seed,
-        capture,
-        lit,
-    })
+    Ok(scanned)
 }
 
 /// Denoised renderings of all views. The rare bright samples of a path tracer are no noise of a camera: poses would follow them,
