@@ -7,8 +7,8 @@ pub mod woodwork;
 use crate::room::shape::Modeller;
 use glam::DVec3;
 
-/// Four round legs from the corners of a rectangle of half sizes `half` at the height `top`. Their feet stand out by `splay` along x
-/// and z; `radii` are those of foot and top.
+/// Four round legs from the corners of a rectangle of half sizes `half` at the height `top`. Their feet stand out by `splay` along
+/// x and z; `radii` are those of foot and top.
 fn legs(m: &mut Modeller, half: [f64; 2], top: f64, splay: [f64; 2], radii: [f64; 2]) {
     for x in [-1.0, 1.0] {
         for z in [-1.0, 1.0] {

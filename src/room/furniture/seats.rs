@@ -57,16 +57,14 @@ pub fn cushion(m: &mut Modeller, size: f64) {
 
 /// A round stool on three splayed legs.
 pub fn stool(m: &mut Modeller) {
-    m.lathe(
-        &[
-            [0.16, 0.42],
-            [0.175, 0.43],
-            [0.18, 0.445],
-            [0.175, 0.46],
-            [0.15, 0.466],
-        ],
-        20,
-    );
+    let seat = [
+        [0.16, 0.42],
+        [0.175, 0.43],
+        [0.18, 0.445],
+        [0.175, 0.46],
+        [0.15, 0.466],
+    ];
+    m.lathe(&seat, 20);
     for i in 0..3 {
         let turn = f64::from(i).mul_add(2.094, 0.5);
         let direction = DVec3::new(turn.cos(), 0.0, turn.sin());

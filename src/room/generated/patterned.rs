@@ -47,9 +47,8 @@ fn project(f: &mut Furnisher, object: u32) {
             continue;
         }
         let corners = mesh.triangles[triangle].map(|i| mesh.positions[i as usize]);
-        let normal = (corners[1] - corners[0])
-            .cross(corners[2] - corners[0])
-            .abs();
+        let [a, b, c] = corners;
+        let normal = (b - a).cross(c - a).abs();
         let flat = |p: DVec3| match normal.max_element() {
             max if max == normal.x => DVec2::new(p.z, p.y),
             max if max == normal.y => DVec2::new(p.x, p.z),

@@ -9,9 +9,8 @@ use crate::error::{Error, Result};
 use crate::math::picture::Picture;
 use crate::math::rng::Stream;
 use crate::room::cameras;
-use crate::room::generated::draft::Draft;
 use crate::room::generated::furnisher::Furnisher;
-use crate::room::generated::photographed::Generated;
+use crate::room::generated::photographed::{Draft, Generated};
 use crate::room::generated::{patterned, phone, window};
 use crate::room::photographs::{Rendering, render_lit};
 use crate::scene::Scene;
@@ -90,10 +89,8 @@ pub fn scan(draft: Draft) -> Result<Generated> {
     let voxel = voxel_size(&frames, None)?.edge;
     let mesh = fuse(&frames, voxel, MAX_BYTES, &mut |_, _| {})?;
 
-    let photographs = files
-        .iter()
-        .map(|file| phone::decode(file))
-        .collect::<Result<_>>()?;
+    let photographs = files.iter().map(|file| phone::decode(file));
+    let photographs = photographs.collect::<Result<_>>()?;
     let mut scanned = draft.photographed(lit, photographs);
     for (frame, imported) in scanned.capture.frames.iter_mut().zip(&frames) {
         frame.pose = imported.pose;
@@ -154,9 +151,8 @@ fn measure(scene: &Scene, camera: &Camera, stream: &mut Stream) -> Vec<f64> {
             return 0.0;
         };
         let depth = f64::from(hit.t * ray.direction.dot(camera.forward()));
-        let cosine = scene.normals[hit.triangle as usize]
-            .dot(ray.direction)
-            .abs();
+        let normal = scene.normals[hit.triangle as usize];
+        let cosine = normal.dot(ray.direction).abs();
         if depth > MAX_DEPTH || cosine < MIN_COSINE {
             return 0.0;
         }
