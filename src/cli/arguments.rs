@@ -132,13 +132,10 @@ mod tests {
                         "invalid float",
                         "is not in",
                     ];
-                    assert!(
-                        !vague.iter().any(|words| message.contains(words)),
-                        "{message}"
-                    );
-                    let named =
-                        message.contains(&option) && message.contains(&format!("'{value}'"));
-                    numbers += u32::from(named && message.contains("wanted"));
+                    let is_vague = vague.iter().any(|words| message.contains(words));
+                    assert!(!is_vague, "{message}");
+                    let wanted = [&option, &format!("'{value}'"), "wanted"];
+                    numbers += u32::from(wanted.iter().all(|words| message.contains(words)));
                 }
             }
         }

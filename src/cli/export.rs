@@ -66,12 +66,10 @@ fn check_extension(path: &Path, format: Format) -> Result<()> {
     let (Some(other), false) = (other, is_of(&format)) else {
         return Ok(());
     };
-    let (own, (other, _)) = (format.endings().join(" or ."), described(*other));
-    let problem = format!(
-        "has the wrong extension for --format {}",
-        described(format).0
-    );
-    let remedy = format!("use the extension .{own}, or choose --format {other}");
+    let [(own, _), (other, _)] = [format, *other].map(described);
+    let problem = format!("has the wrong extension for --format {own}");
+    let endings = format.endings().join(" or .");
+    let remedy = format!("use the extension .{endings}, or choose --format {other}");
     Err(Error::usage(path.display(), problem, remedy))
 }
 

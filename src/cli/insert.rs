@@ -236,10 +236,8 @@ mod tests {
         let made = parsed[1].material.expect("a material");
         let made = made.surface().material(None);
         let lobe = made.lobe.expect("a metal shines");
-        assert_eq!(
-            (lobe.roughness, lobe.specular),
-            (0.25, Vec3::new(0.9, 0.6, 0.3))
-        );
+        let gold = Vec3::new(0.9, 0.6, 0.3);
+        assert_eq!((lobe.roughness, lobe.specular), (0.25, gold));
         assert_eq!(parsed[0].at, Some(DVec3::new(-1.0, 0.0, 2.0)));
         assert_eq!((parsed[0].scale, parsed[0].rotate), (1.0, -90.0));
         assert_eq!(parsed[0].tilt, DVec2::new(-30.0, 15.0));
@@ -261,13 +259,10 @@ mod tests {
     fn materials_are_what_they_are_called_and_others_are_refused() {
         let made = |text| material(text).expect("valid").surface().material(None);
         assert!(made("diffuse:0.1,0.2,0.3").lobe.is_none());
-        let lobe = made("plastic:0.1,0.2,0.3,0.5")
-            .lobe
-            .expect("plastic shines");
-        assert_eq!(
-            (lobe.roughness, lobe.specular),
-            (0.5, Vec3::splat(DIELECTRIC))
-        );
+        let plastic = made("plastic:0.1,0.2,0.3,0.5");
+        let lobe = plastic.lobe.expect("plastic shines");
+        let specular = Vec3::splat(DIELECTRIC);
+        assert_eq!((lobe.roughness, lobe.specular), (0.5, specular));
         for text in [
             "",
             "diffuse",
@@ -280,10 +275,8 @@ mod tests {
             "plastic:0.1,NaN,0.3,0.5",
             "glass:0.1,0.2,0.3,0.5",
         ] {
-            assert!(
-                material(text).is_err_and(|e| e.contains("is wanted")),
-                "{text}"
-            );
+            let refused = material(text).is_err_and(|e| e.contains("is wanted"));
+            assert!(refused, "{text}");
         }
     }
 }
