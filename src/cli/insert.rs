@@ -147,7 +147,8 @@ struct Objects(Vec<Placement>);
 
 impl Args for Objects {
     fn augment_args(command: Command) -> Command {
-        ObjectOptions::augment_args(command)
+        // Without its heading for what follows.
+        ObjectOptions::augment_args(command).next_help_heading(None::<&'static str>)
     }
 
     fn augment_args_for_update(command: Command) -> Command {
